@@ -22,7 +22,8 @@ from fecm.deck.records import Ply
 from fecm.plot import style
 from fecm.plot.kinds import Picture
 from fecm.plot.pictures import save
-from fecm.problem.generate import generate, refined
+from fecm.problem.generate import generate
+from fecm.problem.refine import refined
 from fecm.verification.decks import impact_program, material, result_of, struck_plate
 
 END = 8.0e-4

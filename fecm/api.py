@@ -16,9 +16,11 @@ from fecm.deck.source_text import load_text
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.projectile import Integrator, MassMatrix, RodMethod
 from fecm.problem.build import ENERGY_LIMIT, RunOptions
-from fecm.problem.check_mesh import HOURGLASS, check_listing
+from fecm.problem.check import check, check_listing
 from fecm.problem.memory import check_memory
-from fecm.problem.problem import UNSTABLE, Problem, check
+from fecm.problem.problem import Problem
+from fecm.problem.rules.quadrature import HOURGLASS
+from fecm.problem.rules.time_step import UNSTABLE
 from fecm.problem.slips import LISTING, REPORT, active_slips
 from fecm.results.result import Result, load
 from fecm.results.sinks import MemorySink
@@ -68,7 +70,7 @@ def load_deck(path_or_text: str | Path | BinaryIO | Deck, mode: str = REPORT) ->
             problems.append(checked)
     if listing and not reader.findings.errors:
         for problem in problems:
-            check_listing(problem.deck, problem.mesh, reader.findings)
+            check_listing(problem, reader.findings)
     return LoadedDeck(source, problems, list(reader.findings))
 
 

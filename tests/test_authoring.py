@@ -27,8 +27,8 @@ from fecm.deck.model import (
 )
 from fecm.deck.records import Control
 from fecm.mechanics.time_step import critical_time_step
-from fecm.problem.build import build_projectile
 from fecm.problem.generate import generate
+from fecm.problem.parts import build_projectile
 from tests.calls import Done, assert_unusable, call
 from tests.decks import APPENDIX, LONG, small
 
@@ -94,7 +94,7 @@ def test_a_new_deck_is_sound_and_declares_its_units() -> None:
     assert deck.require(Impact).node == 59  # the middle of 13 x 9 nodes
     dt = next(m.value for m in deck.macros if m.word == "DT")
     critical = load_deck(made.stdout).problems[0]
-    from fecm.problem.build import build_plate
+    from fecm.problem.parts import build_plate
 
     ratio = dt / critical_time_step(build_plate(critical.deck, critical.mesh))
     assert 0.8 < ratio <= 0.9

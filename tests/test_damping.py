@@ -13,7 +13,7 @@ from fecm.api import load_deck
 from fecm.deck.model import Damping
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import PlateMotion
-from fecm.problem.build import build_plate
+from fecm.problem.parts import build_plate
 from fecm.results.result import Result
 from tests.builders import Floats, table
 from tests.calls import call

@@ -20,7 +20,8 @@ from fecm.deck.macros import estimate_work
 from fecm.deck.numerals import parse_integer
 from fecm.deck.reader import MOST_PROBLEMS
 from fecm.deck.source_text import load_text
-from fecm.problem import check_gages, generate
+from fecm.problem import generate
+from fecm.problem.rules import gages as gage_rules
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, MESH, OWN_FINDINGS, PROGRAM, small
 
@@ -174,7 +175,7 @@ def test_too_many_segments_layers_and_gages_are_refused(monkeypatch: pytest.Monk
     prints = small(data=DATA_CARDS + "PRIN\nNOPR\n")
     gages = small(data=DATA_CARDS + "GAGE\n1,.5,.5\n2,.5,.5\n\n")
     assert codes(prints) == codes(gages) == []
-    monkeypatch.setattr(check_gages, "MOST_GAGES", 1)
+    monkeypatch.setattr(gage_rules, "MOST_GAGES", 1)
     assert codes(gages) == ["E012"]
     monkeypatch.setattr(reader, "MOST_LAYERS", 1)
     assert codes(small()) == ["E201"]

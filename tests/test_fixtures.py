@@ -13,7 +13,7 @@ from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.model import Impact, Patch
 from fecm.mechanics.solutions import static_stiffness
-from fecm.problem.build import build_projectile
+from fecm.problem.parts import build_projectile
 from tests.calls import Done, assert_unusable, call
 
 WINDOW = "150x100 plate, w=0 along the window"

@@ -15,8 +15,9 @@ from fecm.deck.model import Allowables, Damping
 from fecm.deck.records import Ply
 from fecm.deck.units import MASS
 from fecm.mechanics.mesh import Mesh
-from fecm.problem.check_plausibility import clamped_frequency, unsupported
-from fecm.problem.check_units import likely_unit
+from fecm.problem.rules.damping import clamped_frequency
+from fecm.problem.rules.units import likely_unit
+from fecm.problem.span import unsupported
 from tests.decks import DATA, ROOT
 from tests.sound_plate import STRENGTHS, Edit, base, found, replaced, strengths, with_card
 

@@ -13,7 +13,7 @@ from fecm.mechanics.laminate import (
     transformed_shear,
     transformed_stiffness,
 )
-from fecm.problem.build import laminate_of
+from fecm.problem.parts import laminate_of
 from tests.builders import (
     GENERAL_PLY,
     REPORT_ANGLES,

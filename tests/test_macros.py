@@ -12,7 +12,7 @@ import fecm
 from fecm.api import load_deck
 from fecm.deck.records import LoadTable, load_factor
 from fecm.mechanics.solutions import modes
-from fecm.problem.build import build_plate
+from fecm.problem.parts import build_plate
 from fecm.results.result import Result
 from tests.calls import call
 from tests.decks import DATA, DATA_CARDS, MESH, PROGRAM, ROOT, small

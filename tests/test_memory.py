@@ -20,8 +20,8 @@ import fecm.problem.memory
 from fecm._memory import NotEnoughMemoryError, available
 from fecm.api import load_deck
 from fecm.mechanics.time_step import critical_time_step
-from fecm.problem.build import build_plate
 from fecm.problem.memory import needed_bytes
+from fecm.problem.parts import build_plate
 from fecm.sweeps.plan import ADVANCED, KEPT, TOGETHER
 from tests.calls import assert_unusable, call
 from tests.decks import small

@@ -11,7 +11,7 @@ import fecm
 from fecm.api import load_deck
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.time_step import critical_time_step
-from fecm.problem.build import build_plate
+from fecm.problem.parts import build_plate
 from fecm.results.result import Result
 from tests.decks import DATA
 

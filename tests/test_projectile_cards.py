@@ -17,8 +17,8 @@ from fecm.deck.model import Impact, Indentation, Material, Projectile
 from fecm.deck.records import Control, Integration, Layer, Macro, Ply
 from fecm.mechanics.points import gages
 from fecm.mechanics.projectile import RigidMass, Rod, report_rod
-from fecm.problem.build import build_plate, build_projectile
 from fecm.problem.generate import generate
+from fecm.problem.parts import build_plate, build_projectile
 from fecm.results.csv import lines
 from fecm.results.result import Result
 from tests.decks import DATA_CARDS, LONG, MESH, OWN_FINDINGS, small

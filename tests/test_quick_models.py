@@ -25,7 +25,7 @@ from fecm.mechanics.laminate import (
     threshold_force,
 )
 from fecm.mechanics.solutions import static_stiffness
-from fecm.problem.check_plausibility import wave_impedance
+from fecm.problem.contact_estimates import wave_impedance
 from fecm.results.result import Result
 from fecm.results.summary import summary
 from fecm.studies.estimate import (

@@ -14,7 +14,7 @@ from fecm.deck.records import NodeValues
 from fecm.mechanics import stiffness_product
 from fecm.mechanics.stiffness_product import ElementProduct, Workers, stiffness_operator
 from fecm.mechanics.symmetry import SymmetryReduction, symmetry_reduction
-from fecm.problem.build import build_plate
+from fecm.problem.parts import build_plate
 from fecm.results.result import Result
 from tests.builders import Floats
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, small

@@ -9,7 +9,8 @@ import fecm
 from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.mechanics.plate import PlateModel
-from fecm.problem.generate import RefineError, generate, refined
+from fecm.problem.generate import generate
+from fecm.problem.refine import RefineError, refined
 from tests.decks import LONG, MESH, small
 
 

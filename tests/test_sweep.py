@@ -23,7 +23,8 @@ from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, LinearPermanent, stacked
 from fecm.mechanics.plate_motion import AppliedForce
-from fecm.problem.build import build_law, build_model, build_projectile
+from fecm.problem.build import build_model
+from fecm.problem.parts import build_law, build_projectile
 from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.cases import Case, CasesError, grid, parse_vary, read_cases

@@ -12,8 +12,8 @@ from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.model import Boundary
 from fecm.mechanics.time_step import critical_time_step
-from fecm.problem.build import is_coupled
 from fecm.problem.generate import generate
+from fecm.problem.parts import is_coupled
 from fecm.sweeps.vary import apply_case
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, model, small

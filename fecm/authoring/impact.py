@@ -25,7 +25,7 @@ from fecm.deck.grid import IN_PLANE
 from fecm.deck.records import Control, Gage
 from fecm.deck.units import in_si, unit_of
 from fecm.mechanics.projectile import RigidMass, Rod
-from fecm.problem.build import build_projectile, projectile_segment
+from fecm.problem.parts import build_projectile, projectile_segment
 
 AnyProjectile = Rod | RigidMass | model.Projectile
 GagePlace = tuple[float, float, float, float]  # x, y, z and degrees

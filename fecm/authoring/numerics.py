@@ -16,8 +16,8 @@ from fecm.deck.records import Macro
 from fecm.mechanics.points import HERTZ
 from fecm.mechanics.solutions import static_stiffness
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
-from fecm.problem.build import build_plate, build_projectile
 from fecm.problem.generate import generate
+from fecm.problem.parts import build_plate, build_projectile
 from fecm.studies.estimate import contact_time
 
 ROWS = 200  # default number of stored rows of strains and displacements

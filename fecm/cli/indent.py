@@ -36,8 +36,8 @@ from fecm.deck.units import unit_names
 from fecm.mechanics import contact_law
 from fecm.mechanics.contact_law import LinearPermanent, YangSunPermanent, hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
-from fecm.problem.build import build_constants
-from fecm.problem.check_segments import check_law
+from fecm.problem.check import check_segment
+from fecm.problem.parts import build_constants
 from fecm.studies import StudyError
 from fecm.studies.indentation_test.constants import fit as fitted
 from fecm.studies.indentation_test.curves import LIMITS_Q
@@ -138,7 +138,7 @@ def _law(deck: Path) -> tuple[Deck, Indentation]:
     problems = [problem.deck for problem in reader.problems() if problem.deck is not None]
     laws = [(one, law) for one in problems if (law := one.last(Indentation)) is not None]
     if laws:
-        check_law(laws[0][1], reader.findings)
+        check_segment(laws[0][1], reader.findings)
     for finding in reader.findings:
         echo(finding.render(str(deck)), err=True)
     if reader.findings.errors:

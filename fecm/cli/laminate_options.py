@@ -25,8 +25,8 @@ from fecm.deck.layup import parse_layup
 from fecm.deck.model import Material
 from fecm.deck.records import Integration, Layer, Ply
 from fecm.mechanics.laminate import Laminate
-from fecm.problem.build import laminate_of
-from fecm.problem.check_segments import check_material
+from fecm.problem.check import check_segment
+from fecm.problem.parts import laminate_of
 
 _META = "fecm.plies"  # key of the plies of --materials among the values of a context
 
@@ -68,7 +68,7 @@ class LaminateOptions:
         integration = Integration(3, 3, -3, thickness * len(layers))
         segment = Material(integration, self.constants(), layers)
         findings = Findings()
-        check_material(segment, findings)
+        check_segment(segment, findings)
         if findings.errors:
             raise click.UsageError(findings.errors[0].message)
         return laminate_of(segment), {} if self.units is None else SYSTEMS[self.units]

@@ -32,7 +32,7 @@ from fecm.mechanics.projectile import (
     RigidMass,
     Rod,
 )
-from fecm.problem.build import build_projectile, build_station
+from fecm.problem.parts import build_projectile, build_station
 from fecm.studies import StudyError
 from fecm.studies.rod_test import pulse_test
 from fecm.studies.rod_test.calibration import calibrate as fit_sensitivity

@@ -30,7 +30,7 @@ from fecm.cli.options import (
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.deck.units import unit_names
 from fecm.mechanics.laminate import Laminate
-from fecm.problem.build import laminate_of_deck
+from fecm.problem.parts import laminate_of_deck
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces
 from fecm.studies.waves import dispersion as compute
 

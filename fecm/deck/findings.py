@@ -7,16 +7,27 @@ warning, ``N`` for a note.  Lines and columns are counted from 1.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from enum import StrEnum
 
 from fecm._errors import FecmError
 from fecm._frozen import frozen
 
-SEVERITIES = {"E": "error", "W": "warning", "N": "note"}  # severities by the first letter of a code
 MOST = 1000  # largest number of errors, and of warnings, that are kept
 # Characters of a card, and of a message, that are shown.
 WIDEST = 200
 LONGEST = 600
+
+
+class Severity(StrEnum):
+    """Severity of a finding."""
+
+    ERROR = "error"  # the deck is refused
+    WARNING = "warning"
+    NOTE = "note"
+
+
+SEVERITIES = {"E": Severity.ERROR, "W": Severity.WARNING, "N": Severity.NOTE}  # by a code's letter
 
 
 @frozen
@@ -52,20 +63,26 @@ class Finding:
     hint: str = ""
 
     @property
-    def severity(self) -> str:
-        """``"error"``, ``"warning"`` or ``"note"``."""
+    def severity(self) -> Severity:
+        """What the first letter of the code says."""
         return SEVERITIES[self.code[0]]
 
     def to_dict(self, source: str) -> dict[str, object]:
         """The finding as plain values, for JSON; `source` is the name of the deck's file."""
         place = self.place
-        line, column, end = (place.line, place.first, place.last) if place else (None, None, None)
         return {
-            "kind": "finding", "severity": self.severity, "code": self.code,
-            "message": self.message, "file": source, "line": line, "column": column,
-            "end_column": end, "field": place.field if place else "",
-            "card": place.text if place else "", "hint": self.hint,
-        }  # fmt: skip
+            "kind": "finding",
+            "severity": self.severity.value,
+            "code": self.code,
+            "message": self.message,
+            "file": source,
+            "line": place.line if place else None,
+            "column": place.first if place else None,
+            "end_column": place.last if place else None,
+            "field": place.field if place else "",
+            "card": place.text if place else "",
+            "hint": self.hint,
+        }
 
     def render(self, source: str) -> str:
         """Format the finding as text, with the card and a caret under the field.
@@ -75,21 +92,26 @@ class Finding:
         head = f"{self.severity}[{self.code}]: {self.message}"
         place = self.place
         lines = [f"{source}:{place.line}:{place.first}: {head}" if place else f"{source}: {head}"]
-        if place and self.severity != "note":
-            number = str(place.line)
-            margin = " " * len(number)
-            card, begin = place.text.rstrip(), 0
-            last = place.last
-            if len(card) > WIDEST:  # the part around the place
-                begin = max(0, place.first - 1 - WIDEST // 2)
-                card = card[begin : begin + WIDEST]
-                last = min(last, begin + len(card))
-            mark = " " * (place.first - begin - 1) + "^" * max(1, last - place.first + 1)
-            lines += [f" {number} | {card}", f" {margin} | {mark} {place.field}".rstrip()]
+        if place and self.severity is not Severity.NOTE:
+            lines += _marked_card(place)
         if self.hint:
             lines.append(f"   hint: {self.hint}")
         # A terminal would interpret control characters.
         return "\n".join("".join(c if c.isprintable() else "·" for c in line) for line in lines)
+
+
+def _marked_card(place: Place) -> list[str]:
+    """The card with its line number, and a caret under the field."""
+    card = place.text.rstrip()
+    begin, last = 0, place.last
+    if len(card) > WIDEST:  # the part around the place
+        begin = max(0, place.first - 1 - WIDEST // 2)
+        card = card[begin : begin + WIDEST]
+        last = min(last, begin + len(card))
+    number = str(place.line)
+    margin = " " * len(number)
+    mark = " " * (place.first - begin - 1) + "^" * max(1, last - place.first + 1)
+    return [f" {number} | {card}", f" {margin} | {mark} {place.field}".rstrip()]
 
 
 def _shortened(text: str) -> str:
@@ -119,6 +141,11 @@ class Findings:
             message = f"There are {MOST} errors or more; the rest of the file is not checked."
             self._all.append(Finding("E000", message))
 
+    def extend(self, found: Iterable[Finding]) -> None:
+        """Add findings as :meth:`add` does."""
+        for finding in found:
+            self.add(finding.code, finding.message, finding.place, finding.hint)
+
     def __iter__(self) -> Iterator[Finding]:
         """Iterate in the order of the deck; findings without a place come last."""
         more = len(self) - self.error_count - MOST
@@ -133,7 +160,7 @@ class Findings:
     @property
     def errors(self) -> list[Finding]:
         """The errors, which make the deck unusable."""
-        return [finding for finding in self if finding.severity == "error"]
+        return [finding for finding in self if finding.severity is Severity.ERROR]
 
 
 class DeckError(FecmError, ValueError):

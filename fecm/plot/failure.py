@@ -22,7 +22,7 @@ from fecm.plot import style
 from fecm.plot.data import deck_of, mesh_of, require
 from fecm.plot.kinds import Picture, PlotError, Width
 from fecm.plot.plate import aspect, mark_impact
-from fecm.problem.build import rules
+from fecm.problem.parts import rules
 from fecm.results.exposures import LargestExposure, largest_exposures
 from fecm.results.plies import places
 from fecm.results.result import Result

@@ -1,22 +1,16 @@
-"""Generate nodes, elements, restraints and loads of the mesh from a deck's cards; bisect elements.
-
-A side that is bisected takes the opposite side of its elements with it, so that the mesh stays
-conforming: bisecting near a point cuts strips of elements through the whole plate.
-"""
+"""Generate nodes, elements, restraints and loads of the mesh from a deck's cards."""
 
 from __future__ import annotations
 
 import bisect
 import operator
-from collections.abc import Hashable, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
 
-from fecm._errors import FecmError
-from fecm._typing import Bools, Floats, Indices
+from fecm._typing import Floats, Indices
 from fecm.deck.findings import Findings, Place
 from fecm.deck.model import (
     Boundary,
@@ -26,16 +20,13 @@ from fecm.deck.model import (
     Forces,
     Impact,
     Projectile,
-    Segment,
-)  # fmt: skip
+)
 from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
-from fecm.mechanics.mesh import Ints, Mesh, element_blocks, equation_numbers
+from fecm.mechanics.mesh import Ints, Mesh, equation_numbers
 
-# Nodes that cards may generate or reset, per node of the deck and besides.
-GENERATED_PER_NODE, GENERATED = 10, 10_000
-# Corners at the ends of each side, and the local coordinate that runs along it.
-_SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))
-_ALONG = (0, 1, 0, 1)
+# Nodes that cards may generate or reset.
+GENERATED_PER_NODE = 10  # per node of the deck
+GENERATED = 10_000  # and besides
 
 
 class _Budget:
@@ -226,105 +217,3 @@ def place_of_element(deck: Deck, number: int) -> Place | None:
         return None
     cards = bisect.bisect_right(segment.records, number, key=lambda record: record.element)
     return segment.records[cards - 1].place("element") if cards else None
-
-
-class RefineError(FecmError, ValueError):
-    """A mesh cannot be bisected."""
-
-
-def refined(deck: Deck, mesh: Mesh, marked: Bools | None = None) -> Deck:
-    """Bisect elements of a deck with a mesh in both directions: all, or those marked, (numel,).
-
-    Old nodes keep their numbers.  A new node is restrained where all nodes of its side, or of its
-    element, are; nodal forces stay where they are.  Raises RefineError if an element is not a
-    quadrilateral with four or nine nodes.
-    """
-    nodes = _Nodes(mesh)
-    elements: list[tuple[int, list[int]]] = []
-    split = _split_sides(mesh, np.ones(len(mesh.elements), bool) if marked is None else marked)
-    for block in element_blocks(mesh.elements, mesh.coordinates):
-        count = block.nodes.shape[1]
-        if count not in (4, 9) or block.shape.nodes != 9:
-            why = "it does not have four or nine nodes"
-            raise RefineError(f"element {block.rows[0] + 1} cannot be bisected: {why}")
-        local = np.stack([block.shape.xi, block.shape.eta], axis=1)[:count]
-        for row in block.rows.tolist():
-            cuts = [2 if split[row, axis] else 1 for axis in (0, 1)]
-            own = mesh.elements[row, :count]
-            for i, j in np.ndindex(*cuts):
-                low = np.array([-1.0 + 2.0 * i / cuts[0], -1.0 + 2.0 * j / cuts[1]])
-                at = low + (local + 1.0) / cuts
-                values = block.shape.shape_functions(at[:, 0], at[:, 1], block.present)[0]
-                spots = zip(at.tolist(), values[:, block.present], strict=True)
-                elements.append((row, [nodes.number(row, own, tuple(p), n) for p, n in spots]))
-    return _rebuilt(deck, mesh, nodes, sorted(elements))
-
-
-def _split_sides(mesh: Mesh, marked: Bools) -> Bools:
-    """Whether each element is bisected along xi and along eta, (numel, 2)."""
-    ends = np.sort(mesh.elements[:, _SIDES], axis=2)
-    _, side = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
-    side = side.reshape(-1, 4)
-    cut = np.zeros(side.max() + 1, dtype=bool)
-    cut[side[marked]] = True
-    while True:
-        pairs = np.stack([cut[side[:, [0, 2]]].any(axis=1), cut[side[:, [1, 3]]].any(axis=1)], 1)
-        before = np.count_nonzero(cut)
-        for axis in (0, 1):
-            cut[side[pairs[:, axis]][:, [axis, axis + 2]]] = True
-        if np.count_nonzero(cut) == before:
-            return pairs
-
-
-class _Nodes:
-    """Old and new nodes: coordinates, restraint codes and prescribed values."""
-
-    def __init__(self, mesh: Mesh) -> None:
-        self._mesh = mesh
-        self._known: dict[Hashable, int] = {}
-        self.coordinates = list(mesh.coordinates)
-        self.codes = list(mesh.codes)
-        self.forces = list(mesh.forces)
-
-    def number(self, row: int, own: Ints, place: tuple[float, ...], shares: Floats) -> int:
-        """Number of the node at a place of an old element; a new one where there is none yet."""
-        old = np.flatnonzero(np.abs(shares - 1.0) < 1e-9)
-        if len(old):
-            return int(own[old[0]])
-        across = zip((1, 0, 1, 0), (-1.0, 1.0, 1.0, -1.0), strict=True)
-        on = [n for n, (axis, at) in enumerate(across) if abs(place[axis] - at) < 1e-9]
-        key: Hashable = (row, place)
-        around = own
-        if on:
-            ends = [int(own[corner]) for corner in _SIDES[on[0]]]
-            t = place[_ALONG[on[0]]] * (1 if on[0] < 2 else -1)  # from the first end to the second
-            key = (min(ends), max(ends), t if ends[0] < ends[1] else -t)
-            around = own[np.abs(shares) > 1e-12]
-        if key not in self._known:
-            self._known[key] = len(self.coordinates) + 1
-            mesh, rows = self._mesh, own - 1
-            codes = (mesh.codes[around - 1] != 0).all(axis=0).astype(np.int32)
-            self.coordinates.append(shares @ mesh.coordinates[rows])
-            self.codes.append(codes)
-            self.forces.append(np.where(codes != 0, shares @ mesh.forces[rows], 0.0))
-        return self._known[key]
-
-
-def _rebuilt(deck: Deck, mesh: Mesh, nodes: _Nodes, elements: list[tuple[int, list[int]]]) -> Deck:
-    """The deck with other nodes and elements, each on a card of its own."""
-    width = mesh.elements.shape[1]
-    places = (NodeValues(n, 0, tuple(p.tolist())) for n, p in enumerate(nodes.coordinates, 1))
-    children = ((*child, *[0] * (width - len(child))) for _, child in elements)
-    cards = (ElementNodes(n, child, 0) for n, child in enumerate(children, 1))
-    restrained = ((n, (codes != 0).astype(int)) for n, codes in enumerate(nodes.codes, 1))
-    codes = (NodeCodes(n, 0, tuple(held.tolist())) for n, held in restrained if held.any())
-    written: list[Segment] = [
-        Coordinates(tuple(places)), Elements(tuple(cards)), Boundary(tuple(codes))
-    ]  # fmt: skip
-    loaded = [(n, force) for n, force in enumerate(nodes.forces, 1) if force.any()]
-    if loaded:
-        written.append(Forces(tuple(NodeValues(n, 0, tuple(f.tolist())) for n, f in loaded)))
-    replaced = (Coordinates, Elements, Boundary, Forces)
-    rest = [segment for segment in deck.segments if not isinstance(segment, replaced)]
-    control = replace(deck.control, numnp=len(nodes.coordinates), numel=len(elements))
-    return replace(deck, control=control, segments=(*written, *rest), text="")

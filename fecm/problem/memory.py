@@ -21,18 +21,18 @@ from fecm.mechanics.plate import ASSEMBLED, BLOCK, PlateModel
 from fecm.mechanics.projectile import REPORT_ELEMENTS
 from fecm.mechanics.solutions import DENSE
 from fecm.mechanics.stiffness_product import AUTO, CSR, WORTH_GROUPING
-from fecm.problem.build import Problem
+from fecm.problem.problem import Problem
 from fecm.results.sinks import RowBuffer
 
 NODE = 800  # bytes per node: mesh, state, fields, buffered rows
 PLACE = 60  # bytes per dof of an element: its indices, its forces, and the matrix that sums them
 POINT = 250  # bytes per strain point of an element: Jacobians and strains
-# Bytes per entry of the element matrices that are kept; and of one under integration, for each row
-# of B and point.
-KEPT, INTEGRATED = 12, 24
+KEPT = 12  # bytes per entry of the element matrices that are kept
+INTEGRATED = 24  # and of one under integration, for each row of B and point
 ROWS = 8  # strains in B: six of the membrane and of bending, two of the transverse shear
-# Bytes of factors of a plate without coupling: TANG's over n log2 n, EIGE's over n^1.5.
-TANGENT, SHIFTED = 300, 70
+# Bytes of factors of a plate without coupling.
+TANGENT = 300  # TANG's, over n log2 n
+SHIFTED = 70  # EIGE's, over n^1.5
 STEP = 80  # bytes per step of the summary after a run
 STATIC = {"TANG", "EIGE"}
 

@@ -34,8 +34,8 @@ LINES = ("vertex", "line", "line3")
 # Name of all sides that belong to one element, unless the mesh has a group of that name.
 BOUNDARY = "boundary"
 ELSEWHERE = (".xdmf", ".xmf")  # formats whose files name other files
-# Coordinates that differ by less, over the size of the mesh, are equal; and areas over its square.
-SAME, NO_AREA = 1e-9, 1e-12
+SAME = 1e-9  # difference of coordinates, over the size of the mesh, that is none
+NO_AREA = 1e-12  # area over the square of the size that is none
 NAMED = 8  # most elements named in a message
 
 

@@ -17,8 +17,9 @@ from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
 from fecm.mechanics.solutions import SingularStiffnessError, compliance
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.time_step import taken_time_step
-from fecm.problem.build import Problem, build_projectile
-from fecm.problem.check_segments import resolution, said_error
+from fecm.problem.parts import build_projectile
+from fecm.problem.problem import Problem
+from fecm.problem.resolution import resolution, said_error
 
 ROOM = 0.6  # share of the critical time step below which the step that DT 0 takes is shown
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import ImpactModel
-from fecm.problem.check_plausibility import contact_step
+from fecm.problem.contact_estimates import contact_step
 from fecm.problem.problem import Problem
 
 
@@ -14,7 +14,7 @@ def likely_cause(problem: Problem, model: ImpactModel, dt: float) -> str:
     plate = model.motion.plate
     try:
         critical = critical_time_step(plate)
-        contact = contact_step(problem, plate, dt, critical)
+        contact = contact_step(problem.deck, plate, problem.contact, dt, critical)
     except UnsoundPlateError as error:
         return str(error)
     side = "above" if dt > critical else "below"

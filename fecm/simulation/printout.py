@@ -21,7 +21,7 @@ from fecm.deck.records import DOF_NAMES, Macro
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.strains import GENERALISED_STRAINS, RESULTANTS
-from fecm.problem.build import build_constants
+from fecm.problem.parts import build_constants
 
 CARRIAGE = {"1": "\f", "0": "\n", "-": "\n\n"}
 

@@ -13,8 +13,8 @@ from fecm.deck.model import Deck, Material
 from fecm.deck.units import unit_names
 from fecm.mechanics.failure import MODES
 from fecm.mechanics.plate_motion import DivergenceError
-from fecm.problem.build import RunOptions, Threshold
-from fecm.problem.problem import Problem
+from fecm.problem.build import RunOptions
+from fecm.problem.problem import Problem, Threshold
 from fecm.problem.slips import mode_of
 from fecm.results.exposures import count_evaluations
 from fecm.results.metrics import MOBILITY, VALIDITY

@@ -11,7 +11,7 @@ from fecm._typing import Floats
 from fecm.mechanics.impact import ImpactState
 from fecm.mechanics.plate_motion import DivergenceError, PlateState
 from fecm.mechanics.ply_stresses import FailureEnvelope
-from fecm.problem.build import Threshold
+from fecm.problem.problem import Threshold
 from fecm.simulation.step_recorder import Columns
 
 TOLERANCE = 1.0e-9  # relative change of the displacement below which CONV leaves its loop

@@ -19,7 +19,7 @@ from fecm._typing import Floats
 from fecm.deck.model import Impact, Indentation
 from fecm.mechanics.laminate import SMALL_MASS, effective_rigidity
 from fecm.mechanics.solutions import static_stiffness
-from fecm.problem.build import build_projectile
+from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
 from fecm.studies import StudyError
 

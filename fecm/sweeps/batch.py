@@ -27,9 +27,10 @@ from fecm.mechanics.contact_law import HystereticLaw, stacked
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.time_step import taken_time_step
-from fecm.problem.build import build_law, build_model, build_projectile
-from fecm.problem.check_segments import check_impact, check_law, check_projectile
-from fecm.problem.problem import Problem, check_program
+from fecm.problem.build import build_model
+from fecm.problem.check import check_impact, check_program, check_segment
+from fecm.problem.parts import build_law, build_projectile
+from fecm.problem.problem import Problem
 from fecm.results.end import Texts, decided
 from fecm.results.exposures import count_evaluations, largest_exposures
 from fecm.results.metrics import (
@@ -82,10 +83,10 @@ def run(task: plan.Task) -> Outcome:
         try:
             deck = apply_case(checked.deck, {n: v for n, v in case.items() if n not in first})
             findings = Findings()
-            check_impact(deck.require(Impact), deck, checked.mesh, findings)
-            check_law(deck.require(LawCards), findings)
+            check_impact(Problem(deck, checked.mesh, checked.program), findings)
+            check_segment(deck.require(LawCards), findings)
             if (projectile := deck.last(Projectile)) is not None:
-                check_projectile(projectile, findings)
+                check_segment(projectile, findings)
             raise_first(findings)
             decks[number] = deck
         except CasesError as error:

@@ -19,10 +19,10 @@ from fecm._typing import Floats
 from fecm.deck.macros import flat
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import RunOptions
-from fecm.problem.check_segments import resolution
-from fecm.problem.generate import RefineError, refined
 from fecm.problem.memory import check_memory
 from fecm.problem.problem import Problem
+from fecm.problem.refine import RefineError, refined
+from fecm.problem.resolution import resolution
 from fecm.results.metrics import VERDICTS
 from fecm.sweeps.cases import REFINE, Case, CasesError
 from fecm.sweeps.plan import without_output

@@ -8,8 +8,8 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.findings import Finding, Findings
-from fecm.problem import check_segments
-from fecm.problem.problem import Problem, check_values
+from fecm.problem.check import check_segments, check_values
+from fecm.problem.problem import Problem
 from fecm.sweeps.cases import CONTACT, LAMINATE, THICKNESS, Case, CasesError
 from fecm.sweeps.vary import apply_case
 
@@ -72,10 +72,7 @@ def _of_value(checked: Problem, name: str, value: float) -> list[Finding]:
     except CasesError:
         return []
     errors = Findings()
-    check_segments.check_material(deck.require(model.Material), errors)
-    for kind, check_segment in check_segments.CHECKS:
-        if (segment := deck.last(kind)) is not None:
-            check_segment(segment, errors)
+    check_segments(deck, errors)
     if errors.errors:
         return []
     try:

@@ -9,7 +9,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.deck.model import Deck, Impact
-from fecm.problem.build import build_projectile
+from fecm.problem.parts import build_projectile
 from fecm.sweeps import plan
 from fecm.sweeps.plan import RUN, Outcome, merge
 from fecm.sweeps.vary import apply_case

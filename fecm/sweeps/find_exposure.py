@@ -8,7 +8,7 @@ from collections.abc import Callable
 import numpy as np
 
 from fecm.deck.model import Deck, Impact
-from fecm.problem.build import build_projectile
+from fecm.problem.parts import build_projectile
 from fecm.results.exposures import FEWEST
 from fecm.results.metrics import EVALUATIONS, EXPOSURES
 from fecm.sweeps.cases import CasesError

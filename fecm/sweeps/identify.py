@@ -16,7 +16,7 @@ from fecm._typing import Floats
 from fecm.deck.model import Deck, Impact, Indentation, Projectile
 from fecm.deck.units import unit_names
 from fecm.mechanics.projectile import RigidMass
-from fecm.problem.build import build_projectile
+from fecm.problem.parts import build_projectile
 from fecm.results.comparison import Measurement, measurement_of
 from fecm.results.validity import MEANING, Reason, reasons_of
 from fecm.studies import StudyError

@@ -24,10 +24,13 @@ from fecm.mechanics.mesh import element_blocks, holds_the_plane
 from fecm.mechanics.points import locate
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.time_step import rounded_time_step, taken_time_step
-from fecm.problem.build import build_projectile, is_coupled, projectile_segment
-from fecm.problem.generate import RefineError, generate, refined, restraint_codes
+from fecm.problem.check import check
+from fecm.problem.generate import generate, restraint_codes
+from fecm.problem.parts import build_projectile, is_coupled, projectile_segment
 from fecm.problem.plate_mesh import BOUNDARY, PlateMesh
-from fecm.problem.problem import UNSTABLE, Problem, check
+from fecm.problem.problem import Problem
+from fecm.problem.refine import RefineError, refined
+from fecm.problem.rules.time_step import UNSTABLE
 from fecm.sweeps.cases import (
     LAMINATE,
     REFINE,

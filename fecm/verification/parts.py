@@ -25,8 +25,8 @@ from fecm.mechanics.contact_law import (
 from fecm.mechanics.laminate import Laminate, effective_rigidity, laminate, threshold_force
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.projectile import CONSISTENT, Rod, report_rod
-from fecm.problem.build import build_plate
 from fecm.problem.generate import generate
+from fecm.problem.parts import build_plate
 from fecm.studies.rod_test.pulse_test import gauss_pulse, simulate_pulse, sine_pulse
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from fecm.verification.case import Value, case

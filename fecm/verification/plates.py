@@ -15,8 +15,8 @@ from fecm.deck.grid import Grid, lines, uniform
 from fecm.deck.model import Patch, Segment
 from fecm.deck.records import Gage, LoadTable, Macro, Ply
 from fecm.mechanics.time_step import critical_time_step
-from fecm.problem.build import build_plate
 from fecm.problem.generate import generate
+from fecm.problem.parts import build_plate
 from fecm.results.result import Result
 from fecm.verification import decks
 from fecm.verification.case import Value, case

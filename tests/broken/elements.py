@@ -13,7 +13,7 @@ from fecm.mechanics import (
 )
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.stiffness_product import ElementProduct
-from fecm.problem import build
+from fecm.problem import parts
 from fecm.simulation.recorder import Recorder
 from tests.breaks import (
     Breaks,
@@ -69,7 +69,7 @@ BREAKS: Breaks = {
         {"resultants": ("ε", "γ_xy", "N"), "cross-ply-plate": ("ω11", "w", "u")},
     ),
     "SHEA ignored": (
-        instead(build, "laminate_of_deck", without_shea), {"resultants": ("γ_xz", "γ_yz")},
+        instead(parts, "laminate_of_deck", without_shea), {"resultants": ("γ_xz", "γ_yz")},
     ),
     "sign of the rotation in the stiffness of transverse shear": (
         changed(element_matrices, "_transverse_shear", rotations_reversed),

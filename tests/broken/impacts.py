@@ -18,7 +18,7 @@ from fecm.mechanics.contact_law import (
 )
 from fecm.mechanics.impact import ImpactSystem
 from fecm.mechanics.plate_motion import PlateMotion
-from fecm.problem import build
+from fecm.problem import parts
 from fecm.studies import estimate
 from tests.breaks import (
     Breaks,
@@ -100,7 +100,7 @@ BREAKS: Breaks = {
         {"patch-compliance": ("W, Hertz",)},
     ),
     "MITC ignored": (
-        changed(build, "has_assumed_shear", lambda found: False), {"assumed-shear": ("w",)},
+        changed(parts, "has_assumed_shear", lambda found: False), {"assumed-shear": ("w",)},
     ),
     "tying points on the sides of the element": (
         value(assumed_shear, "TYING", {9: (assumed_shear.TYING[9][0], (-1.0, 0.0, 1.0), 3)}),

@@ -1,4 +1,4 @@
-"""Findings about names of units, and about values that nothing real has in the units of UNIT."""
+"""Rules about names of units, and about values that nothing real has in the units of UNIT."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import math
 from typing import NamedTuple
 
 from fecm.deck import model
-from fecm.deck.findings import Findings, Place
+from fecm.deck.findings import Place
 from fecm.deck.records import Ply, Record
+from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import (
     COEFFICIENT,
     DENSITY,
@@ -20,6 +21,7 @@ from fecm.deck.units import (
     unit_names,
     unit_of,
 )
+from fecm.problem.problem import Problem
 
 # Units in which values are often given, in m, N and s, by their dimension.
 USED = {
@@ -111,8 +113,15 @@ def has_real_moduli(ply: Ply, names: dict[str, str]) -> bool:
     return factor is None or all(least <= e * factor <= greatest for e in (ply.e1, ply.e2))
 
 
-def check_unit_names(card: model.Units, findings: Findings) -> None:
-    """Warn of a name on UNIT that is a unit of something else."""
+@rule(
+    "W482",
+    Subject.LAMINATE,
+    "A name on UNIT is a unit of something else.",
+    cause="For instance kg stands in the place of the force.",
+    remedy="Length, force and time in this order: `mm N s`.",
+)
+def unit_of_another_kind(card: model.Units) -> Reports:
+    """Find names of masses, stresses and energies, and names in another order."""
     kinds = {**{kind: tuple(units) for kind, units in KNOWN.items()}, **OTHERS}
     for wanted, name in zip(card.NAMES, (card.length, card.force, card.time), strict=True):
         kind = next((kind for kind, units in kinds.items() if name in units), wanted)
@@ -126,14 +135,24 @@ def check_unit_names(card: model.Units, findings: Findings) -> None:
             if unit := next(same, ""):
                 message += f"; with {card.length}, {name} and {card.time} the force is in {unit}"
         hint = "UNIT names the units of length, force and time in this order, as in mm N s"
-        findings.add("W482", f"{message}.", card.place(), hint)
+        yield Report(f"{message}.", card.place(), hint)
 
 
-def check_units(deck: model.Deck, findings: Findings, *, hits: bool) -> None:
-    """Warn in one finding of values that no real material has in the units of UNIT."""
-    names = unit_names(deck)
+@rule(
+    "W435",
+    Subject.LAMINATE,
+    "A value is outside the range of real materials in the units of UNIT.",
+    cause=(
+        "Modulus, density, thickness, velocity and k are judged. The unit that the value seems to "
+        "be in is named."
+    ),
+    remedy="Correct the values or UNIT. Nothing is converted.",
+)
+def unreal_values(problem: Problem) -> Reports:
+    """Find values that nothing real has; all of them are one report."""
+    names = unit_names(problem.deck)
     wrong: list[tuple[Place | None, str]] = []
-    for kind, record, name, value in _judged(deck, hits=hits):
+    for kind, record, name, value in _judged(problem):
         real = REAL[kind]
         factor = in_si(real.dimension, names)
         if factor is None or real.least <= value * factor <= real.greatest:
@@ -147,11 +166,12 @@ def check_units(deck: model.Deck, findings: Findings, *, hits: bool) -> None:
         listed = "; the ".join(what for _, what in wrong)
         message = f"In the units of UNIT ({' '.join(names.values())}) the {listed}."
         hint = "either the values or the names on UNIT are wrong; nothing is converted"
-        findings.add("W435", message, wrong[0][0], hint)
+        yield Report(message, wrong[0][0], hint)
 
 
-def _judged(deck: model.Deck, *, hits: bool) -> list[tuple[str, Record, str, float]]:
+def _judged(problem: Problem) -> list[tuple[str, Record, str, float]]:
     """Kind in :data:`REAL`, card, name and value of the fields that are judged."""
+    deck = problem.deck
     material = deck.require(model.Material)
     ply, layer = material.ply, max(material.layers, key=lambda layer: layer.thickness)
     values: list[tuple[str, Record, str, float]] = [
@@ -163,7 +183,7 @@ def _judged(deck: model.Deck, *, hits: bool) -> list[tuple[str, Record, str, flo
         ("matrix modulus", ply, "shear modulus G23", ply.g23),
         ("ply thickness", layer, "layer thickness", layer.thickness),
     ]
-    if not hits:
+    if not problem.has_impact:
         return values
     impact, law = deck.require(model.Impact), deck.require(model.Indentation)
     if impact.velocity > 0.0:
@@ -173,3 +193,7 @@ def _judged(deck: model.Deck, *, hits: bool) -> list[tuple[str, Record, str, flo
         values.append(("rod modulus", card, "rod's Young's modulus", card.modulus))
         values.append(("density", card, "rod's density", card.density))
     return values
+
+
+OF_NAMES = (unit_of_another_kind,)
+VALUES = (unreal_values,)

@@ -1,0 +1,110 @@
+"""Rules: what each code of a finding means, beside the function that finds it.
+
+A rule is declared once, with its code and its text.  Most are functions, decorated with
+:func:`rule`, that look at a segment or a problem and yield a :class:`Report` for each fault.  What
+is found while cards are read has no such function; ``reader_rules.py`` declares those codes.
+
+The page ``docs/findings.md`` is made of the declarations, see ``fecm/problem/rules/page.py``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from enum import StrEnum
+from functools import wraps
+from typing import NamedTuple, ParamSpec, TypeAlias
+
+from fecm.deck.findings import Finding, Findings, Place
+
+P = ParamSpec("P")
+
+
+class Subject(StrEnum):
+    """Subjects of rules: the headings of the page, in its order."""
+
+    FRAME = "Frame of the file"
+    NUMBERS = "Numbers"
+    SEGMENTS = "Counts and segments"
+    MESH = "Mesh"
+    LAMINATE = "Laminate"
+    IMPACT = "Impact, contact and projectile"
+    POINTS = "Patch, shear, gages, ply stresses"
+    DAMAGE = "Damage and damping"
+    PROGRAM = "Macro program"
+    LISTING = "Listing mode"
+
+
+class Rule(NamedTuple):
+    """Text of a rule."""
+
+    code: str
+    subject: Subject
+    summary: str  # the fault, in one sentence without markup
+    remedy: str  # sentences in Markdown
+    cause: str  # more about the fault, in Markdown; may be empty
+
+
+class Report(NamedTuple):
+    """A fault found by a rule: the finding without its code."""
+
+    message: str
+    place: Place | None = None
+    hint: str = ""
+
+
+Reports: TypeAlias = Iterator[Report]
+RULES: dict[str, Rule] = {}  # rules of the modules that are imported, by code
+
+
+def declare(code: str, subject: Subject, summary: str, *, remedy: str, cause: str = "") -> None:
+    """Declare the text of a code; raises ValueError if the code is taken."""
+    if code in RULES:
+        raise ValueError(f"the code {code} is taken: {RULES[code].summary}")
+    RULES[code] = Rule(code, subject, summary, remedy, cause)
+
+
+def reports(code: str) -> Callable[[Callable[P, Reports]], Callable[P, list[Finding]]]:
+    """Give what a function reports a code that is declared elsewhere."""
+
+    def decorate(function: Callable[P, Reports]) -> Callable[P, list[Finding]]:
+        @wraps(function)
+        def find(*args: P.args, **kwargs: P.kwargs) -> list[Finding]:
+            return [Finding(code, *report) for report in function(*args, **kwargs)]
+
+        return find
+
+    return decorate
+
+
+def rule(
+    code: str, subject: Subject, summary: str, *, remedy: str, cause: str = ""
+) -> Callable[[Callable[P, Reports]], Callable[P, list[Finding]]]:
+    """Declare a code, and give it to what a function reports."""
+    declare(code, subject, summary, remedy=remedy, cause=cause)
+    return reports(code)
+
+
+def apply(
+    rules: Iterable[Callable[P, list[Finding]]],
+    findings: Findings,
+    *args: P.args,
+    **kwargs: P.kwargs,
+) -> bool:
+    """Apply rules one after the other; return whether they found no error."""
+    before = findings.error_count
+    for one in rules:
+        findings.extend(one(*args, **kwargs))
+    return findings.error_count == before
+
+
+def apply_first(
+    rules: Iterable[Callable[P, list[Finding]]],
+    findings: Findings,
+    *args: P.args,
+    **kwargs: P.kwargs,
+) -> None:
+    """Apply rules up to the first that finds something; the others would say the same again."""
+    for one in rules:
+        if found := one(*args, **kwargs):
+            findings.extend(found)
+            return

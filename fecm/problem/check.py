@@ -1,0 +1,232 @@
+"""Checks of a deck: which rules apply, and in which order.
+
+A stage is entered only if the stages before it found nothing that would mislead it, so that one
+mistake gives one finding.  For the same reason nothing is said about missing data of a segment that
+has an unreadable card.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from fecm.deck import model
+from fecm.deck.findings import Findings
+from fecm.deck.macros import Body, compile_program
+from fecm.deck.reader import ParsedProblem
+from fecm.deck.rules import apply, apply_first
+from fecm.problem.generate import generate, rod_diameters
+from fecm.problem.parts import W
+from fecm.problem.problem import Problem
+from fecm.problem.rules import (
+    contact,
+    damage,
+    damping,
+    gages,
+    impact,
+    laminate,
+    mesh,
+    patch,
+    program,
+    projectile,
+    quadrature,
+    segments,
+    shear,
+    time_step,
+    units,
+)
+from fecm.problem.rules import listing as listing_mode
+
+# Segments that can be judged alone.
+ALONE: tuple[type[model.Segment], ...] = (
+    model.Material,
+    model.Indentation,
+    model.Allowables,
+    model.Delamination,
+    model.Damping,
+    model.Projectile,
+    model.Shear,
+    model.Units,
+)
+ELEMENT_ERRORS = ("E303", "E304", "E305")  # after which the numbers of elements mean nothing
+
+
+def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) -> Problem | None:
+    """Check a problem, in listing mode or not; None without a control card."""
+    deck, unsound = problem.deck, problem.unsound
+    if deck is None:
+        return None
+    before = findings.error_count
+
+    def sound() -> bool:
+        return findings.error_count == before and not unsound
+
+    compiled = compile_program(deck.macros, findings)
+    apply(segments.OF_SEGMENTS, findings, deck, unsound)
+    checked = _generated(deck, compiled, unsound, findings, listing=listing)
+    _check_each_segment(checked, findings)
+    if sound():
+        _check_points(checked, findings)
+    if sound():
+        with np.errstate(all="ignore"):  # numbers out of range end in a finding
+            _check_run(checked, findings, sound)
+    return checked
+
+
+def _generated(
+    deck: model.Deck, compiled: Body, unsound: set[str], findings: Findings, *, listing: bool
+) -> Problem:
+    """Generate the mesh and check it as far as it is complete."""
+    errors, element_errors = findings.error_count, _element_errors(findings)
+    checked = Problem(deck, generate(deck, findings), compiled)
+    complete = findings.error_count == errors and not unsound & {"COOR", "ELEM"}
+    given = _element_errors(findings) == element_errors and "ELEM" not in unsound
+    if not given or not deck.has(model.Elements):
+        return checked
+    valid = apply(mesh.OF_ELEMENTS, findings, checked)
+    if valid and complete and deck.has(model.Coordinates):
+        apply(mesh.OF_NODES, findings, checked)
+        if checked.mesh.given.all():
+            apply(mesh.OF_PLACES, findings, checked)
+            _check_shapes(checked, findings, listing=listing)
+    return checked
+
+
+def _element_errors(findings: Findings) -> int:
+    return sum(findings.counts[code] for code in ELEMENT_ERRORS)
+
+
+def _check_shapes(checked: Problem, findings: Findings, *, listing: bool) -> None:
+    """Check Jacobians, lumped masses and zero-energy modes where the orders are valid.
+
+    Listing mode takes L1 for L2, so that nothing is wrong with L2.
+    """
+    material = checked.deck.last(model.Material)
+    if material is None or laminate.unknown_stress_points(material):
+        return
+    apply(quadrature.OF_SHAPES, findings, checked)
+    if not listing:
+        apply(quadrature.OF_SHEAR_ORDER, findings, checked)
+
+
+def _check_each_segment(checked: Problem, findings: Findings) -> None:
+    """Check each segment as far as that needs no sound mesh."""
+    if checked.deck.has(model.Impact):
+        check_impact(checked, findings)
+    check_segments(checked.deck, findings)
+
+
+def check_impact(checked: Problem, findings: Findings) -> None:
+    """Check the ROD segment of a deck."""
+    apply(impact.OF_NODE, findings, checked)
+    apply_first(impact.OF_DOF, findings, checked)
+    apply(impact.OF_VELOCITY, findings, checked)
+
+
+def check_segments(deck: model.Deck, findings: Findings) -> None:
+    """Check the segments of a deck that can be judged alone."""
+    for kind in ALONE:
+        if (segment := deck.last(kind)) is not None:
+            check_segment(segment, findings)
+
+
+def check_segment(segment: model.Segment, findings: Findings) -> None:
+    """Check one of the segments of :data:`ALONE`."""
+    match segment:
+        case model.Material():
+            apply(laminate.OF_MATERIAL, findings, segment)
+        case model.Indentation():
+            apply(contact.OF_LAW, findings, segment)
+        case model.Allowables():
+            apply(damage.OF_STRENGTHS, findings, segment)
+        case model.Delamination():
+            apply(damage.OF_DELAMINATION, findings, segment)
+        case model.Damping():
+            apply(damping.OF_DAMPING, findings, segment)
+        case model.Projectile():
+            _check_projectile(segment, findings)
+        case model.Shear():
+            apply(shear.OF_SHEAR, findings, segment)
+        case model.Units():
+            apply(units.OF_NAMES, findings, segment)
+
+
+def _check_projectile(card: model.Projectile, findings: Findings) -> None:
+    if not apply(projectile.OF_NUMBER, findings, card):
+        return
+    apply(projectile.OF_PROJECTILE, findings, card)
+    if not card.elements:
+        return
+    before = findings.error_count
+    diameters = rod_diameters(card, findings)
+    if findings.error_count == before:
+        apply_first(projectile.OF_DIAMETERS, findings, card, diameters)
+
+
+def _check_points(checked: Problem, findings: Findings) -> None:
+    """Check gages, assumed strains and patch on a sound mesh; add the patch's static load."""
+    before = findings.error_count
+    if checked.deck.has(model.Gages) and apply(gages.OF_COUNT, findings, checked):
+        apply(gages.OF_GAGES, findings, checked)
+    if findings.error_count > before:
+        return
+    apply(quadrature.OF_ASSUMED_SHEAR, findings, checked)
+    if (card := checked.deck.last(model.Patch)) is None:
+        return
+    apply_first(patch.OF_PATCH, findings, checked)
+    if findings.error_count == before and card.load and checked.patch is not None:
+        checked.mesh.forces[:, W] += card.load * checked.patch.weights
+
+
+def _check_run(checked: Problem, findings: Findings, sound: Callable[[], bool]) -> None:
+    """Check a problem whose segments and mesh are sound."""
+    apply(damage.OF_THRESHOLD, findings, checked)
+    _check_time_step(checked, findings)
+    check_program(checked, findings)
+    apply(program.OF_PURPOSE, findings, checked)
+    if sound():
+        apply(mesh.OF_SUPPORTS, findings, checked)
+        check_values(checked, findings)
+        if time_step.takes_steps(checked):
+            apply(time_step.OF_CONTACT, findings, checked)
+    if checked.has_impact:
+        apply(projectile.WITHOUT_PROJECTILE, findings, checked)
+        apply(impact.OF_MESH, findings, checked)
+        apply(gages.OF_POINT_FORCE, findings, checked)
+
+
+def _check_time_step(checked: Problem, findings: Findings) -> None:
+    """Compare every DT with the plate's critical time step, and with the rate of the damping."""
+    if not time_step.takes_steps(checked):
+        return
+    apply((*time_step.OF_ROUNDING, *damping.OF_TIME_STEP), findings, checked)
+    apply_first(time_step.OF_PLATE, findings, checked)
+
+
+def check_program(checked: Problem, findings: Findings) -> None:
+    """Check the length of a program, and that its loops reach the steps to be stored."""
+    if apply(program.OF_LENGTH, findings, checked):
+        apply(program.OF_OUTPUT, findings, checked)
+
+
+def check_values(checked: Problem, findings: Findings) -> None:
+    """Warn of the valid values of a sound problem that look like a mistake."""
+    apply(laminate.VALUES, findings, checked)
+    apply(units.VALUES, findings, checked)
+    if checked.has_impact:
+        apply(contact.VALUES, findings, checked)
+        apply(impact.NEIGHBOURS, findings, checked)
+        apply(projectile.VALUES, findings, checked)
+        apply(impact.VALUES, findings, checked)
+    apply_first(damping.VALUES, findings, checked)
+    apply_first(damage.STRENGTHS, findings, checked)
+    apply(damage.VALUES, findings, checked)
+    apply(gages.VALUES, findings, checked)
+    if checked.has_impact:
+        apply((*contact.OF_COEFFICIENT, *patch.VALUES), findings, checked)
+
+
+def check_listing(checked: Problem, findings: Findings) -> None:
+    """Refuse what the printed program can't compute."""
+    apply(listing_mode.OF_LISTING, findings, checked)

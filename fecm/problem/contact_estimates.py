@@ -1,0 +1,92 @@
+"""Estimates of an impact before the run: peak force, and the stable time step with the contact."""
+
+from __future__ import annotations
+
+import math
+from contextlib import suppress
+from typing import NamedTuple
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.deck import model
+from fecm.mechanics.laminate import Laminate, effective_rigidity
+from fecm.mechanics.plate import PlateModel, UnsoundPlateError
+from fecm.mechanics.projectile import RigidMass
+from fecm.mechanics.stiffness_product import SAFE
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.parts import build_constants, build_projectile
+
+# A clamped square plate under a central force has the stiffness D/(0.0056 a^2): Timoshenko and
+# Woinowsky-Krieger, Theory of Plates and Shells, Table 35.  In terms of the force 8 v (m D)^(1/2)
+# of a wave, that is this factor on the ratio of the masses.
+CLAMPED = 1.0 / (64.0 * 0.0056)
+
+
+def wave_impedance(laminate: Laminate) -> float:
+    """Force over velocity of a point of an infinite plate, 8 (m D*)^(1/2) (force*time/length)."""
+    return 8.0 * math.sqrt(laminate.mass * effective_rigidity(laminate))
+
+
+def expected_peak(deck: model.Deck, plate: PlateModel) -> float:
+    """Estimate the peak force, high rather than low.
+
+    The minimum of the Hertz contact on a rigid target, k^(2/5) (5 m v^2/4)^(3/5), and of the
+    response of the plate: the bending wave for a light projectile, the stiffness of a clamped plate
+    for a heavy one.
+    """
+    impact, law = deck.require(model.Impact), deck.require(model.Indentation)
+    mass, v = build_projectile(deck).total_mass, np.abs(np.float64(impact.velocity))
+    ratio = mass / (plate.area() * plate.laminate.mass)
+    rigid = law.k**0.4 * (1.25 * mass) ** 0.6 * v**1.2
+    return float(min(rigid, wave_impedance(plate.laminate) * v * np.sqrt(1.0 + CLAMPED * ratio)))
+
+
+def contact_stiffness(deck: model.Deck, plate: PlateModel) -> float:
+    """Larger tangent stiffness of loading (3-1) and unloading (3-3) at the expected peak."""
+    law = build_constants(deck.require(model.Indentation))
+    with np.errstate(all="ignore"):  # infinite where the unloading curve is a vertical line
+        force = np.float64(expected_peak(deck, plate))
+        peak = (force / law.k) ** (2.0 / 3.0)
+        if not peak > 0.0:
+            return 0.0
+        return float(force * max(1.5 / peak, law.q / (peak - law.permanent(peak))))
+
+
+class ContactStep(NamedTuple):
+    """Limit of the time step from the contact."""
+
+    stiffness: float  # tangent stiffness of the contact, force/length
+    mass: float  # the smaller of the plate's mass at the impact dof and the projectile's at its tip
+    limit: float  # largest stable time step; infinite where the time step is certainly stable
+
+
+def contact_step(
+    deck: model.Deck, plate: PlateModel, contact: Floats | None, dt: float, bound: float
+) -> ContactStep | None:
+    """Largest time step at which plate and contact are stable together; None without impact.
+
+    `contact` is the distribution of a unit contact force over the dofs, (numnp, 5), or None;
+    `bound` is a lower bound of the plate's critical time step, `dt` the deck's, 0 for 0.9 of the
+    critical one.  The limit is computed only where the bound does not show that this is stable.
+    """
+    if contact is None:
+        return None
+    weights = contact[plate.mesh.equations > 0]
+    stiffness = contact_stiffness(deck, plate)
+    projectile = build_projectile(deck)
+    rigid = isinstance(projectile, RigidMass)
+    tip = projectile.total_mass if rigid else float(projectile.mass()[0])
+    at_node = 1.0 / float((weights**2 / plate.mass).sum())
+    mass = min(tip, at_node)
+    if not stiffness > 0.0:
+        return ContactStep(stiffness, mass, math.inf)
+    # The projectile's implicit step is iterated: a fixed point only below this (beta is 1/6).
+    iterated = math.sqrt(6.0 * tip / stiffness)
+    step = dt or SAFE * bound
+    if step < iterated and (step / bound) ** 2 + step**2 * stiffness / (4.0 * at_node) < 1.0:
+        return ContactStep(stiffness, mass, math.inf)
+    limit = iterated
+    with suppress(UnsoundPlateError):  # the contact's stiffness is out of range
+        limit = min(iterated, critical_time_step(plate, (weights, stiffness)))
+    return ContactStep(stiffness, mass, limit)

@@ -1,0 +1,143 @@
+"""Parts of a run that its deck alone determines; active slips become their parameters."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+
+from fecm.deck import model
+from fecm.deck.model import Deck
+from fecm.deck.records import RodDiameter
+from fecm.mechanics import contact_law
+from fecm.mechanics.element_matrices import IntegrationRules
+from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
+from fecm.mechanics.laminate import Laminate, laminate
+from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
+from fecm.mechanics.projectile import (
+    LISTING_DENSITY,
+    REPORT_DENSITY,
+    Projectile,
+    RigidMass,
+    Rod,
+    Transducer,
+    report_rod,
+)
+from fecm.problem.generate import rod_diameters
+
+W = 2  # dof w, from 0
+
+
+def rules(material: model.Material) -> tuple[Quadrature, Quadrature, Quadrature]:
+    """Quadrature of a MATE card: bending (L1), transverse shear (L2), stored strains (K).
+
+    L1 and L2 outside 1 to 4 count as the nearest of these, as in the listing.  Raises ValueError if
+    K is 0 or beyond 4.
+    """
+    card = material.integration
+    bending, shear = (min(HIGHEST_ORDER, max(1, n)) for n in (card.bending, card.shear))
+    points = gauss(card.points) if card.points > 0 else nodal(-card.points)
+    return gauss(bending), gauss(shear), points
+
+
+def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> PlateModel:
+    """Build the plate of a deck with the active slips."""
+    bending, shear, points = rules(deck.require(model.Material))
+    laminate = laminate_of_deck(deck, isotropic_g12="g12" in slips)
+    if "small-stiffness" in slips:
+        laminate = laminate.without_small_entries()
+    used = IntegrationRules(
+        bending=bending,
+        shear=bending if "shear-order" in slips else shear,
+        strains=bending if "tapes" in slips else points,
+        transposed_jacobian="jacobian" in slips,
+        assumes_shear=has_assumed_shear(deck),
+    )
+    return PlateModel(mesh, laminate, used)
+
+
+def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Projectile:
+    """Build the projectile of a deck; without a PROJ segment the report's rod."""
+    if (card := deck.last(model.Projectile)) is None:
+        return report_rod(LISTING_DENSITY if "density" in slips else REPORT_DENSITY)
+    if not card.elements:
+        return RigidMass(card.size)
+    return Rod(card.size, tuple(rod_diameters(card).tolist()), card.modulus, card.density)
+
+
+def projectile_segment(rod: Projectile, transducer: int = 0) -> model.Projectile:
+    """PROJ segment of a projectile."""
+    if isinstance(rod, RigidMass):
+        return model.Projectile(0, 0, rod.total_mass)
+    cards = [RodDiameter(n, 0, diameter) for n, diameter in enumerate(rod.diameters, start=1)]
+    if len(set(rod.diameters)) == 1 < len(cards):  # those between two cards are generated
+        cards = [replace(cards[0], increment=1), cards[-1]]
+    return model.Projectile(
+        rod.elements, transducer, rod.length, rod.modulus, rod.density, tuple(cards)
+    )
+
+
+def build_constants(measured: model.Indentation) -> contact_law.ContactParameters:
+    """Build the contact parameters of an EXPE segment."""
+    if measured.word == model.Indentation.ACR:
+        return contact_law.YangSunPermanent(measured.k, measured.alpha_p)
+    return contact_law.LinearPermanent(*measured.values())
+
+
+def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> Transducer:
+    """Build the transducer: PROJ's node, or the rod's middle (the next node under its slip)."""
+    sign = 1.0 if "station" in slips else -1.0
+    if isinstance(projectile, RigidMass):
+        return Transducer(0, sign)
+    card = deck.last(model.Projectile)
+    middle = projectile.elements // 2 + (2 if "station" in slips else 1)
+    return Transducer(middle if card is None or not card.transducer else card.transducer, sign)
+
+
+def build_law(
+    deck: Deck, slips: frozenset[str] = frozenset()
+) -> contact_law.HystereticLaw | contact_law.ListingLaw:
+    """Build the contact law of a deck with the active slips."""
+    constants = build_constants(deck.require(model.Indentation))
+    if "reload" in slips:
+        return contact_law.ListingLaw(constants)
+    return contact_law.HystereticLaw(constants)
+
+
+def laminate_of(material: model.Material, *, isotropic_g12: bool = False) -> Laminate:
+    """Laminate of a deck's MATE segment; its inertia uses the card's total thickness.
+
+    With `isotropic_g12` E1/2(1+nu12) replaces G12 where E1 = E2 (the slip ``g12``).
+    """
+    ply = material.ply
+    if isotropic_g12 and ply.e1 == ply.e2:
+        ply = replace(ply, g12=ply.e1 / (2.0 * (1.0 + ply.nu12)))
+    angles = [layer.angle for layer in material.layers]
+    thicknesses = [layer.thickness for layer in material.layers]
+    return laminate(ply, angles, thicknesses, material.integration.thickness)
+
+
+def laminate_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> Laminate:
+    """Laminate of a deck, with its shear correction factor; LookupError without a MATE segment."""
+    shear = deck.last(model.Shear) or model.Shear()
+    plain = laminate_of(deck.require(model.Material), isotropic_g12=isotropic_g12)
+    stiffness = equilibrium_shear_stiffness(plain) if shear.equilibrium else plain.shear
+    return replace(plain, shear=shear.factor * stiffness)
+
+
+def has_assumed_shear(deck: Deck) -> bool:
+    """Whether the transverse shear strains of a deck are assumed (``SHEA MITC``)."""
+    return (deck.last(model.Shear) or model.Shear()).assumed
+
+
+@lru_cache(maxsize=256)
+def is_coupled(material: model.Material) -> bool:
+    """Whether B of a deck's laminate is not 0; False where the MATE segment is invalid."""
+    try:
+        with np.errstate(all="ignore"):
+            return laminate_of(material).is_coupled
+    except (ArithmeticError, ValueError):
+        return False

@@ -1,0 +1,156 @@
+"""Rules about the EXPE segment."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fecm.deck import model
+from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.deck.units import COEFFICIENT, in_si, unit_names
+from fecm.mechanics.contact_law import ACR_POWER
+from fecm.problem.problem import Problem
+from fecm.problem.rules.units import REAL, USED, has_real_moduli, needed_unit
+
+# Powers of measured unloading curves lie between 1.5 and 2.5.
+LEAST_POWER = 1.0
+GREATEST_POWER = 5.0
+# Radii of a rigid sphere whose k the law has: in m where UNIT tells, otherwise over the thickness
+# and over the longer side of the plate.  The report's laws, and those of isotropic plates, give
+# radii from a third to 25 times that of the indenter.
+LEAST_RADIUS = 3e-5
+GREATEST_RADIUS = 5.0
+LEAST_OF_THICKNESS = 6e-3
+MOST_OF_SIDE = 100.0
+USUAL_RADIUS = 8e-3  # m
+REACH = 8.0  # greatest ratio to the usual radius at which a unit is named
+
+
+@rule(
+    "E412",
+    Subject.IMPACT,
+    "A parameter of EXPE is out of range.",
+    remedy="k and q positive, alpha_p 0 or more, s_p at least 0 and below 1.",
+)
+def invalid_parameter(law: model.Indentation) -> Reports:
+    """Find parameters that no contact law has."""
+    limits = [(law.k > 0.0, "positive")]
+    if law.word == model.Indentation.ACR:
+        power = law.q in (0.0, ACR_POWER)
+        limits += [
+            (law.alpha_p > 0.0, "positive"),
+            (law.s_p == 0.0, "blank or 0 with ACR, whose equation 3-7 has no such constant"),
+            (power, "blank or 2.5 with ACR, as equation 3-7 holds for no other"),
+        ]
+    else:
+        limits += [
+            (law.alpha_p >= 0.0, "0 or more"),
+            (0.0 <= law.s_p < 1.0, "at least 0 and below 1"),
+            (law.q > 0.0, "positive"),
+        ]
+    for name, value, (valid, must) in zip(law.names(), law.values(), limits, strict=True):
+        if not valid:
+            yield Report(f"The {name} is {value:g}; it must be {must}.", law.place(name))
+
+
+@rule(
+    "W436",
+    Subject.IMPACT,
+    "alpha_p is above the thickness.",
+    cause="No permanent indentation would occur.",
+    remedy="A length in the deck's unit.",
+)
+def large_indentation(problem: Problem) -> Reports:
+    """Find a critical indentation deeper than the plate."""
+    law = problem.deck.require(model.Indentation)
+    thickness = problem.deck.require(model.Material).integration.thickness
+    if law.alpha_p > thickness:
+        name = law.names()[1]
+        what = f"The {name} = {law.alpha_p:g} is more than the plate's thickness {thickness:g}"
+        message = f"{what}: no permanent indentation would occur."
+        yield Report(message, law.place(name), "it is a length in the deck's unit")
+
+
+@rule(
+    "W437",
+    Subject.IMPACT,
+    "q is outside 1 to 5.",
+    remedy="Measured powers are 1.5 to 2.5.",
+)
+def doubtful_power(problem: Problem) -> Reports:
+    """Find powers of unloading that nobody measured."""
+    law = problem.deck.require(model.Indentation)
+    if law.word != model.Indentation.ACR and not LEAST_POWER <= law.q <= GREATEST_POWER:
+        limits = f"{LEAST_POWER:g} to {GREATEST_POWER:g}"
+        message = f"The unloading power q = {law.q:g} is outside {limits}."
+        yield Report(message, law.place(law.names()[3]), "measured powers are 1.5 to 2.5")
+
+
+def sphere_radius(deck: model.Deck) -> float:
+    """Radius of a rigid sphere with the k of a deck, equation 3-2 with E2 for E_t, length."""
+    k, e2 = deck.require(model.Indentation).k, deck.require(model.Material).ply.e2
+    with np.errstate(all="ignore"):
+        return float((0.75 * np.float64(k) / e2) ** 2)
+
+
+@rule(
+    "W476",
+    Subject.IMPACT,
+    "k is that of a sphere of an impossible radius.",
+    cause=(
+        "By equation 3-2 with E2 it is smaller than 0.03 mm or larger than 5 m (without UNIT: than "
+        "0.006 of the thickness, or 100 plates)."
+    ),
+    remedy="k in force/length^1.5; `fecm indent estimate`.",
+)
+def doubtful_coefficient(problem: Problem) -> Reports:
+    """Find a k that only a sphere of an impossible radius has."""
+    deck, names = problem.deck, unit_names(problem.deck)
+    if not has_real_moduli(deck.require(model.Material).ply, names):  # W435 says so
+        return
+    law, radius = deck.require(model.Indentation), sphere_radius(deck)
+    own, real = in_si(COEFFICIENT, names), REAL["contact coefficient"]
+    if own is not None and not real.least <= law.k * own <= real.greatest:  # the same
+        return
+    unit = in_si("length", names)
+    if unit is not None:
+        possible = LEAST_RADIUS <= radius * unit <= GREATEST_RADIUS
+        shown = f"{radius * unit:.2g} m"
+    else:
+        thickness = problem.laminate.thickness
+        greatest = MOST_OF_SIDE * problem.longer_side
+        possible = LEAST_OF_THICKNESS * thickness <= radius <= greatest
+        shown = f"{radius:.2g}, {radius / thickness:.2g} times the thickness"
+    if possible:
+        return
+    message = (
+        f"k = {law.k:g} is that of a rigid sphere with a radius of about {shown} on the plies' E2"
+    )
+    if unit is not None and (looks := _misread(deck, radius, unit, names)):
+        message += f"; {looks}"
+    hint = "k is in force/length^1.5 of the deck; fecm indent estimate has one for a sphere"
+    yield Report(f"{message}.", law.place(law.names()[0]), hint)
+
+
+def _misread(deck: model.Deck, radius: float, unit: float, names: dict[str, str]) -> str:
+    """Say which unit of k, or of the radius that it was computed from, gives a usual indenter."""
+    k, own = deck.require(model.Indentation).k, in_si(COEFFICIENT, names)
+    found: dict[str, float] = {}
+    if own is not None:
+        for known, factor in USED[COEFFICIENT].items():
+            text = f"k = {k:g} looks like {known}; {needed_unit(COEFFICIENT, names)}"
+            found[text] = radius * unit * (factor / own) ** 2
+    for known, factor in USED["length"].items():
+        text = f"the radius that it was estimated from looks like {known}"
+        found[f"{text}; {needed_unit('length', names)}"] = radius * factor
+    if not all(0.0 < value < math.inf for value in found.values()):
+        return ""
+    far = {text: abs(math.log(value / USUAL_RADIUS)) for text, value in found.items()}
+    nearest = min(far, key=far.__getitem__)
+    return nearest if far[nearest] <= math.log(REACH) else ""
+
+
+OF_LAW = (invalid_parameter,)
+VALUES = (large_indentation, doubtful_power)
+OF_COEFFICIENT = (doubtful_coefficient,)

@@ -1,0 +1,325 @@
+"""Rules about strengths, failure criteria and the delamination threshold: ALLO, FAIL and DELA."""
+
+from __future__ import annotations
+
+from collections import Counter
+
+import numpy as np
+
+from fecm.deck import model
+from fecm.deck.macros import Loop, every, flat
+from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.deck.units import MODULUS, TOUGHNESS, in_si, unit_names
+from fecm.problem.problem import Problem
+from fecm.problem.rules.units import USED, has_real_moduli, likely_unit, looks_like, needed_unit
+
+# Strengths over the modulus of their direction.  Annealed glass has 1e-4, soft matrices 0.1.
+WEAKEST = 5e-5
+STRONGEST = 0.3
+ENDLESS = 1e6  # strength over modulus that stands for no failure
+# Strength, modulus in its direction, and the usual ratio of both.
+SHARES = (
+    ("XT", "E1", 0.012),
+    ("XC", "E1", 0.008),
+    ("YT", "E2", 0.005),
+    ("YC", "E2", 0.02),
+    ("S12", "G12", 0.016),
+    ("S13", "G13", 0.016),
+    ("S23", "G23", 0.02),
+)
+FIBROUS = 2.0  # E1/E2 above which a ply has fibres in one direction
+USUAL_MODULUS = 1e11  # Pa, along fibres; with it the unit of a deck without UNIT is guessed
+# Other orders of XT, XC, YT and YC on a card, and where the values belong.
+ORDERS = {
+    "in the order XT, YT, XC, YC": (0, 2, 1, 3),
+    "with X and Y exchanged": (2, 3, 0, 1),
+    "with tension and compression exchanged": (1, 0, 3, 2),
+}
+# G_IIc, J/m^2.
+LOWEST_TOUGHNESS = 50.0
+HIGHEST_TOUGHNESS = 5000.0
+USUAL_TOUGHNESS = 700.0
+# G_IIc/(E2 h) of plates from 0.5 to 20 mm.
+LOWEST_RELATIVE = 1e-7
+HIGHEST_RELATIVE = 5e-3
+ENOUGH_EVALUATIONS = 20  # of FAIL, that a largest exposure over time is not missed
+MOST_TWIST = 0.1  # largest |D16| and |D26|, over (D11 D22)^(1/2), without a warning of DELA
+
+
+@rule(
+    "E455",
+    Subject.DAMAGE,
+    "A strength on ALLO's card is not positive.",
+    remedy="Compressive strengths are positive too.",
+)
+def invalid_strength(card: model.Allowables) -> Reports:
+    """Find strengths that no ply has."""
+    for (name, _, _), value in zip(SHARES, card.row(), strict=False):
+        if isinstance(value, str) or not value > 0.0:
+            hint = "compressive strengths are positive on this card" if name in ("XC", "YC") else ""
+            message = f"The strength {name} is {value:g}; it must be positive."
+            yield Report(message, card.place(name), hint)
+
+
+@rule(
+    "E456",
+    Subject.DAMAGE,
+    "F12* is not between -1 and 1, or p+ or p- not between 0 and 1.",
+    remedy="Blanks take -0.5, 0.35, 0.3 (carbon fibres; glass: 0.30, 0.25).",
+)
+def invalid_constant_of_criterion(card: model.Allowables) -> Reports:
+    """Find constants that the criteria of Tsai-Wu and Puck don't allow."""
+    for name, value in (("p+", card.p_plus), ("p-", card.p_minus)):
+        if not 0.0 < value < 1.0:
+            message = f"Puck's slope {name} is {value:g}; it must be between 0 and 1."
+            yield Report(message, card.place(), "a blank takes 0.35 for p+ and 0.3 for p-")
+    if not abs(card.f12) < 1.0:
+        message = f"F12* is {card.f12:g}; it must be between -1 and 1."
+        yield Report(message, card.place(), "a blank takes -0.5")
+
+
+@rule(
+    "E457",
+    Subject.DAMAGE,
+    "G_IIc is not positive, or the number of delaminations not whole.",
+    cause="The number is a whole number from 1.",
+    remedy="Correct DELA.",
+)
+def invalid_delamination(card: model.Delamination) -> Reports:
+    """Find values that give no threshold."""
+    if not card.toughness > 0.0:
+        message = f"G_IIc is {card.toughness:g}; it must be positive."
+        yield Report(message, card.place("G_IIc"))
+    if not (card.number >= 1.0 and card.number.is_integer()):
+        must = "a whole number from 1"
+        message = f"The number of delaminations is {card.number:g}; it must be {must}."
+        yield Report(message, card.place("number of delaminations"))
+
+
+@rule(
+    "W458",
+    Subject.DAMAGE,
+    "B is not zero: the threshold takes D - B A⁻¹ B for D.",
+    remedy="A symmetric laminate, or accept it.",
+)
+def coupled_threshold(problem: Problem) -> Reports:
+    """Find coupled laminates, to which the threshold of an isotropic plate is an approximation."""
+    delamination = problem.deck.last(model.Delamination)
+    if delamination is not None and problem.laminate.is_coupled:
+        message = "B is not zero: the delamination threshold takes D - B A^-1 B for D."
+        yield Report(message, delamination.place())
+
+
+@rule(
+    "W461",
+    Subject.DAMAGE,
+    "Bending twists the plate.",
+    cause=(
+        "D16 or D26 is more than a tenth of √(D11 D22). The threshold is that of an isotropic "
+        "plate."
+    ),
+    remedy="An estimate; a test of this layup is better.",
+)
+def twisted_threshold(problem: Problem) -> Reports:
+    """Find laminates whose bending and twisting are coupled."""
+    if (delamination := problem.deck.last(model.Delamination)) is None:
+        return
+    D = problem.laminate.D
+    twist = float(np.abs(D[:2, 2]).max() / np.sqrt(D[0, 0] * D[1, 1]))
+    if twist > MOST_TWIST:
+        message = (
+            f"Bending twists the plate: D16 or D26 is {twist:.2g} (D11 D22)^(1/2). The threshold "
+            "is that of an isotropic plate with the mean stiffness D*."
+        )
+        hint = "threshold and D* do not depend on the axes; how delaminations grow does"
+        yield Report(message, delamination.place(), hint)
+
+
+@rule(
+    "W467",
+    Subject.DAMAGE,
+    "A strength does not suit the modulus in its direction.",
+    cause="It is below 5·10⁻⁵ or above 0.3 of it. The unit that it seems to be in is named.",
+    remedy="Strengths in the moduli's unit.",
+)
+def strengths_in_another_unit(problem: Problem) -> Reports:
+    """Find strengths that no material of these moduli has."""
+    card, names = problem.deck.last(model.Allowables), unit_names(problem.deck)
+    ply = problem.deck.require(model.Material).ply
+    if card is None or not has_real_moduli(ply, names):  # otherwise W435 says so
+        return
+    own = in_si(MODULUS, names)
+    guessed = likely_unit(ply.e1, MODULUS, USUAL_MODULUS) if own is None else ""
+    unit_of_stress = own or USED[MODULUS].get(guessed, 1.0)
+    wrong: dict[str, str] = {}  # what is said of a strength
+    likely = Counter[str]()
+    for (name, modulus, usual), strength in zip(SHARES, card.row(), strict=False):
+        value, stiffness = float(strength), float(getattr(ply, modulus.lower()))
+        share = value / stiffness
+        if WEAKEST <= share <= STRONGEST or share > ENDLESS:
+            continue
+        wrong[name] = f"{name} = {value:g} is {share:.2g} times {modulus}"
+        if own is not None:
+            wrong[name] += f", {value * own:.2g} Pa in the units of UNIT"
+        likely[likely_unit(value, MODULUS, usual * stiffness * unit_of_stress)] += 1
+    if not wrong:
+        return
+    first, *others = wrong
+    message = wrong[first] + (f" (also {', '.join(others)})" if others else "")
+    unit = likely.most_common(1)[0][0]
+    if unit and unit != guessed:
+        needed = f"E1 = {ply.e1:g} looks like {guessed}" if guessed else needed_unit(MODULUS, names)
+        these = "the strengths look" if others else "it looks"
+        message += f": {these} like {unit}; {needed}"
+    hint = "strengths and moduli must be in the same unit"
+    yield Report(f"{message}.", card.place(first), hint)
+
+
+@rule(
+    "W468",
+    Subject.DAMAGE,
+    "YT is above XT, YC above XC, or YC below YT in a ply with E1 > 2 E2.",
+    cause="The order that the values seem to be in is named.",
+    remedy="XT, XC, YT, YC, S12, S13, S23.",
+)
+def strengths_in_another_order(problem: Problem) -> Reports:
+    """Find strengths of a fibrous ply that are not in the order of the card."""
+    card, ply = problem.deck.last(model.Allowables), problem.deck.require(model.Material).ply
+    if card is None:
+        return
+    given = card.xt, card.xc, card.yt, card.yc
+    faults = _faults(*given)
+    if ply.e1 <= FIBROUS * ply.e2 or not faults or max(given) > ENDLESS * ply.e1:
+        return
+    message = f"{' and '.join(faults.values())}, unlike in any ply of parallel fibres"
+    for order, places in ORDERS.items():
+        if not _faults(*(given[place] for place in places)):
+            message += f": the strengths look typed {order}"
+            break
+    hint = "the card's order is XT, XC, YT, YC, S12, S13, S23: X along the fibres, T in tension"
+    yield Report(f"{message}.", card.place(next(iter(faults))), hint)
+
+
+def _faults(xt: float, xc: float, yt: float, yc: float) -> dict[str, str]:
+    """What is wrong with strengths of a ply with fibres in one direction, by the field."""
+    faults = {}
+    if yt >= xt:
+        faults["YT"] = f"YT = {yt:g} is not below XT = {xt:g}"
+    if yc >= xc:
+        faults["YC"] = f"YC = {yc:g} is not below XC = {xc:g}"
+    if yc < yt:
+        faults["YC"] = f"YC = {yc:g} is below YT = {yt:g}"
+    return faults
+
+
+@rule(
+    "W469",
+    Subject.DAMAGE,
+    "No laminate has this G_IIc.",
+    cause="It is outside 50 to 5000 J/m² (without UNIT: G_IIc/(E2 h) outside 10⁻⁷ to 5·10⁻³).",
+    remedy="N/mm is 1000 J/m², lbf/in 175 J/m².",
+)
+def doubtful_toughness(problem: Problem) -> Reports:
+    """Find a toughness in another unit: absolute with UNIT, otherwise over E2 h."""
+    deck, names = problem.deck, unit_names(problem.deck)
+    if (card := deck.last(model.Delamination)) is None:
+        return
+    place, value = card.place("G_IIc"), card.toughness
+    factor = in_si(TOUGHNESS, names)
+    if factor is not None:
+        if LOWEST_TOUGHNESS <= value * factor <= HIGHEST_TOUGHNESS:
+            return
+        limits = f"{LOWEST_TOUGHNESS:g} to {HIGHEST_TOUGHNESS:g}"
+        message = f"G_IIc = {value:g} is {value * factor:.3g} J/m^2 in the units of UNIT"
+        message += f", outside {limits}"
+        if looks := looks_like(value, TOUGHNESS, USUAL_TOUGHNESS, names):
+            message += f": it {looks}"
+        yield Report(f"{message}.", place, "1 N/mm is 1000 J/m^2, 1 lbf/in 175 J/m^2")
+        return
+    material = deck.require(model.Material)
+    relative = value / (material.ply.e2 * material.integration.thickness)
+    if LOWEST_RELATIVE <= relative <= HIGHEST_RELATIVE:
+        return
+    limits = f"{LOWEST_RELATIVE:g} to {HIGHEST_RELATIVE:g}"
+    message = f"G_IIc = {value:g} is {relative:.2g} times E2 h, outside {limits}"
+    hint = "it is a force over a length in the deck's units: N/mm (1000 J/m^2) in mm and N"
+    yield Report(f"{message}: it looks like another unit.", place, hint)
+
+
+@rule(
+    "W470",
+    Subject.DAMAGE,
+    "There are more delaminations than interfaces.",
+    remedy="A blank is one.",
+)
+def too_many_delaminations(problem: Problem) -> Reports:
+    """Find more delaminations than the laminate has room for."""
+    card = problem.deck.last(model.Delamination)
+    plies = len(problem.deck.require(model.Material).layers)
+    if card is not None and card.number > max(1, plies - 1):
+        interfaces = f"{plies} layers have {plies - 1} interfaces"
+        message = f"DELA has {card.number:g} delaminations, but {interfaces}."
+        place = card.place("number of delaminations")
+        yield Report(message, place, "a blank takes one, whose threshold is the highest")
+
+
+@rule(
+    "W471",
+    Subject.DAMAGE,
+    "ALLO is without FAIL.",
+    cause="No exposure is computed.",
+    remedy="FAIL in the loop of RODP.",
+)
+def strengths_without_criteria(problem: Problem) -> Reports:
+    """Find strengths that the program never uses."""
+    card = problem.deck.last(model.Allowables)
+    if card is not None and all(macro.word != "FAIL" for macro in flat(problem.program)):
+        message = "ALLO has strengths, but the program has no FAIL: no exposure is computed."
+        yield Report(message, card.place(), "put FAIL into the loop of RODP")
+
+
+@rule(
+    "W472",
+    Subject.DAMAGE,
+    "FAIL is evaluated at too few times of an impact.",
+    cause=(
+        "It is outside the loop of RODP, or evaluated less than 20 times at an interval above 1: "
+        "the largest exposure may be missed."
+    ),
+    remedy="FAIL in the loop, a smaller N.",
+)
+def few_evaluations(problem: Problem) -> Reports:
+    """Find criteria that may miss the peak."""
+    cards = [macro for macro in flat(problem.program) if macro.word == "FAIL"]
+    count = problem.work.passes["FAIL"]
+    if not cards or not problem.has_impact or count == 0:  # W510 says so
+        return
+    loops = [item for item in problem.program if isinstance(item, Loop)]
+    stepping = [loop for loop in loops if "RODP" in {macro.word for macro in flat(loop.body)}]
+    inside = any(macro.word == "FAIL" for loop in stepping for macro in flat(loop.body))
+    if stepping and not inside:
+        message = (
+            "FAIL is outside the loop of RODP: it sees the plate at one time only, not at the peak."
+        )
+        yield Report(message, cards[0].place("macro"), "put FAIL into the loop of RODP")
+    elif count < ENOUGH_EVALUATIONS and every(cards[0]) > 1:
+        message = (
+            f"FAIL is evaluated {count} time{'s' * (count > 1)} in {problem.work.steps} steps: the "
+            "largest exposures may be missed."
+        )
+        best = int(np.clip(problem.work.steps // 200, 1, every(cards[0]) - 1))
+        hint = f"FAIL,,{best} evaluates it more often"
+        yield Report(message, cards[0].place("value"), hint)
+
+
+OF_STRENGTHS = (invalid_strength, invalid_constant_of_criterion)
+OF_DELAMINATION = (invalid_delamination,)
+OF_THRESHOLD = (coupled_threshold, twisted_threshold)
+# One of these is enough.
+STRENGTHS = (strengths_in_another_unit, strengths_in_another_order)
+VALUES = (
+    strengths_without_criteria,
+    few_evaluations,
+    doubtful_toughness,
+    too_many_delaminations,
+)

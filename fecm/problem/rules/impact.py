@@ -1,0 +1,194 @@
+"""Rules about the ROD segment, and about an impact that the mesh does not resolve."""
+
+from __future__ import annotations
+
+import math
+
+from fecm._typing import Bools
+from fecm.deck import model
+from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.mechanics.mesh import distinct
+from fecm.problem.parts import W
+from fecm.problem.problem import Problem
+from fecm.problem.resolution import ENOUGH_PER_WAVE, resolution, said_error
+
+W_DOF = W + 1  # number of w on the card
+LEAST_PER_WAVE = 4  # elements per bending wave below which a mesh is too coarse
+WORTH_SAYING = 0.03  # mesh error of the peak that is warned of
+# Impact velocity over the wave speed along the fibres.
+CREEPING = 1.0e-6
+HYPERSONIC = 0.1
+
+
+@rule(
+    "E408",
+    Subject.IMPACT,
+    "The impact node does not exist.",
+    remedy="1 to NUMNP.",
+)
+def unknown_impact_node(problem: Problem) -> Reports:
+    """Find a node beyond those of the control card."""
+    impact, control = problem.deck.require(model.Impact), problem.deck.control
+    if not 1 <= impact.node <= control.numnp:
+        what = f"The impact node {impact.node} does not exist"
+        message = f"{what}; the deck has nodes 1 to {control.numnp}."
+        yield Report(message, impact.place("impact node"))
+
+
+@rule(
+    "E409",
+    Subject.IMPACT,
+    "The impact dof does not exist, or with PATC is not w.",
+    remedy="3 is w.",
+)
+def unknown_impact_dof(problem: Problem) -> Reports:
+    """Find a dof beyond those of the control card."""
+    impact, control = problem.deck.require(model.Impact), problem.deck.control
+    if not 1 <= impact.dof <= control.ndf:
+        message = f"The impact dof is {impact.dof}; it must be 1 to {control.ndf}."
+        yield Report(message, impact.place("impact dof"), "3 is w")
+
+
+@rule(
+    "E410",
+    Subject.IMPACT,
+    "The impact dof is restrained.",
+    remedy="Another node, or no support there.",
+)
+def restrained_impact_dof(problem: Problem) -> Reports:
+    """Find a dof that a support holds."""
+    impact = problem.deck.require(model.Impact)
+    known = 1 <= impact.node <= problem.deck.control.numnp
+    if known and problem.mesh.equations[impact.node - 1, impact.dof - 1] == 0:
+        message = f"Dof {impact.dof} of the impact node {impact.node} is restrained."
+        yield Report(message, impact.place("impact node"), "a BOUN card restrains it")
+
+
+@rule(
+    "E413",
+    Subject.IMPACT,
+    "The impact dof is a rotation.",
+    remedy="3 is w.",
+)
+def impact_on_rotation(problem: Problem) -> Reports:
+    """Find a dof that is no displacement."""
+    impact = problem.deck.require(model.Impact)
+    if impact.dof > W_DOF:
+        message = f"The impact dof {impact.dof} is a rotation: a projectile pushes a displacement."
+        yield Report(message, impact.place("impact dof"), "3 is w")
+
+
+@rule(
+    "W413",
+    Subject.IMPACT,
+    "The impact dof is in the plane of the plate.",
+    remedy="3 is w.",
+)
+def impact_in_plane(problem: Problem) -> Reports:
+    """Find a displacement other than w."""
+    impact = problem.deck.require(model.Impact)
+    if impact.dof < W_DOF:
+        message = f"The impact dof is {impact.dof}, not 3: the projectile does not push w."
+        yield Report(message, impact.place("impact dof"))
+
+
+@rule(
+    "E411",
+    Subject.IMPACT,
+    "The impact velocity is negative.",
+    remedy="An approach is positive.",
+)
+def negative_velocity(problem: Problem) -> Reports:
+    """Find a projectile that moves away."""
+    impact = problem.deck.require(model.Impact)
+    if impact.velocity < 0.0:
+        message = f"The impact velocity is {impact.velocity:g}; it must be positive."
+        hint = "an approach is positive on this card"
+        yield Report(message, impact.place("impact velocity"), hint)
+
+
+@rule(
+    "W411",
+    Subject.IMPACT,
+    "The impact velocity is 0.",
+    cause="The projectile rests on the plate.",
+    remedy="A velocity, or loads of FORC.",
+)
+def projectile_at_rest(problem: Problem) -> Reports:
+    """Find a projectile that does not move."""
+    impact = problem.deck.require(model.Impact)
+    if impact.velocity == 0.0:
+        why = "the projectile rests on the plate, which only FORC's loads can move"
+        yield Report(f"The impact velocity is 0: {why}.", impact.place("impact velocity"))
+
+
+@rule(
+    "W441",
+    Subject.IMPACT,
+    "All neighbours of the impact node are restrained.",
+    remedy="Restrain the supports only.",
+)
+def held_around_impact(problem: Problem) -> Reports:
+    """Find supports inside the plate that hold every other node of the struck elements."""
+    mesh, impact = problem.mesh, problem.deck.require(model.Impact)
+    touching = mesh.elements[(mesh.elements == impact.node).any(axis=1)]
+    around = distinct(touching[(touching > 0) & (touching != impact.node)]) - 1
+    places = mesh.coordinates
+    inner: Bools = ((places > places.min(axis=0)) & (places < places.max(axis=0))).all(axis=1)
+    if inner[around].any() and (mesh.equations[around, impact.dof - 1] == 0).all():
+        where = f"the impact node {impact.node} is restrained in dof {impact.dof}"
+        message = f"Every other node of the elements at {where}."
+        yield Report(message, impact.place("impact node"), "restrain the supports only")
+
+
+@rule(
+    "W440",
+    Subject.IMPACT,
+    "The velocity does not suit the wave speed along the fibres.",
+    cause="Their ratio is outside 10⁻⁶ to 0.1.",
+    remedy="Velocity in the deck's units.",
+)
+def doubtful_velocity(problem: Problem) -> Reports:
+    """Find velocities that no low-velocity impact has."""
+    impact, ply = problem.deck.require(model.Impact), problem.deck.require(model.Material).ply
+    along_fibres = math.sqrt(ply.e1 / ply.density)
+    share = abs(impact.velocity) / along_fibres
+    if share and not CREEPING <= share <= HYPERSONIC:
+        wave = f"the wave speed along the fibres, (E1/density)^(1/2) = {along_fibres:.3g}"
+        message = f"The impact velocity {impact.velocity:g} is {share:.2g} of {wave}."
+        hint = "velocity is in the deck's units of length and time"
+        yield Report(message, impact.place("impact velocity"), hint)
+
+
+@rule(
+    "W415",
+    Subject.IMPACT,
+    "There are too few elements per bending wave at the impact node.",
+    remedy="A finer mesh there: see [checking a deck](making.md#checking).",
+)
+def coarse_mesh(problem: Problem) -> Reports:
+    """Find elements at the impact node that are too large for its bending waves."""
+    found = resolution(problem)
+    if found is None or found.elements >= ENOUGH_PER_WAVE:
+        return
+    coarse = found.elements < LEAST_PER_WAVE
+    if not coarse and (found.error is None or found.error < WORTH_SAYING):
+        return
+    about = "" if found.error is None else f": {said_error(found.error)}"
+    what = f"The mesh is {'too coarse' if coarse else 'coarse'} at the impact node"
+    sides = f"{found.elements:.1f} elements of side {found.side:.3g}"
+    wave = f"bending wave of the contact's duration, which is {found.wave:.3g} long"
+    hint = (
+        f"use {ENOUGH_PER_WAVE} elements per wave: sides up to {found.wave / ENOUGH_PER_WAVE:.2g}"
+    )
+    place = problem.deck.require(model.Impact).place("impact node")
+    yield Report(f"{what}: {sides} per {wave}{about}.", place, hint)
+
+
+OF_NODE = (unknown_impact_node,)
+# One of these is enough.
+OF_DOF = (unknown_impact_dof, restrained_impact_dof, impact_on_rotation, impact_in_plane)
+OF_VELOCITY = (negative_velocity, projectile_at_rest)
+NEIGHBOURS = (held_around_impact,)
+VALUES = (doubtful_velocity,)
+OF_MESH = (coarse_mesh,)

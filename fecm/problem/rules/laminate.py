@@ -1,0 +1,307 @@
+"""Rules about the MATE segment: integration orders, constants of the ply, layers, thickness."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from fecm.deck import model
+from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.mechanics.elements import HIGHEST_ORDER
+from fecm.problem.problem import Problem
+
+THICKNESS_TOLERANCE = 1.0e-6  # difference of thicknesses that is rounding
+THINNEST = 1.0e-4  # thickness over the longer side of the plate
+# Thickness over the distance between supports, above which plate theory is off, and fails.
+THICK = 0.1
+THICKEST = 0.25
+# Difference from elasticity: docs/plies.md, from Pagano's exact solution.
+ERRORS = (
+    "at 0.1 the deflection of a [0/90/0] plate with E1/E2 = 25 is 16 % too small and its largest "
+    "stress 12 %, at 0.25 they are 22 % and 44 %; isotropic plates are closer"
+)
+LOWEST_RATIO = 0.5  # E1/E2 of a ply whose fibres are along 1
+LARGEST_ANGLE = 180.0
+SHOWN_ANGLES = 8
+POISSONS_RATIO = "Poisson's ratio NU12"
+
+
+@rule(
+    "W401",
+    Subject.LAMINATE,
+    "L1 or L2 is outside 1 to 4.",
+    remedy="The nearest of these is used.",
+)
+def unknown_order(material: model.Material) -> Reports:
+    """Find orders of bending and shear that are replaced."""
+    card = material.integration
+    for name, order in (("bending order L1", card.bending), ("shear order L2", card.shear)):
+        if not 1 <= order <= HIGHEST_ORDER:
+            used = min(HIGHEST_ORDER, max(1, order))
+            message = f"The {name} is {order} ; {used} is used instead."
+            yield Report(message, card.place(name))
+
+
+@rule(
+    "E402",
+    Subject.LAMINATE,
+    "The stress-point order K is not 1 to 4 or -1 to -4.",
+    remedy="K > 0: Gauss points; K < 0: nodal points.",
+)
+def unknown_stress_points(material: model.Material) -> Reports:
+    """Find an order K that does not exist."""
+    card = material.integration
+    if not 1 <= abs(card.points) <= HIGHEST_ORDER:
+        must = "1 to 4 (Gauss points) or -1 to -4 (nodal points)"
+        message = f"The stress-point order K is {card.points}; it must be {must}."
+        yield Report(message, card.place("stress-point order K"))
+
+
+def _invalid_constants(material: model.Material) -> list[tuple[str, float]]:
+    """Name and value of the ply's constants that must be positive and are not."""
+    ply = material.ply
+    named = zip((field.name for field in ply.fields), map(float, ply.row()), strict=True)
+    return [(name, value) for name, value in named if value <= 0.0 and name != POISSONS_RATIO]
+
+
+@rule(
+    "E403",
+    Subject.LAMINATE,
+    "A constant of the ply is not positive.",
+    remedy="Correct MATE.",
+)
+def invalid_constant(material: model.Material) -> Reports:
+    """Find density and moduli that are not positive."""
+    for name, value in _invalid_constants(material):
+        yield Report(f"The {name} is {value:g}; it must be positive.", material.ply.place(name))
+
+
+@rule(
+    "E404",
+    Subject.LAMINATE,
+    "NU12² is not below E1/E2.",
+    remedy="NU12 of fibre composites is 0.2 to 0.4.",
+)
+def impossible_poissons_ratio(material: model.Material) -> Reports:
+    """Find a ratio under which the ply's stiffness is not positive definite."""
+    ply = material.ply
+    # The square of nu12 against E1/E2, written so that no number overflows.
+    if not _invalid_constants(material) and abs(ply.nu12) >= (ply.e1 / ply.e2) ** 0.5:
+        why = f"its square must stay below E1/E2 = {ply.e1 / ply.e2:g}"
+        message = f"Poisson's ratio NU12 = {ply.nu12:g} is too large: {why}."
+        yield Report(message, ply.place(POISSONS_RATIO))
+
+
+@rule(
+    "E405",
+    Subject.LAMINATE,
+    "The thickness of a layer is not positive.",
+    remedy="Correct the layer.",
+)
+def invalid_layer_thickness(material: model.Material) -> Reports:
+    """Find layers without a thickness."""
+    for position, layer in enumerate(material.layers, start=1):
+        if layer.thickness <= 0.0:
+            what = f"Layer {position} has the thickness {layer.thickness:g}"
+            yield Report(f"{what}; it must be positive.", layer.place("layer thickness"))
+
+
+@rule(
+    "W408",
+    Subject.LAMINATE,
+    "The number of a layer differs from its position.",
+    remedy="Layers are stacked in the order of their cards.",
+)
+def layer_out_of_order(material: model.Material) -> Reports:
+    """Find layers whose numbers have no effect."""
+    for position, layer in enumerate(material.layers, start=1):
+        if layer.number != position:
+            why = "layers are stacked in the order of their cards, whatever their numbers"
+            message = f"Layer {position} has the number {layer.number}: {why}."
+            yield Report(message, layer.place("layer"))
+
+
+@rule(
+    "E406",
+    Subject.LAMINATE,
+    "The total thickness is not positive.",
+    remedy="Correct MATE.",
+)
+def invalid_thickness(material: model.Material) -> Reports:
+    """Find a laminate without a thickness."""
+    card = material.integration
+    if card.thickness <= 0.0:
+        message = f"The total thickness is {card.thickness:g}; it must be positive."
+        yield Report(message, card.place("total thickness"))
+
+
+@rule(
+    "E407",
+    Subject.LAMINATE,
+    "The layers together are not as thick as MATE says.",
+    remedy="Stiffness follows the layers, inertia the card: they must agree.",
+)
+def layers_do_not_add_up(material: model.Material) -> Reports:
+    """Compare the sum of the layers with the total thickness, where both are valid."""
+    card, thicknesses = material.integration, [layer.thickness for layer in material.layers]
+    total, given = sum(thicknesses), card.thickness
+    if given <= 0.0 or any(h <= 0.0 for h in thicknesses):
+        return
+    if abs(total - given) > THICKNESS_TOLERANCE * given:
+        message = f"The layers are {total:g} thick together, the MATE card says {given:g}."
+        hint = "stiffness follows the layers, inertia the card: they must agree"
+        yield Report(message, card.place("total thickness"), hint)
+
+
+@rule(
+    "W433",
+    Subject.LAMINATE,
+    "E1 is below E2/2.",
+    remedy="E1 is the modulus along the fibres.",
+)
+def moduli_exchanged(problem: Problem) -> Reports:
+    """Find a ply that is stiffer across its fibres."""
+    ply = problem.deck.require(model.Material).ply
+    if ply.e1 / ply.e2 < LOWEST_RATIO:
+        why = "E1 is the modulus along the fibres"
+        message = f"E1 = {ply.e1:g} is less than half of E2 = {ply.e2:g}: {why}."
+        yield Report(message, ply.place("Young's modulus E1"))
+
+
+@rule(
+    "W434",
+    Subject.LAMINATE,
+    "NU12 is beyond 1, or as small as NU21.",
+    remedy="NU12 = NU21 E1/E2.",
+)
+def doubtful_poissons_ratio(problem: Problem) -> Reports:
+    """Find a ratio that no ply has, or that is the other one."""
+    ply = problem.deck.require(model.Material).ply
+    ratio, nu, place = ply.e1 / ply.e2, ply.nu12, ply.place(POISSONS_RATIO)
+    if abs(nu) > 1.0:
+        message = f"Poisson's ratio NU12 = {nu:g} is beyond 1: no ply has such a value."
+        yield Report(message, place, "NU12 of fibre composites is 0.2 to 0.4")
+    elif 0.0 < nu < 0.1 and ratio > 3.0 and 0.2 <= nu * ratio <= 0.45:
+        why = f"NU12 would be NU21 E1/E2 = {nu * ratio:.3g}"
+        message = f"Poisson's ratio NU12 = {nu:g} looks like NU21: {why}."
+        hint = "NU12 is the contraction across the fibres under a stress along them"
+        yield Report(message, place, hint)
+
+
+@rule(
+    "W431",
+    Subject.LAMINATE,
+    "A fibre angle is beyond ±180.",
+    remedy="Degrees, counter-clockwise from the x-axis.",
+)
+def large_angle(problem: Problem) -> Reports:
+    """Find angles of more than half a turn."""
+    for layer in problem.deck.require(model.Material).layers:
+        if abs(layer.angle) > LARGEST_ANGLE:
+            message = f"The fibre angle {layer.angle:g} is beyond {LARGEST_ANGLE:g} degrees."
+            hint = "angles are in degrees, counter-clockwise from the x-axis"
+            yield Report(message, layer.place("fibre angle"), hint)
+
+
+@rule(
+    "W432",
+    Subject.LAMINATE,
+    "All fibre angles are multiples of 5° in radians.",
+    remedy="Degrees.",
+)
+def angles_in_radians(problem: Problem) -> Reports:
+    """Find angles that look like radians."""
+    layers = problem.deck.require(model.Material).layers
+    turned = [layer for layer in layers if layer.angle]
+    if turned and are_like_radians([layer.angle for layer in turned]):
+        known = dict.fromkeys(layer.angle for layer in turned[:SHOWN_ANGLES])
+        shown = ", ".join(f"{angle:g} is {math.degrees(angle):.0f} degrees" for angle in known)
+        message = f"The fibre angles look like radians: {shown}."
+        yield Report(message, turned[0].place("fibre angle"), "angles are in degrees")
+
+
+def are_like_radians(angles: Sequence[float]) -> bool:
+    """Whether all angles are small multiples of 5 degrees in radians."""
+    sizes = np.abs(angles)
+    multiples = np.degrees(sizes) / 5.0
+    off = np.abs(multiples - np.rint(multiples))
+    return bool(((sizes > 0.08) & (sizes <= 1.6) & (off < 0.08)).all())
+
+
+def _is_too_thin(problem: Problem) -> bool:
+    thickness = problem.deck.require(model.Material).integration.thickness
+    return thickness < THINNEST * problem.longer_side
+
+
+def _thick_plate(problem: Problem) -> tuple[float, str]:
+    """Thickness over the distance between supports, and the beginning of a sentence about it."""
+    thickness = problem.deck.require(model.Material).integration.thickness
+    span = problem.span
+    share = thickness / span.length
+    return share, f"thickness {thickness:g} is {share:.2g} of the {span.name} {span.length:.4g}"
+
+
+@rule(
+    "W430",
+    Subject.LAMINATE,
+    "The plate is far too thin, or too thick.",
+    cause=(
+        "The thickness is below 10⁻⁴ of the longer side, or above 1/4 of the distance between "
+        "supports (without supports, of the shorter side)."
+    ),
+    remedy="One unit of length for thickness and coordinates.",
+)
+def impossible_thickness(problem: Problem) -> Reports:
+    """Find thicknesses for which there is no plate theory."""
+    card, side = problem.deck.require(model.Material).integration, problem.longer_side
+    thickness, place = card.thickness, card.place("total thickness")
+    hint = "thickness and coordinates must be in the same unit of length"
+    if _is_too_thin(problem):
+        of_side = f"{thickness / side:.2g} of the plate's longer side {side:g}"
+        message = f"The thickness {thickness:g} is {of_side}, less than {THINNEST:g}."
+        yield Report(message, place, hint)
+        return
+    share, what = _thick_plate(problem)
+    if share > THICKEST:
+        message = f"The {what}, more than {THICKEST:g}: plate theory does not hold; {ERRORS}."
+        yield Report(message, place, hint)
+
+
+@rule(
+    "N430",
+    Subject.LAMINATE,
+    "The thickness is above 1/10 of the distance between supports.",
+    cause="[Plate theory](assumptions.md#plate-theory) is off by more than 10 %.",
+    remedy="`SHEA EQUI`; a thinner plate, or elasticity in three dimensions.",
+)
+def thick_plate(problem: Problem) -> Reports:
+    """Find thicknesses at which plate theory is off."""
+    if _is_too_thin(problem):
+        return
+    share, what = _thick_plate(problem)
+    if THICK * (1.0 + 1e-9) < share <= THICKEST:
+        place = problem.deck.require(model.Material).integration.place("total thickness")
+        hint = "SHEA EQUI brings the deflection of this example to 1 % at 0.1"
+        yield Report(f"the {what}: {ERRORS}", place, hint)
+
+
+OF_MATERIAL = (
+    unknown_order,
+    unknown_stress_points,
+    invalid_constant,
+    impossible_poissons_ratio,
+    invalid_layer_thickness,
+    layer_out_of_order,
+    invalid_thickness,
+    layers_do_not_add_up,
+)
+VALUES = (
+    moduli_exchanged,
+    doubtful_poissons_ratio,
+    large_angle,
+    angles_in_radians,
+    impossible_thickness,
+    thick_plate,
+)

@@ -1,0 +1,263 @@
+"""Rules about nodes, elements and supports."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fecm._typing import Bools
+from fecm.deck import model
+from fecm.deck.rules import Report, Reports, Subject, declare, rule
+from fecm.mechanics.elements import CUBIC, TRIANGLE
+from fecm.mechanics.mesh import distinct, holds_the_plane
+from fecm.problem.generate import place_of_element
+from fecm.problem.parts import W
+from fecm.problem.problem import Problem
+from fecm.problem.rules.numbering import describe_elements, describe_nodes, report_elements
+
+CORNERS = TRIANGLE.corners
+THETA_X = 3  # dof theta_x, from 0
+FEW_SUPPORTS = 2  # nodes that hold w up to which they are no support
+# Distance of a mid-side node from its place along the side, over the side's length.
+OFF_PLACE = 0.05
+
+# Found while the mesh is generated, in generate.py.
+declare(
+    "E301",
+    Subject.MESH,
+    "A node, or one that is generated, is outside 1 to NUMNP.",
+    remedy="Correct node, increment or NUMNP.",
+)
+declare(
+    "E302",
+    Subject.MESH,
+    "A node follows itself, so nothing can be generated.",
+    remedy="No increment on the card before.",
+)
+declare(
+    "E303",
+    Subject.MESH,
+    "An element is outside 1 to NUMEL.",
+    remedy="Correct element or NUMEL.",
+)
+declare(
+    "E304",
+    Subject.MESH,
+    "Element numbers do not ascend.",
+    remedy="Sort the cards.",
+)
+declare(
+    "E305",
+    Subject.MESH,
+    "The first element is not element 1.",
+    remedy="Add the elements before it.",
+)
+
+
+def _report(problem: Problem, wrong: Bools, what: str, hint: str = "") -> Reports:
+    """Report the elements that are wrong, (numel,)."""
+    return report_elements(problem.deck, np.flatnonzero(wrong), what, hint)
+
+
+def _corner_missing(problem: Problem, count: int) -> Bools:
+    """Whether one of the first `count` nodes is missing, (numel,)."""
+    return np.asarray((problem.mesh.elements[:, :count] == 0).any(axis=1))
+
+
+def _is_pointed(problem: Problem) -> Bools:
+    """Whether elements end with their third node: those after it make a quadrilateral, (numel,)."""
+    return np.asarray(~(problem.mesh.elements[:, CORNERS:] != 0).any(axis=1))
+
+
+def _is_empty(problem: Problem) -> Bools:
+    """Whether elements have no nodes, (numel,)."""
+    return np.asarray(~(problem.mesh.elements != 0).any(axis=1))
+
+
+@rule(
+    "E308",
+    Subject.MESH,
+    "An element has no nodes.",
+    remedy="Add its nodes.",
+)
+def empty_element(problem: Problem) -> Reports:
+    """Find elements without nodes."""
+    yield from _report(problem, _is_empty(problem), "has no nodes")
+
+
+@rule(
+    "E309",
+    Subject.MESH,
+    "An element has a node outside 1 to NUMNP.",
+    remedy="Correct its own card, or the increment of the card before.",
+)
+def unknown_node(problem: Problem) -> Reports:
+    """Find elements with nodes that the mesh does not have."""
+    elements, numnp = problem.mesh.elements, len(problem.mesh.coordinates)
+    unknown = (elements < 0) | (elements > numnp)
+    hint = "its own card or the increment of the card before it is wrong"
+    wrong = np.asarray(unknown.any(axis=1))
+    yield from _report(problem, wrong, f"has a node outside 1 to {numnp}", hint)
+
+
+@rule(
+    "E310",
+    Subject.MESH,
+    "An element lacks a corner.",
+    remedy="Give a triangle three corners, the others four.",
+)
+def missing_corner(problem: Problem) -> Reports:
+    """Find elements that lack one of their corners."""
+    pointed = _is_pointed(problem)
+    wrong = _corner_missing(problem, CORNERS) & pointed & ~_is_empty(problem)
+    hint = "an element that ends with its third node is a triangle, any other has four corners"
+    yield from _report(problem, wrong, "lacks one of its three corners", hint)
+    wrong = _corner_missing(problem, CORNERS + 1) & ~pointed
+    yield from _report(problem, wrong, "lacks one of its four corners")
+
+
+@rule(
+    "E312",
+    Subject.MESH,
+    "An element has a node twice.",
+    remedy="Correct the card.",
+)
+def repeated_node(problem: Problem) -> Reports:
+    """Find elements with a node twice."""
+    ordered = np.sort(problem.mesh.elements, axis=1)
+    repeated = ((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] != 0)).any(axis=1)
+    yield from _report(problem, repeated, "has a node twice")
+
+
+@rule(
+    "E306",
+    Subject.MESH,
+    "Nodes have no coordinates.",
+    remedy="Add COOR cards for them.",
+)
+def nodes_without_coordinates(problem: Problem) -> Reports:
+    """Find nodes that no COOR card gives or generates."""
+    missing = np.flatnonzero(~problem.mesh.given)
+    if len(missing):
+        place = problem.deck.require(model.Coordinates).place()
+        yield Report(f"{describe_nodes(missing)} without coordinates.", place)
+
+
+@rule(
+    "E307",
+    Subject.MESH,
+    "Nodes are in no element.",
+    remedy="Remove them, or correct the elements.",
+)
+def nodes_in_no_element(problem: Problem) -> Reports:
+    """Find nodes that no element has."""
+    unused = np.flatnonzero(problem.mesh.given & ~problem.mesh.used)
+    if len(unused):
+        place = problem.deck.require(model.Elements).place()
+        yield Report(f"{describe_nodes(unused)} in no element.", place)
+
+
+@rule(
+    "E311",
+    Subject.MESH,
+    "Every dof is restrained.",
+    remedy="BOUN restrains supports only.",
+)
+def nothing_free(problem: Problem) -> Reports:
+    """Find a plate that can't move at all."""
+    if not problem.mesh.number_of_equations:
+        yield Report("Every dof of the plate is restrained.", problem.deck.place())
+
+
+@rule(
+    "W314",
+    Subject.MESH,
+    "Nodes are in the place of another node.",
+    cause="The plate is cut there.",
+    remedy="Give the elements the same node.",
+)
+def coincident_nodes(problem: Problem) -> Reports:
+    """Find nodes with the same coordinates."""
+    coordinates = problem.mesh.coordinates
+    order = np.lexsort(coordinates.T)
+    sorted_places = coordinates[order]
+    same = (sorted_places[1:] == sorted_places[:-1]).all(axis=1)
+    if same.any():
+        rows = distinct(np.concatenate([order[1:][same], order[:-1][same]]))
+        message = f"{describe_nodes(rows)} in the place of another node: the plate is cut there."
+        yield Report(message, problem.deck.require(model.Coordinates).place())
+
+
+@rule(
+    "W323",
+    Subject.MESH,
+    "A side node is away from its place by more than 5 % of the side.",
+    cause="Its place is the middle of the side, in cubic elements the third point.",
+    remedy="Correct the coordinates.",
+)
+def side_node_off_place(problem: Problem) -> Reports:
+    """Find nodes on sides that are off the middle or the third points, seen along the side."""
+    mesh = problem.mesh
+    wrong: list[int] = []
+    for family in problem.families:
+        if family.shape is TRIANGLE:
+            continue
+        thirds = family.shape is CUBIC
+        for place in range(4, 12 if thirds else 8):
+            if not family.present[place]:
+                continue
+            start = place % 4 if place < 8 else (place - 1) % 4  # 9 to 12 precede a corner
+            end = (start + 1) % 4
+            share = 0.5 if not thirds else 1.0 / 3.0 if place < 8 else 2.0 / 3.0
+            corners = mesh.coordinates[mesh.elements[family.rows][:, [start, end]] - 1]
+            node = mesh.coordinates[mesh.elements[family.rows, place] - 1]
+            side = corners[:, 1] - corners[:, 0]
+            with np.errstate(all="ignore"):
+                along = ((node - corners[:, 0]) * side).sum(axis=1) / np.square(side).sum(axis=1)
+            wrong += family.rows[np.abs(along - share) > OFF_PLACE].tolist()
+    if not wrong:
+        return
+    rows = distinct(wrong).astype(np.intp)
+    off = f"away from their places by more than {OFF_PLACE:.0%} of the side"
+    message = f"Side nodes of {describe_elements(rows)} are {off}."
+    hint = "put them at the middle of the side, in cubic elements at its third points"
+    yield Report(message, place_of_element(problem.deck, int(rows[0]) + 1), hint)
+
+
+@rule(
+    "W319",
+    Subject.MESH,
+    "w is restrained at one or two nodes only.",
+    remedy="Restrain every node of a supported edge. A free plate needs no support.",
+)
+def too_few_supports(problem: Problem) -> Reports:
+    """Find a plate that one or two nodes support, unless symmetry holds its rotations."""
+    held = problem.mesh.equations == 0
+    count = int(held[:, W].sum())
+    if 0 < count <= FEW_SUPPORTS and held[:, THETA_X:].any(axis=1).sum() <= FEW_SUPPORTS:
+        segment = problem.deck.last(model.Boundary)
+        message = f"w is restrained at {count} node{'s' if count > 1 else ''} only."
+        hint = "restrain w at every node of a supported edge; a free plate needs no support"
+        yield Report(message, None if segment is None else segment.place(), hint)
+
+
+@rule(
+    "W318",
+    Subject.MESH,
+    "B is not zero, and u and v are restrained at every node.",
+    cause="The plate is too stiff.",
+    remedy="Restrain u and v only where a support holds them. `fecm new` does so.",
+)
+def held_plane_of_coupled_laminate(problem: Problem) -> Reports:
+    """Find in-plane restraints at every node of a laminate whose B is not zero."""
+    if holds_the_plane(problem.mesh.codes) and problem.laminate.is_coupled:
+        boundary = problem.deck.last(model.Boundary)
+        why = "the plate is stiffer than its laminate"
+        message = f"B is not zero, and u and v are restrained at every node: {why}."
+        hint = "restrain u and v only where a support holds them"
+        yield Report(message, boundary.place() if boundary else None, hint)
+
+
+OF_ELEMENTS = (empty_element, unknown_node, missing_corner, repeated_node)
+OF_NODES = (nodes_without_coordinates, nodes_in_no_element, nothing_free)
+OF_PLACES = (coincident_nodes,)
+OF_SUPPORTS = (side_node_off_place, too_few_supports, held_plane_of_coupled_laminate)

@@ -1,0 +1,294 @@
+"""Rules about the PATC segment."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fecm._typing import Bools, Indices
+from fecm.deck import model
+from fecm.deck.macros import flat
+from fecm.deck.rules import Report, Reports, Subject, reports, rule
+from fecm.mechanics.mesh import Mesh, longest_sides
+from fecm.mechanics.points import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError, locate
+from fecm.problem.contact_estimates import expected_peak
+from fecm.problem.parts import W
+from fecm.problem.problem import ContactPatch, Problem
+from fecm.problem.rules.contact import sphere_radius
+
+LARGE = 2.0  # radius of a patch over the thickness, and over that of the contact
+
+
+@rule(
+    "E442",
+    Subject.POINTS,
+    "The shape on PATC's card is unknown.",
+    remedy="DISC is a uniform pressure, HERT Hertz's.",
+)
+def unknown_shape(problem: Problem) -> Reports:
+    """Find words other than those of the shapes."""
+    card = problem.deck.require(model.Patch)
+    if card.shape not in RADIUS_PER_THICKNESS:
+        message = f"`{card.shape}` is not a shape of a patch."
+        hint = f"{DISC} is a uniform pressure, {HERTZ} is Hertz's"
+        yield Report(message, card.place("shape"), hint)
+
+
+@rule(
+    "E443",
+    Subject.POINTS,
+    "The radius of the patch is not positive.",
+    remedy="A blank takes 0.327 h (HERT: 0.377 h).",
+)
+def invalid_radius(problem: Problem) -> Reports:
+    """Find a patch without an area."""
+    card = problem.deck.require(model.Patch)
+    if card.radius is not None and not card.radius > 0.0:
+        message = f"The radius of the patch is {card.radius:g}; it must be positive."
+        hint = "a blank takes 0.327 times the thickness (HERT: 0.377)"
+        yield Report(message, card.place("radius c"), hint)
+
+
+@rule(
+    "E444",
+    Subject.POINTS,
+    "The patch has only one of x0 and y0, or none without ROD.",
+    remedy="Both, or neither with ROD.",
+)
+def incomplete_centre(problem: Problem) -> Reports:
+    """Find a patch without a centre."""
+    card = problem.deck.require(model.Patch)
+    if (card.x is None) != (card.y is None):
+        given, missing = ("y0", "x0") if card.x is None else ("x0", "y0")
+        message = f"The centre of the patch has {given}, but no {missing}."
+        hint = "give both coordinates, or leave both blank for the node of ROD"
+        yield Report(message, card.place(f"centre {missing}"), hint)
+    elif card.x is None and not problem.deck.has(model.Impact):
+        message = "The patch has no centre, and the deck no ROD segment."
+        yield Report(message, card.place(), "give x0 and y0 on the card of PATC")
+
+
+@reports("E409")
+def patch_without_w(problem: Problem) -> Reports:
+    """Find an impact dof that a pressure does not push."""
+    impact = problem.deck.last(model.Impact)
+    if impact is not None and impact.dof != W + 1:
+        message = f"With a patch the impact unknown is 3 (w), not {impact.dof}."
+        yield Report(message, impact.place("impact unknown"), "a pressure pushes w")
+
+
+@rule(
+    "E445",
+    Subject.POINTS,
+    "A part of the patch is off the plate, or w is restrained under it.",
+    remedy="A smaller radius, another centre.",
+)
+def patch_off_the_plate(problem: Problem) -> Reports:
+    """Find a patch that is not wholly on free elements."""
+    card = problem.deck.require(model.Patch)
+    try:
+        patch = problem.patch
+    except PatchError as error:
+        reason = str(error)
+        hint = (
+            "the whole circle must be on the plate: a smaller radius, another centre, or a point "
+            "force without PATC (fecm new --patch none)"
+        )
+        yield Report(f"{reason[0].upper()}{reason[1:]}.", card.place(), hint)
+        return
+    if patch is not None and (held := _held(problem, patch)):
+        message = f"w of {held} under the patch is restrained."
+        yield Report(message, card.place(), "a BOUN card restrains it")
+
+
+def _held(problem: Problem, patch: ContactPatch) -> str:
+    """Name a node or a side under a patch whose w is restrained; empty if there is none."""
+    mesh = problem.mesh
+    held = mesh.codes[:, W] != 0
+    centre = np.array([patch.x, patch.y])
+    near = np.hypot(*(mesh.coordinates - centre).T) <= patch.radius
+    if (held & near).any():
+        return f"node {np.argmax(held & near) + 1}"
+    for family in problem.families:
+        local = np.stack([family.shape.xi, family.shape.eta], axis=1)[family.present]
+        for a in range(family.shape.corners):
+            b = (a + 1) % family.shape.corners
+            (x, y), (from_x, from_y) = local[b] - local[a], (local - local[a]).T
+            on_side = np.abs(x * from_y - y * from_x) < 1e-9
+            nodes = family.nodes[held[family.nodes[:, on_side]].all(axis=1)]
+            start, end = mesh.coordinates[nodes[:, a]], mesh.coordinates[nodes[:, b]]
+            side = end - start
+            t = ((centre - start) * side).sum(axis=1) / (side**2).sum(axis=1)
+            nearest = start + np.clip(t, 0.0, 1.0)[:, None] * side
+            under = np.hypot(*(nearest - centre).T) <= patch.radius
+            if under.any():
+                first, last = nodes[under][0, [a, b]] + 1
+                return f"the side from node {first} to node {last}"
+    return ""
+
+
+@rule(
+    "W447",
+    Subject.POINTS,
+    "The radius is smaller than the side of the patch's element.",
+    cause="Strains near the patch depend on the mesh, and the peak force is too high.",
+    remedy=(
+        "A finer mesh at the patch; `fecm check --mesh-error`: see "
+        "[checking a deck](making.md#checking)."
+    ),
+)
+def patch_smaller_than_element(problem: Problem) -> Reports:
+    """Find a patch that the mesh does not resolve, where its radius is given or stresses stored.
+
+    The default radius belongs to plate theory; few meshes resolve it, and only stresses need it.
+    """
+    card, patch = problem.deck.require(model.Patch), problem.patch
+    needed = card.radius is not None or any(m.word == "PLYS" for m in problem.deck.macros)
+    if patch is None or not needed:
+        return
+    at = np.array([[patch.x, patch.y]])
+    here = np.concatenate([block.rows[locate(block, at)[0]] for block in problem.families])
+    side = _longest_side(problem.mesh, here)
+    if patch.radius < side * (1.0 - 1e-9):
+        message = (
+            f"The radius of the patch, {patch.radius:.4g}, is smaller than the side of its "
+            f"element, {side:.4g}: strains and stresses near the patch depend on the mesh, and "
+            "the peak force is too high (measured: up to 0.7 % at half the side, 1.5 to 6 % at a "
+            "quarter)."
+        )
+        hint = "refine the mesh at the patch; fecm check --mesh-error shows the effect on the peak"
+        yield Report(message, card.place("radius c"), hint)
+
+
+def _longest_side(mesh: Mesh, rows: Indices | Bools) -> float:
+    """Longest side of the elements in some rows."""
+    return float(longest_sides(mesh.elements[rows], mesh.coordinates).max(initial=0.0))
+
+
+@rule(
+    "W474",
+    Subject.POINTS,
+    "PATC with commas has a blank radius.",
+    cause="The values after it are centre and static load.",
+    remedy="`DISC,1.,50.,50.`: columns 5–10 need no field of their own.",
+)
+def blank_radius(problem: Problem) -> Reports:
+    """Find a card with commas whose blank field was meant for the columns 5-10 it skips.
+
+    The values are then centre and load instead of radius and centre, and the centre that was meant
+    is nearer to the impact node.
+    """
+    card = problem.deck.last(model.Patch)
+    if card is None or card.radius is not None or card.x is None or card.y is None:
+        return
+    if not card.load or card.source is None or "," not in card.source.card.data:
+        return
+    x, y = problem.mesh.coordinates[problem.deck.require(model.Impact).node - 1]
+    if math.hypot(card.y - x, card.load - y) >= math.hypot(card.x - x, card.y - y):
+        return
+    shape, _, *others = (text for _, text in card.source.card.cut(card.source.fields))
+    message = (
+        f"The radius on PATC is blank; the values after it are the centre ({card.x:g}, {card.y:g}) "
+        f"and a static load of {card.load:g}."
+    )
+    meant = ",".join([shape, *others])
+    hint = f"if {card.x:g} is the radius, the card is `{meant}`: a comma ends a field, no columns"
+    yield Report(message, card.place("radius c"), hint)
+
+
+@rule(
+    "N473",
+    Subject.POINTS,
+    "The patch is away from ROD's node.",
+    cause=(
+        "It is further than its radius and the sides of the elements there. The force acts on the "
+        "patch."
+    ),
+    remedy="x0 and y0 blank for the node of ROD.",
+)
+def patch_away_from_node(problem: Problem) -> Reports:
+    """Find a patch that is away from the impact node."""
+    patch, mesh, impact = problem.patch, problem.mesh, problem.deck.require(model.Impact)
+    if patch is None:
+        return
+    x, y = mesh.coordinates[impact.node - 1]
+    side = _longest_side(mesh, (mesh.elements == impact.node).any(axis=1))
+    distance = math.hypot(patch.x - x, patch.y - y)
+    if distance > max(patch.radius, side):
+        message = (
+            f"the contact force acts on the patch at ({patch.x:g}, {patch.y:g}), {distance:.3g} "
+            f"from node {impact.node} of ROD at ({x:g}, {y:g}), whose place is not used"
+        )
+        place = problem.deck.require(model.Patch).place("centre x0")
+        yield Report(message, place, "leave x0 and y0 blank for the node of ROD")
+
+
+def _large_patch(problem: Problem) -> str:
+    """What is said of a patch far larger than thickness and contact; empty for another."""
+    card, thickness = problem.deck.last(model.Patch), problem.laminate.thickness
+    if card is None or card.radius is None or card.radius <= LARGE * thickness:
+        return ""
+    law = problem.deck.require(model.Indentation)
+    with np.errstate(all="ignore"):
+        indentation = (expected_peak(problem.deck, problem.plate) / law.k) ** (2.0 / 3.0)
+        contact = math.sqrt(sphere_radius(problem.deck) * indentation)
+    if not card.radius > LARGE * contact > 0.0:
+        return ""
+    return (
+        f"radius of the patch, {card.radius:g}, is {card.radius / thickness:.2g} times the "
+        f"thickness; a sphere with this k touches on a radius of about {contact:.2g}"
+    )
+
+
+def _judges_stresses(problem: Problem) -> bool:
+    """Whether stresses under the load are stored or judged."""
+    return any(macro.word in ("FAIL", "PLYS") for macro in flat(problem.program))
+
+
+def _radius_hint(card: model.Patch) -> str:
+    return f"a blank takes {RADIUS_PER_THICKNESS[card.shape]:g} times the thickness"
+
+
+@rule(
+    "W475",
+    Subject.POINTS,
+    "The radius of the patch looks like that of the indenter.",
+    cause="It is more than twice the thickness, and more than twice that of the contact.",
+    remedy="The radius of the contact, or blank for 0.327 h.",
+)
+def large_patch(problem: Problem) -> Reports:
+    """Find a large patch where stresses under the load are judged."""
+    if _judges_stresses(problem) and (what := _large_patch(problem)):
+        card = problem.deck.require(model.Patch)
+        message = (
+            f"The {what}. It looks like the radius of the indenter: stresses and exposures under "
+            "the load would be too small."
+        )
+        yield Report(message, card.place("radius c"), _radius_hint(card))
+
+
+@rule(
+    "N475",
+    Subject.POINTS,
+    "The radius of the patch is large, but only the force depends on it.",
+    cause="As W475, where the program has neither FAIL nor PLYS.",
+    remedy="The radius of the contact, or blank for 0.327 h.",
+)
+def large_patch_without_stresses(problem: Problem) -> Reports:
+    """Find a large patch that may be meant so that a coarse mesh resolves it."""
+    if not _judges_stresses(problem) and (what := _large_patch(problem)):
+        card = problem.deck.require(model.Patch)
+        yield Report(f"the {what}", card.place("radius c"), _radius_hint(card))
+
+
+# One of these is enough.
+OF_PATCH = (
+    unknown_shape,
+    invalid_radius,
+    incomplete_centre,
+    patch_without_w,
+    patch_off_the_plate,
+    patch_smaller_than_element,
+)
+VALUES = (blank_radius, patch_away_from_node, large_patch, large_patch_without_stresses)

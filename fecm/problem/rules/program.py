@@ -1,0 +1,241 @@
+"""Rules about the macro program: its length, what it stores, and whether anything moves."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fecm.deck import model
+from fecm.deck.macros import MOST_MACROS, every, flat
+from fecm.deck.records import Macro
+from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.mechanics.ply_stresses import is_complete
+from fecm.problem.problem import Problem
+
+LARGE_OUTPUT = 10**9
+# Macros that move the plate or find its modes, and those that store its displacements.
+MOVE = {"RODP", "EXCD", "SOLV", "EIGE"}
+STORE = {"DISP", "STRE", "REAC"}
+OF_AN_IMPACT: tuple[type[model.Segment], ...] = (model.Impact, model.Indentation, model.Projectile)
+
+
+@rule(
+    "E509",
+    Subject.PROGRAM,
+    "The program executes too many macros.",
+    remedy="Nested LOOPs multiply.",
+)
+def endless_program(problem: Problem) -> Reports:
+    """Find a program that would run for days."""
+    if problem.work.macros > MOST_MACROS:
+        # 0.8 ms at start-up; the number may be beyond all floats.
+        from decimal import Context, Decimal
+
+        count = Decimal(problem.work.macros).normalize(Context(prec=3))
+        message = f"The program executes {count:g} macros, more than {MOST_MACROS:g}."
+        place = problem.deck.macros[0].place("macro")
+        yield Report(message, place, "nested LOOPs multiply")
+
+
+@rule(
+    "W510",
+    Subject.PROGRAM,
+    "A macro stores every N steps or passes, but there are fewer.",
+    remedy="A smaller N.",
+)
+def nothing_stored(problem: Problem) -> Reports:
+    """Find macros that are never reached at their N-th step or pass."""
+    sizes = problem.work
+    for macro in flat(problem.program):
+        if macro.word == "RODP" and every(macro) > max(1, sizes.steps):
+            what = f"RODP stores every {every(macro)} steps"
+            message = f"{what}, but the program takes only {sizes.steps}: no strains are stored."
+            yield Report(message, macro.place("value"))
+        if macro.word in ("DISP", "STRE", "PLYS", "FAIL") and not sizes.passes[macro.word]:
+            what = f"{macro.word} stores every {every(macro)} passes"
+            message = f"{what}, but no loop has so many: nothing is stored."
+            yield Report(message, macro.place("value"))
+
+
+@rule(
+    "W511",
+    Subject.PROGRAM,
+    "The program takes no step and stores nothing.",
+    remedy="Add macros.",
+)
+def idle_program(problem: Problem) -> Reports:
+    """Find a program without a result."""
+    if not problem.work.steps and not any(problem.work.passes.values()):
+        macros = problem.deck.macros
+        place = macros[0].place("macro") if macros else None
+        yield Report("The program takes no step and stores nothing.", place)
+
+
+def _cards(problem: Problem, *words: str) -> list[Macro]:
+    return [macro for macro in flat(problem.program) if macro.word in words]
+
+
+@rule(
+    "W449",
+    Subject.POINTS,
+    "Ply stresses under a point force grow without limit.",
+    cause="They depend on the mesh: the finer it is, the larger they are.",
+    remedy="PATC.",
+)
+def ply_stresses_under_point_force(problem: Problem) -> Reports:
+    """Find ply stresses of an impact without a contact patch."""
+    cards = _cards(problem, "PLYS", "FAIL")
+    if cards and problem.has_impact and problem.patch is None:
+        message = "Ply stresses under a point force grow without bound as the mesh is refined."
+        hint = "a PATC segment gives the contact force an area"
+        yield Report(message, cards[0].place("macro"), hint)
+
+
+@rule(
+    "W450",
+    Subject.POINTS,
+    "Elements without nine nodes have no interlaminar stresses.",
+    cause="They are NaN.",
+    remedy="9-node quadrilaterals.",
+)
+def no_interlaminar_stresses(problem: Problem) -> Reports:
+    """Find elements whose interlaminar stresses are not computed."""
+    cards = _cards(problem, "PLYS", "FAIL")
+    others = np.flatnonzero(~is_complete(problem.mesh.elements))
+    if cards and len(others):
+        what = f"Interlaminar stresses of {len(others)} elements without nine nodes"
+        message = f"{what} are not computed (element {others[0] + 1} first): they are NaN."
+        yield Report(message, cards[0].place("macro"))
+
+
+@rule(
+    "E448",
+    Subject.POINTS,
+    "The number of elements of PLYS can't be taken.",
+    cause=(
+        "There are fewer elements, several cards have different numbers, or the nearest ones are "
+        "asked for without a load."
+    ),
+    remedy="0 or a blank takes all.",
+)
+def wrong_number_of_elements(problem: Problem) -> Reports:
+    """Check the number of elements on the PLYS cards."""
+    cards, numel = _cards(problem, "PLYS"), problem.deck.control.numel
+    for card in cards:
+        if card.second > numel:
+            message = f"PLYS takes {card.second:g} elements; the deck has {numel}."
+            yield Report(message, card.place("second value"), "0 or a blank takes all elements")
+        elif card.second != cards[0].second:
+            message = "The PLYS cards take different numbers of elements."
+            yield Report(message, card.place("second value"), "give each the same number")
+    if cards and cards[0].second and not problem.has_impact and problem.patch is None:
+        message = "PLYS takes the elements nearest to the load, but nothing hits the plate."
+        hint = "leave the number blank for all elements"
+        yield Report(message, cards[0].place("second value"), hint)
+
+
+@rule(
+    "W512",
+    Subject.PROGRAM,
+    "The result will be large.",
+    cause="The macro that stores most of it is marked.",
+    remedy="A larger N of that macro; fewer elements of PLYS.",
+)
+def large_result(problem: Problem) -> Reports:
+    """Find results of gigabytes."""
+    if problem.output_bytes <= LARGE_OUTPUT:
+        return
+    word = max(problem.stored_bytes, key=problem.stored_bytes.__getitem__)
+    share = problem.stored_bytes[word]
+    message = (
+        f"The result will take {problem.output_bytes / 1e9:.3g} GB, {share / 1e9:.3g} GB of "
+        f"them for {word}."
+    )
+    storing = next(iter(_cards(problem, word)), None)
+    hint = f"{word} stores every N steps: take a larger N"
+    if word == "PLYS":
+        hint += ", or only the M elements nearest to the load: PLYS,,N,M"
+    yield Report(message, storing.place("value") if storing else None, hint)
+
+
+def _movers(problem: Problem) -> set[str]:
+    """Words of the program that move the plate."""
+    return MOVE & {macro.word for macro in problem.deck.macros}
+
+
+def _unused_segment(problem: Problem) -> model.Segment | None:
+    """First segment of an impact in a deck whose program has no RODP."""
+    if "RODP" in _movers(problem):
+        return None
+    found = (problem.deck.last(kind) for kind in OF_AN_IMPACT)
+    return next((segment for segment in found if segment is not None), None)
+
+
+def _storing_at_rest(problem: Problem) -> Macro | None:
+    """First macro of a program in which nothing moves the plate that stores or steps."""
+    movers = _movers(problem)
+    if not movers <= {"EXCD"} or problem.mesh.forces.any():
+        return None
+    return next((macro for macro in problem.deck.macros if macro.word in STORE | movers), None)
+
+
+def _without_impact(segment: model.Segment) -> str:
+    return f"The deck has a {segment.keyword} segment, but its program has no RODP"
+
+
+NO_RODP_HINT = "RODP takes an impact step; use it instead of EXCD"
+
+
+@rule(
+    "E519",
+    Subject.PROGRAM,
+    "ROD, EXPE or PROJ are without RODP, and nothing moves the plate.",
+    remedy="RODP instead of EXCD.",
+)
+def plate_at_rest(problem: Problem) -> Reports:
+    """Find an impact deck all of whose results would be 0."""
+    segment, stored = _unused_segment(problem), _storing_at_rest(problem)
+    if segment is not None and stored is not None:
+        what = _without_impact(segment)
+        message = f"{what}: the plate never moves, and all results would be 0."
+        yield Report(message, stored.place("macro"), NO_RODP_HINT)
+
+
+@rule(
+    "W520",
+    Subject.PROGRAM,
+    "ROD, EXPE or PROJ are without RODP: nothing hits.",
+    remedy="RODP, or remove the segments.",
+)
+def nothing_hits(problem: Problem) -> Reports:
+    """Find segments of an impact in another program."""
+    segment = _unused_segment(problem)
+    if segment is not None and _storing_at_rest(problem) is None and _movers(problem):
+        message = f"{_without_impact(segment)}: nothing hits the plate."
+        yield Report(message, segment.place(), NO_RODP_HINT)
+
+
+@rule(
+    "W518",
+    Subject.PROGRAM,
+    "EXCD is beside RODP.",
+    cause="The projectile stands still during EXCD.",
+    remedy="RODP only.",
+)
+def projectile_stands_still(problem: Problem) -> Reports:
+    """Find central differences in a program that takes impact steps."""
+    if {"RODP", "EXCD"} <= _movers(problem):
+        last = [macro for macro in problem.deck.macros if macro.word == "EXCD"][-1]
+        message = "EXCD moves the plate but not the projectile, which is at rest during the step."
+        yield Report(message, last.place("macro"), "RODP applies the loads of FORC too")
+
+
+OF_LENGTH = (endless_program,)
+OF_OUTPUT = (
+    nothing_stored,
+    idle_program,
+    ply_stresses_under_point_force,
+    no_interlaminar_stresses,
+    wrong_number_of_elements,
+    large_result,
+)
+OF_PURPOSE = (plate_at_rest, nothing_hits, projectile_stands_still)

@@ -1,0 +1,228 @@
+"""Rules about the PROJ segment, and about a projectile that no segment defines."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.deck import model
+from fecm.deck.rules import Report, Reports, Subject, declare, rule
+from fecm.deck.units import KNOWN, MASS, in_si, unit_names
+from fecm.mechanics.projectile import Rod, report_rod
+from fecm.problem.parts import build_projectile
+from fecm.problem.problem import Problem
+from fecm.problem.rules.numbering import ranges
+from fecm.problem.rules.units import looks_like
+
+# A rod's step is a full matrix of three times as many rows and columns as it has dofs.
+MOST_ROD_ELEMENTS = 500
+# One inch, pound and second in m, N and s.
+REPORT_UNITS = [KNOWN["length"]["in"], KNOWN["force"]["lbf"], KNOWN["time"]["s"]]
+# Mass of the projectile over that of the plate.
+LIGHTEST = 1.0e-4
+HEAVIEST = 2.0e3
+USUAL_MASS_RATIO = 10.0
+# Wave speed in the rod over that along the fibres: lead and polythene are above 1/30.
+SLOWEST = 1.0 / 30.0
+FASTEST = 30.0
+
+# Found while the diameters are generated, in generate.py.
+declare(
+    "E420",
+    Subject.IMPACT,
+    "A diameter is that of an element that the rod does not have.",
+    remedy="Correct PROJ.",
+)
+declare(
+    "E421",
+    Subject.IMPACT,
+    "Rod elements do not ascend.",
+    remedy="Sort the cards.",
+)
+
+
+@rule(
+    "E418",
+    Subject.IMPACT,
+    "The number of rod elements is out of range.",
+    remedy="0 is a rigid mass.",
+)
+def invalid_number_of_elements(card: model.Projectile) -> Reports:
+    """Find a rod of a negative number of elements, or of far too many."""
+    if not 0 <= card.elements <= MOST_ROD_ELEMENTS:
+        must = f"0 (a rigid mass) to {MOST_ROD_ELEMENTS}"
+        message = f"The projectile has {card.elements} rod elements; it must have {must}."
+        yield Report(message, card.place("number of rod elements"))
+
+
+@rule(
+    "E419",
+    Subject.IMPACT,
+    "Length, mass, modulus or density of the projectile is not positive.",
+    remedy="Positive numbers.",
+)
+def invalid_projectile(card: model.Projectile) -> Reports:
+    """Find values of a projectile that are not positive."""
+    values = [
+        (f"projectile's {'length' if card.elements else 'mass'}", card.size, "length or mass")
+    ]
+    if card.elements:
+        values.append(("rod's modulus", card.modulus, "rod's Young's modulus"))
+        values.append(("rod's density", card.density, "rod's density"))
+    for what, value, name in values:
+        if not value > 0.0:
+            yield Report(f"The {what} is {value:g}; it must be positive.", card.place(name))
+
+
+@rule(
+    "E423",
+    Subject.IMPACT,
+    "The transducer node does not exist.",
+    remedy="Blank is the middle.",
+)
+def unknown_transducer(card: model.Projectile) -> Reports:
+    """Find a transducer beyond the rod."""
+    if card.elements and not 0 <= card.transducer <= card.elements + 1:
+        what = f"The transducer node {card.transducer} does not exist"
+        message = f"{what}; the rod has nodes 1 to {card.elements + 1}."
+        yield Report(message, card.place("transducer node"), "blank is the middle")
+
+
+@rule(
+    "E422",
+    Subject.IMPACT,
+    "Rod elements have no diameter, or one that is not positive.",
+    remedy="The first and the last element, with an increment of 1 on the first card.",
+)
+def invalid_diameter(card: model.Projectile, diameters: Floats) -> Reports:
+    """Find elements of a rod without a diameter."""
+    missing = np.flatnonzero(np.isnan(diameters))
+    if len(missing):
+        message = f"Rod elements {ranges(missing + 1)} have no diameter."
+        hint = "give the first and the last element, with an increment of 1 on the first card"
+        yield Report(message, card.place("number of rod elements"), hint)
+    for record in card.diameters:
+        if not record.diameter > 0.0:
+            what = f"The diameter of rod element {record.element} is {record.diameter:g}"
+            yield Report(f"{what}; it must be positive.", record.place("diameter"))
+
+
+@rule(
+    "E429",
+    Subject.IMPACT,
+    "Mass or stiffness of the rod is beyond the range of numbers.",
+    remedy="Check the units of length, diameters, modulus and density.",
+)
+def rod_out_of_range(card: model.Projectile, diameters: Floats) -> Reports:
+    """Find a rod whose matrices overflow or vanish."""
+    rod = Rod(card.size, tuple(diameters.tolist()), card.modulus, card.density)
+    try:
+        with np.errstate(all="ignore"):
+            values = np.concatenate([rod.lumped_mass(), rod.stiffness().diagonal()])
+    except OverflowError:
+        values = np.array([np.inf])
+    if not ((values > 0.0) & np.isfinite(values)).all():
+        message = "The rod's mass or stiffness is beyond the range of numbers."
+        hint = "check the units of length, diameters, modulus and density"
+        yield Report(message, card.place("length or mass"), hint)
+
+
+@rule(
+    "W438",
+    Subject.IMPACT,
+    "The projectile is far too light, or too heavy, for the plate.",
+    cause="Its mass over that of the plate is outside 10⁻⁴ to 2000.",
+    remedy="Mass in force·time²/length: t in mm, N and s.",
+)
+def doubtful_mass(problem: Problem) -> Reports:
+    """Find masses in another unit."""
+    deck, plate, projectile = problem.deck, problem.plate, build_projectile(problem.deck)
+    ratio = projectile.total_mass / (plate.area() * plate.laminate.mass)
+    if LIGHTEST <= ratio <= HEAVIEST:
+        return
+    mass, names = projectile.total_mass, unit_names(deck)
+    message = f"The projectile's mass {mass:.4g} is {ratio:.3g} times the plate's"
+    own = in_si(MASS, names)
+    usual = USUAL_MASS_RATIO * mass / ratio * (own or 1.0)
+    if own is not None and (looks := looks_like(mass, MASS, usual, names)):
+        message += f"; it {looks}"
+    card, impact = deck.last(model.Projectile), deck.require(model.Impact)
+    place = impact.place("impact node") if card is None else card.place("length or mass")
+    hint = "mass is force time^2/length in the deck's units: t in mm, N and s"
+    yield Report(f"{message}.", place, hint)
+
+
+@rule(
+    "W439",
+    Subject.IMPACT,
+    "The wave speed in the rod does not suit that along the fibres.",
+    cause="Their ratio is outside 1/30 to 30.",
+    remedy="Modulus and density in the ply's units.",
+)
+def doubtful_rod(problem: Problem) -> Reports:
+    """Find moduli and densities of a rod in other units than those of the ply."""
+    card, projectile = problem.deck.last(model.Projectile), build_projectile(problem.deck)
+    if card is None or not isinstance(projectile, Rod):
+        return
+    ply = problem.deck.require(model.Material).ply
+    speed = math.sqrt(projectile.modulus / projectile.density)
+    share = speed / math.sqrt(ply.e1 / ply.density)
+    if not SLOWEST <= share <= FASTEST:
+        what = f"The wave speed in the rod, (E/density)^(1/2) = {speed:.3g}"
+        message = f"{what}, is {share:.2g} times that along the plate's fibres."
+        hint = "modulus and density must be in the units of the ply's"
+        yield Report(message, card.place("rod's Young's modulus"), hint)
+
+
+def _takes_the_reports_rod(problem: Problem) -> bool:
+    return not problem.deck.has(model.Projectile)
+
+
+def _has_the_reports_units(names: dict[str, str]) -> bool:
+    """Whether units are those of the report's rod; True where they are unknown."""
+    return not names or [in_si(name, names) for name in names] == REPORT_UNITS
+
+
+@rule(
+    "N414",
+    Subject.IMPACT,
+    "There is no PROJ: the report's steel rod is taken.",
+    cause="The deck is without UNIT, or in in, lbf and s.",
+    remedy="Give PROJ for another projectile.",
+)
+def reports_rod(problem: Problem) -> Reports:
+    """Find a deck in the report's units without a projectile."""
+    if _takes_the_reports_rod(problem) and _has_the_reports_units(unit_names(problem.deck)):
+        place = problem.deck.require(model.Impact).place("impact node")
+        yield Report("no PROJ: the report's steel rod (in, lbf, s) is taken", place)
+
+
+@rule(
+    "W414",
+    Subject.IMPACT,
+    "There is no PROJ in a deck of other units than in, lbf and s.",
+    cause="The report's rod is taken as if the deck were in these.",
+    remedy="Give PROJ.",
+)
+def reports_rod_in_other_units(problem: Problem) -> Reports:
+    """Find a deck in other units without a projectile."""
+    if not _takes_the_reports_rod(problem) or _has_the_reports_units(unit_names(problem.deck)):
+        return
+    rod = report_rod()
+    message = (
+        f"No projectile is defined: the report's steel rod is assumed, in lb, in and s whatever "
+        f"the deck's units (length {rod.length:g}, diameter {rod.diameters[-1]:g}, "
+        f"E {rod.modulus:g}, density {rod.density:g}, mass {rod.total_mass:.5g})."
+    )
+    place = problem.deck.require(model.Impact).place("impact node")
+    yield Report(message, place, "define the projectile in a PROJ segment")
+
+
+OF_NUMBER = (invalid_number_of_elements,)
+OF_PROJECTILE = (invalid_projectile, unknown_transducer)
+# Of diameters without other errors; one of these is enough.
+OF_DIAMETERS = (invalid_diameter, rod_out_of_range)
+VALUES = (doubtful_mass, doubtful_rod)
+WITHOUT_PROJECTILE = (reports_rod, reports_rod_in_other_units)

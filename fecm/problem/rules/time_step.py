@@ -1,0 +1,153 @@
+"""Rules about the time step of the program."""
+
+from __future__ import annotations
+
+import math
+import sys
+
+from fecm.deck import model
+from fecm.deck.macros import STEPS
+from fecm.deck.records import Macro
+from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.mechanics.plate import UnsoundPlateError
+from fecm.mechanics.stiffness_product import SAFE
+from fecm.problem.problem import Problem
+
+# Fraction of the critical time step below which a step's change, of its square, is rounded off.
+LEAST_STEP = math.sqrt(sys.float_info.epsilon)
+WASTEFUL = 0.01  # time step over the stable one
+UNSTABLE = "E508"
+
+
+def deck_time_steps(problem: Problem) -> list[Macro]:
+    """The DT cards of a program."""
+    return [macro for macro in problem.deck.macros if macro.word == "DT"]
+
+
+def takes_steps(problem: Problem) -> bool:
+    """Whether a program takes time steps of a given length."""
+    words = {macro.word for macro in problem.deck.macros}
+    return "DT" in words and not STEPS.isdisjoint(words)
+
+
+def known_safe_step(problem: Problem) -> float | None:
+    """Lower bound of the critical time step; None where E417 says that there is none."""
+    try:
+        return problem.safe_time_step
+    except UnsoundPlateError:
+        return None
+
+
+def _needs_critical_step(problem: Problem) -> bool:
+    """Whether the bound does not show that every DT is stable."""
+    safe, values = problem.safe_time_step, [macro.value for macro in deck_time_steps(problem)]
+    return min(values) == 0.0 or max(values) >= safe
+
+
+@rule(
+    "E417",
+    Subject.IMPACT,
+    "The plate has no critical time step.",
+    cause="Numbers are out of range.",
+    remedy="Check the units of constants, thickness and coordinates.",
+)
+def no_critical_step(problem: Problem) -> Reports:
+    """Find plates whose stiffness or mass is no number."""
+    if not takes_steps(problem):
+        return
+    try:
+        if _needs_critical_step(problem):
+            _ = problem.critical_time_step
+    except UnsoundPlateError as error:
+        message = f"The plate has no critical time step: {error}."
+        hint = "check the units of the ply's constants, the thickness and the coordinates"
+        yield Report(message, problem.deck.require(model.Material).place(), hint)
+
+
+@rule(
+    "E515",
+    Subject.PROGRAM,
+    "DT is so small that rounding loses the motion.",
+    remedy="The unit of time; `DT 0` takes 0.9 of the critical step.",
+)
+def step_lost_by_rounding(problem: Problem) -> Reports:
+    """Find steps whose change of the displacements is rounded off."""
+    safe = known_safe_step(problem)
+    if safe is None or not takes_steps(problem):
+        return
+    for macro in deck_time_steps(problem):
+        if 0.0 < macro.value < LEAST_STEP * safe:
+            what = f"DT = {macro.value:.4g} is so far below the plate's critical time step"
+            message = f"{what} (about {safe:.4g}) that the motion is lost by rounding."
+            hint = "check the unit of time; DT without a number takes 0.9 of the critical step"
+            yield Report(message, macro.place("value"), hint)
+
+
+@rule(
+    UNSTABLE,
+    Subject.PROGRAM,
+    "DT is not below the critical time step.",
+    cause="The motion would grow without bound.",
+    remedy="A smaller DT, or `DT 0`. `--force` runs it.",
+)
+def unstable_step(problem: Problem) -> Reports:
+    """Compare every DT with the critical time step of the plate."""
+    if not takes_steps(problem) or not _needs_critical_step(problem):
+        return
+    critical = problem.critical_time_step
+    for macro in deck_time_steps(problem):
+        if macro.value >= critical:
+            what = f"DT = {macro.value:.4g} is not below the plate's critical time step"
+            message = f"{what} {critical:.4g}: the motion would grow without bound."
+            hint = f"take {0.95 * critical:.2g} or less; --force runs the deck nevertheless"
+            yield Report(message, macro.place("value"), hint)
+
+
+@rule(
+    "W517",
+    Subject.PROGRAM,
+    "DT is not below the stable step with the contact's stiffness.",
+    cause=(
+        "The plate moves explicitly under the contact force of the last step, so that the contact "
+        "acts on it as a spring. The contact may diverge."
+    ),
+    remedy="Check k and the masses, or a smaller DT.",
+)
+def unstable_contact(problem: Problem) -> Reports:
+    """Find steps that the contact makes unstable."""
+    contact = problem.contact_step
+    if contact is None:
+        return
+    for macro in deck_time_steps(problem):
+        dt = macro.value or SAFE * problem.safe_time_step
+        if dt >= contact.limit:
+            message = (
+                f"DT = {dt:.3g} is not below {contact.limit:.3g}, the stable "
+                f"step with the contact's stiffness of about {contact.stiffness:.3g} on a mass "
+                f"of {contact.mass:.3g}: the contact may diverge."
+            )
+            hint = f"check k and the masses, or take a DT of {0.9 * contact.limit:.2g}"
+            yield Report(message, macro.place("value"), hint)
+
+
+@rule(
+    "W516",
+    Subject.PROGRAM,
+    "DT is below 1/100 of the stable step.",
+    remedy="The unit of time.",
+)
+def wasteful_step(problem: Problem) -> Reports:
+    """Find steps far below the stable one."""
+    contact, bound = problem.contact_step, problem.safe_time_step
+    stable = bound if contact is None else min(bound, contact.limit)
+    for macro in deck_time_steps(problem):
+        dt = macro.value
+        if 0.0 < dt < WASTEFUL * stable:
+            message = f"DT = {dt:.3g} is only {dt / stable:.2g} of the stable step {stable:.3g}."
+            yield Report(message, macro.place("value"), "DT is in the deck's unit of time")
+
+
+OF_ROUNDING = (step_lost_by_rounding,)
+# Without a critical step, none can be compared with it.
+OF_PLATE = (no_critical_step, unstable_step)
+OF_CONTACT = (unstable_contact, wasteful_step)
