@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from fecm.deck.rules import Subject, declare
 
-# Frame of the file: findings.py, reader.py.
+# Frame of the file.
 declare(
     "E000",
     Subject.FRAME,
@@ -105,7 +105,7 @@ declare(
     ),
 )
 
-# Numbers: card.py.
+# Numbers.
 declare(
     "E101",
     Subject.NUMBERS,
@@ -168,7 +168,7 @@ declare(
     remedy="Separate values by commas.",
 )
 
-# Counts and words of segments: reader.py.
+# Counts and words of segments.
 declare(
     "E201",
     Subject.SEGMENTS,
@@ -194,7 +194,7 @@ declare(
     remedy="MITC, EQUI or both.",
 )
 
-# Grammar of the macro program: macros.py.
+# Grammar of the macro program.
 declare(
     "E501",
     Subject.PROGRAM,
