@@ -133,6 +133,9 @@ def test_findings_as_sarif_are_valid_and_have_their_place(folder: Path) -> None:
     first = run["results"][0]
     place = first["locations"][0]["physicalLocation"]
     assert (first["ruleId"], first["level"], rules[first["ruleIndex"]]) == ("E101", "error", "E101")
+    assert run["tool"]["driver"]["rules"][first["ruleIndex"]]["shortDescription"] == {
+        "text": "A field is not a number, or a whole number has a decimal point."
+    }
     assert place["artifactLocation"]["uri"] == "a%20folder/wrong.inp"
     line = WRONG.splitlines()[place["region"]["startLine"] - 1]
     assert place["region"]["snippet"]["text"] == line

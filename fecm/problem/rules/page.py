@@ -13,6 +13,8 @@ import fecm.deck.reader_rules
 import fecm.problem.check  # noqa: F401
 from fecm.deck.rules import RULES, Rule, Subject
 
+__all__ = ["RULES", "all_rules", "page"]
+
 HEAD = """\
 # Findings
 
