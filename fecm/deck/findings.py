@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from enum import StrEnum
+from typing import NamedTuple
 
 from fecm._errors import FecmError
-from fecm._frozen import frozen
 
 MOST = 1000  # largest number of errors, and of warnings, that are kept
 # Characters of a card, and of a message, that are shown.
@@ -30,8 +30,7 @@ class Severity(StrEnum):
 SEVERITIES = {"E": Severity.ERROR, "W": Severity.WARNING, "N": Severity.NOTE}  # by a code's letter
 
 
-@frozen
-class Place:
+class Place(NamedTuple):
     """Place of a value: line, first and last column, and the card's text."""
 
     line: int
@@ -41,8 +40,7 @@ class Place:
     field: str = ""
 
 
-@frozen
-class Finding:
+class Finding(NamedTuple):
     """One error, warning or note.
 
     Attributes

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from enum import StrEnum
-from functools import wraps
 from typing import NamedTuple, ParamSpec, TypeAlias
 
 from fecm.deck.findings import Finding, Findings, Place
@@ -67,10 +66,10 @@ def reports(code: str) -> Callable[[Callable[P, Reports]], Callable[P, list[Find
     """Give what a function reports a code that is declared elsewhere."""
 
     def decorate(function: Callable[P, Reports]) -> Callable[P, list[Finding]]:
-        @wraps(function)
         def find(*args: P.args, **kwargs: P.kwargs) -> list[Finding]:
             return [Finding(code, *report) for report in function(*args, **kwargs)]
 
+        find.__name__, find.__doc__ = function.__name__, function.__doc__
         return find
 
     return decorate
