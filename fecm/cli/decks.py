@@ -202,7 +202,7 @@ HOME = "https://fecm.readthedocs.io"
 def _sarif(checked: Mapping[Path, Sequence[Finding]], failures: Sequence[str]) -> dict[str, Any]:
     """SARIF 2.1.0: findings by deck, and messages about decks that could not be read."""
     # 0.3 ms, for the text of the reader's rules, which only SARIF shows.
-    from fecm.problem.rules.page import RULES
+    from fecm.problem.findings_page import RULES
 
     severities = {f.code: f.severity for findings in checked.values() for f in findings}
     codes = sorted(severities)

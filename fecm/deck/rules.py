@@ -4,7 +4,7 @@ A rule is declared once, with its code and its text.  Most are functions, decora
 :func:`rule`, that look at a segment or a problem and yield a :class:`Report` for each fault.  What
 is found while cards are read has no such function; ``reader_rules.py`` declares those codes.
 
-The page ``docs/findings.md`` is made of the declarations, see ``fecm/problem/rules/page.py``.
+The page ``docs/findings.md`` is made of the declarations, see ``fecm/problem/findings_page.py``.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """All rules, and the page ``docs/findings.md`` that is made of them.
 
-Write the page anew by ``python -m fecm.problem.rules.page docs/findings.md``.
+Write the page anew by ``python -m fecm.problem.findings_page docs/findings.md``.
 """
 
 from __future__ import annotations
