@@ -31,7 +31,8 @@ from run import seconds as processor_time
 import fecm
 from fecm.mechanics import kernels
 from fecm.sweeps.batch import _prepared
-from fecm.sweeps.cases import Case, Value, parse_vary
+from fecm.sweeps.case import Case, Value
+from fecm.sweeps.grid import parse_vary
 from fecm.sweeps.vary import apply_case
 
 DECK = HERE.parent / "decks" / "impact-115.inp"

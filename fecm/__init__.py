@@ -25,13 +25,13 @@ if TYPE_CHECKING:
     from fecm.deck.model import Deck
     from fecm.deck.reader import read_deck
     from fecm.deck.records import Ply
+    from fecm.identification.identify import Identification, identify
     from fecm.mechanics.plate_motion import DivergenceError
     from fecm.mechanics.projectile import RigidMass, Rod
     from fecm.results.result import Result, load
     from fecm.sweeps.api import sweep
-    from fecm.sweeps.identify import Identification, identify
     from fecm.sweeps.result import SweepResult
-    from fecm.sweeps.result import load as load_sweep
+    from fecm.sweeps.result_file import load as load_sweep
 
 __all__ = [
     "Contact",
@@ -69,7 +69,7 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "Deck": ("fecm.deck.model", "Deck"),
         "DeckError": ("fecm.deck.findings", "DeckError"),
         "DivergenceError": ("fecm.mechanics.plate_motion", "DivergenceError"),
-        "Identification": ("fecm.sweeps.identify", "Identification"),
+        "Identification": ("fecm.identification.identify", "Identification"),
         "Laminate": ("fecm.authoring.laminate", "Laminate"),
         "Plate": ("fecm.authoring.plate", "Plate"),
         "Ply": ("fecm.deck.records", "Ply"),
@@ -77,10 +77,10 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "RigidMass": ("fecm.mechanics.projectile", "RigidMass"),
         "Rod": ("fecm.mechanics.projectile", "Rod"),
         "SweepResult": ("fecm.sweeps.result", "SweepResult"),
-        "identify": ("fecm.sweeps.identify", "identify"),
+        "identify": ("fecm.identification.identify", "identify"),
         "impact": ("fecm.authoring.impact", "impact"),
         "load": ("fecm.results.result", "load"),
-        "load_sweep": ("fecm.sweeps.result", "load"),
+        "load_sweep": ("fecm.sweeps.result_file", "load"),
         "read_deck": ("fecm.deck.reader", "read_deck"),
         "read_one": ("fecm.api", "read_one"),
         "run": ("fecm.api", "run"),

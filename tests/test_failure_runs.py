@@ -20,7 +20,7 @@ from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import FailureMonitor, PlyStresses
 from fecm.results.sinks import MemorySink
 from fecm.simulation.run import simulate
-from fecm.sweeps.plan import without_output
+from fecm.sweeps.in_full import without_output
 from tests.builders import nothing, rules, square, table, with_restraints
 from tests.calls import call
 from tests.decks import PROGRAM, small

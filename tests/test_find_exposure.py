@@ -9,7 +9,7 @@ import pytest
 
 import fecm
 from fecm.results.metrics import EXPOSURES
-from fecm.sweeps.cases import CasesError
+from fecm.sweeps.case import CasesError
 from fecm.sweeps.find_exposure import ERROR, search
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, small

@@ -11,10 +11,12 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
+from fecm.deck.model import Indentation
+from fecm.identification.alignment import IdentifyError
 from fecm.plot.histories import fit_picture
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import filter_of
-from fecm.sweeps.alignment import IdentifyError
+from fecm.sweeps.case import CasesError
 from tests.calls import Done, assert_unusable, call
 from tests.decks import PROGRAM, small
 
@@ -67,6 +69,19 @@ def deviations(seed: int) -> list[float]:
 
 def test_the_true_parameters_are_found_from_a_noisy_force_of_another_mesh() -> None:
     assert np.abs(deviations(0)).max() < 2.5
+
+
+def test_the_fitted_deck_has_no_cards_of_the_deck_that_was_read() -> None:
+    deck = fecm.read_one(started().to_text())
+    found = fecm.identify(deck, TIME, measured(), ["k"])
+    assert deck.text
+    assert found.deck.text == ""
+    assert f"{found.values['k']:.5g}" == f"{found.deck.require(Indentation).k:.5g}"
+
+
+def test_velocity_and_energy_are_not_fitted_together() -> None:
+    with pytest.raises(CasesError, match="velocity and energy exclude each other"):
+        fecm.identify(started(), TIME, measured(), ["velocity", "energy"])
 
 
 @pytest.mark.long

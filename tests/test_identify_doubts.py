@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
+from fecm.identification.alignment import IdentifyError, level, noise, onset
 from fecm.studies import StudyError
-from fecm.sweeps.alignment import IdentifyError, level, noise, onset
 from tests.calls import call
 
 Floats = NDArray[np.float64]

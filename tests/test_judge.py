@@ -20,8 +20,8 @@ from fecm.results.linear_plate import LIMITS, InPlane, in_plane_of, softness
 from fecm.results.metrics import Indentation, Projectiles, summarise
 from fecm.results.summary import summary
 from fecm.results.validity import counted
-from fecm.sweeps.random_result import bounds, wilson
 from fecm.sweeps.result import SweepResult
+from fecm.sweeps.statistics import bounds, wilson
 from tests.builders import table
 from tests.calls import call
 from tests.decks import small

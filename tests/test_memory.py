@@ -22,7 +22,8 @@ from fecm.api import load_deck
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.memory import needed_bytes
 from fecm.problem.parts import build_plate
-from fecm.sweeps.plan import ADVANCED, KEPT, TOGETHER
+from fecm.sweeps.memory import ADVANCED_BYTES, HISTORY_BYTES
+from fecm.sweeps.plan import MOST_TOGETHER
 from tests.calls import assert_unusable, call
 from tests.decks import small
 
@@ -139,7 +140,9 @@ def test_the_estimate_of_a_sweep_bounds_what_is_measured(
         [sys.executable, "-c", program], capture_output=True, text=True, check=True
     )
     measured = int(done.stdout)
-    estimated = steps * (ADVANCED * min(cases, TOGETHER) + (KEPT * cases if history else 0))
+    estimated = steps * (
+        ADVANCED_BYTES * min(cases, MOST_TOGETHER) + (HISTORY_BYTES * cases if history else 0)
+    )
     assert measured <= estimated <= 2 * measured
 
 
@@ -156,7 +159,7 @@ def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(
     remedy: str,
 ) -> None:
     monkeypatch.setattr(fecm._memory, "available", lambda: free * MEGABYTE)
-    monkeypatch.setattr("fecm.sweeps.plan.ADVANCED", 30)  # with kernels or without
+    monkeypatch.setattr("fecm.sweeps.memory.ADVANCED_BYTES", 30)  # with kernels or without
     deck = tmp_path / "small.inp"
     deck.write_text(small().replace("LOOP         10", "LOOP       4500"))
     vary = ("--vary", "velocity=50:100:3000", "-o", tmp_path / "s.h5")

@@ -13,18 +13,10 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.results.errors import ResultFileError
-from fecm.sweeps.cases import (
-    DESIGNS,
-    CasesError,
-    Design,
-    DesignKind,
-    Law,
-    matrix,
-    random_cases,
-    unit_samples,
-)
+from fecm.sweeps.case import CasesError
 from fecm.sweeps.plan import plan
-from fecm.sweeps.random_result import QUANTILES, Indices, indices, wilson
+from fecm.sweeps.random import DESIGNS, Design, DesignKind, Law, matrix, random_cases, unit_samples
+from fecm.sweeps.statistics import QUANTILES, Indices, indices, wilson
 from tests.calls import Done, assert_unusable, call
 from tests.decks import DATA, DATA_CARDS, small
 

@@ -27,11 +27,16 @@ from fecm.problem.build import build_model
 from fecm.problem.parts import build_law, build_projectile
 from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
-from fecm.sweeps.cases import Case, CasesError, grid, parse_vary, read_cases
-from fecm.sweeps.plan import Outcome, Task, plan, shares_plate, tasks
-from fecm.sweeps.responses import Convolution, plate_response
+from fecm.sweeps.case import Case, CasesError
+from fecm.sweeps.cases import read_cases
+from fecm.sweeps.convolution import Convolution
+from fecm.sweeps.grid import grid, parse_vary
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.parts import OtherSweepError, PartialResults
+from fecm.sweeps.plan import Task, plan, shares_plate, tasks
+from fecm.sweeps.responses import plate_response
 from fecm.sweeps.result import SweepResult
-from fecm.sweeps.schedule import LOST, OtherSweepError, PartialResults, on_workers
+from fecm.sweeps.schedule import LOST, on_workers
 from fecm.sweeps.vary import apply_case
 from tests.calls import Done, call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, model, small
@@ -407,7 +412,7 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
 
 def test_a_scheduler_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr(schedule, "PATIENCE", "0.5s")
+    monkeypatch.setattr(schedule, "PATIENCE", 0.5)
     with pytest.raises(schedule.SchedulerError, match="127"):
         fecm.sweep(model(small()), {"k": [1e6]}, scheduler="tcp://127.0.0.1:9")
 
@@ -447,7 +452,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
 SIGNALLED = """
 import os, signal
 from fecm.__main__ import main
-from fecm.sweeps.schedule import PartialResults
+from fecm.sweeps.parts import PartialResults
 
 plain, stored = PartialResults.put, []
 

@@ -10,7 +10,7 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.sweeps.cases import Case
+from fecm.sweeps.case import Case
 from fecm.sweeps.doubts import JUDGED, doubtful_values
 from fecm.sweeps.vary import apply_case
 from tests.sound_plate import base, replaced, with_card

@@ -17,7 +17,7 @@ from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import RigidMass
 from fecm.results.metrics import SUMMARY
 from fecm.sweeps import batch
-from fecm.sweeps.plan import Status
+from fecm.sweeps.outcome import Status
 from fecm.sweeps.responses import Hits, Impacts, TipSteps, balance_errors, by_numpy, impacts
 from fecm.sweeps.vary import apply_case
 from tests.calls import call

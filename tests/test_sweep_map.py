@@ -15,7 +15,8 @@ import fecm
 from fecm._errors import FecmWarning
 from fecm.plot.kinds import PlotError
 from fecm.plot.pictures import draw
-from fecm.sweeps.result import SweepResult, save
+from fecm.sweeps.result import SweepResult
+from fecm.sweeps.result_file import save
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small
 from tests.pictures import OF_RUNS

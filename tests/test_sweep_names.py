@@ -15,8 +15,12 @@ from fecm.deck import Deck
 from fecm.deck.model import Impact, Indentation, Material, Patch
 from fecm.problem.generate import generate
 from fecm.results.exposures import largest_exposures
-from fecm.sweeps.cases import Case, CasesError, parse_vary, read_cases
+from fecm.sweeps import batch
+from fecm.sweeps.case import Case, CasesError
+from fecm.sweeps.cases import read_cases
+from fecm.sweeps.grid import parse_vary
 from fecm.sweeps.result import summary
+from fecm.sweeps.values import VARIABLES, Changes
 from fecm.sweeps.vary import apply_case
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, model, small
@@ -334,3 +338,49 @@ def test_a_support_of_an_unsymmetric_laminate_frees_the_plane_without_a_note(
     vary = ("--vary", "support=simple", "--vary", "layup=[0_4/90_4]", "-o", tmp_path / "s.h5")
     assert "B is not zero" not in call("sweep", deck, *vary).stderr
     assert new().require(Material).ply.e1 > 0.0
+
+
+# The table of values ------------------------------------------------------------------------------
+
+
+def test_the_table_of_the_page_on_sweeps_is_that_of_the_values() -> None:
+    signs = str.maketrans({"*": "·"})
+    rows = [
+        f"| `{name}` | {variable.dimension.translate(signs)} | {variable.meaning} | "
+        f"{'one for all cases' if variable.changes is Changes.STRIKE else 'one per value'} |"
+        for name, variable in VARIABLES.items()
+    ]
+    page = (Path(__file__).parent.parent / "docs" / "sweeps.md").read_text()
+    section = page.split("## What can be varied")[1].split("\n## ")[0]
+    assert [line for line in section.splitlines() if line.startswith("| `")] == rows
+
+
+def test_the_help_of_the_command_lists_every_name() -> None:
+    text = " ".join(call("sweep", "--help").stdout.split())
+    listed = text.split("Names: ")[1].split(".")[0]
+    assert listed.split(", ") == list(VARIABLES)
+
+
+@pytest.mark.parametrize("name", VARIABLES)
+def test_a_value_is_stored_in_the_unit_of_its_dimension(name: str) -> None:
+    units = {"length": "mm", "force": "N", "time": "s"}
+    found = fecm.SweepResult({}, {}, np.zeros(0), np.zeros(0), units=units)
+    expected = VARIABLES[name].dimension
+    for dimension, unit in units.items():
+        expected = expected.replace(dimension, unit)
+    assert found.unit(name) == expected
+
+
+def test_cases_that_differ_in_their_strikes_share_one_deck(monkeypatch: pytest.MonkeyPatch) -> None:
+    decks: list[Case] = []
+
+    def applied(deck: Deck, case: Case) -> Deck:
+        decks.append(case)
+        return apply_case(deck, case)
+
+    monkeypatch.setattr(batch, "apply_case", applied)
+    vary = {"angle": [30.0], "velocity": [60.0, 115.0], "k": [1e6, 2e6], "mass": [2e-4, 3e-4]}
+    found = fecm.sweep(model(small()), vary)
+    assert len(found) == 8
+    assert len(set(found["peak_force"].tolist())) == 8
+    assert decks == [{"angle": 30.0}]

@@ -15,10 +15,12 @@ import pytest
 from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.batch import run
-from fecm.sweeps.cases import grid
-from fecm.sweeps.plan import Outcome, Plan, Task, plan, tasks
-from fecm.sweeps.schedule import LOST, DamagedPartError, OtherSweepError, PartialResults, alone
-from fecm.sweeps.vary import with_time_step
+from fecm.sweeps.grid import grid
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.parts import DamagedPartError, OtherSweepError, PartialResults, alone
+from fecm.sweeps.plan import Plan, Task, plan, tasks
+from fecm.sweeps.schedule import LOST
+from fecm.sweeps.timing import with_time_step
 from tests.calls import assert_unusable, call
 from tests.decks import model, small
 from tests.kill_runs import SWEEP, SWEPT
@@ -32,7 +34,7 @@ def made() -> Plan:
 
 def test_a_part_with_any_byte_changed_or_cut_off_is_damaged(made: Plan, tmp_path: Path) -> None:
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
-    task = tasks(problem_of(made.deck), made)[0]
+    task = tasks(problem_of(made.settings.deck), made)[0]
     parts.put(task, run(task))
     (path,) = parts.folder.glob("task-*.npz")
     data = path.read_bytes()
@@ -57,7 +59,7 @@ def test_cases_lost_with_their_workers_are_not_stored_as_finished(
 
     monkeypatch.setattr(schedule, "attempt", attempt)
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
-    problem = problem_of(made.deck)
+    problem = problem_of(made.settings.deck)
     found = carry_out(problem, made, parts=parts)
     assert found.fine.tolist() == [False, True]
     assert [parts.get(task) is None for task in tasks(problem, made)] == [True, False]
@@ -79,7 +81,7 @@ def test_a_sweep_that_was_killed_before_its_first_plate_was_done_begins_again(
 
 def test_an_outcome_without_the_mark_of_its_sweep_is_not_taken(made: Plan, tmp_path: Path) -> None:
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
-    (task, *_) = tasks(problem_of(made.deck), made)
+    (task, *_) = tasks(problem_of(made.settings.deck), made)
     parts.put(task, run(task))
     (parts.folder / "sweep.json").unlink()
     with pytest.raises(OtherSweepError, match="another sweep"):

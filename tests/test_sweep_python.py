@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.sweeps.cases import CasesError
+from fecm.sweeps.case import CasesError
 from fecm.sweeps.schedule import SchedulerError
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small

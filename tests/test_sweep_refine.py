@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.deck.model import Deck, Patch
-from fecm.sweeps.cases import CasesError
+from fecm.sweeps.case import CasesError
 from fecm.sweeps.convergence import Convergence, convergence
 from fecm.sweeps.result import SweepResult
 from tests.builders import REPORT_PLY, table

@@ -102,7 +102,8 @@ def export(
         check_outputs([path], overwrite, [result])
     try:
         if target == "csv" and is_sweep:
-            from fecm.sweeps.result import csv_lines, sweep_of
+            from fecm.sweeps.csv import csv_lines
+            from fecm.sweeps.result_file import sweep_of
 
             cases = sweep_of(contents, history=name == "history")
             write_lines(csv_lines(cases, name), path, overwrite=overwrite)

@@ -24,9 +24,9 @@ from fecm.cli.options import (
 from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
 from fecm.deck.units import unit_names, unit_of
+from fecm.identification.identify import CARDS, FREE, Identification, fit
 from fecm.results.comparison import measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
-from fecm.sweeps.identify import CARDS, FREE, Identification, fit
 
 
 @frozen

@@ -89,8 +89,9 @@ def _about(contents: Contents) -> dict[str, Any]:
     """What is shown, under the keys of the JSON output."""
     is_sweep = contents.form == Form.SWEEP
     if is_sweep:
-        from fecm.sweeps.random_result import tables
-        from fecm.sweeps.result import summary, sweep_of
+        from fecm.sweeps.random_tables import tables
+        from fecm.sweeps.result import summary
+        from fecm.sweeps.result_file import sweep_of
 
         sweep = sweep_of(contents, history=False)
         random = [] if sweep.random is None else tables(sweep.random, sweep.unit)

@@ -22,18 +22,38 @@ from fecm.results import hdf5_writer
 from fecm.results.hdf5_reader import read
 from fecm.results.result import result_of
 from fecm.simulation.run import simulate
-from fecm.sweeps import cases as inputs
-from fecm.sweeps import plan as plans
 from fecm.sweeps.api import carry_out, check_draws, problem_of
 from fecm.sweeps.batch import deck_of
-from fecm.sweeps.convergence import refined_cases
+from fecm.sweeps.case import Case, CasesError, Value
+from fecm.sweeps.cases import read_cases
 from fecm.sweeps.convergence import table as table_of
-from fecm.sweeps.doubts import doubtful_values
-from fecm.sweeps.random_result import tables
-from fecm.sweeps.result import SweepResult, remarks, save, summary, verdict
-from fecm.sweeps.schedule import LOST, PartialResults, SchedulerError, address_in, alone
+from fecm.sweeps.doubts import doubtful_values, freed
+from fecm.sweeps.find import Until, parse_until
+from fecm.sweeps.grid import grid, parse_vary
+from fecm.sweeps.limits import Limit, parse_exceed
+from fecm.sweeps.memory import check_memory
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.parts import PartialResults, alone
+from fecm.sweeps.plan import MEASURES, Measure, Plan, Task, plan, shares_plate, tasks
+from fecm.sweeps.random import (
+    DESIGNS,
+    Design,
+    DesignKind,
+    Law,
+    cost,
+    design_of,
+    doubt,
+    parse_random,
+    random_cases,
+)
+from fecm.sweeps.random_tables import tables
+from fecm.sweeps.refine import refined_cases
+from fecm.sweeps.result import SweepResult, remarks, summary, verdict
+from fecm.sweeps.result_file import save
+from fecm.sweeps.schedule import LOST, SchedulerError, address_in
+from fecm.sweeps.values import NAMES
 
-NAMED = [f"{name}=" for name in inputs.NAMES]  # for the shell's completion
+NAMED = [f"{name}=" for name in NAMES]  # for the shell's completion
 
 
 GROUPS = {
@@ -50,17 +70,17 @@ class Options:
     """Argument and options of ``fecm sweep``; those of :func:`fecm.sweep` have its names."""
 
     deck: Path
-    vary: tuple[tuple[str, list[inputs.Value]], ...]
+    vary: tuple[tuple[str, list[Value]], ...]
     cases: Path | None  # table of the cases
     refine: tuple[int, ...] | None
-    random: tuple[tuple[str, inputs.Law], ...]
+    random: tuple[tuple[str, Law], ...]
     samples: int | None
     seed: int | None
-    design: inputs.DesignKind | None
+    design: DesignKind | None
     sensitivity: bool
-    exceed: tuple[inputs.Limit, ...]
+    exceed: tuple[Limit, ...]
     find: str | None
-    until: inputs.Until | None
+    until: Until | None
     output: Path | None
     history: bool
     measure: tuple[str, ...]
@@ -125,10 +145,9 @@ class Options:
 @click.argument("deck", type=DECK_PATH)
 @option(
     "--vary",
-    type=Parsed(inputs.parse_vary, "NAME=VALUES", NAMED),
+    type=Parsed(parse_vary, "NAME=VALUES", NAMED),
     multiple=True,
-    help="FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: "
-    f"{', '.join(inputs.NAMES)}.",
+    help=f"FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: {', '.join(NAMES)}.",
 )
 @option(
     "--cases",
@@ -145,7 +164,7 @@ class Options:
 )
 @option(
     "--random",
-    type=Parsed(inputs.parse_random, "NAME=LAW", NAMED),
+    type=Parsed(parse_random, "NAME=LAW", NAMED),
     multiple=True,
     help="Random value: normal:MEAN,SD, lognormal:MEDIAN,SIGMA, uniform:A,B or "
     "triangular:A,MODE,B; may be repeated, together with --vary.",
@@ -154,7 +173,7 @@ class Options:
 @option("--seed", type=int, metavar="S", help="Seed of --random.  [default: 0]")
 @option(
     "--design",
-    type=click.Choice(inputs.DESIGNS),
+    type=click.Choice(DESIGNS),
     help="Design of --random: Latin hypercube, Sobol' sequence, or independent draws (Monte "
     "Carlo).  [default: lhs]",
 )
@@ -165,7 +184,7 @@ class Options:
 )
 @option(
     "--exceed",
-    type=Parsed(inputs.parse_exceed, "QUANTITY=VALUE"),
+    type=Parsed(parse_exceed, "QUANTITY=VALUE"),
     multiple=True,
     help="Probability that a quantity of the summary exceeds a value; of peak_force also "
     "threshold, that of DELA.  May be repeated.",
@@ -177,7 +196,7 @@ class Options:
 )
 @option(
     "--until",
-    type=Parsed(inputs.parse_until, "QUANTITY=VALUE"),
+    type=Parsed(parse_until, "QUANTITY=VALUE"),
     help="What to reach: peak_force=NUMBER, peak_force=threshold (that of DELA), or "
     "exposure=NUMBER, the largest of FAIL outside the load, by full runs.",
 )
@@ -191,9 +210,9 @@ class Options:
 @option("--history", is_flag=True, help="Also store the contact force of every step.")
 @option(
     "--measure",
-    type=list_of("NAME,...", OneOf(plans.MEASURES)),
+    type=list_of("NAME,...", OneOf(MEASURES)),
     default=(),
-    help=f"Also store {', '.join(plans.MEASURES)}: the largest deflection, strains of gages "
+    help=f"Also store {', '.join(MEASURES)}: the largest deflection, strains of gages "
     "(GAGE), exposures (FAIL).",
 )
 @option(
@@ -244,12 +263,12 @@ def sweep(options: Options) -> None:
     scheduler = options.scheduler
     if options.scheduler_file is not None:
         scheduler = address_in(options.scheduler_file)
-    planned = plans.plan(
+    planned = plan(
         problem,
         cases,
         history=options.history,
         until=options.until,
-        extra=(plans.DEFLECTION,) if options.refine else options.measure,
+        extra=(Measure.DEFLECTION,) if options.refine else options.measure,
         design=design,
         limits=options.exceed,
     )
@@ -257,11 +276,11 @@ def sweep(options: Options) -> None:
     if not options.refine:
         note(*doubtful_values(problem, cases))
     if design is not None:
-        shared = plans.shares_plate(problem) and not planned.alone
-        note(*filter(None, (inputs.doubt(design), inputs.cost(cases, design, shared=shared))))
+        shared = shares_plate(problem) and not planned.settings.in_full
+        note(*filter(None, (doubt(design), cost(cases, design, shared=shared))))
     here = options.workers if scheduler is None else 0
-    plans.check_memory(problem, planned, here, streamed=True)
-    if count := plans.freed(plans.tasks(problem, planned)):
+    check_memory(problem, planned, here, streamed=True)
+    if count := freed(tasks(problem, planned)):
         note(
             f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the deck "
             "restrains at every node, are free there except where w is held"
@@ -270,7 +289,7 @@ def sweep(options: Options) -> None:
     click.get_current_context().with_resource(alone(path))
     parts = PartialResults(path, planned.fingerprint(), restart=options.overwrite)
     result = _carry_out(problem, planned, parts, options.workers, scheduler)
-    forces = parts.forces(plans.tasks(problem, planned)) if options.history else ()
+    forces = parts.forces(tasks(problem, planned)) if options.history else ()
     save(result, path, overwrite=options.overwrite, forces=forces)
     if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
         note(f"{lost} cases were lost with their workers; --overwrite runs them again")
@@ -298,23 +317,23 @@ def _problem(deck: Path) -> Problem:
         raise RefusedError(f"{count_findings(errors)}; nothing was run") from None
 
 
-def _cases(problem: Problem, options: Options) -> tuple[list[inputs.Case], inputs.Design | None]:
+def _cases(problem: Problem, options: Options) -> tuple[list[Case], Design | None]:
     """Cases of the sweep, and the design of random ones."""
     if options.refine:
         return refined_cases(problem, options.refine), None
-    given = inputs.grid(options.vary)
+    given = grid(options.vary)
     if options.cases is not None:
-        given = inputs.read_cases(options.cases)
+        given = read_cases(options.cases)
     if not options.random:
         return given, None
-    design = inputs.design_of(
+    design = design_of(
         dict(options.random),
         options.samples,
         options.seed or 0,
         options.design or "lhs",
         sensitivity=options.sensitivity,
     )
-    return inputs.random_cases(design, given), design
+    return random_cases(design, given), design
 
 
 def _full_runs(options: Options, count: int) -> dict[int, Path]:
@@ -338,7 +357,7 @@ def _print(result: SweepResult, path: Path) -> None:
 
 def _carry_out(
     problem: Problem,
-    planned: plans.Plan,
+    planned: Plan,
     parts: PartialResults,
     workers: int,
     scheduler: str | None,
@@ -351,7 +370,7 @@ def _carry_out(
         per_core = finished / seconds / workers if seconds else 0.0
         return f"{per_core:.3g} cases a second per worker" if finished else ""
 
-    def done(task: plans.Task, outcome: plans.Outcome) -> None:
+    def done(task: Task, outcome: Outcome) -> None:
         nonlocal finished
         finished += len(task.numbers)
         advance(len(task.numbers))
@@ -381,16 +400,16 @@ def _carry_out(
         raise
 
 
-def _run_in_full(planned: plans.Plan, fulls: dict[int, Path], *, overwrite: bool) -> None:
+def _run_in_full(planned: Plan, fulls: dict[int, Path], *, overwrite: bool) -> None:
     """Run chosen cases with all rows that their deck stores."""
     for case, path in fulls.items():
         try:
             prepared = load_deck(deck_of(planned, case))
             if errors := prepared.errors(force=True):
-                raise inputs.CasesError(errors[0].message)
+                raise CasesError(errors[0].message)
             with hdf5_writer.writing(path, overwrite=overwrite) as sink:
                 simulate(prepared.problems[0], sink)
-        except (inputs.CasesError, ArithmeticError) as error:
+        except (CasesError, ArithmeticError) as error:
             note(f"case {case} was not run in full: {error}")
             continue
         echo(f"  case {case:<12} {path}")

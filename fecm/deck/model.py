@@ -152,10 +152,9 @@ class Deck(Record):
         >>> deck.with_(velocity=60, layup="[0/90]5s").control.layers
         20
         """
-        from fecm.sweeps.cases import checked
-        from fecm.sweeps.vary import apply_case
+        from fecm.sweeps.vary import with_values  # the one import that climbs
 
-        return apply_case(self, *checked([values]))
+        return with_values(self, values)
 
     def to_text(self) -> str:
         """Write the problem as cards, ended by STOP; reading them gives the same model.

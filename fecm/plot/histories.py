@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fecm.sweeps.identify import Identification
+    from fecm.identification.identify import Identification
 
 Results = Mapping[str, Result]
 

@@ -13,9 +13,11 @@ from fecm.plot.kinds import LackingError, Picture, PlotError, Width
 from fecm.plot.map_contents import LEVEL
 from fecm.plot.style import WIDTHS, Look, colours, legend, limit_count, lines_legend, panels
 from fecm.plot.sweep_data import Where, beyond, case_rows, counts, quantity_of, variable_of
-from fecm.sweeps.random_result import Indices as SobolIndices
-from fecm.sweeps.random_result import RandomResult, bounds, chance
+from fecm.sweeps.random_result import RandomResult
+from fecm.sweeps.random_tables import chance
 from fecm.sweeps.result import SweepResult
+from fecm.sweeps.statistics import Indices as SobolIndices
+from fecm.sweeps.statistics import bounds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

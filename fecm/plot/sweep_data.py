@@ -16,9 +16,8 @@ from fecm.plot.kinds import PlotError
 from fecm.results.metrics import COLUMNS, VERDICTS
 from fecm.results.metrics import INTEGERS as COUNTS
 from fecm.results.validity import MEANING, Reason, counted
-from fecm.sweeps.cases import INTEGERS as NUMBERS_OF_NODES
-from fecm.sweeps.cases import NAMES
 from fecm.sweeps.result import SweepResult, reasons
+from fecm.sweeps.values import NAMES, VARIABLES, Kind
 
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
@@ -34,7 +33,8 @@ LABELS = {
     "patch": "Radius of the patch", "x0": "$x_0$", "y0": "$y_0$",
     "max_indentation": "Largest indentation",
 }  # fmt: skip
-INTEGERS = (*NUMBERS_OF_NODES, *COUNTS)
+_NUMBERS_OF_NODES = (name for name, one in VARIABLES.items() if one.kind is Kind.INTEGER)
+INTEGERS = (*_NUMBERS_OF_NODES, *COUNTS)
 STILL = "still in contact at the end"
 ENDED = "contact not over at the end"
 Where = Mapping[str, float | str]  # values of parameters, by name, that select cases

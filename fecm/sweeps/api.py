@@ -16,15 +16,29 @@ from fecm.api import LoadedDeck, Progress, load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
 from fecm.problem.problem import Problem
-from fecm.sweeps import cases as inputs
-from fecm.sweeps import plan as plans
 from fecm.sweeps import schedule
-from fecm.sweeps.batch import built, deck_of
-from fecm.sweeps.cases import Case, CasesError, DesignKind
-from fecm.sweeps.convergence import refined_cases
+from fecm.sweeps.batch import deck_of
+from fecm.sweeps.case import Case, CasesError
+from fecm.sweeps.cases import checked
 from fecm.sweeps.doubts import doubtful_values
-from fecm.sweeps.plan import RUN, Build, Measure, Outcome, Plan, Task, merge, plan
-from fecm.sweeps.result import SweepResult, result_of, save
+from fecm.sweeps.grid import combined
+from fecm.sweeps.in_full import built
+from fecm.sweeps.limits import Limit, parse_exceed
+from fecm.sweeps.memory import check_memory
+from fecm.sweeps.outcome import Outcome, Status, merge
+from fecm.sweeps.parts import DamagedPartError, PartialResults
+from fecm.sweeps.plan import BuildFunction, Measure, MeasureFunction, Plan, Task, plan, tasks
+from fecm.sweeps.random import (
+    REMEDY,
+    DesignKind,
+    design_of,
+    doubt,
+    parse_law,
+    random_cases,
+)
+from fecm.sweeps.refine import refined_cases
+from fecm.sweeps.result import SweepResult, result_of
+from fecm.sweeps.result_file import save
 
 
 def problem_of(deck: str | Path | Deck) -> Problem:
@@ -44,7 +58,7 @@ def _loaded(deck: str | Path | Deck) -> LoadedDeck:
 def check_draws(planned: Plan) -> None:
     """Raise CasesError if the least or largest draw of a sensitivity study is impossible."""
     design = planned.design
-    if design is None or not design.sensitivity or planned.build is not None:
+    if design is None or not design.sensitivity or planned.settings.build is not None:
         return
     for name in design.laws:
         values = [case[name] for case in planned.cases[: design.draws]]
@@ -53,10 +67,10 @@ def check_draws(planned: Plan) -> None:
                 deck_of(planned, values.index(value))
             except CasesError as error:
                 text = f"{name} {value:.6g}: {str(error).rstrip('.')}; sensitivity needs all draws"
-                raise CasesError(f"{text}; {inputs.REMEDY}") from None
+                raise CasesError(f"{text}; {REMEDY}") from None
 
 
-def _first_built(build: Build, cases: Sequence[Case]) -> LoadedDeck:
+def _first_built(build: BuildFunction, cases: Sequence[Case]) -> LoadedDeck:
     """The first deck that can be built: it has the units, and tells the memory of a case."""
     first = ""
     for case in cases:
@@ -83,11 +97,17 @@ def _check_sendable(spawned: bool, **functions: object) -> None:
 
 
 def carry_out(
-    problem: Problem, made: Plan, *, workers: int = 1, scheduler: object = None,
-    executor: Executor | None = None, parts: schedule.PartialResults | None = None,
-    done: schedule.Done = lambda task, outcome: None, idle: schedule.Idle = lambda: None,
+    problem: Problem,
+    made: Plan,
+    *,
+    workers: int = 1,
+    scheduler: object = None,
+    executor: Executor | None = None,
+    parts: PartialResults | None = None,
+    done: schedule.Done = lambda task, outcome: None,
+    idle: schedule.Idle = lambda: None,
     note: Callable[[str], None] = warn,
-) -> SweepResult:  # fmt: skip
+) -> SweepResult:
     """Run the tasks of a plan in this process, on an executor, a scheduler or several workers.
 
     Tasks that `parts` has stored are not run again; with it, the result has no forces.  `done` is
@@ -105,11 +125,11 @@ def carry_out(
         outcomes.append(outcome)
         done(task, outcome)
 
-    for task in plans.tasks(problem, made):
+    for task in tasks(problem, made):
         before = None
         try:
             before = None if parts is None else parts.get(task)
-        except schedule.DamagedPartError as error:
+        except DamagedPartError as error:
             note(f"{error}; its cases are run again")
         if before is None:
             left.append(task)
@@ -125,7 +145,8 @@ def carry_out(
         for task in left:
             idle()
             keep(task, schedule.attempt(task))
-    return result_of(made, merge(outcomes, made.history and parts is None))
+    history = made.settings.history and parts is None
+    return result_of(made, merge(outcomes, history=history))
 
 
 def sweep(
@@ -142,8 +163,8 @@ def sweep(
     exceed: Mapping[str, float | Literal["threshold"] | Sequence[float]] | None = None,
     until: float | Literal["threshold"] | Mapping[str, float | str] | None = None,
     history: bool = False,
-    build: Build | None = None,
-    measure: Measure | str | Sequence[str] | None = None,
+    build: BuildFunction | None = None,
+    measure: MeasureFunction | str | Sequence[str] | None = None,
     workers: int = 1,
     scheduler: object = None,
     executor: Executor | None = None,
@@ -244,11 +265,73 @@ def sweep(
     >>> found["w"].shape
     (2,)
     """
+    if random is None and (samples is not None or seed or sensitivity or exceed):
+        raise CasesError("samples, seed, sensitivity and exceed need random values")
+    _check_options(vary, cases, refine, random, until, build, measure)
+    _check_means(workers, scheduler, executor)
+    if progress is not None and not callable(progress):
+        raise CasesError(f"progress is {progress!r}, not a function")
+    own, measures = _measures(measure)
+    free = build is not None
+    grid = {} if vary is None else vary
+    made = combined(grid, free=free) if cases is None else checked(cases, free=free)
+    drawn = None
+    if random is not None:
+        laws = {name: parse_law(name, law, free=free) for name, law in random.items()}
+        drawn = design_of(laws, samples, seed, design, sensitivity=sensitivity)
+        made = random_cases(drawn, made)
+        if text := doubt(drawn):
+            warn(text)
+    if workers > 1 or isinstance(executor, ProcessPoolExecutor):
+        _check_sendable(workers > 1, build=build, measure=own)
+    prepared = _prepared(deck, build, made)
+    (problem,) = prepared.problems
+    if refine is not None:
+        made, measures = refined_cases(problem, refine), (Measure.DEFLECTION,)
+    planned = plan(
+        problem,
+        made,
+        history=history,
+        until=until,
+        build=build,
+        measure=own,
+        extra=measures,
+        design=drawn,
+        limits=_limits(exceed),
+    )
+    check_draws(planned)
+    for text in doubtful_values(problem, made) if build is None else ():
+        warn(text)
+    here = workers if executor is None else getattr(executor, "_max_workers", 0)
+    check_memory(problem, planned, 0 if scheduler is not None else here)
+    result = carry_out(
+        problem,
+        planned,
+        workers=workers,
+        scheduler=scheduler,
+        executor=executor,
+        done=_Watch(len(made), progress, same_names=own is not None),
+    )
+    if output is not None:
+        save(result, Path(output))
+    for text in result.notes:
+        warn(text)
+    return result
+
+
+def _check_options(
+    vary: object,
+    cases: object,
+    refine: object,
+    random: object,
+    until: object,
+    build: object,
+    measure: object,
+) -> None:
+    """Raise CasesError if options exclude each other, or are not of their type."""
     others = (vary, cases, random, until, build, measure)
     if refine is not None and any(other is not None for other in others):
         raise CasesError("refine can't be given together with other cases, until, build or measure")
-    if random is None and (samples is not None or seed or sensitivity or exceed):
-        raise CasesError("samples, seed, sensitivity and exceed need random values")
     if cases is not None and random is not None:
         raise CasesError("give random values together with vary, not with cases")
     alone = until is not None or random is not None or refine is not None
@@ -257,77 +340,75 @@ def sweep(
     if not (random is None or (isinstance(random, Mapping) and random)):
         example = '{"k": "uniform:1e6,2e6"}'
         raise CasesError(f"random is {random!r}; write a mapping such as {example}")
+    if build is not None and not callable(build):
+        raise CasesError(f"build is {build!r}, not a function")
+
+
+def _check_means(workers: int, scheduler: object, executor: object) -> None:
+    """Raise CasesError if more than one of the means to run cases is given."""
     if executor is not None and not isinstance(executor, Executor):
         raise CasesError(f"executor is {executor!r}, not a concurrent.futures.Executor")
     if (workers > 1) + (scheduler is not None) + (executor is not None) > 1:
         raise CasesError("give only one of workers, scheduler and executor")
-    own = measure if callable(measure) else None
-    extra = (measure,) if isinstance(measure, str) else () if own or measure is None else measure
-    if not (isinstance(extra, Sequence) and all(isinstance(name, str) for name in extra)):
+
+
+def _measures(
+    measure: MeasureFunction | str | Sequence[str] | None,
+) -> tuple[MeasureFunction | None, Sequence[str]]:
+    """The function or the names that were given as measure."""
+    if callable(measure):
+        return measure, ()
+    if measure is None:
+        return None, ()
+    names = (measure,) if isinstance(measure, str) else measure
+    if not (isinstance(names, Sequence) and all(isinstance(name, str) for name in names)):
         raise CasesError(f"measure is {measure!r}, not a function or names")
-    for name, function in (("build", build), ("progress", progress)):
-        if not (function is None or callable(function)):
-            raise CasesError(f"{name} is {function!r}, not a function")
-    free = build is not None
-    grid = {} if vary is None else vary
-    made = inputs.combined(grid, free=free) if cases is None else inputs.checked(cases, free=free)
-    drawn = None
-    if random is not None:
-        laws = {name: inputs.parse_law(name, law, free=free) for name, law in random.items()}
-        drawn = inputs.design_of(laws, samples, seed, design, sensitivity=sensitivity)
-        made = inputs.random_cases(drawn, made)
-        if text := inputs.doubt(drawn):
-            warn(text)
-    if workers > 1 or isinstance(executor, ProcessPoolExecutor):
-        _check_sendable(workers > 1, build=build, measure=own)
+    return None, names
+
+
+def _limits(exceed: Mapping[str, float | str | Sequence[float]] | None) -> tuple[Limit, ...]:
+    """Limits of quantities that were given by name."""
+    if not isinstance(exceed or {}, Mapping):
+        raise CasesError(f'exceed is {exceed!r}; write {{"peak_force": [100.0]}} or the like')
+    return tuple(
+        parse_exceed(f"{name}={value}")
+        for name, given in (exceed or {}).items()
+        for value in np.atleast_1d(given).tolist()
+    )
+
+
+def _prepared(
+    deck: str | Path | Deck | None, build: BuildFunction | None, cases: Sequence[Case]
+) -> LoadedDeck:
+    """The deck, or the first that is built; its warnings are told."""
     if deck is not None and build is None:
         prepared = _loaded(deck)
     elif deck is None and build is not None:
-        prepared = _first_built(build, made)
+        prepared = _first_built(build, cases)
     else:
         raise CasesError("give either deck or build")
     for finding in prepared.findings:
         if finding.severity == "warning":
             warn(finding.render(prepared.source))
-    (problem,) = prepared.problems
-    if refine is not None:
-        made, extra = refined_cases(problem, refine), (plans.DEFLECTION,)
-    if not isinstance(exceed or {}, Mapping):
-        raise CasesError(f'exceed is {exceed!r}; write {{"peak_force": [100.0]}} or the like')
-    limits = [
-        inputs.parse_exceed(f"{name}={value}")
-        for name, given in (exceed or {}).items()
-        for value in np.atleast_1d(given).tolist()
-    ]
-    planned = plan(
-        problem, made, history=history, until=until, build=build, measure=own, extra=extra,
-        design=drawn, limits=tuple(limits),
-    )  # fmt: skip
-    check_draws(planned)
-    for text in doubtful_values(problem, made) if build is None else ():
-        warn(text)
-    here = workers if executor is None else getattr(executor, "_max_workers", 0)
-    plans.check_memory(problem, planned, 0 if scheduler is not None else here)
-    finished = 0
-    returned: dict[str, int] = {}  # the first case with some names
+    return prepared
 
-    def done(task: Task, outcome: Outcome) -> None:
-        nonlocal finished
-        if own is not None and outcome.status[0] in RUN:
-            returned.setdefault(", ".join(sorted(outcome.measured)), task.numbers[0])
-            if len(returned) > 1:
-                first, other = (f"{names} for case {case}" for names, case in returned.items())
+
+class _Watch:
+    """Counts the cases that are done, and checks the names of what the caller measures."""
+
+    def __init__(self, cases: int, progress: Progress | None, *, same_names: bool) -> None:
+        self.cases, self.progress, self.same_names = cases, progress, same_names
+        self.finished = 0
+        self.first: dict[str, int] = {}  # case by the names that it was the first to have
+
+    def __call__(self, task: Task, outcome: Outcome) -> None:
+        """Take note of a finished task."""
+        if self.same_names and outcome.status[0] in tuple(Status):
+            self.first.setdefault(", ".join(sorted(outcome.measured)), task.numbers[0])
+            if len(self.first) > 1:
+                first, other = (f"{names} for case {case}" for names, case in self.first.items())
                 hint = "return the same names, NaN where there is no value"
                 raise CasesError(f"measure returns {other}, and {first}; {hint}")
-        finished += len(task.numbers)
-        if progress is not None:
-            progress(finished, len(made))
-
-    result = carry_out(
-        problem, planned, workers=workers, scheduler=scheduler, executor=executor, done=done
-    )
-    if output is not None:
-        save(result, Path(output))
-    for text in result.notes:
-        warn(text)
-    return result
+        self.finished += len(task.numbers)
+        if self.progress is not None:
+            self.progress(self.finished, self.cases)

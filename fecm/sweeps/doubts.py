@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 
 import numpy as np
 
@@ -10,10 +11,15 @@ from fecm.deck import model
 from fecm.deck.findings import Finding, Findings
 from fecm.problem.check import check_segments, check_values
 from fecm.problem.problem import Problem
-from fecm.sweeps.cases import CONTACT, LAMINATE, THICKNESS, Case, CasesError
+from fecm.sweeps.case import Case, CasesError
+from fecm.sweeps.plan import Task
+from fecm.sweeps.values import Changes, Kind, kind_of, names_of
 from fecm.sweeps.vary import apply_case
 
-JUDGED = frozenset((*CONTACT, *LAMINATE, "patch")) - {"layup", "angle"}
+THICKNESS = "thickness"
+LAMINATE = names_of(Changes.LAMINATE)
+_NUMBERS = (n for n in (*names_of(Changes.STRIKE), *LAMINATE) if kind_of(n) is Kind.NUMBER)
+JUDGED = {"patch", *_NUMBERS} - {"angle"}
 FEW = 4  # plies below which a laminate as thin as two of them is possible
 
 
@@ -86,3 +92,17 @@ def _findings(problem: Problem) -> list[Finding]:
     with np.errstate(all="ignore"):
         check_values(problem, findings)
     return [finding for finding in findings if finding.severity == "warning"]
+
+
+def freed(some: Sequence[Task]) -> int:
+    """Count cases with B != 0 in which u and v, restrained at every node, are released."""
+    count = 0
+    for task in some:
+        if "support" in task.cases[0]:  # which has its own u and v
+            continue
+        deck = task.settings.deck
+        laminate = {name: value for name, value in task.cases[0].items() if name in LAMINATE}
+        with suppress(CasesError):
+            if apply_case(deck, laminate).all(model.Boundary) != deck.all(model.Boundary):
+                count += len(task.numbers)
+    return count

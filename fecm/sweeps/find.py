@@ -2,33 +2,88 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+import math
+from collections.abc import Callable, Collection, Mapping
+from enum import StrEnum
 from itertools import compress
+from typing import NamedTuple
 
 import numpy as np
 
-from fecm._typing import Floats
-from fecm.deck.model import Deck, Impact
-from fecm.problem.parts import build_projectile
-from fecm.sweeps import plan
-from fecm.sweeps.plan import RUN, Outcome, merge
-from fecm.sweeps.vary import apply_case
+from fecm._typing import Bools, Floats
+from fecm.deck.model import Deck, Delamination, Impact
+from fecm.sweeps.case import CasesError
+from fecm.sweeps.limits import NO_THRESHOLD, PEAK_FORCE, THRESHOLD, parse_exceed
+from fecm.sweeps.outcome import About, Outcome, merge
+from fecm.sweeps.strike import Strike
 
-Decks = Mapping[int, Deck]  # by the numbers of their cases, ascending
-Runs = Callable[[Decks, bool], Outcome]  # runs decks; doubtful ones in full if they are judged
-RANGE, ERROR = 100.0, 1e-6  # of velocities relative to the deck's, and the last relative error
+Until = float | str | Mapping[str, float | str]  # what a search reaches; see :func:`search_of`
+Strikes = Mapping[int, Strike]  # by the numbers of their cases, ascending
+Runs = Callable[[Strikes, bool], Outcome]  # runs strikes; doubtful ones in full if they are judged
+RANGE = 100.0  # of velocities relative to the deck's
+FIRST_VELOCITIES = 25  # of the first round of a search
+ERROR = 1e-6  # relative error of the velocity found
 ROUGH = 1e-4  # relative difference of the peak force from the value searched, beyond which it jumps
 LONGER = (1, 2, 4, 8)  # times the duration, until the peak at the velocity found is known
 BELOW = "the peak force is below"
 
 
-def found(decks: Decks, force: float, longer: Callable[[int], Runs]) -> Outcome:
+class Sought(StrEnum):
+    """Quantity of a search."""
+
+    PEAK_FORCE = PEAK_FORCE
+    EXPOSURE = "exposure"
+
+
+class Search(NamedTuple):
+    """A search for the velocity at which a quantity reaches a level."""
+
+    quantity: Sought
+    level: float | str  # a number, or of the peak force :data:`~fecm.sweeps.limits.THRESHOLD`
+
+    def check(self, deck: Deck, names: Collection[str]) -> None:
+        """Raise CasesError if the search is not possible in cases of a deck with these names."""
+        if not {"velocity", "energy"}.isdisjoint(names):
+            raise CasesError("velocity is what is searched; it can't be varied as well")
+        if not deck.require(Impact).velocity:
+            raise CasesError("the search begins at the velocity of ROD, which must not be 0")
+        if self.level == THRESHOLD:
+            if deck.last(Delamination) is None:
+                raise CasesError(NO_THRESHOLD)
+        elif not (isinstance(self.level, float | int) and 0.0 < self.level < math.inf):
+            name = self.quantity.replace("_", " ")
+            raise CasesError(f"the {name} to reach is a positive number, not {self.level}")
+
+
+def parse_until(text: str) -> Until:
+    """Read ``peak_force=VALUE`` or ``exposure=NUMBER``; CasesError if it is neither."""
+    name, _, value = (part.strip() for part in text.partition("="))
+    if name not in tuple(Sought) or not value:
+        forms = f"peak_force=NUMBER or peak_force={THRESHOLD}, or exposure=NUMBER"
+        raise CasesError(f"`{text}`: write {forms}")
+    return {name: parse_exceed(text).value}
+
+
+def search_of(until: Until | None) -> Search | None:
+    """The search for a value, alone that of a peak force, or for that of one named quantity."""
+    if until is None:
+        return None
+    if not isinstance(until, Mapping):
+        return Search(Sought.PEAK_FORCE, until)
+    if len(until) != 1 or not {*until} <= {*Sought}:
+        example = '{"exposure": 1.0}'
+        raise CasesError(f"until is {until!r}; write a number, {THRESHOLD!r} or {example}")
+    ((name, level),) = until.items()
+    return Search(Sought(name), level)
+
+
+def found(strikes: Strikes, force: float, longer: Callable[[int], Runs]) -> Outcome:
     """Run cases at the velocities at which their peaks reach a force.
 
     Cases whose peak there is open are searched again in longer runs: `longer` returns what runs
-    decks so many times as long.
+    strikes so many times as long.
     """
-    left, parts = dict(decks), []
+    left, parts = dict(strikes), []
     for factor in LONGER:
         runs, numbers = longer(factor), list(left)
         together = -(-len(numbers) // factor)  # as many forces in memory as at first
@@ -36,51 +91,61 @@ def found(decks: Decks, force: float, longer: Callable[[int], Runs]) -> Outcome:
             some = {number: left[number] for number in numbers[start : start + together]}
             outcome, still_open = _searched(some, force, runs)
             parts.append(outcome)
-            left = {n: deck for n, deck in left.items() if n not in some or n in still_open}
+            left = {n: one for n, one in left.items() if n not in some or n in still_open}
         if not left:
             return merge(parts)
     text = f"no peak force of {force:.6g}: it is open even in a run {LONGER[-1]} times as long"
     return merge([*parts, Outcome.failed(dict.fromkeys(left, text))])
 
 
-def _searched(decks: Decks, force: float, runs: Runs) -> tuple[Outcome, set[int]]:
+def with_found(outcome: Outcome, strikes: Strikes) -> Outcome:
+    """Add the velocities that were found, and their energies: those of the strikes."""
+    velocity = np.array([one.velocity for one in strikes.values()])
+    mass = np.array([one.projectile.total_mass for one in strikes.values()])
+    outcome.columns |= {"found_velocity": velocity, "found_energy": 0.5 * mass * velocity**2}
+    return outcome
+
+
+def _searched(strikes: Strikes, force: float, runs: Runs) -> tuple[Outcome, set[int]]:
     """Search the velocities of cases: outcome of those that are decided, and the open ones."""
 
-    def at(case: int, velocity: float) -> Deck:
-        return apply_case(decks[case], {"velocity": velocity})
-
     def tried(pairs: list[tuple[int, float]]) -> Outcome:
-        return runs({n: at(*pair) for n, pair in enumerate(pairs)}, False)
+        trials = [strikes[case].with_velocity(velocity) for case, velocity in pairs]
+        return runs(dict(enumerate(trials)), False)
 
-    starts = {case: deck.require(Impact).velocity for case, deck in decks.items()}
-    searched = search(starts, force, lambda pairs: tried(pairs).columns[plan.REACHED])
+    starts = {case: one.velocity for case, one in strikes.items()}
+    searched = search(starts, force, lambda pairs: tried(pairs).columns[About.REACHED])
     reasons = {case: v for case, v in searched.items() if isinstance(v, str)}
     still_open: set[int] = set()
     # What is not reached in a run that is too short may be reached in a longer one.
     if low := [case for case, text in reasons.items() if text.startswith(BELOW)]:
         highest = tried([(case, starts[case] * RANGE) for case in low])
-        lacking = np.isnan(highest.columns["peak_force"])
+        lacking = np.isnan(highest.columns[PEAK_FORCE])
         still_open = set(compress(low, lacking))
     parts = [Outcome.failed({n: text for n, text in reasons.items() if n not in still_open})]
+
     velocities = {case: v for case, v in searched.items() if isinstance(v, float)}
     if velocities:
-        outcome = runs({case: at(case, v) for case, v in velocities.items()}, True)
-        velocity = np.array(list(velocities.values()))
-        mass = np.array([build_projectile(decks[case]).total_mass for case in velocities])
-        outcome.columns |= {"found_velocity": velocity, "found_energy": 0.5 * mass * velocity**2}
-        reached, peak = outcome.columns[plan.REACHED], outcome.columns["peak_force"]
-        fine = np.isin(outcome.columns["status"], RUN)
-        is_open = fine & np.isnan(peak)
+        hit = {case: strikes[case].with_velocity(v) for case, v in velocities.items()}
+        outcome = with_found(runs(hit, True), hit)
+        is_open = outcome.fine & np.isnan(outcome.columns[PEAK_FORCE])
         still_open |= {outcome.numbers[row] for row in np.flatnonzero(is_open)}
-        right = fine & ~is_open & (np.abs(reached - force) <= ROUGH * force)
-        parts.append(outcome.select(np.flatnonzero(right)))
-        for row in np.flatnonzero(~right & ~is_open):
-            text = f"at velocity {velocity[row]:.6g}: {outcome.status[row]}"
-            if fine[row]:
-                text = f"from velocity {velocity[row]:.6g} on it is {reached[row]:.6g}"
-                text = f"no peak force of {force:.6g}: {text}, and below it jumps"
-            parts.append(Outcome.failed({outcome.numbers[row]: text}))
+        parts += _decided(outcome, force, ~is_open)
     return merge(parts), still_open
+
+
+def _decided(outcome: Outcome, force: float, known: Bools) -> list[Outcome]:
+    """Outcomes of the cases whose peak is known; those whose peak is not the force have failed."""
+    reached, velocity = outcome.columns[About.REACHED], outcome.columns["found_velocity"]
+    right = outcome.fine & known & (np.abs(reached - force) <= ROUGH * force)
+    reasons = {}
+    for row in np.flatnonzero(~right & known):
+        text = f"at velocity {velocity[row]:.6g}: {outcome.status[row]}"
+        if outcome.fine[row]:
+            jump = f"from velocity {velocity[row]:.6g} on it is {reached[row]:.6g}"
+            text = f"no peak force of {force:.6g}: {jump}, and below it jumps"
+        reasons[outcome.numbers[row]] = text
+    return [outcome.select(np.flatnonzero(right)), Outcome.failed(reasons)]
 
 
 def search(
@@ -94,7 +159,7 @@ def search(
     reason why a case has no velocity.
     """
     found: dict[int, float | str] = dict.fromkeys(starts, "")
-    trials = {n: np.geomspace(v / RANGE, v * RANGE, plan.COUNT) for n, v in starts.items()}
+    trials = {n: np.geomspace(v / RANGE, v * RANGE, FIRST_VELOCITIES) for n, v in starts.items()}
     first = True
     while trials:
         given = peaks([(n, float(v)) for n, values in trials.items() for v in values])

@@ -7,21 +7,19 @@ from collections.abc import Callable
 
 import numpy as np
 
-from fecm.deck.model import Deck, Impact
-from fecm.problem.parts import build_projectile
 from fecm.results.exposures import FEWEST
 from fecm.results.metrics import EVALUATIONS, EXPOSURES
-from fecm.sweeps.cases import CasesError
-from fecm.sweeps.plan import RUN, Outcome
-from fecm.sweeps.vary import apply_case
+from fecm.sweeps.case import CasesError
+from fecm.sweeps.find import with_found
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.strike import Strike
 
 RANGE = 100.0  # of velocities relative to the deck's
 ERROR = 1e-5  # largest relative excess of the exposure found
 MOST = 40  # runs of a case; a smooth dependence takes about six
-(COUNTED,) = EVALUATIONS
 
 
-def found(number: int, deck: Deck, level: float, run: Callable[[Deck], Outcome]) -> Outcome:
+def found(number: int, start: Strike, level: float, run: Callable[[Strike], Outcome]) -> Outcome:
     """Run a case at the velocity at which its largest exposure outside the load reaches a level.
 
     Every trial is a full run, as exposures need the whole plate.  Raises CasesError with the reason
@@ -30,22 +28,26 @@ def found(number: int, deck: Deck, level: float, run: Callable[[Deck], Outcome])
     outcomes: dict[float, Outcome] = {}
 
     def exposure(velocity: float) -> float:
-        outcome = outcomes[velocity] = run(apply_case(deck, {"velocity": velocity}))
-        if outcome.status[0] not in RUN:
-            raise CasesError(f"at velocity {velocity:.6g}: {outcome.status[0]}")
-        if (count := int(outcome.columns[COUNTED][0])) < FEWEST:
-            why = f"FAIL was evaluated {count} times during contact, less than {FEWEST}"
-            raise CasesError(f"at velocity {velocity:.6g}: {why}")
-        values = [outcome.columns[name][0] for name in EXPOSURES if name in outcome.columns]
-        if not values or np.isnan(values).any():
-            raise CasesError(f"at velocity {velocity:.6g} the run ends before its largest exposure")
-        return float(max(values))
+        outcome = outcomes[velocity] = run(start.with_velocity(velocity))
+        return _largest_exposure(outcome, velocity)
 
-    velocity = search(deck.require(Impact).velocity, level, exposure)
-    outcome, mass = outcomes[velocity], build_projectile(deck).total_mass
-    values = {"found_velocity": velocity, "found_energy": 0.5 * mass * velocity**2}
-    outcome.columns |= {name: np.array([value]) for name, value in values.items()}
-    return outcome
+    velocity = search(start.velocity, level, exposure)
+    return with_found(outcomes[velocity], {number: start.with_velocity(velocity)})
+
+
+def _largest_exposure(outcome: Outcome, velocity: float) -> float:
+    """Largest exposure of a run; CasesError if the run does not decide it."""
+    at = f"at velocity {velocity:.6g}"
+    if not outcome.fine[0]:
+        raise CasesError(f"{at}: {outcome.status[0]}")
+    (counted,) = EVALUATIONS
+    if (count := int(outcome.columns[counted][0])) < FEWEST:
+        why = f"FAIL was evaluated {count} times during contact, less than {FEWEST}"
+        raise CasesError(f"{at}: {why}")
+    values = [outcome.columns[name][0] for name in EXPOSURES if name in outcome.columns]
+    if not values or np.isnan(values).any():
+        raise CasesError(f"{at} the run ends before its largest exposure")
+    return float(max(values))
 
 
 def search(start: float, level: float, exposure: Callable[[float], float]) -> float:

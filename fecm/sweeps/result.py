@@ -1,15 +1,12 @@
-"""Result of a sweep: values and results of every case, in memory or in a file."""
+"""Result of a sweep: values and results of every case, and what its cases are worth."""
 
 from __future__ import annotations
 
-import csv
 import math
-import re
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
@@ -17,103 +14,72 @@ from numpy.typing import NDArray
 
 from fecm._errors import did_you_mean
 from fecm._tables import html_table
-from fecm._version import __version__
+from fecm._typing import Bools
 from fecm.deck.model import Delamination
 from fecm.deck.reader import Reader
 from fecm.deck.units import quantity, unit_names, unit_of
-from fecm.results import schema
-from fecm.results.errors import ExportError, NotStoredError, ResultFileError
+from fecm.results.errors import NotStoredError
 from fecm.results.linear_plate import TOO_SOFT, UNSAFE, InPlane, softness
-from fecm.results.metrics import (
-    COLUMNS,
-    FOUND,
-    RATIO,
-    SUMMARY,
-    THRESHOLD,
-    VALIDITY,
-    VERDICTS,
-    described,
-)
+from fecm.results.metrics import COLUMNS, FOUND, RATIO, SUMMARY, THRESHOLD, VALIDITY, VERDICTS
 from fecm.results.pictures import plot
 from fecm.results.validity import BENT, MEANING, counted
-from fecm.sweeps.cases import REFINE, pair
+from fecm.sweeps.case import pair
 from fecm.sweeps.convergence import Convergence, convergence
-from fecm.sweeps.plan import RUN, Forces, Outcome, Plan, Status
-from fecm.sweeps.random_result import (
-    RandomResult,
-    attributes,
-    evaluate,
-    open_ends,
-    random_of,
-    stored,
-)
+from fecm.sweeps.outcome import About, Column, Outcome, Status, was_run
+from fecm.sweeps.plan import Plan
+from fecm.sweeps.random_result import RandomResult, evaluate, open_ends
+from fecm.sweeps.values import REFINE, dimension_of
 
 if TYPE_CHECKING:
     import pandas
     import xarray
     from matplotlib.axes import Axes
 
-    from fecm.results.hdf5_reader import Contents
-
-Array = NDArray[Any]
-WEIGHED = ("mass", "rod_mass", "energy")  # values that the summary shows in g and J
-WORDS = 18  # letters of the names in the lines of the summary
-SAME = 1e-9  # distance from the place given, relative to its coordinates, that is rounding
-FORCE = "history/force"
+LABEL_WIDTH = 18  # of the lines of the summary
 DIGITS = 6  # of the values of a case, unless others are closer
-LISTED = 5  # reasons of failure that the summary lists
-TEXTS_OF = {
-    "status": "ok, still in contact, or why the case failed",
-    "validity": "ok, reasons to doubt the case, or failed",
-}
-DIMENSIONS = {  # of the values, and of the stored force
-    "velocity": "length/time", "energy": "force*length", "force": "force",
-    "k": "force/length^1.5",
-    **dict.fromkeys(("thickness", "laminate_thickness", "ply_thickness"), "length"),
-    **dict.fromkeys(("alpha_p", "radius", "rod_length", "patch", "x0", "y0"), "length"),
-    **dict.fromkeys(("mass", "rod_mass"), "force*time^2/length"),
-    **dict.fromkeys(("density", "rod_density"), "force*time^2/length^4"),
-    **dict.fromkeys(("e1", "e2", "g12", "g13", "g23", "rod_modulus"), "force/length^2"),
-    **dict.fromkeys(("dt", "duration"), "time"),
-}  # fmt: skip
-GROUPS = {  # of the file
-    "cases": "values of what varies",
-    "summary": "what came out of every case",
-    "history": "time steps of every case, and its contact force if asked for",
-}
-FORMULA = re.compile(r"[=+@\x00-\x1f-]")  # how a formula begins
-CASES, HISTORY = "cases", "history"  # tables of the CSV export
+MOST_REASONS = 5  # of failure, that the summary lists
+WEIGHED = ("mass", "rod_mass", "energy")  # values that the summary shows in g and J
+SAME_PLACE = 1e-9  # distance from the place given, relative to its coordinates, that is rounding
 
 
 def summary(result: SweepResult) -> list[str]:
     """Return summary lines: number of cases, smallest and largest peak or velocity, failures."""
     fine = result.fine
-    lines = [f"cases             {len(result)}"]
-    word, names = "peak", ["peak_force"]
-    if "found_velocity" in result.summary:
-        word, names = "found", ["found_velocity", "found_energy"]
-    shown = np.where(fine, result[names[0]], np.nan)
-    if np.isfinite(shown).any():
-        digits = 8 if word == "found" else 6
-        for size, case in (("smallest", np.nanargmin(shown)), ("largest", np.nanargmax(shown))):
-            texts = [quantity(result[n][case], result.unit(n), digits) for n in names]
-            values = ", ".join(f"{name} {_shown(result, name, int(case))}" for name in result.cases)
-            given = f" ({values})" if values else ""
-            lines.append(f"{size} {word:{16 - len(size)}} {', '.join(texts)}{given}")
-    if "at" in result.cases and "hit_x" in result.summary:
-        asked = np.array([pair("at", text) for text in result.cases["at"].tolist()]).T
-        moved = np.hypot(*(asked - (result["hit_x"], result["hit_y"])))
-        if count := np.count_nonzero(moved > SAME * np.abs(asked).max()):
-            distance = f"{np.nanmax(moved):.4g} {result.unit('hit_x')}".rstrip()
-            lines.append(f"moved             {count}: to the nearest node, up to {distance} away")
     failed = Counter(result["status"][~fine].tolist())
-    for reason, times in failed.most_common(LISTED):
+    lines = [f"cases             {len(result)}", *_extremes(result), *_moved(result)]
+    for reason, times in failed.most_common(MOST_REASONS):
         lines.append(f"failed            {times}: {reason}")
-    if (others := len(failed) - LISTED) > 0:
+    if (others := len(failed) - MOST_REASONS) > 0:
         lines.append(f"failed            for {others} other reason{'s' * (others > 1)}")
     if result.random is not None and failed:
         lines.append(f"failed share      {(~fine).mean():.3%} of the draws")
     return lines
+
+
+def _extremes(result: SweepResult) -> Iterator[str]:
+    """The cases with the smallest and the largest peak, or velocity found."""
+    what, names, digits = "peak", ["peak_force"], 6
+    if "found_velocity" in result.summary:
+        what, names, digits = "found", ["found_velocity", "found_energy"], 8
+    shown = np.where(result.fine, result[names[0]], np.nan)
+    if not np.isfinite(shown).any():
+        return
+    for size, case in (("smallest", np.nanargmin(shown)), ("largest", np.nanargmax(shown))):
+        texts = [quantity(result[name][case], result.unit(name), digits) for name in names]
+        values = ", ".join(f"{name} {_shown(result, name, int(case))}" for name in result.cases)
+        given = f" ({values})" if values else ""
+        yield f"{size} {what:{LABEL_WIDTH - 2 - len(size)}} {', '.join(texts)}{given}"
+
+
+def _moved(result: SweepResult) -> Iterator[str]:
+    """How far the places that were hit are from those given."""
+    if "at" not in result.cases or "hit_x" not in result.summary:
+        return
+    asked = np.array([pair("at", text) for text in result.cases["at"].tolist()]).T
+    moved = np.hypot(*(asked - (result["hit_x"], result["hit_y"])))
+    if count := np.count_nonzero(moved > SAME_PLACE * np.abs(asked).max()):
+        distance = f"{np.nanmax(moved):.4g} {result.unit('hit_x')}".rstrip()
+        yield f"moved             {count}: to the nearest node, up to {distance} away"
 
 
 def _shown(result: SweepResult, name: str, case: int) -> str:
@@ -136,7 +102,7 @@ def verdict(result: SweepResult) -> str:
     return f"{len(result)} case{'' if len(result) == 1 else 's'}: {found or 'all ok'}"
 
 
-def reasons(status: Array) -> str:
+def reasons(status: Column) -> str:
     """The most common reason of failure, and the number of others."""
     (first, _), *others = Counter(status.tolist()).most_common()
     more = f", and {len(others)} other reason{'s' * (len(others) > 1)}" if others else ""
@@ -156,7 +122,7 @@ def _counts(result: SweepResult) -> list[tuple[int, str]]:
     return [(int(some.sum()), what) for what, some in cases.items() if some.any()]
 
 
-def _doubts(result: SweepResult) -> dict[str, NDArray[np.bool_]]:
+def _doubts(result: SweepResult) -> dict[str, Bools]:
     """Cases beyond the range of the model, by what they are."""
     found = {}
     for reason, some in counted(result.validity):
@@ -217,12 +183,12 @@ class SweepResult:
         Statistics, sensitivity indices and probabilities of a random sweep.
     """
 
-    cases: dict[str, Array]
-    summary: dict[str, Array]
-    dt: Array
-    steps: Array
-    force: Array | None = None
-    unconverged_steps: Array | None = None
+    cases: dict[str, Column]
+    summary: dict[str, Column]
+    dt: Column
+    steps: Column
+    force: Column | None = None
+    unconverged_steps: Column | None = None
     deck: str = ""
     title: str = ""
     units: dict[str, str] = field(default_factory=dict)
@@ -236,10 +202,10 @@ class SweepResult:
 
     def _repr_html_(self) -> str:
         """Table of the summary, for notebooks."""
-        lines = ((line[:WORDS].strip(), line[WORDS:]) for line in summary(self))
+        lines = ((line[:LABEL_WIDTH].strip(), line[LABEL_WIDTH:]) for line in summary(self))
         return html_table(repr(self)[1:-1], lines)
 
-    def __getitem__(self, name: str) -> Array:
+    def __getitem__(self, name: str) -> Column:
         """Values or results of every case, by name."""
         if name in self.cases:
             return self.cases[name]
@@ -250,22 +216,22 @@ class SweepResult:
         return self.summary[name]
 
     @property
-    def fine(self) -> NDArray[np.bool_]:
+    def fine(self) -> Bools:
         """Cases that were run."""
-        return np.isin(self.summary["status"], RUN)
+        return was_run(self.summary["status"])
 
     @property
-    def still(self) -> NDArray[np.bool_]:
+    def still(self) -> Bools:
         """Cases that were run and ended in contact."""
         return np.asarray(self.summary["status"] == Status.STILL)
 
     @property
-    def validity(self) -> Array:
+    def validity(self) -> Column:
         """``"ok"``, reasons to doubt a case, or ``"failed"``; of earlier files empty texts."""
         return self.summary.get(VALIDITY, np.full(len(self), ""))
 
     @property
-    def over(self) -> NDArray[np.bool_]:
+    def over(self) -> Bools:
         """Cases that were run until their contact was over."""
         return self.fine & ~open_ends(self.summary)
 
@@ -289,7 +255,9 @@ class SweepResult:
 
     def unit(self, name: str) -> str:
         """Return the unit of a value or result; empty if the deck states none."""
-        dimension = COLUMNS[name][1] if name in COLUMNS else DIMENSIONS.get(name, "")
+        if name == "force":
+            return unit_of("force", self.units)
+        dimension = COLUMNS[name][1] if name in COLUMNS else dimension_of(name)
         return unit_of(dimension, self.units)
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -334,13 +302,17 @@ class SweepResult:
         columns = {**self.cases, **self.summary, "dt": self.dt, "steps": self.steps}
         added = {"unsettled_steps": self.unconverged_steps, "force": self.force}
         columns |= {name: values for name, values in added.items() if values is not None}
-        found = xarray.Dataset(
-            {name: (axes[: len(shape) + v.ndim - 1], v[rows].reshape(*shape, *v.shape[1:]),
-                    about(name))
-             for name, v in columns.items() if name not in levels},
-            {name: (name, values, about(name)) for name, values in coordinates.items()},
-            {"title": self.title},
-        )  # fmt: skip
+        variables = {}
+        for name, values in columns.items():
+            if name not in levels:
+                own = axes[: len(shape) + values.ndim - 1]
+                variables[name] = (
+                    own,
+                    values[rows].reshape(*shape, *values.shape[1:]),
+                    about(name),
+                )
+        places = {name: (name, values, about(name)) for name, values in coordinates.items()}
+        found = xarray.Dataset(variables, places, {"title": self.title})
         if self.force is not None:
             found = found.assign_coords(step=np.arange(1, self.force.shape[1] + 1))
         return found.set_coords(list(self.cases))
@@ -391,9 +363,9 @@ class SweepResult:
         return plot(kind, named, path, ax, quantity=quantity, **options)
 
 
-def _grid(cases: Mapping[str, Array], count: int) -> tuple[dict[str, Array], NDArray[np.intp]]:
+def _grid(cases: Mapping[str, Column], count: int) -> tuple[dict[str, Column], NDArray[np.intp]]:
     """Values of each name of a full grid and its cases in their order; no values if it is none."""
-    levels: dict[str, Array] = {}
+    levels: dict[str, Column] = {}
     places: list[NDArray[np.intp]] = []
     for name, values in cases.items():
         found, first, place = np.unique(values, return_index=True, return_inverse=True)
@@ -408,174 +380,36 @@ def _grid(cases: Mapping[str, Array], count: int) -> tuple[dict[str, Array], NDA
 def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
     """Create the result from a plan and its outcome."""
     cases = {name: np.array([case[name] for case in plan.cases]) for name in plan.cases[0]}
-    columns, deck = outcome.columns, plan.deck
-    limited = deck.last(Delamination) is not None or not columns.keys().isdisjoint(THRESHOLD)
-    found = [*SUMMARY, *(THRESHOLD if limited else ())]
-    found += FOUND if plan.until is not None else ()
-    found += [name for name in COLUMNS if name in columns and name not in found]
-    found += [RATIO] if RATIO not in found else []
+    columns, deck = outcome.columns, plan.settings.deck
+    names = [*_summary_names(plan, outcome), *outcome.measured, *VERDICTS]
     none = np.full(len(plan.cases), np.nan)
-    summary = {name: columns.get(name, none) for name in (*found, *outcome.measured, *VERDICTS)}
-    design = plan.design
+    summary = {name: columns.get(name, none) for name in names}
+    random = None
+    if plan.design is not None:
+        random = evaluate(plan.design, cases, summary, plan.limits)
     return SweepResult(
-        cases, summary,
-        columns["dt"], columns["steps"], outcome.force, columns["unsettled"],
-        deck.text or deck.to_text(), deck.title, unit_names(deck),
-        None if design is None else evaluate(design, cases, summary, plan.limits),
-    )  # fmt: skip
-
-
-def save(
-    result: SweepResult, path: Path, *, overwrite: bool = True, forces: Iterable[Forces] = ()
-) -> None:
-    """Write the result of a sweep.
-
-    `forces` are those that the result does not hold, of some cases after the other.  Raises
-    ResultWriteError if the file cannot be written; an existing file is then unchanged.
-    """
-    from fecm.results.hdf5_writer import writing
-
-    if result.force is not None:
-        forces = [(range(len(result)), result.force)]
-    with writing(path, overwrite=overwrite) as sink:
-
-        def put(name: str, values: Array, text: str, dimension: str, *axes: str) -> None:
-            axes = axes or ("cases",)
-            if values.dtype.kind in "US":
-                sink.text(name, values.tolist(), text, axes)
-                return
-            dtype = "i8" if values.dtype.kind in "iu" else "f8"
-            sink.create(schema.Dataset(name, axes, text, dimension, dtype), values.shape)
-            sink.write(name, 0, values)
-
-        about = {"format": schema.Form.SWEEP.value, "format_version": schema.FORMAT_VERSION}
-        about |= {"fecm_version": __version__, "title": result.title}
-        sink.attributes("", about | {f"unit_{name}": unit for name, unit in result.units.items()})
-        sink.text("deck", result.deck, "the cards of the deck that was varied")
-        if result.random is not None:
-            sink.axis_names["laws"] = tuple(result.random.design.laws)
-            for group, attribute_values in attributes(result.random).items():
-                sink.attributes(group, attribute_values)
-        for name, values in result.cases.items():
-            put(f"cases/{name}", values, f"{name} of every case", DIMENSIONS.get(name, ""))
-        for name, values in result.summary.items():
-            text = TEXTS_OF.get(name) or described(name)
-            put(f"summary/{name}", values, text, COLUMNS.get(name, ("", ""))[1])
-        put("history/dt", result.dt, "time step of every case", "time")
-        put("history/steps", result.steps, "number of steps of every case", "")
-        if result.unconverged_steps is not None:
-            text = "steps whose contact iteration did not converge"
-            put("history/unsettled_steps", result.unconverged_steps, text, "")
-        if forces and len(result):
-            longest = int(result.steps.max())
-            text = "contact force after every step"
-            made = schema.Dataset(FORCE, ("cases", "steps"), text, "force")
-            sink.create(made, (len(result), longest))
-            for numbers, force in forces:
-                rows = np.full((len(numbers), longest), np.nan)
-                if force is not None:
-                    rows[:, : force.shape[1]] = force
-                ends = np.flatnonzero(np.diff(numbers) != 1) + 1
-                for start, some in zip([0, *ends.tolist()], np.split(rows, ends), strict=True):
-                    sink.write(FORCE, numbers[start], some)
-        for row in () if result.random is None else stored(result.random):
-            put(*row)
-        for group, text in GROUPS.items():
-            sink.attributes(group, {"description": text})
-        for name, one in result.convergence.items():
-            sink.attributes(f"convergence/{name}", vars(one))
-
-
-def load(path: Path) -> SweepResult:
-    """Read the result of a sweep.
-
-    Raises
-    ------
-    ResultFileError
-        If the file is not the result of a sweep.
-    OSError
-        If the file cannot be opened.
-    """
-    from fecm.results.hdf5_reader import read
-
-    return sweep_of(read(path, schema.Form.SWEEP))
-
-
-def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
-    """Create the result of a sweep from the contents of its file.
-
-    Without `history` the forces, which may be large, are not read.  Raises ResultFileError if data
-    are missing, or their number of cases differs.
-    """
-    path = contents.path
-    names = sorted(contents, key=lambda name: name in contents.lists)  # numbers before texts
-    cases, summary = (
-        {n.removeprefix(group): contents[n] for n in names if n.startswith(group)}
-        for group in ("cases/", "summary/")
+        cases=cases,
+        summary=summary,
+        dt=columns[About.DT],
+        steps=columns[About.STEPS],
+        force=outcome.force,
+        unconverged_steps=columns[About.UNSETTLED],
+        deck=deck.text or deck.to_text(),
+        title=deck.title,
+        units=unit_names(deck),
+        random=random,
     )
-    given = [n for n in ("dt", "steps", "unsettled_steps") if f"history/{n}" in contents]
-    steps = {n: contents[f"history/{n}"] for n in given}
-    required = (*SUMMARY, "status")
-    if not (summary.keys() >= {*required} and steps.keys() >= {"dt", "steps"}):
-        raise ResultFileError(f"{path}: the result of the sweep is incomplete")
-    summary = {name: summary[name] for name in required} | summary  # in their order
-    count = np.shape(steps["dt"])[:1]
-    rows = (*cases.values(), *summary.values(), *steps.values())
-    shape = contents.shapes.get(FORCE)
-    kinds = {name: values.dtype.kind for name, values in summary.items() if name not in VERDICTS}
-    if (
-        any(values.shape != count for values in rows)
-        or (shape is not None and (len(shape), shape[:1]) != (2, count))
-        or not set(kinds.values()) <= set("fiu")
-        or (VALIDITY in summary and summary[VALIDITY].size and summary[VALIDITY].dtype.kind != "U")
+
+
+def _summary_names(plan: Plan, outcome: Outcome) -> list[str]:
+    """Names of the results of every case, whether or not one of them has a value."""
+    columns = outcome.columns
+    names = [*SUMMARY]
+    if plan.settings.deck.last(Delamination) is not None or not columns.keys().isdisjoint(
+        THRESHOLD
     ):
-        message = f"{path}: the data of this sweep do not match in type or number of cases"
-        raise ResultFileError(message)
-    counts, most = steps["steps"], np.inf if shape is None else shape[1]
-    if counts.dtype.kind not in "iu" or not ((counts >= 0) & (counts <= most)).all():
-        raise ResultFileError(f"{path}: history/steps does not match the stored steps")
-    return SweepResult(
-        cases, summary, steps["dt"], counts, contents.get(FORCE) if history else None,
-        steps.get("unsettled_steps"),
-        contents.texts.get("deck", ""), str(contents.attributes.get("title", "")),
-        schema.declared_units(contents.attributes),
-        random_of(contents, cases, summary, count[0]),
-    )  # fmt: skip
-
-
-def csv_lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:
-    """Return the lines of a CSV table, with line ends.
-
-    ``"cases"`` has the values and results of every case, ``"history"`` the contact force after
-    every step of every case that was run.  Cases count from 0, steps from 1.  Numbers are written
-    as Python's repr, which preserves every bit.  An apostrophe precedes texts that a spreadsheet
-    would read as formulas.  Raises ExportError if there is no such table.
-    """
-    if name not in (CASES, HISTORY):
-        raise ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")
-    if name == HISTORY and sweep.force is None:
-        raise ExportError("the sweep has no stored forces; run it again with --history")
-    echo: Any = SimpleNamespace(write=str)  # writerow returns what write returns
-    writer = csv.writer(echo, lineterminator="\n")
-    return (
-        writer.writerow([f"'{v}" if isinstance(v, str) and FORMULA.match(v) else v for v in row])
-        for row in (_case_rows(sweep) if name == CASES else _step_rows(sweep))
-    )
-
-
-def _case_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:
-    columns = {**sweep.cases, **sweep.summary}
-    texts = {name: columns.pop(name) for name in VERDICTS if name in columns}
-    columns |= {"dt": sweep.dt, "steps": sweep.steps, **texts}
-    yield ("case", *columns)
-    yield from zip(range(len(sweep)), *(v.tolist() for v in columns.values()), strict=True)
-
-
-def _step_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:
-    assert sweep.force is not None
-    yield ("case", "step", "time", "force")
-    for case in np.flatnonzero(sweep.fine).tolist():
-        count = int(sweep.steps[case])
-        times = np.add.accumulate(np.full(count, sweep.dt[case])).tolist()
-        forces = sweep.force[case, :count].tolist()
-        yield from zip([case] * count, range(1, count + 1), times, forces, strict=True)
+        names += THRESHOLD
+    if plan.settings.search is not None:
+        names += FOUND
+    names += [name for name in COLUMNS if name in columns and name not in names]
+    return names if RATIO in names else [*names, RATIO]

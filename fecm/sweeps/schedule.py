@@ -2,46 +2,38 @@
 
 Tasks are independent, and their outcomes do not depend on where they run.  Each outcome is reported
 as soon as it is available, so that an interrupted sweep loses only the tasks in progress.
-
-Partial results are in a folder beside the result: one file per task, renamed into place when
-complete, with a checksum at its end that reveals damage.
 """
 
 from __future__ import annotations
 
-import hashlib
-import io
 import json
 import multiprocessing
 import os
-import shutil
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent import futures
-from contextlib import AbstractContextManager, nullcontext, suppress
+from contextlib import nullcontext
 from pathlib import Path
 from pickle import PicklingError
 from typing import Any
 from urllib.parse import urlsplit
 
-import numpy as np
-
 from fecm._errors import FecmError
-from fecm._files import beside, held, packed
 from fecm._inputs import read_input
-from fecm.sweeps.batch import run, told
-from fecm.sweeps.plan import Forces, Outcome, Task
+from fecm.sweeps.batch import run
+from fecm.sweeps.in_full import told
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.plan import Task
 
 Done = Callable[[Task, Outcome], None]
 Idle = Callable[[], None]  # called regularly while workers run, to handle signals
 DEATHS = 3  # of workers without a finished task, after which the remaining tasks count as lost
 LOOK = 0.5  # polling interval in seconds
-PATIENCE = "5s"  # timeout for the scheduler
+PATIENCE = 5.0  # seconds for the scheduler to answer
 LOST = "lost with its worker"
 MOST_ADDRESS = 100_000  # bytes of a file with the scheduler's address
-CHECKSUM = hashlib.sha256().digest_size  # bytes of the checksum after the arrays of a file
 
 
 class SchedulerError(FecmError, RuntimeError):
@@ -119,7 +111,7 @@ def _check_address(address: str) -> None:
         raise SchedulerError(f"`{address}` {what}") from None
     if url.scheme in ("tcp", "tls"):
         try:
-            socket.create_connection((host, port), float(PATIENCE.rstrip("s"))).close()
+            socket.create_connection((host, port), PATIENCE).close()
         except OSError as error:
             raise SchedulerError(f"no Dask scheduler answers at {address} ({error})") from None
 
@@ -171,86 +163,3 @@ def address_in(file: Path) -> str:
     except (ValueError, KeyError, TypeError):
         message = f"{file} has no address; dask scheduler --scheduler-file writes such a file"
         raise SchedulerError(message) from None
-
-
-class OtherSweepError(FecmError, ValueError):
-    """The folder holds the outcomes of another sweep."""
-
-
-class DamagedPartError(FecmError, ValueError):
-    """A file of the folder is damaged."""
-
-
-def parts_of(result: Path) -> Path:
-    """Folder of the partial results of a sweep."""
-    return result.with_name(f".{result.name}.parts")
-
-
-def alone(result: Path) -> AbstractContextManager[None]:
-    """Keep other processes from this result; raises OutputError if one computes it."""
-    return held(parts_of(result), f"{result} is being computed by another process")
-
-
-class PartialResults:
-    """Outcomes of finished tasks of the sweep with a fingerprint, for its result file.
-
-    `restart` deletes the outcomes of another sweep, for which OtherSweepError is raised otherwise.
-    """
-
-    def __init__(self, result: Path, fingerprint: str, *, restart: bool = False) -> None:
-        self.folder = parts_of(result)
-        self.folder.mkdir(exist_ok=True)
-        mark, found = self.folder / "sweep.json", ""
-        with suppress(OSError, ValueError, KeyError, TypeError):
-            found = str(json.loads(mark.read_text())["fingerprint"])
-        # A sweep that was killed while it began has left a folder without outcomes.
-        outcomes = list(self.folder.glob("task-*"))
-        if outcomes and found != fingerprint:
-            if not restart:
-                text = "holds the outcomes of another sweep; --overwrite deletes them"
-                raise OtherSweepError(f"{self.folder} {text}")
-            for path in outcomes:
-                path.unlink()
-        with beside(mark) as partial:
-            partial.write_text(json.dumps({"fingerprint": fingerprint}))
-
-    def _path(self, task: Task) -> Path:
-        return self.folder / f"task-{task.number:06d}.npz"
-
-    def get(self, task: Task) -> Outcome | None:
-        """Outcome of a finished task, None if there is none; DamagedPartError if it is damaged."""
-        path = self._path(task)
-        try:
-            data = path.read_bytes()
-        except FileNotFoundError:
-            return None
-        except OSError as error:
-            raise DamagedPartError(f"{path}: {error.strerror}") from None
-        packed_arrays, checksum = data[:-CHECKSUM], data[-CHECKSUM:]
-        if hashlib.sha256(packed_arrays).digest() != checksum:
-            raise DamagedPartError(f"{path} is damaged")
-        with np.load(io.BytesIO(packed_arrays), allow_pickle=False) as arrays:
-            if arrays["numbers"].tolist() != list(task.numbers):
-                raise DamagedPartError(f"{path} holds other cases")
-            columns = dict(arrays)
-        return Outcome(columns.pop("numbers").tolist(), columns, columns.pop("force", None))
-
-    def put(self, task: Task, outcome: Outcome) -> None:
-        """Store the outcome of a task."""
-        arrays = {**outcome.columns, "numbers": np.array(outcome.numbers)}
-        if outcome.force is not None:
-            arrays["force"] = outcome.force
-        data = packed(arrays)
-        with beside(self._path(task)) as partial, partial.open("wb") as file:
-            file.write(data)
-            file.write(hashlib.sha256(data).digest())
-
-    def forces(self, tasks: Sequence[Task]) -> Iterator[Forces]:
-        """Read the contact forces of one task after the other; None if all its cases failed."""
-        for task in tasks:
-            outcome = self.get(task)
-            yield task.numbers, None if outcome is None else outcome.force
-
-    def clear(self) -> None:
-        """Delete the folder."""
-        shutil.rmtree(self.folder, ignore_errors=True)

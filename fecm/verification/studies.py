@@ -10,16 +10,16 @@ from scipy.special import beta, betaincinv
 
 from fecm._errors import FecmWarning
 from fecm.deck.records import Ply
+from fecm.identification.identify import identify
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.half_space import (
     effective_stiffness,
     indentation_modulus,
     ply_stiffness,
 )
-from fecm.sweeps.cases import Design, Law, matrix
 from fecm.sweeps.convergence import convergence
-from fecm.sweeps.identify import identify
-from fecm.sweeps.random_result import indices, statistics, wilson
+from fecm.sweeps.random import Design, Law, matrix
+from fecm.sweeps.statistics import indices, statistics, wilson
 from fecm.verification import decks
 from fecm.verification.case import Value, case
 

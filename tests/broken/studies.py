@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from fecm.identification import fitting
 from fecm.mechanics import half_space
-from fecm.sweeps import cases, convergence, fitting, random_result
-from fecm.sweeps.responses import Convolution
+from fecm.sweeps import convergence, statistics
+from fecm.sweeps import random as random_values
+from fecm.sweeps.convolution import Convolution
 from tests.breaks import (
     Breaks,
     changed,
@@ -21,15 +23,15 @@ BREAKS: Breaks = {
         instead(Convolution, "give", partly_given), {"convolution": ("largest",)},
     ),
     "the matrices A and B exchanged": (
-        instead(cases, "matrix", exchanged_matrices), {"random-values": ("first", "total")},
+        instead(random_values, "matrix", exchanged_matrices), {"random-values": ("first", "total")},
     ),
     "the median of a lognormal law taken for its mean": (
-        instead(cases.Law, "values",
+        instead(random_values.Law, "values",
                 lambda right, law, unit: right(law, unit) * np.exp(-law.parameters[1] ** 2 / 2.0)),
         {"random-values": ("mean", "its")},
     ),
     "an interval of 90 %": (
-        value(random_result, "Z", 1.6448536), {"random-values": ("lower", "upper")},
+        value(statistics, "Z", 1.6448536), {"random-values": ("lower", "upper")},
     ),
     "meshes in the opposite order": (
         instead(convergence, "_limit", lambda right, values, order: right(values[::-1], order)),

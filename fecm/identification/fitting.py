@@ -13,12 +13,15 @@ from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.deck.model import Deck
+from fecm.identification.alignment import IdentifyError, contact_points
 from fecm.results.comparison import Measurement
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Filter
-from fecm.sweeps.alignment import IdentifyError, contact_points
+from fecm.sweeps.case import Case
 from fecm.sweeps.find import Runs
-from fecm.sweeps.vary import apply_case
+from fecm.sweeps.strike import Strike
+from fecm.sweeps.values import check_names
+from fecm.sweeps.vary import strike
 
 DELAY = "delay"  # measured time at which the approach of the projectile ends in a contact
 OFFSET = "offset"  # measured force without a contact
@@ -26,17 +29,20 @@ OF_RECORD = (DELAY, OFFSET)  # values of the measurement, not of the deck
 STEP = 1e-3  # half of the step of central differences, in the scaled parameters
 POINTS = 10  # fewest measured points
 LOST = 0.2  # largest share of the points of the contact that may be outside the run of the deck
-# Smallest singular value of the Jacobian with unit columns, and smallest column (rms over peak).
-SINGULAR, NO_EFFECT = 1e-3, 1e-6
+SINGULAR = 1e-3  # smallest singular value of the Jacobian with unit columns
+NO_EFFECT = 1e-6  # smallest column of the Jacobian, rms over peak
 SHARE = 0.1  # share of a parameter in a singular vector above which the vector concerns it
 SETTLED = 0.01  # share of a standard error: the fit ends with a step below it
-MOST_EVALUATIONS, FIRST_EVALUATIONS = 60, 6  # of a fit, and of each start of the delay
+MOST_EVALUATIONS = 60  # of a fit
+FIRST_EVALUATIONS = 6  # of each start of the delay
 MOST_FITS = 4  # with fewer points each: those of the run of the deck depend on the delay
 
 
-def fitted(deck: Deck, values: Mapping[str, float]) -> Deck:
-    """Return a deck with values, without those of the record."""
-    return apply_case(deck, {name: v for name, v in values.items() if name not in OF_RECORD})
+def fitted(deck: Deck, values: Mapping[str, float]) -> Strike:
+    """Return the strike of a deck with values, without those of the record."""
+    case: Case = {name: v for name, v in values.items() if name not in OF_RECORD}
+    check_names(case)
+    return strike(deck, case)
 
 
 class Model(NamedTuple):
@@ -153,10 +159,14 @@ def solve(
 
 
 def _least_squares(
-    model: Model, measured: Measurement, inside: NDArray[np.bool_], scaling: Scaling, x0: Floats,
+    model: Model,
+    measured: Measurement,
+    inside: NDArray[np.bool_],
+    scaling: Scaling,
+    x0: Floats,
     evaluations: int,
-) -> Solution:  # fmt: skip
-    from scipy.optimize import least_squares
+) -> Solution:
+    from scipy.optimize import least_squares  # takes 0.2 s to import
 
     time, force = measured.time[inside], measured.force[inside]
     peak = float(np.abs(force).max()) or 1.0
@@ -171,15 +181,25 @@ def _least_squares(
         return forces[:, 0], (above - below) / np.diagonal(up - down)
 
     found = least_squares(
-        lambda x: evaluate(*x)[0] - force / peak, x0, lambda x: evaluate(*x)[1],
-        (scaling.low, scaling.high), max_nfev=evaluations, ftol=SETTLED**2 / len(time),
+        lambda x: evaluate(*x)[0] - force / peak,
+        x0,
+        jac=lambda x: evaluate(*x)[1],
+        bounds=(scaling.low, scaling.high),
+        max_nfev=evaluations,
+        ftol=SETTLED**2 / len(time),
         xtol=1e-7,
-    )  # fmt: skip
-    lost = share_lost(measured.force, inside)
+    )
     return Solution(
-        scaling, found.x, time, force, found.fun * peak + force, found.jac * peak,
-        found.status > 0, found.active_mask, lost,
-    )  # fmt: skip
+        scaling=scaling,
+        x=found.x,
+        time=time,
+        force=force,
+        model=found.fun * peak + force,
+        jacobian=found.jac * peak,
+        converged=found.status > 0,
+        active=found.active_mask,
+        lost=share_lost(measured.force, inside),
+    )
 
 
 def covariance(found: Solution) -> Floats:

@@ -15,17 +15,8 @@ from fecm._errors import warn
 from fecm._typing import Floats
 from fecm.deck.model import Deck, Impact, Indentation, Projectile
 from fecm.deck.units import unit_names
-from fecm.mechanics.projectile import RigidMass
-from fecm.problem.parts import build_projectile
-from fecm.results.comparison import Measurement, measurement_of
-from fecm.results.validity import MEANING, Reason, reasons_of
-from fecm.studies import StudyError
-from fecm.studies.rod_test.filters import Filter, filter_of
-from fecm.sweeps.alignment import IdentifyError, check_measured, lags
-from fecm.sweeps.api import problem_of
-from fecm.sweeps.batch import runs_of
-from fecm.sweeps.find import Runs
-from fecm.sweeps.fitting import (
+from fecm.identification.alignment import IdentifyError, check_measured, lags
+from fecm.identification.fitting import (
     DELAY,
     FIRST_EVALUATIONS,
     LOST,
@@ -43,7 +34,7 @@ from fecm.sweeps.fitting import (
     share_lost,
     solve,
 )
-from fecm.sweeps.misfit import (
+from fecm.identification.misfit import (
     coloured,
     neighbours,
     plate_errors,
@@ -51,7 +42,17 @@ from fecm.sweeps.misfit import (
     undescribed,
     wrong_model,
 )
-from fecm.sweeps.plan import RUN, shares_plate
+from fecm.mechanics.projectile import RigidMass
+from fecm.problem.parts import build_projectile
+from fecm.results.comparison import Measurement, measurement_of
+from fecm.results.validity import MEANING, Reason, reasons_of
+from fecm.studies import StudyError
+from fecm.studies.rod_test.filters import Filter, filter_of
+from fecm.sweeps.api import problem_of
+from fecm.sweeps.batch import runs_of
+from fecm.sweeps.find import Runs
+from fecm.sweeps.plan import shares_plate
+from fecm.sweeps.strike import strike_of
 
 CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
     **dict.fromkeys(("velocity", "energy"), Impact),
@@ -267,10 +268,19 @@ def _identification(
     if not fault:
         plates = plate_errors(model, found, lambda deck: Model(deck, _shared(deck), model.sensor))
     made = Identification(
-        values, dict(zip(start, errors.tolist(), strict=True)), start, correlation,
-        found.time, found.force, found.model, found.converged, found.converged and not fault,
-        plates, fitted(model.deck, rounded), (),
-    )  # fmt: skip
+        values=values,
+        errors=dict(zip(start, errors.tolist(), strict=True)),
+        start=start,
+        correlation=correlation,
+        time=found.time,
+        force=found.force,
+        model=found.model,
+        converged=found.converged,
+        accepted=found.converged and not fault,
+        plate_errors=plates,
+        deck=fitted(model.deck, rounded).deck(),
+        notes=(),
+    )
     notes = filter(None, (fault, *_notes(made, found, measured, model)))
     return replace(made, notes=tuple(notes))
 
@@ -331,9 +341,9 @@ def _notes(
         text = "the model does not describe the measurement down to its noise"
         text = f"{text}, and the standard errors are too small"
         yield f"neighbouring residuals have the correlation {near:.2f}: {text}"
-    fitted = model.runs({0: found.deck}, True)
-    if (status := fitted.status[0]) not in RUN:
-        yield f"the run of the fitted deck fails: {status}"
+    fitted = model.runs({0: strike_of(found.deck)}, True)
+    if not fitted.fine[0]:
+        yield f"the run of the fitted deck fails: {fitted.status[0]}"
     # A measurement may end before the peak does; what the model lacks biases the parameters.
     beyond = [r for r in reasons_of(str(fitted.columns["validity"][0])) if r != Reason.OPEN]
     if beyond:

@@ -12,22 +12,23 @@ from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.deck.model import Deck, Material
 from fecm.deck.units import unit_of
-from fecm.sweeps.fitting import DELAY, OFFSET, Model, Solution, listed
+from fecm.identification.fitting import DELAY, OFFSET, Model, Solution, listed
 from fecm.sweeps.vary import apply_case
 
-# A finding reports a larger correlation of neighbouring residuals, where they exceed a share of the
-# peak.
-COLOURED, FAINT = 0.5, 1e-3
+COLOURED = 0.5  # a finding reports a larger correlation of neighbouring residuals
+FAINT = 1e-3  # share of the peak up to which residuals are the errors of arithmetic
 # Share of the variance of the force in a residual with a shape, above which the model does not
 # describe it.
 UNDESCRIBED = 0.05
 CERTAIN = 5.0  # standard errors from 0, beyond which a delay or an offset is not noise
 HALF = 0.5  # of the systematic part of the residual, which a proposal must remove
-QUIET, LEAST_QUIET = 1e-3, 10  # share of the peak without contact, and fewest such points
+QUIET = 1e-3  # share of the peak up to which there is no contact
+LEAST_QUIET = 10  # fewest points without contact
 SMALL = 5e-3  # share of the peak up to which an offset without contact is not reported
-# Relative change of a property of the plate that gives the derivatives, and the one reported:
-# vibrations shift in phase, so that larger changes are not linear.
-CHANGED, PERCENT = 1e-3, 0.01
+# Relative change of a property of the plate that gives the derivatives.  Vibrations shift in phase,
+# so that larger changes are not linear.
+CHANGED = 1e-3
+PERCENT = 0.01  # the relative change whose effect is reported
 PROPERTIES = ("thickness", "e1")
 
 

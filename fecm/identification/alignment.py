@@ -16,8 +16,10 @@ from fecm.studies import StudyError
 
 OFF = 20.0  # factor between measured and computed peak or duration: a unit must be wrong
 TOP_POINTS = 3  # fewest measured points above half of the peak
-# Level of an onset: share of the peak, and standard deviations of the noise.
-LEAST_LEVEL, MOST_LEVEL, CLEAR = 0.1, 0.5, 5.0
+# Level of an onset, as a share of the peak: above the noise, and within these.
+LEAST_LEVEL = 0.1
+MOST_LEVEL = 0.5
+CLEAR = 5.0  # standard deviations of the noise
 FIRST = 3  # points whose median is the base line of an onset
 LAGS = 2  # lags of the largest cross-correlations that are tried
 LONGEST = 2**22  # points of a record that are correlated

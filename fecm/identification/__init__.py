@@ -1,0 +1,1 @@
+"""Parameters of an impact from a measured force."""

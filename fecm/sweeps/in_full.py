@@ -1,0 +1,173 @@
+"""Cases that are run one by one, as ``fecm run`` does."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.api import LoadedDeck, load_deck
+from fecm.deck.macros import Body, Loop
+from fecm.deck.model import Deck
+from fecm.deck.records import Macro
+from fecm.deck.units import unit_names
+from fecm.mechanics.plate_motion import DivergenceError
+from fecm.problem.problem import Problem
+from fecm.results.exposures import count_evaluations
+from fecm.results.metrics import EVALUATIONS, HIT, Indentation, Projectiles, summarise
+from fecm.results.result import Result
+from fecm.results.sinks import MemorySink
+from fecm.simulation.run import simulate
+from fecm.sweeps import find_exposure
+from fecm.sweeps.case import Case, CasesError
+from fecm.sweeps.find import Sought
+from fecm.sweeps.judge import judge, peaks_of, threshold_of
+from fecm.sweeps.outcome import Outcome, outcome_of
+from fecm.sweeps.plan import BuildFunction, Measure, MeasureFunction, Settings
+from fecm.sweeps.strike import Strike, strike_of
+from fecm.sweeps.timing import with_clock
+from fecm.sweeps.values import name_fault
+from fecm.sweeps.vary import apply_case
+
+FIELDS = ("DISP", "STRE", "PLYS", "REAC", "EIGE")  # macros that store or print fields
+NEVER = 1e9  # steps between two rows of RODP
+
+
+def run_in_full(settings: Settings, number: int, case: Case) -> Outcome:
+    """Run a case on a plate of its own; a case that cannot be run has the reason as its status."""
+    try:
+        checked = problem_of_case(settings, case)
+        search, measure = settings.search, settings.measure
+        if search is not None and search.quantity is Sought.EXPOSURE:
+
+            def run(strike: Strike) -> Outcome:
+                return alone(number, replace(checked, deck=strike.deck()), settings.measures)
+
+            level, start = float(search.level), strike_of(checked.deck)
+            outcome = find_exposure.found(number, start, level, run)
+        else:
+            outcome = alone(number, checked, settings.measures, measure, case)
+    except CasesError as error:
+        return Outcome.failed({number: str(error)})
+    return outcome if settings.build else with_hit(outcome, checked, case)
+
+
+def problem_of_case(settings: Settings, case: Case) -> Problem:
+    """The checked deck of a case with its time step; CasesError if the case cannot be run."""
+    if settings.build is None:
+        return with_clock(apply_case(settings.deck, case), settings.clock, case)
+    (checked,) = built(settings.build, case).problems
+    if unit_names(checked.deck) != unit_names(settings.deck):
+        raise CasesError("build: the units of the deck are not those of the other cases")
+    return checked
+
+
+def built(build: BuildFunction, case: Case) -> LoadedDeck:
+    """Build and check the deck of a case; CasesError if it cannot be built, or has an error."""
+    try:
+        deck = build(dict(case))
+        if not isinstance(deck, Deck):
+            raise TypeError(f"returned {type(deck).__name__}, not a Deck")
+        prepared = load_deck(deck)
+    except Exception as error:
+        raise CasesError(f"build: {told(error)}") from error
+    if errors := prepared.errors():
+        raise CasesError(errors[0].message)
+    if not any(macro.word == "RODP" for macro in deck.macros):
+        raise CasesError("build: the deck has no impact step (RODP)")
+    return prepared
+
+
+def with_hit(outcome: Outcome, checked: Problem, case: Case) -> Outcome:
+    """Add the place that is hit, of cases that give one."""
+    if "at" in case and checked.load_place is not None:
+        for name, value in zip(HIT, checked.load_place, strict=True):
+            outcome.columns[name] = np.where(outcome.fine, value, np.nan)
+    return outcome
+
+
+def alone(
+    number: int,
+    checked: Problem,
+    measures: Sequence[Measure],
+    measure: MeasureFunction | None = None,
+    case: Case | None = None,
+) -> Outcome:
+    """Run one case in full, without storing fields unless it is measured."""
+    sink = MemorySink()
+    try:
+        simulation = simulate(checked if measure else without_output(checked, measures), sink)
+    except (DivergenceError, ArithmeticError) as error:
+        return Outcome.failed({number: str(error)})
+    force, depth, times = (sink.arrays[f"history/{n}"] for n in ("force", "indentation", "time"))
+    about = sink.groups["history"]
+    permanent = np.array([about.get("permanent_indentation", 0.0)])
+    indentation = Indentation(np.maximum(depth.max(keepdims=True), 0.0), depth[-1:], permanent)
+    own = strike_of(checked.deck)
+    metrics = summarise(
+        force[:, None],
+        times,
+        indentation,
+        Projectiles(own.projectile.total_mass, own.velocity),
+        threshold_of(checked),
+        checked.judge.mobility,
+    )
+    outcome = outcome_of(
+        [number],
+        metrics,
+        last=force[-1:],
+        steps=len(force),
+        dt=simulation.state.dt,
+        unsettled=np.array([about.get("unsettled_steps", 0)]),
+        force=force[None],
+    )
+    result = Result(sink.arrays, sink.texts, sink.groups)
+    peaks = peaks_of(measures, result)
+    judge(outcome, checked, measures, end=metrics.end, peaks=peaks, indentation=indentation.largest)
+    if Measure.FAILURE in measures:
+        count = np.array([float(count_evaluations(result))])
+        outcome.columns |= dict.fromkeys(EVALUATIONS, count)
+    if measure is not None:
+        outcome.columns |= _measured(measure, result, case or {})
+    return outcome
+
+
+def _measured(measure: MeasureFunction, result: Result, case: Case) -> dict[str, Floats]:
+    """Columns that the caller computes from the result of a case."""
+    try:
+        found = measure(result)
+        if not isinstance(found, Mapping):
+            raise TypeError(f"returned {type(found).__name__}, not numbers by name")
+        values = {name: np.asarray(value) for name, value in found.items()}
+    except Exception as error:
+        raise CasesError(f"measure: {told(error)}") from error
+    for name, value in values.items():
+        fault = name_fault(name)
+        if name in case or name == "dt":
+            fault = f"`{name}` is a name of the case; choose another"
+        elif value.ndim or value.dtype.kind not in "biuf":
+            fault = f"{name} is not a number"
+        if fault:
+            raise CasesError(f"measure: {fault}")
+    return {name: value.astype(float)[None] for name, value in values.items()}
+
+
+def without_output(checked: Problem, measures: Sequence[Measure] = ()) -> Problem:
+    """Return a problem whose program stores no fields, but those of what is measured."""
+    dropped = {*FIELDS} if Measure.FAILURE in measures else {*FIELDS, "FAIL"}
+
+    def kept(body: Body) -> Iterator[Macro | Loop]:
+        for item in body:
+            if isinstance(item, Loop):
+                yield replace(item, body=tuple(kept(item.body)))
+            elif item.word not in dropped:
+                yield replace(item, value=NEVER) if item.word == "RODP" else item
+
+    return replace(checked, program=tuple(kept(checked.program)))
+
+
+def told(error: Exception) -> str:
+    """Type and text of an exception in one line."""
+    return f"{type(error).__name__}: {' '.join(str(error).split())}"

@@ -1,0 +1,49 @@
+"""Memory that a sweep needs."""
+
+from __future__ import annotations
+
+from fecm import _memory
+from fecm.mechanics.kernels import LIBRARY
+from fecm.problem.memory import needed_bytes
+from fecm.problem.problem import Problem
+from fecm.sweeps.checks import check_deck
+from fecm.sweeps.in_full import without_output
+from fecm.sweeps.plan import MOST_TOGETHER, Plan, runs_together, tasks
+from fecm.sweeps.values import REFINE
+from fecm.sweeps.vary import apply_case
+
+# Bytes per step and case, above the measured values: of a case that is advanced, and of a case
+# whose history is stored.
+ADVANCED_BYTES = 34 if LIBRARY is None else 12
+HISTORY_BYTES = 24
+
+
+def check_memory(checked: Problem, made: Plan, workers: int, *, streamed: bool = False) -> None:
+    """Reject a sweep that needs more memory than is free, by a NotEnoughMemoryError.
+
+    `workers` are those on this machine; 0 if a cluster runs the cases.  If histories are
+    `streamed` to files, only those of one task are held.
+    """
+    settings = made.settings
+    if REFINE in made.cases[-1]:
+        checked = check_deck(apply_case(settings.deck, made.cases[-1]))
+    steps, cases = checked.work.steps, len(made.cases)
+    at_once = min(workers, len(tasks(checked, made)))
+    plate = checked if settings.measure else without_output(checked, settings.measures)
+    stored = 0
+    if settings.history:
+        stored = HISTORY_BYTES * steps * (min(cases, MOST_TOGETHER) if streamed else cases)
+
+    def needed(exact: bool) -> int:
+        if not at_once:
+            return stored
+        one = needed_bytes(plate, in_memory=settings.measure is not None, exact=exact)
+        one += ADVANCED_BYTES * steps * runs_together(checked, made)
+        return stored + at_once * one
+
+    def remedy(free: int) -> str:
+        if needed(True) - stored <= free:
+            return "take fewer cases, or none of their histories"
+        return "take fewer workers" if at_once > 1 else "take fewer steps or a coarser mesh"
+
+    _memory.check("the sweep", needed, remedy)

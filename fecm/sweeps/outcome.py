@@ -1,0 +1,133 @@
+"""Outcomes of cases: their columns, and the contact forces of every step."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Bools, Floats
+from fecm.results.metrics import COLUMNS, SUMMARY, Metrics
+from fecm.results.validity import FAILED, VALID
+
+Column = NDArray[Any]  # of numbers or of texts
+Forces = tuple[Sequence[int], Floats | None]  # of cases, with contact forces (cases, steps)
+
+
+class Status(StrEnum):
+    """Status of a case that was run; that of another one is the reason of its failure."""
+
+    OK = "ok"
+    STILL = "still in contact"  # at the end
+
+
+class About(StrEnum):
+    """Columns that describe the run of a case."""
+
+    STATUS = "status"  # a :class:`Status`, or the reason for the failure
+    VALIDITY = "validity"  # ``"ok"``, the reasons to doubt the case, or ``"failed"``
+    DT = "dt"
+    STEPS = "steps"
+    UNSETTLED = "unsettled"  # number of steps whose contact iteration did not converge
+    REACHED = "reached"  # the largest contact force, a lower bound of the peak
+
+
+def was_run(status: Column) -> Bools:
+    """Cases that were run, by their status."""
+    return np.isin(status, tuple(Status))
+
+
+@dataclass
+class Outcome:
+    """Results of some cases."""
+
+    numbers: list[int]  # of the cases, from 0
+    # (cases,) each, by name: those of :class:`About`, and results, of which those of
+    # :data:`~fecm.results.metrics.METRICS` are NaN if the case failed, or if its end has not
+    # decided them.
+    columns: dict[str, Column]
+    force: Floats | None = None  # (cases, steps): contact force after every step
+
+    @property
+    def status(self) -> list[str]:
+        """Status of each case."""
+        return list(map(str, self.columns[About.STATUS]))
+
+    @property
+    def fine(self) -> Bools:
+        """Cases that were run."""
+        return was_run(self.columns[About.STATUS])
+
+    @property
+    def measured(self) -> list[str]:
+        """Names of the columns that the caller computes."""
+        return [name for name in self.columns if name not in (*COLUMNS, *About)]
+
+    def select(self, rows: NDArray[np.intp]) -> Outcome:
+        """Return the outcome of some of the cases."""
+        columns = {name: values[rows] for name, values in self.columns.items()}
+        force = None if self.force is None else self.force[rows]
+        return Outcome([self.numbers[row] for row in rows], columns, force)
+
+    @classmethod
+    def failed(cls, reasons: Mapping[int, str]) -> Outcome:
+        """Return the outcome of cases that could not be run, from the reasons by their numbers."""
+        count = len(reasons)
+        about: dict[About, Column] = {
+            About.STATUS: np.array(list(reasons.values()), dtype=np.str_),
+            About.VALIDITY: np.full(count, FAILED),
+            About.DT: np.full(count, np.nan),
+            About.STEPS: np.zeros(count, dtype=np.int64),
+            About.UNSETTLED: np.zeros(count, dtype=np.int64),
+            About.REACHED: np.full(count, np.nan),
+        }
+        return cls(list(reasons), {name: np.full(count, np.nan) for name in SUMMARY} | about)
+
+
+def outcome_of(
+    numbers: list[int],
+    metrics: Metrics,
+    *,
+    last: Floats,
+    steps: int,
+    dt: float,
+    unsettled: NDArray[np.int64],
+    force: Floats | None = None,
+) -> Outcome:
+    """Return the outcome of cases that were run with one time step, before they are judged.
+
+    `last` (cases,) are the contact forces after the last step, `force` (cases, steps) all.
+    """
+    cases = len(numbers)
+    about: dict[About, Column] = {
+        About.STATUS: np.where(last > 0.0, Status.STILL, Status.OK),
+        About.VALIDITY: np.full(cases, VALID),
+        About.DT: np.full(cases, dt),
+        About.STEPS: np.full(cases, steps, dtype=np.int64),
+        About.UNSETTLED: unsettled,
+        About.REACHED: metrics.reached,
+    }
+    return Outcome(numbers, metrics.columns | about, force)
+
+
+def merge(parts: Sequence[Outcome], *, history: bool = True) -> Outcome:
+    """Merge outcomes, ordered by the numbers of the cases; their forces only with `history`."""
+    given = [number for part in parts for number in part.numbers]
+    order, numbers = np.argsort(given), sorted(given)
+    columns: dict[str, Column] = {}
+    for name in dict.fromkeys(name for part in parts for name in part.columns):
+        found = [part.columns.get(name, np.full(len(part.numbers), np.nan)) for part in parts]
+        columns[name] = np.concatenate(found)[order]
+    if not history:
+        return Outcome(numbers, columns)
+    longest = max((0 if part.force is None else part.force.shape[1] for part in parts), default=0)
+    force = np.full((len(numbers), longest), np.nan)
+    ends = np.cumsum([len(part.numbers) for part in parts])
+    for part, end in zip(parts, ends, strict=True):
+        if part.force is not None:
+            force[end - len(part.numbers) : end, : part.force.shape[1]] = part.force
+    return Outcome(numbers, columns, force[order])

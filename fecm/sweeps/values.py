@@ -1,0 +1,250 @@
+"""The values that can vary: one row each, from which checks, help and docs/sweeps.md follow."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from enum import Enum, IntEnum, auto
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from fecm._errors import did_you_mean
+from fecm.deck.grid import SUPPORTS
+from fecm.results.metrics import COLUMNS, VERDICTS
+from fecm.sweeps import plates, strike
+from fecm.sweeps.case import PAIRS, Case, CasesError, Value, normal_pair, number
+from fecm.sweeps.plates import PlateSetter
+from fecm.sweeps.strike import StrikeSetter
+
+_Setter = TypeVar("_Setter", PlateSetter, StrikeSetter, None)
+
+
+class Kind(Enum):
+    """Kind of a value."""
+
+    NUMBER = auto()
+    INTEGER = auto()
+    TEXT = auto()
+
+
+class Changes(IntEnum):
+    """What a value changes, in the order in which the values of a case are applied.
+
+    All but a strike need a run of the plate for each value.
+    """
+
+    LAMINATE = auto()
+    PLATE = auto()  # mesh and supports
+    PLACE = auto()  # where the force acts
+    STRIKE = auto()  # velocity, contact law and projectile
+    TIME = auto()  # time step and duration
+
+
+@dataclass(frozen=True)
+class Variable(Generic[_Setter]):
+    """A value that can vary."""
+
+    name: str
+    changes: Changes
+    dimension: str  # that of its unit; empty for a pure number or a text
+    setter: _Setter
+    kind: Kind = Kind.NUMBER
+    meaning: str = ""  # Markdown of docs/sweeps.md
+
+
+_MASS = "force*time^2/length"
+_DENSITY = "force*time^2/length^4"
+_STRESS = "force/length^2"
+_SPEED = "length/time"
+
+# fmt: off
+STRIKE_VALUES: tuple[Variable[StrikeSetter], ...] = (
+    Variable("velocity", Changes.STRIKE, _SPEED, strike.set_velocity,
+             meaning="approach velocity of `ROD`"),
+    Variable("energy", Changes.STRIKE, "force*length", strike.set_energy,
+             meaning="½ m v² of the projectile, instead of `velocity`; with the mass of the case"),
+    Variable("k", Changes.STRIKE, "force/length^1.5", strike.constant("k"),
+             meaning="contact coefficient of `EXPE`"),
+    Variable("radius", Changes.STRIKE, "length", strike.set_radius,
+             meaning="radius of a steel sphere, instead of `k`: [its k](#radius-of-the-sphere) on "
+                     "the laminate of the case"),
+    Variable("alpha_p", Changes.STRIKE, "length", strike.constant("alpha_p"),
+             meaning="critical indentation of `EXPE`"),
+    Variable("s_p", Changes.STRIKE, "", strike.constant("s_p"),
+             meaning="constant of `EXPE`"),
+    Variable("q", Changes.STRIKE, "", strike.constant("q"),
+             meaning="unloading power of `EXPE`"),
+    Variable("mass", Changes.STRIKE, _MASS, strike.set_mass,
+             meaning="mass of the projectile; changes the density of a rod"),
+    Variable("rod_mass", Changes.STRIKE, _MASS, strike.set_mass,
+             meaning="the same as `mass`"),
+    Variable("rod_length", Changes.STRIKE, "length", strike.rod_property("rod_length", "length"),
+             meaning="length of the rod (`PROJ`, or the rod of the report)"),
+    Variable("rod_modulus", Changes.STRIKE, _STRESS, strike.rod_property("rod_modulus", "modulus"),
+             meaning="Young's modulus of the rod"),
+    Variable("rod_density", Changes.STRIKE, _DENSITY, strike.rod_property("rod_density", "density"),
+             meaning="density of the rod"),
+)
+PLATE_VALUES: tuple[Variable[PlateSetter], ...] = (
+    Variable("at", Changes.PLACE, "", plates.set_place, Kind.TEXT,
+             meaning="[impact point](#impact-point) `(x,y)`"),
+    Variable("impact_node", Changes.PLACE, "", plates.set_impact_node, Kind.INTEGER,
+             meaning="node of `ROD`"),
+    Variable("patch", Changes.PLACE, "length", plates.patch_field("radius"),
+             meaning="radius of the patch (`PATC`; a deck without one gets a disc at the impact "
+                     "node)"),
+    Variable("x0", Changes.PLACE, "length", plates.patch_field("x"),
+             meaning="centre of the patch; with `y0`, unless the deck gives that"),
+    Variable("y0", Changes.PLACE, "length", plates.patch_field("y"),
+             meaning="centre of the patch; with `x0`, unless the deck gives that"),
+    Variable("laminate_thickness", Changes.LAMINATE, "length", plates.set_thickness,
+             meaning="thickness of the laminate; every ply is scaled"),
+    Variable("ply_thickness", Changes.LAMINATE, "length", plates.set_ply_thickness,
+             meaning="thickness of every ply, which all have the same"),
+    Variable("thickness", Changes.LAMINATE, "length", plates.set_thickness,
+             meaning="the same as `laminate_thickness`"),
+    Variable("density", Changes.LAMINATE, _DENSITY, plates.ply_property("density"),
+             meaning="density of the ply of `MATE`"),
+    Variable("nu12", Changes.LAMINATE, "", plates.ply_property("nu12"),
+             meaning="Poisson's ratio of the ply"),
+    Variable("e1", Changes.LAMINATE, _STRESS, plates.ply_property("e1"),
+             meaning="Young's modulus of the ply along the fibres"),
+    Variable("e2", Changes.LAMINATE, _STRESS, plates.ply_property("e2"),
+             meaning="Young's modulus of the ply across the fibres"),
+    Variable("g12", Changes.LAMINATE, _STRESS, plates.ply_property("g12"),
+             meaning="shear modulus in the plane of the ply"),
+    Variable("g13", Changes.LAMINATE, _STRESS, plates.ply_property("g13"),
+             meaning="transverse shear modulus along the fibres"),
+    Variable("g23", Changes.LAMINATE, _STRESS, plates.ply_property("g23"),
+             meaning="transverse shear modulus across the fibres"),
+    Variable("layup", Changes.LAMINATE, "", plates.set_layup, Kind.TEXT,
+             meaning="as in [`fecm new`](making.md), with the ply thickness of the deck"),
+    Variable("angle", Changes.LAMINATE, "", plates.add_angle,
+             meaning="degrees added to the angle of every ply"),
+    Variable("size", Changes.PLATE, "", plates.set_size, Kind.TEXT,
+             meaning="`AxB`: sides of the plate; coordinates are scaled along x and y, and with "
+                     "them the centre of the patch and the gages"),
+    Variable("support", Changes.PLATE, "", plates.set_support, Kind.TEXT,
+             meaning="`free`, `simple` or `clamped`: [support](#supports-of-the-outline) of the "
+                     "outline"),
+)
+TIME_VALUES: tuple[Variable[None], ...] = (  # which are set together, after all others
+    Variable("dt", Changes.TIME, "time", None,
+             meaning="[time step](#time-step-and-duration), or `auto`; the duration is kept"),
+    Variable("duration", Changes.TIME, "time", None,
+             meaning="simulated time, rounded up to a step"),
+)
+# fmt: on
+REFINEMENT = Variable("refine", Changes.PLATE, "", plates.refine)  # of a refinement study
+REFINE = REFINEMENT.name
+VARIABLES: dict[str, Variable[PlateSetter] | Variable[StrikeSetter] | Variable[None]] = {
+    **{variable.name: variable for variable in STRIKE_VALUES},
+    **{variable.name: variable for variable in PLATE_VALUES},
+    **{variable.name: variable for variable in TIME_VALUES},
+}
+NAMES = tuple(VARIABLES)
+EXCLUDING = (  # names of which only one can vary
+    ("velocity", "energy"),
+    ("k", "radius"),
+    ("mass", "rod_mass", "rod_density"),
+    ("at", "impact_node"),
+    ("at", "x0"),
+    ("at", "y0"),
+    ("laminate_thickness", "ply_thickness", "thickness"),
+)
+# Names of results, which are no names of cases or of measured columns.
+RESERVED = ("case", "step", "steps", "force", "unsettled_steps", *VERDICTS, *COLUMNS)
+
+
+def names_of(*changes: Changes) -> tuple[str, ...]:
+    """Names of the values that change something."""
+    return tuple(name for name, variable in VARIABLES.items() if variable.changes in changes)
+
+
+PLATE_NAMES = names_of(Changes.PLACE, Changes.LAMINATE, Changes.PLATE, Changes.TIME)
+OF_PLATE = frozenset((*PLATE_NAMES, REFINE))  # which need another response of the plate
+
+
+def plate_values(case: Case) -> Case:
+    """The values of a case that need another response of the plate."""
+    return {name: value for name, value in case.items() if name in OF_PLATE}
+
+
+def kind_of(name: str) -> Kind:
+    """Kind of a value."""
+    return VARIABLES[name].kind
+
+
+def dimension_of(name: str) -> str:
+    """Dimension of a value; empty if its name is none of the table."""
+    return VARIABLES[name].dimension if name in VARIABLES else ""
+
+
+def check_names(names: Collection[str]) -> None:
+    """Raise CasesError if names exclude each other."""
+    for group in EXCLUDING:
+        if len(given := [name for name in group if name in names]) > 1:
+            raise CasesError(f"{given[0]} and {given[1]} exclude each other; vary one of them")
+
+
+def check_known(name: str, where: str) -> None:
+    """Raise CasesError if a name is none of the table."""
+    if name not in VARIABLES:
+        others = did_you_mean(name, NAMES) or f"; the names are {', '.join(NAMES)}"
+        raise CasesError(f"{where}: `{name}` cannot be varied{others}")
+
+
+def check_free(name: object, where: str) -> None:
+    """Raise CasesError if a name that the caller chose can't be that of a column."""
+    if fault := name_fault(name):
+        raise CasesError(f"{where}: {fault}")
+
+
+def name_fault(name: object) -> str:
+    """Why a name can't be that of a column; empty if it can."""
+    if not (isinstance(name, str) and name.isidentifier()):
+        return f"`{name}` is not a name such as width"
+    return f"`{name}` is a name of the results; choose another" if name in RESERVED else ""
+
+
+def parse_value(name: str, text: str) -> Value:
+    """Read the value of a name; CasesError if it is invalid."""
+    if name in PAIRS:
+        return normal_pair(name, text)
+    if name == "support" and text.strip() not in SUPPORTS:
+        raise CasesError(f"support must be {', '.join(SUPPORTS)}, not `{text.strip()}`")
+    if kind_of(name) is Kind.TEXT:
+        return text.strip()
+    value = 0.0 if name == "dt" and text.strip() == "auto" else number(name, text)
+    if kind_of(name) is Kind.NUMBER:
+        return value
+    if not value.is_integer():
+        raise CasesError(f"{name} must be an integer, not {value:g}")
+    return int(value)
+
+
+def value_of(name: str, given: object, where: str) -> Value:
+    """The value of a name that a caller of Python has given; CasesError if it is invalid."""
+    if isinstance(given, np.generic):
+        given = given.item()
+    if kind_of(name) is Kind.TEXT and isinstance(given, Iterable) and not isinstance(given, str):
+        separator = {"at": ",", "size": "x"}.get(name, "/")
+        given = separator.join(map(str, given))
+    try:
+        # float() says itself what is no number
+        text = given if isinstance(given, str) else repr(float(given))  # type: ignore[arg-type]
+        return parse_value(name, text)
+    except (TypeError, ValueError) as error:
+        text = str(error) if isinstance(error, CasesError) else f"{name} can't be {given!r}"
+        raise CasesError(f"{where}: {text}") from None
+
+
+def free_value_of(name: str, given: object, where: str) -> Value:
+    """The value of a name that the caller chose: a finite number or a text."""
+    if isinstance(given, np.generic):
+        given = given.item()
+    if isinstance(given, str) or (isinstance(given, float | int) and math.isfinite(given)):
+        return given
+    raise CasesError(f"{where}: {name} is {given!r}, not a finite number or a text")
