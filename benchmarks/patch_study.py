@@ -17,8 +17,7 @@ import numpy as np
 
 from fecm.deck import Deck
 from fecm.deck.grid import Grid, Section, uniform
-from fecm.deck.model import Indentation, Patch, Projectile, Shear
-from fecm.deck.records import Ply
+from fecm.deck.model import Indentation, Patch, Ply, Projectile, Shear
 from fecm.plot import style
 from fecm.plot.kinds import Picture
 from fecm.plot.pictures import save

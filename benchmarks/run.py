@@ -35,8 +35,16 @@ import fecm
 from fecm.deck import Deck
 from fecm.deck.grid import Grid, Section
 from fecm.deck.macros import compile_program
-from fecm.deck.model import Boundary, Coordinates, Elements, Impact, Material, Patch
-from fecm.deck.records import Control, NodeValues
+from fecm.deck.model import (
+    Boundary,
+    Control,
+    Coordinates,
+    Elements,
+    Impact,
+    Material,
+    NodeValues,
+    Patch,
+)
 from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.stiffness_product import CSR, KERNELS, NUMPY
 from fecm.problem.build import RunOptions, build_model

@@ -22,9 +22,8 @@ if TYPE_CHECKING:
     from fecm.authoring.laminate import Laminate
     from fecm.authoring.plate import Plate
     from fecm.deck.findings import DeckError
-    from fecm.deck.model import Deck
+    from fecm.deck.model import Deck, Ply
     from fecm.deck.reader import read_deck
-    from fecm.deck.records import Ply
     from fecm.identification.identify import Identification, identify
     from fecm.mechanics.plate_motion import DivergenceError
     from fecm.mechanics.projectile import RigidMass, Rod
@@ -72,7 +71,7 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "Identification": ("fecm.identification.identify", "Identification"),
         "Laminate": ("fecm.authoring.laminate", "Laminate"),
         "Plate": ("fecm.authoring.plate", "Plate"),
-        "Ply": ("fecm.deck.records", "Ply"),
+        "Ply": ("fecm.deck.model", "Ply"),
         "Result": ("fecm.results.result", "Result"),
         "RigidMass": ("fecm.mechanics.projectile", "RigidMass"),
         "Rod": ("fecm.mechanics.projectile", "Rod"),

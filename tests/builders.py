@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm.deck.records import Ply
+from fecm.deck.model import Ply
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.laminate import Laminate, laminate

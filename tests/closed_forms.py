@@ -14,7 +14,7 @@ from scipy.integrate import solve_ivp
 from scipy.special import beta, j1
 
 from fecm._typing import Floats
-from fecm.deck.records import Ply
+from fecm.deck.model import Ply
 from tests.closed_forms_plies import equilibrium_shear, exposures, interlaminar
 from tests.closed_forms_statistics import ishigami, lognormal, wilson
 

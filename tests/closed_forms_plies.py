@@ -13,7 +13,7 @@ from numpy.polynomial import Polynomial
 from scipy.optimize import brentq
 
 from fecm._typing import Floats
-from fecm.deck.records import Ply
+from fecm.deck.model import Ply
 from tests.builders import turned_stiffness
 
 # Transverse shear --------------------------------------------------------------------------------

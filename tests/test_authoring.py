@@ -18,6 +18,7 @@ from fecm.deck.grid import Grid, graded, lines, listed, longest_at, refined, uni
 from fecm.deck.layup import LayupError, parse_layup
 from fecm.deck.model import (
     Allowables,
+    Control,
     Delamination,
     Impact,
     Material,
@@ -25,7 +26,6 @@ from fecm.deck.model import (
     Projectile,
     Shear,
 )
-from fecm.deck.records import Control
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_projectile

@@ -15,19 +15,21 @@ from fecm.deck import Deck, DeckError, Reader
 from fecm.deck.model import (
     SEGMENTS,
     Boundary,
+    Control,
     Coordinates,
     Elements,
     Forces,
     Impact,
     Indentation,
+    Macro,
     Material,
+    NodeValues,
     NumberedSegment,
     Page,
     PrintOption,
     Segment,
 )
 from fecm.deck.numerals import format_real, parse_real
-from fecm.deck.records import Control, Macro, NodeValues
 from tests.decks import APPENDIX, DATA_CARDS, LONG, MESH, small
 
 

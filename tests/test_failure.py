@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from fecm.deck.records import Ply
+from fecm.deck.model import Ply
 from fecm.mechanics.failure import (
     CRITERIA,
     MODES,

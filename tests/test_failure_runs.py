@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck.model import Allowables
-from fecm.deck.records import Ply
+from fecm.deck.model import Allowables, Ply
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.failure import CRITERIA, exposure_of
 from fecm.mechanics.interpolation import interpolate

@@ -11,27 +11,25 @@ from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.model import (
     Boundary,
+    Control,
     Coordinates,
+    ElementNodes,
     Elements,
     Forces,
     Impact,
     Indentation,
+    Integration,
+    Layer,
+    Macro,
     Material,
+    NodeCodes,
+    NodeValues,
     Page,
+    Ply,
     PrintOption,
     Units,
 )
 from fecm.deck.reader import Reader
-from fecm.deck.records import (
-    Control,
-    ElementNodes,
-    Integration,
-    Layer,
-    Macro,
-    NodeCodes,
-    NodeValues,
-    Ply,
-)
 from tests.decks import small
 from tests.fuzz_decks import examine, mutate
 

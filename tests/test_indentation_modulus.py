@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fecm.deck.records import Ply
+from fecm.deck.model import Ply
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.half_space import (
     PlyError,

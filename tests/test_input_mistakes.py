@@ -11,8 +11,7 @@ import fecm
 from fecm.api import load_deck
 from fecm.deck.catalogue import MATERIALS, SYSTEMS, convert
 from fecm.deck.findings import Finding
-from fecm.deck.model import Allowables, Damping
-from fecm.deck.records import Ply
+from fecm.deck.model import Allowables, Damping, Ply
 from fecm.deck.units import MASS
 from fecm.mechanics.mesh import Mesh
 from fecm.problem.rules.damping import clamped_frequency

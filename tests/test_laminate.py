@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fecm.deck.model import Material
-from fecm.deck.records import Integration, Layer, Ply
+from fecm.deck.model import Integration, Layer, Material, Ply
 from fecm.mechanics.laminate import (
     laminate,
     reduced_stiffness,

@@ -11,9 +11,8 @@ from fecm.api import load_deck
 from fecm.deck import DeckError, Finding, read_deck
 from fecm.deck.format import format_deck
 from fecm.deck.macros import WORDS, estimate_work
-from fecm.deck.model import Impact, Indentation, Patch, Projectile, Segment, Shear
+from fecm.deck.model import Impact, Indentation, Macro, Patch, Projectile, Segment, Shear
 from fecm.deck.reader import Reader
-from fecm.deck.records import Macro
 from fecm.problem.slips import MODES
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ROOT, small

@@ -10,7 +10,8 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.deck.records import LoadTable, load_factor
+from fecm.deck.macros import load_factor
+from fecm.deck.model import LoadTable
 from fecm.mechanics.solutions import modes
 from fecm.problem.parts import build_plate
 from fecm.results.result import Result

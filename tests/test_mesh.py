@@ -6,8 +6,17 @@ import numpy as np
 import pytest
 
 from fecm.deck import Deck, Findings
-from fecm.deck.model import Boundary, Coordinates, Elements, Forces, Segment
-from fecm.deck.records import Control, ElementNodes, NodeCodes, NodeValues
+from fecm.deck.model import (
+    Boundary,
+    Control,
+    Coordinates,
+    ElementNodes,
+    Elements,
+    Forces,
+    NodeCodes,
+    NodeValues,
+    Segment,
+)
 from fecm.mechanics.mesh import Mesh
 from fecm.problem.generate import generate
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck.records import Ply
+from fecm.deck.model import Ply
 from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.laminate import Laminate, laminate

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fecm.deck.records import Ply
+from fecm.deck.model import Ply
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import Mesh, element_blocks

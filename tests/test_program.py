@@ -13,7 +13,7 @@ import fecm
 from fecm.api import Mode, load_deck
 from fecm.deck import Findings
 from fecm.deck.macros import compile_program, estimate_work
-from fecm.deck.records import Macro
+from fecm.deck.model import Macro
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import RunOptions
 from fecm.results.result import Result

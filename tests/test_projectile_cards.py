@@ -13,8 +13,17 @@ import fecm
 from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.grid import Grid, Section
-from fecm.deck.model import Impact, Indentation, Material, Projectile
-from fecm.deck.records import Control, Integration, Layer, Macro, Ply
+from fecm.deck.model import (
+    Control,
+    Impact,
+    Indentation,
+    Integration,
+    Layer,
+    Macro,
+    Material,
+    Ply,
+    Projectile,
+)
 from fecm.mechanics.points import gages
 from fecm.mechanics.projectile import RigidMass, Rod, report_rod
 from fecm.problem.generate import generate

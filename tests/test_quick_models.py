@@ -16,7 +16,7 @@ from scipy.special import ellipk
 
 import fecm
 from fecm.api import load_deck
-from fecm.deck.records import Ply
+from fecm.deck.model import Ply
 from fecm.mechanics.laminate import (
     SMALL_MASS,
     Laminate,

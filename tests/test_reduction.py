@@ -9,8 +9,7 @@ import pytest
 
 import fecm
 from fecm.deck import Deck
-from fecm.deck.model import Forces, Impact
-from fecm.deck.records import NodeValues
+from fecm.deck.model import Forces, Impact, NodeValues
 from fecm.mechanics import stiffness_product
 from fecm.mechanics.stiffness_product import ElementProduct, Workers, stiffness_operator
 from fecm.mechanics.symmetry import SymmetryReduction, symmetry_reduction

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.polynomial import Polynomial
 
-from fecm.deck.records import Ply
+from fecm.deck.model import Ply
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from tests.builders import (

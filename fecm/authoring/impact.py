@@ -22,7 +22,7 @@ from fecm.deck import model
 from fecm.deck.catalogue import STANDARD, SYSTEM, SYSTEMS, NamedContact
 from fecm.deck.findings import DeckError
 from fecm.deck.grid import IN_PLANE
-from fecm.deck.records import Control, Gage
+from fecm.deck.model import Control, Gage
 from fecm.deck.units import in_si, unit_of
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.parts import build_projectile, projectile_segment

@@ -11,8 +11,7 @@ from fecm.authoring.parameters import ObjectError
 from fecm.deck import catalogue
 from fecm.deck.catalogue import MATERIALS, SYSTEMS, NamedPly
 from fecm.deck.layup import parse_layup
-from fecm.deck.model import Delamination, Material, Segment
-from fecm.deck.records import Integration, Layer, Ply
+from fecm.deck.model import Delamination, Integration, Layer, Material, Ply, Segment
 from fecm.mechanics.laminate import laminate as stiffness_of
 
 ORDER = 3  # integration order of stiffness and mass

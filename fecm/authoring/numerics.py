@@ -11,8 +11,7 @@ from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.authoring.contact import parse_patch
 from fecm.authoring.parameters import ObjectError, check_positive
-from fecm.deck.model import Allowables, Deck, Impact, Indentation, Patch, Shear
-from fecm.deck.records import Macro
+from fecm.deck.model import Allowables, Deck, Impact, Indentation, Macro, Patch, Shear
 from fecm.mechanics.points import HERTZ
 from fecm.mechanics.solutions import static_stiffness
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step

@@ -22,8 +22,7 @@ from fecm.cli.options import (
 from fecm.deck.catalogue import MATERIALS, SYSTEMS, NamedPly, read_plies
 from fecm.deck.findings import Findings
 from fecm.deck.layup import parse_layup
-from fecm.deck.model import Material
-from fecm.deck.records import Integration, Layer, Ply
+from fecm.deck.model import Integration, Layer, Material, Ply
 from fecm.mechanics.laminate import Laminate
 from fecm.problem.check import check_segment
 from fecm.problem.parts import laminate_of

@@ -16,12 +16,14 @@ from fecm.deck.model import (
     Boundary,
     Coordinates,
     Deck,
+    ElementNodes,
     Elements,
     Forces,
     Impact,
+    NodeCodes,
+    NodeValues,
     Projectile,
 )
-from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
 from fecm.mechanics.mesh import Ints, Mesh, equation_numbers
 
 # Nodes that cards may generate or reset.

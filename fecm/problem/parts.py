@@ -8,8 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from fecm.deck import model
-from fecm.deck.model import Deck
-from fecm.deck.records import RodDiameter
+from fecm.deck.model import Deck, RodDiameter
 from fecm.mechanics import contact_law
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal

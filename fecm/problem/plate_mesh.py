@@ -24,8 +24,7 @@ from fecm.deck.grid import (
     boundary_cards,
     round_to,
 )
-from fecm.deck.model import Boundary, Coordinates, Elements
-from fecm.deck.records import ElementNodes, NodeValues
+from fecm.deck.model import Boundary, Coordinates, ElementNodes, Elements, NodeValues
 
 Integers = NDArray[np.int_]
 # Kinds of cells by their number of nodes: meshio's name, which is that of the corners' number too.

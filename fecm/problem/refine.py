@@ -13,8 +13,17 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._typing import Bools, Floats
-from fecm.deck.model import Boundary, Coordinates, Deck, Elements, Forces, Segment
-from fecm.deck.records import ElementNodes, NodeCodes, NodeValues
+from fecm.deck.model import (
+    Boundary,
+    Coordinates,
+    Deck,
+    ElementNodes,
+    Elements,
+    Forces,
+    NodeCodes,
+    NodeValues,
+    Segment,
+)
 from fecm.mechanics.mesh import Ints, Mesh, element_blocks
 
 # Corners at the ends of each side, and the local coordinate that runs along it.

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fecm._typing import Array
-from fecm.deck.records import AXES, DOF_NAMES
+from fecm.deck.mesh_cards import AXES, DOF_NAMES
 from fecm.results.errors import NotStoredError
 from fecm.results.plies import rows_at
 from fecm.results.schema import DATASETS, SCALES, Dataset

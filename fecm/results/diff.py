@@ -26,7 +26,7 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._typing import Array
-from fecm.deck.records import DOF_NAMES
+from fecm.deck.mesh_cards import DOF_NAMES
 from fecm.results.blocks import row_blocks
 from fecm.results.hdf5_reader import Contents, read
 from fecm.results.missing import suggestion

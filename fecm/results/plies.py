@@ -9,8 +9,7 @@ import numpy as np
 
 from fecm._frozen import frozen
 from fecm._typing import Array, Bools, Floats, Indices
-from fecm.deck.model import Material
-from fecm.deck.records import Ply
+from fecm.deck.model import Material, Ply
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.mesh import element_blocks

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from fecm._frozen import frozen
 from fecm._typing import Floats
-from fecm.deck.records import AXES, DOF_NAMES
+from fecm.deck.mesh_cards import AXES, DOF_NAMES
 from fecm.results.criteria import ALL_CRITERIA
 from fecm.results.group import Group
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple, TypeAlias
 
 from fecm.deck.macros import Body, Loop
-from fecm.deck.records import Macro
+from fecm.deck.model import Macro
 
 Action = Callable[[], "bool | None"]  # carries out a macro; True leaves the innermost loop
 # Carries out complete passes of a loop at their begin; False if there are none to carry out so.

@@ -11,8 +11,8 @@ from functools import partial
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.deck.macros import WORDS, Body, number
-from fecm.deck.records import Macro, load_factor
+from fecm.deck.macros import WORDS, Body, load_factor, number
+from fecm.deck.model import Macro
 from fecm.mechanics.solutions import modes, reactions
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.strains import strains_and_resultants

@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm.deck import model
 from fecm.deck.macros import WORDS
-from fecm.deck.records import DOF_NAMES, Macro
+from fecm.deck.mesh_cards import DOF_NAMES
+from fecm.deck.model import Macro
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.strains import GENERALISED_STRAINS, RESULTANTS

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.deck.records import load_factor
+from fecm.deck.macros import load_factor
 from fecm.mechanics.solutions import Tangent
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.problem import Problem

@@ -10,8 +10,7 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.api import LoadedDeck, load_deck
 from fecm.deck.macros import Body, Loop
-from fecm.deck.model import Deck
-from fecm.deck.records import Macro
+from fecm.deck.model import Deck, Macro
 from fecm.deck.units import unit_names
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.problem.problem import Problem

@@ -14,7 +14,7 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.layup import LayupError, parse_layup
-from fecm.deck.records import Layer, NodeCodes, NodeValues
+from fecm.deck.model import Layer, NodeCodes, NodeValues
 from fecm.mechanics.mesh import element_blocks, holds_the_plane
 from fecm.mechanics.points import locate
 from fecm.problem.generate import generate, restraint_codes

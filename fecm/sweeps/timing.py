@@ -10,8 +10,7 @@ from typing import NamedTuple
 
 from fecm.deck.findings import Findings
 from fecm.deck.macros import STEPS, compile_program, every, flat
-from fecm.deck.model import Deck
-from fecm.deck.records import Macro
+from fecm.deck.model import Deck, Macro
 from fecm.mechanics.time_step import rounded_time_step, taken_time_step
 from fecm.problem.check import check_program
 from fecm.problem.problem import Problem

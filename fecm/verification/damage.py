@@ -7,8 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fecm.deck.grid import Grid, lines, uniform
-from fecm.deck.model import Allowables
-from fecm.deck.records import Ply
+from fecm.deck.model import Allowables, Ply
 from fecm.verification import decks
 from fecm.verification.case import Value, case
 

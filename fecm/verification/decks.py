@@ -12,7 +12,7 @@ from fecm._typing import Floats
 from fecm.api import Mode, run_one
 from fecm.deck import model
 from fecm.deck.grid import Grid, Section, lines, uniform
-from fecm.deck.records import Control, Integration, Layer, Macro, NodeCodes, NodeValues, Ply
+from fecm.deck.model import Control, Integration, Layer, Macro, NodeCodes, NodeValues, Ply
 from fecm.results.result import Result
 
 MITC = model.Shear(assumed=True)

@@ -8,8 +8,7 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.grid import Grid, Section, lines, uniform
-from fecm.deck.model import Deck, Impact, Projectile
-from fecm.deck.records import NodeCodes, NodeValues
+from fecm.deck.model import Deck, Impact, NodeCodes, NodeValues, Projectile
 from fecm.verification import decks
 from fecm.verification.case import Value, case
 from fecm.verification.parts import FIBRES, THICK

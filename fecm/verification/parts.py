@@ -13,8 +13,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from fecm.deck.grid import Grid, lines, uniform
-from fecm.deck.model import Coordinates
-from fecm.deck.records import NodeValues, Ply
+from fecm.deck.model import Coordinates, NodeValues, Ply
 from fecm.mechanics.contact_law import (
     ContactPoint,
     HystereticLaw,

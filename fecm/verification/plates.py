@@ -12,8 +12,7 @@ from fecm._typing import Floats
 from fecm.deck import model
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.grid import Grid, lines, uniform
-from fecm.deck.model import Patch, Segment
-from fecm.deck.records import Gage, LoadTable, Macro, Ply
+from fecm.deck.model import Gage, LoadTable, Macro, Patch, Ply, Segment
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate

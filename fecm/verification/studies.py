@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import beta, betaincinv
 
 from fecm._errors import FecmWarning
-from fecm.deck.records import Ply
+from fecm.deck.model import Ply
 from fecm.identification.identify import identify
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.half_space import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from fecm.deck import records
+from fecm.deck import macros as deck_macros
 from fecm.mechanics import (
     element_matrices,
     interpolation,
@@ -115,7 +115,7 @@ BREAKS: Breaks = {
         {"forced-plate": ("strain",)},
     ),
     "the exponent of PROP ignored": (
-        instead(records, "load_factor",
+        instead(deck_macros, "load_factor",
                 lambda right, table, clock: right(replace(table, exponent=1), clock)),
         {"forced-plate": ("w", "strain")},
     ),

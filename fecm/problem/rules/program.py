@@ -6,7 +6,7 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.macros import MOST_MACROS, every, flat
-from fecm.deck.records import Macro
+from fecm.deck.model import Macro
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.mechanics.ply_stresses import is_complete
 from fecm.problem.problem import Problem

@@ -7,7 +7,7 @@ import sys
 
 from fecm.deck import model
 from fecm.deck.macros import STEPS
-from fecm.deck.records import Macro
+from fecm.deck.model import Macro
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.stiffness_product import SAFE

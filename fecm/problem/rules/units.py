@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from fecm.deck import model
 from fecm.deck.findings import Place
-from fecm.deck.records import Ply, Record
+from fecm.deck.model import Ply, Record
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import (
     COEFFICIENT,
