@@ -256,7 +256,7 @@ def _run_one(
         memory = MemorySink()
         report(simulate(problem, memory, choices, [report]))
         return Result(memory.arrays, memory.texts, memory.groups)
-    from fecm.results.hdf5_writer import writing
+    from fecm.results.hdf5_writer import writing  # 25 ms with h5py
 
     with writing(path) as sink:
         report(simulate(problem, sink, choices, [report]))

@@ -87,7 +87,7 @@ class LazyGroup(click.Group):
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete the name of a command or an option."""
-        from click.shell_completion import CompletionItem
+        from click.shell_completion import CompletionItem  # only for a shell
 
         names = [name for name in sorted(COMMANDS) if name.startswith(incomplete)]
         return [

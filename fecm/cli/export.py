@@ -102,6 +102,7 @@ def export(
         check_outputs([path], overwrite, [result])
     try:
         if target == "csv" and is_sweep:
+            # 50 ms, which the result of a run does not need.
             from fecm.sweeps.csv import csv_lines
             from fecm.sweeps.result_file import sweep_of
 

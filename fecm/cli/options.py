@@ -109,7 +109,7 @@ class Parsed(click.ParamType):  # type: ignore[type-arg]
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """Complete a value."""
-        from click.shell_completion import CompletionItem
+        from click.shell_completion import CompletionItem  # only for a shell
 
         done, comma, begun = incomplete.rpartition(",")
         return [

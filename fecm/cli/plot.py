@@ -239,6 +239,7 @@ def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
     for name, path in zip(names, paths, strict=True):
         contents = read(path, Form.RUN, Form.SWEEP)
         if contents.form == Form.SWEEP:
+            # 46 ms, which results of runs do not need.
             from fecm.sweeps.result_file import sweep_of
 
             found[name] = sweep_of(contents, history=False)

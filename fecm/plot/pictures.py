@@ -138,6 +138,7 @@ def draw(
         raise PlotError(f"the kind {kind} shows one result; {len(results)} were given")
     check_options([chosen], options)
     _check_source(chosen, results)
+    # 0.3 s, and an extra that may be absent; so in the functions below.
     import matplotlib
 
     from fecm.plot.style import RC
