@@ -108,7 +108,7 @@ def test_a_new_deck_is_sound_and_declares_its_units() -> None:
          "Hertz's pressure of radius 0.000377 (0.377 of the thickness) instead of a point force"),
         (["--patch", "disc:0.04"], Patch("DISC", 0.04), Shear(assumed=True), "of radius 0.04 ins"),
         (["--patch", "none"], None, Shear(assumed=True), "note: the deck has assumed shear strai"),
-        (["--shear", "full"], Patch(), None, "point force (PATC); --patch none"),
+        (["--shear", "full"], Patch(), None, "point force (PATC); omit them with --patch none"),
         (["--patch", "none", "--shear", "full"], None, None, ""),
     ],
 )  # fmt: skip

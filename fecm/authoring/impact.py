@@ -240,7 +240,7 @@ def author(asked: Request) -> Authored:
     if comment:
         notes.append(
             f"k = {law.k:g} is estimated from the ply's constants (fecm indent estimate) for an "
-            "elastic law; a measured one is better"
+            "elastic law; prefer a measured law"
         )
     damage = damages(plies, asked.giic, notes) if asked.damage else toughness(asked.giic)
     mesh, node, patch = placed(asked.plate, plies.layup, strike.at, patch, doubts)

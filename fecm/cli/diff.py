@@ -141,7 +141,7 @@ def _tolerances(text: str) -> Tolerances:
     type=Parsed(_own, "PATTERN=R[,T]"),
     multiple=True,
     help="Tolerances of a dataset, group or pattern instead of --rtol and --atol; may be "
-    "repeated, and the last that matches holds.",
+    "repeated, and the last one that matches applies.",
 )
 @option(
     "--tol-file",

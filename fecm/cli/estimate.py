@@ -56,7 +56,7 @@ COLUMNS = {
 @click.argument("deck", type=DECK_PATH)
 @FORMAT_OPTION
 def estimate(deck: Path, form: Format) -> None:
-    """Estimate the impact of DECK by models without a mesh, beside the run itself.
+    """Estimate the impact of DECK by two quick models, and compare them with the run.
 
     The infinite plate is for small masses, the static plate for large ones; a model out of its
     range is marked.  With a DELA segment, velocity and energy are those at which the peak force

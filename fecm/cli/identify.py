@@ -61,7 +61,7 @@ class Options:
     "--filter",
     "sensor",
     type=Parsed(filter_of, "FILTER"),
-    help=f"Filter of the measurement, which the computed force passes too: {FILTER_HELP}",
+    help=f"Filter of the measurement, also applied to the computed force: {FILTER_HELP}",
 )
 @option(
     "-o",

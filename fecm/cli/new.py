@@ -430,4 +430,4 @@ def _additions(deck: Deck) -> str:
             parts.append(f"assumed shear strains ({words})")
         elif shear.equilibrium:
             parts.append(f"shear stiffness from equilibrium ({words})")
-    return f"the deck has {' and '.join(parts)}; --patch none and --shear full leave them out"
+    return f"the deck has {' and '.join(parts)}; omit them with --patch none and --shear full"

@@ -223,7 +223,9 @@ def covariance(found: Solution) -> Floats:
     # Delay and offset may be 0, which no error can be compared with.
     vague = [f"{n} ({100.0 * e:.0f} %)" for n, e in errors if e > 1.0 and n not in OF_RECORD]
     if vague:
-        hint = "the standard error is above 100 %; give known values in the deck and leave them out"
+        hint = (
+            "the standard error is above 100 %; set known values in the deck, and do not fit them"
+        )
         raise IdentifyError(f"the measurement does not determine {listed(vague)}: {hint}")
     return found_covariance
 

@@ -9,7 +9,7 @@ import numpy as np
 from fecm._typing import Array
 
 TOO_SOFT = "a linear plate, without membrane stiffening, is too soft"
-UNSAFE = "a threshold energy there is too high, which is unsafe"
+UNSAFE = "threshold energies are therefore too high (unsafe)"
 
 
 class InPlane(StrEnum):

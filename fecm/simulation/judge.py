@@ -104,8 +104,8 @@ def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:
     if broken:
         yield Doubt(
             Reason.BROKEN,
-            f"exposure above 1 ({', '.join(broken)}): the run goes on elastically, without the "
-            "softening that follows the first failure",
+            f"exposure above 1 ({', '.join(broken)}): the run continues elastically; the "
+            "softening after the first failure is not modelled",
         )
 
 
