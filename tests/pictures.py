@@ -22,9 +22,7 @@ LONG_PROGRAM = PROGRAM.replace(" 10\n", "330\n")
 
 def run(deck: str) -> Result:
     """Result of a deck of one problem."""
-    result = fecm.run(deck)
-    assert isinstance(result, Result)
-    return result
+    return fecm.run_one(deck)
 
 
 def plot(result: Result, kind: str, **options: Any) -> Any:

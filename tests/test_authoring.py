@@ -116,8 +116,7 @@ def test_a_new_deck_has_patch_and_assumed_shear_and_says_so_in_a_line(
     options: list[str], patch: Patch | None, shear: Shear | None, note: str
 ) -> None:
     made = new(*PLATE, *options)
-    deck = fecm.read_deck(made.stdout)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(made.stdout)
     assert (deck.last(Patch), deck.last(Shear)) == (patch, shear)
     notes = [line for line in made.stderr.splitlines() if line.startswith("fecm: note")]
     assert sum("SHEA MITC" in line or "PATC" in line for line in notes) == bool(note)
@@ -132,8 +131,7 @@ def test_the_mesh_is_refined_to_the_radius_of_a_patch(options: list[str]) -> Non
         made.stderr
     )
     assert "W447" not in made.stderr
-    deck = fecm.read_deck(made.stdout)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(made.stdout)
     mesh = generate(deck)
     at = mesh.coordinates[deck.require(Impact).node - 1]
     beside = np.abs(mesh.coordinates - at)
@@ -176,8 +174,7 @@ def test_a_named_ply_is_converted_between_systems_of_units() -> None:
 def test_supports_hold_what_their_names_say(
     support: str, w: int, theta_x: int, theta_y: int
 ) -> None:
-    deck = fecm.read_deck(new(*PLATE, "--edge", f"left={support}").stdout)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(new(*PLATE, "--edge", f"left={support}").stdout)
     mesh = generate(deck)
     left = np.flatnonzero(mesh.coordinates[:, 0] == 0.0)
     inside = np.setdiff1d(np.arange(117), left)
@@ -188,8 +185,7 @@ def test_supports_hold_what_their_names_say(
 
 def test_a_coupled_laminate_keeps_its_in_plane_unknowns() -> None:
     options = [o if o != "[0/90]s" else "[0/90]" for o in PLATE]
-    deck = fecm.read_deck(new(*options, "--edge", "left=clamped").stdout)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(new(*options, "--edge", "left=clamped").stdout)
     mesh = generate(deck)
     assert (mesh.equations[mesh.coordinates[:, 0] > 0] > 0).all()
 
@@ -274,8 +270,7 @@ DELA
 )
 def test_formatting_keeps_fields_blank_whose_default_is_not_zero(cards: str) -> None:
     text = small().replace("END\nMACR", f"{cards}END\nMACR")
-    deck = fecm.read_deck(text)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(text)
     patch, strengths = deck.require(Patch), deck.require(Allowables)
     assert (patch.radius, patch.x, patch.y, patch.load) == (None, 3.0, None, 25.0)
     assert (strengths.s12, strengths.s13, strengths.s23) == (20.0, 20.0, 30.0)
@@ -336,11 +331,9 @@ def test_a_new_deck_carries_its_own_projectile_in_its_own_units() -> None:
     rigid = new(*PLATE, "--projectile", "mass:0.05")
     assert rigid.exit_code == 0
     assert not {"N414", "W414"} & {f.code for f in load_deck(rigid.stdout).findings}
-    deck = fecm.read_deck(rigid.stdout)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(rigid.stdout)
     assert deck.require(Projectile) == Projectile(0, 0, 0.05)
-    rod = fecm.read_deck(new(*PLATE, "--projectile", "rod:.02,.016,210e9,7800").stdout)
-    assert isinstance(rod, Deck)
+    rod = fecm.read_one(new(*PLATE, "--projectile", "rod:.02,.016,210e9,7800").stdout)
     mass = 7800 * 0.02 * np.pi * 0.008**2
     assert build_projectile(rod).total_mass == pytest.approx(mass, rel=1e-9)
 

@@ -34,9 +34,7 @@ OMEGA = float(
 
 
 def run(deck: str) -> Result:
-    result = fecm.run(deck)
-    assert isinstance(result, Result)
-    return result
+    return fecm.run_one(deck)
 
 
 def damped(deck: str, card: str) -> str:

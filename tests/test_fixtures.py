@@ -35,9 +35,7 @@ def new(*options: str) -> Done:
 def deck_of(*options: str) -> Deck:
     made = new(*options)
     assert made.exit_code == 0, made.stderr
-    deck = fecm.read_deck(made.stdout)
-    assert isinstance(deck, Deck)
-    return deck
+    return fecm.read_one(made.stdout)
 
 
 @pytest.mark.parametrize("plate", PLIES)

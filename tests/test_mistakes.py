@@ -32,9 +32,7 @@ def changed(*changes: Change) -> str:
 
 def run_one(text: str) -> Result:
     """Run the deck's only problem."""
-    result = fecm.run(text)
-    assert isinstance(result, Result)
-    return result
+    return fecm.run_one(text)
 
 
 def codes(text: str) -> set[str]:

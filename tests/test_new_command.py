@@ -34,9 +34,7 @@ def new(*options: str) -> Done:
 def deck_of(*options: str) -> Deck:
     made = new(*options)
     assert made.exit_code == 0, made.stderr
-    deck = fecm.read_deck(made.stdout)
-    assert isinstance(deck, Deck)
-    return deck
+    return fecm.read_one(made.stdout)
 
 
 def held_in_plane(*options: str) -> dict[str, list[bool]]:
@@ -70,8 +68,7 @@ def held_in_plane(*options: str) -> dict[str, list[bool]]:
 )
 def test_energy_and_velocity_take_a_unit(options: tuple[str, ...], velocity: float) -> None:
     made = new(*PLATE, "--layup", "[0/90]4s", *QUICK, *options)
-    deck = fecm.read_deck(made.stdout)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(made.stdout)
     assert deck.require(Impact).velocity == pytest.approx(velocity, rel=1e-6)
     joules = 0.5 * (velocity / 1e3) ** 2  # of 1 kg
     assert f"note: energy {joules:.4g} J, {velocity:g} mm/s" in made.stderr
@@ -131,8 +128,7 @@ def test_a_named_ply_has_its_own_thickness_in_the_decks_units() -> None:
                "--law", "1e4,0,0,1.5", "--projectile", "mass:1e-3", *QUICK)  # fmt: skip
     made = new(*options, "--material", "T300/5208", "--units", "mm-N-s")
     assert "note: the plies are 0.125 mm thick, as T300/5208 is listed" in made.stderr
-    deck = fecm.read_deck(made.stdout)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(made.stdout)
     assert deck.require(Material).layers[0].thickness == 0.125
     (thinner,) = {
         layer.thickness
@@ -259,8 +255,7 @@ def test_an_impact_whose_contact_cannot_be_estimated_gets_half_periods(
 ) -> None:
     made = new(*D7136, *options)
     plain = deck_of(*D7136)
-    deck = fecm.read_deck(made.stdout)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(made.stdout)
     time, expected = (
         {macro.word: macro.value for macro in one.macros}["LOOP"] for one in (deck, plain)
     )

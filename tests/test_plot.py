@@ -57,8 +57,7 @@ def test_a_deck_without_units_has_none_on_its_axes() -> None:
 
 
 def test_several_results_share_the_axes_each_in_its_colour(result: Result) -> None:
-    listing = fecm.run(NAMED, mode="listing")
-    assert isinstance(listing, Result)
+    listing = fecm.run_one(NAMED, mode="listing")
     both = {"report": result, "listing": listing}
     figure = draw("force", both).figure
     assert [axes.get_ylabel() for axes in figure.axes] == [

@@ -63,16 +63,12 @@ def codes(text: str) -> list[str]:
 
 def result_of(text: str | Deck) -> Result:
     """Result of a deck of one problem."""
-    result = fecm.run(text)
-    assert isinstance(result, Result)
-    return result
+    return fecm.run_one(text)
 
 
 def model(text: str) -> Deck:
     """Model of a deck of one problem."""
-    deck = fecm.read_deck(text)
-    assert isinstance(deck, Deck)
-    return deck
+    return fecm.read_one(text)
 
 
 def test_the_reports_rod_on_cards_gives_the_reports_history_and_no_warning() -> None:

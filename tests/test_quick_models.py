@@ -281,6 +281,4 @@ def test_more_delaminations_lower_the_threshold() -> None:
 
 
 def run_one(text: str) -> Result:
-    found = fecm.run(text)
-    assert isinstance(found, Result)
-    return found
+    return fecm.run_one(text)

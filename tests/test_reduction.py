@@ -37,8 +37,7 @@ SYMMETRIC = DATA_CARDS.replace("    2  90. ", "    2   0. ")
 
 def found(text: str, hit: tuple[int, int] = MIDDLE) -> SymmetryReduction:
     """Reduction of a small deck."""
-    deck = fecm.read_deck(text)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(text)
     return symmetry_reduction(
         build_plate(deck, fecm.problem.generate.generate(deck)), unit(hit, deck.control.numnp)
     )
@@ -109,8 +108,7 @@ def test_what_half_a_turn_does_not_carry_into_itself_is_stepped_whole(
 
 
 def test_a_load_on_one_side_needs_the_whole_plate() -> None:
-    deck = fecm.read_deck(small())
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(small())
     segments = list(deck.segments)
     where = next(i for i, s in enumerate(segments) if isinstance(s, Impact))
     aside = Forces((NodeValues(8, 0, (0.0, 0.0, 1.0, 0.0, 0.0)),))
@@ -144,8 +142,7 @@ def test_the_long_deck_agrees_with_the_sparse_matrix_in_every_dataset() -> None:
 
 
 def test_rounding_of_a_symmetric_layup_counts_as_no_coupling() -> None:
-    deck = fecm.read_deck(LONG)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(LONG)
     plate = build_plate(deck, fecm.problem.generate.generate(deck))
     assert np.abs(plate.laminate.B).max() > 0.0
     assert not plate.laminate.is_coupled
@@ -157,8 +154,7 @@ def test_rounding_of_a_symmetric_layup_counts_as_no_coupling() -> None:
 def test_any_number_of_threads_gives_the_same_forces_to_the_last_bit(
     threads: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    deck = fecm.read_deck(LONG)
-    assert isinstance(deck, Deck)
+    deck = fecm.read_one(LONG)
     plate = build_plate(deck, fecm.problem.generate.generate(deck))
     monkeypatch.setattr(stiffness_product, "BATCH", 500)
     monkeypatch.setattr("fecm.mechanics.plate.PIECE", 100)
