@@ -76,9 +76,10 @@ def entry(rows: Any, columns: Any, factor: float) -> Callable[[Any], Any]:
 def in_laminate(**changes: Callable[[Any], Any]) -> Break:
     """Change parts of every laminate."""
     return changed(
-        laminates, "laminate",
+        laminates,
+        "laminate",
         lambda made: replace(made, **{n: new(getattr(made, n)) for n, new in changes.items()}),
-    )  # fmt: skip
+    )
 
 
 def in_stiffness(**changes: Callable[[Any], Any]) -> Break:
@@ -183,8 +184,9 @@ def turned(of: Callable[[Any, Any], bool], **factors: float) -> Break:
     return instead(HystereticLaw, "_turned", broken)
 
 
-def standing_plate(right: Any, impact: Any, motion: Any, rod: Any, law: Any, contact: Any,
-                   *args: Any) -> None:  # fmt: skip
+def standing_plate(
+    right: Any, impact: Any, motion: Any, rod: Any, law: Any, contact: Any, *args: Any
+) -> None:
     right(impact, motion, rod, law, replace(contact, plate_moves=False), *args)
 
 

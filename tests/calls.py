@@ -54,8 +54,12 @@ def program(*arguments: object, cwd: Path, **options: object) -> Done:
     """Run ``python -m fecm`` in a folder, in a process of its own."""
     done: subprocess.CompletedProcess[str] = subprocess.run(
         [sys.executable, "-W", "error", "-m", "fecm", *map(str, arguments)],
-        cwd=cwd, capture_output=True, text=True, check=False, **options,
-    )  # type: ignore[call-overload]  # fmt: skip
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+        **options,
+    )  # type: ignore[call-overload]
     return Done(done.returncode, done.stdout, done.stderr)
 
 

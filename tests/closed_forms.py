@@ -320,9 +320,14 @@ def two_bodies(time: float) -> tuple[float, ...]:
         return [y[1], -F / mass, y[3], (F - resistance) / plate, resistance * y[3]]
 
     found = solve_ivp(
-        rate, (0.0, time), [0.0, 100.0, 0.0, 0.0, 0.0], "DOP853", rtol=1e-13, atol=1e-15,
+        rate,
+        (0.0, time),
+        [0.0, 100.0, 0.0, 0.0, 0.0],
+        "DOP853",
+        rtol=1e-13,
+        atol=1e-15,
         events=lambda _, y: y[1] - y[3],
-    )  # fmt: skip
+    )
     return force(found.y_events[0][0]), -found.y[1, -1], found.y[2, -1], found.y[4, -1]
 
 
@@ -334,9 +339,19 @@ def indentation() -> tuple[float | None, ...]:
     lost = 2.0 / 5.0 * k * peak**2.5 - force * (peak - remains) / (q + 1.0)
     halfway = k / alpha_cr * ((peak - remains_acr) / 2.0) ** 2.5
     return (
-        None, force, force / 2.0**q, 0.0, 0.0, 0.0, force, force / 2.0**1.5, lost, force, halfway,
+        None,
+        force,
+        force / 2.0**q,
         0.0,
-    )  # fmt: skip
+        0.0,
+        0.0,
+        force,
+        force / 2.0**1.5,
+        lost,
+        force,
+        halfway,
+        0.0,
+    )
 
 
 def time_steps() -> tuple[float, float]:

@@ -33,9 +33,14 @@ measured: fecm.SweepResult = fecm.sweep(
 )
 peaks: xarray.DataArray = sweep.to_xarray().peak_force
 drawn: fecm.SweepResult = fecm.sweep(
-    deck, random={"k": "lognormal:1.9e6,0.15"}, samples=4096, seed=0, design="sobol",
-    sensitivity=True, exceed={"peak_force": [500.0]},
-)  # fmt: skip
+    deck,
+    random={"k": "lognormal:1.9e6,0.15"},
+    samples=4096,
+    seed=0,
+    design="sobol",
+    sensitivity=True,
+    exceed={"peak_force": [500.0]},
+)
 if drawn.random is not None:
     mean: float = float(drawn.random.statistics["peak_force"].mean)
     first: NDArray[np.float64] = drawn.random.sensitivity["peak_force"].first_interval
@@ -47,8 +52,13 @@ laminates: list[fecm.Laminate] = [fecm.Laminate(x, ply, 0.2) for x in ("[0/90]s"
 rods: tuple[fecm.Rod | fecm.RigidMass, ...] = (fecm.RigidMass(1e-3),)
 made: fecm.Deck = fecm.impact(
     fecm.Plate.rectangle((100, 80), (10, 8), support="simple", edges={"top": "free"}),
-    laminates[0], rods[0], fecm.Contact.estimate(8.0), energy=500.0, duration=1e-3, units="mm-N-s",
-).with_(velocity=3.0, layup="[0/90]2s")  # fmt: skip
+    laminates[0],
+    rods[0],
+    fecm.Contact.estimate(8.0),
+    energy=500.0,
+    duration=1e-3,
+    units="mm-N-s",
+).with_(velocity=3.0, layup="[0/90]2s")
 
 result.plot("forse")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 result.forse  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018

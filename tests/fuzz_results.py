@@ -80,8 +80,9 @@ def mutate(source: Path, target: Path, random: random.Random) -> str:
         places = _structure(bytes(data)) if random.random() < 0.7 else range(len(data))
         for _ in range(random.choice([1, 1, 2, 3, 8, 30])):
             at = random.choice(places)
-            data[at] = random.choice([data[at] ^ 1 << random.randrange(8), random.randrange(256),
-                                      0, 255])  # fmt: skip
+            data[at] = random.choice(
+                [data[at] ^ 1 << random.randrange(8), random.randrange(256), 0, 255]
+            )
     target.write_bytes(data)
     return kind
 
@@ -254,8 +255,12 @@ def work(first: int, count: int, step: int, commands: Sequence[str]) -> Tally:
         sound = folder / (f"{SWEEP}.h5" if "plot map" in commands else "run.h5")
         if sound.stem == SWEEP:
             text = small(PROGRAM.replace("         10", "        400"))  # every contact ends
-            sweep(text, {"velocity": [50.0, 100.0, 150.0], "alpha_p": [0.0005, 0.0007]},
-                  history=True, output=sound)  # fmt: skip
+            sweep(
+                text,
+                {"velocity": [50.0, 100.0, 150.0], "alpha_p": [0.0005, 0.0007]},
+                history=True,
+                output=sound,
+            )
         else:
             run(small(), output=sound)
         for seed in range(first, first + count, step):
@@ -288,8 +293,11 @@ def main() -> int:
         arguments = ["--seed", options.seed + number, "--count", options.count - number,
                      "--step", options.workers, *["--all"] * options.all,
                      *["--sweep"] * options.sweep]  # fmt: skip
-        workers.append(subprocess.Popen([*head, *map(str, arguments)], env=environment,
-                                        stdout=subprocess.PIPE, text=True))  # fmt: skip
+        workers.append(
+            subprocess.Popen(
+                [*head, *map(str, arguments)], env=environment, stdout=subprocess.PIPE, text=True
+            )
+        )
     tally = Tally()
     for worker in workers:
         told, _ = worker.communicate()

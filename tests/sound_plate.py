@@ -11,8 +11,9 @@ from fecm.api import load_deck
 from fecm.deck.findings import Finding
 
 # Codes of the rules on test; that of the mesh, W415, depends on the decks' few elements.
-RULES = re.compile("[NW](430|435|438|440|446|467|468|469|470|471|472|473|474|475|476|477|478|479|"
-                   "480|481|482)")  # fmt: skip
+RULES = re.compile(
+    "[NW](430|435|438|440|446|467|468|469|470|471|472|473|474|475|476|477|478|479|480|481|482)"
+)
 STRENGTHS = (2326.2, 1200.1, 62.3, 199.8, 92.3, 92.3, 92.3)
 Edit = Callable[[str], str]
 
@@ -25,8 +26,11 @@ def base() -> str:
         fecm.Laminate("[45/0/-45/90]2s", "IM7/8552", 0.184),
         fecm.RigidMass(2e-3),
         fecm.Contact.estimate(8.0),
-        energy=3000.0, duration=8e-3, units="mm-N-s", damage=True,
-    )  # fmt: skip
+        energy=3000.0,
+        duration=8e-3,
+        units="mm-N-s",
+        damage=True,
+    )
     return deck.to_text()
 
 

@@ -194,8 +194,12 @@ def test_a_result_that_cannot_be_written_ends_in_one_line_and_leaves_what_was_th
 
     done = subprocess.run(
         [sys.executable, "-m", "fecm", "run", str(deck), "--overwrite"],
-        cwd=deck.parent, capture_output=True, text=True, check=False, preexec_fn=limit,
-    )  # fmt: skip
+        cwd=deck.parent,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=limit,
+    )
     assert done.returncode == 2
     assert "small.h5 can't be written: File too large" in done.stderr
     assert "Traceback" not in done.stderr
@@ -228,19 +232,34 @@ def test_a_reader_that_leaves_is_no_answer(arguments: tuple[str, ...], runs: Pat
     with os.fdopen(write, "w") as gone:
         done = subprocess.run(
             [sys.executable, "-m", "fecm", *arguments],
-            stdout=gone, stderr=subprocess.PIPE, text=True, check=False,
+            stdout=gone,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
             cwd=runs,
-        )  # fmt: skip
+        )
     assert (done.returncode, done.stderr) == (2, "")
 
 
 def test_a_full_output_ends_in_one_line(tmp_path: Path) -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(
-            [sys.executable, "-m", "fecm", "rod", "--pulse", "sine:1,1", *("--length", "1"),
-             *("--modulus", "1", "--density", "1", "--diameter", "1")],
-            stdout=full, stderr=subprocess.PIPE, text=True, check=False, cwd=tmp_path,
-        )  # fmt: skip
+            [
+                sys.executable,
+                "-m",
+                "fecm",
+                "rod",
+                "--pulse",
+                "sine:1,1",
+                *("--length", "1"),
+                *("--modulus", "1", "--density", "1", "--diameter", "1"),
+            ],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+            check=False,
+            cwd=tmp_path,
+        )
     assert done.returncode == 2
     assert done.stderr == "fecm: error: standard output: No space left on device\n"
 

@@ -53,9 +53,14 @@ def test_the_reports_deck_is_what_the_report_says() -> None:
     half = [0.0, 45.0, 0.0, -45.0, 0.0] * 2
     assert [layer.angle for layer in material.layers] == half + half[::-1]
     assert [(m.word, m.value) for m in deck.macros] == [
-        ("LMAS", 0.0), ("DT", 2e-7), ("LOOP", 10.0), ("TIME", 0.0), ("RODP", 5.0),
-        ("DISP", 5.0), ("NEXT", 0.0),
-    ]  # fmt: skip
+        ("LMAS", 0.0),
+        ("DT", 2e-7),
+        ("LOOP", 10.0),
+        ("TIME", 0.0),
+        ("RODP", 5.0),
+        ("DISP", 5.0),
+        ("NEXT", 0.0),
+    ]
 
 
 @pytest.mark.parametrize(

@@ -239,8 +239,11 @@ def test_title_attributes_and_deck_are_listed_and_not_judged(
     assert "`LMAS` against `lmas`" in done.stdout
     listed = {item["name"]: item for item in strict(diff(a, b, "--format", "json"))["listed"]}
     assert listed["tape8:colour"] == {
-        "name": "tape8:colour", "a": None, "b": [1.0, "NaN"], "line": None
-    }  # fmt: skip
+        "name": "tape8:colour",
+        "a": None,
+        "b": [1.0, "NaN"],
+        "line": None,
+    }
 
 
 def test_only_takes_datasets_and_groups_and_brief_prints_names(runs: Path) -> None:
@@ -291,8 +294,11 @@ def test_the_last_tolerance_that_matches_a_dataset_holds(
     ):
         assert diff(a, b, "--only", "history", *options).exit_code == status, options
     said = strict(diff(a, b, "--tol-file", file, "--rtol", "1e-3", "--format", "json"))
-    found = {entry["name"]: entry["tolerance"] / (entry["scale"] or 1.0)
-             for entry in said["datasets"] if "force" in entry["name"]}  # fmt: skip
+    found = {
+        entry["name"]: entry["tolerance"] / (entry["scale"] or 1.0)
+        for entry in said["datasets"]
+        if "force" in entry["name"]
+    }
     assert found == pytest.approx({"history/force": 1e-2, "tape9/force": 1e-3})
     assert "tape8/kappa_x" in said["excluded"]
 

@@ -35,9 +35,12 @@ def run_shell(block: str, folder: Path) -> None:
         return
     path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
     subprocess.run(
-        ["bash", "-euo", "pipefail", "-c", block], cwd=folder, env=os.environ | {"PATH": path},
-        check=True, stdout=subprocess.DEVNULL,
-    )  # fmt: skip
+        ["bash", "-euo", "pipefail", "-c", block],
+        cwd=folder,
+        env=os.environ | {"PATH": path},
+        check=True,
+        stdout=subprocess.DEVNULL,
+    )
 
 
 def run_page(page: Path, folder: Path) -> None:

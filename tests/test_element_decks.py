@@ -60,9 +60,13 @@ def nine_node_result() -> Result:
     [(4, 12, (4, 3, 4), 16, 0.03), (4, 12, (4, 4, -4), 16, 0.03), (16, 3, (2, 1, 2), 4, 0.06)],
 )
 def test_an_impact_on_other_elements_has_the_force_of_the_9_node_mesh(
-    n: int, kind: int, orders: tuple[int, int, int], points: int, tolerance: float,
+    n: int,
+    kind: int,
+    orders: tuple[int, int, int],
+    points: int,
+    tolerance: float,
     nine_node_result: Result,
-) -> None:  # fmt: skip
+) -> None:
     mesh = square(n, n, kind)
     result = run(mesh, orders)
     expected = nine_node_result

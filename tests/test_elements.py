@@ -299,14 +299,21 @@ def sorted_elements(*rows: list[int]) -> list[ElementBlock]:
 
 def test_elements_are_sorted_by_their_nodes_and_keep_their_rows() -> None:
     found = sorted_elements(
-        [1, 2, 3], [1, 2, 3, 4], [4, 5, 6], list(range(1, 13)), [1, 2, 3, 4, 0, 6],
+        [1, 2, 3],
+        [1, 2, 3, 4],
+        [4, 5, 6],
+        list(range(1, 13)),
+        [1, 2, 3, 4, 0, 6],
         [1, 2, 3, 4, 0, 0, 0, 0, 0, 10],
-    )  # fmt: skip
+    )
     by_rows = {tuple(family.rows.tolist()): family for family in found}
     assert {rows: family.shape.name for rows, family in by_rows.items()} == {
-        (0, 2): "triangle", (1,): "quadrilateral", (4,): "quadrilateral",
-        (3,): "cubic quadrilateral", (5,): "cubic quadrilateral",
-    }  # fmt: skip
+        (0, 2): "triangle",
+        (1,): "quadrilateral",
+        (4,): "quadrilateral",
+        (3,): "cubic quadrilateral",
+        (5,): "cubic quadrilateral",
+    }
     assert by_rows[0, 2].nodes.tolist() == [[0, 1, 2], [3, 4, 5]]
     assert by_rows[5,].nodes.tolist() == [[0, 1, 2, 3, 9]]
     for family in found:

@@ -201,9 +201,16 @@ def test_exporting_twice_gives_the_same_bytes(tmp_path: Path, result: Result) ->
 def test_the_history_can_be_read_back_to_the_last_bit(result: Result) -> None:
     got = exported(result, "history")
     assert list(got[0]) == [
-        "step", "time", "force", "indentation", "transducer", "displacement", "velocity",
-        "acceleration", "plate_w",
-    ]  # fmt: skip
+        "step",
+        "time",
+        "force",
+        "indentation",
+        "transducer",
+        "displacement",
+        "velocity",
+        "acceleration",
+        "plate_w",
+    ]
     for name in got[0]:
         column = [float(row[name]) for row in got]
         np.testing.assert_array_equal(column, result[f"history/{name}"])
@@ -300,8 +307,10 @@ def test_the_command_writes_beside_the_user_and_keeps_what_is_there(file: Path) 
     shown = call("export", file, "--to", "csv", "--dataset", "tape3/w", "-o", "-", cwd=folder)
     assert len(rows(shown.stdout)) == 50
     assert sorted(p.name for p in folder.iterdir()) == [
-        "small-history.csv", "small.h5", "small.vtkhdf",
-    ]  # fmt: skip
+        "small-history.csv",
+        "small.h5",
+        "small.vtkhdf",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -51,13 +51,16 @@ def histories(found: Result) -> dict[str, np.ndarray]:
     outside = found["failure/under_load"] == 0
     rows = [stresses.evaluate(field) for field in found["tape3/displacement"]]
     return {
-        name: np.array([
-            exposure_of(criterion(card, row["sigma_1"], row["sigma_2"], row["tau_12"]))[outside]
-            .max()
-            for row in rows
-        ])
+        name: np.array(
+            [
+                exposure_of(criterion(card, row["sigma_1"], row["sigma_2"], row["tau_12"]))[
+                    outside
+                ].max()
+                for row in rows
+            ]
+        )
         for name, criterion in CRITERIA.items()
-    }  # fmt: skip
+    }
 
 
 def test_first_failures_are_the_first_crossings_of_the_stresses(every_step: Result) -> None:

@@ -43,8 +43,22 @@ def test_the_static_stiffness_of_d7136_is_that_of_another_code(plate: str) -> No
     with (Path(__file__).parent / "data" / "d7136_stiffness.csv").open() as file:
         (row,) = (r for r in csv.DictReader(file) if (r["plate"], r["support"]) == (plate, WINDOW))
     layup, thickness, ply = PLIES[plate]
-    made = new("--fixture", "D7136", "--layup", layup, "--ply-thickness", thickness, "--ply", ply,
-               "--patch", "disc:2", "--duration", "1e-4", "--mesh", "10x8")  # fmt: skip
+    made = new(
+        "--fixture",
+        "D7136",
+        "--layup",
+        layup,
+        "--ply-thickness",
+        thickness,
+        "--ply",
+        ply,
+        "--patch",
+        "disc:2",
+        "--duration",
+        "1e-4",
+        "--mesh",
+        "10x8",
+    )
     (problem,) = load_deck(made.stdout).problems
     assert problem.contact is not None
     stiffness = static_stiffness(problem.moving_plate, problem.contact)
@@ -72,8 +86,18 @@ def test_w_is_held_along_the_window_and_nowhere_else() -> None:
 
 
 def test_energy_gives_the_velocity_of_the_mass() -> None:
-    deck = deck_of("--fixture", "window:60x40,50x30", *PLATE, *QUICK, "--projectile", "mass:2e-3",
-                   "--energy", "4000", "--law", "5e4,0,0,1.5")  # fmt: skip
+    deck = deck_of(
+        "--fixture",
+        "window:60x40,50x30",
+        *PLATE,
+        *QUICK,
+        "--projectile",
+        "mass:2e-3",
+        "--energy",
+        "4000",
+        "--law",
+        "5e4,0,0,1.5",
+    )
     assert deck.require(Impact).velocity == pytest.approx(2000.0)
 
 
@@ -109,8 +133,19 @@ def test_contact_estimate_is_that_of_indent_estimate_and_says_so_in_the_deck(
     ply: tuple[str, ...],
 ) -> None:
     made = new(*SPHERE, *ply, "--contact", "estimate:8", "--units", "mm-N-s")
-    printed = call("indent", "estimate", *ply, "--radius", "8", "--es", "207e3", "--nus", ".3",
-                   "--units", "mm-N-s")  # fmt: skip
+    printed = call(
+        "indent",
+        "estimate",
+        *ply,
+        "--radius",
+        "8",
+        "--es",
+        "207e3",
+        "--nus",
+        ".3",
+        "--units",
+        "mm-N-s",
+    )
     card = printed.stdout.splitlines()[-1]
     assert card in made.stdout
     assert "! k of EXPE is estimated by the laminate's indentation modulus" in made.stdout

@@ -24,10 +24,17 @@ class Ours:
 
 
 Theirs: Any = dataclass(frozen=True)(
-    type("Ours", (), {"__annotations__": vars(Ours)["__annotations__"], "__module__": __name__,
-                      "size": 1.0, "note": field(default="", compare=False, repr=False,
-                                                 kw_only=True)})
-)  # fmt: skip
+    type(
+        "Ours",
+        (),
+        {
+            "__annotations__": vars(Ours)["__annotations__"],
+            "__module__": __name__,
+            "size": 1.0,
+            "note": field(default="", compare=False, repr=False, kw_only=True),
+        },
+    )
+)
 
 
 def test_equality_hash_and_text_are_those_of_a_standard_dataclass() -> None:

@@ -72,9 +72,12 @@ def start(folder: Path, what: str, patience: str = "0.4") -> subprocess.Popen[st
     """Start a command that does something to itself while it reads a file."""
     return subprocess.Popen(
         [sys.executable, "-c", PROGRAM, "act", "x.h5", what],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=folder,
         env={**os.environ, "FECM_PATIENCE": patience, "PYTHONPATH": str(Path.cwd())},
-    )  # fmt: skip
+    )
 
 
 def ended(folder: Path, what: str, patience: str = "0.4") -> tuple[int, str, str]:
@@ -284,8 +287,11 @@ def fuzz(*arguments: object, patience: str) -> str:
     """Put mutated files through `info` and `diff`; fails where one of them ends badly."""
     done = subprocess.run(
         [sys.executable, "-m", "tests.fuzz_results", *map(str, arguments)],
-        capture_output=True, text=True, check=False, env={**os.environ, "FECM_PATIENCE": patience},
-    )  # fmt: skip
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, "FECM_PATIENCE": patience},
+    )
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

@@ -39,8 +39,12 @@ def plate(
         fecm.Laminate("[45/0/-45/90]2s", "AS4/8552", 0.18),
         fecm.RigidMass(mass),
         fecm.Contact(k, alpha_p, 0.6 if q == 2.0 else 0.0, q),
-        velocity=velocity, duration=DURATION, dt=dt, units="mm-N-s", patch="hertz:18",
-    )  # fmt: skip
+        velocity=velocity,
+        duration=DURATION,
+        dt=dt,
+        units="mm-N-s",
+        patch="hertz:18",
+    )
 
 
 @cache
@@ -111,10 +115,15 @@ def test_k_mass_and_velocity_are_one_too_many_for_hertzs_contact(tmp_path: Path)
     # A grain of 2 mg on 60 mm: Hertz's impact on a half-space has a peak and a duration only.
     deck = fecm.impact(
         fecm.Plate.rectangle((100, 100), (6, 6), support="simple"),
-        fecm.Laminate("[0/90]s", "AS4/8552", 15.0), fecm.RigidMass(2e-9),
-        fecm.Contact(1.2e5, 0.0, 0.0, 1.5), velocity=100.0, duration=3e-5, dt=2e-7,
-        units="mm-N-s", patch="hertz:18",
-    )  # fmt: skip
+        fecm.Laminate("[0/90]s", "AS4/8552", 15.0),
+        fecm.RigidMass(2e-9),
+        fecm.Contact(1.2e5, 0.0, 0.0, 1.5),
+        velocity=100.0,
+        duration=3e-5,
+        dt=2e-7,
+        units="mm-N-s",
+        patch="hertz:18",
+    )
     result = fecm.run_one(deck)
     (tmp_path / "d.inp").write_text(deck.to_text())
     write(tmp_path / "f.csv", result.time, result.force)
@@ -184,8 +193,18 @@ def identify(folder: Path, *options: object, table: str = "f.csv") -> Done:
 
 
 def test_the_command_prints_values_errors_correlations_and_cards(folder: Path) -> None:
-    done = call("identify", "d.inp", "f.csv", "--free", "velocity,k", "-o", "fitted.inp",
-                "--plot", "fit.png", cwd=folder)  # fmt: skip
+    done = call(
+        "identify",
+        "d.inp",
+        "f.csv",
+        "--free",
+        "velocity,k",
+        "-o",
+        "fitted.inp",
+        "--plot",
+        "fit.png",
+        cwd=folder,
+    )
     assert done.exit_code == 0
     for text in ("velocity     100 ±", "from 115", "correlation", "converged    yes", "ROD\n"):
         assert text in done.stdout

@@ -32,10 +32,15 @@ def clamped(k: float, mass: float, velocity: float, support: Support = "clamped"
     """A mass of 40 g on a thin plate, mm-N-s: humps of 480, 288, 361 and 996 N."""
     return fecm.impact(
         fecm.Plate.rectangle((120, 80), (12, 8), support=support),
-        fecm.Laminate("[0/90]3s", "IM7/8552", 0.2), fecm.RigidMass(mass),
-        fecm.Contact(k, 1.0, 0.0, 1.5), velocity=velocity, duration=2.4e-4, dt=4e-7,
-        units="mm-N-s", patch="disc:12",
-    )  # fmt: skip
+        fecm.Laminate("[0/90]3s", "IM7/8552", 0.2),
+        fecm.RigidMass(mass),
+        fecm.Contact(k, 1.0, 0.0, 1.5),
+        velocity=velocity,
+        duration=2.4e-4,
+        dt=4e-7,
+        units="mm-N-s",
+        patch="disc:12",
+    )
 
 
 @cache
@@ -133,10 +138,15 @@ def heavy(k: float, mass: float, velocity: float, thickness: float = 0.18) -> fe
     """A mass of 0.5 kg that leaves the plate after 2.1 ms, mm-N-s; its peak is 2080 N."""
     return fecm.impact(
         fecm.Plate.rectangle((100, 100), (6, 6), support="simple"),
-        fecm.Laminate("[45/0/-45/90]2s", "AS4/8552", thickness), fecm.RigidMass(mass),
-        fecm.Contact(k, 1.0, 0.0, 1.5), velocity=velocity, duration=3e-3, dt=5e-7,
-        units="mm-N-s", patch="hertz:18",
-    )  # fmt: skip
+        fecm.Laminate("[45/0/-45/90]2s", "AS4/8552", thickness),
+        fecm.RigidMass(mass),
+        fecm.Contact(k, 1.0, 0.0, 1.5),
+        velocity=velocity,
+        duration=3e-3,
+        dt=5e-7,
+        units="mm-N-s",
+        patch="hertz:18",
+    )
 
 
 def recorded(offset: float = 0.0, delay: float = 0.0) -> Floats:

@@ -25,8 +25,13 @@ def test_a_curve_of_the_deck_fits_back_to_the_decks_card(tmp_path: Path) -> None
     assert float(at_peak["indentation"]) == 1e-3
     assert float(at_peak["force"]) == pytest.approx(1.912e6 * 1e-3**1.5, rel=1e-12)
     assert [rows[n]["branch"] for n in (60, 61, 149, 151, 200, 241)] == [
-        "loading", "unloading", "reloading", "loading", "unloading", "reloading",
-    ]  # fmt: skip
+        "loading",
+        "unloading",
+        "reloading",
+        "loading",
+        "unloading",
+        "reloading",
+    ]
     (tmp_path / "test.csv").write_text(made.stdout)
     done = call("indent", "fit", tmp_path / "test.csv")
     assert done.exit_code == 0
@@ -197,8 +202,12 @@ def test_files_of_testing_machines_give_the_same_law(
     done = call("indent", "fit", file, "--format", "json")
     assert done.exit_code == 0, done.stderr
     found = json.loads(done.stdout)
-    length, force = {None: (1.0, 1.0), ("in", "lbf"): (1.0, 1.0), ("mm", "N"): (MM, NEWTON),
-                     ("m", "N"): (1000 * MM, NEWTON)}[units]  # fmt: skip
+    length, force = {
+        None: (1.0, 1.0),
+        ("in", "lbf"): (1.0, 1.0),
+        ("mm", "N"): (MM, NEWTON),
+        ("m", "N"): (1000 * MM, NEWTON),
+    }[units]
     assert found["units"] == (dict(zip(("length", "force"), units, strict=True)) if units else None)
     assert found["k"]["value"] == pytest.approx(K / force * length**1.5, rel=1e-6)
     assert found["alpha_p"]["value"] == pytest.approx(ALPHA_P / length, rel=1e-3)

@@ -163,8 +163,17 @@ def test_a_new_deck_takes_a_named_contact_in_the_plys_units() -> None:
     done = call(*PLATE, "--material", "report", "--contact", "yang-0.5")
     deck = fecm.read_one(done.stdout)
     assert deck.require(Indentation) == Indentation(9.694e5, 3.16e-3, 0.0, 2.5, "ACR")
-    metric = call(*PLATE, "--material", "report", "--units", "m-N-s", "--contact", "report-0.75",
-                  "--projectile", "mass:0.05")  # fmt: skip
+    metric = call(
+        *PLATE,
+        "--material",
+        "report",
+        "--units",
+        "m-N-s",
+        "--contact",
+        "report-0.75",
+        "--projectile",
+        "mass:0.05",
+    )
     deck = fecm.read_one(metric.stdout)
     assert deck.require(Indentation).alpha_p == pytest.approx(6.564e-4 * 0.0254, rel=1e-5)
 

@@ -124,9 +124,13 @@ def new_deck(
         fecm.Laminate("[0/90]2s", ply, own(thickness, "length")),  # type: ignore[arg-type]
         fecm.RigidMass(own(2e-5, MASS)),
         fecm.Contact(own(k, "force/length^1.5"), 0.0, 0.0, 1.5),
-        velocity=own(3000.0, "length/time"), duration=3e-5, dt=1e-8, every=1,
-        units=system, damage=damage,
-    )  # fmt: skip
+        velocity=own(3000.0, "length/time"),
+        duration=3e-5,
+        dt=1e-8,
+        every=1,
+        units=system,
+        damage=damage,
+    )
     return deck.to_text()
 
 
@@ -193,8 +197,11 @@ def strip(thickness: float, **supports: str) -> list[Finding]:
         fecm.Laminate("[0/90]2s", "IM7/8552", thickness / 8.0),
         fecm.RigidMass(1e-3),
         fecm.Contact(4e4, 0.0, 0.0, 1.5),
-        velocity=1000.0, duration=1e-7, dt=1e-9, units="mm-N-s",
-    )  # fmt: skip
+        velocity=1000.0,
+        duration=1e-7,
+        dt=1e-9,
+        units="mm-N-s",
+    )
     return [finding for finding in found(deck.to_text()) if finding.code[1:] == "430"]
 
 

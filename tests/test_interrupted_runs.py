@@ -188,10 +188,17 @@ def test_a_disk_that_fills_leaves_the_last_checkpoint_usable(whole: Path) -> Non
     shutil.copy(LONG, whole / "short.inp")
     (whole / "f.h5").write_text("precious")
     done = program(
-        "run", "short.inp", "-o", "f.h5", "--overwrite", "--checkpoint", "0",
+        "run",
+        "short.inp",
+        "-o",
+        "f.h5",
+        "--overwrite",
+        "--checkpoint",
+        "0",
         *NUMPY,
-        cwd=whole, preexec_fn=lambda: small_files(2_000_000),
-    )  # fmt: skip
+        cwd=whole,
+        preexec_fn=lambda: small_files(2_000_000),
+    )
     assert done.exit_code == 2
     assert "Traceback" not in done.stderr
     assert "File too large" in done.stderr

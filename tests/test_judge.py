@@ -35,19 +35,25 @@ def soft(duration: float = WHOLE) -> Deck:
     """A thin plate under a heavy mass: a force that rings while it rises for 4 ms."""
     return fecm.impact(
         fecm.Plate.rectangle((150, 100), (4, 4), support="simple"),
-        fecm.Laminate("[45/0/-45/90]2s", "IM7/8552", 0.125), fecm.RigidMass(2e-3),
-        fecm.Contact(49000.0, 1.0, 0.0, 1.5), velocity=2330, duration=duration,
-        units="mm-N-s", damage=True,
-    )  # fmt: skip
+        fecm.Laminate("[45/0/-45/90]2s", "IM7/8552", 0.125),
+        fecm.RigidMass(2e-3),
+        fecm.Contact(49000.0, 1.0, 0.0, 1.5),
+        velocity=2330,
+        duration=duration,
+        units="mm-N-s",
+        damage=True,
+    )
 
 
 @functools.cache
 def swept(duration: float = WHOLE) -> SweepResult:
     """Draws of the velocity around that at which the peak reaches the threshold."""
     return fecm.sweep(
-        soft(duration), random={"velocity": "normal:2330,150"}, samples=32,
+        soft(duration),
+        random={"velocity": "normal:2330,150"},
+        samples=32,
         exceed={"peak_force": "threshold"},
-    )  # fmt: skip
+    )
 
 
 # The end -----------------------------------------------------------------------------------------
@@ -233,18 +239,14 @@ def test_an_end_between_two_contacts_is_no_end() -> None:
 
 def test_a_sweep_counts_what_is_beyond_its_model(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(soft().to_text())
-    done = call(
-        "sweep", "d.inp", "--vary", "velocity=100,600,2500", "-o", "s.h5", cwd=tmp_path
-    )  # fmt: skip
+    done = call("sweep", "d.inp", "--vary", "velocity=100,600,2500", "-o", "s.h5", cwd=tmp_path)
     assert done.exit_code == 0
     last = done.stdout.splitlines()[-1]
     assert last.startswith("3 cases: 2 beyond the linear plate (w > 0.3 h, up to 3.")
     assert last.endswith("h), 1 elastic beyond delamination (peak force > threshold)")
     assert "therefore too high (unsafe)" in done.stderr
     found = fecm.load_sweep(tmp_path / "s.h5")
-    assert found["validity"].tolist() == [
-        "ok", "w > 0.3 h", "w > 0.3 h; peak force > threshold"
-    ]  # fmt: skip
+    assert found["validity"].tolist() == ["ok", "w > 0.3 h", "w > 0.3 h; peak force > threshold"]
     picture: Any = draw("map", {"s": found}).figure
     (axes, *_) = picture.axes
     assert "/ beyond the linear plate (w > 0.3 h): 2 of 3 cases" in axes.get_xlabel()

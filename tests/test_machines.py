@@ -141,8 +141,9 @@ def test_findings_as_sarif_are_valid_and_have_their_place(folder: Path) -> None:
     assert place["region"]["snippet"]["text"] == line
     columns = slice(place["region"]["startColumn"] - 1, place["region"]["endColumn"] - 1)
     assert line[columns].strip() == "1l5.0"
-    uris = {r["locations"][0]["physicalLocation"]["artifactLocation"]["uri"]
-            for r in run["results"][1:]}  # fmt: skip
+    uris = {
+        r["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] for r in run["results"][1:]
+    }
     assert uris == {(folder / "doubtful.inp").as_uri()}
     page = (ROOT / "docs" / "findings.md").read_text()
     for rule in run["tool"]["driver"]["rules"]:
@@ -188,8 +189,9 @@ def test_a_schema_refuses_what_the_command_does_not_print(folder: Path) -> None:
 
 def shell_step(number: int, folder: Path, **inputs: str) -> subprocess.CompletedProcess[str]:
     """Run a shell step of the action with fecm on the path, as a runner does."""
-    steps = [s for s in yaml.safe_load((ROOT / "action.yml").read_text())["runs"]["steps"]
-             if "run" in s]  # fmt: skip
+    steps = [
+        s for s in yaml.safe_load((ROOT / "action.yml").read_text())["runs"]["steps"] if "run" in s
+    ]
     tool = folder / "bin" / "fecm"
     tool.parent.mkdir(exist_ok=True)
     tool.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m fecm "$@"\n')
@@ -197,9 +199,13 @@ def shell_step(number: int, folder: Path, **inputs: str) -> subprocess.Completed
     path = {"PATH": f"{tool.parent}:{os.environ['PATH']}", "RUNNER_TEMP": str(folder)}
     assert inputs.keys() == steps[number]["env"].keys()
     return subprocess.run(
-        ["bash", "-e", "-o", "pipefail", "-c", steps[number]["run"]], cwd=folder, text=True,
-        env=os.environ | path | inputs, capture_output=True, check=False,
-    )  # fmt: skip
+        ["bash", "-e", "-o", "pipefail", "-c", steps[number]["run"]],
+        cwd=folder,
+        text=True,
+        env=os.environ | path | inputs,
+        capture_output=True,
+        check=False,
+    )
 
 
 @pytest.mark.long

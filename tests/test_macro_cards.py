@@ -147,11 +147,33 @@ def test_a_time_step_is_written_as_a_person_reads_it() -> None:
 
 def test_a_new_deck_has_a_time_step_that_a_person_can_read() -> None:
     made = call(
-        "new", "-", "--size", "100x100", "--mesh", "8x8", "--layup", "[0/90]s", "--units", "mm-N-s",
-        "--ply-thickness", 0.5, "--material", "AS/3501", "--support", "clamped", "--velocity", 1000,
-        "--law", "30000,0.01,0.1,2", "--projectile", "mass:1e-4", "--duration", 1e-4,
-        "--dt", "2.5e-7",
-    )  # fmt: skip
+        "new",
+        "-",
+        "--size",
+        "100x100",
+        "--mesh",
+        "8x8",
+        "--layup",
+        "[0/90]s",
+        "--units",
+        "mm-N-s",
+        "--ply-thickness",
+        0.5,
+        "--material",
+        "AS/3501",
+        "--support",
+        "clamped",
+        "--velocity",
+        1000,
+        "--law",
+        "30000,0.01,0.1,2",
+        "--projectile",
+        "mass:1e-4",
+        "--duration",
+        1e-4,
+        "--dt",
+        "2.5e-7",
+    )
     assert made.exit_code == 0, made.stderr
     assert "\nDT,,2.5E-7\n" in made.stdout
     assert Macro("DT", value=2.5e-7) in fecm.read_one(made.stdout).macros

@@ -344,10 +344,18 @@ def test_the_printed_output_holds_what_the_original_printed(tmp_path: Path) -> N
     assert done.exit_code == 0
     page = printed.read_text()
     for heading in (
-        "Control information", "Nodal coordinates", "Elements", "Restraint codes", "Material",
-        "Indentation law", "Impact", "Equation numbers", "Macro program",
-        "Element strains and stress resultants", "Mesh and storage",
-    ):  # fmt: skip
+        "Control information",
+        "Nodal coordinates",
+        "Elements",
+        "Restraint codes",
+        "Material",
+        "Indentation law",
+        "Impact",
+        "Equation numbers",
+        "Macro program",
+        "Element strains and stress resultants",
+        "Mesh and storage",
+    ):
         assert f"\n  {heading}" in page
     assert page.count("\f") == page.count("small plate") - 1
     assert "1.912e+06" in page

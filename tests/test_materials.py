@@ -84,8 +84,10 @@ def test_what_a_ply_lacks_is_told_or_refused() -> None:
     deck = fecm.read_one(made.stdout)
     assert deck.require(Allowables).s23 == 57.0
     assert not deck.has(Delamination)
-    for refused in (new("--material", "report", "--damage", "--units", "mm-N-s"),
-                    new("--ply", "1.6e-9,.3,140e3,9e3,5e3,5e3,3e3", "--damage")):  # fmt: skip
+    for refused in (
+        new("--material", "report", "--damage", "--units", "mm-N-s"),
+        new("--ply", "1.6e-9,.3,140e3,9e3,5e3,5e3,3e3", "--damage"),
+    ):
         assert_unusable(refused)
         assert "--damage" in refused.stderr
 

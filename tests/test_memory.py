@@ -61,11 +61,32 @@ def plate(folder: Path, elements: int, macros: str, *options: str) -> Path:
     """Write a deck of a square plate with a macro program."""
     path = folder / "plate.inp"
     done = call(
-        "new", path, "--size", "6x6", "--mesh", f"{elements}x{elements}", "--layup", "[0/90]s",
-        "--ply-thickness", "0.0053", "--ply", "0.000148,0.3,1.75e7,1.15e6,8e5,8e5,8e5",
-        "--support", "clamped", "--velocity", "100", "--law", "1912000,0.0006564,0.094,2",
-        "--duration", "2e-7", "--dt", "1e-8", "--every", "10", *options,
-    )  # fmt: skip
+        "new",
+        path,
+        "--size",
+        "6x6",
+        "--mesh",
+        f"{elements}x{elements}",
+        "--layup",
+        "[0/90]s",
+        "--ply-thickness",
+        "0.0053",
+        "--ply",
+        "0.000148,0.3,1.75e7,1.15e6,8e5,8e5,8e5",
+        "--support",
+        "clamped",
+        "--velocity",
+        "100",
+        "--law",
+        "1912000,0.0006564,0.094,2",
+        "--duration",
+        "2e-7",
+        "--dt",
+        "1e-8",
+        "--every",
+        "10",
+        *options,
+    )
     assert done.exit_code == 0, done.stderr
     head = path.read_text().partition("MACR")[0]
     path.write_text(f"{head}MACR\n{macros}END\nSTOP\n")
@@ -86,9 +107,12 @@ def test_the_estimate_bounds_what_is_measured(tmp_path: Path) -> None:
     static = f"{small().partition('MACR')[0]}MACR\nLMAS\nEIGE\nEND\nSTOP\n"
     program = OWN + PEAK.format(small=small(), static=static, count=len(plates))
     done = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", program], cwd=tmp_path, capture_output=True,
-        text=True, check=True,
-    )  # fmt: skip
+        [sys.executable, "-W", "ignore", "-c", program],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     for measured, estimate in zip(map(int, done.stdout.split()), estimated, strict=True):
         assert measured <= estimate <= 4 * measured + 60 * MEGABYTE
 

@@ -116,8 +116,11 @@ def test_equations_are_numbered_by_node_and_unknown() -> None:
     cards = Boundary((NodeCodes(1, 1, (-1, -1, 0, 0, 0)), NodeCodes(3, 0, (1, 1, 1, 0, 0))))
     made = mesh(cards, numnp=4)
     assert made.equations.tolist() == [
-        [0, 0, 1, 2, 3], [0, 0, 4, 5, 6], [0, 0, 0, 7, 8], [9, 10, 11, 12, 13],
-    ]  # fmt: skip
+        [0, 0, 1, 2, 3],
+        [0, 0, 4, 5, 6],
+        [0, 0, 0, 7, 8],
+        [9, 10, 11, 12, 13],
+    ]
     assert made.number_of_equations == 13
 
 

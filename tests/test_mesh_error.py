@@ -17,10 +17,30 @@ STEPS = PROGRAM.replace("LOOP         10", "LOOP        150")
 def new(mesh: str, *options: str) -> str:
     """Deck of a plate that a bending wave of the impact covers."""
     made = call(
-        "new", "-", "--size", "40x40", "--mesh", mesh, "--layup", "[0/90]2s", "--units", "mm-N-s",
-        "--ply-thickness", ".25", "--material", "T300/5208", "--velocity", "3000",
-        "--law", "45000,.016,.094,2.5", "--projectile", "mass:2e-5", "--duration", "5e-5", *options,
-    )  # fmt: skip
+        "new",
+        "-",
+        "--size",
+        "40x40",
+        "--mesh",
+        mesh,
+        "--layup",
+        "[0/90]2s",
+        "--units",
+        "mm-N-s",
+        "--ply-thickness",
+        ".25",
+        "--material",
+        "T300/5208",
+        "--velocity",
+        "3000",
+        "--law",
+        "45000,.016,.094,2.5",
+        "--projectile",
+        "mass:2e-5",
+        "--duration",
+        "5e-5",
+        *options,
+    )
     assert made.exit_code == 0, made.stderr
     return made.stdout
 

@@ -99,8 +99,18 @@ def test_units_that_cannot_be_meant_are_refused(option: str, value: str, message
 
 def test_a_unit_needs_the_decks_own() -> None:
     ply = ("--ply", "1.58e-9,.32,161000,11380,5170,5170,3980", "--ply-thickness", "0.125")
-    made = new(*ply, *PLATE[2:4], "--law", "5e4,0,0,1.5", *PLATE[6:], "--layup", "[0/90]4s",
-               *QUICK, "--energy", "4J")  # fmt: skip
+    made = new(
+        *ply,
+        *PLATE[2:4],
+        "--law",
+        "5e4,0,0,1.5",
+        *PLATE[6:],
+        "--layup",
+        "[0/90]4s",
+        *QUICK,
+        "--energy",
+        "4J",
+    )
     assert_unusable(made)
     assert "--energy is '4J': give --units, the deck's" in made.stderr
 
@@ -132,9 +142,12 @@ def test_a_named_ply_has_its_own_thickness_in_the_decks_units() -> None:
     assert deck.require(Material).layers[0].thickness == 0.125
     (thinner,) = {
         layer.thickness
-        for layer in deck_of(*options, "--material", "T300/5208", "--units", "mm-N-s",
-                             "--ply-thickness", "0.1").require(Material).layers
-    }  # fmt: skip
+        for layer in deck_of(
+            *options, "--material", "T300/5208", "--units", "mm-N-s", "--ply-thickness", "0.1"
+        )
+        .require(Material)
+        .layers
+    }
     assert thinner == 0.1
     unknown = new(*options, "--material", "T700/2510")
     assert_unusable(unknown)
@@ -181,8 +194,12 @@ def test_the_edges_of_a_coupled_laminate_are_held_in_the_plane_as_asked(
     asked = () if in_plane is None else ("--in-plane", in_plane)
     found = held_in_plane(*COUPLED, "--support", support, *asked)
     assert found == {
-        "left": left, "right": left, "bottom": bottom, "top": bottom, "inside": [False, False]
-    }  # fmt: skip
+        "left": left,
+        "right": left,
+        "bottom": bottom,
+        "top": bottom,
+        "inside": [False, False],
+    }
 
 
 def test_an_imported_mesh_is_held_across_its_straight_edges_only() -> None:
@@ -204,8 +221,19 @@ def test_a_coupled_laminate_slides_on_the_window_of_a_fixture() -> None:
     # N/mm on 20 x 12 elements, with u and v of the window's nodes restrained and freed by hand.
     for in_plane, expected in (("held", 3060.0), (None, 2199.0)):
         asked = () if in_plane is None else ("--in-plane", in_plane)
-        made = new("--fixture", "D7136", "--mesh", "10x8", "--layup", "[0_8/90_8]",
-                   "--ply-thickness", ".276", "--material", "IM7/8552", *asked)  # fmt: skip
+        made = new(
+            "--fixture",
+            "D7136",
+            "--mesh",
+            "10x8",
+            "--layup",
+            "[0_8/90_8]",
+            "--ply-thickness",
+            ".276",
+            "--material",
+            "IM7/8552",
+            *asked,
+        )
         assert ("! The plate slides on the window" in made.stdout) == (in_plane is None)
         (problem,) = load_deck(made.stdout).problems
         assert problem.contact is not None
@@ -242,8 +270,20 @@ def test_a_static_solution_pins_the_rigid_motion_in_the_plane_without_a_reaction
 @pytest.mark.parametrize("layup", ["[45/-45]8s", "[0_16/90_16]"])
 def test_the_default_duration_of_a_fixture_ends_after_the_contact(layup: str) -> None:
     # Indentation makes the contact of a stiff plate longer at a low energy than half a period.
-    deck = deck_of("--fixture", "D7136", "--mesh", "6x4", "--layup", layup, "--ply-thickness",
-                   "0.18", "--material", "IM7/8552", "--energy", "1J")  # fmt: skip
+    deck = deck_of(
+        "--fixture",
+        "D7136",
+        "--mesh",
+        "6x4",
+        "--layup",
+        layup,
+        "--ply-thickness",
+        "0.18",
+        "--material",
+        "IM7/8552",
+        "--energy",
+        "1J",
+    )
     result = fecm.run_one(deck)
     assert result.force.max() > 0.0
     assert result.force[-1] == 0.0

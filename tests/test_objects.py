@@ -478,12 +478,19 @@ def test_whole_numbers_make_the_same_deck_as_others() -> None:
     whole = fecm.impact(
         fecm.Plate.rectangle((100, 80), (four, 4)),
         fecm.Laminate([0], fecm.Ply(1, 0, 2, 2, 1, 1, 1), one),
-        fecm.RigidMass(1), fecm.Contact(1, 0, 0, 2), velocity=1, duration=1,
-    )  # fmt: skip
+        fecm.RigidMass(1),
+        fecm.Contact(1, 0, 0, 2),
+        velocity=1,
+        duration=1,
+    )
     floats = fecm.impact(
-        PLATE, fecm.Laminate([0.0], fecm.Ply(1.0, 0.0, 2.0, 2.0, 1.0, 1.0, 1.0), 1.0),
-        fecm.RigidMass(1.0), fecm.Contact(1.0, 0.0, 0.0, 2.0), velocity=1.0, duration=1.0,
-    )  # fmt: skip
+        PLATE,
+        fecm.Laminate([0.0], fecm.Ply(1.0, 0.0, 2.0, 2.0, 1.0, 1.0, 1.0), 1.0),
+        fecm.RigidMass(1.0),
+        fecm.Contact(1.0, 0.0, 0.0, 2.0),
+        velocity=1.0,
+        duration=1.0,
+    )
     assert whole.to_text() == floats.to_text()
 
 

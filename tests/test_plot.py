@@ -61,8 +61,9 @@ def test_several_results_share_the_axes_each_in_its_colour(result: Result) -> No
     both = {"report": result, "listing": listing}
     figure = draw("force", both).figure
     assert [axes.get_ylabel() for axes in figure.axes] == [
-        "Contact force (lbf)", "Transducer (lbf)",
-    ]  # fmt: skip
+        "Contact force (lbf)",
+        "Transducer (lbf)",
+    ]
     assert legend_of(figure) == ["report", "listing"]
     np.testing.assert_array_equal(lines(figure.axes[0])["listing"][1], listing.force)
     np.testing.assert_array_equal(lines(figure.axes[1])["report"][1], result.transducer)
@@ -335,8 +336,11 @@ def test_force_draws_the_delamination_threshold_if_there_is_one(result: Result) 
     assert first == pytest.approx(2.0 * second)  # the square root of G_IIc
     same = draw("force", {"none": result, "a": weak, "b": weak}).figure
     assert [text.partition(" thre")[0] for text in legend_of(same)] == [
-        "none", "a", "b", "a, b: delamination"
-    ]  # fmt: skip
+        "none",
+        "a",
+        "b",
+        "a, b: delamination",
+    ]
     all_weak = draw("force", {"a": weak, "b": weak}).figure
     assert legend_of(all_weak)[2].startswith("delamination threshold")
     assert "delamination threshold" not in legend_of(plot(result, "force"))

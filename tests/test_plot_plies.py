@@ -35,9 +35,13 @@ def test_thickness_shows_six_components_with_jumps_at_the_faces_of_plies(plies: 
         figure: Any = plot(plies, "thickness", at=((1.45, 1.05),), times=(2.5e-6,))
     labels = [axes.get_xlabel().partition(" (") for axes in figure.axes]
     assert [label for label, _, _ in labels] == [
-        r"$\sigma_1$", r"$\sigma_2$", r"$\tau_{12}$", r"$\tau_{xz}$", r"$\tau_{yz}$",
+        r"$\sigma_1$",
+        r"$\sigma_2$",
+        r"$\tau_{12}$",
+        r"$\tau_{xz}$",
+        r"$\tau_{yz}$",
         r"$(\tau_{xz}^2 + \tau_{yz}^2)^{1/2}$",
-    ]  # fmt: skip
+    ]
     assert figure.get_suptitle() == "element 4 at 1.5, 1 in, time 2.5 µs"
     member = plies["plies/element"].tolist().index(4)
     curves = [axes.get_lines()[-1].get_data() for axes in figure.axes]
@@ -143,8 +147,10 @@ def test_the_map_of_exposures_has_a_cell_around_every_point(points: int) -> None
     assert len(hatched.get_paths()) == np.count_nonzero(under)
     cells = [path.vertices[:4] for path in (*shown.get_paths(), *hatched.get_paths())]
     assert sum(map(area, cells)) == pytest.approx(4.0, rel=1e-12)
-    x, y = (np.concatenate([result[f"failure/{n}"][~under], result[f"failure/{n}"][under]])
-            for n in "xy")  # fmt: skip
+    x, y = (
+        np.concatenate([result[f"failure/{n}"][~under], result[f"failure/{n}"][under]])
+        for n in "xy"
+    )
     for cell, place in zip(cells, np.stack([x, y], axis=1), strict=True):
         assert (cell.min(axis=0) <= place + 1e-12).all()
         assert (cell.max(axis=0) >= place - 1e-12).all()

@@ -85,8 +85,11 @@ def test_pictures_that_do_not_fit_the_axes_are_refused(
     result: fecm.Result, kind: RunKind, words: str
 ) -> None:
     with pytest.raises(PlotError, match=words):
-        result.plot(kind, ax=pyplot.subplots()[1], times=(2.5e-6, 5e-6, 5e-6, 5e-6)
-                    if kind == "contour" else ())  # fmt: skip
+        result.plot(
+            kind,
+            ax=pyplot.subplots()[1],
+            times=(2.5e-6, 5e-6, 5e-6, 5e-6) if kind == "contour" else (),
+        )
     with pytest.raises(PlotError, match="path or ax, not both"):
         result.plot("force", "x.png", ax=pyplot.gca())
     with pytest.raises(PlotError, match="three-dimensional"):
@@ -109,8 +112,9 @@ def test_the_users_style_holds_where_it_differs_from_that_of_matplotlib(
     with matplotlib.rc_context(own):
         lines = result.plot("force").get_lines()
         assert [(line.get_linewidth(), line.get_color()) for line in lines] == [
-            (3.5, "red"), (3.5, "lime"),
-        ]  # fmt: skip
+            (3.5, "red"),
+            (3.5, "lime"),
+        ]
         picture = draw("force", {"a": result}).figure
         assert picture.axes[0].get_lines()[0].get_linewidth() == 0.9
     assert result.plot("force").get_lines()[0].get_linewidth() == 0.9

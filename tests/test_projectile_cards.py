@@ -208,11 +208,16 @@ def test_a_rigid_mass_on_a_large_thin_plate_is_the_impact_on_an_infinite_one() -
         "large thin plate",
         Control(grid.nodes, grid.elements, 1, 2, 5, 9),
         (
-            grid.coordinates(), grid.element_cards(), boundary, material, Projectile(0, 0, m),
-            Impact(middle, 3, v), Indentation(k, 1.0, 0.0, 1.5),
+            grid.coordinates(),
+            grid.element_cards(),
+            boundary,
+            material,
+            Projectile(0, 0, m),
+            Impact(middle, 3, v),
+            Indentation(k, 1.0, 0.0, 1.5),
         ),
         program,
-    )  # fmt: skip
+    )
     result = result_of(deck)
     D = E * h**3 / (12.0 * (1.0 - nu**2))
     expected = infinite_plate(m, v, k, 1.0 / (8.0 * math.sqrt(D * rho * h)), result.time)

@@ -62,8 +62,11 @@ def test_the_docstrings_of_public_functions_and_methods_are_numpys() -> None:
     public = [getattr(fecm, name) for name in fecm.__all__]
     found = [member for member in public if inspect.isfunction(member)]
     for kind in filter(inspect.isclass, public):
-        found += [f for name, f in vars(kind).items()
-                  if inspect.isfunction(f) and not name.startswith("_")]  # fmt: skip
+        found += [
+            f
+            for name, f in vars(kind).items()
+            if inspect.isfunction(f) and not name.startswith("_")
+        ]
     wrong = {
         f.__qualname__: error
         for f in found
@@ -113,9 +116,12 @@ for arguments, names in %r.items():
 def test_no_command_imports_what_it_does_not_use(tmp_path: Path) -> None:
     (tmp_path / "small.inp").write_text(small())
     done = subprocess.run(
-        [sys.executable, "-c", LOADED % UNUSED], cwd=tmp_path, capture_output=True, text=True,
+        [sys.executable, "-c", LOADED % UNUSED],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
         env=os.environ | {"PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
+    )
     assert done.returncode == 0, done.stderr
 
 

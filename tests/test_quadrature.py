@@ -65,10 +65,13 @@ def test_order_4_takes_four_rectangles_in_the_printed_programs_order(
     expected = [
         (sx * half_width, sy * half_height)
         for half_width, half_height in (
-            (outer, outer), (inner, outer), (outer, inner), (inner, inner),
+            (outer, outer),
+            (inner, outer),
+            (outer, inner),
+            (inner, inner),
         )
         for sx, sy in ((-1, -1), (1, -1), (1, 1), (-1, 1))
-    ]  # fmt: skip
+    ]
     np.testing.assert_allclose(np.stack([rule.xi, rule.eta], axis=-1), expected, atol=1e-14)
 
 

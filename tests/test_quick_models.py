@@ -180,11 +180,35 @@ def test_the_static_stiffness_of_thin_plates_is_timoshenkos(row: dict[str, str])
     ratio = row["plate"].partition("b/a=")[2].partition(" ")[0] or "1"
     support = "clamped" if "clamped" in row["plate"] else "simple"
     made = call(
-        "new", "-", "--size", f"1x{ratio}", "--mesh", "8x10", "--grading", "3", "--dt", "1e-3",
-        "--layup", "[0]", "--ply-thickness", ".005", "--ply", "1,.3,1,1,.384615,.384615,.384615",
-        "--support", support, "--patch", "disc:.015", "--projectile", "mass:1",
-        "--velocity", "1e-6", "--law", "1,0,0,1.5", "--duration", "1e-3",
-    )  # fmt: skip
+        "new",
+        "-",
+        "--size",
+        f"1x{ratio}",
+        "--mesh",
+        "8x10",
+        "--grading",
+        "3",
+        "--dt",
+        "1e-3",
+        "--layup",
+        "[0]",
+        "--ply-thickness",
+        ".005",
+        "--ply",
+        "1,.3,1,1,.384615,.384615,.384615",
+        "--support",
+        support,
+        "--patch",
+        "disc:.015",
+        "--projectile",
+        "mass:1",
+        "--velocity",
+        "1e-6",
+        "--law",
+        "1,0,0,1.5",
+        "--duration",
+        "1e-3",
+    )
     (problem,) = load_deck(made.stdout).problems
     assert problem.contact is not None
     rigidity = 0.005**3 / (12.0 * (1.0 - 0.3**2))
@@ -264,10 +288,29 @@ def test_a_laminate_whose_bending_twists_it_is_named_beside_its_threshold(
     ply = "1.6e-9,.3,141e3,9.75e3,5.2e3,5.2e3,3.2e3"
     layup = "[" + "/".join(f"{angle:g}" for angle in angles) + "]"
     made = call(
-        "new", "-", "--size", "100x80", "--mesh", "2x2", "--layup", layup, "--ply-thickness", ".5",
-        "--ply", ply, "--velocity", "2000", "--law", "5e4,0,0,1.5", "--projectile", "mass:1e-3",
-        "--duration", "1e-5", "--patch", "disc:2",
-    )  # fmt: skip
+        "new",
+        "-",
+        "--size",
+        "100x80",
+        "--mesh",
+        "2x2",
+        "--layup",
+        layup,
+        "--ply-thickness",
+        ".5",
+        "--ply",
+        ply,
+        "--velocity",
+        "2000",
+        "--law",
+        "5e4,0,0,1.5",
+        "--projectile",
+        "mass:1e-3",
+        "--duration",
+        "1e-5",
+        "--patch",
+        "disc:2",
+    )
     deck = load_deck(made.stdout.replace("EXPE", "DELA\n0.5\nEXPE"))
     assert ("W461" in [finding.code for finding in deck.findings]) is warns
 

@@ -53,8 +53,10 @@ def random_deck(seed: int) -> tuple[str, str, tuple[str, ...]]:
     plain = listing or bool(slips)  # without the words that the report's program lacks
 
     # Material: B is 0 where the layers are mirrored, or only one angle is there.
-    layers = [(one("0.", "30.", "45.", "90.", "-60."), 1e-3 * rng.integers(20, 60))
-              for _ in range(rng.integers(1, 4))]  # fmt: skip
+    layers = [
+        (one("0.", "30.", "45.", "90.", "-60."), 1e-3 * rng.integers(20, 60))
+        for _ in range(rng.integers(1, 4))
+    ]
     layers += layers[::-1] if rng.random() < 0.4 else []
     cards = "".join(f"{n},{angle},{h:.3f}\n" for n, (angle, h) in enumerate(layers, 1))
     text = text.replace("1,0.,.053\n2,90.,.053\n", cards)
@@ -120,8 +122,22 @@ def compare(seed: int) -> None:
 
 def test_the_decks_have_every_word_slip_and_family_of_elements() -> None:
     texts, modes, slips = zip(*map(random_deck, range(200)), strict=True)
-    for word in ("PATC\nDISC", "PATC\nHERT", "GAGE", "DAMP", "PROJ\n0", "PROJ\n4", "FORC", "SHEA",
-                 "EXPE ACR", "ALLO", "DISP", "STRE", "PLYS", "FAIL"):  # fmt: skip
+    for word in (
+        "PATC\nDISC",
+        "PATC\nHERT",
+        "GAGE",
+        "DAMP",
+        "PROJ\n0",
+        "PROJ\n4",
+        "FORC",
+        "SHEA",
+        "EXPE ACR",
+        "ALLO",
+        "DISP",
+        "STRE",
+        "PLYS",
+        "FAIL",
+    ):
         assert any(word in text for text in texts)
     assert {text.splitlines()[1].split(",")[5] for text in texts} == set(map(str, ORDERS))
     assert set(modes) == {"report", LISTING}

@@ -110,8 +110,19 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = tmp_path_factory.mktemp("random")
     (made / "small.inp").write_text(QUICK)
     options = ("--random", "k=uniform:1e6,3e6", "--random", "velocity=normal:115,9")
-    done = call("sweep", "small.inp", *options, "--samples", 32, "--sensitivity", "--exceed",
-                "peak_force=600", "-o", "one.h5", cwd=made)  # fmt: skip
+    done = call(
+        "sweep",
+        "small.inp",
+        *options,
+        "--samples",
+        32,
+        "--sensitivity",
+        "--exceed",
+        "peak_force=600",
+        "-o",
+        "one.h5",
+        cwd=made,
+    )
     assert done.exit_code == 0
     return made
 
@@ -243,20 +254,28 @@ def check_hertz(found: fecm.SweepResult) -> None:
 def test_a_small_study_of_hertzs_impact_agrees_with_the_closed_forms() -> None:
     check_hertz(
         fecm.sweep(
-            fecm.read_one(QUICK), random=LAWS, samples=256, design="sobol", sensitivity=True,
+            fecm.read_one(QUICK),
+            random=LAWS,
+            samples=256,
+            design="sobol",
+            sensitivity=True,
             exceed={"peak_force": [500.0, 600.0]},
         )
-    )  # fmt: skip
+    )
 
 
 @pytest.mark.long
 def test_4096_samples_of_hertzs_impact_agree_with_the_closed_forms() -> None:
     check_hertz(
         fecm.sweep(
-            fecm.read_one(HERTZ), random=LAWS, samples=4096, design="sobol", sensitivity=True,
+            fecm.read_one(HERTZ),
+            random=LAWS,
+            samples=4096,
+            design="sobol",
+            sensitivity=True,
             exceed={"peak_force": [450.0, 500.0, 550.0, 600.0]},
         )
-    )  # fmt: skip
+    )
 
 
 def test_the_same_seed_gives_the_same_bytes(folder: Path) -> None:
@@ -282,9 +301,12 @@ def test_the_cases_of_a_design_identify_an_interrupted_sweep() -> None:
 def test_a_file_gives_back_the_results_of_the_sweep(folder: Path) -> None:
     loaded = fecm.load_sweep(folder / "one.h5")
     again = fecm.sweep(
-        folder / "small.inp", random={"k": "uniform:1e6,3e6", "velocity": "normal:115,9"},
-        samples=32, sensitivity=True, exceed={"peak_force": 600},
-    )  # fmt: skip
+        folder / "small.inp",
+        random={"k": "uniform:1e6,3e6", "velocity": "normal:115,9"},
+        samples=32,
+        sensitivity=True,
+        exceed={"peak_force": 600},
+    )
     assert loaded.random is not None
     assert again.random is not None
     assert loaded.random.design == again.random.design
@@ -329,9 +351,14 @@ def test_the_axes_of_the_file_are_named(folder: Path) -> None:
 
 def test_every_combination_of_varied_values_gets_the_same_draws(folder: Path) -> None:
     random = {"k": "normal:1.9e6,1e5"}
-    found = fecm.sweep(folder / "small.inp", {"velocity": [50.0, 115.0]}, random=random,
-                       samples=16, exceed={"peak_force": [500.0, 600.0]},
-                       output=folder / "two.h5")  # fmt: skip
+    found = fecm.sweep(
+        folder / "small.inp",
+        {"velocity": [50.0, 115.0]},
+        random=random,
+        samples=16,
+        exceed={"peak_force": [500.0, 600.0]},
+        output=folder / "two.h5",
+    )
     np.testing.assert_array_equal(found["k"][:16], found["k"][16:])
     np.testing.assert_array_equal(found["velocity"], np.repeat([50.0, 115.0], 16))
     assert found.random is not None

@@ -154,9 +154,12 @@ def test_the_default_time_step_is_most_of_a_waves_time_through_an_element() -> N
 
 def test_the_ratio_is_none_where_no_force_is_applied() -> None:
     history = RodHistory(
-        np.arange(3.0), np.array([0.0, 2.0, 4.0]), (0.5,), np.array([[1.0], [1.0], [3.0]]),
+        np.arange(3.0),
+        np.array([0.0, 2.0, 4.0]),
+        (0.5,),
+        np.array([[1.0], [1.0], [3.0]]),
         np.zeros((3, 3)),
-    )  # fmt: skip
+    )
     assert np.isnan(history.ratios[0, 0])
     assert history.ratios[1:, 0].tolist() == [0.5, 0.75]
     assert history.mean_ratios.tolist() == [0.625]
@@ -178,9 +181,16 @@ def test_the_command_prints_what_the_rod_does() -> None:
     assert done.stderr == ""
     found, expected = columns(done.stdout), simulate_pulse(rod(), GAUSS, 2e-7, 600e-6, (0.5, 0.25))
     assert list(found) == [
-        "time", "force", "force_at_0.5", "force_at_0.25", "ratio_at_0.5", "ratio_at_0.25",
-        "acceleration_struck_end", "acceleration_middle", "acceleration_far_end",
-    ]  # fmt: skip
+        "time",
+        "force",
+        "force_at_0.5",
+        "force_at_0.25",
+        "ratio_at_0.5",
+        "ratio_at_0.25",
+        "acceleration_struck_end",
+        "acceleration_middle",
+        "acceleration_far_end",
+    ]
     np.testing.assert_array_equal(found["force_at_0.25"], expected.forces[:, 1])
     np.testing.assert_array_equal(found["acceleration_far_end"], expected.accelerations[:, 2])
     np.testing.assert_array_equal(found["ratio_at_0.5"], expected.forces[:, 0] / found["force"])

@@ -28,17 +28,24 @@ def long(*values: object) -> object:
 def shell(command: str, folder: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run a command line of the shell; ``F`` is the program."""
     return subprocess.run(
-        ["bash", "-c", f'F="{FECM}"; {command}'], cwd=folder, capture_output=True, text=True,
-        check=False, env={**os.environ, **environment},
-    )  # fmt: skip
+        ["bash", "-c", f'F="{FECM}"; {command}'],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        env={**os.environ, **environment},
+    )
 
 
 def python(code: str, *arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:
     """Run Python code."""
     return subprocess.run(
         [sys.executable, "-c", code, *arguments],
-        cwd=cwd, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=cwd,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
 
 
 @pytest.fixture
@@ -246,9 +253,14 @@ def test_too_little_address_space_ends_in_one_line(folder: Path, megabytes: int)
         resource.setrlimit(resource.RLIMIT_AS, (megabytes * 10**6, megabytes * 10**6))
 
     done = subprocess.run(
-        [sys.executable, "-m", "fecm", "run", "d.inp"], cwd=folder, capture_output=True,
-        text=True, check=False, preexec_fn=limit, timeout=20,
-    )  # fmt: skip
+        [sys.executable, "-m", "fecm", "run", "d.inp"],
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        preexec_fn=limit,
+        timeout=20,
+    )
     assert done.returncode == 2
     assert done.stderr.startswith("fecm: error: ")
     assert done.stderr.count("\n") == 1

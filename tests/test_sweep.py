@@ -96,10 +96,12 @@ def test_no_case_depends_on_the_others_of_its_plate() -> None:
     cases: list[Case] = [
         {"velocity": v, "k": k, "mass": m}
         for v, k, m in zip(
-            random.uniform(50, 150, 40), random.uniform(1e6, 3e6, 40), [1.8e-4, 3e-4] * 20,
+            random.uniform(50, 150, 40),
+            random.uniform(1e6, 3e6, 40),
+            [1.8e-4, 3e-4] * 20,
             strict=True,
         )
-    ]  # fmt: skip
+    ]
     many = fecm.sweep(deck, cases=cases, history=True)
     some = [33, 2, 7]
     few = fecm.sweep(deck, cases=[cases[n] for n in some], history=True)
@@ -114,10 +116,13 @@ def test_the_law_of_many_cases_is_the_law_of_each() -> None:
     measured = [
         LinearPermanent(k, a, s, q)
         for k, a, s, q in zip(
-            random.uniform(1e6, 3e6, 15), random.uniform(0, 1e-3, 15), random.uniform(0, 0.2, 15),
-            random.uniform(1.5, 2.5, 15), strict=True,
+            random.uniform(1e6, 3e6, 15),
+            random.uniform(0, 1e-3, 15),
+            random.uniform(0, 0.2, 15),
+            random.uniform(1.5, 2.5, 15),
+            strict=True,
         )
-    ]  # fmt: skip
+    ]
     together = HystereticLaw(stacked(measured))
     memory, last = together.start(), ContactPoint(np.zeros(15), np.zeros(15))
     alone = [(HystereticLaw(c), HystereticLaw(c).start(), ContactPoint(0.0, 0.0)) for c in measured]
@@ -241,9 +246,12 @@ def test_a_plate_with_other_loads_is_run_whole() -> None:
 def test_a_case_that_fails_is_a_row_with_its_reason() -> None:
     found = fecm.sweep(
         model(small(STEPS)),
-        cases=[{"thickness": 0.1, "k": -1e6}, {"thickness": -1.0, "k": 1e6},
-               {"thickness": 0.1, "k": 1e6}],
-    )  # fmt: skip
+        cases=[
+            {"thickness": 0.1, "k": -1e6},
+            {"thickness": -1.0, "k": 1e6},
+            {"thickness": 0.1, "k": 1e6},
+        ],
+    )
     assert found.fine.tolist() == [False, False, True]
     assert "contact coefficient" in found["status"][0]
     assert "thick" in found["status"][1]
@@ -279,8 +287,9 @@ def test_a_grid_has_every_combination_once_and_a_table_its_rows(tmp_path: Path) 
     table = tmp_path / "cases.csv"
     table.write_text("velocity, layup\n1, [0/90]s\n\n2, [45]\n")
     assert read_cases(table) == [
-        {"velocity": 1.0, "layup": "[0/90]s"}, {"velocity": 2.0, "layup": "[45]"}
-    ]  # fmt: skip
+        {"velocity": 1.0, "layup": "[0/90]s"},
+        {"velocity": 2.0, "layup": "[45]"},
+    ]
 
 
 @pytest.mark.parametrize(
@@ -471,8 +480,11 @@ def test_a_sweep_that_is_interrupted_from_outside_ends_in_the_same_file(tmp_path
     command = ["sweep", "plate.inp", "--history", *varied, "-o"]
     done = subprocess.run(
         [sys.executable, "-c", SIGNALLED, *command, "s.h5"],
-        cwd=tmp_path, capture_output=True, text=True, check=False,
-    )  # fmt: skip
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     folder = tmp_path / ".s.h5.parts"
     assert done.returncode == 130
     assert "resumes this sweep" in done.stderr
@@ -495,8 +507,18 @@ def swept(*arguments: object) -> Done:
 def test_a_result_keeps_cases_numbers_and_forces(tmp_path: Path) -> None:
     deck, path = tmp_path / "plate.inp", tmp_path / "s.h5"
     deck.write_text(small(STEPS, data="UNIT\nin lbf s\n" + DATA_CARDS))
-    done = swept(deck, "--vary", "velocity=50,100", "--vary", "layup=[0/90],[x]", "-o", path,
-                "--history", "--full", "2")  # fmt: skip
+    done = swept(
+        deck,
+        "--vary",
+        "velocity=50,100",
+        "--vary",
+        "layup=[0/90],[x]",
+        "-o",
+        path,
+        "--history",
+        "--full",
+        "2",
+    )
     assert done.exit_code == 1
     assert "failed            2: layup" in done.stdout
     assert done.stdout.splitlines()[-1] == "4 cases: 2 failed"

@@ -33,9 +33,11 @@ def swept(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A sweep of velocities and two layups, one of which can't be read."""
     path = tmp_path_factory.mktemp("sweep") / "sweep.h5"
     fecm.sweep(
-        small(), {"velocity": VELOCITIES, "layup": ["[0/90]", "nonsense"]}, history=True,
+        small(),
+        {"velocity": VELOCITIES, "layup": ["[0/90]", "nonsense"]},
+        history=True,
         output=path,
-    )  # fmt: skip
+    )
     return path
 
 
@@ -96,9 +98,11 @@ def test_info_tells_programs_the_same(swept: Path) -> None:
 def test_a_sweep_is_the_same_as_itself_run_again(swept: Path, tmp_path: Path) -> None:
     again = tmp_path / "again.h5"
     fecm.sweep(
-        small(), {"velocity": VELOCITIES, "layup": ["[0/90]", "nonsense"]}, history=True,
+        small(),
+        {"velocity": VELOCITIES, "layup": ["[0/90]", "nonsense"]},
+        history=True,
         output=again,
-    )  # fmt: skip
+    )
     assert again.read_bytes() == swept.read_bytes()
     done = call("diff", swept, again)
     assert done.exit_code == 0

@@ -144,9 +144,7 @@ def test_texts_that_spreadsheets_compute_are_exported_as_texts(tmp_path: Path) -
     fecm.sweep(small(STEPS), {"layup": layups}, output=tmp_path / "s.h5")
     text = call("export", tmp_path / "s.h5", "--to", "csv", "-o", "-").stdout
     rows = list(csv.DictReader(io.StringIO(text)))
-    assert [row["layup"] for row in rows] == [
-        "'=cmd|x", "'+1", "'-1", "'@a", "'=1", "[0/90]"
-    ]  # fmt: skip
+    assert [row["layup"] for row in rows] == ["'=cmd|x", "'+1", "'-1", "'@a", "'=1", "[0/90]"]
 
 
 @pytest.mark.parametrize("more", [(), ("--random", "k=normal:1e6,1e4", "--samples", "16")])

@@ -38,9 +38,13 @@ def drawn(**ranges: tuple[float, float]) -> list[Case]:
 
 
 ANY = drawn(
-    velocity=(20.0, 300.0), k=(1e6, 3e6), alpha_p=(0.0, 1e-3), s_p=(0.0, 0.2), q=(1.5, 2.5),
+    velocity=(20.0, 300.0),
+    k=(1e6, 3e6),
+    alpha_p=(0.0, 1e-3),
+    s_p=(0.0, 0.2),
+    q=(1.5, 2.5),
     mass=(1e-4, 4e-4),
-)  # fmt: skip
+)
 FIRM = drawn(velocity=(20.0, 300.0), k=(1e6, 3e6), alpha_p=(1e-4, 1e-3))
 RODS = drawn(velocity=(20.0, 300.0), rod_length=(0.5, 2.0), k=(1e6, 3e6))
 

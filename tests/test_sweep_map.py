@@ -240,9 +240,7 @@ def test_each_layup_is_a_curve(layups: SweepResult) -> None:
         assert x.tolist() == sorted(VELOCITIES)
         order = np.argsort(layups["velocity"][here])
         np.testing.assert_array_equal(y, layups["peak_force"][here][order])
-    assert [text.get_text() for text in figure.legends[0].get_texts()] == [
-        *LAYUPS, "level 100 lbf"
-    ]  # fmt: skip
+    assert [text.get_text() for text in figure.legends[0].get_texts()] == [*LAYUPS, "level 100 lbf"]
     assert data_of(axes.get_lines()[-1])[1].tolist() == [100.0, 100.0]
     assert axes.get_ylabel() == "Peak force (lbf)"
 
@@ -400,8 +398,20 @@ def test_the_command_draws_a_map_without_being_asked_for_its_kind(
     done = call("plot", "plane.h5")
     assert (done.exit_code, done.stdout, done.stderr) == (0, "plane-map.png\n", "")
     assert Path("plane-map.png").read_bytes().startswith(b"\x89PNG")
-    done = call("plot", "plane.h5", "--over", "velocity", "--where", "k=2e6", "--quantity",
-                "impulse", "--level", "1e9", "-o", "line.svg")  # fmt: skip
+    done = call(
+        "plot",
+        "plane.h5",
+        "--over",
+        "velocity",
+        "--where",
+        "k=2e6",
+        "--quantity",
+        "impulse",
+        "--level",
+        "1e9",
+        "-o",
+        "line.svg",
+    )
     assert (done.exit_code, done.stdout) == (0, "line.svg\n")
     assert done.stderr.startswith("fecm: note: the level 1e+09 is outside")
     assert done.stderr.count("\n") == 1

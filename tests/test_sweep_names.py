@@ -48,10 +48,16 @@ def gaged() -> Deck:
     """A plate with gages and failure criteria, hit for a time after which it is free."""
     return fecm.impact(
         fecm.Plate.rectangle((100, 80), (3, 3), support="clamped"),
-        fecm.Laminate("[0/45/-45/90]s", "AS4/3501-6", 0.25), fecm.RigidMass(2e-6),
-        fecm.Contact.estimate(radius=8), velocity=3000, duration=3e-4, units="mm-N-s",
-        gages=[(30, 20, 1, 0), (60, 60, -1, 45)], damage=True, every=20,
-    )  # fmt: skip
+        fecm.Laminate("[0/45/-45/90]s", "AS4/3501-6", 0.25),
+        fecm.RigidMass(2e-6),
+        fecm.Contact.estimate(radius=8),
+        velocity=3000,
+        duration=3e-4,
+        units="mm-N-s",
+        gages=[(30, 20, 1, 0), (60, 60, -1, 45)],
+        damage=True,
+        every=20,
+    )
 
 
 # Values against decks that are written with them --------------------------------------------------
@@ -100,12 +106,16 @@ def test_an_energy_is_half_of_mass_times_velocity_squared() -> None:
     rod = fecm.Rod.cylinder(200.0, 10.0, 2e5, 7.8e-9)
     own = apply_case(
         fecm.impact(
-            fecm.Plate.rectangle((100, 100), (4, 4)), fecm.Laminate("[0]8", "T300/5208", 0.25),
-            rod, fecm.Contact(45000.0, 0.016, 0.094, 2.5), velocity=1.0, duration=1e-4,
+            fecm.Plate.rectangle((100, 100), (4, 4)),
+            fecm.Laminate("[0]8", "T300/5208", 0.25),
+            rod,
+            fecm.Contact(45000.0, 0.016, 0.094, 2.5),
+            velocity=1.0,
+            duration=1e-4,
             units="mm-N-s",
         ),
         {"energy": 80.0},
-    )  # fmt: skip
+    )
     mass = math.pi / 4.0 * 10.0**2 * 200.0 * 7.8e-9
     assert own.require(Impact).velocity == pytest.approx(math.sqrt(2 * 80.0 / mass), rel=1e-6)
     found = fecm.sweep(deck, {"energy": [80.0], "mass": [2e-5, 5e-5]})
@@ -123,9 +133,22 @@ def test_an_energy_is_half_of_mass_times_velocity_squared() -> None:
 def test_a_radius_is_the_k_of_indent_estimate_for_a_steel_sphere() -> None:
     def estimated(units: str, radius: float, modulus: float) -> float:
         done = call(
-            "indent", "estimate", *ESTIMATE, "--units", units, "--radius", radius, "--es", modulus,
-            "--nus", ".3", "--nu23", ".4", "--format", "json",
-        )  # fmt: skip
+            "indent",
+            "estimate",
+            *ESTIMATE,
+            "--units",
+            units,
+            "--radius",
+            radius,
+            "--es",
+            modulus,
+            "--nus",
+            ".3",
+            "--nu23",
+            ".4",
+            "--format",
+            "json",
+        )
         return float(json.loads(done.stdout)["k"])
 
     k = apply_case(new(), {"radius": 8.0}).require(Indentation).k
@@ -271,9 +294,15 @@ def test_the_command_measures_and_counts_what_failed(tmp_path: Path) -> None:
     deck, path = tmp_path / "p.inp", tmp_path / "s.h5"
     deck.write_text(gaged().to_text())
     done = call(
-        "sweep", deck, "--vary", "at=(50,40),(25,40),(500,0)", "--measure", "gages,failure", "-o",
+        "sweep",
+        deck,
+        "--vary",
+        "at=(50,40),(25,40),(500,0)",
+        "--measure",
+        "gages,failure",
+        "-o",
         path,
-    )  # fmt: skip
+    )
     assert done.exit_code == 1
     assert done.stdout.splitlines()[-1] == "3 cases: 1 failed"
     assert done.stderr.count("B is not zero") == 0

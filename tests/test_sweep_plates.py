@@ -24,11 +24,30 @@ LAYUPS = ("[0/90]2s", "[0_4/90_4]", "[45/-45]4")
 def new(layup: str, *options: str) -> str:
     """Deck that ``fecm new`` writes for a layup."""
     made = call(
-        "new", "-", "--size", "100x100", "--mesh", "4x4", "--layup", layup,
-        "--ply-thickness", ".25", "--material", "T300/5208", "--units", "mm-N-s",
-        "--velocity", "3000", "--law", "45000,.016,.094,2.5", "--projectile", "mass:2e-5",
-        "--duration", "2e-4", *options,
-    )  # fmt: skip
+        "new",
+        "-",
+        "--size",
+        "100x100",
+        "--mesh",
+        "4x4",
+        "--layup",
+        layup,
+        "--ply-thickness",
+        ".25",
+        "--material",
+        "T300/5208",
+        "--units",
+        "mm-N-s",
+        "--velocity",
+        "3000",
+        "--law",
+        "45000,.016,.094,2.5",
+        "--projectile",
+        "mass:2e-5",
+        "--duration",
+        "2e-4",
+        *options,
+    )
     assert made.exit_code == 0
     return made.stdout
 
@@ -97,9 +116,11 @@ def test_in_plane_unknowns_that_rest_do_not_limit_the_time_step() -> None:
     held = model(LONG.read_text().replace("LOOP       4000", "LOOP       1000"))
     assert not is_coupled(held.require(fecm.deck.model.Material))
     free = Deck(
-        held.title, held.control,
-        tuple(s for s in held.segments if not isinstance(s, Boundary)), held.macros,
-    )  # fmt: skip
+        held.title,
+        held.control,
+        tuple(s for s in held.segments if not isinstance(s, Boundary)),
+        held.macros,
+    )
     steps = [f"{line}" for deck in (held, free) for line in _critical(deck)]
     assert steps[0] == steps[1]
     force = [_run(deck).force for deck in (held, free)]

@@ -128,9 +128,13 @@ def test_built_decks_give_the_results_of_runs_and_keep_names_and_measured_column
 ) -> None:
     path, seen = tmp_path / "s.h5", list[tuple[int, int]]()
     found = fecm.sweep(
-        vary=OWN, build=plate, measure=readings, history=True, output=path,
+        vary=OWN,
+        build=plate,
+        measure=readings,
+        history=True,
+        output=path,
         progress=lambda *counts: seen.append(counts),
-    )  # fmt: skip
+    )
     assert seen == [(done, 8) for done in range(1, 9)]
     assert found.fine.tolist() == 2 * [True, True, False, False]
     assert found["status"].tolist()[2:4] == [

@@ -37,8 +37,10 @@ def plate(mass: float = 0.000181, duration: float = 3e-5) -> Deck:
             fecm.Laminate("[0/90/0/90/0/90/0/90/0/90]s", REPORT_PLY, 0.0053),
             fecm.RigidMass(mass),
             fecm.Contact(1912000.0, 1.0, 0.0, 1.5),
-            velocity=115.0, duration=duration, patch=Patch(radius=RADIUS),
-        )  # fmt: skip
+            velocity=115.0,
+            duration=duration,
+            patch=Patch(radius=RADIUS),
+        )
 
 
 def found_from(values: Floats | list[float], nodes: int = 9) -> Convergence:

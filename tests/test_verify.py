@@ -189,9 +189,15 @@ def test_zeners_figures_are_the_solution_of_his_equations() -> None:
         return [y[1] - slope * force, -force / m]  # approach; velocity of the mass
 
     found = solve_ivp(
-        rate, (0.0, 200e-6), [0.0, v], method="DOP853", rtol=1e-12, atol=1e-16,
-        dense_output=True, events=lambda t, y: rate(t, y)[0],
-    )  # fmt: skip
+        rate,
+        (0.0, 200e-6),
+        [0.0, v],
+        method="DOP853",
+        rtol=1e-12,
+        atol=1e-16,
+        dense_output=True,
+        events=lambda t, y: rate(t, y)[0],
+    )
     time = found.t_events[0][0]
     figures = (
         ("largest force", k * found.sol(time)[0] ** 1.5),
@@ -300,14 +306,21 @@ def test_figures_of_series_and_of_waves_are_those_of_the_reference_files() -> No
     series = [
         of(static, f"h/a={ratio}", column, load="uni (unit)")
         for ratio, column in (
-            ("0.1 ks=1.0", "w_centre"), ("0.1 ks=1.0", "quarter_point w(a/4,b/4)"),
-            ("0.01 ks=1.0", "w_centre"), ("0.1 ks=0.83", "w_centre"),
+            ("0.1 ks=1.0", "w_centre"),
+            ("0.1 ks=1.0", "quarter_point w(a/4,b/4)"),
+            ("0.01 ks=1.0", "w_centre"),
+            ("0.1 ks=0.83", "w_centre"),
         )
-    ]  # fmt: skip
+    ]
     assert expected == pytest.approx(series, rel=1e-10)
     for quantity, m, n in (("ω11, lumped", 1, 1), ("ω13, lumped", 1, 3), ("ω33, cons", 3, 3)):
-        value = of("freq_ssss_mindlin.csv", "h/a=0.1 ks=1.0", "omega_flex_rad/s_or_nondim",
-                   m=str(m), n=str(n))  # fmt: skip
+        value = of(
+            "freq_ssss_mindlin.csv",
+            "h/a=0.1 ks=1.0",
+            "omega_flex_rad/s_or_nondim",
+            m=str(m),
+            n=str(n),
+        )
         assert check_of("frequencies", quantity).expected == pytest.approx(value, rel=1e-11)
     (along,) = [r for r in reference("waves_normal_velocity.csv") if r["theta_deg"] == "0"]
     given = [float(value) for value in list(along.values())[1:6]]
@@ -317,8 +330,13 @@ def test_figures_of_series_and_of_waves_are_those_of_the_reference_files() -> No
     given = [of("waves_wavefront_rays.csv", "extension", c, normal_deg="45") for c in columns]
     assert fronts[5:] == pytest.approx(given, rel=1e-10)
     for quantity, ratio in (("ω, wavelength 10 h", "10"), ("ω, wavelength h", "1")):
-        value = of("waves_dispersion.csv", "0", "mode1_omega_rad/s", alpha_deg="0",
-                   **{"lambda_over_h": ratio})  # fmt: skip
+        value = of(
+            "waves_dispersion.csv",
+            "0",
+            "mode1_omega_rad/s",
+            alpha_deg="0",
+            **{"lambda_over_h": ratio},
+        )
         assert check_of("dispersion", quantity).expected == pytest.approx(value, rel=1e-10)
 
 
@@ -333,20 +351,36 @@ def test_figures_of_patches_and_plies_are_those_of_the_reference_files() -> None
         return [float(row[column]) for column in columns]
 
     for shape in ("disc", "hertz"):
-        given = at("static_patch.csv", "[0/90]5s", ["W/F conjugate mean"], K="1", shape=shape,
-                   **{"c (radius or half side)": "0.5"})  # fmt: skip
+        given = at(
+            "static_patch.csv",
+            "[0/90]5s",
+            ["W/F conjugate mean"],
+            K="1",
+            shape=shape,
+            **{"c (radius or half side)": "0.5"},
+        )
         found = check_of("patch-compliance", f"W, {shape.replace('h', 'H')}").expected
         assert found == pytest.approx(given[0], rel=4e-6)
-    given = at("patch_impact_summary.csv", "report-ply", ["peak force", "time of peak"], c="0.125",
-               **{"law alpha_p s_p q": ""})  # fmt: skip
+    given = at(
+        "patch_impact_summary.csv",
+        "report-ply",
+        ["peak force", "time of peak"],
+        c="0.125",
+        **{"law alpha_p s_p q": ""},
+    )
     assert [check.expected for check in chosen(["patch-impact"])[0].checks] == given
     given = at("shear_stiffness.csv", "[0/90/0] Pagano", ["H xz,xz", "H yz,yz"])
     expected = [check.expected for check in chosen(["equilibrium-shear"])[0].checks[1:3]]
     assert expected == pytest.approx(given, rel=1e-8)
     columns = ["sx(a/2,b/2,+h/2)/(q0 S^2)", "txy(0,0,+h/2)/(q0 S^2)", "txz(0,b/2,0)/(q0 S)",
                "tyz(a/2,0,0)/(q0 S)", "sy(a/2,b/2,90-ply upper face)/(q0 S^2)"]  # fmt: skip
-    given = at("pagano_sinusoidal.csv", "[0/90/0]", columns, theory="FSDT K=1",
-               **{"b/a": "1", "S=a/h": "10"})  # fmt: skip
+    given = at(
+        "pagano_sinusoidal.csv",
+        "[0/90/0]",
+        columns,
+        theory="FSDT K=1",
+        **{"b/a": "1", "S=a/h": "10"},
+    )
     # The origin of the rows is in the middle, that of the file in a corner.
     signs = np.array([100.0, 100.0, -10.0, -10.0, 100.0])
     quantities = ("σ1 at z = h/2", "τ12", "τ_xz", "τ_yz", "σ1 at z = h/6")
@@ -355,8 +389,10 @@ def test_figures_of_patches_and_plies_are_those_of_the_reference_files() -> None
 
 
 def test_figures_of_damage_are_those_of_the_reference_files() -> None:
-    first = {r["criterion"]: float(r["q0 at first failure (Pa)"]) for r in
-             reference("first_ply_failure_chain.csv")}  # fmt: skip
+    first = {
+        r["criterion"]: float(r["q0 at first failure (Pa)"])
+        for r in reference("first_ply_failure_chain.csv")
+    }
     assert [check.expected for check in chosen(["failure"])[0].checks] == list(first.values())
     figures = {
         ("threshold", "isotropic"): ("threshold_loads.csv", 0, "F threshold"),

@@ -84,8 +84,9 @@ def test_fronts_have_the_reference_files_rays_and_positions(
     rays = np.stack([column(rows, f"ray_v{axis}_in/s") for axis in "xy"], axis=1)
     speed = column(rows, "c_n_in/s")
     np.testing.assert_allclose(fronts.velocity[:, place], speed, rtol=1e-9)
-    np.testing.assert_allclose(fronts.ray[:, place] / speed[:, None], rays / speed[:, None],
-                               atol=1e-9)  # fmt: skip
+    np.testing.assert_allclose(
+        fronts.ray[:, place] / speed[:, None], rays / speed[:, None], atol=1e-9
+    )
     directions = column(rows, "ray_dir_deg")
     np.testing.assert_allclose(fronts.ray_angle[:, place], directions, atol=1e-6)
     for time in (2, 4, 5, 8, 10):
@@ -318,8 +319,15 @@ def test_where_sheets_cross_or_touch_the_names_stay_on_smooth_curves() -> None:
 
 
 def test_fronts_that_pass_one_another_closely_are_not_taken_to_cross() -> None:
-    ply = Ply(density=1e-4, nu12=0.3, e1=50184626.6, e2=1775970.6, g12=589298.9, g13=1182032.1,
-              g23=187260.5)  # fmt: skip
+    ply = Ply(
+        density=1e-4,
+        nu12=0.3,
+        e1=50184626.6,
+        e2=1775970.6,
+        g12=589298.9,
+        g13=1182032.1,
+        g23=187260.5,
+    )
     surfaces = WaveSurfaces(Medium(laminate(ply, [0.0, 17.3, 45.0], [0.005] * 3)))
     normals = np.arange(0.0, 180.0, 0.5)
     one, other = surfaces.fronts(normals), surfaces.fronts(normals + 180.0)
@@ -347,8 +355,9 @@ def test_a_fronts_name_tells_where_it_moves_in_another_way() -> None:
     def excess(normal: float) -> float:
         x, y = np.cos(np.deg2rad(normal)), np.sin(np.deg2rad(normal))
         off = (q12 + q66) * x * y
-        _, modes = np.linalg.eigh([[q11 * x * x + q66 * y * y, off],
-                                   [off, q66 * x * x + q22 * y * y]])  # fmt: skip
+        _, modes = np.linalg.eigh(
+            [[q11 * x * x + q66 * y * y, off], [off, q66 * x * x + q22 * y * y]]
+        )
         return float((modes[:, 1] @ [x, y]) ** 2) - 0.5
 
     assert excess(first - 0.1) > 0.0 > excess(first)

@@ -115,8 +115,9 @@ def test_several_times_may_be_given_in_several_ways(times: tuple[object, ...]) -
 
 
 def test_negative_angles_are_no_options() -> None:
-    found = rows(call("waves", "dispersion", "--angle", "-45", "30", LONG,
-                      "--wavelengths", "2:2:1"))  # fmt: skip
+    found = rows(
+        call("waves", "dispersion", "--angle", "-45", "30", LONG, "--wavelengths", "2:2:1")
+    )
     assert [float(row["angle_deg"]) for row in found] == [-45.0] * 5 + [30.0] * 5
     waves = dispersion(Medium(report_plate()), -45.0, [2.0]).phase_velocity[0]
     np.testing.assert_allclose([float(r["phase_velocity"]) for r in found[:5]], waves, rtol=1e-9)
@@ -353,6 +354,7 @@ def test_options_make_the_laminate_of_their_plies() -> None:
     assert made.thickness == pytest.approx(0.3)
     assert made.is_coupled
     assert made.shear[0, 0] == pytest.approx(
-        general_plate().shear[0, 0] + 0.05 * (0.8 * 0.75 + 0.5 * 0.25)
+        general_plate().shear[0, 0]
+        + 0.05 * (0.8 * 0.75 + 0.5 * 0.25)
         - 0.05 * (0.8 * np.cos(np.deg2rad(70)) ** 2 + 0.5 * np.sin(np.deg2rad(70)) ** 2)
-    )  # fmt: skip
+    )
