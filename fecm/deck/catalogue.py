@@ -153,7 +153,7 @@ def _ply(name: str, table: Mapping[str, object]) -> NamedPly:
 
 
 def _constant(name: str, key: str, value: object) -> float:
-    """A number of a ply's table, or a ValueError where it can't be meant."""
+    """A number of a ply's table, or a ValueError if it is implausible."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"[{name}] {key}: {value!r} is not a number")
     if not math.isfinite(value) or (KEYS[key] and value <= 0.0):

@@ -26,7 +26,7 @@ def capitals(word: str) -> str:
 
 
 def parse_integer(text: str) -> int | None:
-    """Read an I field without blanks; None if it is no integer.  The caller limits its length."""
+    """Read an integer without blanks, or None; the caller limits its length."""
     return int(text) if _INTEGER.fullmatch(text) else None
 
 

@@ -253,7 +253,7 @@ def _hint_of_separators(card: Card, fields: Fields) -> str:
 
 
 def _hint_of_points(card: Card, fields: Fields) -> str:
-    """Hint for a card with commas, of which some stand in numbers for the decimal point."""
+    """Hint for a card with commas, some of which are decimal points."""
     pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", card.data)
     words = pointed.replace(",", " ").split()
     pieces = [text for _, text in card.cut(fields)]

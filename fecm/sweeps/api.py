@@ -380,7 +380,7 @@ def _limits(exceed: Mapping[str, float | str | Sequence[float]] | None) -> tuple
 def _prepared(
     deck: str | Path | Deck | None, build: BuildFunction | None, cases: Sequence[Case]
 ) -> LoadedDeck:
-    """The deck, or the first that is built; its warnings are told."""
+    """The deck, or the first that is built; its warnings are issued."""
     if deck is not None and build is None:
         prepared = _loaded(deck)
     elif deck is None and build is not None:

@@ -233,7 +233,7 @@ def value_of(name: str, given: object, where: str) -> Value:
         separator = {"at": ",", "size": "x"}.get(name, "/")
         given = separator.join(map(str, given))
     try:
-        # float() says itself what is no number
+        # float() reports what is not a number
         text = given if isinstance(given, str) else repr(float(given))  # type: ignore[arg-type]
         return parse_value(name, text)
     except (TypeError, ValueError) as error:

@@ -16,7 +16,7 @@ from fecm.problem.rules.units import USED, has_real_moduli, likely_unit, looks_l
 # Strengths over the modulus of their direction.  Annealed glass has 1e-4, soft matrices 0.1.
 WEAKEST = 5e-5
 STRONGEST = 0.3
-ENDLESS = 1e6  # strength over modulus that stands for no failure
+ENDLESS = 1e6  # strength over modulus that means no failure
 # Strength, modulus in its direction, and the usual ratio of both.
 SHARES = (
     ("XT", "E1", 0.012),

@@ -71,7 +71,7 @@ def restrained_impact_dof(problem: Problem) -> Reports:
     remedy="3 is w.",
 )
 def impact_on_rotation(problem: Problem) -> Reports:
-    """Find a dof that is no displacement."""
+    """Find a dof that is not a displacement."""
     impact = problem.deck.require(model.Impact)
     if impact.dof > W_DOF:
         message = f"The impact dof {impact.dof} is a rotation: a projectile pushes a displacement."

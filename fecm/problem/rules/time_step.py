@@ -52,7 +52,7 @@ def _needs_critical_step(problem: Problem) -> bool:
     remedy="Check the units of constants, thickness and coordinates.",
 )
 def no_critical_step(problem: Problem) -> Reports:
-    """Find plates whose stiffness or mass is no number."""
+    """Find plates whose stiffness or mass is not a number."""
     if not takes_steps(problem):
         return
     try:

@@ -117,7 +117,7 @@ def has_real_moduli(ply: Ply, names: dict[str, str]) -> bool:
     "W482",
     Subject.LAMINATE,
     "A name on UNIT is a unit of something else.",
-    cause="For instance kg stands in the place of the force.",
+    cause="For instance, kg is given as the force.",
     remedy="Length, force and time in this order: `mm N s`.",
 )
 def unit_of_another_kind(card: model.Units) -> Reports:
