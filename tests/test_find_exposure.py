@@ -89,11 +89,19 @@ def test_each_case_of_a_sweep_has_its_velocity() -> None:
         assert np.max(exposures) == pytest.approx(0.5, rel=2e-5)
 
 
+def test_a_run_that_leaves_the_exposure_open_is_repeated_longer() -> None:
+    short = fecm.sweep(failing(steps=40), until={"exposure": 1.0})
+    (steps,) = short.steps
+    assert steps in (80, 160, 320)
+    longer = fecm.sweep(failing(steps=int(steps)), until={"exposure": 1.0})
+    assert short["found_velocity"][0] == pytest.approx(longer["found_velocity"][0], rel=ERROR)
+
+
 def test_few_evaluations_and_short_runs_find_no_velocity() -> None:
     rare = fecm.sweep(failing(every=40, steps=400), until={"exposure": 1.0})
     assert "FAIL was evaluated" in rare["status"][0]
-    short = fecm.sweep(failing(steps=40), until={"exposure": 1.0})
-    assert "ends before its largest exposure" in short["status"][0]
+    short = fecm.sweep(failing(steps=8), until={"exposure": 1.0})
+    assert "largest exposure is open even in a run 8 times as long" in short["status"][0]
     assert np.isnan(short["found_velocity"][0])
 
 

@@ -1,4 +1,4 @@
-"""The judge: what an end decides, and where the model ends to hold, the same for all commands."""
+"""The judge: what an end decides and where the model no longer holds, for all commands alike."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The judge of results: where the model ends to hold, and the reasons to doubt a case.
+"""The judge of results: where the model no longer holds, and the reasons to doubt a case.
 
 Runs, cases of sweeps, searches, estimates and pictures all ask this module.  Its functions take
 many cases at once: arrays (cases,).

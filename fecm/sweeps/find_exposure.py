@@ -10,44 +10,53 @@ import numpy as np
 from fecm.results.exposures import FEWEST
 from fecm.results.metrics import EVALUATIONS, EXPOSURES
 from fecm.sweeps.case import CasesError
-from fecm.sweeps.find import with_found
+from fecm.sweeps.find import LONGER, RANGE, with_found
 from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.strike import Strike
 
-RANGE = 100.0  # of velocities relative to the deck's
 ERROR = 1e-5  # largest relative excess of the exposure found
 MOST = 40  # runs of a case; a smooth dependence takes about six
 
 
-def found(number: int, start: Strike, level: float, run: Callable[[Strike], Outcome]) -> Outcome:
+def found(
+    number: int, start: Strike, level: float, run: Callable[[Strike, int], Outcome]
+) -> Outcome:
     """Run a case at the velocity at which its largest exposure outside the load reaches a level.
 
-    Every trial is a full run, as exposures need the whole plate.  Raises CasesError with the reason
-    if no velocity is found.
+    Every trial is a full run, as exposures need the whole plate.  `run` takes a strike and how many
+    times as long the run is; one that leaves the exposure open is repeated, longer.  Raises
+    CasesError with the reason if no velocity is found.
     """
     outcomes: dict[float, Outcome] = {}
+    factors = list(LONGER)  # those that are left
 
     def exposure(velocity: float) -> float:
-        outcome = outcomes[velocity] = run(start.with_velocity(velocity))
-        return _largest_exposure(outcome, velocity)
+        while factors:
+            outcome = outcomes[velocity] = run(start.with_velocity(velocity), factors[0])
+            largest = _largest_exposure(outcome, velocity)
+            if not math.isnan(largest):
+                return largest
+            del factors[0]
+        text = f"open even in a run {LONGER[-1]} times as long"
+        raise CasesError(f"at velocity {velocity:.6g} the largest exposure is {text}")
 
     velocity = search(start.velocity, level, exposure)
     return with_found(outcomes[velocity], {number: start.with_velocity(velocity)})
 
 
 def _largest_exposure(outcome: Outcome, velocity: float) -> float:
-    """Largest exposure of a run; CasesError if the run does not decide it."""
+    """Largest exposure of a run, NaN if it is open; CasesError if the run has none to rely on."""
     at = f"at velocity {velocity:.6g}"
     if not outcome.fine[0]:
         raise CasesError(f"{at}: {outcome.status[0]}")
+    values = [float(outcome.columns[name][0]) for name in EXPOSURES if name in outcome.columns]
+    if values and np.isnan(values).any():
+        return math.nan
     (counted,) = EVALUATIONS
-    if (count := int(outcome.columns[counted][0])) < FEWEST:
+    if (count := int(outcome.columns[counted][0])) < FEWEST or not values:
         why = f"FAIL was evaluated {count} times during contact, less than {FEWEST}"
         raise CasesError(f"{at}: {why}")
-    values = [outcome.columns[name][0] for name in EXPOSURES if name in outcome.columns]
-    if not values or np.isnan(values).any():
-        raise CasesError(f"{at} the run ends before its largest exposure")
-    return float(max(values))
+    return max(values)
 
 
 def search(start: float, level: float, exposure: Callable[[float], float]) -> float:

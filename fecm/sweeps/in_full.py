@@ -26,7 +26,7 @@ from fecm.sweeps.judge import judge, peaks_of, threshold_of
 from fecm.sweeps.outcome import Outcome, outcome_of
 from fecm.sweeps.plan import BuildFunction, Measure, MeasureFunction, Settings
 from fecm.sweeps.strike import Strike, strike_of
-from fecm.sweeps.timing import with_clock
+from fecm.sweeps.timing import lengthened, with_clock
 from fecm.sweeps.values import name_fault
 from fecm.sweeps.vary import apply_case
 
@@ -41,8 +41,9 @@ def run_in_full(settings: Settings, number: int, case: Case) -> Outcome:
         search, measure = settings.search, settings.measure
         if search is not None and search.quantity is Sought.EXPOSURE:
 
-            def run(strike: Strike) -> Outcome:
-                return alone(number, replace(checked, deck=strike.deck()), settings.measures)
+            def run(strike: Strike, factor: int) -> Outcome:
+                longer = checked if factor == 1 else lengthened(checked, factor)
+                return alone(number, replace(longer, deck=strike.deck()), settings.measures)
 
             level, start = float(search.level), strike_of(checked.deck)
             outcome = find_exposure.found(number, start, level, run)
