@@ -12,8 +12,10 @@ from unittest import mock
 
 import pytest
 
+import fecm
 from fecm.cli import main
 from fecm.cli.interrupts import signals
+from fecm.deck import Deck
 
 
 @dataclass(frozen=True)
@@ -80,3 +82,15 @@ def assert_unusable(done: Done) -> None:
     assert done.stderr.startswith("fecm: error: ")
     assert done.stderr.count("\n") == 1
     assert done.stderr.endswith("\n")
+
+
+def new(*options: str | Path) -> Done:
+    """Run ``fecm new`` to standard output."""
+    return call("new", "-", *options)
+
+
+def new_deck(*options: str | Path) -> Deck:
+    """Deck that ``fecm new`` writes."""
+    made = new(*options)
+    assert made.exit_code == 0, made.stderr
+    return fecm.read_one(made.stdout)

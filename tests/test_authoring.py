@@ -29,7 +29,7 @@ from fecm.deck.model import (
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_projectile
-from tests.calls import Done, assert_unusable, call
+from tests.calls import assert_unusable, call, new
 from tests.decks import APPENDIX, LONG, small
 
 REPORT = [
@@ -44,11 +44,6 @@ PLATE = [
     "--material", "T300/5208", "--units", "m-N-s", "--velocity", "3", "--law", "1e9,1e-5,.1,2.5",
     "--duration", "1e-4", "--projectile", "mass:0.05",
 ]  # fmt: skip
-
-
-def new(*options: str) -> Done:
-    """Run ``fecm new`` to standard output."""
-    return call("new", "-", *options)
 
 
 @pytest.mark.parametrize(

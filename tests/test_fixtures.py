@@ -8,13 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import fecm
 from fecm.api import load_deck
-from fecm.deck import Deck
 from fecm.deck.model import Impact, Patch
 from fecm.mechanics.solutions import static_stiffness
 from fecm.problem.parts import build_projectile
-from tests.calls import Done, assert_unusable, call
+from tests.calls import assert_unusable, call, new, new_deck
 
 WINDOW = "150x100 plate, w=0 along the window"
 ISOTROPIC = "2.7e-9,.3,6e4,6e4,23076.9231,23076.9231,23076.9231"
@@ -26,16 +24,6 @@ PLIES = {
 }  # fmt: skip
 PLATE = ("--layup", "[45/0/-45/90]3s", "--ply-thickness", ".184", "--ply", IM7)
 QUICK = ("--mesh", "8x6", "--duration", "1e-4")
-
-
-def new(*options: str) -> Done:
-    return call("new", "-", *options)
-
-
-def deck_of(*options: str) -> Deck:
-    made = new(*options)
-    assert made.exit_code == 0, made.stderr
-    return fecm.read_one(made.stdout)
 
 
 @pytest.mark.parametrize("plate", PLIES)
@@ -66,7 +54,7 @@ def test_the_static_stiffness_of_d7136_is_that_of_another_code(plate: str) -> No
 
 
 def test_d7136_prescribes_mass_energy_patch_and_units() -> None:
-    deck = deck_of("--fixture", "D7136", *PLATE, *QUICK)
+    deck = new_deck("--fixture", "D7136", *PLATE, *QUICK)
     assert build_projectile(deck).total_mass == 5.5e-3
     assert deck.last(Patch) == Patch("HERT")
     energy = 0.5 * 5.5e-3 * deck.require(Impact).velocity ** 2
@@ -86,7 +74,7 @@ def test_w_is_held_along_the_window_and_nowhere_else() -> None:
 
 
 def test_energy_gives_the_velocity_of_the_mass() -> None:
-    deck = deck_of(
+    deck = new_deck(
         "--fixture",
         "window:60x40,50x30",
         *PLATE,

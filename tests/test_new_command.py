@@ -10,14 +10,13 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.cli.new import new as command
-from fecm.deck import Deck
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.model import Delamination, Impact, Material, Shear
 from fecm.mechanics.solutions import Tangent, in_plane_pins, static_stiffness
 from fecm.problem.summary import ProblemSummary
 from tests import closed_forms
 from tests.builders import DATA
-from tests.calls import Done, assert_unusable, call
+from tests.calls import assert_unusable, call, new, new_deck
 from tests.closed_forms_plies import equilibrium_shear
 
 MM = ("--material", "IM7/8552", "--projectile", "mass:1e-3", "--contact", "estimate:8")
@@ -25,16 +24,6 @@ PLATE = (*MM, "--size", "100x80", "--mesh", "5x4")
 D7136 = ("--fixture", "D7136", "--mesh", "8x6", "--material", "IM7/8552", "--layup",
          "[45/0/-45/90]4s")  # fmt: skip
 QUICK = ("--duration", "1e-4")
-
-
-def new(*options: str) -> Done:
-    return call("new", "-", *options)
-
-
-def deck_of(*options: str) -> Deck:
-    made = new(*options)
-    assert made.exit_code == 0, made.stderr
-    return fecm.read_one(made.stdout)
 
 
 def held_in_plane(*options: str) -> dict[str, list[bool]]:
@@ -75,7 +64,7 @@ def test_energy_and_velocity_take_a_unit(options: tuple[str, ...], velocity: flo
 
 
 def test_a_duration_takes_a_unit() -> None:
-    deck = deck_of(*PLATE, "--layup", "[0/90]4s", "--velocity", "3m/s", "--duration", "0.1ms")
+    deck = new_deck(*PLATE, "--layup", "[0/90]4s", "--velocity", "3m/s", "--duration", "0.1ms")
     values = {macro.word: macro.value for macro in deck.macros}
     assert values["DT"] * values["LOOP"] == pytest.approx(1e-4, rel=0.02)
 
@@ -142,7 +131,7 @@ def test_a_named_ply_has_its_own_thickness_in_the_decks_units() -> None:
     assert deck.require(Material).layers[0].thickness == 0.125
     (thinner,) = {
         layer.thickness
-        for layer in deck_of(
+        for layer in new_deck(
             *options, "--material", "T300/5208", "--units", "mm-N-s", "--ply-thickness", "0.1"
         )
         .require(Material)
@@ -166,10 +155,10 @@ def test_a_toughness_stands_in_for_one_that_a_ply_does_not_have() -> None:
     assert MATERIALS["T700/2510"].delamination("mm-N-s") is None
     without = new(*D7136[:4], *D7136[6:], *ply, *QUICK)
     assert "so no delamination threshold (DELA); --giic gives it" in without.stderr
-    deck = deck_of(*D7136[:4], *D7136[6:], *ply, *QUICK, "--giic", "0.9")
+    deck = new_deck(*D7136[:4], *D7136[6:], *ply, *QUICK, "--giic", "0.9")
     assert deck.require(Delamination) == Delamination(0.9)
-    assert deck_of(*D7136, *QUICK, "--giic", "0.9").require(Delamination).toughness == 0.9
-    own = deck_of(*D7136, *QUICK, "--damage").require(Delamination).toughness
+    assert new_deck(*D7136, *QUICK, "--giic", "0.9").require(Delamination).toughness == 0.9
+    own = new_deck(*D7136, *QUICK, "--damage").require(Delamination).toughness
     assert own == MATERIALS["IM7/8552"].value("GIIc", "mm-N-s")
 
 
@@ -270,7 +259,7 @@ def test_a_static_solution_pins_the_rigid_motion_in_the_plane_without_a_reaction
 @pytest.mark.parametrize("layup", ["[45/-45]8s", "[0_16/90_16]"])
 def test_the_default_duration_of_a_fixture_ends_after_the_contact(layup: str) -> None:
     # Indentation makes the contact of a stiff plate longer at a low energy than half a period.
-    deck = deck_of(
+    deck = new_deck(
         "--fixture",
         "D7136",
         "--mesh",
@@ -294,7 +283,7 @@ def test_an_impact_whose_contact_cannot_be_estimated_gets_half_periods(
     options: tuple[str, ...],
 ) -> None:
     made = new(*D7136, *options)
-    plain = deck_of(*D7136)
+    plain = new_deck(*D7136)
     deck = fecm.read_one(made.stdout)
     time, expected = (
         {macro.word: macro.value for macro in one.macros}["LOOP"] for one in (deck, plain)
@@ -319,7 +308,7 @@ def test_an_impact_whose_contact_cannot_be_estimated_gets_half_periods(
 def test_the_shear_factor_is_written_beside_the_assumed_strains(
     options: tuple[str, ...], expected: Shear | None
 ) -> None:
-    assert deck_of(*D7136, *QUICK, *options).last(Shear) == expected
+    assert new_deck(*D7136, *QUICK, *options).last(Shear) == expected
 
 
 @pytest.mark.parametrize("value", ["0", "-1", "x", "nan"])
