@@ -228,3 +228,29 @@ class Damping(Segment, keyword="DAMP"):
     coefficient: float  # a of the damping matrix C = a M, 1/time
 
     fields: ClassVar[Fields] = layout("F10 a")
+
+
+@frozen
+class Nonlinear(Segment, keyword="NONL"):
+    """NONL: the plate stretches as it bends, von Karman (not in the report's program)."""
+
+    @classmethod
+    def read(cls, head: Card, cards: CardStream) -> Self:
+        """Read the keyword card, which is all there is."""
+        return cls(source=Source(head))
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's card."""
+        yield self.keyword
+
+
+@frozen
+class Preload(Segment, keyword="PREL"):
+    """PREL: (3F10.0); uniform initial membrane force (not in the report's program)."""
+
+    # N0, force/length; tension is positive.
+    n_x: float
+    n_y: float = 0.0
+    n_xy: float = 0.0
+
+    fields: ClassVar[Fields] = layout("F10 N0x", "F10 N0y", "F10 N0xy")

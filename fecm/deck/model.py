@@ -23,7 +23,9 @@ from fecm.deck.material_cards import (
     Integration,
     Layer,
     Material,
+    Nonlinear,
     Ply,
+    Preload,
     Shear,
 )
 from fecm.deck.mesh_cards import (
@@ -42,9 +44,9 @@ from fecm.deck.segment import NumberedSegment, Segment
 __all__ = [
     "Allowables", "Boundary", "Control", "Coordinates", "Damping", "Deck", "Delamination",
     "ElementNodes", "Elements", "Forces", "Gage", "Gages", "Impact", "Indentation", "Integration",
-    "Layer", "LoadTable", "Macro", "Material", "NodeCodes", "NodeValues", "NumberedSegment", "Page",
-    "Patch", "Ply", "PrintOption", "Projectile", "Record", "RodDiameter", "Segment", "Shear",
-    "Units",
+    "Layer", "LoadTable", "Macro", "Material", "NodeCodes", "NodeValues", "Nonlinear",
+    "NumberedSegment", "Page", "Patch", "Ply", "Preload", "PrintOption", "Projectile", "Record",
+    "RodDiameter", "Segment", "Shear", "Units",
 ]  # fmt: skip
 
 TITLE = "FECM"
@@ -66,6 +68,8 @@ SEGMENTS: dict[str, type[Segment]] = {
     "ALLO": Allowables,
     "DELA": Delamination,
     "DAMP": Damping,
+    "NONL": Nonlinear,
+    "PREL": Preload,
     "GAGE": Gages,
     "UNIT": Units,
     "PRIN": PrintOption,

@@ -42,11 +42,14 @@ class UnsoundPlateError(FecmError, ArithmeticError):
 
 @frozen
 class PlateModel:
-    """The discrete plate: M a + K u = P."""
+    """The discrete plate: M a + f(u) = P, with f(u) = K u unless it is nonlinear."""
 
     mesh: Mesh
     laminate: Laminate
     rules: IntegrationRules
+    # Uniform initial membrane force N0_x, N0_y, N0_xy, force/length; tension is positive.
+    preload: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    nonlinear: bool = False  # whether stretching follows from bending, see membrane.py
 
     @property
     def neq(self) -> int:

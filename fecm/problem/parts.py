@@ -55,7 +55,14 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
         transposed_jacobian="jacobian" in slips,
         assumes_shear=has_assumed_shear(deck),
     )
-    return PlateModel(mesh, laminate, used)
+    preload = deck.last(model.Preload)
+    return PlateModel(
+        mesh,
+        laminate,
+        used,
+        preload=(0.0, 0.0, 0.0) if preload is None else (preload.n_x, preload.n_y, preload.n_xy),
+        nonlinear=deck.has(model.Nonlinear),
+    )
 
 
 def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Projectile:
