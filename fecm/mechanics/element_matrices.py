@@ -38,7 +38,7 @@ class IntegrationRules:
     assumes_shear: bool = False
 
 
-def _membrane_and_bending(at: Interpolation) -> Floats:
+def membrane_and_bending(at: Interpolation) -> Floats:
     """B matrix of midplane strains and curvatures, equations 2-6 to 2-9: (ne, npt, 6, 5 nn)."""
     ne, npt, _, nn = at.dN.shape
     B = np.zeros((ne, npt, 6, nn, NDOF))
@@ -79,7 +79,7 @@ def stiffness(family: ElementBlock, laminate: Laminate, rules: IntegrationRules)
     ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
     slip = rules.transposed_jacobian
     at = interpolate(family, rules.bending, transposed_jacobian=slip)
-    K = _integrate(_membrane_and_bending(at), ABD, at.jxw)
+    K = _integrate(membrane_and_bending(at), ABD, at.jxw)
     if rules.assumes_shear:
         rule = assumed_shear.quadrature(family)
         jxw = jacobian_determinants(family, rule) * rule.weights

@@ -80,9 +80,18 @@ class PlateModel:
     def _dofs(self, family: ElementBlock) -> Indices:
         return self._numbers[family.nodes].reshape(len(family.rows), -1)
 
-    def _element_matrices(self, matrices_of: MatricesOf) -> Iterator[tuple[Indices, Floats]]:
-        """Dofs (ne, n) and matrices (ne, n, n) of all elements, block by block."""
+    def _element_matrices(
+        self, matrices_of: MatricesOf, *, congruent: bool = True
+    ) -> Iterator[tuple[Indices, Floats]]:
+        """Dofs (ne, n) and matrices (ne, n, n) of all elements, block by block.
+
+        Congruent elements have the same matrix unless that depends on the displacement.
+        """
         for family in self.families:
+            if not congruent:
+                for part in family.blocks(BLOCK):
+                    yield self._dofs(part), matrices_of(part)
+                continue
             same = congruence(family)
             for start in range(0, len(family.rows), BLOCK):
                 block = np.arange(start, min(start + BLOCK, len(family.rows)))
@@ -95,14 +104,17 @@ class PlateModel:
         """Number of entries of all element matrices."""
         return sum(len(f.nodes) * (NDOF * f.nodes.shape[1]) ** 2 for f in self.families)
 
-    def _assembled(self, matrices_of: MatricesOf) -> sparse.csr_array:
-        """Assembled matrix (neq, neq + restrained); columns of restrained dofs come last."""
+    def assembled(self, matrices_of: MatricesOf, *, congruent: bool = True) -> sparse.csr_array:
+        """Assembled matrix (neq, neq + restrained); columns of restrained dofs come last.
+
+        Congruent elements have the same matrix unless it is said that they have not.
+        """
         from scipy import sparse  # 0.16 s, which most runs don't need
 
         neq, ndof = self.neq, self._numbers.size
         require(ASSEMBLED * self.entries, "to assemble the plate's matrices")
         total = sparse.csr_array((neq, ndof))
-        for dofs, matrices in self._element_matrices(matrices_of):
+        for dofs, matrices in self._element_matrices(matrices_of, congruent=congruent):
             rows = np.broadcast_to(dofs[:, :, None], matrices.shape)
             columns = np.broadcast_to(dofs[:, None, :], matrices.shape)
             wanted = (rows < neq) & (matrices != 0.0)
@@ -115,7 +127,7 @@ class PlateModel:
     @cached_property
     def _with_supports(self) -> sparse.csr_array:
         """K with the columns of the restrained dofs last."""
-        return self._assembled(self.stiffness_of)
+        return self.assembled(self.stiffness_of)
 
     @cached_property
     def stiffness(self) -> sparse.csr_array:
@@ -141,7 +153,7 @@ class PlateModel:
     def consistent_mass(self) -> sparse.csr_array:
         """Consistent M, sparse (neq, neq), with the bending rule; assembled on first access."""
         laminate, rule = self.laminate, self.rules.bending
-        made = self._assembled(lambda f: element_matrices.consistent_mass(f, laminate, rule))
+        made = self.assembled(lambda f: element_matrices.consistent_mass(f, laminate, rule))
         return made[:, : self.neq].tocsr()
 
     def area(self) -> float:
@@ -229,6 +241,8 @@ class StiffnessOperator(ABC):
     """The internal forces of a displacement."""
 
     size: int  # entries of a padded vector
+    # Integral of (N - N0) eps_q at the last displacement, see membrane.py; 0 of a linear plate.
+    quadratic_work: float = 0.0
 
     @abstractmethod
     def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:

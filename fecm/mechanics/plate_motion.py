@@ -1,13 +1,15 @@
-"""Explicit motion of the plate: M a = P - K u, report section 4.3.1.
+"""Explicit motion of the plate: M a = P - f(u), report section 4.3.1.
+
+The internal force f is K u, or that of a plate that stretches as it bends (membrane.py).
 
 Central differences in increments: d = u - u_last is dt times the velocity in the middle of the last
-step, and d + dt^2 M^-1 (P - K u) is the next increment.  Vectors are over equations and are
+step, and d + dt^2 M^-1 (P - f) is the next increment.  Vectors are over equations and are
 processed in pieces that fit the cache.
 
 With damping C = a M the velocity is the mean of both middles, so that the mass stays diagonal and
 the order 2:
 
-    (1 + b) d_next = (1 - b) d + dt^2 M^-1 (P - K u),  b = a dt/2
+    (1 + b) d_next = (1 - b) d + dt^2 M^-1 (P - f),  b = a dt/2
 
 The critical time step does not change.  A mode of frequency w has
 (1 + b) z^2 - (2 - w^2 dt^2) z + (1 - b) = 0.  With b > 0 both roots are inside the unit circle if
@@ -27,7 +29,14 @@ from fecm._errors import FecmError
 from fecm._frozen import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics.plate import PlateModel, pieces
-from fecm.mechanics.stiffness_product import AUTO, CSR, Workers, resolved, stiffness_operator
+from fecm.mechanics.stiffness_product import (
+    AUTO,
+    CSR,
+    NonlinearProduct,
+    Workers,
+    internal_force_operator,
+    resolved,
+)
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 
 # Length of a product for which BLAS uses one thread, whatever the number of threads.
@@ -65,13 +74,14 @@ class PlateState:
 
     padded: Floats  # (size,): displacement, padded as the stiffness operator requires
     increment: Floats  # (n,): displacement increment of the last step
-    scaled_internal_force: Floats  # (n,): M^-1 K u times `dt2`
+    scaled_internal_force: Floats  # (n,): M^-1 f times `dt2`
     step: int = 0  # number of steps
     time: float = 0.0  # sum of the time steps
     dt: float = 0.0  # last time step
     dt2: float = 0.0  # factor of `scaled_internal_force`, the square of the time step
     external_work: float = 0.0  # work done by nodal forces
-    sums: Sums = field(default_factory=lambda: Sums(*[0.0] * 6))  # inner products of the vectors
+    prescribed: float = 0.0  # load factor of the prescribed displacements in the internal force
+    sums: Sums = field(default_factory=lambda: Sums(*[0.0] * 7))  # inner products of the vectors
     # Displacement, increment and scaled internal force of each piece.
     views: list[tuple[Floats, Floats, Floats]] = field(init=False, repr=False)
 
@@ -86,8 +96,12 @@ class PlateState:
 
     @property
     def strain_energy(self) -> float:
-        """Strain energy, half the product of displacement and internal force (force*length)."""
-        return 0.5 * self.sums.strain
+        """Strain energy (force*length).
+
+        Half the product of displacement and internal force, less the quadratic strains' part, which
+        grows with the fourth power of the deflection.
+        """
+        return 0.5 * (self.sums.strain - self.sums.quadratic)
 
 
 class Sums(NamedTuple):
@@ -95,11 +109,12 @@ class Sums(NamedTuple):
 
     # Of increment d, displacement u, nodal loads P and scaled internal force s.
     inertia: float  # d M d
-    power: float  # d K u
-    strain: float  # u K u
-    force: float  # (K u) s
+    power: float  # d f
+    strain: float  # u f
+    force: float  # f s
     load: float  # P d
     load_force: float  # P s
+    quadratic: float = 0.0  # of a nonlinear plate: integral of (N - N0) eps_q
 
 
 @frozen
@@ -186,7 +201,7 @@ class PlateMotion:
     ) -> None:
         self.plate, self.damping, self.solver = plate, damping, resolved(solver)
         self._reduction = kept = unreduced(plate) if reduced is None or solver == CSR else reduced
-        self.product = stiffness_operator(plate, solver, kept, workers)
+        self.product = internal_force_operator(plate, solver, kept, workers)
         self.mass = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
         self._dof_indices = kept.dof_indices
         self._inverse_mass = 1.0 / self.mass
@@ -242,7 +257,10 @@ class PlateMotion:
         return DofSums(self._dof_indices.ravel()[dof_indices], weights, prescribed)
 
     def displace(self, state: PlateState, change: Floats) -> None:
-        """Add to the displacement of a state, (n,), without a time step."""
+        """Add to the displacement of a state, (n,), without a time step.
+
+        The prescribed displacements are those of the last :meth:`unbalanced` or step.
+        """
         state.padded[: len(change)] += change
         self._update_forces(state)
 
@@ -251,6 +269,21 @@ class PlateMotion:
         self._scale_for(state.dt2)
         sums = self.product.each(state.padded, partial(self._piece_sums, state))
         state.sums = sums[0] if len(sums) == 1 else Sums(*map(sum, zip(*sums, strict=True)))
+        if self.plate.nonlinear:
+            state.sums = state.sums._replace(quadratic=self.product.quadratic_work)
+
+    def prescribe(self, state: PlateState, factor: float) -> bool:
+        """Prescribe displacements with a load factor; whether the internal force changes by it.
+
+        That of a linear plate does not: there the prescribed displacements are loads.
+        """
+        if not (self._prescribes and isinstance(self.product, NonlinearProduct)):
+            return False
+        if self.product.prescribed is None or state.prescribed != factor:
+            self.product.prescribed = factor * self._prescribed
+            state.prescribed = factor
+            return True
+        return False
 
     def _scale_for(self, dt2: float) -> None:
         if self._scaled_for != dt2:
@@ -258,7 +291,7 @@ class PlateMotion:
             self._scaled_for = dt2
 
     def _piece_sums(self, state: PlateState, number: int, internal: Floats) -> Sums:
-        """Scaled internal force and inner products of one piece, from K u."""
+        """Scaled internal force and inner products of one piece, from its internal force."""
         u, d, force = state.views[number]
         scale, mass, work, loads = self._views[number]
         np.multiply(internal, scale, out=force)
@@ -274,6 +307,7 @@ class PlateMotion:
 
     def unbalanced(self, state: PlateState, factor: float) -> Floats:
         """Load minus internal force of every equation, with a load factor of the nodal forces."""
+        self.prescribe(state, factor)
         force = -self.product(state.displacement)
         if self._loads is not None:
             force += factor * self._loads
@@ -288,14 +322,14 @@ class PlateMotion:
         *,
         velocity_dt: float | None = None,
     ) -> None:
-        """Take one step: v += velocity_dt (M^-1 (P - K u) - a v), u += dt v; changes the state.
+        """Take one step: v += velocity_dt (M^-1 (P - f) - a v), u += dt v; changes the state.
 
         `factor` scales the nodal forces; `velocity_dt` is the time between the middles of the last
         step and of this one, `dt` by default.
         """
         dt_v = dt if velocity_dt is None else velocity_dt
         dt2, b = dt * dt_v, 0.5 * self.damping * dt_v
-        if state.dt2 != dt2:
+        if self.prescribe(state, factor) or state.dt2 != dt2:
             state.dt2 = dt2
             self._update_forces(state)
         self._scale_for(dt2)
@@ -324,18 +358,18 @@ class PlateMotion:
         """Kinetic energy at the time of the displacement (force*length).
 
         The stored velocity is half a step old: the energy is that of v + dt/2 a, with
-        a = M^-1 (P - K u), and `factor` that of the nodal forces.  Its square is expanded into the
+        a = M^-1 (P - f), and `factor` that of the nodal forces.  Its square is expanded into the
         inner products of :class:`Sums`.  With damping the mean of the velocities before and after
         is that, divided by 1 + b.
         """
         dt2 = state.dt**2
         if not dt2:
             return 0.0
-        inertia, power, _, internal, nodal, nodal_force = state.sums
+        inertia, power, _, internal, nodal, nodal_force, _ = state.sums
         to_step = dt2 / state.dt2
-        work = factor * nodal - power  # d (P - K u)
+        work = factor * nodal - power  # d (P - f)
         force = factor * (factor * self._loads_square * dt2 - 2.0 * nodal_force * to_step)
-        force += internal * to_step  # dt^2 (P - K u) M^-1 (P - K u)
+        force += internal * to_step  # dt^2 (P - f) M^-1 (P - f)
         if applied is not None and applied.force:
             load, F = applied
             inverse = load.inverse_mass * dt2

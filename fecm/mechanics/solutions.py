@@ -11,9 +11,11 @@ import numpy as np
 from fecm._errors import FecmError
 from fecm._frozen import frozen
 from fecm._typing import Floats
+from fecm.mechanics.membrane import Membrane, tangent
 from fecm.mechanics.plate import PlateModel
 
 if TYPE_CHECKING:
+    from scipy import sparse
     from scipy.sparse.linalg import SuperLU
 
 # Residual relative to the load above which the stiffness is considered singular.
@@ -29,6 +31,24 @@ NOT_HELD = 1.0e-9
 
 class SingularStiffnessError(FecmError, ArithmeticError):
     """The supports allow motion without strain."""
+
+
+class ConvergenceError(FecmError, ArithmeticError):
+    """Newton's method did not reach equilibrium."""
+
+    exit_code = 1
+
+
+def tangent_stiffness(plate: PlateModel, field: Floats | None) -> sparse.csr_array:
+    """Stiffness about a displacement field, (numnp, 5), sparse (neq, neq); K at rest without one.
+
+    That of a linear plate is K everywhere.
+    """
+    if field is None or not plate.nonlinear:
+        return plate.stiffness
+    at = field
+    added = plate.assembled(lambda block: tangent(plate, block, at), congruent=False)
+    return (plate.stiffness + added[:, : plate.neq]).tocsr()
 
 
 def in_plane_pins(plate: PlateModel) -> list[int]:
@@ -57,17 +77,17 @@ def in_plane_pins(plate: PlateModel) -> list[int]:
 
 
 class Tangent:
-    """The factorised stiffness; raises SingularStiffnessError if that fails.
+    """The factorised stiffness about a field; raises SingularStiffnessError if that fails.
 
     Rigid motions in the plane are pinned, so that they need no supports.
     """
 
-    def __init__(self, plate: PlateModel) -> None:
+    def __init__(self, plate: PlateModel, field: Floats | None = None) -> None:
         # 0.2 s, which most runs don't need.
         from scipy.sparse import diags_array
         from scipy.sparse.linalg import MatrixRankWarning, splu
 
-        self._stiffness = held = plate.stiffness
+        self._stiffness = held = tangent_stiffness(plate, field)
         if pins := in_plane_pins(plate):
             springs = np.zeros(plate.neq)
             springs[pins] = held.diagonal()[pins]
@@ -115,6 +135,8 @@ def static_stiffness(plate: PlateModel, contact: Floats) -> float:
 def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:
     """Internal minus applied forces, (numnp, 5): those of supports, and elsewhere the residual."""
     internal = plate.internal_forces(field)
+    if plate.nonlinear:
+        internal += Membrane(plate).forces(field)[0]
     free = plate.mesh.equations > 0
     internal[free] -= factor * plate.mesh.forces[free]
     return internal
@@ -128,13 +150,16 @@ class Modes:
     shapes: Floats  # (n, neq): unit modal mass; the largest entry is positive
 
 
-def modes(plate: PlateModel, count: int, *, consistent: bool) -> Modes:
-    """Compute the lowest modes, at most as many as equations, with the chosen mass matrix."""
+def modes(plate: PlateModel, count: int, *, consistent: bool, field: Floats | None = None) -> Modes:
+    """Compute the lowest modes, at most as many as equations, with the chosen mass matrix.
+
+    Those of a nonlinear plate are small motions about a displacement field, (numnp, 5).
+    """
     # 0.2 s, which most runs don't need.
     from scipy import linalg, sparse
     from scipy.sparse.linalg import eigsh
 
-    K = plate.stiffness
+    K = tangent_stiffness(plate, field)
     M = plate.consistent_mass if consistent else sparse.diags_array(plate.mass, format="csr")
     count = min(count, plate.neq)
     if plate.neq < DENSE or count >= plate.neq // 2:

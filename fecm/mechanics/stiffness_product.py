@@ -20,6 +20,7 @@ import numpy as np
 from fecm._typing import Floats, Indices
 from fecm.mechanics import kernels
 from fecm.mechanics.kernels.plate import CompiledProduct
+from fecm.mechanics.membrane import Membrane
 from fecm.mechanics.mesh import congruence, distinct
 from fecm.mechanics.plate import PlateModel, R, StiffnessOperator, pieces
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
@@ -210,6 +211,39 @@ class ElementProduct(StiffnessOperator):
         return self._total
 
 
+class NonlinearProduct(StiffnessOperator):
+    """Internal forces of a nonlinear plate: those of K u, and those of the quadratic strains.
+
+    `prescribed` (numnp, 5) are the displacements of the restrained dofs.  Their part of K u belongs
+    to the loads, as for a linear plate.
+    """
+
+    def __init__(
+        self, plate: PlateModel, kept: SymmetryReduction, linear: StiffnessOperator
+    ) -> None:
+        self._linear = linear
+        self._kept = kept
+        self._membrane = Membrane(plate, kept.weights.astype(float))
+        self._pieces = pieces(kept.count)
+        self.size = linear.size
+        self.prescribed: Floats | None = None
+
+    def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
+        """Compute the internal forces and apply a function to each piece."""
+        kept = self._kept
+        field = kept.sign * np.append(padded[: kept.count], 0.0)[kept.index]
+        if self.prescribed is not None:
+            field += self.prescribed
+        forces, self.quadratic_work = self._membrane.forces(field)
+        if self.prescribed is not None:
+            # Work of the supports: the displacements of the other dofs alone are in u f.
+            self.quadratic_work -= float((forces * self.prescribed).sum())
+        quadratic = kept.gather(forces)
+        return self._linear.each(
+            padded, lambda number, linear: use(number, linear + quadratic[self._pieces[number]])
+        )
+
+
 def resolved(solver: str) -> str:
     """The solver itself instead of ``"auto"``."""
     if solver != AUTO:
@@ -224,6 +258,8 @@ def stiffness_operator(
     workers: Workers | None = None,
 ) -> StiffnessOperator:
     """Build the operator K u of a plate, for all dofs unless it is reduced.
+
+    K is the stiffness at rest, also of a nonlinear plate; see :func:`internal_force_operator`.
 
     The solver is one of `SOLVERS`: ``"csr"`` for the sparse matrix of all dofs; otherwise element
     by element, with one matrix for elements that are congruent to enough others.
@@ -262,3 +298,11 @@ def stiffness_operator(
                 groups.append((weights[rows, None, None] * K, dof_indices[rows]))
             domains.append(groups)
     return ElementProduct(domains, kept.count, signed=kept.signed, workers=workers)
+
+
+def internal_force_operator(
+    plate: PlateModel, solver: str, reduced: SymmetryReduction, workers: Workers | None = None
+) -> StiffnessOperator:
+    """Build the operator of the internal forces, which are K u unless the plate is nonlinear."""
+    linear = stiffness_operator(plate, solver, reduced, workers)
+    return NonlinearProduct(plate, reduced, linear) if plate.nonlinear else linear

@@ -118,7 +118,8 @@ def restrain_resting_dofs(plate: PlateModel, contact: Floats | None) -> PlateMod
     mesh = plate.mesh
     in_plane, others = mesh.equations[:, :2].any(), mesh.equations[:, 2:].any()
     pulled = mesh.forces[:, :2].any() or (contact is not None and contact[:, :2].any())
-    if not (in_plane and others) or pulled or plate.laminate.is_coupled:
+    stretches = plate.laminate.is_coupled or plate.nonlinear
+    if not (in_plane and others) or pulled or stretches:
         return plate
     codes = mesh.codes.copy()
     codes[:, :2] = 1

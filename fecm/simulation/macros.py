@@ -5,6 +5,7 @@ A word with a number on its card receives it.  An action returns True to leave t
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from functools import partial
 
@@ -13,7 +14,7 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.deck.macros import WORDS, Body, load_factor, number
 from fecm.deck.model import Macro
-from fecm.mechanics.solutions import modes, reactions
+from fecm.mechanics.solutions import ConvergenceError, modes, reactions
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.strains import strains_and_resultants
 from fecm.mechanics.time_step import critical_time_step, taken_time_step
@@ -134,7 +135,9 @@ def central_difference(run: Simulation) -> None:
 
 
 def form_tangent(run: Simulation) -> None:
-    """TANG."""
+    """TANG: the stiffness, of a nonlinear plate about its present displacement."""
+    if run.model.plate.nonlinear:
+        run.linearise(run.displacement_field())
     run.state.factorised = run.tangent is not None
 
 
@@ -150,8 +153,30 @@ def solve(run: Simulation) -> None:
         return
     change = run.tangent.solve(state.residual)
     run.model.motion.displace(state.plate, change)
-    limit = state.tolerance * float(np.linalg.norm(state.plate.displacement))
-    state.converged = float(np.linalg.norm(change)) <= limit
+    size = float(np.linalg.norm(state.plate.displacement))
+    state.converged = float(np.linalg.norm(change)) <= state.tolerance * size
+    if run.model.plate.nonlinear and not math.isfinite(size):
+        raise ConvergenceError(_not_in_equilibrium(run, "the displacement is no longer finite"))
+
+
+def leave_if_converged(run: Simulation) -> bool:
+    """CONV: leave the loop if the last SOLV met the tolerance."""
+    state = run.state
+    if state.converged:
+        state.equilibrium_factor = run.force_factor()
+    elif run.model.plate.nonlinear and not run.interpreter.passes_to_come:
+        passes = run.interpreter.current_pass
+        raise ConvergenceError(_not_in_equilibrium(run, f"no equilibrium after {passes} passes"))
+    return state.converged
+
+
+def _not_in_equilibrium(run: Simulation, symptom: str) -> str:
+    """What to say of a load for which Newton's method fails."""
+    factor, reached = run.force_factor(), run.state.equilibrium_factor
+    return (
+        f"{symptom} at the load factor {factor:g}; the last equilibrium was at {reached:g}. "
+        "Apply the load in smaller steps (TIME and PROP in an outer LOOP)."
+    )
 
 
 def form_mass(run: Simulation, *, consistent: bool) -> None:
@@ -165,9 +190,10 @@ def set_tolerance(run: Simulation, tolerance: float) -> None:
 
 
 def find_modes(run: Simulation, n: int) -> None:
-    """EIGE."""
+    """EIGE: the lowest modes, of a nonlinear plate about its present displacement."""
     state, plate = run.state, run.model.plate
-    found = modes(plate, n, consistent=state.consistent_mass)
+    about = run.displacement_field() if plate.nonlinear else None
+    found = modes(plate, n, consistent=state.consistent_mass, field=about)
     pairs = zip(found.angular_frequency, found.shapes, strict=True)
     for mode, (omega, shape) in enumerate(pairs, start=1):
         columns = {"number": mode, "angular_frequency": omega, "shape": plate.field(shape, 0.0)}
@@ -251,7 +277,7 @@ ACTIONS: dict[str, Callable[..., bool | None]] = {
     "FORM": form_residual,
     "SOLV": solve,
     "TOL": set_tolerance,
-    "CONV": lambda run: run.state.converged,  # leaves the loop if the last SOLV met the tolerance
+    "CONV": leave_if_converged,
     "REAC": store_reactions,
     "EIGE": find_modes,
     "EXCD": central_difference,

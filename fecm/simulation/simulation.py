@@ -70,8 +70,13 @@ class Simulation:
 
     @cached_property
     def tangent(self) -> Tangent:
-        """The factorised stiffness."""
-        return Tangent(self.model.plate)
+        """The factorised stiffness about the field of the last TANG."""
+        return Tangent(self.model.plate, self.state.linearised)
+
+    def linearise(self, field: Floats) -> None:
+        """Form the stiffness about a displacement field, (numnp, 5)."""
+        self.state.linearised = field
+        self.__dict__.pop("tangent", None)
 
     def load_factor(self, clock: float) -> float:
         """Load factor of PROP at a time of the clock; under its slip that of t = 0."""

@@ -95,6 +95,9 @@ class RunState:
     factorised: bool = False  # whether TANG was carried out
     converged: bool = False  # whether the last SOLV met the tolerance
     residual: Floats | None = None  # (neq,): load less internal force, formed by FORM
+    # (numnp, 5): displacement about which TANG has formed the stiffness of a nonlinear plate
+    linearised: Floats | None = None
+    equilibrium_factor: float = 0.0  # load factor of the last equilibrium that CONV found
     steps_since_output: int = 0  # impact steps since the last output (the slip ``counter``)
     prop_force: float | None = None  # instead of the contact force (the slip ``prop-contact``)
     first_dt: float | None = None  # time step of the rod's constants

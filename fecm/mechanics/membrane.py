@@ -1,0 +1,303 @@
+"""Stretching of a plate that bends: the membrane strains of von Karman, tied.
+
+A plate whose midplane slopes are not small stretches by eps_q = (w,x^2/2, w,y^2/2, w,x w,y).  The
+membrane force is N = N0 + A (eps_l + eps_q) + B kappa, where eps_l is the linear strain of u and v.
+The internal force f is the gradient of the strain energy
+
+    U = 1/2 int (eps A eps + 2 eps B kappa + kappa D kappa + gamma S gamma) dA
+        + 1/2 int (N0_x w,x^2 + N0_y w,y^2 + 2 N0_xy w,x w,y) dA,   eps = eps_l + eps_q.
+
+Signs, axes and the order of strains are those of :mod:`~fecm.mechanics.element_matrices`.  Moderate
+rotations: the error of the strains is about the square of the slope.
+
+Membrane locking.  In an element w,x^2 is quadratic in x and eps_l only linear, so that a plate that
+bends without stretching would be too stiff.  The quadratic strains are therefore taken at the tying
+points of the assumed shear strains (:mod:`~fecm.mechanics.assumed_shear`) and interpolated between
+them.  Their components are covariant, along the base vectors x,xi and x,eta of the element's
+centre: e_11 = w,1^2/2, e_22 = w,2^2/2, e_12 = w,1 w,2, with w,a the slope along base vector a.
+e_11 is taken at xi = +-1/sqrt(3), eta = 0, +-sqrt(3/5), e_22 the other way round, e_12 at
++-1/sqrt(3) in both directions.  With the base vectors of the centre a patch of constant membrane
+force is exact on distorted meshes; with those of the tying points it is not (Bucalem and Bathe
+1993; Wisniewski and Panasz 2013).
+
+Arrays over elements have them last here: (..., points, ne).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fecm._frozen import frozen
+from fecm._typing import Floats, Indices
+from fecm.mechanics import assumed_shear
+from fecm.mechanics.element_matrices import membrane_and_bending
+from fecm.mechanics.elements import Quadrature, gauss
+from fecm.mechanics.interpolation import (
+    NDOF,
+    interpolate,
+    inverse_jacobian,
+    jacobian,
+    local_shape_functions,
+)
+from fecm.mechanics.mesh import ElementBlock
+from fecm.mechanics.plate import PlateModel
+
+# Elements of a block: their arrays fit the cache.
+BLOCK = 256
+# Tying points of e_11 or e_22; those of e_12 follow in every array of slopes.
+TYING = 6
+
+
+def supports(family: ElementBlock) -> bool:
+    """Whether the elements of a block have tied membrane strains: those with nine nodes."""
+    return family.shape.nodes == 9 and family.nodes.shape[1] == 9
+
+
+class QuadraticStrains:
+    """Tied quadratic strains of 9-node elements at the points of a rule."""
+
+    def __init__(self, family: ElementBlock, rule: Quadrature) -> None:
+        _, at_centre = local_shape_functions(family, gauss(1))
+        centre = jacobian(family, at_centre)[:, 0]  # (ne, a, i): base vectors of the centre
+        points = [_with_corners(assumed_shear.tying_points(9, axis)) for axis in (0, 1)]
+        # Slope along base vector a per slope in xi and in eta, (2, points, ne), and their table.
+        self._metric: list[Floats] = []
+        self._tables: list[Floats] = []
+        for axis, at in enumerate(points):
+            _, local = local_shape_functions(family, at)
+            inverse, _ = inverse_jacobian(family, local)
+            along = np.einsum("ei,etib->bte", centre[:, axis], inverse)
+            self._metric.append(np.ascontiguousarray(along))
+            self._tables.append(np.concatenate([local[:, 0], local[:, 1]]))
+        # Interpolation of e_11, e_22 and e_12 to the points of the rule, (points, tying).
+        self._weights = [
+            assumed_shear.tying_weights(9, 0, rule),
+            assumed_shear.tying_weights(9, 1, rule),
+            _corner_weights(rule),
+        ]
+        # Strains xx, yy, xy per e_11, e_22, e_12, (3, 3, ne).
+        (xi_x, eta_x), (xi_y, eta_y) = np.linalg.inv(centre).transpose(1, 2, 0)
+        self._to_global = np.array(
+            [
+                [xi_x**2, eta_x**2, xi_x * eta_x],
+                [xi_y**2, eta_y**2, xi_y * eta_y],
+                [2.0 * xi_x * xi_y, 2.0 * eta_x * eta_y, xi_x * eta_y + xi_y * eta_x],
+            ]
+        )
+
+    def slopes(self, w: Floats) -> tuple[Floats, Floats]:
+        """Slopes w,1 and w,2 of nodal values (9, ne) at their tying points, (10, ne) each."""
+        one, two = (
+            (metric * (table @ w).reshape(metric.shape)).sum(axis=0)
+            for metric, table in zip(self._metric, self._tables, strict=True)
+        )
+        return one, two
+
+    def slope_matrices(self) -> tuple[Floats, Floats]:
+        """Matrices of the slopes w,1 and w,2, (10, 9, ne) each."""
+        one, two = (
+            np.einsum("bte,btn->tne", metric, table.reshape(2, -1, 9))
+            for metric, table in zip(self._metric, self._tables, strict=True)
+        )
+        return one, two
+
+    def at_points(self, tied: tuple[Floats, Floats, Floats]) -> Floats:
+        """Strains xx, yy, xy at the points of the rule, (3, points, ne), of tied components.
+
+        These are e_11, e_22 (6, ..., ne) and e_12 (4, ..., ne); other axes may stand between.
+        """
+        parts = [np.tensordot(H, e, 1) for H, e in zip(self._weights, tied, strict=True)]
+        shape = (3, 3, *[1] * (parts[0].ndim - 1), self._to_global.shape[2])
+        return np.asarray((self._to_global.reshape(shape) * np.stack(parts)).sum(axis=1))
+
+    def tied_forces(self, N: Floats) -> tuple[Floats, Floats, Floats]:
+        """Forces n_11, n_22, n_12 on the tied components, of membrane forces (3, points, ne).
+
+        These contain the weights of the points.
+        """
+        covariant = (self._to_global[:, :, None] * N[:, None]).sum(axis=0)
+        one, two, both = (H.T @ n for H, n in zip(self._weights, covariant, strict=True))
+        return one, two, both
+
+    def nodal_forces(self, along_one: Floats, along_two: Floats) -> Floats:
+        """Forces on w of the nodes, (9, ne), of those on the slopes, (10, ne) each."""
+        one, two = (
+            table.T @ (metric * force).reshape(-1, force.shape[1])
+            for force, metric, table in zip(
+                (along_one, along_two), self._metric, self._tables, strict=True
+            )
+        )
+        return one + two
+
+
+def tied_components(one: Floats, two: Floats) -> tuple[Floats, Floats, Floats]:
+    """e_11, e_22 and e_12 of slopes at their tying points."""
+    return (
+        0.5 * one[:TYING] * one[:TYING],
+        0.5 * two[:TYING] * two[:TYING],
+        one[TYING:] * two[TYING:],
+    )
+
+
+def quadratic_strains(family: ElementBlock, rule: Quadrature, field: Floats) -> Floats:
+    """Tied eps_q of a displacement field (numnp, 5) at the points of a rule, (3, points, ne)."""
+    tied = QuadraticStrains(family, rule)
+    return tied.at_points(tied_components(*tied.slopes(field[family.nodes, 2].T)))
+
+
+@frozen
+class _Elements:
+    """Some elements, and what their forces need."""
+
+    nodes: Indices  # (9, ne)
+    weight: Floats  # (points, ne): Jacobian determinant times weight
+    table: Floats  # (2 points, 9): slopes in xi and in eta
+    inverse: Floats  # (2, 2, points, ne): Jacobian's inverse, dxi_a/dx_i in row i and column a
+    tied: QuadraticStrains
+
+
+class Membrane:
+    """Internal forces of the quadratic strains: f(u) - K u.
+
+    `weights` (numel,) are numbers of elements that each represents, 1 by default; those of weight 0
+    are left out.
+    """
+
+    def __init__(self, plate: PlateModel, weights: Floats | None = None) -> None:
+        self._laminate = plate.laminate
+        self._elements: list[_Elements] = []
+        rule = plate.rules.bending
+        for family in plate.families:
+            of_family = np.ones(len(family.rows)) if weights is None else weights[family.rows]
+            kept = np.flatnonzero(of_family)
+            for start in range(0, len(kept), BLOCK):
+                members = kept[start : start + BLOCK]
+                block = family.take(members)
+                _, local = local_shape_functions(block, rule)
+                inverse, determinant = inverse_jacobian(block, local)
+                area = determinant * rule.weights * of_family[members, None]
+                self._elements.append(
+                    _Elements(
+                        nodes=block.nodes.T.copy(),
+                        weight=area.T.copy(),
+                        table=np.concatenate([local[:, 0], local[:, 1]]),
+                        inverse=inverse.transpose(2, 3, 1, 0).copy(),
+                        tied=QuadraticStrains(block, rule),
+                    )
+                )
+
+    def forces(self, field: Floats) -> tuple[Floats, float]:
+        """Forces f(u) - K u of a displacement field, (numnp, 5), and the quadratic work.
+
+        The quadratic work is the integral of (N - N0) eps_q.  With it the strain energy is
+        U = (u f - quadratic work)/2, because eps_q doubles under the variation u.
+        """
+        numnp = len(field)
+        total = np.zeros((NDOF, numnp))
+        work = 0.0
+        for part in self._elements:
+            forces, of_part = self._forces(part, field[part.nodes].transpose(2, 0, 1))
+            work += of_part
+            for dof, force in forces.items():
+                total[dof] += np.bincount(part.nodes.ravel(), force.ravel(), numnp)
+        return total.T, work
+
+    def _forces(self, part: _Elements, q: Floats) -> tuple[dict[int, Floats], float]:
+        """Forces (9, ne) on the dofs of some elements, and the quadratic work."""
+        A, B, tied = self._laminate.A, self._laminate.B, part.tied
+        coupled = self._laminate.is_coupled
+        one, two = tied.slopes(q[2])
+        components = tied_components(one, two)
+        quadratic = tied.at_points(components)
+        stretched = part.weight * np.tensordot(A, quadratic, 1)
+        N = part.weight * np.tensordot(A, _strains(part, q[:2]), 1) + stretched
+        if coupled:
+            N -= part.weight * np.tensordot(B, _strains(part, q[3:]), 1)
+        n11, n22, n12 = tied.tied_forces(N)
+        along_one = np.concatenate([one[:TYING] * n11, two[TYING:] * n12])
+        along_two = np.concatenate([two[:TYING] * n22, one[TYING:] * n12])
+        forces = {2: tied.nodal_forces(along_one, along_two)}
+        forces[0], forces[1] = _of_stresses(part, stretched)
+        if coupled:
+            moments = -part.weight * np.tensordot(B, quadratic, 1)
+            forces[3], forces[4] = _of_stresses(part, moments)
+        work = sum(float((n * e).sum()) for n, e in zip((n11, n22, n12), components, strict=True))
+        return forces, work
+
+
+def _strains(part: _Elements, q: Floats) -> Floats:
+    """Strains xx, yy, xy at the points of quadrature, (3, points, ne), of u and v, (2, 9, ne)."""
+    (u_x, u_y), (v_x, v_y) = (
+        (part.inverse * (part.table @ values).reshape(part.inverse.shape[1:])).sum(axis=1)
+        for values in q
+    )
+    return np.stack([u_x, v_y, u_y + v_x])
+
+
+def _of_stresses(part: _Elements, N: Floats) -> tuple[Floats, Floats]:
+    """Forces on u and v of the nodes, (9, ne) each, of weighted stresses (3, points, ne)."""
+    x, y = (
+        part.table.T
+        @ (part.inverse[0] * N[along] + part.inverse[1] * N[across]).reshape(-1, N.shape[2])
+        for along, across in ((0, 2), (2, 1))
+    )
+    return x, y
+
+
+def tangent(plate: PlateModel, family: ElementBlock, field: Floats) -> Floats:
+    """Difference of tangent stiffness and K of a block's elements at a field, (ne, 45, 45)."""
+    rule, laminate = plate.rules.bending, plate.laminate
+    ne, nn = family.nodes.shape
+    at = interpolate(family, rule)
+    linear = membrane_and_bending(at)
+    tied = QuadraticStrains(family, rule)
+    q = field[family.nodes].transpose(2, 1, 0)
+    one, two = tied.slopes(q[2])
+    G1, G2 = tied.slope_matrices()
+    # Variation of eps_q, (3, points, 9, ne), per w of the nodes.
+    varied = tied.at_points(
+        (
+            one[:TYING, None] * G1[:TYING],
+            two[:TYING, None] * G2[:TYING],
+            one[TYING:, None] * G2[TYING:] + two[TYING:, None] * G1[TYING:],
+        )
+    )
+    quadratic = np.zeros_like(linear)
+    quadratic.reshape(ne, -1, 6, nn, NDOF)[:, :, :3, :, 2] = varied.transpose(3, 1, 0, 2)
+    ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
+    C = at.jxw[:, :, None, None] * ABD
+    mixed = np.einsum("epik,epij,epjl->ekl", linear, C, quadratic, optimize=True)
+    square = np.einsum("epik,epij,epjl->ekl", quadratic, C, quadratic, optimize=True)
+    strains = np.einsum("epik,ek->epi", linear, q.transpose(2, 1, 0).reshape(ne, -1))
+    stretch = tied.at_points(tied_components(one, two)).transpose(2, 1, 0)
+    N = strains @ ABD[:3].T + stretch @ laminate.A.T
+    n11, n22, n12 = tied.tied_forces((at.jxw[:, :, None] * N).transpose(2, 1, 0))
+    both = np.einsum("te,tie,tje->eij", n12, G1[TYING:], G2[TYING:], optimize=True)
+    stress = both + both.swapaxes(1, 2)
+    for n, G in ((n11, G1), (n22, G2)):
+        stress += np.einsum("te,tie,tje->eij", n, G[:TYING], G[:TYING], optimize=True)
+    K = mixed + mixed.swapaxes(1, 2) + (square + square.swapaxes(1, 2)) / 2.0
+    K.reshape(ne, nn, NDOF, nn, NDOF)[:, :, 2, :, 2] += stress
+    return np.asarray(K)
+
+
+# Tying points of e_12: +-1/sqrt(3) in both directions.
+_CORNERS = gauss(2)
+
+
+def _with_corners(points: Quadrature) -> Quadrature:
+    """Tying points of e_11 or e_22, and those of e_12."""
+    xi, eta, weights = (
+        np.concatenate([getattr(points, name), getattr(_CORNERS, name)])
+        for name in ("xi", "eta", "weights")
+    )
+    return Quadrature(xi, eta, weights)
+
+
+def _corner_weights(rule: Quadrature) -> Floats:
+    """Bilinear functions between the tying points of e_12, at the points of a rule, (points, 4)."""
+    return np.asarray(
+        (1.0 + 3.0 * np.outer(rule.xi, _CORNERS.xi))
+        * (1.0 + 3.0 * np.outer(rule.eta, _CORNERS.eta))
+        / 4.0
+    )
