@@ -88,6 +88,24 @@ def stiffness(family: ElementBlock, laminate: Laminate, rules: IntegrationRules)
     return K + _integrate(_transverse_shear(at), laminate.shear, at.jxw)
 
 
+def geometric_stiffness(
+    family: ElementBlock, preload: tuple[float, float, float], rules: IntegrationRules
+) -> Floats:
+    """Element matrices K_sigma of a uniform membrane force on the slopes of w, (ne, 5 nn, 5 nn).
+
+    Integral of (w,x; w,y)' [N_x, N_xy; N_xy, N_y] (w,x; w,y) with the rule of bending, where
+    `preload` is N_x, N_y, N_xy (force/length), tension positive.  Exactly symmetric; indefinite
+    under compression or shear.  Zienkiewicz and Taylor, The Finite Element Method.
+    """
+    n_x, n_y, n_xy = preload
+    N = np.array([[n_x, n_xy], [n_xy, n_y]])
+    at = interpolate(family, rules.bending, transposed_jacobian=rules.transposed_jacobian)
+    ne, nn = family.nodes.shape
+    K = np.zeros((ne, nn, NDOF, nn, NDOF))
+    K[:, :, 2, :, 2] = _integrate(at.dN, N, at.jxw)
+    return K.reshape(ne, nn * NDOF, nn * NDOF)
+
+
 def lumped_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) -> Floats:
     """Lumped element masses: diagonal of the consistent matrix, scaled to the element's mass.
 

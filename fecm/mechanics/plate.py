@@ -33,6 +33,9 @@ ASSEMBLED = 24
 # Number of element matrices in memory at the same time.
 BLOCK = 1024
 
+# No initial membrane force.
+UNLOADED = (0.0, 0.0, 0.0)
+
 MatricesOf = Callable[[ElementBlock], Floats]
 
 
@@ -48,13 +51,18 @@ class PlateModel:
     laminate: Laminate
     rules: IntegrationRules
     # Uniform initial membrane force N0_x, N0_y, N0_xy, force/length; tension is positive.
-    preload: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    preload: tuple[float, float, float] = UNLOADED
     nonlinear: bool = False  # whether stretching follows from bending, see membrane.py
 
     @property
     def neq(self) -> int:
         """Number of equations."""
         return self.mesh.number_of_equations
+
+    @property
+    def is_preloaded(self) -> bool:
+        """Whether an initial membrane force acts."""
+        return self.preload != UNLOADED
 
     @cached_property
     def _free(self) -> Bools:
@@ -74,8 +82,14 @@ class PlateModel:
         return element_blocks(self.mesh.elements, self.mesh.coordinates)
 
     def stiffness_of(self, family: ElementBlock) -> Floats:
-        """Element stiffness matrices, (ne, 5 nn, 5 nn)."""
-        return element_matrices.stiffness(family, self.laminate, self.rules)
+        """Element stiffness matrices, (ne, 5 nn, 5 nn), with K_sigma of the preload.
+
+        ``replace(plate, preload=UNLOADED)`` is the plate without it.
+        """
+        K = element_matrices.stiffness(family, self.laminate, self.rules)
+        if self.is_preloaded:
+            K += element_matrices.geometric_stiffness(family, self.preload, self.rules)
+        return K
 
     def _dofs(self, family: ElementBlock) -> Indices:
         return self._numbers[family.nodes].reshape(len(family.rows), -1)

@@ -14,7 +14,7 @@ from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import Mesh
-from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.plate import UNLOADED, PlateModel
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
 from fecm.mechanics.projectile import (
     LISTING_DENSITY,
@@ -60,7 +60,7 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
         mesh,
         laminate,
         used,
-        preload=(0.0, 0.0, 0.0) if preload is None else (preload.n_x, preload.n_y, preload.n_xy),
+        preload=UNLOADED if preload is None else (preload.n_x, preload.n_y, preload.n_xy),
         nonlinear=deck.has(model.Nonlinear),
     )
 
