@@ -245,7 +245,10 @@ def _of_stresses(part: _Elements, N: Floats) -> tuple[Floats, Floats]:
 
 
 def tangent(plate: PlateModel, family: ElementBlock, field: Floats) -> Floats:
-    """Difference of tangent stiffness and K of a block's elements at a field, (ne, 45, 45)."""
+    """Difference of tangent stiffness and K of a block's elements at a field, (ne, 45, 45).
+
+    The second derivative of the strain energy; exactly symmetric.
+    """
     rule, laminate = plate.rules.bending, plate.laminate
     ne, nn = family.nodes.shape
     at = interpolate(family, rule)
@@ -276,9 +279,9 @@ def tangent(plate: PlateModel, family: ElementBlock, field: Floats) -> Floats:
     stress = both + both.swapaxes(1, 2)
     for n, G in ((n11, G1), (n22, G2)):
         stress += np.einsum("te,tie,tje->eij", n, G[:TYING], G[:TYING], optimize=True)
-    K = mixed + mixed.swapaxes(1, 2) + (square + square.swapaxes(1, 2)) / 2.0
+    K = 2.0 * mixed + square
     K.reshape(ne, nn, NDOF, nn, NDOF)[:, :, 2, :, 2] += stress
-    return np.asarray(K)
+    return np.asarray((K + K.swapaxes(1, 2)) / 2.0)
 
 
 # Tying points of e_12: +-1/sqrt(3) in both directions.

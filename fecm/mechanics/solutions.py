@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 # Residual relative to the load above which the stiffness is considered singular.
 SINGULAR = 1.0e-6
+# Rounding error of the forces in balance, relative to the sum of their parts.
+ROUNDING = 1.0e-12
 # Modes of fewer equations are those of a dense problem.
 DENSE = 60
 # Shift of the spectrum relative to the largest eigenvalue, about half the digits of a double, which
@@ -106,11 +108,19 @@ class Tangent:
         except (RuntimeError, MatrixRankWarning) as error:
             raise SingularStiffnessError(f"the stiffness is singular ({error})") from None
 
-    def solve(self, residual: Floats) -> Floats:
-        """Displacement under a load, (neq,); SingularStiffnessError if they do not balance."""
+    def solve(self, residual: Floats, displacement: Floats | None = None) -> Floats:
+        """Displacement under a load, (neq,); SingularStiffnessError if they do not balance.
+
+        With a present displacement the residual may be its forces' rounding error, which does not
+        balance.
+        """
         change = self._factors.solve(residual)
         left = np.abs(self._stiffness @ change - residual).max()
-        if not left <= SINGULAR * np.abs(residual).max():
+        limit = SINGULAR * np.abs(residual).max()
+        if displacement is not None:
+            rounding = ROUNDING * (abs(self._stiffness) @ np.abs(displacement)).max()
+            limit = max(limit, rounding)
+        if not left <= limit:
             raise SingularStiffnessError("the stiffness is singular")
         return np.asarray(change)
 

@@ -151,7 +151,7 @@ def solve(run: Simulation) -> None:
     state = run.state
     if not state.factorised or state.residual is None:
         return
-    change = run.tangent.solve(state.residual)
+    change = run.tangent.solve(state.residual, state.plate.displacement)
     run.model.motion.displace(state.plate, change)
     size = float(np.linalg.norm(state.plate.displacement))
     state.converged = float(np.linalg.norm(change)) <= state.tolerance * size

@@ -1,0 +1,394 @@
+"""Plates that stretch as they bend, under static loads.
+
+The reference tables are those of von Karman plates in first-order shear deformation theory, of
+independent programs; lengths in mm, forces in N, thickness 2 mm unless said otherwise:
+
+- nonlinear_rectangles.csv: Legendre-Ritz solutions with 7 to 16 functions in a direction;
+- nonlinear_levy.csv: Levy's clamped square plate (NACA TN 847, 1942), computed anew in the same way,
+  as Levy's truncated series is up to 2.4 % high;
+- nonlinear_circles.csv: circular plates, by spectral elements and by a boundary value solver;
+- nonlinear_cylindrical.csv: cylindrical bending, closed form with one scalar root;
+- nonlinear_preload.csv: a plate with an initial membrane force, Ritz.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+from itertools import groupby
+
+import numpy as np
+import pytest
+
+from fecm.deck.model import Ply
+from fecm.mechanics.laminate import Laminate, laminate
+from fecm.mechanics.membrane import Membrane, quadratic_strains, tangent
+from fecm.mechanics.plate import PlateModel
+from tests.builders import (
+    PARALLELOGRAM,
+    SKEWED,
+    SQUARE,
+    Corners,
+    Floats,
+    boundary,
+    distorted_square,
+    general_plate,
+    isotropic_plate,
+    mesh_on,
+    nothing,
+    one_element,
+    parallelograms,
+    square,
+    table,
+    with_restraints,
+)
+from tests.nonlinear_plates import (
+    RULES,
+    disc,
+    equilibrium,
+    patch,
+    pressure,
+    rectangle,
+    with_preload,
+)
+
+H = 2.0
+Row = dict[str, str]
+
+
+def isotropic(nu: float = 0.3, thickness: float = H) -> Laminate:
+    """The tables' isotropic plate, E = 70000, with the shear factor 5/6."""
+    g = 70000.0 / (2.0 + 2.0 * nu)
+    plain = laminate(Ply(2.7e-9, nu, 70000.0, 70000.0, g, g, g), [0.0], [thickness])
+    return replace(plain, shear=5.0 / 6.0 * plain.shear)
+
+
+def layered(*angles: float) -> Laminate:
+    """The tables' plies of 0.25 mm, with the shear factor 5/6."""
+    ply = Ply(1.53e-9, 0.3, 141000.0, 9700.0, 5500.0, 5500.0, 3700.0)
+    plain = laminate(ply, angles, [0.25] * len(angles))
+    return replace(plain, shear=5.0 / 6.0 * plain.shear)
+
+
+LAMINATES = {
+    "iso": isotropic(),
+    "cross": layered(0, 90, 0, 90, 90, 0, 90, 0),
+    "unsym": layered(0, 0, 0, 0, 90, 90, 90, 90),
+}
+
+
+def centre(plate: PlateModel) -> Floats:
+    """Weights of the deflection of the node at the origin."""
+    weights = np.zeros(len(plate.mesh.coordinates))
+    weights[np.hypot(*plate.mesh.coordinates.T).argmin()] = 1.0
+    return weights
+
+
+# The element --------------------------------------------------------------------------------------
+
+
+def one(corners: Corners, seed: int = 0) -> PlateModel:
+    """A free element of the general laminate, its mid-sides off the middle with a seed."""
+    coordinates, elements = one_element(corners, 9)
+    if seed:
+        coordinates = coordinates + np.random.default_rng(seed).normal(0.0, 0.03, (9, 2))
+    mesh = with_restraints(coordinates, elements, nothing(coordinates))
+    return PlateModel(mesh, general_plate(), RULES, nonlinear=True)
+
+
+ELEMENTS = pytest.mark.parametrize(
+    ("corners", "seed"), [(SQUARE, 0), (PARALLELOGRAM, 0), (SKEWED, 0), (SKEWED, 5)]
+)
+
+
+def state(seed: int = 3) -> Floats:
+    """Displacements of nine nodes, with slopes of about one half."""
+    return np.random.default_rng(seed).normal(0.0, 0.3, (9, 5))
+
+
+def force(plate: PlateModel, field: Floats) -> tuple[Floats, float]:
+    """Internal force of an element (45,), and its strain energy."""
+    (K,) = plate.stiffness_of(plate.families[0])
+    forces, work = Membrane(plate).forces(field)
+    nodes = plate.mesh.elements[0] - 1
+    u = field[nodes].ravel()
+    total = K @ u + forces[nodes].ravel()
+    return total, 0.5 * float(u @ total - work)
+
+
+@ELEMENTS
+def test_the_internal_force_is_the_gradient_of_the_strain_energy(
+    corners: Corners, seed: int
+) -> None:
+    plate, field, step = one(corners, seed), state(), 1e-4
+    found, _ = force(plate, field)
+    slopes = []
+    for dof in range(45):
+        change = np.zeros((9, 5))
+        change[plate.mesh.elements[0, dof // 5] - 1, dof % 5] = step
+        # The energy is of the fourth degree, for which this difference is exact.
+        once, twice = (
+            force(plate, field + times * change)[1] - force(plate, field - times * change)[1]
+            for times in (1, 2)
+        )
+        slopes.append((8.0 * once - twice) / (12.0 * step))
+    assert np.abs(found - slopes).max() < 1e-9 * np.abs(found).max()
+
+
+@ELEMENTS
+def test_the_tangent_is_the_gradient_of_the_internal_force(corners: Corners, seed: int) -> None:
+    plate, field, step = one(corners, seed), state(), 1e-4
+    (family,) = plate.families
+    found = plate.stiffness_of(family)[0] + tangent(plate, family, field)[0]
+    columns = []
+    for dof in range(45):
+        change = np.zeros((9, 5))
+        change[plate.mesh.elements[0, dof // 5] - 1, dof % 5] = step
+        once, twice = (
+            force(plate, field + times * change)[0] - force(plate, field - times * change)[0]
+            for times in (1, 2)
+        )
+        columns.append((8.0 * once - twice) / (12.0 * step))
+    assert np.abs(found - np.array(columns)).max() < 1e-9 * np.abs(found).max()
+    np.testing.assert_array_equal(found, found.T)
+
+
+@ELEMENTS
+def test_a_free_element_has_six_motions_without_energy(corners: Corners, seed: int) -> None:
+    plate = one(corners, seed)
+    values = np.linalg.eigvalsh(plate.stiffness_of(plate.families[0])[0])
+    assert np.count_nonzero(values < 1e-12 * values[-1]) == 6
+
+
+def inclined(coordinates: Floats) -> tuple[Floats, Floats]:
+    """A field of constant strains and slopes, and its membrane strain eps_l + eps_q."""
+    x, y = coordinates.T
+    gradient = np.array([[3e-3, -2e-3], [4e-3, 1e-3]])  # du/dx, du/dy; dv/dx, dv/dy
+    slope = np.array([0.4, -0.3])
+    field = np.zeros((len(coordinates), 5))
+    field[:, :2] = coordinates @ gradient.T
+    field[:, 2] = slope[0] * x + slope[1] * y
+    field[:, 3:] = slope
+    strain = [
+        gradient[0, 0] + slope[0] ** 2 / 2.0,
+        gradient[1, 1] + slope[1] ** 2 / 2.0,
+        gradient[0, 1] + gradient[1, 0] + slope[0] * slope[1],
+    ]
+    return field, np.array(strain)
+
+
+@pytest.mark.parametrize("mesh", [square, parallelograms, distorted_square])
+def test_a_constant_membrane_force_at_finite_slopes_is_exact_on_straight_sided_meshes(
+    mesh: type[None],
+) -> None:
+    coordinates, elements = mesh(3, 3)  # type: ignore[call-arg]
+    held = boundary(coordinates, elements)
+    plate = PlateModel(
+        with_restraints(coordinates, elements, held), general_plate(), RULES, nonlinear=True
+    )
+    field, strain = inclined(coordinates)
+    quadratic = strain - [3e-3, 1e-3, 2e-3]
+    for family in plate.families:
+        found = quadratic_strains(family, RULES.bending, field)
+        np.testing.assert_allclose(found, np.broadcast_to(quadratic[:, None, None], found.shape),
+                                   rtol=1e-12)  # fmt: skip
+    forces = plate.internal_forces(field) + Membrane(plate).forces(field)[0]
+    assert np.abs(forces[~held]).max() < 1e-12 * np.abs(forces).max()
+
+
+def strip(distorted: bool) -> PlateModel:
+    """Half of a strip in cylindrical bending, of length 1, that is free to shorten."""
+    x, y = np.meshgrid(np.linspace(0.0, 0.5, 5), [0.0, 0.125, 0.25])
+    corners = np.stack([x, y], axis=-1)
+    if distorted:
+        inner = (slice(1, -1), slice(1, -1))
+        shifts = np.random.default_rng(9).uniform(-0.2, 0.2, corners.shape) * 0.125
+        corners[inner] += shifts[inner]
+    coordinates, elements = mesh_on(corners, 9)
+    restrained = nothing(coordinates)
+    restrained[:, [1, 4]] = True
+    restrained[np.isclose(coordinates[:, 0], 0.0), 0] = True
+    restrained[np.isclose(coordinates[:, 0], 0.0), 3] = True
+    restrained[np.isclose(coordinates[:, 0], 0.5), 2] = True
+    mesh = with_restraints(coordinates, elements, restrained)
+    return PlateModel(mesh, isotropic_plate(0.01, 5.0 / 6.0), RULES, nonlinear=True)
+
+
+@pytest.mark.parametrize(("distorted", "limit"), [(False, 1e-9), (True, 5e-4)])
+def test_a_strip_that_is_free_to_shorten_bends_without_membrane_locking(
+    distorted: bool, limit: float
+) -> None:
+    plate = strip(distorted)
+    load, weights = pressure(plate), centre(plate)
+    small, large = (
+        equilibrium(plate, load, weights, thicknesses * 0.01, steps=4)
+        for thicknesses in (1e-3, 5.0)
+    )
+    assert large.load / small.load == pytest.approx(5000.0, rel=limit)
+
+
+# Plates -------------------------------------------------------------------------------------------
+
+
+@cache
+def rectangles() -> list[tuple[str, list[Row]]]:
+    """Rows of the rectangles by plate and load."""
+    rows = table("nonlinear_rectangles.csv")
+    return [
+        (name, list(part))
+        for name, part in groupby(rows, lambda row: f"{row['case']} {row['load']} {row['sign']}")
+    ]
+
+
+def solved(name: str, rows: list[Row], n: int) -> list[tuple[float, float]]:
+    """Load and energy over those of the rows, less 1, on a quarter of n x n elements."""
+    case, load, _ = name.split()
+    kind, *_ = case.split("_")
+    size = next(part for part in case.split("_") if part[:2] in ("10", "12") and "x" in part)
+    a, b, _ = map(float, size.split("x"))
+    plate = rectangle(a, b, n, LAMINATES[kind], "_".join(case.split("_")[-2:]))
+    uniform = load == "uniform"
+    forces = pressure(plate) if uniform else patch(plate, "HERT", 10.0)
+    weights = centre(plate) if uniform else 4.0 * forces
+    field, errors = None, []
+    for row in rows:
+        deflection = float(row["sign"]) * float(row["control_over_h"]) * H
+        found = equilibrium(plate, forces, weights, deflection, field)
+        field = found.field
+        errors.append((
+            found.load / float(row["load_value"]) - 1.0,
+            found.energy / float(row["strain_energy_mJ"]) - 1.0,
+        ))  # fmt: skip
+    return errors
+
+
+@pytest.mark.parametrize(
+    ("name", "rows"), [item for item in rectangles() if "uniform" in item[0]], ids=lambda v: str(v)[:40]
+)  # fmt: skip
+def test_rectangles_under_pressure_follow_the_spectral_solution_up_to_three_thicknesses(
+    name: str, rows: list[Row]
+) -> None:
+    assert np.abs(solved(name, rows, 8)).max() < 4e-4
+
+
+@pytest.mark.parametrize("name", ["iso_100x100x2_clamped_immovable uniform 1"])
+def test_the_error_under_pressure_falls_with_more_than_the_third_order(name: str) -> None:
+    rows = dict(rectangles())[name][:3]
+    coarse, fine = (np.array(solved(name, rows, n))[:, 1] for n in (4, 8))
+    assert (np.log2(np.abs(coarse / fine)) > 3.5).all()
+
+
+@pytest.mark.parametrize(
+    ("name", "rows"), [item for item in rectangles() if "hert" in item[0]], ids=lambda v: str(v)[:40]
+)  # fmt: skip
+def test_rectangles_under_a_patch_follow_the_spectral_solution(name: str, rows: list[Row]) -> None:
+    known = [row for row in rows if float(row["rel_change_n"]) < 1e-3]
+    assert np.abs(solved(name, known, 8)).max() < 1e-3
+
+
+@pytest.mark.parametrize("name", ["iso_100x100x2_clamped_immovable hert 1"])
+def test_an_isotropic_plate_under_a_patch_is_within_two_ten_thousandths_on_a_fine_mesh(
+    name: str,
+) -> None:
+    rows = [row for row in dict(rectangles())[name] if float(row["control_over_h"]) <= 2.0]
+    assert np.abs(solved(name, rows, 12)).max() < 2e-4
+
+
+def test_levys_clamped_plate_deflects_as_computed() -> None:
+    E, h, a = 70000.0, 1.0, 100.0
+    plate = rectangle(a, a, 8, isotropic(0.1**0.5, h), "clamped_immovable")
+    load, weights, field = pressure(plate), centre(plate), None
+    for row in table("nonlinear_levy.csv"):
+        found = equilibrium(plate, load, weights, float(row["this_w_over_h"]) * h, field)
+        field = found.field
+        wanted = float(row["q_a4_over_E_h4"]) * E * h**4 / a**4
+        # The load rises faster than the deflection, so that its error is the larger one.
+        assert found.load == pytest.approx(wanted, rel=3e-4)
+
+
+@pytest.mark.parametrize("edge", ["clamped_immovable", "clamped_movable", "ss_immovable", "ss_movable"])  # fmt: skip
+@pytest.mark.parametrize("load", ["uniform 0", "disc 10", "disc 30"])
+def test_circular_plates_follow_the_axisymmetric_solution(edge: str, load: str) -> None:
+    kind, radius = load.split()
+    rows = [
+        row
+        for row in table("nonlinear_circles.csv")
+        if (row["edge"], row["load"], row["c_mm"]) == (edge, kind, radius)
+    ]
+    plate = disc(100.0, 5, isotropic(), edge)
+    forces = pressure(plate) if kind == "uniform" else patch(plate, "DISC", float(radius))
+    field, weights = None, centre(plate)
+    assert len(rows) == 4
+    for row in rows:
+        found = equilibrium(plate, forces, weights, float(row["w0_over_h"]) * H, field)
+        field = found.field
+        assert found.load == pytest.approx(float(row["load_value"]), rel=1e-3)
+        assert found.energy == pytest.approx(float(row["strain_energy_mJ"]), rel=3e-3)
+
+
+@pytest.mark.parametrize("ends", ["pinned", "clamped"])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_an_unsymmetric_strip_bends_as_the_closed_form_for_both_signs_of_the_load(
+    ends: str, sign: float
+) -> None:
+    rows = [
+        row
+        for row in table("nonlinear_cylindrical.csv")
+        if row["ends"] == ends and float(row["q_N_per_mm2"]) * sign > 0.0
+    ]
+    coordinates, elements = mesh_on(
+        np.stack(np.meshgrid(np.linspace(0.0, 50.0, 9), [0.0, 5.0]), axis=-1), 9
+    )
+    at_end = np.isclose(coordinates[:, 0], 50.0)
+    restrained = nothing(coordinates)
+    restrained[:, [1, 4]] = True
+    restrained[np.isclose(coordinates[:, 0], 0.0), 0] = True
+    restrained[np.isclose(coordinates[:, 0], 0.0), 3] = True
+    restrained[at_end, 0] = restrained[at_end, 2] = True
+    restrained[at_end, 3] = ends == "clamped"
+    plate = PlateModel(
+        with_restraints(coordinates, elements, restrained),
+        layered(0, 0, 0, 0, 90, 90, 90, 90),
+        RULES,
+        nonlinear=True,
+    )
+    load, weights, field = pressure(plate), centre(plate), None
+    assert len(rows) == 5
+    for row in rows:
+        found = equilibrium(plate, load, weights, float(row["w_centre_mm"]), field)
+        field = found.field
+        assert found.load == pytest.approx(float(row["q_N_per_mm2"]), rel=5e-5)
+
+
+# Initial membrane force ---------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("ratio", ["-0.5", "5.0"])
+def test_a_plate_with_preload_stretches_as_the_spectral_solution(ratio: str) -> None:
+    rows = [row for row in table("nonlinear_preload.csv") if row["N0_over_Ncr_biaxial"] == ratio]
+    N0 = float(rows[0]["N0_N_per_mm"])
+    plate = with_preload(rectangle(100.0, 100.0, 8, isotropic(), "ss_immovable"), N0, N0)
+    load, weights, field = pressure(plate), centre(plate), None
+    for row in rows:
+        found = equilibrium(plate, load, weights, float(row["w_centre_over_h"]) * H, field)
+        field = found.field
+        assert found.load == pytest.approx(float(row["q_N_per_mm2"]), rel=4e-4)
+        # The strain energy contains N0's work on the slopes.
+        assert found.energy == pytest.approx(float(row["strain_energy_above_preload_mJ"]), rel=4e-4)
+
+
+def test_a_preload_by_displaced_edges_is_that_of_the_card() -> None:
+    by_card = with_preload(
+        rectangle(100.0, 100.0, 4, isotropic(), "ss_immovable"), 505.0, -30.0, 0.0
+    )
+    strain = np.linalg.solve(by_card.laminate.A, [505.0, -30.0, 0.0])
+    mesh = by_card.mesh
+    forces = np.zeros(mesh.forces.shape)
+    forces[:, :2] = np.where(mesh.codes[:, :2] != 0, mesh.coordinates * strain[:2], 0.0)
+    by_edges = replace(by_card, preload=(0.0, 0.0, 0.0), mesh=replace(mesh, forces=forces))
+    load, weights = pressure(by_card), centre(by_card)
+    for deflection in (0.2, 4.0):
+        one, other = (
+            equilibrium(plate, load, weights, deflection, steps=2) for plate in (by_card, by_edges)
+        )
+        assert other.load == pytest.approx(one.load, rel=1e-9)
