@@ -167,9 +167,9 @@ def equilibrium(
     start: Floats | None = None,
     steps: int = 1,
 ) -> Equilibrium:
-    """Equilibrium in which the weighted sum of w, (numnp,), has a value, under a multiple of a load.
+    """Equilibrium in which the weighted sum of w has a value, under a multiple of a load.
 
-    Newton's method with the load's factor as an unknown.
+    Load and weights are (numnp,).  Newton's method with the load's factor as an unknown.
     """
     free = plate.mesh.equations > 0
     membrane = Membrane(plate)

@@ -122,7 +122,8 @@ def test_an_impact_on_displaced_edges_is_that_on_the_preload_of_the_card() -> No
     without = result(STEPS, data=STRUCK)
     assert np.abs(without.history.force - by_card.history.force).max() > 1e-3 * peak
     for found in (by_edges, by_card, without):
-        assert np.abs(found.energy.balance_error).max() < 1e-6 * found["energy"].attrs["initial"]
+        # Wilson's method damps the highest modes of the rod.
+        assert np.abs(found.energy.balance_error).max() < 1e-5 * found.energy.attributes["initial"]
 
 
 @pytest.mark.parametrize("macros", [True, False])
