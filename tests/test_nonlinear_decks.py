@@ -121,9 +121,10 @@ def test_an_impact_on_displaced_edges_is_that_on_the_preload_of_the_card() -> No
     np.testing.assert_allclose(by_edges.history.force, by_card.history.force, atol=1e-9 * peak)
     without = result(STEPS, data=STRUCK)
     assert np.abs(without.history.force - by_card.history.force).max() > 1e-3 * peak
+    # The balance is as good as that of the linear plate.
+    linear = np.abs(result(STEPS, data=STRUCK, words="").energy.balance_error).max()
     for found in (by_edges, by_card, without):
-        # Wilson's method damps the highest modes of the rod.
-        assert np.abs(found.energy.balance_error).max() < 1e-5 * found.energy.attributes["initial"]
+        assert np.abs(found.energy.balance_error).max() < 1.05 * linear
 
 
 @pytest.mark.parametrize("macros", [True, False])
