@@ -119,6 +119,27 @@ def stiff_contact() -> str:
     return sound.replace("  100000.0     0.017", "       1E7     0.017")
 
 
+def edge_held(*codes: str) -> list[str]:
+    """BOUN cards of the small plate: codes of the nodes of its left edge."""
+    return [f"{node:5}    0    {'    '.join(codes)}" for node in range(1, 26, 5)]
+
+
+def nonlinear(
+    *codes: str, orders: str = "    3    3   -3", words: str = "SHEA MITC\n", program: str = PROGRAM
+) -> Deck:
+    """The small plate with NONL, held along its left edge."""
+    mesh = "\n".join([MESH[: MESH.index("BOUN")] + "BOUN", *edge_held(*codes), "", ""])
+    cards = DATA_CARDS.replace("    3    3   -3", orders)
+    return lambda: small(program, mesh=mesh, data=f"NONL\n{words}{cards}")
+
+
+def nonlinear_of_8_nodes() -> str:
+    return wrong("assumed-shear-of-8-nodes")().replace("SHEA MITC", "NONL\nSHEA MITC")
+
+
+CLAMPED = "11111"
+SYMMETRIC = "01010"  # v, theta_x: u is missing
+
 DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values()} | {
     "E000": macros("XXXX\n" * 1001),
     "W000": macros(PROGRAM + f"CHEC{'beyond':>40}\n" * 1002),
@@ -245,6 +266,15 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "W458": lambda: decks.small(data="DELA\n.8,\n" + decks.DATA_CARDS),
     "E459": more("DAMP\n-1.,\n"),
     "W460": more("DAMP\n1.E6,\n"),
+    "E483": more("PREL\n1.,2.,3.\n"),
+    "W484": plate(with_card("PREL", "0.,2.E3,0.")),
+    "W485": plate(with_card("PREL", ",,")),
+    "E490": lambda: small(data="NONL\nSHEA MITC\n" + DATA_CARDS),
+    "E491": nonlinear(*CLAMPED, words=""),
+    "E492": nonlinear_of_8_nodes,
+    "E493": nonlinear(*CLAMPED, program=PROGRAM + "CMAS\nEIGE          2\n"),
+    "E494": nonlinear(*CLAMPED, orders="    2    3   -3"),
+    "W495": nonlinear(*SYMMETRIC),
     "W461": plate(replaced(r"^(.{5}).{5}(     0\.184)$", r"\1 45.0\2")),
     "E501": macros("XXXX\n"),
     "E502": wrong("loop-without-next"),

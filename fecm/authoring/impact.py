@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from numbers import Real
 from types import UnionType
 from typing import Literal, NamedTuple
 
@@ -52,6 +53,8 @@ class Request:
     numerics: Numerics
     units: str | None = None
     in_plane: InPlane | None = None
+    nonlinear: bool = False
+    preload: Sequence[float | str] | None = None
     gages: Iterable[GagePlace] = ()
     damage: bool = False
     giic: float | None = None
@@ -116,6 +119,8 @@ def impact(
     shear: Quadrature = "mitc",
     shear_factor: float | Literal["equi"] = 1.0,
     in_plane: InPlane | None = None,
+    nonlinear: bool = False,
+    preload: Sequence[float | str] | None = None,
     gages: Iterable[tuple[float, float, float, float]] = (),
     damage: bool = False,
     giic: float | None = None,
@@ -123,8 +128,8 @@ def impact(
 ) -> model.Deck:
     """Deck of an impact, as `fecm new` writes it.
 
-    A laminate without coupling has its in-plane dofs restrained, as the report's does; any other
-    has them free inside the plate, and restrained on its supports as `in_plane` says.
+    A linear plate whose laminate is not coupled has its in-plane dofs restrained, as the report's
+    does; any other has them free inside, and restrained on its supports as `in_plane` says.
 
     Parameters
     ----------
@@ -161,8 +166,15 @@ def impact(
     shear_factor : float or str
         Factor of the transverse shear stiffness, or ``"equi"``, the stiffness from equilibrium.
     in_plane : str, optional
-        Displacements u and v of a coupled laminate where the plate is supported: ``"held"``, the
-        default of edges; ``"free"``, that of fixtures; or ``"normal"``, held across the edge only.
+        Displacements u and v of a nonlinear plate, or a coupled laminate, where it is supported:
+        ``"held"``, the default of edges; ``"free"``, that of fixtures; or ``"normal"``, held across
+        the edge only.
+    nonlinear : bool
+        The plate stretches as it bends (von Kármán), which matters from a deflection of about half
+        the thickness on; `shear` must be ``"mitc"``.
+    preload : sequence of float or str, optional
+        Uniform membrane force N0x, N0y and, by default 0, N0xy in the plate before the impact
+        (force/length, tension positive), also with a unit, ``"50N/mm"``.
     gages : iterable of tuple
         Place x, y and z from the mid-plane (length) and direction (degrees) of strain gages.
     damage : bool
@@ -205,6 +217,8 @@ def impact(
             Numerics(patch, shear, shear_factor, duration, dt, every),
             units=units,
             in_plane=in_plane,
+            nonlinear=nonlinear,
+            preload=preload,
             gages=gages,
             damage=damage,
             giic=giic,
@@ -244,7 +258,8 @@ def author(asked: Request) -> Authored:
         )
     damage = damages(plies, asked.giic, notes) if asked.damage else toughness(asked.giic)
     mesh, node, patch = placed(asked.plate, plies.layup, strike.at, patch, doubts)
-    boundary, slides = supported(asked.plate, mesh, plies.is_coupled, asked.in_plane, notes)
+    stretches = asked.nonlinear or plies.is_coupled
+    boundary, slides = supported(asked.plate, mesh, asked.in_plane, notes, stretches=stretches)
     segments = (
         _units(asked, plies),
         mesh.coordinates(),
@@ -256,7 +271,9 @@ def author(asked: Request) -> Authored:
         _gages(asked.gages),
         *damage,
         law,
-        asked.numerics.shear_segment(),
+        asked.numerics.shear_segment(nonlinear=asked.nonlinear),
+        model.Nonlinear() if asked.nonlinear else None,
+        _preload(asked, plies),
         plies.segment(),
     )
     control = Control(mesh.nodes, mesh.elements, len(plies.layup.angles), 2, 5, mesh.most_nodes)
@@ -347,6 +364,18 @@ def _projectile(projectile: AnyProjectile | None) -> model.Projectile | None:
     if isinstance(projectile, Rod | RigidMass):
         return projectile_segment(projectile)
     return projectile
+
+
+def _preload(asked: Request, plies: Plies) -> model.Preload | None:
+    """PREL segment of a membrane force, if there is one."""
+    if asked.preload is None:
+        return None
+    given = list(asked.preload)
+    forces = [in_units("preload", force, "force/length", plies.system) for force in given]
+    known = [force for force in forces if isinstance(force, Real) and math.isfinite(force)]
+    if len(known) < len(given) or len(given) not in (2, 3):
+        raise ObjectError(f"`preload` is {asked.preload!r}, not N0x, N0y and, if given, N0xy")
+    return model.Preload(*map(float, known))
 
 
 def _gages(places: Iterable[GagePlace]) -> model.Gages | None:

@@ -138,14 +138,14 @@ class Supported(NamedTuple):
 
 
 def supported(
-    plate: Plate, mesh: AnyMesh, coupled: bool, in_plane: InPlane | None, notes: list[str]
+    plate: Plate, mesh: AnyMesh, in_plane: InPlane | None, notes: list[str], *, stretches: bool
 ) -> Supported:
-    """Supports of a plate; without coupling u and v are held everywhere."""
-    if not coupled:
+    """Supports of a plate; u and v are held everywhere in one that does not stretch."""
+    if not stretches:
         if in_plane is not None:
             notes.append(
-                "`in_plane` has no effect: the laminate is not coupled, and its u and v are held "
-                "everywhere"
+                "`in_plane` has no effect: the laminate is not coupled and the plate linear, and "
+                "its u and v are held everywhere"
             )
         everywhere, in_plane = (1, 1, 0, 0, 0), HELD
     else:

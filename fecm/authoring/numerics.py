@@ -50,9 +50,11 @@ class Numerics:
             return Patch(HERTZ) if prescribed else Patch()
         return parse_patch(self.patch) if isinstance(self.patch, str) else self.patch
 
-    def shear_segment(self) -> Shear | None:
+    def shear_segment(self, *, nonlinear: bool = False) -> Shear | None:
         """SHEA segment; None for the report's shear stiffness and quadrature."""
         factor, assumed = self.shear_factor, self.shear == MITC
+        if nonlinear and not assumed:
+            raise ObjectError(f"`nonlinear` needs assumed shear strains: `shear` {MITC}")
         if factor == EQUI:
             return Shear(assumed=assumed, equilibrium=True)
         if isinstance(factor, str):

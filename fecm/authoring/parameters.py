@@ -14,7 +14,12 @@ from fecm.deck.units import in_si, unit_in_si
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 
 # A value with a unit of a dimension, for messages.
-EXAMPLES = {"force*length": "10J", "length/time": "3m/s", "time": "4ms"}
+EXAMPLES = {
+    "force*length": "10J",
+    "length/time": "3m/s",
+    "time": "4ms",
+    "force/length": "50N/mm",
+}
 
 
 class ObjectError(FecmError, ValueError):

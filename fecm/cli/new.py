@@ -29,7 +29,7 @@ from fecm.cli.options import FILE_PATH, POSITIVE, Finite, Parsed, assignment, co
 from fecm.deck.catalogue import CONTACTS, MATERIALS, STRENGTHS, NamedContact, NamedPly
 from fecm.deck.format import format_deck
 from fecm.deck.grid import IN_PLANE, SUPPORTS
-from fecm.deck.model import Deck, Indentation, Material, Patch, Shear
+from fecm.deck.model import Deck, Indentation, Material, Nonlinear, Patch, Shear
 from fecm.mechanics.points import DISC, RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.plate_mesh import BOUNDARY
@@ -82,7 +82,7 @@ def _mesh(text: str) -> tuple[int, int] | Path:
 
 
 GROUPS = {
-    "Plate": ("size", "mesh", "grading", "columns", "rows"),
+    "Plate": ("size", "mesh", "grading", "columns", "rows", "nonlinear", "preload"),
     "Laminate": (
         "layup",
         "ply_thickness",
@@ -119,6 +119,8 @@ class Options:
     grading: float
     columns: str
     rows: str
+    nonlinear: bool
+    preload: tuple[str, ...] | None
     laminate: LaminateOptions
     damage: bool
     giic: float | None
@@ -210,6 +212,18 @@ class Options:
     help="Elements along x one by one, as in 3*0.5,8*0.375,3*0.5, instead of --size and --mesh.",
 )
 @option("--rows", default="", metavar="LIST", help="The same along y.")
+@option(
+    "--nonlinear",
+    is_flag=True,
+    help="The plate stretches as it bends (NONL), which matters from a deflection of about half "
+    "its thickness on.",
+)
+@option(
+    "--preload",
+    type=list_of("NX,NY[,NXY]", str, [2, 3]),
+    help="Membrane force in the plate before the impact (PREL), force/length, tension positive; "
+    "in the deck's units or with a unit, as in -50N/mm,0.",
+)
 @laminate_options(required=True)
 @option(
     "--damage",
@@ -248,8 +262,8 @@ class Options:
 @option(
     "--in-plane",
     type=click.Choice(list(IN_PLANE)),
-    help="In-plane displacements of a coupled laminate on its supports: held, normal (held "
-    "across the edge only) or free.  [default: held; with --fixture free]",
+    help="In-plane displacements on the supports, with --nonlinear or a coupled laminate: held, "
+    "normal (held across the edge only) or free.  [default: held; with --fixture free]",
 )
 @option(
     "--at", type=list_of("X,Y", Finite(), [2]), help="Impact point.  [default: the plate's centre]"
@@ -336,8 +350,7 @@ def new(options: Options) -> None:
     except (ObjectError, ImportError) as error:
         raise click.UsageError(_as_options(str(error), context.params)) from None
     notes = [_as_options(text, context.params) for text in (*made.doubts, *made.notes)]
-    if made.deck.has(Patch) or made.deck.has(Shear):
-        notes.append(_additions(made.deck))
+    notes += _additions(made.deck)
     text = made.comments + format_deck(made.deck.to_text())
     prepared = load_deck(text)
     if errors := prepared.errors():
@@ -407,6 +420,8 @@ def _author(options: Options, given: Collection[str]) -> Authored:
             ),
             units=laminate.units,
             in_plane=options.in_plane,
+            nonlinear=options.nonlinear,
+            preload=options.preload,
             damage=options.damage,
             giic=options.giic,
             title=options.title,
@@ -414,9 +429,10 @@ def _author(options: Options, given: Collection[str]) -> Authored:
     )
 
 
-def _additions(deck: Deck) -> str:
-    """Say what a deck has besides the cards of the report's program."""
+def _additions(deck: Deck) -> list[str]:
+    """Say what a deck has, unasked, besides the cards of the report's program."""
     parts: list[str] = []
+    options: list[str] = []
     if (patch := deck.last(Patch)) is not None:
         share = RADIUS_PER_THICKNESS[patch.shape]
         thickness = deck.require(Material).integration.thickness
@@ -424,10 +440,14 @@ def _additions(deck: Deck) -> str:
         about = "" if patch.radius else f" ({share:g} of the thickness)"
         pressure = "a uniform pressure" if patch.shape == DISC else "Hertz's pressure"
         parts.append(f"{pressure} of radius {radius:.4g}{about} instead of a point force (PATC)")
-    if (shear := deck.last(Shear)) is not None:
+        options.append("--patch none")
+    if (shear := deck.last(Shear)) is not None and not deck.has(Nonlinear):
         words = " ".join([Shear.keyword, *shear.words()])
         if shear.assumed:
             parts.append(f"assumed shear strains ({words})")
         elif shear.equilibrium:
             parts.append(f"shear stiffness from equilibrium ({words})")
-    return f"the deck has {' and '.join(parts)}; omit them with --patch none and --shear full"
+        options.append("--shear full")
+    if not parts:
+        return []
+    return [f"the deck has {' and '.join(parts)}; omit them with {' and '.join(options)}"]

@@ -254,3 +254,8 @@ class Preload(Segment, keyword="PREL"):
     n_xy: float = 0.0
 
     fields: ClassVar[Fields] = layout("F10 N0x", "F10 N0y", "F10 N0xy")
+
+    @property
+    def forces(self) -> tuple[float, float, float]:
+        """N0x, N0y and N0xy."""
+        return self.n_x, self.n_y, self.n_xy

@@ -27,7 +27,9 @@ from fecm.problem.rules import (
     impact,
     laminate,
     mesh,
+    nonlinear,
     patch,
+    preload,
     program,
     projectile,
     quadrature,
@@ -45,6 +47,7 @@ ALONE: tuple[type[model.Segment], ...] = (
     model.Allowables,
     model.Delamination,
     model.Damping,
+    model.Preload,
     model.Projectile,
     model.Shear,
     model.Units,
@@ -144,6 +147,8 @@ def check_segment(segment: model.Segment, findings: Findings) -> None:
             apply(damage.OF_DELAMINATION, findings, segment)
         case model.Damping():
             apply(damping.OF_DAMPING, findings, segment)
+        case model.Preload():
+            apply(preload.ALONE, findings, segment)
         case model.Projectile():
             _check_projectile(segment, findings)
         case model.Shear():
@@ -171,7 +176,10 @@ def _check_points(checked: Problem, findings: Findings) -> None:
         apply(gages.OF_GAGES, findings, checked)
     if findings.error_count > before:
         return
-    apply(quadrature.OF_ASSUMED_SHEAR, findings, checked)
+    if checked.deck.has(model.Nonlinear):
+        apply(nonlinear.OF_NONLINEAR, findings, checked)
+    else:
+        apply(quadrature.OF_ASSUMED_SHEAR, findings, checked)
     if (card := checked.deck.last(model.Patch)) is None:
         return
     apply_first(patch.OF_PATCH, findings, checked)
@@ -181,12 +189,15 @@ def _check_points(checked: Problem, findings: Findings) -> None:
 
 def _check_run(checked: Problem, findings: Findings, sound: Callable[[], bool]) -> None:
     """Check a problem whose segments and mesh are sound."""
+    apply(preload.OF_PRELOAD, findings, checked)
     apply(damage.OF_THRESHOLD, findings, checked)
     _check_time_step(checked, findings)
     check_program(checked, findings)
     apply(program.OF_PURPOSE, findings, checked)
     if sound():
         apply(mesh.OF_SUPPORTS, findings, checked)
+        if checked.deck.has(model.Nonlinear):
+            apply(nonlinear.OF_SYMMETRY, findings, checked)
         check_values(checked, findings)
         if time_step.takes_steps(checked):
             apply(time_step.OF_CONTACT, findings, checked)
@@ -214,6 +225,7 @@ def check_values(checked: Problem, findings: Findings) -> None:
     """Warn of the valid values of a sound problem that look like a mistake."""
     apply(laminate.VALUES, findings, checked)
     apply(units.VALUES, findings, checked)
+    apply(preload.VALUES, findings, checked)
     if checked.has_impact:
         apply(contact.VALUES, findings, checked)
         apply(impact.NEIGHBOURS, findings, checked)

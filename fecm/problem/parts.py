@@ -27,7 +27,9 @@ from fecm.mechanics.projectile import (
 )
 from fecm.problem.generate import rod_diameters
 
-W = 2  # dof w, from 0
+# Dofs, from 0.
+W = 2
+THETA_X = 3
 
 
 def rules(material: model.Material) -> tuple[Quadrature, Quadrature, Quadrature]:
@@ -60,7 +62,7 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
         mesh,
         laminate,
         used,
-        preload=UNLOADED if preload is None else (preload.n_x, preload.n_y, preload.n_xy),
+        preload=UNLOADED if preload is None else preload.forces,
         nonlinear=deck.has(model.Nonlinear),
     )
 

@@ -17,7 +17,7 @@ from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
 from fecm.mechanics.solutions import SingularStiffnessError, compliance
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.time_step import taken_time_step
-from fecm.problem.parts import build_projectile
+from fecm.problem.parts import W, build_projectile
 from fecm.problem.problem import Problem
 from fecm.problem.resolution import resolution, said_error
 
@@ -73,6 +73,9 @@ class ProblemSummary:
         self.layers = deck.control.layers
         self.equations = plate.neq
         self.steps = problem.work.steps
+        self.nonlinear = plate.nonlinear
+        self.free_in_plane = int((plate.mesh.codes[:, :W] == 0).all(axis=1).sum())  # nodes
+        self.preload = plate.preload  # N0x, N0y, N0xy
         self.A, self.B, self.D, self.shear = laminate.A, laminate.B, laminate.D, laminate.shear
         self.plate_mass = plate.area() * laminate.mass
         self.projectile_mass = build_projectile(deck).total_mass  # even without impact
@@ -112,6 +115,14 @@ class ProblemSummary:
         lines += _matrix("shear xz, yz", self.shear, unit_of("force/length", self.units))
         if self._leaves_out_equilibrium:
             lines.append(f"  shear factor        1; {self._said_change()}")
+
+        if self.nonlinear:
+            of_all = f"{self.free_in_plane} of {self.nodes} nodes"
+            lines.append(f"  kinematics          von Kármán plate, u and v free at {of_all}")
+        if any(self.preload):
+            named = zip(("N0x", "N0y", "N0xy"), self.preload, strict=True)
+            forces = ", ".join(f"{name} {quantity(n, 'force/length')}" for name, n in named)
+            lines.append(f"  preload             {forces}")
 
         def mass(value: float) -> str:
             known = mass_in_si(value, self.units)

@@ -175,7 +175,8 @@ def set_support(deck: model.Deck, value: Value) -> model.Deck:
     if deck.has(model.Forces) or mesh.elements.shape[1] not in (4, 9) or not mesh.elements.all():
         raise CasesError("support: the deck must have no FORC, and all elements four or nine nodes")
     plate = PlateMesh(mesh.coordinates, mesh.elements.astype(int) - 1, {}, np.array([], int))
-    everywhere = (0, 0, 0, 0, 0) if is_coupled(deck.require(model.Material)) else (1, 1, 0, 0, 0)
+    stretches = deck.has(model.Nonlinear) or is_coupled(deck.require(model.Material))
+    everywhere = (0, 0, 0, 0, 0) if stretches else (1, 1, 0, 0, 0)
     made = plate.supported(everywhere, {BOUNDARY: support})
     others = tuple(s for s in deck.segments if not isinstance(s, model.Boundary))
     if made is not None and support == "simple" and mesh.elements.shape[1] == 4:

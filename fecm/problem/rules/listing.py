@@ -13,7 +13,14 @@ MOST_LAYERS = 25  # layers that the listing's arrays hold (CNPD: QBR(3,3,25), TH
 REMEDY = "Report mode."
 HINT = "run the deck in report mode"
 LATER_MACROS = ("PLYS", "FAIL")
-LATER_SEGMENTS = (model.Allowables, model.Delamination, model.Damping, model.Patch)
+LATER_SEGMENTS = (
+    model.Allowables,
+    model.Delamination,
+    model.Damping,
+    model.Patch,
+    model.Nonlinear,
+    model.Preload,
+)
 
 
 @rule(
@@ -58,7 +65,7 @@ def too_many_layers(problem: Problem) -> Reports:
     "E603",
     Subject.LISTING,
     "The deck has a word that the printed program does not have.",
-    cause="These are PATC, PLYS, FAIL, ALLO, DELA, DAMP, SHEA MITC and SHEA EQUI.",
+    cause="These are PATC, PLYS, FAIL, ALLO, DELA, DAMP, NONL, PREL, SHEA MITC and SHEA EQUI.",
     remedy=REMEDY,
 )
 def later_words(problem: Problem) -> Reports:

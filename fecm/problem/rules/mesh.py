@@ -10,12 +10,11 @@ from fecm.deck.rules import Report, Reports, Subject, declare, rule
 from fecm.mechanics.elements import CUBIC, TRIANGLE
 from fecm.mechanics.mesh import distinct, holds_the_plane
 from fecm.problem.generate import place_of_element
-from fecm.problem.parts import W
+from fecm.problem.parts import THETA_X, W
 from fecm.problem.problem import Problem
 from fecm.problem.rules.numbering import describe_elements, describe_nodes, report_elements
 
 CORNERS = TRIANGLE.corners
-THETA_X = 3  # dof theta_x, from 0
 FEW_SUPPORTS = 2  # nodes that hold w up to which they are no support
 # Distance of a mid-side node from its place along the side, over the side's length.
 OFF_PLACE = 0.05

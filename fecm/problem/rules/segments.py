@@ -20,6 +20,8 @@ SINGLE: Kinds = (
     model.Allowables,
     model.Delamination,
     model.Damping,
+    model.Nonlinear,
+    model.Preload,
 )
 
 

@@ -1,0 +1,177 @@
+"""Rules about the NONL segment: a plate that stretches as it bends."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from fecm._typing import Bools
+from fecm.deck import model
+from fecm.deck.findings import Place
+from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.mechanics.elements import QUADRILATERAL
+from fecm.mechanics.mesh import holds_the_plane
+from fecm.problem.parts import THETA_X, W, has_assumed_shear
+from fecm.problem.problem import Problem
+from fecm.problem.rules.numbering import report_elements
+
+ORDER = 3  # bending order L1, by which the membrane is integrated too
+SAME_LINE = 1e-9  # difference of coordinates on one line, over the size of the mesh
+
+
+def _place(problem: Problem) -> Place | None:
+    """Place of the effective NONL."""
+    return problem.deck.require(model.Nonlinear).place()
+
+
+@rule(
+    "E490",
+    Subject.LAMINATE,
+    "NONL, and u and v are restrained at every node.",
+    cause="The plate is too stiff: at 20 J in the fixture D7136 the force is 12 % too high.",
+    remedy="Restrain u and v only where a support holds them. `fecm new --nonlinear` does so.",
+)
+def held_plane(problem: Problem) -> Reports:
+    """Find a nonlinear plate none of whose points can move in the plane."""
+    if not holds_the_plane(problem.mesh.codes):
+        return
+    records = [card for segment in problem.deck.all(model.Boundary) for card in segment.records]
+    inside = [card for card in records if any(card.codes[:W]) and not card.codes[W]]
+    place = (inside or records)[0].place() if records else None
+    cards = "the cards of BOUN"
+    if inside:
+        count = len(inside)
+        cards = "this card of BOUN" if count == 1 else f"the {count} cards of BOUN like this one"
+    message = "NONL, and u and v are restrained at every node: the plate is too stiff."
+    hint = (
+        f"put 0 for u and v, the first two codes, on {cards}, so that only supports hold them; "
+        "fecm new --nonlinear --in-plane writes such supports"
+    )
+    yield Report(message, place, hint)
+
+
+@rule(
+    "E491",
+    Subject.LAMINATE,
+    "NONL is without SHEA MITC.",
+    cause="Full quadrature of the transverse shear locks before the plate stretches.",
+    remedy="Add `SHEA MITC`.",
+)
+def without_assumed_shear(problem: Problem) -> Reports:
+    """Find a nonlinear plate without assumed shear strains."""
+    if not has_assumed_shear(problem.deck):
+        why = "with full quadrature the transverse shear locks before the plate stretches"
+        shear = problem.deck.last(model.Shear)
+        hint = "add MITC to this card" if shear else "add the card SHEA MITC"
+        place = shear.place() if shear else _place(problem)
+        yield Report(f"NONL needs assumed shear strains: {why}.", place, hint)
+
+
+@rule(
+    "E492",
+    Subject.LAMINATE,
+    "NONL has an element that is not a quadrilateral with 9 nodes.",
+    remedy="Take 9-node elements; `fecm new` writes them.",
+)
+def other_elements(problem: Problem) -> Reports:
+    """Find elements whose stretching by deflections is not known."""
+    wrong = np.zeros(len(problem.mesh.elements), dtype=bool)
+    for family in problem.families:
+        nine = family.shape is QUADRILATERAL and family.nodes.shape[1] == QUADRILATERAL.nodes
+        wrong[family.rows] = not nine
+    what = "is not a quadrilateral with 9 nodes, as NONL needs"
+    hint = "elements with 3, 4, 8 or 12 nodes are for linear plates only"
+    yield from report_elements(problem.deck, np.flatnonzero(wrong), what, hint)
+
+
+@rule(
+    "E493",
+    Subject.LAMINATE,
+    "NONL is with CMAS.",
+    cause="Nonlinear plates take the lumped mass.",
+    remedy="`LMAS`.",
+)
+def consistent_mass(problem: Problem) -> Reports:
+    """Find a consistent mass, for which there are no nonlinear plates."""
+    card = next((macro for macro in problem.deck.macros if macro.word == "CMAS"), None)
+    if card is not None:
+        yield Report("NONL takes the lumped mass only.", card.place("macro"), "take LMAS")
+
+
+@rule(
+    "E494",
+    Subject.LAMINATE,
+    "NONL is with a bending order L1 other than 3.",
+    cause="The membrane is integrated with it: 2 leaves motions of u and v without energy.",
+    remedy="L1 = 3.",
+)
+def other_order(problem: Problem) -> Reports:
+    """Find a rule that does not fit the interpolation of the quadratic strains."""
+    card = problem.deck.require(model.Material).integration
+    if card.bending != ORDER:
+        message = f"NONL needs the bending order L1 = {ORDER} for the membrane, not {card.bending}."
+        yield Report(message, card.place("bending order L1"), f"take L1 = {ORDER}")
+
+
+@rule(
+    "W495",
+    Subject.LAMINATE,
+    "NONL, and a line of symmetry is free to move across itself.",
+    cause=(
+        "On a straight edge the slope across it is held, as by symmetry, but w and the in-plane "
+        "displacement across it are free."
+    ),
+    remedy="Restrain u on an edge along y with θx, v on one along x with θy.",
+)
+def open_symmetry(problem: Problem) -> Reports:
+    """Find edges with the symmetry of bending, but not that of stretching."""
+    boundary = problem.deck.last(model.Boundary)
+    if boundary is None:
+        return
+    for axis, dof, rotation in ((0, "u", "theta_x"), (1, "v", "theta_y")):
+        for where, nodes in _open_lines(problem, axis):
+            line = f"{'xy'[axis]} = {where:.6g}"
+            message = (
+                f"On the edge {line} {rotation} is restrained at {nodes} nodes and w is free, as "
+                f"by symmetry, but {dof} is free too: the line may move across itself."
+            )
+            hint = f"restrain {dof} there too if the plate is half of a symmetric one"
+            yield Report(message, boundary.place(), hint)
+
+
+def _open_lines(problem: Problem, axis: int) -> Iterator[tuple[float, int]]:
+    """Place and number of nodes of edges across an axis with only the symmetry of bending."""
+    mesh = problem.mesh
+    free = mesh.codes == 0
+    turned = ~free[:, THETA_X + axis] & free[:, W] & free[:, axis]
+    rows = np.flatnonzero(turned & _on_edges_across(problem, axis))
+    places = mesh.coordinates[rows, axis]
+    order = np.argsort(places)
+    breaks = np.flatnonzero(np.diff(places[order]) > SAME_LINE * problem.longer_side) + 1
+    for line in np.split(rows[order], breaks) if len(rows) else ():
+        yield float(mesh.coordinates[line, axis].mean()), len(line)
+
+
+def _on_edges_across(problem: Problem, axis: int) -> Bools:
+    """Whether nodes are on an element's side that no other has and that is normal to an axis."""
+    mesh = problem.mesh
+    # Corners and middle of each side of 9-node elements.
+    sides = np.stack([mesh.elements[:, [n, (n + 1) % 4, 4 + n]] for n in range(4)], axis=1)
+    sides = sides.reshape(-1, 3) - 1
+    _, first, counts = np.unique(sides[:, 2], return_index=True, return_counts=True)
+    own = sides[first[counts == 1]]
+    along = np.ptp(mesh.coordinates[own, axis], axis=1) <= SAME_LINE * problem.longer_side
+    found = np.zeros(len(mesh.coordinates), dtype=bool)
+    found[own[along]] = True
+    return found
+
+
+OF_NONLINEAR = (
+    other_elements,
+    without_assumed_shear,
+    other_order,
+    held_plane,
+    consistent_mass,
+)
+OF_SYMMETRY = (open_symmetry,)

@@ -1,0 +1,76 @@
+"""Rules about the PREL segment: an initial membrane force."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from fecm.deck import model
+from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.deck.units import in_si, unit_names
+from fecm.problem.problem import Problem
+
+FORCE = "force/length"
+LARGEST_STRAIN = 0.01  # by the preload, above which its unit is doubted
+
+
+@rule(
+    "W485",
+    Subject.LAMINATE,
+    "All forces of PREL are zero.",
+    remedy="Give N0x, N0y or N0xy, or remove the segment.",
+)
+def no_preload(card: model.Preload) -> Reports:
+    """Find a preload without a force."""
+    if not any(card.forces):
+        hint = "its fields are N0x, N0y and N0xy, a force over a length; tension is positive"
+        yield Report("PREL is without effect: all its forces are zero.", card.place(), hint)
+
+
+@rule(
+    "E483",
+    Subject.LAMINATE,
+    "PREL is with a laminate whose B is not zero.",
+    cause="Such a laminate bends under a force in its plane.",
+    remedy="A static solution under that force before the impact, with `NONL`.",
+)
+def preload_of_coupled_laminate(problem: Problem) -> Reports:
+    """Find a preload that would bend the plate."""
+    card = problem.deck.last(model.Preload)
+    if card is not None and any(card.forces) and problem.laminate.is_coupled:
+        message = "B is not zero: the plate bends under the force of PREL, and is not flat."
+        hint = "preload it by a static solution before the impact, with NONL: FORC, TANG to CONV"
+        yield Report(message, card.place(), hint)
+
+
+def _largest_strain(problem: Problem, card: model.Preload) -> float:
+    """Largest of the strains of the mid-plane under the preload; NaN of a singular stiffness."""
+    try:
+        return float(np.abs(np.linalg.solve(problem.laminate.A, card.forces)).max())
+    except np.linalg.LinAlgError:
+        return math.nan
+
+
+@rule(
+    "W484",
+    Subject.LAMINATE,
+    "The preload of PREL strains the plate by more than 1 %.",
+    remedy="The unit of force over length: N/mm in mm and N.",
+)
+def large_preload(problem: Problem) -> Reports:
+    """Find a preload that few laminates would survive."""
+    if (card := problem.deck.last(model.Preload)) is None:
+        return
+    if (largest := _largest_strain(problem, card)) > LARGEST_STRAIN:
+        factor = in_si(FORCE, unit_names(problem.deck))
+        force = max(map(abs, card.forces))
+        known = "" if factor is None else f", up to {force * factor:.3g} N/m in the units of UNIT,"
+        message = f"The preload of PREL{known} strains the plate by {largest:.2%}."
+        hint = "N0 is a stress times the thickness: N/mm in mm and N; 1 N/mm is 1000 N/m"
+        yield Report(message, card.place(), hint)
+
+
+ALONE = (no_preload,)
+OF_PRELOAD = (preload_of_coupled_laminate,)
+VALUES = (large_preload,)
