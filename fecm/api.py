@@ -15,7 +15,7 @@ from fecm.deck.reader import Reader, read_deck
 from fecm.deck.source_text import load_text
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.projectile import Integrator, MassMatrix, RodMethod
-from fecm.problem.build import ENERGY_LIMIT, RunOptions
+from fecm.problem.build import ENERGY_LIMIT, RunOptions, check_options
 from fecm.problem.check import check, check_listing
 from fecm.problem.memory import check_memory
 from fecm.problem.problem import Problem
@@ -183,8 +183,8 @@ def run(
     DivergenceError
         If the motion grows without bound, or the energy balance exceeds its limit.
     ValueError
-        If the mode, a slip, the solver, the rod's mass or its integrator is unknown, or a number
-        is invalid.
+        If the mode, a slip, the solver, the rod's mass or its integrator is unknown, a number is
+        invalid, or the solver or a slip is not for a nonlinear plate.
     NotEnoughMemoryError
         If the run needs more memory than is free; a MemoryError.
     OSError
@@ -224,6 +224,8 @@ def _run(
         raise DeckError(prepared.findings, prepared.source)
     if one:
         _check_one(prepared.problems)
+    for problem in prepared.problems:
+        check_options(problem, choices)
     found = tuple(finding for finding in prepared.findings if finding.severity != "error")
     for finding in found:
         if finding.severity == "warning":

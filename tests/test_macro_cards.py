@@ -11,7 +11,17 @@ from fecm.api import load_deck
 from fecm.deck import DeckError, Finding, read_deck
 from fecm.deck.format import format_deck
 from fecm.deck.macros import WORDS, estimate_work
-from fecm.deck.model import Impact, Indentation, Macro, Patch, Projectile, Segment, Shear
+from fecm.deck.model import (
+    Impact,
+    Indentation,
+    Macro,
+    Nonlinear,
+    Patch,
+    Preload,
+    Projectile,
+    Segment,
+    Shear,
+)
 from fecm.deck.reader import Reader
 from fecm.problem.slips import MODES
 from tests.calls import call
@@ -199,6 +209,9 @@ def test_a_new_deck_has_a_time_step_that_a_person_can_read() -> None:
         Projectile(0, 0, 1e-4, 0.0, 7.8e-9),
         Projectile(0, 0, 1e-4),
         Indentation(30000.0, 0.01, 0.0, 2.5, "ACR"),
+        Nonlinear(),
+        Preload(50.0),
+        Preload(-1 / 3, 0.0, 1e-300),
     ],
     ids=repr,
 )

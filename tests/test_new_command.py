@@ -167,6 +167,10 @@ def test_a_toughness_stands_in_for_one_that_a_ply_does_not_have() -> None:
 COUPLED = (*PLATE, "--layup", "[0_4/90_4]", "--velocity", "3000")
 
 
+NONLINEAR = (*PLATE, "--layup", "[0/90]2s", "--velocity", "3000", "--nonlinear")
+
+
+@pytest.mark.parametrize("plate", [COUPLED, NONLINEAR], ids=["coupled", "nonlinear"])
 @pytest.mark.parametrize(
     ("support", "in_plane", "left", "bottom"),
     [
@@ -177,11 +181,15 @@ COUPLED = (*PLATE, "--layup", "[0_4/90_4]", "--velocity", "3000")
         ("simple", "free", [False, False], [False, False]),
     ],
 )
-def test_the_edges_of_a_coupled_laminate_are_held_in_the_plane_as_asked(
-    support: str, in_plane: str | None, left: list[bool], bottom: list[bool]
+def test_the_edges_of_a_plate_that_stretches_are_held_in_the_plane_as_asked(
+    plate: tuple[str, ...],
+    support: str,
+    in_plane: str | None,
+    left: list[bool],
+    bottom: list[bool],
 ) -> None:
     asked = () if in_plane is None else ("--in-plane", in_plane)
-    found = held_in_plane(*COUPLED, "--support", support, *asked)
+    found = held_in_plane(*plate, "--support", support, *asked)
     assert found == {
         "left": left,
         "right": left,

@@ -85,13 +85,18 @@ SIDES = (100.0, 80.0)
          lambda: fecm.impact(
              fecm.Plate.on_fixture("D7136", (8, 6)),
              fecm.Laminate("[45/0/-45/90]3s", "AS4/8552", 0.184))),
+        ([*SIZE, *PLY, *SI, *LAW_OPTION, *MASS_OPTION, *GO, "--support", "clamped",
+          "--in-plane", "normal", "--nonlinear", "--preload", "-20,0.01kN/mm,3"],
+         lambda: fecm.impact(
+             fecm.Plate.rectangle(SIDES, (6, 4), support="clamped"), PLIES, MASS, LAW,
+             in_plane="normal", nonlinear=True, preload=(-20, "10N/mm", 3.0), **QUICK)),
         (["--mesh", str(CIRCLE), "--edge", "rim=clamped", *PLY, *SI, "--contact", "estimate:8",
           *MASS_OPTION, *GO, "--at", "3,4"],
          lambda: fecm.impact(
              imported(CIRCLE, {"rim": "clamped"}), PLIES, MASS, fecm.Contact.estimate(8.0),
              at=(3, 4), **QUICK)),
     ],
-    ids=["rectangle", "graded", "columns", "fixture", "imported"],
+    ids=["rectangle", "graded", "columns", "fixture", "nonlinear", "imported"],
 )  # fmt: skip
 def test_the_command_line_and_python_make_the_same_deck(options: list[str], made: Any) -> None:
     deck = made()

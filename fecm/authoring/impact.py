@@ -370,11 +370,11 @@ def _preload(asked: Request, plies: Plies) -> model.Preload | None:
     """PREL segment of a membrane force, if there is one."""
     if asked.preload is None:
         return None
-    given = list(asked.preload)
+    given = list(asked.preload) if isinstance(asked.preload, Iterable) else []
     forces = [in_units("preload", force, "force/length", plies.system) for force in given]
     known = [force for force in forces if isinstance(force, Real) and math.isfinite(force)]
     if len(known) < len(given) or len(given) not in (2, 3):
-        raise ObjectError(f"`preload` is {asked.preload!r}, not N0x, N0y and, if given, N0xy")
+        raise ObjectError(f"`preload` is {asked.preload!r}, not N0x, N0y and perhaps N0xy")
     return model.Preload(*map(float, known))
 
 

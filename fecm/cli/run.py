@@ -42,7 +42,7 @@ from fecm.mechanics.projectile import (
 )
 from fecm.mechanics.solutions import SingularStiffnessError
 from fecm.mechanics.stiffness_product import AUTO, SOLVERS
-from fecm.problem.build import ENERGY_LIMIT, RunOptions
+from fecm.problem.build import ENERGY_LIMIT, RunOptions, check_options
 from fecm.problem.memory import check_memory
 from fecm.problem.problem import Problem
 from fecm.problem.slips import NAMES, active_slips
@@ -217,6 +217,8 @@ def run(options: Options) -> None:
     except ValueError as error:
         raise click.UsageError(str(error)) from None
     problems = load_valid(options.deck, "; nothing was run", options.mode, force=options.force)
+    for problem in problems:
+        check_options(problem, choices)
     jobs = _jobs(problems, options)
     limit = options.fail_limit
     if limit is not None and not any(problem.work.passes["FAIL"] for problem in problems):

@@ -13,7 +13,7 @@ import numpy as np
 
 from fecm._errors import warn
 from fecm._typing import Floats
-from fecm.deck.model import Deck, Impact, Indentation, Projectile
+from fecm.deck.model import Deck, Impact, Indentation, Nonlinear, Projectile
 from fecm.deck.units import unit_names
 from fecm.identification.alignment import IdentifyError, check_measured, lags
 from fecm.identification.fitting import (
@@ -201,6 +201,11 @@ def identify(
 def _shared(deck: Deck) -> Runs:
     """The function that runs cases of a deck by one response of its plate."""
     problem = problem_of(deck)
+    if problem.deck.has(Nonlinear):
+        raise StudyError(
+            "identify needs a linear plate, and the deck has NONL; fit a test at an energy that "
+            "leaves the deflection below a quarter of the plate's thickness, without NONL"
+        )
     if not shares_plate(problem):
         loads = "FORC, EXCD, TANG, FORM and SOLV"
         needed = f"impact steps (RODP) of one size, and a plate without {loads}"

@@ -6,6 +6,7 @@ from dataclasses import field, replace
 
 import numpy as np
 
+from fecm._errors import FecmError
 from fecm._frozen import frozen
 from fecm._typing import Bools
 from fecm.deck import model
@@ -62,6 +63,24 @@ class RunOptions:
             raise ValueError(f"threads is {self.threads}; it must be 0 or more")
         if not self.energy_limit > 0.0:
             raise ValueError(f"energy_limit is {self.energy_limit:g}; it must be positive")
+
+
+class OptionsError(FecmError, ValueError):
+    """A problem can't be run with the options."""
+
+
+def check_options(problem: Problem, options: RunOptions) -> None:
+    """Raise OptionsError if a nonlinear plate is to be run as only linear ones can be."""
+    if not problem.deck.has(model.Nonlinear):
+        return
+    if options.solver == CSR:
+        known = ", ".join(solver for solver in SOLVERS if solver != CSR)
+        raise OptionsError(
+            f"the solver {CSR} has one matrix for all displacements, and the plate is nonlinear "
+            f"(NONL); take one of {known}"
+        )
+    if "jacobian" in options.slips:
+        raise OptionsError("the slip jacobian is for linear plates only, and the deck has NONL")
 
 
 @frozen

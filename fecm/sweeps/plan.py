@@ -16,7 +16,7 @@ from typing import Any
 
 from fecm._version import __version__
 from fecm.deck.macros import flat
-from fecm.deck.model import Deck, Delamination, Gages
+from fecm.deck.model import Deck, Delamination, Gages, Nonlinear
 from fecm.problem.problem import Problem
 from fecm.results.metrics import COLUMNS, FOUND, GAGE, SUMMARY
 from fecm.results.metrics import THRESHOLD as OF_THRESHOLD
@@ -166,7 +166,9 @@ def _check_limits(
 
 
 def shares_plate(checked: Problem) -> bool:
-    """Whether a program has only impact steps of one size, and the plate no other loads."""
+    """Whether a program has only impact steps of one size, and a linear plate no other loads."""
+    if checked.deck.has(Nonlinear):
+        return False
     words = [macro.word for macro in flat(checked.program)]
     sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
     if "RODP" not in words or len(sizes) != 1 or words.index("DT") > words.index("RODP"):

@@ -86,6 +86,18 @@ def ply_property(name: str) -> PlateSetter:
     return changed
 
 
+def preload_force(name: str) -> PlateSetter:
+    """Setter of a force of the preload; a deck without one gets it."""
+
+    def changed(deck: model.Deck, value: Value) -> model.Deck:
+        old = deck.last(model.Preload)
+        fields: dict[str, Any] = {name: float(value)}  # mypy compares each with every field
+        new = replace(old or model.Preload(0.0), **fields, source=None)
+        return swapped(deck, old, new)
+
+    return changed
+
+
 def _common_thickness(name: str, deck: model.Deck) -> float:
     """Thickness of every ply; CasesError if they differ."""
     first, *others = (layer.thickness for layer in deck.require(model.Material).layers)

@@ -123,6 +123,12 @@ PLATE_VALUES: tuple[Variable[PlateSetter], ...] = (
              meaning="as in [`fecm new`](making.md), with the ply thickness of the deck"),
     Variable("angle", Changes.LAMINATE, "", plates.add_angle,
              meaning="degrees added to the angle of every ply"),
+    Variable("preload_x", Changes.LAMINATE, "force/length", plates.preload_force("n_x"),
+             meaning="membrane force N0x of `PREL`, tension positive; a deck without it gets it"),
+    Variable("preload_y", Changes.LAMINATE, "force/length", plates.preload_force("n_y"),
+             meaning="the same for N0y"),
+    Variable("preload_xy", Changes.LAMINATE, "force/length", plates.preload_force("n_xy"),
+             meaning="the same for N0xy"),
     Variable("size", Changes.PLATE, "", plates.set_size, Kind.TEXT,
              meaning="`AxB`: sides of the plate; coordinates are scaled along x and y, and with "
                      "them the centre of the patch and the gages"),
