@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +24,7 @@ from fecm.sweeps.plan import shares_plate
 from fecm.sweeps.vary import apply_case
 from tests.builders import DATA
 from tests.calls import assert_unusable, call
+from tests.decks import ROOT
 
 LAW = fecm.Contact(1e5, 0.0, 0.0, 1.5)
 MASS = fecm.RigidMass(1e-3)
@@ -264,6 +266,29 @@ def test_check_names_kinematics_and_preload_in_one_line_each(tmp_path: Path) -> 
     assert summary["nonlinear"] is True
     assert summary["free_in_plane"] == 49
     assert summary["preload"] == [50.0, -2.5, 0.0]
+
+
+# Preload by a static solution --------------------------------------------------------------------
+
+
+def test_displaced_edges_before_an_impact_are_the_preload_of_their_strain() -> None:
+    page = (ROOT / "docs" / "making.md").read_text(encoding="utf-8")
+    (recipe,) = re.findall(r"```text\n(FORC\n.*?END\n)```", page, re.DOTALL)
+    displaced, newton = recipe.split("...\nMACR\n")
+    newton = newton[: newton.index("LMAS")]
+    made = deck()
+    rigidity = load_deck(made).problems[0].laminate.A
+    forces = rigidity @ [0.0004, 0.0, 0.0]
+    loaded = made.to_text().replace("EXPE\n", f"{displaced}EXPE\n")
+    results = [
+        fecm.run_one(loaded.replace("MACR\n", f"MACR\n{newton}")),
+        fecm.run_one(made.with_(preload_x=forces[0], preload_y=forces[1])),
+        fecm.run_one(made),
+    ]
+    by_hand, by_card, without = (result.force for result in results)
+    peak = without.max()
+    assert np.abs(by_hand - by_card).max() < 1e-9 * peak
+    assert np.abs(by_card - without).max() > 1e-6 * peak
 
 
 # Sweeps ------------------------------------------------------------------------------------------
