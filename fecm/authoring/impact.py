@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from numbers import Real
 from types import UnionType
 from typing import Literal, NamedTuple
 
@@ -17,7 +16,7 @@ from fecm.authoring.fixtures import DropWeight
 from fecm.authoring.laminate import Laminate, Plies, damages, plies_of, toughness
 from fecm.authoring.mesh import InPlane, placed, supported
 from fecm.authoring.numerics import AUTO, FULL, MITC, Numerics, Quadrature
-from fecm.authoring.parameters import ObjectError, check_positive, in_units
+from fecm.authoring.parameters import ObjectError, check_positive, in_units, is_finite
 from fecm.authoring.plate import Plate
 from fecm.deck import model
 from fecm.deck.catalogue import STANDARD, SYSTEM, SYSTEMS, NamedContact
@@ -372,7 +371,7 @@ def _preload(asked: Request, plies: Plies) -> model.Preload | None:
         return None
     given = list(asked.preload) if isinstance(asked.preload, Iterable) else []
     forces = [in_units("preload", force, "force/length", plies.system) for force in given]
-    known = [force for force in forces if isinstance(force, Real) and math.isfinite(force)]
+    known = [force for force in forces if is_finite(force)]
     if len(known) < len(given) or len(given) not in (2, 3):
         raise ObjectError(f"`preload` is {asked.preload!r}, not N0x, N0y and perhaps N0xy")
     return model.Preload(*map(float, known))

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from numbers import Real
+from typing import TypeGuard
 
 from fecm._errors import FecmError
 from fecm.deck.catalogue import SYSTEMS
@@ -24,6 +25,11 @@ EXAMPLES = {
 
 class ObjectError(FecmError, ValueError):
     """Objects that make no deck; messages quote the names of parameters in backquotes."""
+
+
+def is_finite(value: object) -> TypeGuard[float]:
+    """Whether a parameter is a finite number."""
+    return isinstance(value, Real) and math.isfinite(value)
 
 
 def check_positive(**values: float | None) -> None:
