@@ -6,20 +6,28 @@ of first-order shear deformation theory, computed by another program.
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
-from fecm.deck.model import Ply
+import fecm
+from fecm import _memory
+from fecm.api import load_deck
+from fecm.deck.model import Allowables, Material, Ply
 from fecm.mechanics import element_matrices
+from fecm.mechanics.buckling import buckling_factor
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import element_blocks
 from fecm.mechanics.plate import UNLOADED, PlateModel
+from fecm.mechanics.ply_stresses import uniform_exposures
 from fecm.mechanics.solutions import modes
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
+from fecm.problem.summary import ProblemSummary
+from fecm.results.result import Result
 from tests.builders import (
     SKEWED,
     Floats,
@@ -36,6 +44,7 @@ from tests.builders import (
     with_restraints,
 )
 from tests.patches import MeshMaker, area_of
+from tests.sound_plate import base, with_card
 
 Force = tuple[float, float, float]
 
@@ -64,6 +73,12 @@ def free_plate(maker: MeshMaker, kind: int, preload: Force = PRELOAD) -> PlateMo
     coordinates, elements = maker(3, 4, kind)
     mesh = with_restraints(coordinates, elements, nothing(coordinates))
     return PlateModel(mesh, general_plate(), rules(), preload=preload)
+
+
+def scaled(preload: Force, factor: float) -> Force:
+    """A multiple of a preload."""
+    n_x, n_y, n_xy = preload
+    return factor * n_x, factor * n_y, factor * n_xy
 
 
 def tilted(coordinates: Floats) -> Floats:
@@ -170,3 +185,263 @@ def test_a_strong_tension_shortens_both_time_steps() -> None:
     assert critical_time_step(model) == pytest.approx(exact, rel=5e-5)
     assert 0.8 * exact < safe_time_step(model) <= exact
     assert exact < 0.5 * critical_time_step(replace(model, preload=UNLOADED))
+
+
+# Buckling ----------------------------------------------------------------------------------------
+
+DIRECTIONS: dict[str, Force] = {
+    "x": (-1.0, 0.0, 0.0),
+    "y": (0.0, -1.0, 0.0),
+    "biaxial": (-1.0, -1.0, 0.0),
+}
+
+
+@pytest.mark.parametrize("load", DIRECTIONS)
+def test_the_buckling_load_is_naviers(load: str) -> None:
+    expected = min(
+        float(row["N_critical_N_per_mm"])
+        for row in table("preload_buckling.csv")
+        if row["load"] == load
+    )
+    plate = replace(reference_plate(16), preload=scaled(DIRECTIONS[load], expected / 2.0))
+    assert buckling_factor(plate) == pytest.approx(2.0, rel=2e-4)
+
+
+@pytest.mark.parametrize("n", [2, 4])  # a dense and a sparse solution
+@pytest.mark.parametrize(
+    "preload", [(-900.0, 1000.0, 0.0), (-20.0, 5.0, 30.0), (0.0, 0.0, -90.0), (-70.0, 0.0, 0.0)]
+)
+def test_at_the_buckling_load_the_lowest_eigenvalue_is_zero(n: int, preload: Force) -> None:
+    plate = replace(reference_plate(n), preload=preload)
+    factor = buckling_factor(plate)
+    K, free = (one.stiffness.toarray() for one in (plate, replace(plate, preload=UNLOADED)))
+    scale = np.sqrt(np.outer(plate.mass, plate.mass))
+
+    def lowest(times: float) -> float:
+        return float(np.linalg.eigvalsh((free + times * (K - free)) / scale)[0])
+
+    unloaded = lowest(0.0)
+    assert abs(lowest(factor)) < 1e-7 * unloaded
+    # It is the first one: there is none below.
+    assert all(lowest(share * factor) > 0.0 for share in (0.25, 0.5, 0.75, 0.99))
+
+
+@pytest.mark.parametrize("n", [2, 8])
+def test_the_buckling_factor_is_inverse_to_the_preload(n: int) -> None:
+    plate = replace(reference_plate(n), preload=(-50.0, 10.0, 20.0))
+    factor = buckling_factor(plate)
+    for times in (0.1, 3.0, 1000.0):
+        more = replace(plate, preload=scaled(plate.preload, times))
+        assert buckling_factor(more) == pytest.approx(factor / times, rel=1e-7)
+
+
+def test_the_buckling_factor_is_the_same_number_every_time() -> None:
+    plate = replace(reference_plate(8), preload=(-50.0, 10.0, 20.0))
+    assert buckling_factor(plate) == buckling_factor(replace(plate))
+
+
+@pytest.mark.parametrize("preload", [UNLOADED, (10.0, 0.0, 0.0), (10.0, 5.0, 7.0), (0.0, 3.0, 0.0)])
+def test_a_plate_in_tension_does_not_buckle(preload: Force) -> None:
+    plate = replace(reference_plate(2), preload=preload)
+    assert not plate.is_compressed
+    assert buckling_factor(plate) == np.inf
+
+
+@pytest.mark.parametrize("preload", [(-1e-3, 0.0, 0.0), (10.0, 5.0, 7.1), (0.0, -1.0, 0.0)])
+def test_a_negative_principal_force_compresses(preload: Force) -> None:
+    assert replace(reference_plate(2), preload=preload).is_compressed
+    n_x, n_y, n_xy = preload
+    assert np.linalg.eigvalsh([[n_x, n_xy], [n_xy, n_y]])[0] < 0.0
+
+
+def test_a_compression_far_below_buckling_has_an_infinite_factor() -> None:
+    plate = replace(reference_plate(8), preload=(-0.1, 0.0, 0.0))
+    assert buckling_factor(plate) == np.inf
+
+
+@pytest.mark.parametrize("n", [1, 4])
+def test_a_plate_that_moves_freely_has_the_buckling_factor_zero(n: int) -> None:
+    coordinates, elements = square(n, n)
+    mesh = with_restraints(coordinates, elements, nothing(coordinates))
+    plate = PlateModel(mesh, cross_ply(), rules(), preload=(-1.0, 0.0, 0.0))
+    assert buckling_factor(plate) == 0.0
+
+
+def test_too_little_memory_for_the_buckling_load_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(_memory, "UNNOTICED", 0)
+    monkeypatch.setattr(_memory, "available", lambda: 1000)
+    plate = replace(reference_plate(4), preload=(-1.0, 0.0, 0.0))
+    with pytest.raises(_memory.NotEnoughMemoryError, match="buckling"):
+        buckling_factor(plate)
+
+
+# Findings and the summary ------------------------------------------------------------------------
+
+
+def preloaded(card: str) -> str:
+    """The sound plate, 100 x 100 mm, under a preload in N/mm."""
+    return with_card("PREL", card)(base())
+
+
+def codes(text: str) -> set[str]:
+    """Codes of the findings about the preload."""
+    return {finding.code for finding in load_deck(text).findings} & {"E486", "E487", "W488", "W489"}
+
+
+def test_findings_follow_the_ratio_to_the_buckling_load() -> None:
+    # The plate of sound_plate buckles at about 602 N/mm along x.
+    (problem,) = load_deck(preloaded("-300.0")).problems
+    critical = 300.0 * problem.buckling_factor
+    expected = {0.5: set(), 0.9: set(), 0.92: {"W488"}, 0.999: {"W488"}, 1.001: {"E487"}}
+    for share, found in expected.items():
+        assert codes(preloaded(f"{-share * critical:.6g}")) == found, share
+
+
+def test_the_message_names_the_ratio_to_the_buckling_load() -> None:
+    (problem,) = load_deck(preloaded("-300.0")).problems
+    card = f"{-1.23 * 300.0 * problem.buckling_factor:.6g}"
+    (error,) = load_deck(preloaded(card)).errors()
+    assert "1.23 times the buckling load" in error.message
+
+
+def test_compression_of_a_free_plate_is_an_error_and_tension_none() -> None:
+    free = re.sub(r"(?m)^BOUN\n(.+\n)*", "", base())
+    assert codes(with_card("PREL", "-1.0")(free)) == {"E486"}
+    assert codes(with_card("PREL", "1.0")(free)) == set()
+
+
+def test_a_preload_beyond_the_strength_of_a_ply_is_found() -> None:
+    (finding,) = [f for f in load_deck(preloaded("2000.")).findings if f.code == "W489"]
+    assert "ply 4" in finding.message
+    # The 90-degree plies, by maximum stress: sigma_2/YT of Hooke's law.
+    (problem,) = load_deck(preloaded("1.0")).problems
+    laminate, ply = problem.laminate, problem.deck.require(Material).ply
+    strain = np.linalg.inv(laminate.A)[:, 0]
+    q22 = ply.e2 / (1.0 - ply.nu12**2 * ply.e2 / ply.e1)
+    sigma_2 = q22 * (strain[0] + ply.nu12 * strain[1])
+    limit = 62.3 / sigma_2
+    assert codes(preloaded(f"{1.001 * limit:.6g}")) >= {"W489"}
+    (worst,) = [
+        one
+        for one in uniform_exposures(laminate, problem.deck.require(Allowables), 100.0 * strain)
+        if one.criterion == "max_stress"
+    ]
+    assert worst.exposure == pytest.approx(100.0 / limit, rel=1e-12)
+    assert (worst.mode, worst.ply) == ("matrix tension", 4)
+
+
+@pytest.mark.parametrize(
+    ("card", "line"),
+    [
+        ("-300.0", "buckling load       2.005 times the preload"),
+        ("-1.0", "buckling load       more than 64 times the preload"),
+    ],
+)
+def test_the_summary_has_the_buckling_load(card: str, line: str) -> None:
+    (problem,) = load_deck(preloaded(card)).problems
+    assert f"  {line}" in ProblemSummary(problem).lines()
+
+
+def test_a_plate_without_compression_has_no_line_about_buckling() -> None:
+    for text in (base(), preloaded("1.0")):
+        (problem,) = load_deck(text).problems
+        summary = ProblemSummary(problem)
+        assert summary.buckling_factor is None
+        assert not any("buckling" in line for line in summary.lines())
+
+
+# Results -----------------------------------------------------------------------------------------
+
+STORING = """LOOP         40
+TIME
+RODP         20
+STRE         20
+PLYS         20
+FAIL         20
+NEXT
+"""
+
+
+def short_run(text: str) -> Result:
+    """Run forty steps of a deck, storing strains, ply stresses and exposures."""
+    return fecm.run_one(re.sub(r"(?m)^LOOP(.*\n)*?NEXT\n", STORING, text), solver="numpy")
+
+
+@cache
+def runs() -> tuple[Result, Result]:
+    """Short runs without and with a preload so small that it hardly changes the motion."""
+    gage = with_card("GAGE", "1,30.,30.,1.472,20.", "")
+    return short_run(gage(base())), short_run(gage(preloaded("2e-3,-1e-3,5e-4")))
+
+
+def test_membrane_forces_include_the_preload_and_strains_do_not() -> None:
+    without, preloaded_one = runs()
+    for name, n in zip(("N_x", "N_y", "N_xy"), (2e-3, -1e-3, 5e-4), strict=True):
+        assert np.abs(without[f"stresses/{name}"]).max() < 1e-12
+        assert np.abs(preloaded_one[f"stresses/{name}"] - n).max() < 1e-12
+    for name in ("eps_xx", "eps_yy", "gamma_xy"):
+        assert not preloaded_one[f"stresses/{name}"].any()
+
+
+def test_ply_stresses_are_those_of_bending_and_of_the_preload() -> None:
+    without, preloaded_one = runs()
+    # Force balance: the plies together carry N0, whatever their angles.
+    z, angles = without["plies/z"], preloaded_one.plies().angles
+    differences = [
+        (preloaded_one[f"plies/{name}"] - without[f"plies/{name}"])[0].mean(axis=-1)
+        for name in ("sigma_1", "sigma_2", "tau_12")
+    ]
+    one, two, shear = differences
+    c, s = np.cos(np.deg2rad(angles)), np.sin(np.deg2rad(angles))
+    thickness = z[:, 2] - z[:, 0]
+    n_x = ((c**2 * one + s**2 * two - 2.0 * c * s * shear) * thickness).sum(axis=-1)
+    n_y = ((s**2 * one + c**2 * two + 2.0 * c * s * shear) * thickness).sum(axis=-1)
+    n_xy = ((c * s * (one - two) + (c**2 - s**2) * shear) * thickness).sum(axis=-1)
+    for found, expected in ((n_x, 2e-3), (n_y, -1e-3), (n_xy, 5e-4)):
+        np.testing.assert_allclose(found, expected, rtol=2e-4)
+    for name in ("tau_xz", "tau_yz"):
+        scale = np.abs(without[f"plies/{name}"]).max()
+        change = preloaded_one[f"plies/{name}"] - without[f"plies/{name}"]
+        assert np.abs(change).max() < 1e-5 * scale
+
+
+def test_the_result_names_the_preload_and_gages_leave_it_out() -> None:
+    without, preloaded_one = runs()
+    named = preloaded_one.attributes_of("laminate")
+    assert [named[f"N0_{axis}"] for axis in ("x", "y", "xy")] == [2e-3, -1e-3, 5e-4]
+    assert preloaded_one.attributes_of("gages")["preload"] == "excluded"
+    assert "preload" not in without.attributes_of("gages")
+    assert "N0_x" not in without.attributes_of("laminate")
+    scale = np.abs(without["gages/strain"]).max()
+    change = preloaded_one["gages/strain"] - without["gages/strain"]
+    assert np.abs(change).max() < 1e-5 * scale
+
+
+@pytest.mark.parametrize("solver", ["numpy", "auto"])
+def test_exposures_begin_with_those_of_the_preload(solver: str) -> None:
+    text = re.sub(r"(?m)^LOOP(.*\n)*?NEXT\n", STORING, preloaded("500."))
+    result = fecm.run_one(text, solver=solver)
+    (problem,) = load_deck(text).problems
+    strengths = problem.deck.require(Allowables)
+    expected = uniform_exposures(problem.laminate, strengths, problem.plate.preload_strain)
+    assert result["exposures/step"].tolist() == [0, 20, 40]
+    assert result["exposures/time"][0] == 0.0
+    first = [one.exposure for one in expected]
+    assert result["exposures/exposure"][0, :4] == pytest.approx(first, rel=1e-12)
+    # Bending adds to them: linear exposures of stress states exactly so.
+    assert np.all(result["exposures/exposure"][1, :4] > first)
+    assert result["failure/max_stress/exposure"].min() > 0.0
+
+
+def test_a_ply_that_the_preload_fails_has_failed_at_time_zero() -> None:
+    with pytest.warns(fecm.FecmWarning):
+        result = short_run(preloaded("2000."))
+    first = result.first_failures[0]
+    assert (first.time, first.force, first.energy) == (0.0, 0.0, 0.0)
+    assert first.ply == 4
+
+
+def test_strains_are_judged_with_those_of_the_preload() -> None:
+    with pytest.warns(fecm.FecmWarning, match="strain reaches 1"):
+        result = short_run(preloaded("2000."))
+    assert "strain > 1 %" in result.validity

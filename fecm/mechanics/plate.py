@@ -64,6 +64,17 @@ class PlateModel:
         """Whether an initial membrane force acts."""
         return self.preload != UNLOADED
 
+    @property
+    def is_compressed(self) -> bool:
+        """Whether a principal value of the preload is negative, so that the plate can buckle."""
+        n_x, n_y, n_xy = self.preload
+        return n_x < 0.0 or n_y < 0.0 or n_xy**2 > n_x * n_y
+
+    @property
+    def preload_strain(self) -> Floats:
+        """Midplane strain A^-1 N0 of the preload, (3,); B is zero."""
+        return np.linalg.solve(self.laminate.A, np.array(self.preload))
+
     @cached_property
     def _free(self) -> Bools:
         return np.asarray(self.mesh.equations > 0)

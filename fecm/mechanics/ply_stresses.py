@@ -3,11 +3,13 @@
 z runs from the struck face, -h/2, to h/2; ply 1 is at the struck face.  Stresses of a ply are in
 its own axes; interlaminar shear stresses are in the axes of the plate.  Both are linear in the
 midplane strains eps and the curvatures kappa, eps(z) = eps + z kappa, or in their derivatives.
+An initial membrane force N0 adds the constant strain A^-1 N0.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -133,12 +135,18 @@ class PlyStresses:
     """Stresses of the plies of some elements: rows of the mesh, ascending; all by default.
 
     The rule has the points of the in-plane stresses; the interlaminar ones belong to the element's
-    centre.
+    centre.  `initial` is a uniform midplane strain of the undeformed plate, (3,).
     """
 
     def __init__(
-        self, mesh: Mesh, laminate: Laminate, rule: Quadrature, members: Indices | None = None
+        self,
+        mesh: Mesh,
+        laminate: Laminate,
+        rule: Quadrature,
+        members: Indices | None = None,
+        initial: Floats | None = None,
     ) -> None:
+        self._initial = initial
         self.members = np.arange(len(mesh.elements)) if members is None else members
         elements = mesh.elements[self.members]
         self.z = laminate.plies.z
@@ -161,7 +169,7 @@ class PlyStresses:
         Returns
         -------
         strains : ndarray (elements, points, 6)
-            eps_xx, eps_yy, gamma_xy, kappa_x, kappa_y, kappa_xy.
+            eps_xx, eps_yy, gamma_xy with the initial strain; kappa_x, kappa_y, kappa_xy.
         gradients : ndarray (elements, 2, 6)
             Derivatives with respect to x and y at the centre; NaN in elements without 9 nodes.
         """
@@ -174,6 +182,8 @@ class PlyStresses:
             if curved is not None:
                 # By x, y of the derivatives by x, y: xx, xy; xy, yy.
                 gradients[family.rows] = _strains((curved @ q)[:, [[0, 2], [2, 1]]])
+        if self._initial is not None:
+            strains[..., :3] += self._initial
         return strains, gradients
 
     def evaluate(self, field: Floats) -> dict[str, Floats]:
@@ -208,6 +218,30 @@ def is_complete(elements: Ints) -> Bools:
     nodes = np.zeros((len(elements), 12), dtype=bool)
     nodes[:, : elements.shape[1]] = elements > 0
     return np.asarray(nodes[:, :9].all(axis=1) & ~nodes[:, 9:].any(axis=1))
+
+
+class UniformExposure(NamedTuple):
+    """Largest exposure of a criterion under a uniform midplane strain."""
+
+    criterion: str
+    exposure: float
+    mode: str
+    ply: int  # from 1 at the struck face
+
+
+def uniform_exposures(
+    laminate: Laminate, strengths: failure.Strengths, strain: Floats
+) -> list[UniformExposure]:
+    """Largest exposure of each criterion under a uniform midplane strain, (3,)."""
+    stresses = np.moveaxis(in_plane_stresses(laminate)[:, 0, :, :3] @ strain, 1, 0)
+    found = []
+    for name, criterion in failure.CRITERIA.items():
+        candidates = criterion(strengths, *stresses)
+        exposure = failure.exposure_of(candidates)
+        ply = int(exposure.argmax())
+        mode = failure.MODES[int(failure.modes_of(candidates)[ply])]
+        found.append(UniformExposure(name, float(exposure[ply]), mode, ply + 1))
+    return found
 
 
 # Largest exposures over time: of all states, and modes only where an exposure rises ---------------

@@ -27,6 +27,9 @@ DENSE = 60
 # Shift of the spectrum relative to the largest eigenvalue, about half the digits of a double, which
 # makes the matrix of a plate without supports regular.
 SHIFT = 1.0e-9
+# Bytes of the factors of n equations without coupling, over n log2 n: an upper bound of what was
+# measured.
+FACTORS = 300
 # Eigenvalue of the supported rigid motions, relative to the largest, below which one is free.
 NOT_HELD = 1.0e-9
 
@@ -78,6 +81,25 @@ def in_plane_pins(plate: PlateModel) -> list[int]:
         gram = gram + np.outer(motions[node, dof], motions[node, dof])
 
 
+def factorised(matrix: sparse.csr_array) -> SuperLU:
+    """LU factors of a symmetric matrix; raises SingularStiffnessError if there are none."""
+    from scipy.sparse.linalg import MatrixRankWarning, splu
+
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", MatrixRankWarning)
+            # K is positive definite; pivoting only costs fill, a factor of 40 on a plate of
+            # 30 x 30 elements.
+            return splu(
+                matrix.tocsc(),
+                permc_spec="MMD_AT_PLUS_A",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
+            )
+    except (RuntimeError, MatrixRankWarning) as error:
+        raise SingularStiffnessError(f"the stiffness is singular ({error})") from None
+
+
 class Tangent:
     """The factorised stiffness about a field; raises SingularStiffnessError if that fails.
 
@@ -85,28 +107,14 @@ class Tangent:
     """
 
     def __init__(self, plate: PlateModel, field: Floats | None = None) -> None:
-        # 0.2 s, which most runs don't need.
-        from scipy.sparse import diags_array
-        from scipy.sparse.linalg import MatrixRankWarning, splu
+        from scipy.sparse import diags_array  # 0.2 s, which most runs don't need
 
         self._stiffness = held = tangent_stiffness(plate, field)
         if pins := in_plane_pins(plate):
             springs = np.zeros(plate.neq)
             springs[pins] = held.diagonal()[pins]
             held = held + diags_array(springs, format="csr")
-        try:
-            with warnings.catch_warnings():
-                warnings.simplefilter("error", MatrixRankWarning)
-                # K is positive definite; pivoting only costs fill, a factor of 40 on a plate of
-                # 30 x 30 elements.
-                self._factors: SuperLU = splu(
-                    held.tocsc(),
-                    permc_spec="MMD_AT_PLUS_A",
-                    diag_pivot_thresh=0.0,
-                    options={"SymmetricMode": True},
-                )
-        except (RuntimeError, MatrixRankWarning) as error:
-            raise SingularStiffnessError(f"the stiffness is singular ({error})") from None
+        self._factors = factorised(held)
 
     def solve(self, residual: Floats, displacement: Floats | None = None) -> Floats:
         """Displacement under a load, (neq,); SingularStiffnessError if they do not balance.

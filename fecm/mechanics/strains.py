@@ -32,12 +32,16 @@ STRAIN_BLOCK = 256
 
 
 def strains_and_resultants(
-    strains: StrainField, laminate: Laminate, field: Floats
+    strains: StrainField,
+    laminate: Laminate,
+    field: Floats,
+    preload: tuple[float, float, float],
 ) -> dict[str, Floats]:
     """Midplane strains, curvatures, transverse shear strains and resultants (equation 2-20).
 
     Each is (numel, npt), by the names of :data:`GENERALISED_STRAINS` and :data:`RESULTANTS`, of a
-    displacement field (numnp, 5).
+    displacement field (numnp, 5).  The membrane forces include `preload`, N_x, N_y, N_xy of the
+    undeformed plate; the strains do not.
     """
     bending = strains.evaluate(field)
     # The curvatures of the rotations (-u, -v) are the midplane strains of u and v.
@@ -46,6 +50,8 @@ def strains_and_resultants(
     membrane = strains.evaluate(in_plane)[:3]
     curvature, shear = bending[:3], bending[[4, 3]]
     N = np.tensordot(laminate.A, membrane, 1) + np.tensordot(laminate.B, curvature, 1)
+    if any(preload):
+        N += np.reshape(preload, (3, 1, 1))
     M = np.tensordot(laminate.B, membrane, 1) + np.tensordot(laminate.D, curvature, 1)
     Q = np.tensordot(laminate.shear, shear, 1)
     values = np.concatenate([membrane, curvature, shear, N, M, Q])

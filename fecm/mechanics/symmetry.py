@@ -121,9 +121,15 @@ def restrain_resting_dofs(plate: PlateModel, contact: Floats | None) -> PlateMod
     stretches = plate.laminate.is_coupled or plate.nonlinear
     if not (in_plane and others) or pulled or stretches:
         return plate
-    codes = mesh.codes.copy()
+    return restrain_plane(plate)
+
+
+def restrain_plane(plate: PlateModel) -> PlateModel:
+    """Restrain the in-plane dofs of a plate."""
+    codes = plate.mesh.codes.copy()
     codes[:, :2] = 1
-    return replace(plate, mesh=replace(mesh, codes=codes, equations=equation_numbers(codes)))
+    mesh = replace(plate.mesh, codes=codes, equations=equation_numbers(codes))
+    return replace(plate, mesh=mesh)
 
 
 def _images(plate: PlateModel, contact: Floats | None) -> tuple[Indices, Indices] | None:

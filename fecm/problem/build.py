@@ -206,14 +206,15 @@ def _stresses(
     """Ply stresses of PLYS, and the failure criteria of FAIL; None where there is no such macro."""
     words = {macro.word: macro for macro in flat(problem.program)}
     points = problem.rules[2]
+    initial = plate.preload_strain if plate.is_preloaded else None
     plies = failure = None
     if "PLYS" in words:  # the M elements nearest to the load, or all
         nearest = np.argsort(problem.distances.round(9), kind="stable")
         rows = np.sort(nearest[: int(words["PLYS"].second) or None])
-        plies = PlyStresses(problem.mesh, plate.laminate, points, rows)
+        plies = PlyStresses(problem.mesh, plate.laminate, points, rows, initial)
     if "FAIL" in words:
         kind = CompiledMonitor if compiled else FailureMonitor
-        stresses = PlyStresses(problem.mesh, plate.laminate, points)
+        stresses = PlyStresses(problem.mesh, plate.laminate, points, initial=initial)
         failure = kind(stresses, plate.laminate, problem.deck.require(model.Allowables))
     return plies, failure
 

@@ -20,6 +20,7 @@ from fecm.problem.generate import generate, rod_diameters
 from fecm.problem.parts import W
 from fecm.problem.problem import Problem
 from fecm.problem.rules import (
+    buckling,
     contact,
     damage,
     damping,
@@ -198,6 +199,7 @@ def _check_run(checked: Problem, findings: Findings, sound: Callable[[], bool]) 
         apply(mesh.OF_SUPPORTS, findings, checked)
         if checked.deck.has(model.Nonlinear):
             apply(nonlinear.OF_SYMMETRY, findings, checked)
+        apply_first(buckling.OF_PRELOAD, findings, checked)
         check_values(checked, findings)
         if time_step.takes_steps(checked):
             apply(time_step.OF_CONTACT, findings, checked)

@@ -19,7 +19,7 @@ from fecm.mechanics import interpolation
 from fecm.mechanics.mesh import congruence
 from fecm.mechanics.plate import ASSEMBLED, BLOCK, PlateModel
 from fecm.mechanics.projectile import REPORT_ELEMENTS
-from fecm.mechanics.solutions import DENSE
+from fecm.mechanics.solutions import DENSE, FACTORS
 from fecm.mechanics.stiffness_product import AUTO, CSR, WORTH_GROUPING
 from fecm.problem.problem import Problem
 from fecm.results.sinks import RowBuffer
@@ -30,9 +30,7 @@ POINT = 250  # bytes per strain point of an element: Jacobians and strains
 KEPT = 12  # bytes per entry of the element matrices that are kept
 INTEGRATED = 24  # and of one under integration, for each row of B and point
 ROWS = 8  # strains in B: six of the membrane and of bending, two of the transverse shear
-# Bytes of factors of a plate without coupling.
-TANGENT = 300  # TANG's, over n log2 n
-SHIFTED = 70  # EIGE's, over n^1.5
+SHIFTED = 70  # bytes of EIGE's factors of a plate without coupling, over n^1.5
 STEP = 80  # bytes per step of the summary after a run
 STATIC = {"TANG", "EIGE"}
 
@@ -97,7 +95,7 @@ def _product(model: PlateModel, *, exact: bool) -> int:
 def _factors(model: PlateModel, words: set[str]) -> int:
     """Factors of the stiffness: n log n in a plane mesh ordered well, n^1.5 ordered by columns."""
     n = model.neq
-    total = TANGENT * n * math.log2(max(2, n)) if "TANG" in words else 0.0
+    total = FACTORS * n * math.log2(max(2, n)) if "TANG" in words else 0.0
     total += SHIFTED * n**1.5 if "EIGE" in words else 0.0
     # With coupling all 5 x 5 dofs of two nodes interact, instead of 2 x 2 and 3 x 3.
     return int(total * (25 / 13 if model.laminate.is_coupled else 1.0))

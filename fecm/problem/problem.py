@@ -12,6 +12,7 @@ from fecm._typing import Bools, Floats
 from fecm.deck import model
 from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, moves_only
 from fecm.deck.model import Deck
+from fecm.mechanics.buckling import buckling_factor
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import CRITERIA
 from fecm.mechanics.laminate import Laminate, effective_rigidity, threshold_force
@@ -108,6 +109,11 @@ class Problem:
     def critical_time_step(self) -> float:
         """Critical time step of the moving plate, which limits the program."""
         return critical_time_step(self.moving_plate)
+
+    @cached_property
+    def buckling_factor(self) -> float:
+        """Factor on the preload at which the plate buckles; infinite if that is far away."""
+        return buckling_factor(self.plate)
 
     @cached_property
     def contact_step(self) -> ContactStep | None:

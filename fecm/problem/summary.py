@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from contextlib import suppress
 from dataclasses import replace
 
@@ -12,6 +13,7 @@ from fecm._typing import Floats
 from fecm.deck.macros import flat
 from fecm.deck.model import Shear
 from fecm.deck.units import MASS, mass_in_si, unit_names, unit_of
+from fecm.mechanics.buckling import FAR
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
 from fecm.mechanics.solutions import SingularStiffnessError, compliance
@@ -82,6 +84,9 @@ class ProblemSummary:
         self.critical_time_step = float("nan")
         with suppress(UnsoundPlateError):  # the check reports it if the program takes steps
             self.critical_time_step = problem.critical_time_step
+        # Factor on the preload at which the plate buckles, infinite if that is far away; None where
+        # the preload does not compress the plate.
+        self.buckling_factor = problem.buckling_factor if plate.is_compressed else None
         self.time_steps = [m.value for m in flat(problem.program) if m.word == "DT"]
         self.output_bytes = problem.output_bytes  # approximate size of the result
         # Elements at the impact node per bending wave of the contact, and the estimated mesh error
@@ -133,6 +138,10 @@ class ProblemSummary:
             f"  projectile mass     {mass(self.projectile_mass)}",
             f"  critical time step  {quantity(self.critical_time_step, 'time')}",
         ]
+        if self.buckling_factor is not None:
+            far = math.isinf(self.buckling_factor)
+            times = f"more than {FAR:g}" if far else f"{self.buckling_factor:.4g}"
+            lines.append(f"  buckling load       {times} times the preload")
         for dt in dict.fromkeys(self.time_steps):
             dt = dt or SAFE * self.critical_time_step
             share = dt / self.critical_time_step

@@ -251,8 +251,8 @@ def store_stresses(run: Simulation, n: int) -> None:
     """STRE."""
     if run.interpreter.current_pass % n:
         return
-    plate, points = run.state.plate, run.model.stress_points
-    values = strains_and_resultants(points, run.model.plate.laminate, run.displacement_field())
+    plate, model, points = run.state.plate, run.model.plate, run.model.stress_points
+    values = strains_and_resultants(points, model.laminate, run.displacement_field(), model.preload)
     run.recorder.row("stresses", plate.step, plate.time, values)
     run.printer.stresses(values, points.places(run.problem.mesh.coordinates), run.state.clock)
 

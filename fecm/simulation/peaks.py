@@ -78,18 +78,23 @@ def _indentations(simulation: Simulation, result: Result) -> Iterator[Peak]:
 
 
 def _face_strains(simulation: Simulation, result: Result, group: str) -> Iterator[Peak]:
-    """Peaks of the strains of a group, `tape8` without membrane strains or `stresses`."""
+    """Peaks of the strains of a group, `tape8` without membrane strains or `stresses`.
+
+    With the uniform strain of the preload.
+    """
     model, problem = simulation.model, simulation.problem
     half = model.plate.laminate.thickness / 2.0
+    preload = model.plate.preload_strain if model.plate.is_preloaded else np.zeros(3)
     has_membrane = group == "stresses"
     points = model.stress_points if has_membrane else model.strains
     names = [*MEMBRANE, *BENDING] if has_membrane else [*BENDING]
     for times, values in _blocks(result, group, names):
         sizes = [max(part.max(), -part.min()) for part in values]
-        if sum(sizes[:-3]) + half * sum(sizes[-3:]) < STRAIN:
+        if np.abs(preload).sum() + sum(sizes[:-3]) + half * sum(sizes[-3:]) < STRAIN:
             continue  # a bound, as few runs come near the limit
+        membrane = values[:-3] or [np.zeros(())] * 3
         curvature = [half * kappa for kappa in values[-3:]]
-        middle = values[:-3] or [np.zeros(())] * 3
+        middle = [m + initial for m, initial in zip(membrane, preload, strict=True)]
         x, y = points.places(problem.mesh.coordinates)
         near = problem.under_load(x, y)
         for side in (1.0, -1.0):

@@ -37,6 +37,7 @@ class Recorder:
         has_impact = model.impact is not None
         self._room = {  # upper bound of the rows of each group
             **{group: sizes.passes[STORED_BY[group]] for group in AT_MACROS},
+            "exposures": sizes.passes["FAIL"] + model.plate.is_preloaded * bool(model.failure),
             "tape8": has_impact * sizes.contact_rows,
             "tape9": has_impact * (sizes.steps if tapes else sizes.contact_rows),
             "history": has_impact * sizes.steps,
@@ -93,6 +94,11 @@ class Recorder:
         if (patch := model.patch) is not None:
             values = {"shape": patch.shape, "radius": patch.radius, "x": patch.x, "y": patch.y}
             self._sink.attributes("patch", values)
+        if model.plate.is_preloaded:
+            values = dict(zip(("N0_x", "N0_y", "N0_xy"), model.plate.preload, strict=True))
+            self._sink.attributes("laminate", values)
+            if self._room["gages"]:
+                self._sink.attributes("gages", {"preload": "excluded"})
         if model.under_load is not None and model.failure is not None:
             self._sink.attributes("failure", {"modes": list(MODES)})
         for path, array in self._constants().items():

@@ -23,7 +23,7 @@ from fecm.results.schema import FORMAT_VERSION, Form
 from fecm.results.sinks import Sink
 from fecm.simulation.divergence import likely_cause
 from fecm.simulation.judge import judge
-from fecm.simulation.macros import bind, bind_loop
+from fecm.simulation.macros import STORING, bind, bind_loop
 from fecm.simulation.simulation import Observer, Simulation
 
 
@@ -49,6 +49,7 @@ def run(simulation: Simulation) -> None:
     problem, state = simulation.problem, simulation.state
     if not state.position:
         _write_header(simulation)
+        _evaluate_preload(simulation)
         simulation.printer.problem(problem.deck, problem.mesh, simulation.model.plate)
     try:
         with np.errstate(all="ignore"):  # an overflow is reported as a divergence
@@ -86,6 +87,13 @@ def _write_header(simulation: Simulation) -> None:
     sink.text("deck", deck.text or deck.to_text(), "the cards of the problem")
     at_nodes = deck.require(Material).integration.points < 0 and "tapes" not in options.slips
     simulation.recorder.create("nodes" if at_nodes else "gauss")
+
+
+def _evaluate_preload(simulation: Simulation) -> None:
+    """Let FAIL find the exposures of the plate at rest under its preload."""
+    if simulation.model.plate.is_preloaded:
+        rest = np.zeros((1, *simulation.problem.mesh.equations.shape))
+        STORING["FAIL"](simulation, [0], [0.0], rest)
 
 
 def _units(deck: Deck) -> dict[str, str]:

@@ -10,8 +10,10 @@ from fecm.deck import model
 from fecm.deck.macros import Loop, every, flat
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import MODULUS, TOUGHNESS, in_si, unit_names
+from fecm.mechanics.ply_stresses import uniform_exposures
 from fecm.problem.problem import Problem
 from fecm.problem.rules.units import USED, has_real_moduli, likely_unit, looks_like, needed_unit
+from fecm.results.criteria import spelt
 
 # Strengths over the modulus of their direction.  Annealed glass has 1e-4, soft matrices 0.1.
 WEAKEST = 5e-5
@@ -312,6 +314,26 @@ def few_evaluations(problem: Problem) -> Reports:
         yield Report(message, cards[0].place("value"), hint)
 
 
+@rule(
+    "W489",
+    Subject.DAMAGE,
+    "The preload alone fails a ply.",
+    cause="A criterion of FAIL is at 1 or above under PREL, before anything moves.",
+    remedy="A smaller preload; the units of PREL, force/length, and of ALLO.",
+)
+def preload_beyond_strength(problem: Problem) -> Reports:
+    """Find a preload whose stresses reach the strength of a ply."""
+    strengths, card = problem.deck.last(model.Allowables), problem.deck.last(model.Preload)
+    if strengths is None or card is None:
+        return
+    exposures = uniform_exposures(problem.laminate, strengths, problem.plate.preload_strain)
+    worst = max(exposures, key=lambda one: one.exposure)
+    if worst.exposure >= 1.0:
+        what = f"{worst.mode}, {spelt(worst.criterion)}, ply {worst.ply}"
+        message = f"The preload alone reaches exposure {worst.exposure:.3g} ({what})."
+        yield Report(message, card.place(), "PREL is a force per length, tension positive")
+
+
 OF_STRENGTHS = (invalid_strength, invalid_constant_of_criterion)
 OF_DELAMINATION = (invalid_delamination,)
 OF_THRESHOLD = (coupled_threshold, twisted_threshold)
@@ -320,6 +342,7 @@ STRENGTHS = (strengths_in_another_unit, strengths_in_another_order)
 VALUES = (
     strengths_without_criteria,
     few_evaluations,
+    preload_beyond_strength,
     doubtful_toughness,
     too_many_delaminations,
 )

@@ -1,0 +1,96 @@
+"""Buckling of a plate under its preload."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from fecm._memory import require
+from fecm.mechanics.element_matrices import geometric_stiffness
+from fecm.mechanics.plate import UNLOADED, PlateModel
+from fecm.mechanics.solutions import DENSE, FACTORS, SingularStiffnessError, factorised
+from fecm.mechanics.symmetry import restrain_plane
+
+if TYPE_CHECKING:
+    from scipy import sparse
+    from scipy.sparse.linalg import SuperLU
+
+# Factors on the preload that are computed: from the least on, in strides, up to one that is far
+# away.
+FAR = 64.0
+STRIDE = 4.0
+LEAST = 1.0e-9
+TOLERANCE = 1.0e-9  # relative error of a factor
+
+
+def buckling_factor(plate: PlateModel) -> float:
+    """Factor on the preload at which the plate buckles; infinite beyond FAR.
+
+    The smallest positive lambda of (K + lambda K_sigma) phi = 0 with the plate's supports: at 1 the
+    preload is the buckling load.  0 where the supports allow motion without strain.  The plate,
+    whose laminate has B = 0, buckles without u and v.
+
+    K + lambda K_sigma is positive definite below the smallest lambda, so that its factors bracket
+    it: low < lambda <= STRIDE low.  With the shift low, K phi = nu (K + low K_sigma) phi has the
+    largest nu = lambda/(lambda - low), far from the others, for Lanczos iteration.
+    Raises NotEnoughMemoryError.
+    """
+    bending = restrain_plane(plate)
+    n = bending.neq
+    if not plate.is_compressed or not n:
+        return math.inf
+    require(int(FACTORS * n * math.log2(n + 1)), "to find the buckling load")
+    K = replace(bending, preload=UNLOADED).stiffness
+    K_sigma = bending.assembled(
+        lambda block: geometric_stiffness(block, bending.preload, bending.rules)
+    )[:, :n].tocsr()
+    found = _dense_factor(K, K_sigma) if n < DENSE else _sparse_factor(K, K_sigma)
+    return found if found <= FAR else math.inf
+
+
+def _dense_factor(K: sparse.csr_array, K_sigma: sparse.csr_array) -> float:
+    """Buckling factor by all eigenvalues of -K_sigma phi = phi K/lambda."""
+    from scipy import linalg
+
+    try:
+        largest = float(linalg.eigvalsh(-K_sigma.toarray(), K.toarray())[-1])
+    except np.linalg.LinAlgError:  # K is not positive definite
+        return 0.0
+    return 1.0 / largest if largest > 0.0 else math.inf
+
+
+def _sparse_factor(K: sparse.csr_array, K_sigma: sparse.csr_array) -> float:
+    """Buckling factor above the first shift at which K + shift K_sigma is positive definite."""
+    from scipy.sparse.linalg import LinearOperator, eigsh
+
+    shift = FAR
+    while (factors := _factors_of_positive(K + shift * K_sigma)) is None:
+        shift /= STRIDE
+        if shift < LEAST:
+            return 0.0
+    if shift == FAR:
+        return math.inf
+    (nu,) = eigsh(
+        K,
+        1,
+        K + shift * K_sigma,
+        Minv=LinearOperator(K.shape, matvec=factors.solve, dtype=np.float64),
+        which="LA",
+        v0=np.random.default_rng(0).standard_normal(K.shape[0]),
+        tol=TOLERANCE,
+        return_eigenvectors=False,
+    )
+    return shift * float(nu) / (float(nu) - 1.0)
+
+
+def _factors_of_positive(matrix: sparse.csr_array) -> SuperLU | None:
+    """Factors of a symmetric matrix; None unless all pivots, on the diagonal, are positive."""
+    try:
+        factors = factorised(matrix)
+    except SingularStiffnessError:
+        return None
+    on_diagonal = np.array_equal(factors.perm_r, factors.perm_c)
+    return factors if on_diagonal and factors.U.diagonal().min() > 0.0 else None

@@ -1,0 +1,64 @@
+"""Rules about the plate under the compression of PREL."""
+
+from __future__ import annotations
+
+from fecm.deck import model
+from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.mechanics.mesh import rigid_deflections
+from fecm.problem.problem import Problem
+
+NEAR = 1.1  # buckling load over the preload below which the response is doubtful
+
+
+@rule(
+    "E486",
+    Subject.LAMINATE,
+    "PREL compresses a plate that its supports let move along w.",
+    cause="It has no buckling load, and its edge loads may or may not keep their direction.",
+    remedy="Restrain w at the edges, or a preload in tension.",
+)
+def compressed_free_plate(problem: Problem) -> Reports:
+    """Find compression of a plate with rigid deflections."""
+    card = problem.deck.last(model.Preload)
+    if card is None or not problem.plate.is_compressed:
+        return
+    if rigid_deflections(problem.mesh).size:
+        message = "PREL compresses a plate that its supports let move along w."
+        yield Report(message, card.place(), "restrain w at every node of a supported edge")
+
+
+@rule(
+    "E487",
+    Subject.LAMINATE,
+    "The preload is at or beyond the buckling load.",
+    cause="The flat plate is not stable: its deflection would grow without bound.",
+    remedy="A smaller compression; the units of PREL, force/length.",
+)
+def buckled(problem: Problem) -> Reports:
+    """Compare the preload with the buckling load."""
+    card, factor = problem.deck.last(model.Preload), problem.buckling_factor
+    if card is None or factor > 1.0:
+        return
+    times = f"{1.0 / factor:.3g} times" if factor else "far beyond"
+    message = f"The preload N0 is {times} the buckling load: the plate is not stable."
+    yield Report(message, card.place(), "PREL is a force per length, tension positive")
+
+
+@rule(
+    "W488",
+    Subject.LAMINATE,
+    "The preload is above 1/1.1 of the buckling load.",
+    cause="Stiffness and frequencies depend on a small difference.",
+    remedy="A finer mesh and exact loads and supports, or a smaller compression.",
+)
+def nearly_buckled(problem: Problem) -> Reports:
+    """Find a preload just below the buckling load."""
+    card, factor = problem.deck.last(model.Preload), problem.buckling_factor
+    if card is None or not 1.0 < factor < NEAR:
+        return
+    message = f"The preload N0 is {1.0 / factor:.3g} times the buckling load"
+    why = "stiffness and frequencies depend on a small difference"
+    yield Report(f"{message}: {why}.", card.place(), "imperfections of a real plate matter here")
+
+
+OF_PRELOAD = (compressed_free_plate, buckled, nearly_buckled)
