@@ -112,12 +112,21 @@ def without_shea(right: Any, deck: Any, **kwargs: Any) -> Any:
 def without_coupling(names: str) -> Break:
     """Forget B in some of the stress resultants."""
 
-    def broken(right: Any, strains: Any, laminate: Any, field: Any) -> Any:
-        poor = right(strains, replace(laminate, B=0.0 * laminate.B), field)
-        rich = right(strains, laminate, field)
+    def broken(right: Any, strains: Any, laminate: Any, *others: Any) -> Any:
+        poor = right(strains, replace(laminate, B=0.0 * laminate.B), *others)
+        rich = right(strains, laminate, *others)
         return rich | {name: found for name, found in poor.items() if name[0] == names}
 
     return instead(strains, "strains_and_resultants", broken)
+
+
+def without_preload(right: Any, strains: Any, laminate: Any, field: Any, preload: Any) -> Any:
+    return right(strains, laminate, field, (0.0, 0.0, 0.0))
+
+
+def exchanged_forces(right: Any, family: Any, preload: Any, rules: Any) -> Any:
+    n_x, n_y, n_xy = preload
+    return right(family, (n_y, n_x, n_xy), rules)
 
 
 def of_q16(right: Any, q: Any, angle: float) -> Any:
@@ -269,7 +278,7 @@ def halved(number: float) -> float:
     return number / 2.0
 
 
-def doubled(number: float) -> float:
+def doubled(number: Any) -> Any:
     return 2.0 * number
 
 

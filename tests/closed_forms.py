@@ -8,6 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from scipy.integrate import solve_ivp
@@ -16,6 +17,7 @@ from scipy.special import beta, j1
 from fecm._typing import Floats
 from fecm.deck.model import Ply
 from tests.closed_forms_plies import equilibrium_shear, exposures, interlaminar
+from tests.closed_forms_preload import preloaded
 from tests.closed_forms_statistics import ishigami, lognormal, wilson
 
 # Layers ------------------------------------------------------------------------------------------
@@ -434,6 +436,9 @@ EXPECTED: dict[str, Sequence[float | None]] = {
         *equilibrium_shear(PAGANO, (0.0, 90.0), 1.0).diagonal(), *ANGLES[[0, 1, 0], [0, 1, 1]],
     ),
     "ply-stresses": ply_stresses(),
+    "preload": preloaded(
+        partial(stiffness, *bending_and_shear(PAGANO, (0.0, 90.0, 0.0), H)), PAGANO
+    ),
     "failure-states": (*exposures(), *interlaminar()),
     "random-values": (*ishigami(), *lognormal(115.0, 0.08), *wilson(3, 40)),
     "refinement": (1.7, 1.0),

@@ -16,7 +16,17 @@ import pytest
 import fecm
 from fecm import _memory
 from fecm.api import load_deck
-from fecm.deck.model import Allowables, Material, Ply
+from fecm.deck.grid import Grid, uniform
+from fecm.deck.model import (
+    Allowables,
+    Deck,
+    Impact,
+    Material,
+    Patch,
+    Ply,
+    Preload,
+    Projectile,
+)
 from fecm.mechanics import element_matrices
 from fecm.mechanics.buckling import buckling_factor
 from fecm.mechanics.laminate import Laminate, laminate
@@ -28,6 +38,11 @@ from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.summary import ProblemSummary
 from fecm.results.result import Result
+from fecm.studies.estimate import estimate
+from fecm.sweeps.case import Case
+from fecm.sweeps.checks import check_deck
+from fecm.sweeps.vary import apply_case
+from fecm.verification import decks
 from tests.builders import (
     SKEWED,
     Floats,
@@ -43,6 +58,7 @@ from tests.builders import (
     table,
     with_restraints,
 )
+from tests.closed_forms import bending_and_shear, disc, stiffness
 from tests.patches import MeshMaker, area_of
 from tests.sound_plate import base, with_card
 
@@ -445,3 +461,118 @@ def test_strains_are_judged_with_those_of_the_preload() -> None:
     with pytest.warns(fecm.FecmWarning, match="strain reaches 1"):
         result = short_run(preloaded("2000."))
     assert "strain > 1 %" in result.validity
+
+
+# Impacts -----------------------------------------------------------------------------------------
+
+
+# By the number of elements a side, below the critical ones.
+TIME_STEPS = {4: 7e-7, 8: 6.8e-7, 16: 5.6e-7, 32: 3.1e-7}
+
+
+def struck(n: int, case: dict[str, str], duration: float) -> Deck:
+    """The plate of the reference data on n x n elements, struck by a rigid mass on a disc."""
+    grid = Grid(uniform(SIDE, n), uniform(SIDE, n))
+    middle, _, _ = grid.nearest(SIDE / 2.0, SIDE / 2.0)
+    segments = (
+        decks.supports(grid, decks.SUPPORTED),
+        Projectile(0, 0, float(case["mass_t"])),
+        Impact(middle, 3, float(case["velocity_mm_per_s"])),
+        decks.elastic(float(case["k_N_per_mm15"])),
+        Patch(case["patch"], float(case["c_mm"])),
+        decks.MITC,
+        Preload(float(case["N0x_N_per_mm"]), float(case["N0y_N_per_mm"])),
+        decks.material(PLY, ANGLES, 0.269),
+    )
+    dt = TIME_STEPS[n]
+    return decks.deck(grid, segments, decks.impact_program(dt, int(duration / dt) + 2))
+
+
+def summary_of(case: str) -> dict[str, str]:
+    """Row of a case in the summary of the reference data."""
+    (row,) = (row for row in table("preload_impact_summary.csv") if row["case"] == case)
+    return row
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("case", [row["case"] for row in table("preload_impact_summary.csv")])
+def test_an_impact_under_preload_is_that_of_the_exact_modal_series(case: str) -> None:
+    row = summary_of(case)
+    ends = float(row["first_contact_end_s"])
+    found = fecm.run_one(struck(32, row, 1.02 * max(ends, *map(float, extremes(row)))))
+    w, touches = found["history/plate_w"], found.force > 0.0
+    assert found.force.max() == pytest.approx(float(row["peak_N"]), rel=2e-3)
+    assert w.max() == pytest.approx(float(row["W_max_mm"]), rel=1e-3)
+    last = found.time[1:][touches[:-1] & ~touches[1:]]
+    assert last[0] == pytest.approx(ends, abs=1e-6)
+
+
+def extremes(row: dict[str, str]) -> tuple[str, str]:
+    """Times of the largest force and deflection."""
+    return row["t_peak_s"], row["t_Wmax_s"]
+
+
+@pytest.mark.parametrize(
+    ("case", "force"),
+    [
+        ("ball_biax_+5cr", 2e-3),
+        pytest.param("100g_biax_-0.5cr", 6e-3, marks=pytest.mark.long),
+    ],
+)
+def test_the_history_of_an_impact_under_preload_is_that_of_the_series(
+    case: str, force: float
+) -> None:
+    row, exact = summary_of(case), table(f"preload_impact_{case}.csv")
+    time, F, w = (np.array([float(one[name]) for one in exact]) for name in ("t_s", "F_N", "W_mm"))
+    first = time < 1.1 * float(row["first_contact_end_s"])
+    found = fecm.run_one(struck(32, row, float(time[first][-1])))
+    F_found = np.interp(time[first], found.time, found.force)
+    w_found = np.interp(time[first], found.time, found["history/plate_w"])
+    assert np.abs(F_found - F[first]).max() < force * float(row["peak_N"])
+    assert np.abs(w_found - w[first]).max() < 1e-3 * float(row["W_max_mm"])
+
+
+def test_the_preload_changes_an_impact_on_few_elements_as_it_does_exactly() -> None:
+    rows = [summary_of(case) for case in ("100g_0", "100g_x_+100")]
+    w = [fecm.run_one(struck(8, row, 1.7e-3))["history/plate_w"].max() for row in rows]
+    exact = [float(row["W_max_mm"]) for row in rows]
+    assert w[1] / w[0] == pytest.approx(exact[1] / exact[0], rel=5e-3)
+
+
+def test_cases_under_a_preload_equal_their_full_runs() -> None:
+    deck = struck(4, summary_of("100g_biax_-0.5cr"), 1.6e-3)
+    cases: list[Case] = [
+        {"velocity": 500.0, "rod_mass": 1e-4},
+        {"velocity": 3000.0, "rod_mass": 2e-5},
+        {"velocity": 2000.0, "rod_mass": 5e-5},
+    ]
+    found = fecm.sweep(deck, cases=cases, history=True)
+    assert found.force is not None
+    assert found["status"].tolist() == ["ok"] * 3
+    for force, case in zip(found.force, cases, strict=True):
+        result = fecm.run_one(apply_case(deck, case))
+        assert np.abs(force - result.force).max() < 1e-9 * result.force.max()
+
+
+def test_a_case_whose_plate_buckles_under_the_preload_says_so() -> None:
+    deck = struck(4, summary_of("100g_biax_-0.5cr"), 1e-5)
+    found = fecm.sweep(deck, {"thickness": [2.69, 2.0], "dt": ["auto"]})
+    assert "buckling" not in found["status"][0]
+    assert "1.2" in found["status"][1]
+    assert "times the buckling load" in found["status"][1]
+
+
+def series_compliance(force: float) -> float:
+    """Deflection per force on the disc in the middle, of the plate under N_x = N_y."""
+    a, b = np.meshgrid(*[np.pi / SIDE * np.arange(1.0, 401.0, 2.0)] * 2, indexing="ij")
+    K = stiffness(*bending_and_shear(PLY, ANGLES, 2.69), a, b)
+    K[..., 0, 0] += force * (a**2 + b**2)
+    shares = disc(10.0 * np.hypot(a, b))
+    return float((4.0 / SIDE**2 * shares**2 * np.linalg.inv(K)[..., 0, 0]).sum())
+
+
+@pytest.mark.parametrize("case", ["100g_biax_-0.5cr", "ball_biax_+5cr"])
+def test_the_static_stiffness_of_an_estimate_is_that_of_the_preloaded_plate(case: str) -> None:
+    row = summary_of(case)
+    found = estimate(check_deck(struck(16, row, 1e-5))).stiffness
+    assert found == pytest.approx(1.0 / series_compliance(float(row["N0x_N_per_mm"])), rel=2e-3)

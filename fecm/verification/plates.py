@@ -13,6 +13,7 @@ from fecm.deck import model
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.grid import Grid, lines, uniform
 from fecm.deck.model import Gage, LoadTable, Macro, Patch, Ply, Segment
+from fecm.mechanics.buckling import buckling_factor
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
@@ -101,6 +102,40 @@ def _cross_ply_plate() -> Sequence[Value]:
 @case
 def _angle_ply_plate() -> Sequence[Value]:
     return two_layers((45.0, -45.0), decks.ANGLE_PLY, 2, (2 * FEWER + 1) * 2 * FEWER)
+
+
+TENSION = model.Preload(0.02, 0.005)
+COMPRESSION = model.Preload(-0.004, -0.004)
+
+
+@case
+def _preload() -> Sequence[Value]:
+    """Buckling loads of symmetric modes, then frequencies, deflection, forces and stresses."""
+    plate = decks.material(STIFF, CROSS, THICKNESS / len(CROSS))
+
+    def made(preload: model.Preload, macros: str, load: float = 0.0) -> model.Deck:
+        others = [decks.MITC, preload]
+        return decks.quarter_plate(ELEMENTS, plate, decks.program(macros), load, others=others)
+
+    def factor(n_x: float, n_y: float) -> float:
+        deck = made(model.Preload(n_x, n_y), "")
+        return buckling_factor(build_plate(deck, generate(deck)))
+
+    modes = [
+        decks.result_of(made(preload, "LMAS EIGE=2")).modes.angular_frequency
+        for preload in (TENSION, COMPRESSION)
+    ]
+    bent = decks.result_of(made(TENSION, "TANG FORM SOLV DISP", 1.0))
+    rest = decks.result_of(made(TENSION, "STRE PLYS"))
+    return [
+        *(factor(*force) for force in ((-1.0, 0.0), (0.0, -1.0), (-1.0, 0.5))),
+        *modes[0],
+        modes[1][0],
+        bent.tape3.w[0, 0],
+        *decks.fields(rest, "stresses", "N_x N_y"),
+        rest["plies/sigma_1"][:, :, :, [0, 2]],
+        rest["plies/sigma_2"][:, :, :, 1],
+    ]
 
 
 @case

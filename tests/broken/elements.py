@@ -11,6 +11,7 @@ from fecm.mechanics import (
     points,
     strains,
 )
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.stiffness_product import ElementProduct
 from fecm.problem import parts
@@ -18,8 +19,10 @@ from fecm.simulation.recorder import Recorder
 from tests.breaks import (
     Breaks,
     changed,
+    doubled,
     entry,
     equal_shares,
+    exchanged_forces,
     exchanged_on_tape8,
     in_stiffness,
     in_strains,
@@ -30,6 +33,7 @@ from tests.breaks import (
     rotary_for_mass,
     rotations_reversed,
     without_coupling,
+    without_preload,
     without_shea,
 )
 
@@ -70,6 +74,20 @@ BREAKS: Breaks = {
     ),
     "SHEA ignored": (
         instead(parts, "laminate_of_deck", without_shea), {"resultants": ("γ_xz", "γ_yz")},
+    ),
+    "geometric stiffness doubled": (
+        changed(element_matrices, "geometric_stiffness", doubled),
+        {"preload": ("buckling", "ω", "w")},
+    ),
+    "N_x and N_y exchanged in the geometric stiffness": (
+        instead(element_matrices, "geometric_stiffness", exchanged_forces),
+        {"preload": ("buckling load N_y", "ω13")},
+    ),
+    "preload missing in the membrane forces": (
+        instead(strains, "strains_and_resultants", without_preload), {"preload": ("N_",)},
+    ),
+    "preload missing in the plies": (
+        changed(PlateModel, "preload_strain", nothing), {"preload": ("σ",)},
     ),
     "sign of the rotation in the stiffness of transverse shear": (
         changed(element_matrices, "_transverse_shear", rotations_reversed),
