@@ -9,6 +9,7 @@ from __future__ import annotations
 import re
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -58,6 +59,7 @@ from tests.builders import (
     table,
     with_restraints,
 )
+from tests.calls import call
 from tests.closed_forms import bending_and_shear, disc, stiffness
 from tests.patches import MeshMaker, area_of
 from tests.sound_plate import base, with_card
@@ -537,6 +539,20 @@ def test_the_preload_changes_an_impact_on_few_elements_as_it_does_exactly() -> N
     w = [fecm.run_one(struck(8, row, 1.7e-3))["history/plate_w"].max() for row in rows]
     exact = [float(row["W_max_mm"]) for row in rows]
     assert w[1] / w[0] == pytest.approx(exact[1] / exact[0], rel=5e-3)
+
+
+def test_errors_of_the_linear_plate_are_said_to_be_those_without_preload() -> None:
+    said = "without PREL, whose compression makes it more"
+    hard = {"velocity": [6000.0]}
+    assert said in " ".join(fecm.sweep(preloaded("-300."), hard).notes)
+    assert said not in " ".join(fecm.sweep(base(), hard).notes)
+
+
+def test_an_estimate_says_which_models_neglect_the_preload(tmp_path: Path) -> None:
+    (tmp_path / "plate.inp").write_text(preloaded("-300."))
+    told = call("estimate", tmp_path / "plate.inp")
+    assert "preload     in the static plate and the run" in told.stdout
+    assert "without PREL, whose compression makes it more" in told.stderr
 
 
 def test_cases_under_a_preload_equal_their_full_runs() -> None:

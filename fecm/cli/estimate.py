@@ -16,7 +16,7 @@ from fecm.cli.help import typical
 from fecm.cli.options import DECK_PATH, FORMAT_OPTION, Format
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.problem.problem import Problem
-from fecm.results.linear_plate import TOO_SOFT, UNSAFE, softness
+from fecm.results.linear_plate import TOO_SOFT, UNSAFE
 from fecm.results.metrics import RATIO
 from fecm.results.validity import Judge
 from fecm.studies.estimate import Estimate
@@ -60,7 +60,8 @@ def estimate(deck: Path, form: Format) -> None:
 
     The infinite plate is for small masses, the static plate for large ones; a model out of its
     range is marked.  With a DELA segment, velocity and energy are those at which the peak force
-    reaches the delamination threshold.  The models without a mesh neglect DAMP.
+    reaches the delamination threshold.  The models without a mesh neglect DAMP, and
+    the infinite plate neglects PREL.
     """
     problem = load_single(deck, "estimate")
     found = estimate_problem(problem)
@@ -123,6 +124,10 @@ def _page(problem: Problem, found: Estimate, rows: Sequence[Row]) -> list[str]:
     ]
     if problem.damping:
         lines.append("damping     in the run only: the models without a mesh neglect DAMP")
+    if problem.plate.is_preloaded:
+        lines.append(
+            "preload     in the static plate and the run: the infinite plate neglects PREL"
+        )
     table = [["model", *(name.replace("_", " ") for name in COLUMNS)]]
     for row in rows:
         marked = row.name if row.applies else f"{row.name} (out of range)"
@@ -161,4 +166,4 @@ def _bent(where: str, deflection: float, judge: Judge) -> list[str]:
     ratio = deflection / judge.thickness
     if not ratio > judge.limit:
         return []
-    return [f"{where} deflects by {ratio:.3g} h: {softness(ratio, judge.in_plane)}"]
+    return [f"{where} deflects by {ratio:.3g} h: {judge.softness(ratio)}"]

@@ -205,7 +205,12 @@ class Problem:
         mobility = 0.0
         if self.contact is not None:
             mobility = self.moving_plate.rigid_mobility(self.contact[:, W])
-        return Judge(self.laminate.thickness, in_plane_of(self.mesh.codes), mobility)
+        return Judge(
+            self.laminate.thickness,
+            in_plane_of(self.mesh.codes),
+            mobility,
+            self.plate.is_preloaded,
+        )
 
     @property
     def damping(self) -> float:

@@ -9,6 +9,8 @@ import numpy as np
 from fecm._typing import Array
 
 TOO_SOFT = "a linear plate, without membrane stiffening, is too soft"
+# The errors are those of plates without preload.
+PRELOADED = "that is without PREL, whose compression makes it more and whose tension less"
 UNSAFE = "threshold energies are therefore too high (unsafe)"
 
 
@@ -55,7 +57,7 @@ def in_plane_of(codes: Array) -> InPlane:
     return InPlane.HELD if supports[:, :2].any(axis=1).mean() > 0.5 else InPlane.FREE
 
 
-def softness(ratio: float, in_plane: InPlane) -> str:
+def softness(ratio: float, in_plane: InPlane, *, preloaded: bool = False) -> str:
     """Error of a linear plate at a deflection over its thickness, in words.
 
     Examples
@@ -69,6 +71,9 @@ def softness(ratio: float, in_plane: InPlane) -> str:
     more = "at least" if ratio > DEFLECTIONS[-1] else "about"
     if in_plane is InPlane.UNKNOWN:
         size = f"{low} % (edges free in the plane) to {high} % (held)"
-        return f"the force is {more} {size} too low at the same energy"
-    edges = f"(edges {in_plane} in the plane)"
-    return f"the force is {more} {low} to {high} % too low at the same energy {edges}"
+        edges = ""
+    else:
+        size = f"{low} to {high} %"
+        edges = f" (edges {in_plane} in the plane)"
+    preload = f"; {PRELOADED}" if preloaded else ""
+    return f"the force is {more} {size} too low at the same energy{edges}{preload}"

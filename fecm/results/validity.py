@@ -15,7 +15,7 @@ import numpy as np
 from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.results.end import Texts, peak_known
-from fecm.results.linear_plate import LIMITS, InPlane
+from fecm.results.linear_plate import LIMITS, InPlane, softness
 
 STRAIN = 0.01  # largest strain for which plies are taken as linear
 # Exposure, or force relative to the delamination threshold, from which on a case is beyond it.  A
@@ -108,6 +108,11 @@ class Judge:
     # Velocity that an impulse under the load gives the rigid motion of the plate, 1/mass; 0 if its
     # supports hold the plate.
     mobility: float = 0.0
+    preloaded: bool = False  # whether an initial membrane force acts
+
+    def softness(self, ratio: float) -> str:
+        """Error of the linear plate at a deflection over its thickness, in words."""
+        return softness(ratio, self.in_plane, preloaded=self.preloaded)
 
     @property
     def limit(self) -> float:

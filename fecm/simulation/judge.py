@@ -11,7 +11,7 @@ from fecm.mechanics.mesh import rigid_deflections
 from fecm.results.criteria import spelt
 from fecm.results.end import OPEN_ENDS, End
 from fecm.results.exposures import FEWEST, count_evaluations, largest_exposures
-from fecm.results.linear_plate import TOO_SOFT, UNSAFE, softness
+from fecm.results.linear_plate import TOO_SOFT, UNSAFE
 from fecm.results.result import Result
 from fecm.results.validity import BENT, CROSSED, INDENTATION, STRAIN, Reason, joined
 from fecm.simulation import peaks
@@ -118,7 +118,7 @@ def _bent(simulation: Simulation, result: Result, peak: Peak) -> str:
     note = f"{_reached(result, what, size, peak)} {limits.limit} h {TOO_SOFT}"
     if not simulation.problem.has_impact:
         return note
-    return f"{note}: {softness(peak.value / limits.thickness, limits.in_plane)}; {UNSAFE}"
+    return f"{note}: {limits.softness(peak.value / limits.thickness)}; {UNSAFE}"
 
 
 def _size(result: Result, value: float, thickness: float) -> str:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from fecm._errors import did_you_mean
 from fecm._tables import html_table
 from fecm._typing import Bools
-from fecm.deck.model import Delamination
+from fecm.deck.model import Delamination, Preload
 from fecm.deck.reader import Reader
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.results.errors import NotStoredError
@@ -152,8 +152,14 @@ def remarks(result: SweepResult) -> Iterator[str]:
         if np.isfinite(ratio).any():
             largest = float(np.nanmax(ratio))
             in_plane = InPlane.UNKNOWN if held else InPlane.FREE
-            size = f" (at w = {largest:.3g} h {softness(largest, in_plane)})"
+            error = softness(largest, in_plane, preloaded=_is_preloaded(result.deck))
+            size = f" (at w = {largest:.3g} h {error})"
         yield f"beyond its range {TOO_SOFT}{size}; {UNSAFE}"
+
+
+def _is_preloaded(deck: str) -> bool:
+    """Whether the text of a deck has a PREL segment."""
+    return any(problem.deck and problem.deck.has(Preload) for problem in Reader(deck).problems())
 
 
 @dataclass(repr=False)
