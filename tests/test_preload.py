@@ -37,6 +37,7 @@ from fecm.mechanics.ply_stresses import uniform_exposures
 from fecm.mechanics.solutions import modes
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
+from fecm.problem.rules.damping import clamped_frequency
 from fecm.problem.summary import ProblemSummary
 from fecm.results.result import Result
 from fecm.studies.estimate import estimate
@@ -44,6 +45,7 @@ from fecm.sweeps.case import Case
 from fecm.sweeps.checks import check_deck
 from fecm.sweeps.vary import apply_case
 from fecm.verification import decks
+from tests import stopped_runs
 from tests.builders import (
     SKEWED,
     Floats,
@@ -449,6 +451,42 @@ def test_exposures_begin_with_those_of_the_preload(solver: str) -> None:
     # Bending adds to them: linear exposures of stress states exactly so.
     assert np.all(result["exposures/exposure"][1, :4] > first)
     assert result["failure/max_stress/exposure"].min() > 0.0
+
+
+@pytest.mark.parametrize("solver", ["csr", "auto"])
+def test_every_solver_steps_the_preloaded_plate(solver: str) -> None:
+    text = re.sub(r"(?m)^LOOP(.*\n)*?NEXT\n", STORING, preloaded("-300.,150.,60."))
+    expected, found = (fecm.run_one(text, solver=one) for one in ("numpy", solver))
+    difference = np.abs(found["history/plate_w"] - expected["history/plate_w"]).max()
+    assert difference < 1e-9 * expected["history/plate_w"].max()
+    plain = short_run(base())["history/plate_w"]
+    assert np.abs(expected["history/plate_w"] - plain).max() > 1e-3 * plain.max()
+    assert np.abs(expected["energy/balance_error"]).max() < 1e-5 * 3000.0
+
+
+def test_a_resumed_run_has_the_exposures_at_rest_once(tmp_path: Path) -> None:
+    text = re.sub(r"(?m)^LOOP(.*\n)*?NEXT\n", STORING, preloaded("500."))
+    whole, resumed = tmp_path / "whole.h5", tmp_path / "resumed.h5"
+    stopped_runs.run(text, whole)
+    with pytest.raises(stopped_runs.StoppedError):
+        stopped_runs.run(text, resumed, stop=25)
+    stopped_runs.run(text, resumed, resume=True)
+    assert resumed.read_bytes() == whole.read_bytes()
+
+
+def test_damping_is_compared_with_a_frequency_under_the_preload() -> None:
+    # A skin under strong tension: omega^2 = N (pi/a)^2 2/(rho h), of a clamped one 25 % more.
+    (problem,) = load_deck(preloaded("1e6,1e6")).problems
+    h, rho = 2.944, 1.57e-9
+    skin = np.sqrt(2e6 * (np.pi / 100.0) ** 2 / (rho * h))
+    assert 1.0 < clamped_frequency(problem) / skin < 1.15
+
+
+def test_waves_say_that_they_leave_the_preload_out(tmp_path: Path) -> None:
+    for text, said in ((preloaded("100."), True), (base(), False)):
+        (tmp_path / "plate.inp").write_text(text)
+        told = call("waves", "dispersion", tmp_path / "plate.inp", "--wavelengths", "5:6:2")
+        assert ("PREL is left out" in told.stderr) == said
 
 
 def test_a_ply_that_the_preload_fails_has_failed_at_time_zero() -> None:

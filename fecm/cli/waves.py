@@ -118,6 +118,8 @@ class Source:
         problems = load_valid(deck, "; no waves were computed", warnings=False)
         if len(problems) > 1:
             note(f"{deck} has {len(problems)} problems; the laminate of the first is used")
+        if problems[0].plate.is_preloaded:
+            note("PREL is left out: these are waves of the laminate without preload")
         return laminate_of_deck(problems[0].deck), unit_names(problems[0].deck)
 
 

@@ -107,13 +107,15 @@ def clamped_frequency(problem: Problem) -> float:
     """Lowest natural frequency of a clamped rectangle of the plate's size, radians over time.
 
     Rayleigh's quotient of products of the modes of clamped beams, whose integrals are 22.373^2
-    and 12.303^2; thin plate theory, without the coupling D16, D26.
+    and 12.303^2; thin plate theory, without the coupling D16, D26.  With the preload.
     """
     D = problem.laminate.D
     a, b = np.ptp(problem.mesh.coordinates[problem.mesh.used], axis=0).tolist()
     along, across = 22.373**2 * D[0, 0] / a**4, 22.373**2 * D[1, 1] / b**4
     twist = 2.0 * 12.303**2 * (D[0, 1] + 2.0 * D[2, 2]) / (a * b) ** 2
-    return math.sqrt((along + across + twist) / problem.laminate.mass)
+    n_x, n_y, _ = problem.plate.preload
+    preload = 12.303 * (n_x / a**2 + n_y / b**2)
+    return math.sqrt(max(0.0, along + across + twist + preload) / problem.laminate.mass)
 
 
 OF_DAMPING = (negative_damping,)
