@@ -40,6 +40,7 @@ from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.rules.damping import clamped_frequency
 from fecm.problem.summary import ProblemSummary
 from fecm.results.result import Result
+from fecm.results.summary import summary
 from fecm.studies.estimate import estimate
 from fecm.sweeps.case import Case
 from fecm.sweeps.checks import check_deck
@@ -435,6 +436,13 @@ def test_the_result_names_the_preload_and_gages_leave_it_out() -> None:
     scale = np.abs(without["gages/strain"]).max()
     change = preloaded_one["gages/strain"] - without["gages/strain"]
     assert np.abs(change).max() < 1e-5 * scale
+
+
+def test_the_summary_of_a_run_names_the_preload() -> None:
+    without, preloaded_one = runs()
+    expected = "preload           N_x = 0.002 N/mm, N_y = -0.001 N/mm, N_xy = 0.0005 N/mm"
+    assert expected in summary(preloaded_one)
+    assert not any(line.startswith("preload") for line in summary(without))
 
 
 @pytest.mark.parametrize("solver", ["numpy", "auto"])

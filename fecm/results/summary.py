@@ -38,6 +38,7 @@ def summary(result: Result) -> list[str]:
     if clock in result:
         time = result[clock]
         lines.append(_line("steps", f"{len(time)}, up to time {quantity(time[-1], 'time')}"))
+    lines += _preload(result)
     if "history/force" in result:
         lines += _impact(result)
     elif "tape3/w" in result and (w := result["tape3/w"]).any():
@@ -56,6 +57,18 @@ def summary(result: Result) -> list[str]:
         more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
         lines.append(_line("frequencies", f"{texts}{more} {result.unit('1/time')}".rstrip()))
     return lines or ["nothing was stored"]
+
+
+def _preload(result: Result) -> list[str]:
+    """Line of the initial membrane force of PREL."""
+    given = result.attributes_of("laminate")
+    forces = {f"N_{name}": given.get(f"N0_{name}") for name in ("x", "y", "xy")}
+    named = [
+        f"{name} = {_quantity(result, force, 'force/length')}"
+        for name, force in forces.items()
+        if isinstance(force, float) and force
+    ]
+    return [_line("preload", ", ".join(named))] if named else []
 
 
 def _delaminations(result: Result) -> str:
