@@ -216,7 +216,7 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "W415": small,
     "W416": data("EXPE", "EXPE ABC"),
     "E417": data(" 17500000.", "   1.E+308"),
-    "E486": more("PREL\n-1.0\n"),
+    "E486": plate(lambda text: with_card("PREL", "-1.0")(replaced(r"^BOUN\n(.+\n)*", "")(text))),
     "E487": plate(with_card("PREL", "-1000.")),
     "W488": plate(with_card("PREL", "-580.")),
     "W489": plate(with_card("PREL", "2000.")),

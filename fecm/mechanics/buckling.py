@@ -27,7 +27,7 @@ TOLERANCE = 1.0e-9  # relative error of a factor
 
 
 def buckling_factor(plate: PlateModel) -> float:
-    """Factor on the preload at which the plate buckles; infinite beyond FAR.
+    """Factor on the preload at which the plate buckles; infinite beyond FAR, NaN if unknown.
 
     The smallest positive lambda of (K + lambda K_sigma) phi = 0 with the plate's supports: at 1 the
     preload is the buckling load.  0 where the supports allow motion without strain.  The plate,
@@ -47,8 +47,10 @@ def buckling_factor(plate: PlateModel) -> float:
     K_sigma = bending.assembled(
         lambda block: geometric_stiffness(block, bending.preload, bending.rules)
     )[:, :n].tocsr()
+    if not (np.isfinite(K.data).all() and np.isfinite(K_sigma.data).all()):
+        return math.nan
     found = _dense_factor(K, K_sigma) if n < DENSE else _sparse_factor(K, K_sigma)
-    return found if found <= FAR else math.inf
+    return math.inf if found > FAR else found
 
 
 def _dense_factor(K: sparse.csr_array, K_sigma: sparse.csr_array) -> float:

@@ -72,8 +72,11 @@ class PlateModel:
 
     @property
     def preload_strain(self) -> Floats:
-        """Midplane strain A^-1 N0 of the preload, (3,); B is zero."""
-        return np.linalg.solve(self.laminate.A, np.array(self.preload))
+        """Midplane strain A^-1 N0 of the preload, (3,), where B is zero; NaN of a singular A."""
+        try:
+            return np.linalg.solve(self.laminate.A, np.array(self.preload))
+        except np.linalg.LinAlgError:
+            return np.full(3, np.nan)
 
     @cached_property
     def _free(self) -> Bools:

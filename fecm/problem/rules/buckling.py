@@ -37,7 +37,7 @@ def compressed_free_plate(problem: Problem) -> Reports:
 def buckled(problem: Problem) -> Reports:
     """Compare the preload with the buckling load."""
     card, factor = problem.deck.last(model.Preload), problem.buckling_factor
-    if card is None or factor > 1.0:
+    if card is None or not factor <= 1.0:
         return
     times = f"{1.0 / factor:.3g} times" if factor else "far beyond"
     message = f"The preload N0 is {times} the buckling load: the plate is not stable."
