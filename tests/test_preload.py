@@ -280,6 +280,16 @@ def test_a_compression_far_below_buckling_has_an_infinite_factor() -> None:
     assert buckling_factor(plate) == np.inf
 
 
+@pytest.mark.parametrize("n", [1, 8])
+def test_a_plate_whose_deflection_is_held_does_not_buckle(n: int) -> None:
+    coordinates, elements = square(n, n)
+    held = simple_support(coordinates)
+    held[:, 2] = True
+    mesh = with_restraints(coordinates, elements, held)
+    plate = PlateModel(mesh, cross_ply(), rules(), preload=(-1.0, 0.0, 0.0))
+    assert buckling_factor(plate) == np.inf
+
+
 @pytest.mark.parametrize("n", [1, 4])
 def test_a_plate_that_moves_freely_has_the_buckling_factor_zero(n: int) -> None:
     coordinates, elements = square(n, n)

@@ -24,6 +24,7 @@ FAR = 64.0
 STRIDE = 4.0
 LEAST = 1.0e-9
 TOLERANCE = 1.0e-9  # relative error of a factor
+ROUNDING = 1.0e-9  # of a principal force, relative to the other one
 
 
 def buckling_factor(plate: PlateModel) -> float:
@@ -33,24 +34,38 @@ def buckling_factor(plate: PlateModel) -> float:
     preload is the buckling load.  0 where the supports allow motion without strain.  The plate,
     whose laminate has B = 0, buckles without u and v.
 
-    K + lambda K_sigma is positive definite below the smallest lambda, so that its factors bracket
-    it: low < lambda <= STRIDE low.  With the shift low, K phi = nu (K + low K_sigma) phi has the
-    largest nu = lambda/(lambda - low), far from the others, for Lanczos iteration.
-    Raises NotEnoughMemoryError.
+    Lanczos iteration for the largest mu of -K_sigma phi = mu (K + shift K_sigma) phi, which is
+    1/(lambda - shift).  Under tension in another direction other mu are large, negative, and keep
+    the iteration from the wanted one, unless the shift is near it.  K + lambda K_sigma is positive
+    definite below the smallest lambda, so that its factors bracket it: shift < lambda <= STRIDE
+    shift.  Raises NotEnoughMemoryError.
     """
     bending = restrain_plane(plate)
     n = bending.neq
     if not plate.is_compressed or not n:
         return math.inf
-    require(int(FACTORS * n * math.log2(n + 1)), "to find the buckling load")
+    # The factors, and a copy of which the pivots are taken.
+    require(int(2 * FACTORS * n * math.log2(n + 1)), "to find the buckling load")
     K = replace(bending, preload=UNLOADED).stiffness
     K_sigma = bending.assembled(
         lambda block: geometric_stiffness(block, bending.preload, bending.rules)
     )[:, :n].tocsr()
     if not (np.isfinite(K.data).all() and np.isfinite(K_sigma.data).all()):
         return math.nan
-    found = _dense_factor(K, K_sigma) if n < DENSE else _sparse_factor(K, K_sigma)
+    if not K_sigma.nnz:  # w is held
+        return math.inf
+    if n < DENSE:
+        found = _dense_factor(K, K_sigma)
+    else:
+        found = _sparse_factor(K, K_sigma, FAR if _pulls(plate) else 0.0)
     return math.inf if found > FAR else found
+
+
+def _pulls(plate: PlateModel) -> bool:
+    """Whether a principal value of the preload is positive, beyond rounding."""
+    n_x, n_y, n_xy = plate.preload
+    least, largest = np.linalg.eigvalsh([[n_x, n_xy], [n_xy, n_y]])
+    return bool(largest > ROUNDING * abs(least))
 
 
 def _dense_factor(K: sparse.csr_array, K_sigma: sparse.csr_array) -> float:
@@ -64,19 +79,19 @@ def _dense_factor(K: sparse.csr_array, K_sigma: sparse.csr_array) -> float:
     return 1.0 / largest if largest > 0.0 else math.inf
 
 
-def _sparse_factor(K: sparse.csr_array, K_sigma: sparse.csr_array) -> float:
-    """Buckling factor above the first shift at which K + shift K_sigma is positive definite."""
+def _sparse_factor(K: sparse.csr_array, K_sigma: sparse.csr_array, first: float) -> float:
+    """Buckling factor above a shift at which K + shift K_sigma is positive definite."""
     from scipy.sparse.linalg import LinearOperator, eigsh
 
-    shift = FAR
+    shift = first
     while (factors := _factors_of_positive(K + shift * K_sigma)) is None:
         shift /= STRIDE
         if shift < LEAST:
             return 0.0
     if shift == FAR:
         return math.inf
-    (nu,) = eigsh(
-        K,
+    (largest,) = eigsh(
+        -K_sigma,
         1,
         K + shift * K_sigma,
         Minv=LinearOperator(K.shape, matvec=factors.solve, dtype=np.float64),
@@ -85,7 +100,7 @@ def _sparse_factor(K: sparse.csr_array, K_sigma: sparse.csr_array) -> float:
         tol=TOLERANCE,
         return_eigenvectors=False,
     )
-    return shift * float(nu) / (float(nu) - 1.0)
+    return shift + 1.0 / float(largest)
 
 
 def _factors_of_positive(matrix: sparse.csr_array) -> SuperLU | None:

@@ -7,6 +7,7 @@ from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.mechanics.mesh import rigid_deflections
 from fecm.problem.problem import Problem
 
+STIFFLESS = "PREL is far beyond the buckling load, or the plate has motions without stiffness"
 NEAR = 1.1  # buckling load over the preload below which the response is doubtful
 
 
@@ -39,9 +40,11 @@ def buckled(problem: Problem) -> Reports:
     card, factor = problem.deck.last(model.Preload), problem.buckling_factor
     if card is None or not factor <= 1.0:
         return
-    times = f"{1.0 / factor:.3g} times" if factor else "far beyond"
-    message = f"The preload N0 is {times} the buckling load: the plate is not stable."
-    yield Report(message, card.place(), "PREL is a force per length, tension positive")
+    message = (
+        f"The preload N0 is {1.0 / factor:.3g} times the buckling load" if factor else STIFFLESS
+    )
+    hint = "PREL is a force per length, tension positive"
+    yield Report(f"{message}: the plate is not stable.", card.place(), hint)
 
 
 @rule(
