@@ -120,8 +120,10 @@ def without_coupling(names: str) -> Break:
     return instead(strains, "strains_and_resultants", broken)
 
 
-def without_preload(right: Any, strains: Any, laminate: Any, field: Any, preload: Any) -> Any:
-    return right(strains, laminate, field, (0.0, 0.0, 0.0))
+def without_preload(
+    right: Any, strains: Any, laminate: Any, field: Any, preload: Any, *others: Any
+) -> Any:
+    return right(strains, laminate, field, (0.0, 0.0, 0.0), *others)
 
 
 def exchanged_forces(right: Any, family: Any, preload: Any, rules: Any) -> Any:

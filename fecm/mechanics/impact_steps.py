@@ -204,7 +204,7 @@ class Burst:
     """Records of consecutive steps."""
 
     columns: dict[str, Floats]  # (steps,) each
-    strains: Floats  # (steps, gages)
+    strains: Floats  # (steps, gages): weighted sums of the gages, see `GageArray`
     fields: Floats  # (rows, numnp, 5): displacement fields of the stored steps
 
 

@@ -41,6 +41,7 @@ from fecm.mechanics.interpolation import (
 )
 from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.strains import StrainField
 
 # Elements of a block: their arrays fit the cache.
 BLOCK = 256
@@ -93,6 +94,10 @@ class QuadraticStrains:
         )
         return one, two
 
+    def of(self, w: Floats) -> Floats:
+        """Strains at the points of the rule, (3, points, ne), of nodal values of w, (9, ne)."""
+        return self.at_points(tied_components(*self.slopes(w)))
+
     def slope_matrices(self) -> tuple[Floats, Floats]:
         """Matrices of the slopes w,1 and w,2, (10, 9, ne) each."""
         one, two = (
@@ -141,8 +146,15 @@ def tied_components(one: Floats, two: Floats) -> tuple[Floats, Floats, Floats]:
 
 def quadratic_strains(family: ElementBlock, rule: Quadrature, field: Floats) -> Floats:
     """Tied eps_q of a displacement field (numnp, 5) at the points of a rule, (3, points, ne)."""
-    tied = QuadraticStrains(family, rule)
-    return tied.at_points(tied_components(*tied.slopes(field[family.nodes, 2].T)))
+    return QuadraticStrains(family, rule).of(field[family.nodes, 2].T)
+
+
+def quadratic_strains_at(points: StrainField, field: Floats) -> Floats:
+    """Tied eps_q of a displacement field (numnp, 5) at points of every element, (3, numel, npt)."""
+    strains = np.empty((3, *points.shape))
+    for family in points.families:
+        strains[:, family.rows] = quadratic_strains(family, points.rule, field).swapaxes(1, 2)
+    return strains
 
 
 @frozen

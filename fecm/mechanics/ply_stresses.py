@@ -18,6 +18,7 @@ from fecm.mechanics import failure
 from fecm.mechanics.elements import Quadrature, gauss
 from fecm.mechanics.interpolation import interpolate, inverse_jacobian, local_shape_functions
 from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.membrane import QuadraticStrains
 from fecm.mechanics.mesh import ElementBlock, Ints, Mesh, element_blocks
 
 
@@ -135,7 +136,8 @@ class PlyStresses:
     """Stresses of the plies of some elements: rows of the mesh, ascending; all by default.
 
     The rule has the points of the in-plane stresses; the interlaminar ones belong to the element's
-    centre.  `initial` is a uniform midplane strain of the undeformed plate, (3,).
+    centre.  `initial` is a uniform midplane strain of the undeformed plate, (3,).  The midplane
+    strains of a `nonlinear` plate are eps_l + eps_q; its elements have nine nodes.
     """
 
     def __init__(
@@ -145,6 +147,8 @@ class PlyStresses:
         rule: Quadrature,
         members: Indices | None = None,
         initial: Floats | None = None,
+        *,
+        nonlinear: bool = False,
     ) -> None:
         self._initial = initial
         self.members = np.arange(len(mesh.elements)) if members is None else members
@@ -157,6 +161,7 @@ class PlyStresses:
                 family,
                 interpolate(family, rule).dN,
                 second_derivatives(family) if is_complete(elements[family.rows]).all() else None,
+                _Quadratic(family, rule) if nonlinear else None,
             )
             for family in element_blocks(elements, mesh.coordinates)
         ]
@@ -175,13 +180,18 @@ class PlyStresses:
         """
         count, points, _ = self.shape
         strains, gradients = np.empty((count, points, 6)), np.full((count, 2, 6), np.nan)
-        for family, slopes, curved in self._families:
+        for family, slopes, curved, quadratic in self._families:
             q = field[family.nodes][:, :, [0, 1, 3, 4]]
             q[:, :, 2:] *= -1.0  # curvatures are the strains of the rotations' negatives
-            strains[family.rows] = _strains(slopes @ q[:, None])
+            strains[family.rows] = strains_of(slopes @ q[:, None])
             if curved is not None:
                 # By x, y of the derivatives by x, y: xx, xy; xy, yy.
-                gradients[family.rows] = _strains((curved @ q)[:, [[0, 2], [2, 1]]])
+                gradients[family.rows] = strains_of((curved @ q)[:, [[0, 2], [2, 1]]])
+            if quadratic is not None:
+                w = field[family.nodes, 2]
+                strains[family.rows, :, :3] += quadratic.strains(w)
+                if curved is not None:
+                    gradients[family.rows, :, :3] += quadratic.gradients(w, curved)
         if self._initial is not None:
             strains[..., :3] += self._initial
         return strains, gradients
@@ -206,7 +216,27 @@ class PlyStresses:
         return found
 
 
-def _strains(slopes: Floats) -> Floats:
+class _Quadratic:
+    """Strains eps_q = (w,x^2/2, w,y^2/2, w,x w,y) of a block's elements."""
+
+    def __init__(self, family: ElementBlock, rule: Quadrature) -> None:
+        self._tied = QuadraticStrains(family, rule)
+        self._slopes_at_centre = interpolate(family, gauss(1)).dN[:, 0]
+
+    def strains(self, w: Floats) -> Floats:
+        """Tied strains at the points, (ne, points, 3), of nodal values (ne, 9)."""
+        return self._tied.of(w.T).transpose(2, 1, 0)
+
+    def gradients(self, w: Floats, curved: Floats) -> Floats:
+        """Derivatives by x and y at the centre, (ne, 2, 3), with those of `second_derivatives`."""
+        x, y = np.einsum("ein,en->ie", self._slopes_at_centre, w)
+        xx, yy, xy = np.einsum("ein,en->ie", curved, w)
+        by_x = (x * xx, y * xy, xx * y + x * xy)
+        by_y = (x * xy, y * yy, xy * y + x * yy)
+        return np.array([by_x, by_y]).transpose(2, 0, 1)
+
+
+def strains_of(slopes: Floats) -> Floats:
     """Strains (..., 6) from d/dx and d/dy (..., 2, 4) of u, v and the rotations' negatives."""
     x, y = slopes[..., 0, :], slopes[..., 1, :]
     parts = [(x[..., i], y[..., i + 1], y[..., i] + x[..., i + 1]) for i in (0, 2)]

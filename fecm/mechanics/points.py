@@ -140,14 +140,14 @@ def _summed(
             rule = Quadrature(xi[:, 0], xi[:, 1], shares[which])
             values, _ = local_shape_functions(family, rule)
             np.add.at(weights, family.nodes[members], shares[which, None] * values)
-            side = min(side, _shortest_side(family.take(np.unique(members))))
+            side = min(side, shortest_side(family.take(np.unique(members))))
         if not found.all():
             at = ", ".join(f"{value:.6g}" for value in points[~found][0])
             raise PatchError(f"the patch is not on the plate at ({at})")
     return weights, side
 
 
-def _shortest_side(elements: ElementBlock) -> float:
+def shortest_side(elements: ElementBlock) -> float:
     """Shortest distance of two corners that follow each other; infinite without elements."""
     corners = elements.coordinates[:, : elements.shape.corners]
     sides = np.roll(corners, -1, axis=1) - corners
@@ -159,7 +159,7 @@ def _shortest_side(elements: ElementBlock) -> float:
 # z runs from the midplane towards the face away from the projectile.  Normals stay straight,
 # u(z) = u - z theta, so that the strain at z is the midplane strain plus z times the curvature.
 # Strains are discontinuous between elements: a gage on a common edge or node reads the mean of the
-# adjacent elements.
+# adjacent elements.  A plate that stretches as it bends adds (dw/ds)^2/2, of the mean slope.
 
 
 class OutsideError(FecmError, ValueError):
@@ -179,19 +179,35 @@ class GagePlace(Protocol):
 
 @frozen
 class GageArray:
-    """Strains of gages as weighted sums of dofs."""
+    """Strains of gages by weighted sums of dofs.
+
+    The first rows are the linear strains of the gages; those of a nonlinear plate are followed by
+    the slopes dw/ds.
+    """
 
     numbers: NDArray[np.int32]  # (gages,)
-    dof_indices: Indices  # (gages, m): indices into a flattened field
-    weights: Floats  # (gages, m): strain per unit of the dof
+    dof_indices: Indices  # (rows, m): indices into a flattened field
+    weights: Floats  # (rows, m): strain or slope per unit of the dof
+
+    def strains(self, sums: Floats) -> Floats:
+        """Strains (..., gages) of the weighted sums, (..., rows)."""
+        linear, slopes = np.split(sums, [len(self.numbers)], axis=-1)
+        return linear + 0.5 * slopes**2 if slopes.size else linear
 
 
 def gages(
-    mesh: Mesh, records: Sequence[GagePlace], *, transposed_jacobian: bool = False
+    mesh: Mesh,
+    records: Sequence[GagePlace],
+    *,
+    transposed_jacobian: bool = False,
+    nonlinear: bool = False,
 ) -> GageArray:
     """Express the gages' strains by dofs; raises OutsideError if one is not on the plate."""
     families = element_blocks(mesh.elements, mesh.coordinates)
-    rows = [_functional(families, record, transposed_jacobian) for record in records]
+    found = [_functional(families, record, transposed_jacobian) for record in records]
+    rows = [linear for linear, _ in found]
+    if nonlinear:
+        rows += [slope for _, slope in found]
     most = max(len(indices) for indices, _ in rows)
     dof_indices = np.zeros((len(rows), most), dtype=np.intp)
     weights = np.zeros((len(rows), most))
@@ -201,10 +217,14 @@ def gages(
     return GageArray(numbers, dof_indices, weights)
 
 
+# Dofs and weights of a sum.
+_Functional = tuple[Indices, Floats]
+
+
 def _functional(
     families: Sequence[ElementBlock], gage: GagePlace, transposed_jacobian: bool
-) -> tuple[Indices, Floats]:
-    """Dofs and weights of a gage's strain."""
+) -> tuple[_Functional, _Functional]:
+    """A gage's linear strain, and the slope dw/ds in its direction."""
     point = np.array([[gage.x, gage.y]])
     found = [
         (family.take(np.array([member])), Quadrature(at[:1], at[1:], np.ones(1)))
@@ -214,11 +234,18 @@ def _functional(
     if not found:
         raise OutsideError(f"gage {gage.number} at ({gage.x:g}, {gage.y:g}) is not on the plate")
     c, s = np.cos(np.deg2rad(gage.direction)), np.sin(np.deg2rad(gage.direction))
-    parts: list[tuple[Indices, Floats]] = []
+    strain: list[_Functional] = []
+    slope: list[_Functional] = []
     for element, rule in found:
         at = interpolate(element, rule, transposed_jacobian=transposed_jacobian)
         along = c * at.dN[0, 0, 0] + s * at.dN[0, 0, 1]  # derivative in the gage's direction
         for dof, factor in ((0, c), (1, s), (3, -gage.z * c), (4, -gage.z * s)):
-            parts.append((element.nodes[0] * NDOF + dof, factor * along / len(found)))
+            strain.append((element.nodes[0] * NDOF + dof, factor * along / len(found)))
+        slope.append((element.nodes[0] * NDOF + 2, along / len(found)))
+    return _joined(strain), _joined(slope)
+
+
+def _joined(parts: Sequence[_Functional]) -> _Functional:
+    """The sum of some sums."""
     dof_indices, weights = (np.concatenate(part) for part in zip(*parts, strict=True))
     return dof_indices, weights

@@ -36,18 +36,22 @@ def strains_and_resultants(
     laminate: Laminate,
     field: Floats,
     preload: tuple[float, float, float],
+    quadratic: Floats | None = None,
 ) -> dict[str, Floats]:
     """Midplane strains, curvatures, transverse shear strains and resultants (equation 2-20).
 
     Each is (numel, npt), by the names of :data:`GENERALISED_STRAINS` and :data:`RESULTANTS`, of a
     displacement field (numnp, 5).  The membrane forces include `preload`, N_x, N_y, N_xy of the
-    undeformed plate; the strains do not.
+    undeformed plate; the strains do not.  To the midplane strains of a nonlinear plate eps_q is
+    added, its `quadratic` ones, (3, numel, npt).
     """
     bending = strains.evaluate(field)
     # The curvatures of the rotations (-u, -v) are the midplane strains of u and v.
     in_plane = np.zeros_like(field)
     in_plane[:, 3:] = -field[:, :2]
     membrane = strains.evaluate(in_plane)[:3]
+    if quadratic is not None:
+        membrane = membrane + quadratic
     curvature, shear = bending[:3], bending[[4, 3]]
     N = np.tensordot(laminate.A, membrane, 1) + np.tensordot(laminate.B, curvature, 1)
     if any(preload):

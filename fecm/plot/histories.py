@@ -260,5 +260,18 @@ def energy(results: Results, *, width: Width = "column") -> Picture:
     if len(drawn) > 1:
         handles += [Line2D([], [], color="0.3", ls=look) for look in style.STYLES[: len(drawn)]]
         labels += list(drawn)
+    elif points := _membrane(axes, results, shades[1]):
+        handles.append(points)
+        labels.append("plate, membrane")
     style.legend(figure, handles, labels)
     return Picture(figure)
+
+
+def _membrane(axes: Axes, results: Results, colour: str) -> Line2D | None:
+    """Draw the membrane's part of the strain energy at its rows; None where it is not stored."""
+    ((name, result),) = results.items()
+    if "membrane/energy" not in result:
+        return None
+    time, values = data.require(result, name, "membrane/time", "membrane/energy")
+    (points,) = axes.plot(time, values, color=colour, ls="none", marker=".", ms=3.0)
+    return points

@@ -26,6 +26,7 @@ from fecm.mechanics.points import GageArray, gages
 from fecm.mechanics.projectile import STEPS, RodMethod, Transducer
 from fecm.mechanics.stiffness_product import AUTO, CSR, KERNELS, SOLVERS, Workers, available
 from fecm.mechanics.strains import StrainField
+from fecm.mechanics.stretching import Stretching
 from fecm.mechanics.symmetry import restrain_resting_dofs, symmetry_reduction
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_law, build_plate, build_projectile, build_station
@@ -96,6 +97,7 @@ class ImpactModel:
     strains: StrainField
     stress_points: StrainField
     gages: GageArray | None
+    stretching: Stretching | None  # of a nonlinear plate
     patch: ContactPatch | None
     plies: PlyStresses | None  # elements whose ply stresses are stored; None without PLYS
     failure: FailureMonitor | None  # failure criteria; None without FAIL
@@ -141,6 +143,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         ),
         stress_points=stress_points,
         gages=read,
+        stretching=_stretching(problem, plate),
         patch=problem.patch,
         plies=plies,
         failure=failure,
@@ -211,10 +214,14 @@ def _stresses(
     if "PLYS" in words:  # the M elements nearest to the load, or all
         nearest = np.argsort(problem.distances.round(9), kind="stable")
         rows = np.sort(nearest[: int(words["PLYS"].second) or None])
-        plies = PlyStresses(problem.mesh, plate.laminate, points, rows, initial)
+        plies = PlyStresses(
+            problem.mesh, plate.laminate, points, rows, initial, nonlinear=plate.nonlinear
+        )
     if "FAIL" in words:
         kind = CompiledMonitor if compiled else FailureMonitor
-        stresses = PlyStresses(problem.mesh, plate.laminate, points, initial=initial)
+        stresses = PlyStresses(
+            problem.mesh, plate.laminate, points, initial=initial, nonlinear=plate.nonlinear
+        )
         failure = kind(stresses, plate.laminate, problem.deck.require(model.Allowables))
     return plies, failure
 
@@ -223,4 +230,18 @@ def _gages(problem: Problem, mesh: Mesh, plate: PlateModel) -> GageArray | None:
     """The strain gages; None without a GAGE segment."""
     if (cards := problem.deck.last(model.Gages)) is None:
         return None
-    return gages(mesh, cards.records, transposed_jacobian=plate.rules.transposed_jacobian)
+    return gages(
+        mesh,
+        cards.records,
+        transposed_jacobian=plate.rules.transposed_jacobian,
+        nonlinear=plate.nonlinear,
+    )
+
+
+def _stretching(problem: Problem, plate: PlateModel) -> Stretching | None:
+    """What evaluates the stretching of a nonlinear plate where it is stored."""
+    work = problem.work
+    rows = work.contact_rows if problem.has_impact else work.passes["DISP"]
+    if not (plate.nonlinear and rows):
+        return None
+    return Stretching(plate, problem.under_load, problem.load_place)

@@ -27,6 +27,7 @@ from fecm.results.sinks import RowBuffer
 NODE = 800  # bytes per node: mesh, state, fields, buffered rows
 PLACE = 60  # bytes per dof of an element: its indices, its forces, and the matrix that sums them
 POINT = 250  # bytes per strain point of an element: Jacobians and strains
+STRETCHING = 400  # bytes per Gauss point of a nonlinear plate whose stretching is stored
 KEPT = 12  # bytes per entry of the element matrices that are kept
 INTEGRATED = 24  # and of one under integration, for each row of B and point
 ROWS = 8  # strains in B: six of the membrane and of bending, two of the transverse shear
@@ -46,6 +47,8 @@ def needed_bytes(
     output, model, control = checked.output_bytes, checked.plate, checked.deck.control
     bending, _, strains = checked.rules
     total = NODE * control.numnp + POINT * control.numel * max(len(strains.xi), len(bending.xi))
+    if model.nonlinear:
+        total += STRETCHING * control.numel * len(bending.xi)
     if solver == CSR or words & STATIC:
         total += ASSEMBLED * model.entries
     if solver != CSR:

@@ -209,7 +209,8 @@ class Problem:
             self.laminate.thickness,
             in_plane_of(self.mesh.codes),
             mobility,
-            self.plate.is_preloaded,
+            preloaded=self.plate.is_preloaded,
+            nonlinear=self.plate.nonlinear,
         )
 
     @property
@@ -233,8 +234,9 @@ class Problem:
         chosen = next((int(m.second) for m in flat(self.program) if m.word == "PLYS"), 0)
         plies = (chosen or control.numel) * (layers * (6 * an_element + 6) + 2)
         history = work.steps * (18 + gages + bool(self.damping))
+        row = 10 if self.deck.has(model.Nonlinear) else 0  # of `membrane`
         numbers = {
-            "DISP": work.passes["DISP"] * (field + control.numnp),
+            "DISP": work.passes["DISP"] * (field + control.numnp + row),
             "STRE": work.passes["STRE"] * points * 16,
             "REAC": work.passes["REAC"] * field,
             "EIGE": work.passes["EIGE"] * field,
@@ -243,7 +245,7 @@ class Problem:
                 min(1, work.passes["FAIL"]) * 9 * points * layers * 2  # both faces of a ply
                 + work.passes["FAIL"] * len(CRITERIA) * 5
             ),
-            "RODP": work.contact_rows * (points * 5 + 8) + history,
+            "RODP": work.contact_rows * (points * 5 + 8 + row) + history,
         }
         return {word: 8 * count for word, count in numbers.items()}
 

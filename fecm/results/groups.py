@@ -23,6 +23,9 @@ GROUPS = {
     ),
     "energy": GroupInfo("energies at every step", "RODP"),
     "gages": GroupInfo("strain gages, read at every step", "RODP or EXCD"),
+    "membrane": GroupInfo(
+        "stretching of a nonlinear plate, at the rows of tape8; without impact at those of tape3"
+    ),
     "stresses": GroupInfo("strains and stress resultants, stored by STRE", "STRE"),
     "patch": GroupInfo("nodal weights of the contact force"),
     "plies": GroupInfo("stresses ply by ply, stored by PLYS", "PLYS"),

@@ -11,6 +11,7 @@ from fecm._typing import Array
 TOO_SOFT = "a linear plate, without membrane stiffening, is too soft"
 # The errors are those of plates without preload.
 PRELOADED = "that is without PREL, whose compression makes it more and whose tension less"
+REMEDY = "NONL includes the stiffening (fecm new --nonlinear)"
 UNSAFE = "threshold energies are therefore too high (unsafe)"
 
 

@@ -69,6 +69,7 @@ class Result(Stored, schema.Contact):
     history: schema.History
     energy: schema.Energy
     gages: schema.GageGroup
+    membrane: schema.Membrane
     stresses: schema.Stresses
     patch: schema.PatchGroup
     failure: schema.Failure

@@ -39,6 +39,16 @@ class Form(StrEnum):
     SWEEP = "fecm-sweep"
 
 
+class Kinematics(StrEnum):
+    """Strains of the plate: the attribute :data:`KINEMATICS` of nonlinear ones."""
+
+    LINEAR = "linear"
+    VON_KARMAN = "von Karman"
+
+
+KINEMATICS = "kinematics"
+
+
 @frozen
 class Dataset:
     """One dataset of a result."""
@@ -177,6 +187,31 @@ class GageGroup(Rows):
     strain: Annotated[Floats, "rows gages", "normal strain of every gage in its direction"]
 
 
+class Membrane(Rows):
+    """Stretching of a nonlinear plate, at the rows of tape8; without impact at those of tape3."""
+
+    energy: Annotated[
+        _Energy, "membrane energy, 1/2 n A^-1 n of n = A eps + B kappa", "force*length"
+    ]
+    strain_energy: Annotated[_Energy, "strain energy of the plate", "force*length"]
+    preload_energy: Annotated[
+        _Energy, "energy 1/2 N0_ij w,i w,j of the preload, only with PREL", "force*length"
+    ]
+    largest_slope: Annotated[Floats, "rows", "largest slope |grad w|"]
+    largest_strain: Annotated[
+        Floats, "rows", "largest principal strain of both faces, in size, away from the load"
+    ]
+    largest_force: Annotated[
+        Floats, "rows", "largest principal membrane force, tension positive", "force/length"
+    ]
+    force_at_load: Annotated[
+        Floats, "rows", "principal membrane force at the load, the largest in size", "force/length"
+    ]
+    moment_at_load: Annotated[
+        Floats, "rows", "principal moment at the load, the largest in size", "force"
+    ]
+
+
 class Stresses(Rows):
     """Strains and stress resultants, stored by STRE."""
 
@@ -299,6 +334,7 @@ GROUP_TYPES: dict[str, type[Group]] = {
     "history": History,
     "energy": Energy,
     "gages": GageGroup,
+    "membrane": Membrane,
     "stresses": Stresses,
     "patch": PatchGroup,
     "plies": PlyRows,

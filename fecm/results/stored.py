@@ -19,7 +19,7 @@ from fecm.results.errors import NotStoredError, ResultFileError
 from fecm.results.group import Attributes
 from fecm.results.metrics import VALIDITY
 from fecm.results.missing import not_stored
-from fecm.results.schema import declared_units
+from fecm.results.schema import KINEMATICS, Kinematics, declared_units
 
 
 class Stored:
@@ -47,6 +47,11 @@ class Stored:
     def mode(self) -> str:
         """``"report"`` or ``"listing"``."""
         return str(self.attributes.get("mode", ""))
+
+    @property
+    def kinematics(self) -> str:
+        """Strains of the plate: ``"linear"``, or ``"von Karman"`` with NONL."""
+        return str(self.attributes.get(KINEMATICS, Kinematics.LINEAR))
 
     @property
     def slips(self) -> tuple[str, ...]:

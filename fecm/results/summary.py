@@ -17,6 +17,7 @@ from fecm.results.first_failure import FirstFailure, failure_metrics, first_fail
 from fecm.results.result import Result
 from fecm.results.validity import CROSSED
 
+NEAR = 0.05  # of the time of the peak, up to which a row is that of the peak
 LISTED = 6  # most contacts and frequencies listed individually
 # Where a run has ended that has not decided its peak.
 UNDECIDED = {
@@ -46,6 +47,8 @@ def summary(result: Result) -> list[str]:
         lines.append(_line("largest w", f"{quantity(w[row, node], 'length')} at node {node + 1}"))
     elif "tape3/w" in result:
         lines.append(_line("largest w", "0: nothing moved the plate"))
+    if text := _membrane(result):
+        lines.append(_line("membrane", text))
     if result.threshold:
         lines.append(_line("delamination", f"{_delamination(result)}{_delaminations(result)}"))
     lines += _exposures(result)
@@ -69,6 +72,30 @@ def _preload(result: Result) -> list[str]:
         if isinstance(force, float) and force
     ]
     return [_line("preload", ", ".join(named))] if named else []
+
+
+def _membrane(result: Result) -> str:
+    """Share of the membrane in the strain energy of a nonlinear plate; empty if it is not known.
+
+    It is that of the stored row nearest to the peak force; without contact that of the largest
+    energy.  The energy of the preload does not count.
+    """
+    needed = [f"membrane/{name}" for name in ("time", "energy", "strain_energy")]
+    if not all(path in result and result[path].size for path in needed):
+        return ""
+    elastic = result["membrane/strain_energy"].copy()
+    if "membrane/preload_energy" in result:
+        elastic -= result["membrane/preload_energy"]
+    row, at = int(elastic.argmax()), "where it is largest"
+    if "history/force" in result and (force := result["history/force"]).any():
+        time, peak = result["membrane/time"], float(result["history/time"][force.argmax()])
+        row, at = int(np.abs(time - peak).argmin()), "at the peak"
+        if abs(time[row] - peak) > NEAR * peak:
+            at = f"at time {_quantity(result, time[row], 'time')}, the row nearest to the peak"
+    if not elastic[row] > 0.0:
+        return ""
+    percent = 100.0 * float(result["membrane/energy"][row]) / float(elastic[row])
+    return f"{percent:.{0 if percent > 9.5 else 1}f} % of the strain energy {at}"
 
 
 def _delaminations(result: Result) -> str:

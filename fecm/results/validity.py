@@ -6,6 +6,7 @@ many cases at once: arrays (cases,).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from enum import StrEnum
 from itertools import compress
@@ -21,6 +22,7 @@ STRAIN = 0.01  # largest strain for which plies are taken as linear
 # Exposure, or force relative to the delamination threshold, from which on a case is beyond it.  A
 # search for the velocity that reaches 1 ends a hair above.
 CROSSED = 1.0001
+SLOPE = 0.25  # of a nonlinear plate, up to which its rotations are moderate
 INDENTATION = 0.25  # of the thickness, up to which the contact law of a half-space holds
 
 # Validity of a case without a reason to doubt it, and of one that was not computed.
@@ -35,6 +37,7 @@ class Reason(StrEnum):
     OPEN = "peak not reached"
     BENT_HELD = f"w > {LIMITS[InPlane.HELD]} h"
     BENT_FREE = f"w > {LIMITS[InPlane.FREE]} h"
+    STEEP = f"slope > {SLOPE}"
     STRAINED = "strain > 1 %"
     SOFT = "indentation > h/4"
     BROKEN = "exposure > 1"
@@ -53,6 +56,7 @@ MEANING: dict[str, str] = {
     Reason.OPEN: "with an open peak",
     Reason.BENT_HELD: f"beyond the linear plate ({Reason.BENT_HELD})",
     Reason.BENT_FREE: f"beyond the linear plate ({Reason.BENT_FREE})",
+    Reason.STEEP: f"beyond moderate rotations ({Reason.STEEP})",
     Reason.STRAINED: f"beyond linear plies ({Reason.STRAINED})",
     Reason.SOFT: f"beyond the contact law ({Reason.SOFT})",
     Reason.BROKEN: f"elastic beyond the first failure ({Reason.BROKEN})",
@@ -109,6 +113,7 @@ class Judge:
     # supports hold the plate.
     mobility: float = 0.0
     preloaded: bool = False  # whether an initial membrane force acts
+    nonlinear: bool = False  # whether stretching follows from bending
 
     def softness(self, ratio: float) -> str:
         """Error of the linear plate at a deflection over its thickness, in words."""
@@ -116,8 +121,11 @@ class Judge:
 
     @property
     def limit(self) -> float:
-        """Deflection up to which the plate is taken as linear, over its thickness."""
-        return LIMITS[self.in_plane]
+        """Deflection up to which the plate is taken as linear, over its thickness.
+
+        Infinite if the plate is not taken as linear.
+        """
+        return math.inf if self.nonlinear else LIMITS[self.in_plane]
 
     def validity(self, extent: Extent) -> Texts:
         """``"ok"``, or the reasons to doubt each case, in words."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -11,10 +12,10 @@ from fecm.mechanics.mesh import rigid_deflections
 from fecm.results.criteria import spelt
 from fecm.results.end import OPEN_ENDS, End
 from fecm.results.exposures import FEWEST, count_evaluations, largest_exposures
-from fecm.results.linear_plate import TOO_SOFT, UNSAFE
+from fecm.results.linear_plate import REMEDY, TOO_SOFT, UNSAFE
 from fecm.results.result import Result
-from fecm.results.validity import BENT, CROSSED, INDENTATION, STRAIN, Reason, joined
-from fecm.simulation import peaks
+from fecm.results.validity import BENT, CROSSED, INDENTATION, SLOPE, STRAIN, Reason, joined
+from fecm.simulation import membrane, peaks
 from fecm.simulation.peaks import Peak
 from fecm.simulation.simulation import Simulation
 
@@ -43,6 +44,7 @@ def judge(simulation: Simulation, result: Result) -> Verdict:
         *_numerical(simulation),
         *(doubt.note for doubt in beyond),
         *_few_evaluations(simulation, result),
+        *membrane.doubts(simulation, result),
     ]
     end = result.end
     if end is None:
@@ -87,12 +89,20 @@ def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:
     """Deflection, strain, indentation and exposures beyond their limits."""
     with np.errstate(all="ignore"):
         deflection = peaks.deflection(simulation, result)
+        slope = peaks.slope(result)
         strain = peaks.strain(simulation, result)
         indentation = peaks.indentation(simulation, result)
     limits = simulation.problem.judge
     h = limits.thickness
     if deflection.value > limits.limit * h:
         yield Doubt(BENT[limits.in_plane], _bent(simulation, result, deflection))
+    if slope.value > SLOPE:
+        reached = _reached(result, "slope", f"{slope.value:.3g}", slope)
+        yield Doubt(
+            Reason.STEEP,
+            f"{reached} {SLOPE} von Kármán strains, which are for moderate rotations, have an "
+            f"error of about slope²/2 = {slope.value**2 / 2.0:.1%}",
+        )
     if strain.value > STRAIN:
         reached = _reached(result, "strain", f"{strain.value:.2%}", strain)
         yield Doubt(Reason.STRAINED, f"{reached} 1 % linear plies are doubtful")
@@ -116,9 +126,9 @@ def _bent(simulation: Simulation, result: Result, peak: Peak) -> str:
     what = "deflection, less its rigid motion," if is_free else "deflection"
     size = _size(result, peak.value, limits.thickness)
     note = f"{_reached(result, what, size, peak)} {limits.limit} h {TOO_SOFT}"
-    if not simulation.problem.has_impact:
-        return note
-    return f"{note}: {limits.softness(peak.value / limits.thickness)}; {UNSAFE}"
+    if simulation.problem.has_impact:
+        note = f"{note}: {limits.softness(peak.value / limits.thickness)}; {UNSAFE}"
+    return note if simulation.options.slips else f"{note}; {REMEDY}"
 
 
 def _size(result: Result, value: float, thickness: float) -> str:
@@ -129,5 +139,7 @@ def _size(result: Result, value: float, thickness: float) -> str:
 
 def _reached(result: Result, what: str, value: str, peak: Peak) -> str:
     """Begin of a note: what a quantity reaches, and where and when."""
-    time = f"{peak.time:.6g} {result.unit('time')}".rstrip()
-    return f"the {what} reaches {value} at ({peak.x:.6g}, {peak.y:.6g}), time {time}: beyond"
+    time = f"time {peak.time:.6g} {result.unit('time')}".rstrip()
+    if not math.isnan(peak.x):
+        time = f"({peak.x:.6g}, {peak.y:.6g}), {time}"
+    return f"the {what} reaches {value} at {time}: beyond"

@@ -14,6 +14,7 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.deck.macros import WORDS, Body, load_factor, number
 from fecm.deck.model import Macro
+from fecm.mechanics.membrane import quadratic_strains_at
 from fecm.mechanics.solutions import ConvergenceError, modes, reactions
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.strains import strains_and_resultants
@@ -211,6 +212,7 @@ def _at_passes(word: str, run: Simulation, n: int) -> None:
 def _store_displacements(run: Simulation, steps: Steps, times: Times, fields: Floats) -> None:
     run.recorder.rows("tape3", steps, times, {"w": fields[:, :, 2], "displacement": fields})
     if run.state.impact is None:
+        run.recorder.stretching(steps, times, fields)
         for time, field in zip(times, fields, strict=True):
             run.printer.displacements(field, time)
 
@@ -252,7 +254,9 @@ def store_stresses(run: Simulation, n: int) -> None:
     if run.interpreter.current_pass % n:
         return
     plate, model, points = run.state.plate, run.model.plate, run.model.stress_points
-    values = strains_and_resultants(points, model.laminate, run.displacement_field(), model.preload)
+    field = run.displacement_field()
+    quadratic = quadratic_strains_at(points, field) if model.nonlinear else None
+    values = strains_and_resultants(points, model.laminate, field, model.preload, quadratic)
     run.recorder.row("stresses", plate.step, plate.time, values)
     run.printer.stresses(values, points.places(run.problem.mesh.coordinates), run.state.clock)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
@@ -20,12 +21,13 @@ MEMBRANE = ("eps_xx", "eps_yy", "gamma_xy")
 
 
 class Peak(NamedTuple):
-    """Largest value of a quantity, and where and when it occurs."""
+    """Largest value of a quantity, and when and where it occurs."""
 
     value: float
     time: float
-    x: float
-    y: float
+    # Place; NaN where it is not known.
+    x: float = math.nan
+    y: float = math.nan
 
 
 NO_PEAK = Peak(0.0, 0.0, 0.0, 0.0)
@@ -45,8 +47,19 @@ def strain(simulation: Simulation, result: Result) -> Peak:
         *_face_strains(simulation, result, "tape8"),
         *_face_strains(simulation, result, "stresses"),
         *_gage_strains(simulation, result),
+        *_of_membrane(result, "largest_strain"),
     ]
     return max(stored, default=NO_PEAK)
+
+
+def slope(result: Result) -> Peak:
+    """Largest slope of a nonlinear plate at its stored rows."""
+    return max(_of_membrane(result, "largest_slope"), default=NO_PEAK)
+
+
+def membrane_force(result: Result) -> Peak:
+    """Largest principal membrane force of a nonlinear plate at its stored rows."""
+    return max(_of_membrane(result, "largest_force"), default=NO_PEAK)
 
 
 def indentation(simulation: Simulation, result: Result) -> Peak:
@@ -108,6 +121,13 @@ def _gage_strains(simulation: Simulation, result: Result) -> Iterator[Peak]:
         x, y = np.array([(gage.x, gage.y) for gage in cards.records]).T
         for times, (values,) in _blocks(result, "gages", ["strain"]):
             yield _peak(np.abs(values), times, x, y)
+
+
+def _of_membrane(result: Result, name: str) -> Iterator[Peak]:
+    """Peaks of the rows of ``membrane``, whose places are not stored."""
+    for times, (values,) in _blocks(result, "membrane", [name]):
+        row = int(values.argmax())
+        yield Peak(float(values[row]), float(times[row]))
 
 
 def _blocks(

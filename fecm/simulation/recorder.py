@@ -23,7 +23,20 @@ from fecm.simulation.step_recorder import EVERY_STEP, OnBlock, StepRecorder
 Steps = Sequence[int]  # of rows
 Times = Sequence[float]
 FAILURE = ("failure", *(f"failure/{name}" for name in ALL_CRITERIA))
+MEMBRANE = "membrane"
 AT_MACROS = ("tape3", "tape8", "stresses", "plies", "exposures", "reactions", "modes")
+
+
+def _absent(model: ImpactModel) -> set[str]:
+    """Datasets that a run lacks although it has their group."""
+    absent = set()
+    if not model.motion.damping:
+        absent.add("energy/damping_work")
+    if not model.plate.is_preloaded:
+        absent.add(f"{MEMBRANE}/preload_energy")
+    if model.stretching is None or not model.stretching.has_load:
+        absent |= {f"{MEMBRANE}/force_at_load", f"{MEMBRANE}/moment_at_load"}
+    return absent
 
 
 class Recorder:
@@ -43,17 +56,21 @@ class Recorder:
             "history": has_impact * sizes.steps,
             "energy": sizes.steps,
             "gages": (model.gages is not None) * sizes.steps,
+            MEMBRANE: 0,
             **dict.fromkeys(FAILURE, int(model.failure is not None)),
             "patch": int(model.patch is not None),
         }
+        if model.stretching is not None:
+            rows = sizes.contact_rows if has_impact else sizes.passes["DISP"]
+            self._room[MEMBRANE] = rows
+        absent = _absent(model)
         self._datasets = [
             (dataset, self._shape(dataset))
             for dataset in DATASETS.values()
-            if self._room.get(dataset.group) != 0
-            and (dataset.path != "energy/damping_work" or model.motion.damping)
+            if self._room.get(dataset.group) != 0 and dataset.path not in absent
         ]
         self._buffers: dict[str, RowBuffer] = {}
-        for group in (*EVERY_STEP, "tape9", *AT_MACROS):
+        for group in (*EVERY_STEP, "tape9", *AT_MACROS, MEMBRANE):
             members = [p for p in self._datasets if p[0].group == group and p[0].shape[0] == "rows"]
             if members:
                 self._buffers[group] = RowBuffer(sink, members)
@@ -138,7 +155,7 @@ class Recorder:
         return found
 
     def row(self, group: str, step: int, time: float, columns: Mapping[str, Any]) -> None:
-        """Store a row of one of the groups :data:`AT_MACROS`: a value or an array per dataset."""
+        """Store a row of a group: a value or an array per dataset."""
         rows = {name: np.asarray(value)[None] for name, value in columns.items()}
         self.rows(group, [step], [time], rows)
 
@@ -151,6 +168,13 @@ class Recorder:
         """Store rows of tape8: strains of the displacements at `times`, (rows, numnp, 5)."""
         strains = self._model.strains.evaluate(fields)
         self.rows("tape8", steps, times, dict(zip(STRAINS, strains, strict=True)))
+        self.stretching(steps, times, fields)
+
+    def stretching(self, steps: Steps, times: Times, fields: Floats) -> None:
+        """Store rows about the midplane of a nonlinear plate, of displacements at `times`."""
+        if self._model.stretching is not None:
+            for step, time, field in zip(steps, times, fields, strict=True):
+                self.row(MEMBRANE, step, time, self._model.stretching.evaluate(field)._asdict())
 
     def _parts(self) -> dict[str, StepRecorder | RowBuffer]:
         """What has rows that are not stored yet, by its path in a checkpoint."""

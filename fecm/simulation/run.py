@@ -19,7 +19,7 @@ from fecm.problem.slips import mode_of
 from fecm.results.exposures import count_evaluations
 from fecm.results.metrics import MOBILITY, VALIDITY
 from fecm.results.result import Result
-from fecm.results.schema import FORMAT_VERSION, Form
+from fecm.results.schema import FORMAT_VERSION, KINEMATICS, Form, Kinematics
 from fecm.results.sinks import Sink
 from fecm.simulation.divergence import likely_cause
 from fecm.simulation.judge import judge
@@ -71,6 +71,7 @@ def run(simulation: Simulation) -> None:
 def _write_header(simulation: Simulation) -> None:
     """Store the attributes of the file, the deck, and every dataset without its rows."""
     sink, options, deck = simulation.sink, simulation.options, simulation.problem.deck
+    plate = simulation.model.plate
     attributes = {
         "format": Form.RUN.value,
         "format_version": FORMAT_VERSION,
@@ -79,6 +80,7 @@ def _write_header(simulation: Simulation) -> None:
         "mode": mode_of(options.slips),
         "slips": sorted(options.slips),
         "solver": simulation.model.motion.solver,
+        **({KINEMATICS: Kinematics.VON_KARMAN.value} if plate.nonlinear else {}),
         **options.rod_method.attributes,
         **({} if options.law is None else {"law": type(options.law).__name__}),
         **_units(deck),

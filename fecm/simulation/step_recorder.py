@@ -77,6 +77,7 @@ class StepRecorder:
         gages = 0
         if model.impact is not None:
             self._rod = np.empty((BLOCK, 3, len(model.impact.rod_mass)))
+        self._gage_array = model.gages
         if model.gages is not None:
             self._gages = model.motion.dof_sums(model.gages.dof_indices, model.gages.weights)
             gages = len(model.gages.numbers)
@@ -107,7 +108,8 @@ class StepRecorder:
         kinetic = self._motion.kinetic_energy(plate, factor, applied)
         row = [plate.step, plate.time, kinetic, plate.strain_energy, plate.external_work]
         if self._gages is not None:
-            self._table[len(NAMES) :, self._count] = self._gages.evaluate(plate, factor)
+            sums = self._gages.evaluate(plate, factor)
+            self._table[len(NAMES) :, self._count] = self._strains(sums)
         if impact is not None:
             self._rod[self._count] = impact.rod.motion
             indentation, force = impact.contact
@@ -118,11 +120,18 @@ class StepRecorder:
         if self._count == BLOCK:
             self.flush()
 
-    def add(self, plate: PlateState, columns: Columns, strains: Floats, on_tape9: Array) -> None:
-        """Add rows for many steps, and the contact of some of them to tape9."""
-        work = np.full(len(strains), plate.external_work)
+    def _strains(self, sums: Floats) -> Floats:
+        """Strains of the gages, (..., gages), of their weighted sums."""
+        return sums if self._gage_array is None else self._gage_array.strains(sums)
+
+    def add(self, plate: PlateState, columns: Columns, sums: Floats, on_tape9: Array) -> None:
+        """Add rows for many steps, and the contact of some of them to tape9.
+
+        `sums` are the weighted sums of the gages, (steps, rows).
+        """
+        work = np.full(len(sums), plate.external_work)
         given = {**columns, "external_work": work, "on_tape9": on_tape9}
-        values = np.vstack([*(given[name] for name in NAMES), strains.T])
+        values = np.vstack([*(given[name] for name in NAMES), self._strains(sums).T])
         while values.size:
             self._add_projectile()
             part, values = np.split(values, [BLOCK - self._count], axis=1)

@@ -1,0 +1,197 @@
+"""What the midplane of a nonlinear plate carries: energies, slopes, strains and membrane forces.
+
+The strain energy without the preload's part is
+
+    1/2 int n A^-1 n dA + 1/2 int (kappa (D - B A^-1 B) kappa + gamma S gamma) dA,
+    n = A eps + B kappa,  eps = eps_l + eps_q.
+
+Its first part is that of the membrane: 1/2 eps A eps if B is zero.  The membrane force is N0 + n.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from fecm._typing import Bools, Floats
+from fecm.mechanics import assumed_shear
+from fecm.mechanics.elements import Quadrature
+from fecm.mechanics.interpolation import interpolate, jacobian_determinants
+from fecm.mechanics.membrane import QuadraticStrains
+from fecm.mechanics.mesh import ElementBlock
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.ply_stresses import strains_of
+from fecm.mechanics.points import locate
+
+# Elements of a block.
+BLOCK = 1024
+
+
+class Stretch(NamedTuple):
+    """Midplane of a plate in a displacement field.
+
+    The largest values are those at the points of quadrature.
+    """
+
+    energy: float  # of the membrane, force*length
+    strain_energy: float  # of the plate, force*length
+    preload_energy: float  # 1/2 int N0_ij w,i w,j dA, force*length
+    largest_slope: float  # |grad w|
+    # Principal strain of both faces, in size, away from the load; with that of the preload.
+    largest_strain: float
+    largest_force: float  # principal membrane force, tension positive, force/length
+    # Principal membrane force and moment at the load, in size, force/length and force.
+    force_at_load: float
+    moment_at_load: float
+
+
+class _Midplane(NamedTuple):
+    """Strains, curvatures and slopes of some elements, (ne, points, components)."""
+
+    strains: Floats
+    curvatures: Floats
+    slopes: Floats
+
+
+class _Elements:
+    """Some elements at the points of a rule."""
+
+    def __init__(self, block: ElementBlock, rule: Quadrature) -> None:
+        at = interpolate(block, rule)
+        self.area = at.jxw  # (ne, points): that a point stands for
+        self.x, self.y = np.einsum("pn,eni->iep", at.N, block.coordinates)
+        self._nodes, self._slopes = block.nodes, at.dN
+        self._tied = QuadraticStrains(block, rule)
+
+    def midplane(self, field: Floats) -> _Midplane:
+        """The midplane in a displacement field, (numnp, 5)."""
+        q = field[self._nodes]
+        q[..., 3:] *= -1.0  # curvatures are the strains of the rotations' negatives
+        slopes = self._slopes @ q[:, None]
+        strains = strains_of(slopes[..., [0, 1, 3, 4]])
+        stretch = self._tied.of(q[..., 2].T).transpose(2, 1, 0)
+        return _Midplane(strains[..., :3] + stretch, strains[..., 3:], slopes[..., 2])
+
+
+def nowhere(x: Floats, y: Floats) -> Bools:
+    """No point is near the load."""
+    return np.zeros(np.broadcast_shapes(x.shape, y.shape), dtype=bool)
+
+
+class Stretching:
+    """Evaluates displacement fields of a nonlinear plate.
+
+    `near` tells which points, x and y, are so near to the load that their strains don't count;
+    `load` is the place of the load.
+    """
+
+    def __init__(
+        self,
+        plate: PlateModel,
+        near: Callable[[Floats, Floats], Bools] = nowhere,
+        load: tuple[float, float] | None = None,
+    ) -> None:
+        self.has_load = load is not None
+        self._laminate = plate.laminate
+        self._compliance = np.linalg.inv(plate.laminate.A)
+        self._preload = np.array(plate.preload)
+        blocks = (block for family in plate.families for block in family.blocks(BLOCK))
+        parts = [_Elements(block, plate.rules.bending) for block in blocks]
+        self._parts = [(part, near(part.x, part.y)) for part in parts]
+        self._sheared = []
+        for family in plate.families:
+            rule = assumed_shear.quadrature(family)
+            area = jacobian_determinants(family, rule) * rule.weights
+            self._sheared.append((plate.strain_field(rule), family.rows, area))
+        self._at_load = [] if load is None else _elements_at(plate, load)
+
+    def evaluate(self, field: Floats) -> Stretch:
+        """Evaluate a displacement field, (numnp, 5)."""
+        energies, largest = np.zeros(3), np.full(3, -np.inf)
+        for part, near in self._parts:
+            at = part.midplane(field)
+            energies += self._energies(at, part.area)
+            largest = np.maximum(largest, self._largest(at, near))
+        membrane, bending, preload = energies.tolist()
+        slope, strain, force = largest.tolist()
+        force_at_load, moment_at_load = self._under_load(field)
+        return Stretch(
+            energy=membrane,
+            strain_energy=membrane + bending + preload + self._shear_energy(field),
+            preload_energy=preload,
+            largest_slope=slope,
+            largest_strain=strain,
+            largest_force=force,
+            force_at_load=force_at_load,
+            moment_at_load=moment_at_load,
+        )
+
+    def _forces(self, at: _Midplane) -> Floats:
+        """Membrane forces n, (ne, points, 3)."""
+        return np.asarray(at.strains @ self._laminate.A + at.curvatures @ self._laminate.B)
+
+    def _energies(self, at: _Midplane, area: Floats) -> Floats:
+        """Energies of the membrane, of bending and of the preload."""
+        A, B, D = self._laminate.A, self._laminate.B, self._laminate.D
+        n = self._forces(at)
+        x, y = np.moveaxis(at.slopes, -1, 0)
+        squares = np.stack([x * x, y * y, 2.0 * x * y], axis=-1)
+        densities = [
+            (n * (n @ self._compliance)).sum(axis=-1),
+            (at.curvatures * (at.curvatures @ (D - B @ np.linalg.solve(A, B)))).sum(axis=-1),
+            squares @ self._preload,
+        ]
+        return np.array([0.5 * (area * density).sum() for density in densities])
+
+    def _shear_energy(self, field: Floats) -> float:
+        """Energy of the transverse shear."""
+        energy = 0.0
+        for strains, rows, area in self._sheared:
+            gamma = strains.evaluate(field)[[4, 3]][:, rows]
+            density = np.einsum("iep,ij,jep->ep", gamma, self._laminate.shear, gamma)
+            energy += 0.5 * float((area * density).sum())
+        return energy
+
+    def _largest(self, at: _Midplane, near: Bools) -> Floats:
+        """Largest slope, strain of a face away from the load, and membrane force."""
+        slope = np.hypot(at.slopes[..., 0], at.slopes[..., 1])
+        middle = at.strains + self._compliance @ self._preload
+        bent = 0.5 * self._laminate.thickness * at.curvatures
+        # The third component of strains is twice that of their tensor.
+        faces = [_size(strains * [1.0, 1.0, 0.5]) for strains in (middle - bent, middle + bent)]
+        strain = np.where(near, 0.0, np.maximum(*faces))
+        mean, radius = principal_values(self._preload + self._forces(at))
+        return np.array([slope.max(), strain.max(), (mean + radius).max()])
+
+    def _under_load(self, field: Floats) -> tuple[float, float]:
+        """Membrane force and moment at the load: means of the adjacent elements; 0 without it."""
+        B, D = self._laminate.B, self._laminate.D
+        states = [part.midplane(field) for part in self._at_load]
+        if not states:
+            return 0.0, 0.0
+        force = np.mean([self._forces(at)[0, 0] for at in states], axis=0)
+        moment = np.mean([(at.strains @ B + at.curvatures @ D)[0, 0] for at in states], axis=0)
+        return float(_size(self._preload + force)), float(_size(moment))
+
+
+def principal_values(tensor: Floats) -> tuple[Floats, Floats]:
+    """Principal values of xx, yy, xy (..., 3): their mean, and half of their difference."""
+    xx, yy, xy = np.moveaxis(tensor, -1, 0)
+    return 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
+
+
+def _size(tensor: Floats) -> Floats:
+    """Principal value of xx, yy, xy (..., 3) that is the largest in size."""
+    mean, radius = principal_values(tensor)
+    return np.asarray(np.abs(mean) + radius)
+
+
+def _elements_at(plate: PlateModel, place: tuple[float, float]) -> list[_Elements]:
+    """The elements that contain a place, each at this place alone."""
+    return [
+        _Elements(family.take(np.array([member])), Quadrature(xi[:1], xi[1:], np.ones(1)))
+        for family in plate.families
+        for member, _, xi in zip(*locate(family, np.array([place])), strict=True)
+    ]
