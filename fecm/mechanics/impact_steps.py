@@ -34,11 +34,12 @@ from fecm.mechanics.rod_modes import Modes
 # Records of a step, in the order of structures.h.
 COLUMNS = (
     "time",
-    # Inner products of the plate's state: d M d, d K u, u K u, and K u with s.
+    # Inner products of the plate's state: d M d, d f, u f, and f with s, of the internal force f.
     "inertia",
     "power",
     "strain",
     "internal",
+    "quadratic",  # see :class:`~fecm.mechanics.plate_motion.Sums`
     # d and s under the load.
     "load_d",
     "load_s",
@@ -277,13 +278,13 @@ class ImpactSteps:
         moved = float(tips[-1] - (tips[-2] if steps > 1 else state.rod.tip))
         state.rod = self._modes.state(written.motion, impact.rod.tip, moved)
         self._leave(state, impact)
-        names = ("inertia", "power", "strain", "internal")
-        inertia, power, strain, internal = (columns[name][-1].item() for name in names)
-        plate.sums = Sums(inertia, power, strain, internal, 0.0, 0.0)
+        names = ("inertia", "power", "strain", "internal", "quadratic")
+        inertia, power, strain, internal, quadratic = (columns[name][-1].item() for name in names)
+        plate.sums = Sums(inertia, power, strain, internal, 0.0, 0.0, quadratic)
         plate.step += steps
         columns["step"] = np.arange(plate.step - steps + 1, plate.step + 1, dtype=float)
         columns["plate_kinetic"] = self._kinetic(columns, plate.dt2)
-        columns["plate_strain"] = 0.5 * columns["strain"]
+        columns["plate_strain"] = 0.5 * (columns["strain"] - columns["quadratic"])
         return Burst(columns, written.strains, self._product.fields(written.fields))
 
     def _impact(self, state: ImpactState, dt: float, stored: Indices, written: Written) -> Impact:

@@ -19,6 +19,7 @@ import numpy as np
 
 from fecm._typing import Floats, Indices
 from fecm.mechanics import kernels
+from fecm.mechanics.kernels import membrane
 from fecm.mechanics.kernels.plate import CompiledProduct
 from fecm.mechanics.membrane import Membrane
 from fecm.mechanics.mesh import congruence, distinct
@@ -303,6 +304,14 @@ def stiffness_operator(
 def internal_force_operator(
     plate: PlateModel, solver: str, reduced: SymmetryReduction, workers: Workers | None = None
 ) -> StiffnessOperator:
-    """Build the operator of the internal forces, which are K u unless the plate is nonlinear."""
+    """Build the operator of the internal forces, which are K u unless the plate is nonlinear.
+
+    The kernels have the membrane of a plate without prescribed displacements.
+    """
+    if plate.nonlinear and resolved(solver) == KERNELS and membrane.supports(plate):
+        prescribed = plate.mesh.forces[reduced.sign == 0.0]
+        if not prescribed.any():
+            threads = 1 if workers is None else workers.count
+            return CompiledProduct(plate, reduced, threads, nonlinear=True)
     linear = stiffness_operator(plate, solver, reduced, workers)
     return NonlinearProduct(plate, reduced, linear) if plate.nonlinear else linear

@@ -2,7 +2,8 @@
 
 Each kernel has one Python file, with its structures, what goes in and what comes out:
 
-- K u: :mod:`~fecm.mechanics.kernels.plate`, with :mod:`~fecm.mechanics.kernels.element_groups`;
+- K u: :mod:`~fecm.mechanics.kernels.plate`, with :mod:`~fecm.mechanics.kernels.element_groups`
+  and :mod:`~fecm.mechanics.kernels.membrane`;
 - steps of an impact: :mod:`fecm.mechanics.impact_steps`;
 - many impacts on one plate: :mod:`fecm.mechanics.impact_sweep`;
 - strains: :mod:`~fecm.mechanics.kernels.strains`;
@@ -48,7 +49,7 @@ POINTERS = {
 FUNCTIONS = {
     "fecm_stamp": (c_int, []),
     "fecm_has_avx2": (c_int, []),
-    "fecm_internal_force": (c_int, [c_void_p, c_int64]),
+    "fecm_internal_force": (c_int, [c_void_p, c_int64, Doubles]),
     "fecm_impact_steps": (c_int64, [c_void_p, c_void_p, c_int64, c_int64]),
     "fecm_sweep": (c_int, [c_void_p]),
     "fecm_strains": (None, [c_void_p, c_int64, c_int64, c_int64, Doubles, Doubles]),

@@ -6,12 +6,13 @@ from ctypes import c_int64
 from enum import IntEnum
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.mechanics import assumed_shear
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, jacobian, local_shape_functions
-from fecm.mechanics.kernels import Doubles, Structure
+from fecm.mechanics.kernels import Doubles, Integers, Structure, membrane
 from fecm.mechanics.kernels.layout import LANES, Indices
 from fecm.mechanics.mesh import ElementBlock, congruence, distinct
 from fecm.mechanics.plate import PlateModel
@@ -24,7 +25,7 @@ SYMMETRIC = 1e-14
 
 
 # Fields of a Group by their names.
-Fields = dict[str, int | Floats]
+Fields = dict[str, int | Floats | NDArray[np.int32]]
 
 
 class ElementKind(IntEnum):
@@ -65,7 +66,12 @@ class Group(Structure):
     `in_plane_t`      (nodes, 2 bending)            the slopes at the points of bending
     `tied`            (2, shear, tying)             weights between the tying points
     `tied_t`          (2, tying, shear)             transposed
+    Nonlinear plate:
+    `parallelograms`  number                        whether the elements are
+    `grid`            (9,)                          places of the nodes in rows of eta
     ================  ============================  ==========================================
+
+    With a preload `deflection` has the slopes at the points of bending last.
     """
 
     _fields_ = (
@@ -83,6 +89,8 @@ class Group(Structure):
         ("in_plane_t", Doubles),
         ("tied", Doubles),
         ("tied_t", Doubles),
+        ("parallelograms", c_int64),
+        ("grid", Integers),
     )
 
 
@@ -101,26 +109,35 @@ class ElementGroup:
         weights: Floats,
         *,
         congruent: bool,
+        nonlinear: bool = False,
     ) -> None:
         self._plate = plate
         self._columns = columns
         self._weights = weights
+        self._nonlinear = nonlinear
         self.family = family
         nn = family.nodes.shape[1]
         self.order = np.arange(nn)
         rules = plate.rules
         shear = assumed_shear.quadrature(family) if rules.assumes_shear else rules.shear
         self._rules = (rules.bending, shear)
+        if nonlinear:
+            self._rules = (membrane.in_rows(rules.bending), shear)
         if congruent:
             self.kind, fields = self._matrices(weights[0])
-        elif nn == family.shape.nodes == 9 and not rules.assumes_shear:
+        elif nn == family.shape.nodes == 9 and not (rules.assumes_shear or plate.is_preloaded):
             self.order = np.lexsort((family.shape.xi, family.shape.eta))
             self.kind, fields = ElementKind.FACTORIZED, self._factors()
         else:
             self.kind, fields = ElementKind.TABULATED, self._tables()
+        self.parallelograms = nonlinear and bool(membrane.are_parallelograms(family).all())
+        if nonlinear:
+            places = np.argsort(self.order)[membrane.grid(family)]
+            fields["grid"] = places.astype(np.int32)
         self.structure = Group(
             kind=self.kind,
             nodes=nn,
+            parallelograms=int(self.parallelograms),
             **{
                 name: value if isinstance(value, int) else np.ascontiguousarray(value)
                 for name, value in fields.items()
@@ -129,8 +146,17 @@ class ElementGroup:
 
     @property
     def has_matrix(self) -> bool:
-        """Whether the elements have no numbers of their own."""
+        """Whether the elements have a matrix in common."""
         return self.kind in (ElementKind.ONE_MATRIX, ElementKind.TWO_MATRICES)
+
+    @property
+    def needs_data(self) -> bool:
+        """Whether the kernels need numbers at the points of quadrature."""
+        return not self.has_matrix or (self._nonlinear and not self.parallelograms)
+
+    def _differing(self, members: Indices) -> Indices:
+        """The first element in all lanes of a block instead of congruent ones."""
+        return np.zeros(LANES, dtype=np.intp) if self.has_matrix else members
 
     def _matrices(self, weight: float) -> tuple[ElementKind, Fields]:
         """The common matrix, or those of the even and odd motions; sets the order."""
@@ -210,6 +236,8 @@ class ElementGroup:
         else:
             values, local = local_shape_functions(family, shear)
             deflection = _slopes(local)
+        if self._plate.is_preloaded:
+            deflection = np.concatenate([deflection, slopes])
         rotations = np.concatenate([slopes, values])
         return fields | {
             "rotations": rotations,
@@ -220,12 +248,13 @@ class ElementGroup:
         }
 
     def data(self, members: Indices) -> Floats:
-        """Numbers of elements without a matrix, (blocks, numbers, 8).
+        """Numbers of elements without a matrix, (blocks, numbers, 8); one block if congruent.
 
         FACTORIZED: a factor, and coefficients of x and of y, (1 + 8 + 8); TABULATED: inverse
         Jacobian with its determinant times the weight, (points, 5), and slopes of the mapping at
         the tying points, (2 tying, 2).
         """
+        members = self._differing(members)
         family = self.family.take(members)
         if self.kind == ElementKind.FACTORIZED:
             parts = self._coefficients(family, members)
@@ -233,8 +262,17 @@ class ElementGroup:
             parts = [self._at_points(rule, family, members) for rule in self._rules]
             if self._plate.rules.assumes_shear:
                 parts += _slopes_of_mapping(family)
-        values = np.concatenate([part.reshape(len(members), -1) for part in parts], axis=1)
-        return np.ascontiguousarray(values.reshape(-1, LANES, values.shape[1]).swapaxes(1, 2))
+        return _in_lanes(
+            np.concatenate([part.reshape(len(members), -1) for part in parts], axis=1)
+        )
+
+    def membrane(self, members: Indices) -> Floats:
+        """Numbers of the membrane of elements, (blocks, numbers, 8); one block if congruent."""
+        members = self._differing(members)
+        family, weights = self.family.take(members), self._weights[members]
+        return _in_lanes(
+            membrane.numbers(self._plate, family, weights, parallelograms=self.parallelograms)
+        )
 
     def _coefficients(self, family: ElementBlock, members: Indices) -> list[Floats]:
         """A quarter of the weights, and coefficients of the coordinates but the constant ones."""
@@ -255,10 +293,13 @@ class ElementGroup:
         return np.concatenate([inverse, jxw[:, :, None]], axis=2)
 
 
-def grouped(family: ElementBlock, weights: Floats) -> list[tuple[Indices, bool]]:
+def grouped(
+    family: ElementBlock, weights: Floats, *, nonlinear: bool = False
+) -> list[tuple[Indices, bool]]:
     """Groups of a family's elements that move, and whether they are congruent.
 
-    Elements of weight 0 are left out: they are images of others.
+    Elements of weight 0 are left out: they are images of others.  Of a nonlinear plate, groups are
+    either of parallelograms or of other elements.
     """
     same = congruence(family)
     (stepped,) = np.nonzero(weights)
@@ -267,7 +308,16 @@ def grouped(family: ElementBlock, weights: Floats) -> list[tuple[Indices, bool]]
     many = np.flatnonzero(counts >= WORTH_GROUPING)
     found = [(stepped[group == one], True) for one in many.tolist()]
     alone = stepped[counts[group] < WORTH_GROUPING]
-    return [*found, (alone, False)] if len(alone) else found
+    parts = [alone]
+    if nonlinear:
+        flat = membrane.are_parallelograms(family.take(alone))
+        parts = [alone[flat], alone[~flat]]
+    return [*found, *((part, False) for part in parts if len(part))]
+
+
+def _in_lanes(values: Floats) -> Floats:
+    """Numbers of elements, (ne, numbers), eight elements at a time, (blocks, numbers, 8)."""
+    return np.ascontiguousarray(values.reshape(-1, LANES, values.shape[1]).swapaxes(1, 2))
 
 
 def _in_rows(rule: Quadrature) -> Floats:

@@ -5,6 +5,7 @@
  *   structures.h  what Python passes
  *   impact.h      contact law, projectile and contact iteration of one case
  *   plate.h       K u, the plate's update, and strains; twice, with AVX2 and without
+ *   membrane.h    forces of the membrane of a nonlinear plate; twice
  *   sweep.h       many impacts on one plate, four at a time; twice
  *   failure.h     exposures of plies, four states of stress at a time; twice
  *   fields.h      places of the fields of structures, for a test
@@ -88,10 +89,30 @@ typedef struct {
     int64_t *used;         /* (blocks,): those whose forces are not all 0 */
 } Response;
 
-/* Inner products of a state: d M d, d K u, u K u, K u s. */
+/* Inner products of a state: d M d, d f, u f, f s with the internal force f = K u; and the work of the
+ * membrane force on the quadratic strains of a nonlinear plate. */
 typedef struct {
-    double inertia, power, strain, force;
+    double inertia, power, strain, force, quadratic;
 } Sums;
+
+enum { SUMS = 5 }; /* their number, a half of each for every chunk */
+
+/* Membrane of nonlinear plates, see membrane.h.  Tying points along and across the direction of a strain;
+ * the latter are those of the quadrature too, and the ratio of both over 2. */
+static const double ALONG[] = {-0.57735026918962576, 0.57735026918962576};
+static const double ACROSS[] = {-0.77459666924148338, 0.0, 0.77459666924148338};
+static const double SPREAD = 0.67082039324993691;
+
+/* Modes of strains, and the integrals of their squares. */
+enum { MODES = 8 };
+static const double NORMS[] = {4.0, 1.0 / 3.0, 1.0 / 3.0, 4.0 / 9.0, 4.0 / 45.0, 16.0 / 135.0, 4.0 / 45.0, 16.0 / 135.0};
+
+/* Modes from values at tying points.  Along their direction: of sums, for modes without it, and of
+ * differences; across it: mean (middle, sides), slope, bend.  Of corners: mean, slope, twist. */
+enum { MIDDLE, SIDES, STRAIGHT, BENT };
+static const double OF_SUM[] = {2.0 / 9.0, 5.0 / 36.0, 0.64549722436790281, 5.0 / 6.0};
+static const double OF_DIFFERENCE[] = {0.76980035891950105, 0.48112522432468813, 0.55901699437494745, 0.72168783648703216};
+static const double OF_CORNERS[] = {1.0 / 4.0, 0.86602540378443865, 3.0 / 4.0};
 
 #define TARGET static
 #include "impact.h"
@@ -127,7 +148,7 @@ typedef struct {
     const Plate *plate;
     Impact *impact;
     int64_t steps, taken, threads;
-    half *sums;     /* (chunks, 4) */
+    half *sums;     /* (chunks, SUMS) */
     double *forces; /* (threads, nd, most): of the chunk in work, zero between chunks */
     Sums result;
     int stop;
@@ -222,6 +243,7 @@ static void end_step(Job *job, int64_t number, int next) {
     double *row = x->records + COLUMNS * number;
     row[INERTIA] = job->result.inertia, row[POWER] = job->result.power;
     row[STRAIN] = job->result.strain, row[INTERNAL] = job->result.force, row[LOAD_S] = s;
+    row[QUADRATIC] = job->result.quadratic;
 }
 
 static void take_steps(Job *job, int64_t thread) {
@@ -233,7 +255,7 @@ static void take_steps(Job *job, int64_t thread) {
         meet(job);
         if (job->stop) return;
         double *forces = job->forces + thread * p->nd * p->most;
-        for (int64_t c = first; c < end; c++) CHOSEN(run_chunk)(p, c, next, forces, job->sums + 4 * c);
+        for (int64_t c = first; c < end; c++) CHOSEN(run_chunk)(p, c, next, forces, job->sums + SUMS * c);
         meet(job);
         if (thread) continue;
         job->result = CHOSEN(finish)(p, next, job->sums);
@@ -281,7 +303,7 @@ static int with_memory(Job *job) {
     const Plate *p = job->plate;
     if (job->threads > MOST_THREADS) job->threads = MOST_THREADS;
     if (job->threads > p->chunks) job->threads = p->chunks;
-    job->sums = malloc(sizeof(half) * 4 * p->chunks);
+    job->sums = malloc(sizeof(half) * SUMS * p->chunks);
     job->forces = calloc(job->threads * p->nd * p->most, sizeof(double));
     const int found = job->sums && job->forces;
     if (found) carry_out(job);
@@ -296,10 +318,12 @@ static int with_memory(Job *job) {
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-/* s = scale K u. */
-EXPORT int fecm_internal_force(const Plate *plate, int64_t threads) {
+/* s = scale f(u), and the work of the membrane force on the quadratic strains. */
+EXPORT int fecm_internal_force(const Plate *plate, int64_t threads, double *quadratic) {
     Job job = {.plate = plate, .steps = 1, .threads = threads};
-    return with_memory(&job);
+    if (!with_memory(&job)) return 0;
+    *quadratic = job.result.quadratic;
+    return 1;
 }
 
 /* Take impact steps; returns their number, which is smaller if the motion is no longer finite. */

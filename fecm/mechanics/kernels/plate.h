@@ -137,10 +137,11 @@ INLINE void NAME(tabulated)(int nd, int nodes, const Plate *p, const Chunk *c, c
     for (int node = 0; node < nodes; node++) NAME(take)(nd, p, c, b->place[node], u, x + node, nodes);
     const int nb = (int)g->bending, ns = (int)g->shear, nt = (int)g->tying;
     const int values = nt ? 2 * nt : ns, slopes = nt ? 2 * nt : 2 * ns, first = nd == 5 ? 2 : 0;
-    lanes at_w[32], at_r[2][48], at_u[2][32], e[2][16], part[12];
+    const int sloped = slopes + (p->preload ? 2 * nb : 0);
+    lanes at_w[64], at_r[2][48], at_u[2][32], e[2][16], part[12];
     const lanes *w = x + first * nodes;
     const double *C = p->stiffness, *S = p->shear;
-    NAME(product)(g->deflection, slopes, nodes, w, at_w);
+    NAME(product)(g->deflection, sloped, nodes, w, at_w);
     for (int i = 0; i < 2; i++) {
         NAME(product)(g->rotations, 2 * nb + values, nodes, w + (1 + i) * nodes, at_r[i]);
         if (nd == 5) NAME(product)(g->rotations, 2 * nb, nodes, x + i * nodes, at_u[i]);
@@ -221,9 +222,19 @@ INLINE void NAME(tabulated)(int nd, int nodes, const Plate *p, const Chunk *c, c
                 }
         }
     }
+    if (p->preload) /* the initial membrane force on the slopes */
+        for (int side = 0; side < 2; side++)
+            for (int point = 0; point < nb; point++) {
+                const half xx = G(0), xe = G(1), yx = G(2), ye = G(3), jxw = G(4);
+                lanes *const a = at_w + slopes + point, *const b = a + nb;
+                const half wx = xx * HALF(*a) + xe * HALF(*b), wy = yx * HALF(*a) + ye * HALF(*b);
+                const half nx = jxw * (p->preload[0] * wx + p->preload[2] * wy);
+                const half ny = jxw * (p->preload[2] * wx + p->preload[1] * wy);
+                HALF(*a) = xx * nx + yx * ny, HALF(*b) = xe * nx + ye * ny;
+            }
 #undef G
     lanes *const yw = y + first * nodes;
-    NAME(product)(g->deflection_t, nodes, slopes, at_w, yw);
+    NAME(product)(g->deflection_t, nodes, sloped, at_w, yw);
     for (int i = 0; i < 2; i++) {
         NAME(product)(g->rotations_t, nodes, 2 * nb + values, at_r[i], yw + (1 + i) * nodes);
         if (nd == 5) NAME(product)(g->in_plane_t, nodes, 2 * nb, at_u[i], y + i * nodes);
@@ -401,6 +412,8 @@ INLINE void NAME(factorized)(int nd, const Plate *p, const Chunk *chunk, const B
     for (int node = 0; node < 9; node++) NAME(give)(nd, p, chunk, b->place[node], y[0] + node, 9, f);
 }
 
+#include "membrane.h"
+
 /* Scale the internal forces of a chunk's nodes, add to the sums, and take the next step if asked to. */
 INLINE void NAME(update)(int nd, const Plate *p, const Chunk *c, double *force, int next, half *sums) {
     const int64_t n = c->nodes;
@@ -439,28 +452,33 @@ INLINE void NAME(update)(int nd, const Plate *p, const Chunk *c, double *force, 
     sums[2] = strain[0] + strain[1], sums[3] = internal[0] + internal[1];
 }
 
-/* Forces of a chunk, and the update of the nodes that are its own. */
-INLINE void NAME(chunk)(int nd, const Plate *p, const Chunk *c, int next, double *force, half *sums) {
+/* Forces of a chunk, and the update of the nodes that are its own.  Of a nonlinear plate the matrices
+ * have the last three dofs. */
+INLINE void NAME(chunk)(int nd, int nonlinear, const Plate *p, const Chunk *c, int next, double *force, half *sums) {
     const Chunk *common = p->chunk + p->chunks;
+    const int last = nonlinear ? 3 : nd;
     double *u = p->u + nd * c->first;
     const double *of_all = p->u + nd * common->first;
     for (int64_t i = 0; i < c->shared; i++)
         for (int64_t dof = 0; dof < nd; dof++)
             u[dof * c->nodes + c->copies[i]] = c->signs[nd * i + dof] * of_all[dof * common->nodes + c->shares[i]];
+    const double *of_last = u + (nd - last) * c->nodes;
+    double *on_last = force + (nd - last) * c->nodes;
     for (int64_t number = 0; number < c->blocks; number++) {
         const Block *b = c->block + number;
         const int nodes = (int)b->group->nodes, pairs = (int)b->group->pairs;
         switch (b->group->kind) {
-        case ONE_MATRIX: NAME(one_matrix)(nd, nodes, p, c, b, u, force); break;
+        case ONE_MATRIX: NAME(one_matrix)(last, nodes, p, c, b, of_last, on_last); break;
         case TWO_MATRICES:
             if (pairs == 4 && nodes == 9)
-                NAME(two_matrices)(nd, 4, 1, p, c, b, u, force);
+                NAME(two_matrices)(last, 4, 1, p, c, b, of_last, on_last);
             else
-                NAME(two_matrices)(nd, pairs, nodes - 2 * pairs, p, c, b, u, force);
+                NAME(two_matrices)(last, pairs, nodes - 2 * pairs, p, c, b, of_last, on_last);
             break;
-        case FACTORIZED: NAME(factorized)(nd, p, c, b, u, force); break;
-        case TABULATED: NAME(tabulated)(nd, nodes, p, c, b, u, force); break;
+        case FACTORIZED: NAME(factorized)(last, p, c, b, of_last, on_last); break;
+        case TABULATED: NAME(tabulated)(last, nodes, p, c, b, of_last, on_last); break;
         }
+        if (nonlinear) NAME(membrane)(p, c, b, u, force, sums + 4);
     }
     for (int64_t i = 0; i < c->shared; i++)
         for (int64_t dof = 0; dof < nd; dof++)
@@ -469,33 +487,41 @@ INLINE void NAME(chunk)(int nd, const Plate *p, const Chunk *c, int next, double
 }
 
 /* `force` is (nd, most) and zero, before and after. */
-TARGET void NAME(run_chunk)(const Plate *p, int64_t number, int next, double *force, half *sums) {
-    memset(sums, 0, 4 * sizeof *sums);
+TARGET void NAME(run_linear)(const Plate *p, const Chunk *c, int next, double *force, half *sums) {
     if (p->nd == 3)
-        NAME(chunk)(3, p, p->chunk + number, next, force, sums);
+        NAME(chunk)(3, 0, p, c, next, force, sums);
     else
-        NAME(chunk)(5, p, p->chunk + number, next, force, sums);
+        NAME(chunk)(5, 0, p, c, next, force, sums);
 }
 
-/* Add up what the chunks share, update it, and add up the sums of all, (chunks, 4). */
+TARGET void NAME(run_nonlinear)(const Plate *p, const Chunk *c, int next, double *force, half *sums) {
+    NAME(chunk)(5, 1, p, c, next, force, sums);
+}
+
+TARGET void NAME(run_chunk)(const Plate *p, int64_t number, int next, double *force, half *sums) {
+    memset(sums, 0, SUMS * sizeof *sums);
+    (p->nonlinear ? NAME(run_nonlinear) : NAME(run_linear))(p, p->chunk + number, next, force, sums);
+}
+
+/* Add up what the chunks share, update it, and add up the sums of all, (chunks, SUMS). */
 TARGET Sums NAME(finish)(const Plate *p, int next, half *sums) {
     const int64_t nd = p->nd;
     const Chunk *common = p->chunk + p->chunks;
-    half total[4];
+    half total[SUMS];
     memset(total, 0, sizeof total);
     for (int64_t number = 0; number < p->chunks; number++) {
         const Chunk *c = p->chunk + number;
         for (int64_t i = 0; i < c->shared; i++)
             for (int64_t dof = 0; dof < nd; dof++) p->shared[dof * common->nodes + c->shares[i]] += c->force[nd * i + dof];
-        for (int i = 0; i < 4; i++) total[i] += sums[4 * number + i];
+        for (int i = 0; i < SUMS; i++) total[i] += sums[SUMS * number + i];
     }
     if (nd == 3)
         NAME(update)(3, p, common, p->shared, next, total);
     else
         NAME(update)(5, p, common, p->shared, next, total);
-    double added[4];
-    for (int i = 0; i < 4; i++) added[i] = (total[i][0] + total[i][1]) + (total[i][2] + total[i][3]);
-    return (Sums){added[0], added[1], added[2], added[3]};
+    double added[SUMS];
+    for (int i = 0; i < SUMS; i++) added[i] = (total[i][0] + total[i][1]) + (total[i][2] + total[i][3]);
+    return (Sums){added[0], added[1], added[2], added[3], added[4]};
 }
 
 /* Curvatures x, y, xy and shear strains yz, xz, as StrainField evaluates them, four points at a time. */

@@ -13,7 +13,8 @@ A vector has a part for each chunk, and a last one for the nodes that chunks sha
     a part:  u_0 u_1 u_2 ... u_(nodes - 1) | v_0 v_1 ...     | w_0 ...       | theta_x, theta_y
              one dof of all nodes            the next dof
 
-nd is 3 where u and v are at rest.  A chunk has places for all nodes of its elements: nodes of its
+nd is 3 where u and v are at rest.  Of a nonlinear plate it is 5, and the groups of elements have
+matrices or tables of the last three dofs; the rest is done by the membrane.  A chunk has places for all nodes of its elements: nodes of its
 own, which it moves; copies of shared nodes, which it fills from the last part before its blocks are
 computed, and whose forces it hands over afterwards; a spare place; and unused ones up to a multiple
 of eight.  Shared are nodes of several chunks, nodes that others follow by symmetry, and those that
@@ -65,11 +66,12 @@ class Block(Structure):
         ("group", POINTER(Group)),
         ("place", Integers),  # (nodes,): see the head of this module
         ("data", Doubles),  # (numbers, 8): see ElementGroup.data; not set for those with a matrix
+        ("membrane", Doubles),  # (numbers, 8) of a nonlinear plate: see ElementGroup.membrane
     )
 
 
 # The same as an array's type: blocks are filled in by group, many at a time.
-BLOCK = np.dtype([(name, np.uint64) for name in ("group", "place", "data")])
+BLOCK = np.dtype([(name, np.uint64) for name, _ in Block._fields_])
 
 
 class Chunk(Structure):
@@ -110,6 +112,7 @@ class Plate(Structure):
     `lane`       (rows, 8)                  places of the lanes where they don't follow
     `stiffness`  (6, 6)                     of midplane strains and negative curvatures
     `shear`      (2, 2)                     transverse shear stiffness
+    `preload`    (3,)                       initial membrane force; not set without
     `mass`       (nodes,) or (nd, nodes)    lumped mass, part by part, divided by `ratio`
     `inverse`    as `mass`                  1 over it, 0 where it is 0
     `ratio`      (nd,)                      mass of each dof over that of the first
@@ -130,6 +133,9 @@ class Plate(Structure):
         ("lane", Integers),
         ("stiffness", Doubles),
         ("shear", Doubles),
+        ("preload", Doubles),
+        ("nonlinear", c_int64),  # whether stretching follows from bending
+        ("coupled", c_int64),  # whether B is not 0
         ("transposed", c_int64),  # whether the inverse Jacobian is, the slip `jacobian`
         ("planes", c_int64),  # first dimension of `mass`: 1, or nd
         ("mass", Doubles),
@@ -148,19 +154,32 @@ class CompiledPlate:
     """A plate in the layout of the kernels.
 
     Vectors have a part (nd, nodes) for each chunk, and a last one for the nodes that chunks share;
-    `position` (count,) are the places of the independent dofs in them.
+    `position` (count,) are the places of the independent dofs in them.  With `nonlinear` the
+    internal force is that of a plate that stretches as it bends, see membrane.py.
     """
 
-    def __init__(self, plate: PlateModel, kept: SymmetryReduction) -> None:
+    def __init__(
+        self, plate: PlateModel, kept: SymmetryReduction, *, nonlinear: bool = False
+    ) -> None:
         moves = kept.sign != 0.0
-        self.columns = columns = np.arange(0 if moves[:, :2].any() else 2, NDOF)
+        in_plane = nonlinear or moves[:, :2].any()
+        self.columns = columns = np.arange(0 if in_plane else 2, NDOF)
+        self._nonlinear = nonlinear
         self._held: list[object] = []  # what the structures point to by addresses
         groups = [
-            ElementGroup(plate, family.take(chosen), columns, weights[chosen], congruent=congruent)
+            ElementGroup(
+                plate,
+                family.take(chosen),
+                columns[-3:] if nonlinear else columns,
+                weights[chosen],
+                congruent=congruent,
+                nonlinear=nonlinear,
+            )
             for family in plate.families
             for weights in [kept.weights[family.rows].astype(float)]
-            for chosen, congruent in grouped(family, weights)
+            for chosen, congruent in grouped(family, weights, nonlinear=nonlinear)
         ]
+        self._groups = groups
         families = [group.family for group in groups]
         leader = _leaders(kept)
         layout = layout_of(families)
@@ -203,6 +222,9 @@ class CompiledPlate:
             lane=_integers(lanes),
             stiffness=np.block([[laminate.A, -laminate.B], [-laminate.B, laminate.D]]),
             shear=np.ascontiguousarray(laminate.shear),
+            preload=np.array(plate.preload) if plate.is_preloaded else None,
+            nonlinear=int(nonlinear),
+            coupled=int(laminate.is_coupled),
             transposed=int(plate.rules.transposed_jacobian),
             planes=len(factor) // count,
             mass=factor,
@@ -271,8 +293,10 @@ class CompiledPlate:
             self._held.append(group.structure)
             table["group"][rows] = ctypes.addressof(group.structure)
             table["place"][rows] = self._addresses(begins.astype(np.int32))
-            if not group.has_matrix:
+            if group.needs_data:
                 table["data"][rows] = self._addresses(group.data(member.ravel()))
+            if self._nonlinear:
+                table["membrane"][rows] = self._addresses(group.membrane(member.ravel()))
         blocks = np.searchsorted(layout.chunk, np.arange(layout.chunks + 1))
         for c in range(layout.chunks):
             where = ctypes.c_void_p(table.ctypes.data + int(blocks[c]) * BLOCK.itemsize)
@@ -293,17 +317,30 @@ class CompiledPlate:
             np.divide(dt2, self._ratio, out=self._rate)
         self.structure.rate = None if dt2 is None else floats(self._rate)
 
-    def internal_force(self, threads: int = 1) -> None:
-        """Compute `s`, which is K u times `scale`."""
-        if not LIBRARY.fecm_internal_force(ctypes.byref(self.structure), threads):
+    def internal_force(self, threads: int = 1) -> float:
+        """Compute `s`, the internal force times `scale`; returns the quadratic work."""
+        work = c_double()
+        structure = ctypes.byref(self.structure)
+        if not LIBRARY.fecm_internal_force(structure, threads, ctypes.byref(work)):
             raise MemoryError
+        return work.value
 
 
 class CompiledProduct(StiffnessOperator):
-    """K u by the compiled kernels; padded vectors are those of the reduction."""
+    """K u by the compiled kernels, or with `nonlinear` the internal force of a nonlinear plate.
 
-    def __init__(self, plate: PlateModel, kept: SymmetryReduction, threads: int = 1) -> None:
-        self.plate = CompiledPlate(plate, kept)
+    Padded vectors are those of the reduction.
+    """
+
+    def __init__(
+        self,
+        plate: PlateModel,
+        kept: SymmetryReduction,
+        threads: int = 1,
+        *,
+        nonlinear: bool = False,
+    ) -> None:
+        self.plate = CompiledPlate(plate, kept, nonlinear=nonlinear)
         self._count = kept.count
         self._signed = kept.signed
         self._threads = threads
@@ -320,7 +357,7 @@ class CompiledProduct(StiffnessOperator):
         plate = self.plate
         plate.u[plate.position] = padded[: self._count]
         plate.set_scale(None)
-        plate.internal_force(self._threads)
+        self.quadratic_work = plate.internal_force(self._threads)
         forces = plate.s[plate.position]
         return [use(number, forces[piece]) for number, piece in enumerate(self._pieces)]
 

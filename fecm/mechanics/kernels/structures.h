@@ -27,6 +27,9 @@ typedef struct {
     const double *rotations_t, *deflection_t; /* TABULATED: transposed.  FACTORIZED: weights of the points */
     const double *in_plane_t;                 /* TABULATED: (nodes, 2 bending) */
     const double *tied, *tied_t;              /* TABULATED: (2, shear, tying), (2, tying, shear) */
+    /* Of a nonlinear plate: whether its elements are parallelograms; (9,): nodes by rows of eta. */
+    int64_t parallelograms;
+    const int32_t *grid;
 } Group;
 
 /* Eight elements. */
@@ -38,6 +41,7 @@ typedef struct {
     /* TABULATED: inverse Jacobian with its determinant times the weight, (points, 5, 8), and slopes of the
      * mapping (2 tying, 2, 8).  FACTORIZED: a factor, and coefficients of x and y, (1 + 8 + 8, 8). */
     const double *data;
+    const double *membrane; /* of a nonlinear plate: (16, 8) for parallelograms, otherwise (101, 8) */
 } Block;
 
 /* Blocks of near elements; the last chunk has no blocks, and the nodes that others share. */
@@ -57,6 +61,8 @@ typedef struct {
     const Chunk *chunk;
     const int32_t *lane;             /* (rows, 8) */
     const double *stiffness, *shear; /* (6, 6) of strains and negative curvatures; (2, 2) */
+    const double *preload;           /* (3,): initial membrane force N0 x, y, xy; or NULL */
+    int64_t nonlinear, coupled;      /* whether the plate is, and B is not 0 */
     int64_t transposed;              /* whether the Jacobian of FACTORIZED elements is */
     int64_t planes;                  /* of the next two: 1, or one for each dof */
     const double *mass, *inverse;    /* divided by `ratio`; of each node, or of each entry */
@@ -118,8 +124,8 @@ typedef struct {
 
 /* Columns of `records`. */
 enum {
-    TIME, INERTIA, POWER, STRAIN, INTERNAL, LOAD_D, LOAD_S, FORCE, INDENTATION, PLATE_W, CONTACT_WORK, DISPLACEMENT,
-    VELOCITY, ACCELERATION, PROJECTILE_KINETIC, PROJECTILE_STRAIN, STATION, COLUMNS
+    TIME, INERTIA, POWER, STRAIN, INTERNAL, QUADRATIC, LOAD_D, LOAD_S, FORCE, INDENTATION, PLATE_W, CONTACT_WORK,
+    DISPLACEMENT, VELOCITY, ACCELERATION, PROJECTILE_KINETIC, PROJECTILE_STRAIN, STATION, COLUMNS
 };
 
 /* Impacts on one plate by one kind of projectile, whose mass and stiffness have a factor in each case. */

@@ -1,0 +1,416 @@
+/* Membrane of a nonlinear plate; included by plate.h, once for each instruction set.
+ *
+ * Theory.  Numbers are those of the equations in docs/theory.  A plate with slopes that are not small
+ * stretches as it bends (von Karman):
+ *
+ *   (1) eps = eps_l + eps_q, eps_l = (u,x, v,y, u,y + v,x), eps_q = (w,x^2/2, w,y^2/2, w,x w,y)
+ *   (3) N = N0 + A eps + B kappa, M = B eps + D kappa
+ *
+ * D kappa, the transverse shear and N0 on the slopes, equation (12), are linear in w, theta_x and
+ * theta_y: they are the work of the four kinds of plate.h.  What is left is done here: the forces of
+ * A eps + B kappa on u, v and w, and those of B eps on the rotations, equations (10) and (11).
+ *
+ * Frame.  x_1 = x,xi and x_2 = x,eta at the centre of an element are its base vectors.  U_a = x_a (u, v)
+ * and T_a = x_a (theta_x, theta_y) are displacement and rotation along them, and D_a = R_ab d/dxi_b the
+ * derivative along x_a, with R = J_c J^-1 of the Jacobians at the centre and at the point.  Then
+ *
+ *   e_11 = D_1 U_1, e_22 = D_2 U_2, e_12 = D_1 U_2 + D_2 U_1, curvatures the same of -T,
+ *
+ * and A_c = T_c' A T_c, B_c = T_c' B T_c with T_c of equation (9).  On parallelograms R = 1.
+ *
+ * Tying.  Equations (7) and (8): e_11 has w,1^2/2 of the points xi = +-1/sqrt(3), eta = 0,
+ * +-sqrt(3/5), e_22 has w,2^2/2 of those with xi and eta exchanged, and e_12 has w,1 w,2 of
+ * xi, eta = +-1/sqrt(3).  Between them they are interpolated.  Without that a plate that bends without
+ * stretching would be too stiff; with base vectors of the tying points instead of the centre it would
+ * fail the patch test (Bucalem and Bathe 1993; Wisniewski and Panasz 2013).
+ *
+ * Parallelograms.  There e_11, linear or tied, is linear in xi and quadratic in eta, e_22 the other
+ * way round, and e_12 is a sum of both kinds: each has some of eight orthogonal modes.  The 3 x 3 points
+ * integrate their products exactly, so that the energy is a sum over modes, and nothing is computed at
+ * points but the slopes of w.
+ *
+ * Other elements have R at the 9 points and, halved, at the tying points.  Slopes are summed along xi and
+ * then along eta, as those of FACTORIZED elements.
+ *
+ * Numbers of a block, (16, 8) or (101, 8): x_1/2, x_2/2 (4; half, as `slopes` gives twice the slope); A_c
+ * and -B_c in the order 11, 22, 12, with 1 1, 1 2, 1 3, 2 2, 2 3, 3 3 (6 + 6), times determinant and
+ * weight on parallelograms.  Others: R and the determinant times the weight (9, 5); R_1/2 at the
+ * points of e_11 (6, 2), R_2/2 at those of e_22 (6, 2), both at those of e_12 (4, 4).
+ *
+ * All functions compute four elements.  Coefficients c, and forces on them, are of U_1, U_2, w, T_1, T_2.
+ */
+
+#define AT(i) NAME(load)(data + LANES * (i))
+
+/* (n_1, n_2, n_3) = C (e_1, e_2, e_3) with the upper half of C; `first` and `second` say whether e_1 and
+ * e_2 are anything but 0, and n_1 and n_2 wanted. */
+INLINE void NAME(stresses)(int first, int second, const half *C, const half *e, half *n) {
+    if (first && second) {
+        n[0] = C[0] * e[0] + C[1] * e[1] + C[2] * e[2];
+        n[1] = C[1] * e[0] + C[3] * e[1] + C[4] * e[2];
+        n[2] = C[2] * e[0] + C[4] * e[1] + C[5] * e[2];
+    } else if (first)
+        n[0] = C[0] * e[0] + C[2] * e[2], n[2] = C[2] * e[0] + C[5] * e[2];
+    else
+        n[1] = C[3] * e[1] + C[4] * e[2], n[2] = C[4] * e[1] + C[5] * e[2];
+}
+
+/* Modes of strains of parallelograms: 1; xi/2, eta/2; xi eta; p(xi)/2, p(xi) eta; p(eta)/2, p(eta) xi, with
+ * p(x) = x^2 - 1/3.  e_11 has none of 4 and 5, e_22 none of 6 and 7.
+ *
+ * Twice the slopes of a biquadratic along xi and along eta; and the transpose. */
+INLINE void NAME(slope_modes)(const half *c, half *xi, half *eta) {
+    xi[0] = c[1] + 1.0 / 6.0 * c[7], eta[0] = c[3] + 1.0 / 6.0 * c[5];
+    xi[1] = 4.0 * c[2] + 2.0 / 3.0 * c[8], eta[2] = 4.0 * c[6] + 2.0 / 3.0 * c[8];
+    xi[2] = c[4], eta[1] = c[4];
+    xi[3] = c[5], eta[3] = c[7];
+    xi[6] = c[7], eta[4] = c[5];
+    xi[7] = c[8], eta[5] = c[8];
+}
+
+INLINE void NAME(sum_slope_modes)(const half *xi, const half *eta, half *c) {
+    const half zero = {0};
+    c[0] = zero, c[1] = xi[0], c[3] = eta[0];
+    c[2] = 4.0 * xi[1], c[6] = 4.0 * eta[2];
+    c[4] = xi[2] + eta[1];
+    c[5] = xi[3] + 1.0 / 6.0 * eta[0] + eta[4], c[7] = eta[3] + 1.0 / 6.0 * xi[0] + xi[6];
+    c[8] = 2.0 / 3.0 * (xi[1] + eta[2]) + xi[7] + eta[5];
+}
+
+/* Modes e of the strains of U_1 and U_2; forces on these from those on the modes. */
+INLINE void NAME(strain_modes)(half (*c)[9], half (*e)[MODES]) {
+    half one[MODES], other[MODES];
+    NAME(slope_modes)(c[0], e[0], one);
+    NAME(slope_modes)(c[1], other, e[1]);
+    for (int m = 0; m < 4; m++) e[2][m] = one[m] + other[m];
+    e[2][4] = one[4], e[2][5] = one[5], e[2][6] = other[6], e[2][7] = other[7];
+}
+
+INLINE void NAME(sum_strain_modes)(half (*n)[MODES], half (*force)[9]) {
+    NAME(sum_slope_modes)(n[0], n[2], force[0]);
+    NAME(sum_slope_modes)(n[2], n[1], force[1]);
+}
+
+/* Add e_11 or e_22 of the points, (along, across), to the modes; and the transpose. */
+INLINE void NAME(tie)(int axis, double scale, half (*f)[3], half *e) {
+    const int one = axis ? 1 : 2, two = axis ? 4 : 6, along = axis ? 2 : 1, both = axis ? 5 : 7;
+    const double *a = OF_SUM, *b = OF_DIFFERENCE;
+    half sum[3], odd[3];
+    for (int k = 0; k < 3; k++) sum[k] = f[1][k] + f[0][k], odd[k] = f[1][k] - f[0][k];
+    const half sums = sum[2] + sum[0], odds = odd[2] + odd[0];
+    e[0] += scale * a[MIDDLE] * sum[1] + scale * a[SIDES] * sums;
+    e[one] += scale * a[STRAIGHT] * (sum[2] - sum[0]);
+    e[two] += scale * a[BENT] * (sums - 2.0 * sum[1]);
+    e[along] += scale * b[MIDDLE] * odd[1] + scale * b[SIDES] * odds;
+    e[3] += scale * b[STRAIGHT] * (odd[2] - odd[0]);
+    e[both] += scale * b[BENT] * (odds - 2.0 * odd[1]);
+}
+
+INLINE void NAME(untie)(int axis, double scale, const half *n, half (*f)[3]) {
+    const int one = axis ? 1 : 2, two = axis ? 4 : 6, along = axis ? 2 : 1, both = axis ? 5 : 7;
+    const double *a = OF_SUM, *b = OF_DIFFERENCE;
+    const half straight = scale * a[STRAIGHT] * n[one], bent = scale * a[BENT] * n[two];
+    const half turned = scale * b[STRAIGHT] * n[3], curved = scale * b[BENT] * n[both];
+    const half side = scale * a[SIDES] * n[0] + bent, of_side = scale * b[SIDES] * n[along] + curved;
+    const half sum[3] = {side - straight, scale * a[MIDDLE] * n[0] - 2.0 * bent, side + straight};
+    const half odd[3] = {of_side - turned, scale * b[MIDDLE] * n[along] - 2.0 * curved, of_side + turned};
+    for (int k = 0; k < 3; k++) f[1][k] = sum[k] + odd[k], f[0][k] = sum[k] - odd[k];
+}
+
+/* Slopes along xi (axis 0) or eta, twice, of c: at the tying points of e_11 or e_22, (along, across),
+ * and at those of e_12, (along, across). */
+INLINE void NAME(tied_slopes)(int axis, const half *c, half (*at)[3], half (*corner)[2]) {
+    const int along = axis ? 3 : 1, across = axis ? 1 : 3;
+    half d[3][2];
+    for (int b = 0; b < 3; b++) NAME(slopes)(2, ALONG, c[along + b * across], c[2 * along + b * across], d[b], 1);
+    for (int i = 0; i < 2; i++) {
+        NAME(values)(3, ACROSS, d[0][i], d[1][i], d[2][i], at[i], 1);
+        NAME(values)(2, ALONG, d[0][i], d[1][i], d[2][i], corner[i], 1);
+    }
+}
+
+INLINE void NAME(sum_tied_slopes)(int axis, half (*at)[3], half (*corner)[2], half *c) {
+    const int along = axis ? 3 : 1, across = axis ? 1 : 3;
+    half d[3][2] = {{{0}}};
+    for (int i = 0; i < 2; i++) {
+        NAME(sum_values)(3, ACROSS, at[i], 1, &d[0][i], &d[1][i], &d[2][i]);
+        NAME(sum_values)(2, ALONG, corner[i], 1, &d[0][i], &d[1][i], &d[2][i]);
+    }
+    for (int b = 0; b < 3; b++) NAME(sum_slopes)(2, ALONG, d[b], 1, c + along + b * across, c + 2 * along + b * across);
+}
+
+/* Stresses of each mode; n_11 of the modes 4 and 5 and n_22 of 6 and 7 are not set. */
+INLINE void NAME(mode_stresses)(const half *C, half (*e)[MODES], half (*n)[MODES]) {
+#pragma GCC unroll 8
+    for (int m = 0; m < MODES; m++) {
+        const int first = m < 4 || m > 5, second = m < 6;
+        half strain[3], stress[3];
+        if (first) strain[0] = NORMS[m] * e[0][m];
+        if (second) strain[1] = NORMS[m] * e[1][m];
+        strain[2] = NORMS[m] * e[2][m];
+        NAME(stresses)(first, second, C, strain, stress);
+        if (first) n[0][m] = stress[0];
+        if (second) n[1][m] = stress[1];
+        n[2][m] = stress[2];
+    }
+}
+
+/* Add e_12 of the corners (xi, eta) to the modes; and the transpose. */
+INLINE void NAME(tie_corners)(double scale, half (*f)[2], half *e) {
+    const half low = f[0][1] + f[0][0], high = f[1][1] + f[1][0];
+    const half left = f[0][1] - f[0][0], right = f[1][1] - f[1][0];
+    e[0] += scale * OF_CORNERS[0] * (high + low);
+    e[1] += scale * OF_CORNERS[1] * (high - low);
+    e[2] += scale * OF_CORNERS[1] * (right + left);
+    e[3] += scale * OF_CORNERS[2] * (right - left);
+}
+
+INLINE void NAME(untie_corners)(double scale, const half *n, half (*f)[2]) {
+    const half a = scale * OF_CORNERS[0] * n[0], x = scale * OF_CORNERS[1] * n[1];
+    const half y = scale * OF_CORNERS[1] * n[2], both = scale * OF_CORNERS[2] * n[3];
+    const half low = a - x, high = a + x, left = y - both, right = y + both;
+    f[0][0] = low - left, f[0][1] = low + left, f[1][0] = high - right, f[1][1] = high + right;
+}
+
+/* Forces on the coefficients of a parallelogram. */
+INLINE void NAME(of_modes)(int coupled, const double *data, half (*c)[9], half (*force)[9]) {
+    half e[3][MODES], n[3][MODES], A[6], at[2][2][3], corner[2][2][2], f[2][3], g[2][2];
+    NAME(strain_modes)(c, e);
+    for (int axis = 0; axis < 2; axis++) {
+        NAME(tied_slopes)(axis, c[2], at[axis], corner[axis]);
+        for (int i = 0; i < 2; i++)
+            for (int k = 0; k < 3; k++) f[i][k] = at[axis][i][k] * at[axis][i][k];
+        NAME(tie)(axis, 0.125, f, e[axis]); /* w,1^2/2, with twice w,1 */
+    }
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 2; k++) g[i][k] = corner[0][i][k] * corner[1][k][i];
+    NAME(tie_corners)(0.25, g, e[2]);
+
+    for (int i = 0; i < 6; i++) A[i] = AT(4 + i);
+    NAME(mode_stresses)(A, e, n);
+    if (coupled) {
+        half B[6], bent[3][MODES], stress[3][MODES];
+        for (int i = 0; i < 6; i++) B[i] = AT(10 + i);
+        NAME(mode_stresses)(B, e, stress);
+        NAME(sum_strain_modes)(stress, force + 3);
+        NAME(strain_modes)(c + 3, bent);
+        NAME(mode_stresses)(B, bent, stress);
+        for (int m = 0; m < MODES; m++) {
+            if (m < 4 || m > 5) n[0][m] += stress[0][m];
+            if (m < 6) n[1][m] += stress[1][m];
+            n[2][m] += stress[2][m];
+        }
+    }
+    NAME(sum_strain_modes)(n, force);
+    memset(force[2], 0, sizeof force[2]);
+    NAME(untie_corners)(0.25, n[2], g);
+    for (int i = 0; i < 2; i++)
+        for (int k = 0; k < 2; k++) {
+            const half one = corner[0][i][k];
+            corner[0][i][k] = g[i][k] * corner[1][k][i], corner[1][k][i] = g[i][k] * one;
+        }
+    for (int axis = 0; axis < 2; axis++) {
+        NAME(untie)(axis, 0.25, n[axis], f);
+        for (int i = 0; i < 2; i++)
+            for (int k = 0; k < 3; k++) at[axis][i][k] *= f[i][k];
+        NAME(sum_tied_slopes)(axis, at[axis], corner[axis], force[2]);
+    }
+}
+
+/* Twice the slopes of a biquadratic along xi and eta at m points in eta by n in xi; and the transpose, added. */
+INLINE void NAME(gradient)(int m, const double *y, int n, const double *x, const half *c, half *along, half *across) {
+    half d[3][3], v[3][3];
+    for (int b = 0; b < 3; b++) {
+        NAME(slopes)(n, x, c[3 * b + 1], c[3 * b + 2], d[b], 1);
+        if (b) NAME(values)(n, x, c[3 * b], c[3 * b + 1], c[3 * b + 2], v[b], 1);
+    }
+    for (int l = 0; l < n; l++) {
+        NAME(values)(m, y, d[0][l], d[1][l], d[2][l], along + l, n);
+        NAME(slopes)(m, y, v[1][l], v[2][l], across + l, n);
+    }
+}
+
+INLINE void NAME(sum_gradient)(int m, const double *y, int n, const double *x, const half *along, const half *across, half *c) {
+    half d[3][3] = {{{0}}}, v[3][3] = {{{0}}};
+    for (int l = 0; l < n; l++) {
+        NAME(sum_values)(m, y, along + l, n, &d[0][l], &d[1][l], &d[2][l]);
+        NAME(sum_slopes)(m, y, across + l, n, &v[1][l], &v[2][l]);
+    }
+    for (int b = 0; b < 3; b++) {
+        NAME(sum_slopes)(n, x, d[b], 1, c + 3 * b + 1, c + 3 * b + 2);
+        if (b) NAME(sum_values)(n, x, v[b], 1, c + 3 * b, c + 3 * b + 1, c + 3 * b + 2);
+    }
+}
+
+/* Values at -sqrt(3/5), 0, sqrt(3/5) of a linear function from those at +-1/sqrt(3); and the transpose. */
+INLINE void NAME(spread)(half low, half high, half *v, int step) {
+    const half middle = 0.5 * (low + high), odd = SPREAD * (high - low);
+    v[0] = middle - odd, v[step] = middle, v[2 * step] = middle + odd;
+}
+
+INLINE void NAME(gather)(const half *v, int step, half *low, half *high) {
+    const half middle = 0.5 * (v[0] + v[step] + v[2 * step]), odd = SPREAD * (v[2 * step] - v[0]);
+    *low = middle - odd, *high = middle + odd;
+}
+
+/* Strains at the 9 points of U_1 and U_2, with R there; and the transpose. */
+INLINE void NAME(strains_of)(half (*R)[4], half (*c)[9], half (*e)[9]) {
+    half a[2][9], b[2][9];
+    for (int i = 0; i < 2; i++) NAME(gradient)(3, ACROSS, 3, ACROSS, c[i], a[i], b[i]);
+    for (int k = 0; k < 9; k++) {
+        const half *r = R[k];
+        e[0][k] = r[0] * a[0][k] + r[1] * b[0][k];
+        e[1][k] = r[2] * a[1][k] + r[3] * b[1][k];
+        e[2][k] = r[0] * a[1][k] + r[1] * b[1][k] + (r[2] * a[0][k] + r[3] * b[0][k]);
+    }
+}
+
+INLINE void NAME(sum_strains)(half (*R)[4], half (*n)[9], half (*force)[9]) {
+    half a[2][9], b[2][9];
+    for (int k = 0; k < 9; k++) {
+        const half *r = R[k];
+        a[0][k] = r[0] * n[0][k] + r[2] * n[2][k], b[0][k] = r[1] * n[0][k] + r[3] * n[2][k];
+        a[1][k] = r[0] * n[2][k] + r[2] * n[1][k], b[1][k] = r[1] * n[2][k] + r[3] * n[1][k];
+    }
+    for (int i = 0; i < 2; i++) NAME(sum_gradient)(3, ACROSS, 3, ACROSS, a[i], b[i], force[i]);
+}
+
+/* Forces on the coefficients of an element that is no parallelogram. */
+INLINE void NAME(of_points)(int coupled, const double *numbers, const double *points, half (*c)[9], half (*force)[9]) {
+    const double *const of_tying = numbers + 16 * LANES;
+    half e[3][9], n[3][9], along[9], across[9], w1[6], w2[6], corner[2][4], g[9];
+    const double *data = of_tying;
+    NAME(gradient)(3, ACROSS, 2, ALONG, c[2], along, across);
+    for (int t = 0; t < 6; t++) {
+        w1[t] = AT(2 * t) * along[t] + AT(2 * t + 1) * across[t];
+        g[t] = 0.5 * w1[t] * w1[t];
+    }
+    for (int k = 0; k < 3; k++) NAME(spread)(g[2 * k], g[2 * k + 1], e[0] + 3 * k, 1);
+    data += 12 * LANES;
+    NAME(gradient)(2, ALONG, 3, ACROSS, c[2], along, across);
+    for (int t = 0; t < 6; t++) {
+        w2[t] = AT(2 * t) * along[t] + AT(2 * t + 1) * across[t];
+        g[t] = 0.5 * w2[t] * w2[t];
+    }
+    for (int l = 0; l < 3; l++) NAME(spread)(g[l], g[3 + l], e[1] + l, 3);
+    data += 12 * LANES;
+    NAME(gradient)(2, ALONG, 2, ALONG, c[2], along, across);
+    for (int t = 0; t < 4; t++) {
+        corner[0][t] = AT(4 * t) * along[t] + AT(4 * t + 1) * across[t];
+        corner[1][t] = AT(4 * t + 2) * along[t] + AT(4 * t + 3) * across[t];
+        g[t] = corner[0][t] * corner[1][t];
+    }
+    half row[2][3];
+    for (int k = 0; k < 2; k++) NAME(spread)(g[2 * k], g[2 * k + 1], row[k], 1);
+    for (int l = 0; l < 3; l++) NAME(spread)(row[0][l], row[1][l], e[2] + l, 3);
+
+    half linear[3][9], bent[3][9], moment[3][9], R[9][4];
+    data = numbers;
+    const half xx = 2.0 * AT(0), xy = 2.0 * AT(1), yx = 2.0 * AT(2), yy = 2.0 * AT(3);
+    data = points;
+    for (int k = 0; k < 9; k++) {
+        const half xi_x = AT(5 * k), eta_x = AT(5 * k + 1), xi_y = AT(5 * k + 2), eta_y = AT(5 * k + 3);
+        R[k][0] = xx * xi_x + xy * xi_y, R[k][1] = xx * eta_x + xy * eta_y;
+        R[k][2] = yx * xi_x + yy * xi_y, R[k][3] = yx * eta_x + yy * eta_y;
+    }
+    NAME(strains_of)(R, c, linear);
+    if (coupled) NAME(strains_of)(R, c + 3, bent);
+    data = numbers;
+    half A[6], B[6];
+    for (int i = 0; i < 6; i++) A[i] = AT(4 + i), B[i] = AT(10 + i);
+    for (int k = 0; k < 9; k++) {
+        const half area = NAME(load)(points + (5 * k + 4) * LANES);
+        half strain[3], stress[3], more[3];
+        for (int i = 0; i < 3; i++) strain[i] = area * (e[i][k] + linear[i][k]);
+        NAME(stresses)(1, 1, A, strain, stress);
+        if (coupled) {
+            half turned[3], of_bending[3];
+            NAME(stresses)(1, 1, B, strain, more);
+            for (int i = 0; i < 3; i++) moment[i][k] = more[i], turned[i] = area * bent[i][k];
+            NAME(stresses)(1, 1, B, turned, of_bending);
+            for (int i = 0; i < 3; i++) stress[i] += of_bending[i];
+        }
+        for (int i = 0; i < 3; i++) n[i][k] = stress[i];
+    }
+    memset(force, 0, sizeof(half) * 9 * (coupled ? 5 : 3));
+    NAME(sum_strains)(R, n, force);
+    if (coupled) NAME(sum_strains)(R, moment, force + 3);
+
+    data = of_tying;
+    for (int k = 0; k < 3; k++) NAME(gather)(n[0] + 3 * k, 1, g + 2 * k, g + 2 * k + 1);
+    for (int t = 0; t < 6; t++) along[t] = AT(2 * t) * (w1[t] * g[t]), across[t] = AT(2 * t + 1) * (w1[t] * g[t]);
+    NAME(sum_gradient)(3, ACROSS, 2, ALONG, along, across, force[2]);
+    data += 12 * LANES;
+    for (int l = 0; l < 3; l++) NAME(gather)(n[1] + l, 3, g + l, g + 3 + l);
+    for (int t = 0; t < 6; t++) along[t] = AT(2 * t) * (w2[t] * g[t]), across[t] = AT(2 * t + 1) * (w2[t] * g[t]);
+    NAME(sum_gradient)(2, ALONG, 3, ACROSS, along, across, force[2]);
+    data += 12 * LANES;
+    for (int l = 0; l < 3; l++) NAME(gather)(n[2] + l, 3, &row[0][l], &row[1][l]);
+    for (int k = 0; k < 2; k++) NAME(gather)(row[k], 1, g + 2 * k, g + 2 * k + 1);
+    for (int t = 0; t < 4; t++) {
+        const half one = corner[1][t] * g[t], two = corner[0][t] * g[t];
+        along[t] = AT(4 * t) * one + AT(4 * t + 2) * two, across[t] = AT(4 * t + 1) * one + AT(4 * t + 3) * two;
+    }
+    NAME(sum_gradient)(2, ALONG, 2, ALONG, along, across, force[2]);
+}
+
+/* Components along the base vectors x_1/2, x_2/2 of fields x and y; and the transpose. */
+INLINE void NAME(covariant)(const double *data, half *a, half *b) {
+    const half xx = AT(0), xy = AT(1), yx = AT(2), yy = AT(3);
+    for (int i = 0; i < 9; i++) {
+        const half x = a[i], y = b[i];
+        a[i] = xx * x + xy * y, b[i] = yx * x + yy * y;
+    }
+}
+
+INLINE void NAME(cartesian)(const double *data, half *a, half *b) {
+    const half xx = AT(0), xy = AT(1), yx = AT(2), yy = AT(3);
+    for (int i = 0; i < 9; i++) {
+        const half one = a[i], two = b[i];
+        a[i] = xx * one + yx * two, b[i] = xy * one + yy * two;
+    }
+}
+
+/* Forces of the membrane of a block, and the work of its membrane forces on the quadratic strains. */
+INLINE void NAME(stretch)(int coupled, int modes, const Plate *p, const Chunk *chunk, const Block *b, const double *u, double *f, half *work) {
+    const int nd = coupled ? 5 : 3;
+    const int32_t *grid = b->group->grid;
+    lanes x[5][9] ALIGNED;
+    for (int i = 0; i < 9; i++) NAME(take)(nd, p, chunk, b->place[grid[i]], u, x[0] + i, 9);
+    for (int side = 0; side < 2; side++) {
+        const double *data = b->membrane + 4 * side, *points = b->data + 4 * side;
+        half c[5][9] ALIGNED, force[5][9] ALIGNED;
+        for (int dof = 0; dof < nd; dof++)
+            for (int i = 0; i < 9; i++) c[dof][i] = HALF(x[dof][i]);
+        NAME(covariant)(data, c[0], c[1]);
+        if (coupled) NAME(covariant)(data, c[3], c[4]);
+        for (int dof = 0; dof < nd; dof++) NAME(coefficients)(c[dof]);
+        if (modes)
+            NAME(of_modes)(coupled, data, c, force);
+        else
+            NAME(of_points)(coupled, data, points, c, force);
+        /* w f_w is twice that work, as eps_q is of the second order. */
+        half sum = 0.5 * c[2][1] * force[2][1];
+        for (int i = 2; i < 9; i++) sum += 0.5 * c[2][i] * force[2][i];
+        *work += sum;
+        for (int dof = 0; dof < nd; dof++) NAME(nodal)(force[dof]);
+        NAME(cartesian)(data, force[0], force[1]);
+        if (coupled) NAME(cartesian)(data, force[3], force[4]);
+        for (int dof = 0; dof < nd; dof++)
+            for (int i = 0; i < 9; i++) HALF(x[dof][i]) = force[dof][i];
+    }
+    for (int i = 0; i < 9; i++) NAME(give)(nd, p, chunk, b->place[grid[i]], x[0] + i, 9, f);
+}
+
+TARGET void NAME(membrane)(const Plate *p, const Chunk *chunk, const Block *b, const double *u, double *f, half *work) {
+    if (b->group->parallelograms && p->coupled)
+        NAME(stretch)(1, 1, p, chunk, b, u, f, work);
+    else if (b->group->parallelograms)
+        NAME(stretch)(0, 1, p, chunk, b, u, f, work);
+    else if (p->coupled)
+        NAME(stretch)(1, 0, p, chunk, b, u, f, work);
+    else
+        NAME(stretch)(0, 0, p, chunk, b, u, f, work);
+}
+
+#undef AT
