@@ -179,7 +179,6 @@ class CompiledPlate:
             for weights in [kept.weights[family.rows].astype(float)]
             for chosen, congruent in grouped(family, weights, nonlinear=nonlinear)
         ]
-        self._groups = groups
         families = [group.family for group in groups]
         leader = _leaders(kept)
         layout = layout_of(families)
