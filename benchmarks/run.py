@@ -6,7 +6,8 @@ The plain loop is the product with scipy's CSR matrix, the update of the plate a
 code.  A step is everything that ``fecm run`` does in it: energies, history, a row of strains and of
 displacements at every twentieth step, the file written.  Its cost is the difference of a long and a
 short run over the difference of their steps; what is left is the set-up.  `memory` takes steps
-without rows and without a file.  All are processor times, the best of some rounds in turns; each
+without rows and without a file, and `over_linear` is its ratio to that of the same plate without
+NONL, whose u and v rest where B is 0; the plain loop is always linear.  All are processor times, the best of some rounds in turns; each
 case has a process of its own, and one thread unless said otherwise.
 `--write` keeps the figures in benchmarks/results, under the machine's name.
 """
@@ -43,7 +44,9 @@ from fecm.deck.model import (
     Impact,
     Material,
     NodeValues,
+    Nonlinear,
     Patch,
+    Shear,
 )
 from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.stiffness_product import CSR, KERNELS, NUMPY
@@ -74,14 +77,23 @@ def refined(times: int, aside: int = 0) -> Deck:
 
     The impact is `aside` nodes beside the middle.
     """
-    deck = report()
     columns = [
         Section(0.0, 1.5, 3 * times),
         Section(1.5, 4.5, 8 * times),
         Section(4.5, 6.0, 3 * times),
     ]
     rows = [Section(0.0, 0.5, times), Section(0.5, 3.5, 8 * times), Section(3.5, 4.0, times)]
-    grid = Grid(columns, rows)
+    return on_grid(Grid(columns, rows), aside)
+
+
+def even(count: int) -> Deck:
+    """The report's plate of equal elements, so many in each direction."""
+    return on_grid(Grid([Section(0.0, 6.0, count)], [Section(0.0, 4.0, count)]))
+
+
+def on_grid(grid: Grid, aside: int = 0) -> Deck:
+    """The report's plate with another mesh; the impact is `aside` nodes beside the middle."""
+    deck = report()
     boundary = grid.boundary((1, 1, 0, 0, 0), {})
     hit = Impact(grid.nearest(3.0, 2.0)[0] + aside, 3, 115.0)
     mesh = [part for part in (grid.coordinates(), grid.element_cards(), boundary) if part]
@@ -107,15 +119,15 @@ def moved(deck: Deck, move: Callable[[np.ndarray], np.ndarray]) -> Deck:
     return replace(deck, segments=tuple(segments), text="")
 
 
-def distorted(times: int) -> Deck:
-    """The mesh with its inner corners moved by up to a tenth of an element."""
+def distorted(deck: Deck, most: float) -> Deck:
+    """The deck with its inner corners moved by up to a length."""
 
     def shift(corners: np.ndarray) -> np.ndarray:
-        shifts = np.random.default_rng(0).uniform(-0.04 / times, 0.04 / times, corners.shape)
+        shifts = np.random.default_rng(0).uniform(-most, most, corners.shape)
         shifts[[0, -1]] = shifts[:, [0, -1]] = 0.0
         return corners + shifts
 
-    return moved(refined(times), shift)
+    return moved(deck, shift)
 
 
 def graded(times: int) -> Deck:
@@ -146,17 +158,33 @@ def patched() -> Deck:
     return replace(deck, segments=(*deck.segments, Patch()), text="")
 
 
+def stretched(deck: Deck) -> Deck:
+    """The deck with NONL and assumed shear strains, u and v free."""
+    segments = [s for s in deck.segments if not isinstance(s, Boundary)]
+    return replace(deck, segments=(*segments, Shear(assumed=True), Nonlinear()), text="")
+
+
+def linear(deck: Deck) -> Deck:
+    """The deck without NONL."""
+    segments = tuple(s for s in deck.segments if not isinstance(s, Nonlinear))
+    return replace(deck, segments=segments, text="")
+
+
 CASES: dict[str, Callable[[], Deck]] = {
     "report": report,
     "patch": patched,
-    "distorted": lambda: distorted(1),
+    "distorted": lambda: distorted(refined(1), 0.04),
     "x3": lambda: refined(3),
     "x10": lambda: refined(10),
     "x10 off-centre": lambda: refined(10, 20),
     "x10 graded": lambda: graded(10),
-    "x10 distorted": lambda: distorted(10),
-    "x10 distorted, B": lambda: coupled(distorted(10)),
+    "x10 distorted": lambda: distorted(refined(10), 0.004),
+    "x10 distorted, B": lambda: coupled(distorted(refined(10), 0.004)),
     "x32": lambda: refined(32),
+    "NONL": lambda: stretched(report()),
+    "NONL distorted": lambda: stretched(distorted(refined(1), 0.04)),
+    "NONL 32 x 32": lambda: stretched(even(32)),
+    "NONL 32 x 32 distorted": lambda: stretched(distorted(even(32), 0.0125)),
 }
 
 
@@ -283,9 +311,12 @@ def measure(name: str, rounds: int) -> dict[str, object]:
             wanted = LONGER * 2 * short / max(more - few, 1e-3)
             counts[solver] = short + max(2 * short, int(min(8000, largest, wanted)))
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
-        plain = Plain(problem)
+        plain = Plain(checked(linear(deck), 10))
         plain_steps = max(3, int(BUDGET / max(seconds(plain, 3) / 3, 1e-9)))
         memory = Memory(problem) if LIBRARY is not None else None
+        rests = None
+        if memory is not None and deck.has(Nonlinear):
+            rests = Memory(checked(linear(deck), 10))
         own = 0 if memory is None else max(20, int(BUDGET * 20 / max(seconds(memory, 20), 1e-6)))
         best: dict[tuple[str, int], float] = {}
 
@@ -302,6 +333,8 @@ def measure(name: str, rounds: int) -> dict[str, object]:
                 take(solver, loop, counts[solver])
             if memory is not None:
                 take("memory", memory, own)
+            if rests is not None:
+                take("linear", rests, own)
             for key, both in pair:
                 take(key, both, own, wall)
     cost = {"plain": best["plain", plain_steps] / plain_steps}
@@ -312,6 +345,8 @@ def measure(name: str, rounds: int) -> dict[str, object]:
         cost["memory"] = best["memory", own] / own
     if pair:
         figures["two_threads"] = round(best["1", own] / best["2", own], 2)
+    if rests is not None:
+        figures["over_linear"] = round(best["memory", own] / best["linear", own], 2)
     figures["us_a_step"] = {key: round(value * 1e6, 2) for key, value in cost.items()}
     figures["plain_over"] = {
         key: round(cost["plain"] / value, 1) for key, value in cost.items() if key != "plain"
