@@ -6,9 +6,10 @@ The plain loop is the product with scipy's CSR matrix, the update of the plate a
 code.  A step is everything that ``fecm run`` does in it: energies, history, a row of strains and of
 displacements at every twentieth step, the file written.  Its cost is the difference of a long and a
 short run over the difference of their steps; what is left is the set-up.  `memory` takes steps
-without rows and without a file, and `over_linear` is its ratio to that of the same plate without
-NONL, whose u and v rest where B is 0; the plain loop is always linear.  All are processor times, the best of some rounds in turns; each
-case has a process of its own, and one thread unless said otherwise.
+without rows and without a file.  Of a deck with NONL `over_linear` is the ratio of these steps to
+those without the word, where u and v rest if B is 0; its plain loop is linear.  All are processor
+times, the best of some rounds in turns; each case has a process of its own, and one thread unless
+said otherwise.
 `--write` keeps the figures in benchmarks/results, under the machine's name.
 """
 

@@ -54,6 +54,20 @@ def supports(family: ElementBlock) -> bool:
     return family.shape.nodes == 9 and family.nodes.shape[1] == 9
 
 
+def covariant_to_global(base: Floats) -> Floats:
+    """Strains xx, yy, xy per covariant e_11, e_22, e_12, (ne, 3, 3).
+
+    `base` (ne, 2, 2) are the base vectors x,xi and x,eta.
+    """
+    (xi_x, eta_x), (xi_y, eta_y) = np.linalg.inv(base).transpose(1, 2, 0)
+    rows = [
+        [xi_x**2, eta_x**2, xi_x * eta_x],
+        [xi_y**2, eta_y**2, xi_y * eta_y],
+        [2.0 * xi_x * xi_y, 2.0 * eta_x * eta_y, xi_x * eta_y + xi_y * eta_x],
+    ]
+    return np.array(rows).transpose(2, 0, 1)
+
+
 class QuadraticStrains:
     """Tied quadratic strains of 9-node elements at the points of a rule."""
 
@@ -76,15 +90,7 @@ class QuadraticStrains:
             assumed_shear.tying_weights(9, 1, rule),
             _corner_weights(rule),
         ]
-        # Strains xx, yy, xy per e_11, e_22, e_12, (3, 3, ne).
-        (xi_x, eta_x), (xi_y, eta_y) = np.linalg.inv(centre).transpose(1, 2, 0)
-        self._to_global = np.array(
-            [
-                [xi_x**2, eta_x**2, xi_x * eta_x],
-                [xi_y**2, eta_y**2, xi_y * eta_y],
-                [2.0 * xi_x * xi_y, 2.0 * eta_x * eta_y, xi_x * eta_y + xi_y * eta_x],
-            ]
-        )
+        self._to_global = covariant_to_global(centre).transpose(1, 2, 0)
 
     def slopes(self, w: Floats) -> tuple[Floats, Floats]:
         """Slopes w,1 and w,2 of nodal values (9, ne) at their tying points, (10, ne) each."""

@@ -262,9 +262,7 @@ class ElementGroup:
             parts = [self._at_points(rule, family, members) for rule in self._rules]
             if self._plate.rules.assumes_shear:
                 parts += _slopes_of_mapping(family)
-        return _in_lanes(
-            np.concatenate([part.reshape(len(members), -1) for part in parts], axis=1)
-        )
+        return _in_lanes(np.concatenate([part.reshape(len(members), -1) for part in parts], axis=1))
 
     def membrane(self, members: Indices) -> Floats:
         """Numbers of the membrane of elements, (blocks, numbers, 8); one block if congruent."""

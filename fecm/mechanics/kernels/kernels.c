@@ -97,18 +97,19 @@ typedef struct {
 
 enum { SUMS = 5 }; /* their number, a half of each for every chunk */
 
-/* Membrane of nonlinear plates, see membrane.h.  Tying points along and across the direction of a strain;
- * the latter are those of the quadrature too, and the ratio of both over 2. */
+/* Membrane of nonlinear plates, see membrane.h.  Tying points along and across the direction of a strain,
+ * of which the latter are those of the quadrature too; and half of their ratio. */
 static const double ALONG[] = {-0.57735026918962576, 0.57735026918962576};
 static const double ACROSS[] = {-0.77459666924148338, 0.0, 0.77459666924148338};
 static const double SPREAD = 0.67082039324993691;
 
-/* Modes of strains, and the integrals of their squares. */
+/* Number of modes of the strains of parallelograms, and the integrals of their squares. */
 enum { MODES = 8 };
 static const double NORMS[] = {4.0, 1.0 / 3.0, 1.0 / 3.0, 4.0 / 9.0, 4.0 / 45.0, 16.0 / 135.0, 4.0 / 45.0, 16.0 / 135.0};
 
-/* Modes from values at tying points.  Along their direction: of sums, for modes without it, and of
- * differences; across it: mean (middle, sides), slope, bend.  Of corners: mean, slope, twist. */
+/* Weights of values at tying points in modes.  Along the direction of e_11 or e_22 a mode has the sum of two
+ * values or their difference, and across it a mean, of three such, a slope or a bend.  Of e_12: mean, slope,
+ * twist. */
 enum { MIDDLE, SIDES, STRAIGHT, BENT };
 static const double OF_SUM[] = {2.0 / 9.0, 5.0 / 36.0, 0.64549722436790281, 5.0 / 6.0};
 static const double OF_DIFFERENCE[] = {0.76980035891950105, 0.48112522432468813, 0.55901699437494745, 0.72168783648703216};

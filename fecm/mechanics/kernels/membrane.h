@@ -1,49 +1,53 @@
 /* Membrane of a nonlinear plate; included by plate.h, once for each instruction set.
  *
- * Theory.  Numbers are those of the equations in docs/theory.  A plate with slopes that are not small
- * stretches as it bends (von Karman):
+ * Theory: "Plate that stretches" in docs/theory.md.  With moderate slopes (von Karman) the midplane strains
+ * are eps = eps_l + eps_q, eps_l = (u,x, v,y, u,y + v,x) and eps_q = (w,x^2/2, w,y^2/2, w,x w,y), and
  *
- *   (1) eps = eps_l + eps_q, eps_l = (u,x, v,y, u,y + v,x), eps_q = (w,x^2/2, w,y^2/2, w,x w,y)
- *   (3) N = N0 + A eps + B kappa, M = B eps + D kappa
+ *   N = N0 + A eps + B kappa,   M = B eps + D kappa.
  *
- * D kappa, the transverse shear and N0 on the slopes, equation (12), are linear in w, theta_x and
- * theta_y: they are the work of the four kinds of plate.h.  What is left is done here: the forces of
- * A eps + B kappa on u, v and w, and those of B eps on the rotations, equations (10) and (11).
+ * D kappa, transverse shear, and N0 on the slopes are linear in w, theta_x and theta_y: they are the work
+ * of the four kinds of plate.h, with the last three dofs.  The rest is done here: the forces of
+ * A eps + B kappa on u, v and w, and those of B eps on the rotations.
  *
- * Frame.  x_1 = x,xi and x_2 = x,eta at the centre of an element are its base vectors.  U_a = x_a (u, v)
- * and T_a = x_a (theta_x, theta_y) are displacement and rotation along them, and D_a = R_ab d/dxi_b the
- * derivative along x_a, with R = J_c J^-1 of the Jacobians at the centre and at the point.  Then
+ * Frame.  Base vectors of an element are x_1 = x,xi and x_2 = x,eta at its centre.  U_a = x_a (u, v) and
+ * T_a = x_a (theta_x, theta_y) are displacements and rotations along them, and D_a = R_ab d/dxi_b is the
+ * derivative along x_a, with R = J_c J^-1 of the Jacobians at the centre and at a point.  Covariant strains:
  *
- *   e_11 = D_1 U_1, e_22 = D_2 U_2, e_12 = D_1 U_2 + D_2 U_1, curvatures the same of -T,
+ *   e_11 = D_1 U_1,   e_22 = D_2 U_2,   e_12 = D_1 U_2 + D_2 U_1,   curvatures the same of -T.
  *
- * and A_c = T_c' A T_c, B_c = T_c' B T_c with T_c of equation (9).  On parallelograms R = 1.
+ * They have the stiffnesses A_c = T' A T and B_c = T' B T, with T from covariant strains to those in x and
+ * y.  On parallelograms R = 1.
  *
- * Tying.  Equations (7) and (8): e_11 has w,1^2/2 of the points xi = +-1/sqrt(3), eta = 0,
- * +-sqrt(3/5), e_22 has w,2^2/2 of those with xi and eta exchanged, and e_12 has w,1 w,2 of
- * xi, eta = +-1/sqrt(3).  Between them they are interpolated.  Without that a plate that bends without
- * stretching would be too stiff; with base vectors of the tying points instead of the centre it would
- * fail the patch test (Bucalem and Bathe 1993; Wisniewski and Panasz 2013).
+ * Tying.  With w,a = D_a w, the quadratic part of e_11 is w,1^2/2 at xi = +-1/sqrt(3), eta = 0, +-sqrt(3/5),
+ * that of e_22 is w,2^2/2 at the points with xi and eta exchanged, and that of e_12 is w,1 w,2 at
+ * xi, eta = +-1/sqrt(3).  Between these points they are interpolated.  With eps_q of every point a plate
+ * that bends without stretching would be too stiff (Bucalem and Bathe 1993); with the base vectors of
+ * the tying points a constant membrane force would not be exact (Wisniewski and Panasz 2013).
  *
- * Parallelograms.  There e_11, linear or tied, is linear in xi and quadratic in eta, e_22 the other
- * way round, and e_12 is a sum of both kinds: each has some of eight orthogonal modes.  The 3 x 3 points
- * integrate their products exactly, so that the energy is a sum over modes, and nothing is computed at
- * points but the slopes of w.
+ * Parallelograms.  There e_11, linear and tied, is linear in xi and quadratic in eta, e_22 the other way
+ * round, and e_12 a sum of both: each has some of eight orthogonal modes,
  *
- * Other elements have R at the 9 points and, halved, at the tying points.  Slopes are summed along xi and
- * then along eta, as those of FACTORIZED elements.
+ *   0: 1   1: xi/2   2: eta/2   3: xi eta   4: p(xi)/2   5: p(xi) eta   6: p(eta)/2   7: p(eta) xi,
  *
- * Numbers of a block, (16, 8) or (101, 8): x_1/2, x_2/2 (4; half, as `slopes` gives twice the slope); A_c
- * and -B_c in the order 11, 22, 12, with 1 1, 1 2, 1 3, 2 2, 2 3, 3 3 (6 + 6), times determinant and
- * weight on parallelograms.  Others: R and the determinant times the weight (9, 5); R_1/2 at the
- * points of e_11 (6, 2), R_2/2 at those of e_22 (6, 2), both at those of e_12 (4, 4).
+ * with p(x) = x^2 - 1/3; e_11 has no 4 and 5, e_22 no 6 and 7.  The 3 x 3 points integrate their products
+ * exactly, so that the energy is a sum over the modes, and only the slopes of w are computed at points.
  *
- * All functions compute four elements.  Coefficients c, and forces on them, are of U_1, U_2, w, T_1, T_2.
+ * Other elements.  Slopes along xi and eta at the 9 points and at the tying points, by sums along xi and then
+ * along eta as of FACTORIZED elements, and there the strains with R.
+ *
+ * Numbers of a block.  `membrane`: x_1/2 and x_2/2 (4), as `slopes` gives twice the slopes; the upper halves
+ * of A_c and -B_c (6 + 6), for parallelograms times determinant and weight.  For others: R_1/2 at the
+ * points of e_11 (6, 2), R_2/2 at those of e_22 (6, 2), both at those of e_12 (4, 4); and `data` as
+ * TABULATED elements have it, with the points in rows of eta.
+ *
+ * Functions compute four elements, and are followed by their transposes.  Coefficients c, and forces on them,
+ * are of U_1, U_2, w, T_1, T_2; slopes are twice those.
  */
 
 #define AT(i) NAME(load)(data + LANES * (i))
 
-/* (n_1, n_2, n_3) = C (e_1, e_2, e_3) with the upper half of C; `first` and `second` say whether e_1 and
- * e_2 are anything but 0, and n_1 and n_2 wanted. */
+/* n = C e with the upper half of C (3, 3); without `first` or `second`, e_1 or e_2 is 0 and n_1 or n_2 is of
+ * no use. */
 INLINE void NAME(stresses)(int first, int second, const half *C, const half *e, half *n) {
     if (first && second) {
         n[0] = C[0] * e[0] + C[1] * e[1] + C[2] * e[2];
@@ -55,10 +59,7 @@ INLINE void NAME(stresses)(int first, int second, const half *C, const half *e, 
         n[1] = C[3] * e[1] + C[4] * e[2], n[2] = C[4] * e[1] + C[5] * e[2];
 }
 
-/* Modes of strains of parallelograms: 1; xi/2, eta/2; xi eta; p(xi)/2, p(xi) eta; p(eta)/2, p(eta) xi, with
- * p(x) = x^2 - 1/3.  e_11 has none of 4 and 5, e_22 none of 6 and 7.
- *
- * Twice the slopes of a biquadratic along xi and along eta; and the transpose. */
+/* Modes of the slopes of a biquadratic along xi and along eta. */
 INLINE void NAME(slope_modes)(const half *c, half *xi, half *eta) {
     xi[0] = c[1] + 1.0 / 6.0 * c[7], eta[0] = c[3] + 1.0 / 6.0 * c[5];
     xi[1] = 4.0 * c[2] + 2.0 / 3.0 * c[8], eta[2] = 4.0 * c[6] + 2.0 / 3.0 * c[8];
@@ -77,7 +78,7 @@ INLINE void NAME(sum_slope_modes)(const half *xi, const half *eta, half *c) {
     c[8] = 2.0 / 3.0 * (xi[1] + eta[2]) + xi[7] + eta[5];
 }
 
-/* Modes e of the strains of U_1 and U_2; forces on these from those on the modes. */
+/* Modes of the strains of U_1 and U_2. */
 INLINE void NAME(strain_modes)(half (*c)[9], half (*e)[MODES]) {
     half one[MODES], other[MODES];
     NAME(slope_modes)(c[0], e[0], one);
@@ -91,7 +92,7 @@ INLINE void NAME(sum_strain_modes)(half (*n)[MODES], half (*force)[9]) {
     NAME(sum_slope_modes)(n[2], n[1], force[1]);
 }
 
-/* Add e_11 or e_22 of the points, (along, across), to the modes; and the transpose. */
+/* Add e_11 (axis 0) or e_22 (axis 1) of its tying points, along and across the axis, to its modes. */
 INLINE void NAME(tie)(int axis, double scale, half (*f)[3], half *e) {
     const int one = axis ? 1 : 2, two = axis ? 4 : 6, along = axis ? 2 : 1, both = axis ? 5 : 7;
     const double *a = OF_SUM, *b = OF_DIFFERENCE;
@@ -117,8 +118,7 @@ INLINE void NAME(untie)(int axis, double scale, const half *n, half (*f)[3]) {
     for (int k = 0; k < 3; k++) f[1][k] = sum[k] + odd[k], f[0][k] = sum[k] - odd[k];
 }
 
-/* Slopes along xi (axis 0) or eta, twice, of c: at the tying points of e_11 or e_22, (along, across),
- * and at those of e_12, (along, across). */
+/* Slopes along an axis at the tying points of e_11 or e_22, and at those of e_12; along and across. */
 INLINE void NAME(tied_slopes)(int axis, const half *c, half (*at)[3], half (*corner)[2]) {
     const int along = axis ? 3 : 1, across = axis ? 1 : 3;
     half d[3][2];
@@ -139,7 +139,7 @@ INLINE void NAME(sum_tied_slopes)(int axis, half (*at)[3], half (*corner)[2], ha
     for (int b = 0; b < 3; b++) NAME(sum_slopes)(2, ALONG, d[b], 1, c + along + b * across, c + 2 * along + b * across);
 }
 
-/* Stresses of each mode; n_11 of the modes 4 and 5 and n_22 of 6 and 7 are not set. */
+/* Forces on the modes. */
 INLINE void NAME(mode_stresses)(const half *C, half (*e)[MODES], half (*n)[MODES]) {
 #pragma GCC unroll 8
     for (int m = 0; m < MODES; m++) {
@@ -155,7 +155,7 @@ INLINE void NAME(mode_stresses)(const half *C, half (*e)[MODES], half (*n)[MODES
     }
 }
 
-/* Add e_12 of the corners (xi, eta) to the modes; and the transpose. */
+/* Add e_12 of its tying points (xi, eta) to its modes. */
 INLINE void NAME(tie_corners)(double scale, half (*f)[2], half *e) {
     const half low = f[0][1] + f[0][0], high = f[1][1] + f[1][0];
     const half left = f[0][1] - f[0][0], right = f[1][1] - f[1][0];
@@ -180,7 +180,7 @@ INLINE void NAME(of_modes)(int coupled, const double *data, half (*c)[9], half (
         NAME(tied_slopes)(axis, c[2], at[axis], corner[axis]);
         for (int i = 0; i < 2; i++)
             for (int k = 0; k < 3; k++) f[i][k] = at[axis][i][k] * at[axis][i][k];
-        NAME(tie)(axis, 0.125, f, e[axis]); /* w,1^2/2, with twice w,1 */
+        NAME(tie)(axis, 0.125, f, e[axis]); /* w,a^2/2 from twice w,a */
     }
     for (int i = 0; i < 2; i++)
         for (int k = 0; k < 2; k++) g[i][k] = corner[0][i][k] * corner[1][k][i];
@@ -217,7 +217,7 @@ INLINE void NAME(of_modes)(int coupled, const double *data, half (*c)[9], half (
     }
 }
 
-/* Twice the slopes of a biquadratic along xi and eta at m points in eta by n in xi; and the transpose, added. */
+/* Slopes of a biquadratic along xi and along eta at m points in eta by n in xi; the transpose adds. */
 INLINE void NAME(gradient)(int m, const double *y, int n, const double *x, const half *c, half *along, half *across) {
     half d[3][3], v[3][3];
     for (int b = 0; b < 3; b++) {
@@ -242,7 +242,7 @@ INLINE void NAME(sum_gradient)(int m, const double *y, int n, const double *x, c
     }
 }
 
-/* Values at -sqrt(3/5), 0, sqrt(3/5) of a linear function from those at +-1/sqrt(3); and the transpose. */
+/* Values of a linear function at -sqrt(3/5), 0, sqrt(3/5) from those at +-1/sqrt(3). */
 INLINE void NAME(spread)(half low, half high, half *v, int step) {
     const half middle = 0.5 * (low + high), odd = SPREAD * (high - low);
     v[0] = middle - odd, v[step] = middle, v[2 * step] = middle + odd;
@@ -253,7 +253,7 @@ INLINE void NAME(gather)(const half *v, int step, half *low, half *high) {
     *low = middle - odd, *high = middle + odd;
 }
 
-/* Strains at the 9 points of U_1 and U_2, with R there; and the transpose. */
+/* Strains of U_1 and U_2 at the 9 points, with R there. */
 INLINE void NAME(strains_of)(half (*R)[4], half (*c)[9], half (*e)[9]) {
     half a[2][9], b[2][9];
     for (int i = 0; i < 2; i++) NAME(gradient)(3, ACROSS, 3, ACROSS, c[i], a[i], b[i]);
@@ -275,86 +275,96 @@ INLINE void NAME(sum_strains)(half (*R)[4], half (*n)[9], half (*force)[9]) {
     for (int i = 0; i < 2; i++) NAME(sum_gradient)(3, ACROSS, 3, ACROSS, a[i], b[i], force[i]);
 }
 
-/* Forces on the coefficients of an element that is no parallelogram. */
-INLINE void NAME(of_points)(int coupled, const double *numbers, const double *points, half (*c)[9], half (*force)[9]) {
-    const double *const of_tying = numbers + 16 * LANES;
-    half e[3][9], n[3][9], along[9], across[9], w1[6], w2[6], corner[2][4], g[9];
-    const double *data = of_tying;
-    NAME(gradient)(3, ACROSS, 2, ALONG, c[2], along, across);
-    for (int t = 0; t < 6; t++) {
-        w1[t] = AT(2 * t) * along[t] + AT(2 * t + 1) * across[t];
-        g[t] = 0.5 * w1[t] * w1[t];
-    }
-    for (int k = 0; k < 3; k++) NAME(spread)(g[2 * k], g[2 * k + 1], e[0] + 3 * k, 1);
-    data += 12 * LANES;
-    NAME(gradient)(2, ALONG, 3, ACROSS, c[2], along, across);
-    for (int t = 0; t < 6; t++) {
-        w2[t] = AT(2 * t) * along[t] + AT(2 * t + 1) * across[t];
-        g[t] = 0.5 * w2[t] * w2[t];
-    }
-    for (int l = 0; l < 3; l++) NAME(spread)(g[l], g[3 + l], e[1] + l, 3);
-    data += 12 * LANES;
-    NAME(gradient)(2, ALONG, 2, ALONG, c[2], along, across);
-    for (int t = 0; t < 4; t++) {
-        corner[0][t] = AT(4 * t) * along[t] + AT(4 * t + 1) * across[t];
-        corner[1][t] = AT(4 * t + 2) * along[t] + AT(4 * t + 3) * across[t];
-        g[t] = corner[0][t] * corner[1][t];
-    }
-    half row[2][3];
-    for (int k = 0; k < 2; k++) NAME(spread)(g[2 * k], g[2 * k + 1], row[k], 1);
-    for (int l = 0; l < 3; l++) NAME(spread)(row[0][l], row[1][l], e[2] + l, 3);
+/* Slopes along x_1 and x_2 at the tying points of e_11, of e_22, and of e_12. */
+typedef struct {
+    half one[6], two[6], both[2][4];
+} NAME(Tied);
 
-    half linear[3][9], bent[3][9], moment[3][9], R[9][4];
-    data = numbers;
+/* Tied quadratic strains at the 9 points, with R/2 of the tying points. */
+INLINE void NAME(tied_strains)(const double *data, const half *c, NAME(Tied) *tied, half (*e)[9]) {
+    half xi[6], eta[6], at[6], row[2][3];
+    NAME(gradient)(3, ACROSS, 2, ALONG, c, xi, eta);
+    for (int t = 0; t < 6; t++) {
+        const half slope = AT(2 * t) * xi[t] + AT(2 * t + 1) * eta[t];
+        tied->one[t] = slope, at[t] = 0.5 * slope * slope;
+    }
+    for (int k = 0; k < 3; k++) NAME(spread)(at[2 * k], at[2 * k + 1], e[0] + 3 * k, 1);
+    NAME(gradient)(2, ALONG, 3, ACROSS, c, xi, eta);
+    for (int t = 0; t < 6; t++) {
+        const half slope = AT(12 + 2 * t) * xi[t] + AT(13 + 2 * t) * eta[t];
+        tied->two[t] = slope, at[t] = 0.5 * slope * slope;
+    }
+    for (int l = 0; l < 3; l++) NAME(spread)(at[l], at[3 + l], e[1] + l, 3);
+    NAME(gradient)(2, ALONG, 2, ALONG, c, xi, eta);
+    for (int t = 0; t < 4; t++) {
+        const half one = AT(24 + 4 * t) * xi[t] + AT(25 + 4 * t) * eta[t];
+        const half two = AT(26 + 4 * t) * xi[t] + AT(27 + 4 * t) * eta[t];
+        tied->both[0][t] = one, tied->both[1][t] = two, at[t] = one * two;
+    }
+    for (int k = 0; k < 2; k++) NAME(spread)(at[2 * k], at[2 * k + 1], row[k], 1);
+    for (int l = 0; l < 3; l++) NAME(spread)(row[0][l], row[1][l], e[2] + l, 3);
+}
+
+INLINE void NAME(sum_tied_strains)(const double *data, const NAME(Tied) *tied, half (*n)[9], half *force) {
+    half xi[6], eta[6], at[6], row[2][3];
+    for (int k = 0; k < 3; k++) NAME(gather)(n[0] + 3 * k, 1, at + 2 * k, at + 2 * k + 1);
+    for (int t = 0; t < 6; t++) {
+        const half pull = tied->one[t] * at[t];
+        xi[t] = AT(2 * t) * pull, eta[t] = AT(2 * t + 1) * pull;
+    }
+    NAME(sum_gradient)(3, ACROSS, 2, ALONG, xi, eta, force);
+    for (int l = 0; l < 3; l++) NAME(gather)(n[1] + l, 3, at + l, at + 3 + l);
+    for (int t = 0; t < 6; t++) {
+        const half pull = tied->two[t] * at[t];
+        xi[t] = AT(12 + 2 * t) * pull, eta[t] = AT(13 + 2 * t) * pull;
+    }
+    NAME(sum_gradient)(2, ALONG, 3, ACROSS, xi, eta, force);
+    for (int l = 0; l < 3; l++) NAME(gather)(n[2] + l, 3, &row[0][l], &row[1][l]);
+    for (int k = 0; k < 2; k++) NAME(gather)(row[k], 1, at + 2 * k, at + 2 * k + 1);
+    for (int t = 0; t < 4; t++) {
+        const half one = tied->both[1][t] * at[t], two = tied->both[0][t] * at[t];
+        xi[t] = AT(24 + 4 * t) * one + AT(26 + 4 * t) * two;
+        eta[t] = AT(25 + 4 * t) * one + AT(27 + 4 * t) * two;
+    }
+    NAME(sum_gradient)(2, ALONG, 2, ALONG, xi, eta, force);
+}
+
+/* Forces on the coefficients of an element that is no parallelogram. */
+INLINE void NAME(of_points)(int coupled, const double *data, const double *points, half (*c)[9], half (*force)[9]) {
+    half e[3][9], linear[3][9], bent[3][9], moment[3][9], R[9][4], A[6], B[6];
+    NAME(Tied) tied;
+    NAME(tied_strains)(data + 16 * LANES, c[2], &tied, e);
     const half xx = 2.0 * AT(0), xy = 2.0 * AT(1), yx = 2.0 * AT(2), yy = 2.0 * AT(3);
-    data = points;
     for (int k = 0; k < 9; k++) {
-        const half xi_x = AT(5 * k), eta_x = AT(5 * k + 1), xi_y = AT(5 * k + 2), eta_y = AT(5 * k + 3);
+        const double *inverse = points + 5 * k * LANES;
+        const half xi_x = NAME(load)(inverse), eta_x = NAME(load)(inverse + LANES);
+        const half xi_y = NAME(load)(inverse + 2 * LANES), eta_y = NAME(load)(inverse + 3 * LANES);
         R[k][0] = xx * xi_x + xy * xi_y, R[k][1] = xx * eta_x + xy * eta_y;
         R[k][2] = yx * xi_x + yy * xi_y, R[k][3] = yx * eta_x + yy * eta_y;
     }
     NAME(strains_of)(R, c, linear);
     if (coupled) NAME(strains_of)(R, c + 3, bent);
-    data = numbers;
-    half A[6], B[6];
     for (int i = 0; i < 6; i++) A[i] = AT(4 + i), B[i] = AT(10 + i);
     for (int k = 0; k < 9; k++) {
         const half area = NAME(load)(points + (5 * k + 4) * LANES);
-        half strain[3], stress[3], more[3];
+        half strain[3], curvature[3], stress[3], other[3];
         for (int i = 0; i < 3; i++) strain[i] = area * (e[i][k] + linear[i][k]);
         NAME(stresses)(1, 1, A, strain, stress);
         if (coupled) {
-            half turned[3], of_bending[3];
-            NAME(stresses)(1, 1, B, strain, more);
-            for (int i = 0; i < 3; i++) moment[i][k] = more[i], turned[i] = area * bent[i][k];
-            NAME(stresses)(1, 1, B, turned, of_bending);
-            for (int i = 0; i < 3; i++) stress[i] += of_bending[i];
+            NAME(stresses)(1, 1, B, strain, other);
+            for (int i = 0; i < 3; i++) moment[i][k] = other[i], curvature[i] = area * bent[i][k];
+            NAME(stresses)(1, 1, B, curvature, other);
+            for (int i = 0; i < 3; i++) stress[i] += other[i];
         }
-        for (int i = 0; i < 3; i++) n[i][k] = stress[i];
+        for (int i = 0; i < 3; i++) e[i][k] = stress[i];
     }
     memset(force, 0, sizeof(half) * 9 * (coupled ? 5 : 3));
-    NAME(sum_strains)(R, n, force);
+    NAME(sum_strains)(R, e, force);
     if (coupled) NAME(sum_strains)(R, moment, force + 3);
-
-    data = of_tying;
-    for (int k = 0; k < 3; k++) NAME(gather)(n[0] + 3 * k, 1, g + 2 * k, g + 2 * k + 1);
-    for (int t = 0; t < 6; t++) along[t] = AT(2 * t) * (w1[t] * g[t]), across[t] = AT(2 * t + 1) * (w1[t] * g[t]);
-    NAME(sum_gradient)(3, ACROSS, 2, ALONG, along, across, force[2]);
-    data += 12 * LANES;
-    for (int l = 0; l < 3; l++) NAME(gather)(n[1] + l, 3, g + l, g + 3 + l);
-    for (int t = 0; t < 6; t++) along[t] = AT(2 * t) * (w2[t] * g[t]), across[t] = AT(2 * t + 1) * (w2[t] * g[t]);
-    NAME(sum_gradient)(2, ALONG, 3, ACROSS, along, across, force[2]);
-    data += 12 * LANES;
-    for (int l = 0; l < 3; l++) NAME(gather)(n[2] + l, 3, &row[0][l], &row[1][l]);
-    for (int k = 0; k < 2; k++) NAME(gather)(row[k], 1, g + 2 * k, g + 2 * k + 1);
-    for (int t = 0; t < 4; t++) {
-        const half one = corner[1][t] * g[t], two = corner[0][t] * g[t];
-        along[t] = AT(4 * t) * one + AT(4 * t + 2) * two, across[t] = AT(4 * t + 1) * one + AT(4 * t + 3) * two;
-    }
-    NAME(sum_gradient)(2, ALONG, 2, ALONG, along, across, force[2]);
+    NAME(sum_tied_strains)(data + 16 * LANES, &tied, e, force[2]);
 }
 
-/* Components along the base vectors x_1/2, x_2/2 of fields x and y; and the transpose. */
+/* Components along the base vectors, from those in x and y. */
 INLINE void NAME(covariant)(const double *data, half *a, half *b) {
     const half xx = AT(0), xy = AT(1), yx = AT(2), yy = AT(3);
     for (int i = 0; i < 9; i++) {

@@ -1,19 +1,11 @@
-"""What the compiled kernels need for the membrane of a nonlinear plate; see membrane.h.
-
-The numbers of an element are those of its frame at the centre, `FRAME` of them: halves of the base
-vectors x,xi and x,eta; the membrane stiffness A and the negative coupling -B for covariant strains.
-On parallelograms the stiffnesses are multiplied by the Jacobian determinant and the number of
-elements that this one represents.  Other elements have more: at the 9 points, in rows of eta, the
-derivatives along both base vectors per derivative in xi and in eta, and the determinant times
-weight; then half of such derivatives at the tying points of e_11, of e_22 and of e_12.
-"""
+"""Numbers of the membrane of a nonlinear plate for the compiled kernels; see membrane.h."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from fecm._typing import Bools, Floats, Indices
-from fecm.mechanics import assumed_shear
+from fecm.mechanics import assumed_shear, membrane
 from fecm.mechanics.elements import Quadrature, gauss
 from fecm.mechanics.interpolation import inverse_jacobian, jacobian, local_shape_functions
 from fecm.mechanics.mesh import TOLERANCE, ElementBlock
@@ -26,8 +18,11 @@ _UPPER = np.triu_indices(3)
 def supports(plate: PlateModel) -> bool:
     """Whether the kernels have the membrane of a plate: of 9-node elements with 3 x 3 points."""
     rules = plate.rules
-    nine = all(family.shape.nodes == 9 == family.nodes.shape[1] for family in plate.families)
-    return nine and rules.assumes_shear and len(rules.bending.xi) == 9
+    return (
+        rules.assumes_shear
+        and len(rules.bending.xi) == 9
+        and all(map(membrane.supports, plate.families))
+    )
 
 
 def grid(family: ElementBlock) -> Indices:
@@ -51,10 +46,17 @@ def are_parallelograms(family: ElementBlock) -> Bools:
 def numbers(
     plate: PlateModel, family: ElementBlock, weights: Floats, *, parallelograms: bool
 ) -> Floats:
-    """Numbers of elements that represent `weights` of them, (ne, 16) or (ne, 101)."""
-    centre = _centre(family)
-    laminate = plate.laminate
-    to_global = _to_global(np.linalg.inv(centre))
+    """Numbers of elements, (ne, 16) for parallelograms and (ne, 56) for others.
+
+    All have halves of the base vectors x,xi and x,eta of the centre, (2, 2), and the upper halves
+    of A and -B for covariant strains, (6,) each.  For parallelograms the latter are multiplied by
+    the Jacobian determinant and by `weights`, the number of elements that each represents.  Others
+    have derivatives along half a base vector, per derivative in xi and in eta: along the first one
+    at the tying points of e_11, (6, 2), along the second one at those of e_22, (6, 2), and along
+    both at those of e_12, (4, 2, 2).
+    """
+    centre, laminate = _centre(family), plate.laminate
+    to_global = membrane.covariant_to_global(centre)
     stiffness = np.stack([laminate.A, -laminate.B])[:, None]
     covariant = to_global.swapaxes(1, 2) @ stiffness @ to_global  # (2, ne, 3, 3)
     if parallelograms:
@@ -83,17 +85,6 @@ def _centre(family: ElementBlock) -> Floats:
     """Base vectors x,xi and x,eta of the elements' centres, (ne, 2, 2)."""
     _, local = local_shape_functions(family, gauss(1))
     return jacobian(family, local)[:, 0]
-
-
-def _to_global(inverse: Floats) -> Floats:
-    """Strains xx, yy, xy per covariant e_11, e_22, e_12, (ne, 3, 3); dxi_a/dx_i in row i."""
-    (xi_x, eta_x), (xi_y, eta_y) = inverse.transpose(1, 2, 0)
-    rows = [
-        [xi_x**2, eta_x**2, xi_x * eta_x],
-        [xi_y**2, eta_y**2, xi_y * eta_y],
-        [2.0 * xi_x * xi_y, 2.0 * eta_x * eta_y, xi_x * eta_y + xi_y * eta_x],
-    ]
-    return np.array(rows).transpose(2, 0, 1)
 
 
 def _product(xi: tuple[float, ...], eta: tuple[float, ...]) -> Quadrature:

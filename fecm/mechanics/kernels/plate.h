@@ -9,6 +9,8 @@
  *   FACTORIZED     quadrature of 9-node elements, sums along xi and then along eta
  *   TABULATED      quadrature with tables of shape functions, for all other elements
  *
+ * Of a nonlinear plate K is that of w, theta_x and theta_y alone, and membrane.h adds the rest.
+ *
  * Where the eight places of a node follow one another, they are two loads of four; elsewhere they are
  * eight numbers of `lane`.  A lane without an element takes and gives at a spare place of the chunk.
  *
@@ -19,7 +21,7 @@
  *
  * Sums.  In matrix products a register sums over the columns in ascending order.  `update` sums each
  * energy in two registers of four lanes, even and odd fours of nodes, for all dofs; a chunk returns
- * them added, (4 energies, 4 lanes).  Every order is fixed by the layout alone.
+ * them added, (4 energies, 4 lanes).  The fifth sum is that of the blocks of a nonlinear plate.  Every order is fixed by the layout alone.
  *
  * Threads.  run_chunk writes the entries of its chunk, its `force`, its `sums` and the buffer of its
  * thread, and reads shared nodes, which only `finish` writes.
@@ -452,8 +454,7 @@ INLINE void NAME(update)(int nd, const Plate *p, const Chunk *c, double *force, 
     sums[2] = strain[0] + strain[1], sums[3] = internal[0] + internal[1];
 }
 
-/* Forces of a chunk, and the update of the nodes that are its own.  Of a nonlinear plate the matrices
- * have the last three dofs. */
+/* Forces of a chunk, and the update of the nodes that are its own. */
 INLINE void NAME(chunk)(int nd, int nonlinear, const Plate *p, const Chunk *c, int next, double *force, half *sums) {
     const Chunk *common = p->chunk + p->chunks;
     const int last = nonlinear ? 3 : nd;

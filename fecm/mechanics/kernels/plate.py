@@ -13,12 +13,14 @@ A vector has a part for each chunk, and a last one for the nodes that chunks sha
     a part:  u_0 u_1 u_2 ... u_(nodes - 1) | v_0 v_1 ...     | w_0 ...       | theta_x, theta_y
              one dof of all nodes            the next dof
 
-nd is 3 where u and v are at rest.  Of a nonlinear plate it is 5, and the groups of elements have
-matrices or tables of the last three dofs; the rest is done by the membrane.  A chunk has places for all nodes of its elements: nodes of its
-own, which it moves; copies of shared nodes, which it fills from the last part before its blocks are
-computed, and whose forces it hands over afterwards; a spare place; and unused ones up to a multiple
-of eight.  Shared are nodes of several chunks, nodes that others follow by symmetry, and those that
-follow.  Entries that the chunk doesn't move have a mass of 0.
+nd is 3 where u and v are at rest.  Of a nonlinear plate it is 5: the groups of elements have
+matrices or tables of the last three dofs, and the membrane adds the rest.
+
+A chunk has places for all nodes of its elements: nodes of its own, which it moves; copies of shared
+nodes, which it fills from the last part before its blocks are computed, and whose forces it hands
+over afterwards; a spare place; and unused ones up to a multiple of eight.  Shared are nodes of
+several chunks, nodes that others follow by symmetry, and those that follow.  Entries that the chunk
+doesn't move have a mass of 0.
 
 Blocks and lanes.  A block is eight elements of one group in one chunk, one in each lane.  Elements
 of a strip share sides, and places are numbered along strips, so that the first nodes of eight

@@ -41,7 +41,7 @@ typedef struct {
     /* TABULATED: inverse Jacobian with its determinant times the weight, (points, 5, 8), and slopes of the
      * mapping (2 tying, 2, 8).  FACTORIZED: a factor, and coefficients of x and y, (1 + 8 + 8, 8). */
     const double *data;
-    const double *membrane; /* of a nonlinear plate: (16, 8) for parallelograms, otherwise (101, 8) */
+    const double *membrane; /* of a nonlinear plate: (16, 8) for parallelograms, (56, 8) for others */
 } Block;
 
 /* Blocks of near elements; the last chunk has no blocks, and the nodes that others share. */
