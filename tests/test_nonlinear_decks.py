@@ -61,7 +61,7 @@ def text(program: str, *, held: str = "both", data: str = "", words: str = "NONL
 
 def result(*args: str, **kwargs: str) -> fecm.Result:
     """Result of the deck."""
-    return fecm.run_one(deck_of(text(*args, **kwargs)), solver="numpy")
+    return fecm.run_one(deck_of(text(*args, **kwargs)))
 
 
 def test_newtons_method_ends_in_equilibrium_with_the_supports() -> None:
