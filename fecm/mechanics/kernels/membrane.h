@@ -388,7 +388,7 @@ INLINE void NAME(stretch)(int coupled, int modes, const Plate *p, const Chunk *c
     lanes x[5][9] ALIGNED;
     for (int i = 0; i < 9; i++) NAME(take)(nd, p, chunk, b->place[grid[i]], u, x[0] + i, 9);
     for (int side = 0; side < 2; side++) {
-        const double *data = b->membrane + 4 * side, *points = b->data + 4 * side;
+        const double *data = b->membrane + 4 * side;
         half c[5][9] ALIGNED, force[5][9] ALIGNED;
         for (int dof = 0; dof < nd; dof++)
             for (int i = 0; i < 9; i++) c[dof][i] = HALF(x[dof][i]);
@@ -398,7 +398,7 @@ INLINE void NAME(stretch)(int coupled, int modes, const Plate *p, const Chunk *c
         if (modes)
             NAME(of_modes)(coupled, data, c, force);
         else
-            NAME(of_points)(coupled, data, points, c, force);
+            NAME(of_points)(coupled, data, b->data + 4 * side, c, force);
         /* w f_w is twice that work, as eps_q is of the second order. */
         half sum = 0.5 * c[2][1] * force[2][1];
         for (int i = 2; i < 9; i++) sum += 0.5 * c[2][i] * force[2][i];

@@ -157,7 +157,7 @@ class CompiledPlate:
 
     Vectors have a part (nd, nodes) for each chunk, and a last one for the nodes that chunks share;
     `position` (count,) are the places of the independent dofs in them.  With `nonlinear` the
-    internal force is that of a plate that stretches as it bends, see membrane.py.
+    internal force is that of a plate that stretches as it bends, :mod:`~fecm.mechanics.membrane`.
     """
 
     def __init__(
