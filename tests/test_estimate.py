@@ -82,8 +82,12 @@ def test_models_reach_the_threshold_at_their_velocity() -> None:
         assert same.impact.peak == pytest.approx(model.threshold, rel=1e-6)
 
 
-def test_a_deck_without_impact_is_refused(tmp_path: Path) -> None:
+def test_a_deck_without_impact_or_velocity_is_refused(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(small("LMAS\nEIGE,2\n"))
     done = call("estimate", "d.inp", cwd=tmp_path)
     assert done.exit_code == 2
     assert "the deck has no impact" in done.stderr
+    (tmp_path / "d.inp").write_text(deck().replace("     115.0", "       0.0"))
+    done = call("estimate", "d.inp", cwd=tmp_path)
+    assert done.exit_code == 2
+    assert "the velocity of ROD is 0: the projectile does not approach" in done.stderr

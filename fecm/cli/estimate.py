@@ -56,12 +56,12 @@ COLUMNS = {
 @click.argument("deck", type=DECK_PATH)
 @FORMAT_OPTION
 def estimate(deck: Path, form: Format) -> None:
-    """Estimate the impact of DECK by two quick models, and compare them with the run.
+    """Estimate the impact of DECK by quick models, and compare them with the run.
 
-    The infinite plate is for small masses, the static plate for large ones; a model out of its
-    range is marked.  With a DELA segment, velocity and energy are those at which the peak force
-    reaches the delamination threshold.  The models without a mesh neglect DAMP, and
-    the infinite plate neglects PREL.
+    The infinite plate is for small masses, the static plate for large ones, that of a deck with
+    NONL linear and nonlinear; a model out of its range is marked.  With a DELA segment, velocity
+    and energy are those at which the peak force reaches the delamination threshold.  The models
+    without a mesh neglect DAMP, and the infinite plate neglects PREL.
     """
     problem = load_single(deck, "estimate")
     found = estimate_problem(problem)
@@ -79,12 +79,14 @@ def estimate(deck: Path, form: Format) -> None:
     ]
     own, bent, doubts = _run_itself(problem, found.mass)
     rows.append(own)
-    static, judge = found.models[-1], problem.judge
-    bent = [
-        *_bent("the static plate", static.impact.peak / found.stiffness, judge),
-        *_bent("the static plate at the threshold", static.threshold / found.stiffness, judge),
-        *bent,
-    ]
+    judge = problem.judge
+    if not problem.plate.nonlinear:
+        static = found.models[-1]
+        bent = [
+            *_bent("the static plate", static.impact.peak / found.stiffness, judge),
+            *_bent("the static plate at the threshold", static.threshold / found.stiffness, judge),
+            *bent,
+        ]
     if bent:
         note(f"beyond {judge.limit} h {TOO_SOFT}; {UNSAFE}", *bent)
     note(*doubts)
@@ -100,11 +102,13 @@ def _document(found: Estimate, rows: Sequence[Row]) -> dict[str, object]:
     for row in rows:
         values = dict(zip(COLUMNS, row[1:-1], strict=True))
         models.append({"model": row.name, **values, "applies": row.applies})
+    about = {"nonlinear": found.remark} if found.remark else {}
     return {
         "class": found.response,
         "mass_ratio": found.mass_ratio,
         "lambda": found.parameter,
         "stiffness": found.stiffness,
+        **about,
         "models": models,
     }
 
@@ -128,6 +132,8 @@ def _page(problem: Problem, found: Estimate, rows: Sequence[Row]) -> list[str]:
         lines.append(
             "preload     in the static plate and the run: the infinite plate neglects PREL"
         )
+    if found.remark:
+        lines.append(f"stretching  {found.remark}")
     table = [["model", *(name.replace("_", " ") for name in COLUMNS)]]
     for row in rows:
         marked = row.name if row.applies else f"{row.name} (out of range)"
