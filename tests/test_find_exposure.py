@@ -10,7 +10,7 @@ import pytest
 import fecm
 from fecm.results.metrics import EXPOSURES
 from fecm.sweeps.case import CasesError
-from fecm.sweeps.find_exposure import ERROR, search
+from fecm.sweeps.find_in_full import ERROR, search
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, small
 from tests.test_first_failure import failing, run

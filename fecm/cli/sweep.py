@@ -28,6 +28,7 @@ from fecm.sweeps.case import Case, CasesError, Value
 from fecm.sweeps.cases import read_cases
 from fecm.sweeps.convergence import table as table_of
 from fecm.sweeps.doubts import doubtful_values, freed
+from fecm.sweeps.expected import expected
 from fecm.sweeps.find import Until, parse_until
 from fecm.sweeps.grid import grid, parse_vary
 from fecm.sweeps.limits import Limit, parse_exceed
@@ -250,9 +251,10 @@ def sweep(options: Options) -> None:
     """Run DECK many times with varied parameters.
 
     Cases that differ only in the projectile, its velocity or the indentation law share one run of
-    the plate.  The same command resumes an interrupted sweep.  The last line counts the cases that
-    failed, those that ended in contact, and those that are beyond the range of the model.  The exit
-    status is 1 if a case failed, or ended before a quantity of --exceed was known.
+    the plate; with NONL each takes a full run.  The same command resumes an interrupted sweep.  The
+    last line counts the cases that failed, those that ended in contact, and those that are beyond
+    the range of the model.  The exit status is 1 if a case failed, or ended before a quantity of
+    --exceed was known.
     """
     options.check()
     path = options.path
@@ -285,6 +287,8 @@ def sweep(options: Options) -> None:
             f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the deck "
             "restrains at every node, are free there except where w is held"
         )
+    if problem.plate.nonlinear:
+        note(expected(problem, planned, here))
 
     click.get_current_context().with_resource(alone(path))
     parts = PartialResults(path, planned.fingerprint(), restart=options.overwrite)

@@ -173,6 +173,9 @@ def sweep(
 ) -> SweepResult:
     """Run a deck many times with varied values.
 
+    Cases that differ only in the projectile, its velocity or the contact law share one run of the
+    plate; of a nonlinear plate (NONL) each case is one full run, and each search about five.
+
     The warnings about the deck and the numbers of failed and doubtful cases
     (:attr:`SweepResult.notes`) are :class:`FecmWarning`.
 

@@ -6,7 +6,7 @@ then stepped once under a unit force; every case follows by convolution with its
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache, partial
 from itertools import compress
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from fecm._memory import require
 from fecm._typing import Floats
 from fecm.deck.macros import flat
-from fecm.deck.model import Deck
+from fecm.deck.model import Deck, Nonlinear
 from fecm.mechanics.contact_law import HystereticLaw, stacked
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.time_step import taken_time_step
@@ -26,8 +26,9 @@ from fecm.problem.build import build_model
 from fecm.problem.problem import Problem
 from fecm.results.metrics import GAGE, Projectiles, summarise
 from fecm.simulation.judge import ENERGY_WARNING
+from fecm.sweeps import find_in_full
 from fecm.sweeps.case import Case, CasesError, Value
-from fecm.sweeps.find import Runs, Strikes, found
+from fecm.sweeps.find import Runs, Sought, Strikes, found
 from fecm.sweeps.in_full import alone, problem_of_case, run_in_full, with_hit
 from fecm.sweeps.judge import Peak, judge, threshold_of
 from fecm.sweeps.limits import THRESHOLD
@@ -95,7 +96,26 @@ def _outcome(settings: Settings, checked: Problem, runs: Runs, strikes: Strikes)
             return runs
         return runs_of(lengthened(checked, factor), settings.measures, history=settings.history)
 
+    if checked.deck.has(Nonlinear):
+        return merge([_found_in_full(checked, n, one, force, longer) for n, one in strikes.items()])
     return found(strikes, force, longer)
+
+
+def _found_in_full(
+    checked: Problem, number: int, strike: Strike, force: float, longer: Callable[[int], Runs]
+) -> Outcome:
+    """Search the velocity of a strike of a nonlinear plate, from that of the quick models on."""
+    from fecm.studies.estimate import velocity_at  # 0.1 s, which most sweeps don't need
+
+    def run(trial: Strike, factor: int) -> Outcome:
+        return longer(factor)({number: trial}, True)
+
+    start = velocity_at(replace(checked, deck=strike.deck()), force)
+    first = strike.with_velocity(start)
+    try:
+        return find_in_full.found(number, first, Sought.PEAK_FORCE, force, run)
+    except CasesError as error:
+        return Outcome.failed({number: str(error)})
 
 
 @lru_cache(maxsize=1)

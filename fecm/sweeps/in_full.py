@@ -19,7 +19,7 @@ from fecm.results.metrics import EVALUATIONS, HIT, Indentation, Projectiles, sum
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
 from fecm.simulation.run import simulate
-from fecm.sweeps import find_exposure
+from fecm.sweeps import find_in_full
 from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.find import Sought
 from fecm.sweeps.judge import judge, peaks_of, threshold_of
@@ -46,7 +46,7 @@ def run_in_full(settings: Settings, number: int, case: Case) -> Outcome:
                 return alone(number, replace(longer, deck=strike.deck()), settings.measures)
 
             level, start = float(search.level), strike_of(checked.deck)
-            outcome = find_exposure.found(number, start, level, run)
+            outcome = find_in_full.found(number, start, search.quantity, level, run)
         else:
             outcome = alone(number, checked, settings.measures, measure, case)
     except CasesError as error:

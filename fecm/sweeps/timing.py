@@ -61,11 +61,16 @@ def stable_time_step(deck: Deck) -> float:
     return taken_time_step(check_deck(with_time_step(deck, 0.0)).critical_time_step)
 
 
+def duration_of(checked: Problem) -> float:
+    """Simulated time of a problem."""
+    taken = taken_time_step(checked.critical_time_step)
+    return _length(checked.deck.macros, taken).duration
+
+
 def lengthened(checked: Problem, factor: float) -> Problem:
     """Return a problem that runs `factor` times as long, with the same time step."""
     deck, taken = checked.deck, taken_time_step(checked.critical_time_step)
-    duration = _length(deck.macros, taken).duration
-    macros = with_time_step(deck, None, taken, factor * duration).macros
+    macros = with_time_step(deck, None, taken, factor * duration_of(checked)).macros
     return replace(checked, program=compile_program(macros, Findings()))
 
 

@@ -1,0 +1,70 @@
+"""Expected time of a sweep whose cases are run in full, from a few steps of one run."""
+
+from __future__ import annotations
+
+import time
+
+from fecm.problem.problem import Problem
+from fecm.sweeps.case import Case, CasesError
+from fecm.sweeps.find_in_full import USUAL
+from fecm.sweeps.in_full import alone
+from fecm.sweeps.plan import Plan
+from fecm.sweeps.timing import duration_of, lengthened
+from fecm.sweeps.values import REFINE
+
+# Steps of two short runs: the first shows what a run costs before its steps.
+FEW = 10
+MORE = 110
+UNITS = ((3600.0, "h"), (60.0, "min"), (1.0, "s"))
+
+
+def expected(problem: Problem, made: Plan, workers: int) -> str:
+    """Say how many full runs the cases of a plan take, and about how long.
+
+    The time is that of `workers` on this machine; 0 if a cluster runs the cases.
+    """
+    count = len(made.cases)
+    cases = f"{count} case{'' if count == 1 else 's'}"
+    runs = "one full run each"
+    each = 1
+    if made.settings.search is not None:
+        each, runs = USUAL, f"about {USUAL} full runs each"
+    text = f"a nonlinear plate has no impulse response: {cases}, {runs}"
+    try:
+        begin, step = _costs(problem, made)
+    except CasesError:  # no run of a few steps
+        return text
+    duration = duration_of(problem)
+    steps = sum(_full_steps(case, duration, problem.work.steps) for case in made.cases)
+    seconds = each * (begin * count + step * steps)
+    where = f" by {workers} workers" if workers > 1 else ""
+    if not workers:
+        where = " of computation"
+    return f"{text}: about {_rounded(seconds / max(1, min(workers, count)))}{where}"
+
+
+def _costs(problem: Problem, made: Plan) -> tuple[float, float]:
+    """Seconds of a run before its steps, and of a step."""
+    times = []
+    for steps in (FEW, MORE):
+        short = lengthened(problem, min(1.0, steps / problem.work.steps))
+        begin = time.perf_counter()
+        alone(0, short, made.settings.measures)
+        times.append((time.perf_counter() - begin, short.work.steps))
+    (first, few), (second, more) = times
+    if more == few:
+        return 0.0, second / more
+    step = max(0.0, second - first) / (more - few)
+    return max(0.0, first - step * few), step
+
+
+def _full_steps(case: Case, duration: float, steps: int) -> float:
+    """Steps of a case, counted by the elements of the deck, whose duration and steps are given."""
+    dt = float(case.get("dt", 0.0)) or duration / steps
+    return float(case.get(REFINE, 1)) ** 2 * float(case.get("duration", duration)) / dt
+
+
+def _rounded(seconds: float) -> str:
+    """A duration with two digits."""
+    size, unit = next(((s, u) for s, u in UNITS if seconds >= 2.0 * s), UNITS[-1])
+    return f"{float(f'{seconds / size:.2g}'):g} {unit}"

@@ -1,0 +1,220 @@
+"""Sweeps, searches and estimates of decks with NONL, whose cases are run in full."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.api import load_deck
+from fecm.deck.model import Impact
+from fecm.problem.problem import Problem
+from fecm.results.metrics import RATIO
+from fecm.studies import StudyError
+from fecm.studies.estimate import estimate, nonlinear_curve, velocity_at
+from fecm.sweeps import batch, expected, in_full
+from fecm.sweeps.case import Case
+from fecm.sweeps.outcome import Outcome
+from fecm.sweeps.plan import plan, tasks
+from tests.calls import call
+from tests.test_nonlinear_decks import STRUCK, forces, text
+
+PROGRAM = "LMAS\nDT        4.E-7\nLOOP        600\nTIME\nRODP         50\nNEXT\n"
+# A soft contact, so that the plate is bent to 0.7 of its thickness.
+BLOW = STRUCK.replace("300.0", "600.0").replace("1912000.", "  50000.")
+BLOW += "PATC\nHERT,.2\nPROJ\n0, 0, 2e-5\n\nDELA\n.5\n"
+DECK = text(PROGRAM, data=BLOW)
+LINEAR = text(PROGRAM, data=BLOW, words="")
+THRESHOLD = 77.623436
+
+
+def problem_of(deck: str) -> Problem:
+    (problem,) = load_deck(deck).problems
+    return problem
+
+
+@pytest.fixture
+def runs(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Peak forces of the full runs that are taken."""
+    taken: list[float] = []
+    own = in_full.alone
+
+    def counted(*given: Any, **more: Any) -> Outcome:
+        outcome = own(*given, **more)
+        taken.append(float(outcome.columns["peak_force"][0]))
+        return outcome
+
+    monkeypatch.setattr(batch, "alone", counted)
+    return taken
+
+
+def test_every_case_is_a_full_run_of_the_stretched_plate(runs: list[float]) -> None:
+    velocities = [300.0, 600.0]
+    swept = fecm.sweep(DECK, {"velocity": velocities}, history=True, measure="max_deflection")
+    assert len(runs) == 2
+    assert swept.force is not None
+    for row, velocity in enumerate(velocities):
+        full = fecm.run_one(DECK.replace("600.0", f"{velocity}"))
+        np.testing.assert_array_equal(swept.force[row], full.force)
+        assert swept["max_deflection"][row] == full.plate_w.max()
+    linear = fecm.sweep(LINEAR, {"velocity": velocities}, measure="max_deflection")
+    assert set(linear.summary) == set(swept.summary)
+    # The linear plate deflects by 1.1 times as much.
+    assert linear["max_deflection"][1] > 1.09 * swept["max_deflection"][1]
+
+
+def test_the_limit_of_the_linear_plate_is_none_of_a_nonlinear_one() -> None:
+    linear, nonlinear = (fecm.sweep(deck, {"k": [5e4]}) for deck in (LINEAR, DECK))
+    assert min(linear[RATIO][0], nonlinear[RATIO][0]) > 0.6
+    assert "w > 0.3 h" in linear["validity"][0]
+    assert "w > " not in nonlinear["validity"][0]
+    assert "indentation > h/4" in nonlinear["validity"][0]
+
+
+def test_cases_are_tasks_of_their_own_and_resume() -> None:
+    problem = problem_of(DECK)
+    cases: list[Case] = [{"velocity": float(v)} for v in range(1, 6)]
+    assert [task.numbers for task in tasks(problem, plan(problem, cases))] == [
+        (0,), (1,), (2,), (3,), (4,)
+    ]  # fmt: skip
+    searches = plan(problem, [{"k": 5e4}, {"k": 6e4}], until=50.0)
+    assert [task.numbers for task in tasks(problem, searches)] == [(0,), (1,)]
+    assert len(tasks(problem_of(LINEAR), plan(problem_of(LINEAR), cases))) == 1
+
+
+def test_a_search_takes_few_runs_and_its_velocity_gives_the_same_run_again(
+    runs: list[float],
+) -> None:
+    found = fecm.sweep(DECK, {"k": [6e4]}, until="threshold")
+    assert 3 <= len(runs) <= 6
+    assert THRESHOLD <= found["peak_force"][0] <= THRESHOLD * (1.0 + 2e-5)
+    velocity = float(found["found_velocity"][0])
+    assert found["found_energy"][0] == pytest.approx(0.5 * 2e-5 * velocity**2, rel=1e-12)
+    again = fecm.sweep(DECK, {"k": [6e4], "velocity": [velocity]})
+    for name in again.summary:
+        if again[name].dtype.kind == "f":
+            np.testing.assert_allclose(again[name][0], found[name][0], rtol=1e-9)
+
+
+def test_a_search_starts_at_the_quick_models_and_lengthens_runs_that_end_too_early(
+    runs: list[float],
+) -> None:
+    found = fecm.sweep(DECK.replace("LOOP        600", "LOOP        120"), until=20.0)
+    assert np.isnan(runs[0])
+    assert found.steps[0] in (240, 480)
+    assert found["peak_force"][0] == pytest.approx(20.0, rel=2e-5)
+    starts = [velocity_at(problem_of(DECK.replace("600.0", v)), 20.0) for v in ("600.0", "  6.0")]
+    assert starts[0] == pytest.approx(starts[1], rel=1e-8)
+    # Both models are too soft.
+    assert 1.0 < starts[0] / found["found_velocity"][0] < 1.3
+
+
+def test_the_number_of_runs_and_their_time_are_told_first(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(DECK)
+    done = call("sweep", "d.inp", "--vary", "velocity=300,400,500", cwd=tmp_path)
+    assert done.exit_code == 0, done.stderr
+    assert re.search(r"response: 3 cases, one full run each: about [\d.]+ s", done.stderr)
+    assert "3 cases: 3 beyond the contact law" in done.stdout
+    problem = problem_of(DECK)
+    searched = expected.expected(problem, plan(problem, [{}], until=50.0), 0)
+    assert "1 case, about 5 full runs each: about " in searched
+    assert searched.endswith(" s of computation")
+
+
+def test_the_expected_time_grows_with_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(expected, "_costs", lambda *_: (1.0, 0.01))  # seconds of a run, of a step
+    problem = problem_of(DECK)
+
+    def told(cases: list[dict[str, Any]], workers: int = 1, **more: Any) -> str:
+        return expected.expected(problem, plan(problem, cases, **more), workers).split("about ")[-1]
+
+    assert told([{"k": 5e4}]) == "7 s"
+    assert told([{"k": 5e4}] * 6, 2) == "21 s by 2 workers"
+    assert told([{}], until=50.0) == "35 s"
+    assert told([{"duration": 2.4e-4}, {"duration": 4.8e-4}]) == "20 s"
+    assert told([{"k": 5e4}] * 900) == "100 min"
+    assert told([{"dt": 4e-7}, {"dt": 2e-7}]) == "20 s"
+    cases = [{"refine": 1, "elements": 4, "dt": 4e-7}, {"refine": 2, "elements": 16, "dt": 2e-7}]
+    assert told(cases) == "56 s"
+
+
+def test_refined_and_random_cases_are_full_runs_too(runs: list[float]) -> None:
+    short = DECK.replace("LOOP        600", "LOOP         60")
+    refined = fecm.sweep(short, refine=[1, 2])
+    assert len(runs) == 2
+    assert refined.fine.all()
+    drawn = fecm.sweep(short, random={"velocity": "uniform:300,600"}, samples=16)
+    assert len(runs) == 18
+    assert drawn.random is not None
+    assert drawn.fine.all()
+
+
+# Estimates ----------------------------------------------------------------------------------------
+
+HEAVY = DECK.replace("2e-5", "2e-2").replace("600.0", " 20.0")  # M/M_plate = 100
+
+
+def test_the_estimate_of_a_nonlinear_plate_has_a_static_row_from_its_curve(tmp_path: Path) -> None:
+    program = PROGRAM.replace("        600", "         20")
+    (tmp_path / "d.inp").write_text(HEAVY.replace(PROGRAM, program))
+    done = call("estimate", "d.inp", "--format", "json", cwd=tmp_path)
+    assert done.exit_code == 0, done.stderr
+    found = json.loads(done.stdout)
+    assert "9 to 26 % low in force at M/M_plate = 24" in found["nonlinear"]
+    rows = {row["model"]: row for row in found["models"]}
+    assert [*rows] == ["infinite plate", "static plate", "nonlinear static plate", "run"]
+    assert [row["applies"] for row in rows.values()] == [False, False, True, True]
+    static = rows["nonlinear static plate"]
+    # The energy is that in plate and contact at the peak.
+    problem = problem_of(HEAVY)
+    energy = 0.5 * 2e-2 * 20.0**2
+    curve = nonlinear_curve(problem, energy, np.nan)
+    w = np.linspace(0.0, curve.deflection[-1], 20001)
+    force, work = curve.at(w)
+    stored = work + 0.4 * np.cbrt(force**5 / 5e4**2)
+    assert static["peak_force"] == pytest.approx(np.interp(energy, stored, force), rel=1e-6)
+    assert static["energy"] == pytest.approx(np.interp(THRESHOLD, force, stored), rel=1e-5)
+    # A search for the force would start there.
+    assert velocity_at(problem, THRESHOLD) == pytest.approx(static["velocity"], rel=1e-3)
+    assert static["peak_force"] > 1.2 * rows["static plate"]["peak_force"]
+    assert "too soft" not in done.stderr
+    page = call("estimate", "d.inp", cwd=tmp_path).stdout
+    assert "  stretching  the nonlinear static plate is 9 to 26 % low" in page
+
+
+def test_the_row_of_a_linear_deck_stays_alone() -> None:
+    found = estimate(problem_of(LINEAR))
+    assert [model.name for model in found.models] == ["infinite plate", "static plate"]
+    assert found.remark == ""
+
+
+def test_both_static_rows_of_a_small_deflection_agree_and_apply() -> None:
+    problem = problem_of(HEAVY)
+    slow = tuple(
+        replace(segment, velocity=0.02) if isinstance(segment, Impact) else segment
+        for segment in problem.deck.segments
+    )
+    found = estimate(replace(problem, deck=replace(problem.deck, segments=slow)))
+    _, static, nonlinear = found.models
+    assert static.applies
+    assert nonlinear.applies
+    assert nonlinear.impact.peak == pytest.approx(static.impact.peak, rel=1e-6)
+    assert nonlinear.impact.duration == pytest.approx(static.impact.duration, rel=1e-6)
+
+
+def test_a_loaded_plate_has_no_static_curve() -> None:
+    loaded = problem_of(text(PROGRAM, data=BLOW + forces(1.0)))
+    with pytest.raises(StudyError, match="no nonlinear static plate: the deck has FORC"):
+        nonlinear_curve(loaded, 1.0, np.nan)
+    found = estimate(loaded)
+    assert "FORC" in found.remark
+    assert [model.name for model in found.models] == ["infinite plate", "static plate"]
+    heavy = problem_of(text(PROGRAM, data=BLOW.replace("2e-5", "2e-2") + forces(1.0)))
+    static = estimate(heavy).models[1]
+    assert velocity_at(heavy, static.threshold) == pytest.approx(static.velocity, rel=1e-8)
