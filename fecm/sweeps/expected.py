@@ -12,9 +12,11 @@ from fecm.sweeps.plan import Plan
 from fecm.sweeps.timing import duration_of, lengthened
 from fecm.sweeps.values import REFINE
 
-# Steps of two short runs: the first shows what a run costs before its steps.
+# Steps of a short run, which shows what a run costs before its steps; then runs of so many times
+# more steps follow, until one takes enough seconds longer.
 FEW = 10
-MORE = 110
+MORE = 8
+ENOUGH = 0.1
 UNITS = ((3600.0, "h"), (60.0, "min"), (1.0, "s"))
 
 
@@ -45,17 +47,25 @@ def expected(problem: Problem, made: Plan, workers: int) -> str:
 
 def _costs(problem: Problem, made: Plan) -> tuple[float, float]:
     """Seconds of a run before its steps, and of a step."""
-    times = []
-    for steps in (FEW, MORE):
-        short = lengthened(problem, min(1.0, steps / problem.work.steps))
-        begin = time.perf_counter()
-        alone(0, short, made.settings.measures)
-        times.append((time.perf_counter() - begin, short.work.steps))
-    (first, few), (second, more) = times
+    first, few = _seconds(problem, made, FEW)
+    second, more = first, few
+    wanted = FEW
+    # Other work of the machine changes short times.
+    while second - first < ENOUGH and wanted < problem.work.steps:
+        wanted *= MORE
+        second, more = _seconds(problem, made, wanted)
     if more == few:
         return 0.0, second / more
     step = max(0.0, second - first) / (more - few)
     return max(0.0, first - step * few), step
+
+
+def _seconds(problem: Problem, made: Plan, steps: int) -> tuple[float, int]:
+    """Seconds of a run of about so many steps, and their number."""
+    short = lengthened(problem, min(1.0, steps / problem.work.steps))
+    begin = time.perf_counter()
+    alone(0, short, made.settings.measures)
+    return time.perf_counter() - begin, short.work.steps
 
 
 def _full_steps(case: Case, duration: float, steps: int) -> float:
