@@ -30,12 +30,13 @@ ROD
 EXPE
   1912000. 0.0006564     0.094       2.0
 """
+SUPPORTS = {"both": (1, 1), "free": (0, 0)}  # codes of u and v on the edges
 EDGE = (1, 2, 3, 4, 5, 6, 10, 11, 15, 16, 20, 21, 22, 23, 24, 25)
 
 
 def mesh(*, held: str) -> str:
     """The small plate of 2 x 2, whose edges do not deflect and hold u and v or not."""
-    u, v = {"both": (1, 1), "free": (0, 0)}[held]
+    u, v = SUPPORTS[held]
     cards = [f"{node:5d}    0{u:5d}{v:5d}    1    0    0" for node in EDGE]
     return MESH.split("BOUN")[0] + "BOUN\n" + "\n".join(cards) + "\n\n"
 
@@ -78,13 +79,21 @@ def test_newtons_method_ends_in_equilibrium_with_the_supports() -> None:
 
 
 def test_a_plate_that_is_free_in_its_plane_needs_no_supports_there() -> None:
-    free, held = (
-        result(NEWTON + "DISP\n", held=name, data=forces(2000.0)).tape3 for name in ("free", "both")
-    )
+    found = {name: result(NEWTON + "DISP\n", held=name, data=forces(2000.0)) for name in SUPPORTS}
+    free, held = found["free"].tape3, found["both"].tape3
     assert free.w[0, 12] > 1.2 * held.w[0, 12]
     u = free.displacement[0, :, 0].reshape(5, 5)
     np.testing.assert_allclose(u[2, 0] - u[2, 4], 2.0 * (u[2, 0] - u[2, 2]), rtol=1e-6)
     assert u[2, 0] > u[2, 4]
+
+
+@pytest.mark.parametrize("held", SUPPORTS)
+def test_pinned_rigid_motion_is_noted(held: str, tmp_path: Path) -> None:
+    deck = tmp_path / "plate.inp"
+    deck.write_text(text(NEWTON + "DISP\n", held=held, data=forces(2000.0)))
+    done = call("run", str(deck), "-o", str(tmp_path / "plate.h5"))
+    assert done.exit_code == 0
+    assert ("TANG pins the rigid motion" in done.stderr) == (held == "free")
 
 
 def test_loops_that_end_without_equilibrium_are_an_error_that_names_the_load(

@@ -110,9 +110,10 @@ class Tangent:
         from scipy.sparse import diags_array  # 0.2 s, which most runs don't need
 
         self._stiffness = held = tangent_stiffness(plate, field)
-        if pins := in_plane_pins(plate):
+        self.pins = in_plane_pins(plate)  # equations, from 0, that hold the plate in its plane
+        if self.pins:
             springs = np.zeros(plate.neq)
-            springs[pins] = held.diagonal()[pins]
+            springs[self.pins] = held.diagonal()[self.pins]
             held = held + diags_array(springs, format="csr")
         self._factors = factorised(held)
 

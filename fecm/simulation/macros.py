@@ -135,10 +135,18 @@ def central_difference(run: Simulation) -> None:
     run.observe()
 
 
+PINNED = (
+    "the supports leave the plate free in its plane: TANG pins the rigid motion, which changes no "
+    "strain"
+)
+
+
 def form_tangent(run: Simulation) -> None:
     """TANG: the stiffness, of a nonlinear plate about its present displacement."""
     if run.model.plate.nonlinear:
         run.linearise(run.displacement_field())
+        if run.tangent.pins and PINNED not in run.state.notes:
+            run.state.notes.append(PINNED)
     run.state.factorised = run.tangent is not None
 
 
