@@ -19,6 +19,7 @@ from fecm.deck.model import Ply
 from tests.closed_forms_plies import equilibrium_shear, exposures, interlaminar
 from tests.closed_forms_preload import preloaded
 from tests.closed_forms_statistics import ishigami, lognormal, wilson
+from tests.closed_forms_stretching import strips
 
 # Layers ------------------------------------------------------------------------------------------
 
@@ -415,6 +416,7 @@ EXPECTED: dict[str, Sequence[float | None]] = {
     "cross-ply-plate": two_layers(cross_ply(H)),
     "angle-ply-plate": two_layers(angle_ply(H)),
     "forced-plate": forced(600 * 1.08e-7),
+    "cylindrical-bending": (*strips(), 1.0),
     "dispersion": (None, None, math.sqrt(12.0 * 0.8e6 / 0.000148) / 0.106),
     "rod-pulse": (None, None, None, IMPULSE / (7.33e-4 * math.pi * 0.625**2 / 4.0), None),
     "rod-waves": (BAR_SPEED, 1000.0, math.pi * BAR_SPEED, math.pi * BAR_SPEED),

@@ -16,7 +16,7 @@ from fecm.mechanics import element_matrices
 from fecm.mechanics import laminate as laminates
 from fecm.mechanics.contact_law import LinearPermanent
 from fecm.problem.generate import generate
-from fecm.verification import CASES, carry_out, chosen
+from fecm.verification import CASES, carry_out, chosen, stretching
 from fecm.verification.case import HEAD, Case, Check, Label, Row, cells, page
 from fecm.verification.decks import report_impact
 from tests import closed_forms
@@ -153,7 +153,7 @@ def test_of_a_field_the_value_farthest_from_the_expected_one_counts() -> None:
 STATED = {
     "static-bending", "frequencies", "wave-fronts", "dispersion", "rod-pulse", "infinite-plate",
     "supported-plate", "patch-impact", "failure", "small-mass", "large-mass",
-    "contact-coefficient",
+    "contact-coefficient", "stretching-plate", "stretching-disc", "stretching-impact",
 }  # fmt: skip
 
 
@@ -412,6 +412,26 @@ def test_figures_of_damage_are_those_of_the_reference_files() -> None:
     for (case, quantity), (name, row, column) in figures.items():
         given = float(list(reference(name))[row][column])
         assert check_of(case, quantity).expected == pytest.approx(given, rel=1e-7)
+
+
+def test_figures_of_plates_that_stretch_are_those_of_the_reference_files() -> None:
+    (levy,) = [r for r in reference("nonlinear_levy.csv") if r["q_a4_over_E_h4"] == "134.9"]
+    assert check_of("stretching-plate", "w/h").expected == float(levy["this_w_over_h"])
+    discs = {
+        r["edge"]: float(r["load_value"])
+        for r in reference("nonlinear_circles.csv")
+        if (r["load"], r["w0_over_h"]) == ("uniform", "1")
+    }
+    assert stretching.PRESSURES == (discs["clamped_immovable"], discs["ss_movable"])
+    (impact,) = [
+        r
+        for r in reference("nonlinear_impacts.csv")
+        if (r["case"], r["target_w_over_h"]) == ("iso_clamped_immovable", "1.0")
+    ]
+    assert stretching.VELOCITY == float(impact["velocity_mm_per_s"])
+    for quantity, column in (("largest w", "W_max_mm"), ("largest force", "peak_N")):
+        given = float(impact[column])
+        assert check_of("stretching-impact", quantity).expected == pytest.approx(given, rel=1e-7)
 
 
 def test_figures_of_sensitivity_are_those_of_the_reference_file() -> None:

@@ -10,7 +10,15 @@ import pytest
 
 from fecm.verification import CASES, carry_out, chosen
 from fecm.verification.case import Label
-from tests.broken import elements, impacts, laminates, plies, studies, waves_and_rods
+from tests.broken import (
+    elements,
+    impacts,
+    laminates,
+    plies,
+    stretching,
+    studies,
+    waves_and_rods,
+)
 
 BREAKS = {
     **laminates.BREAKS,
@@ -18,12 +26,13 @@ BREAKS = {
     **waves_and_rods.BREAKS,
     **impacts.BREAKS,
     **plies.BREAKS,
+    **stretching.BREAKS,
     **studies.BREAKS,
 }
 
 
 # The program's own errors of a motion that cannot be.
-REFUSALS = ("DivergenceError", "PlyError", "StudyError")
+REFUSALS = ("ConvergenceError", "DivergenceError", "PlyError", "StudyError")
 ROWS = {
     (one.name, check.quantity)
     for one in CASES

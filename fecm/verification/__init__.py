@@ -14,6 +14,7 @@ from fecm.verification import (  # noqa: F401  (they fill CASE_OF)
     impacts,
     parts,
     plates,
+    stretching,
     studies,
 )
 from fecm.verification.case import CASE_OF, TABLES, Case, Row, carry_out

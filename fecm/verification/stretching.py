@@ -1,0 +1,130 @@
+"""Plates that stretch as they bend, under loads and an impact (mm, N, s)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.deck import model
+from fecm.deck.grid import Grid, graded, lines, uniform
+from fecm.deck.model import Deck, Impact, NodeValues, Patch, Ply, Projectile, Segment
+from fecm.mechanics.interpolation import interpolate
+from fecm.mechanics.time_step import critical_time_step, rounded_time_step
+from fecm.problem.generate import generate
+from fecm.problem.parts import build_plate
+from fecm.verification import decks
+from fecm.verification.case import Value, case
+
+NEWTON = decks.program("LOOP=30 TANG FORM SOLV CONV NEXT DISP")
+STRETCHES: tuple[Segment, ...] = (decks.MITC, model.Nonlinear())
+FACTOR = 5.0 / 6.0  # of the shear moduli
+THICKNESS = 2.0
+ALUMINIUM = decks.isotropic(70e3, 0.3, 2.7e-9, FACTOR)
+FIBRES = Ply(1.53e-9, 0.3, 141e3, 9700.0, 5500.0, 5500.0 * FACTOR, 3700.0 * FACTOR)
+ELEMENTS = 6  # of a side of a quarter
+# Codes of every node, and of the left, bottom, right and top edge of a quarter whose left and
+# bottom edges are lines of symmetry.
+QUARTER = "00000 10010 01001"
+CLAMPED = "11111 11111"
+RESTS = "00100 00100"
+PRESSURES = (0.1022849258, 0.02069852564)  # of a clamped disc, and of one that rests on its rim
+VELOCITY = 2271.56334  # of the mass
+
+
+def middle(made: Deck) -> float:
+    """Deflection of node 1."""
+    return float(decks.result_of(made).tape3.w[-1, 0])
+
+
+@case
+def _stretching_plate() -> Sequence[Value]:
+    """Levy's clamped plate, of side, thickness and modulus 1, 1/100 and 1."""
+    h = 0.01
+    plate = decks.material(decks.isotropic(1.0, 0.1**0.5, 1.0, FACTOR), [0.0], h)
+    codes = f"{QUARTER} {CLAMPED}"
+    made = decks.quarter_plate(ELEMENTS, plate, NEWTON, 134.9 * h**4, codes, STRETCHES)
+    return [middle(made) / h]
+
+
+def strip(end: str, pressure: float, others: Sequence[Segment] = STRETCHES) -> Deck:
+    """Half a strip of [0_4/90_4] in cylindrical bending, from its middle to an end with codes."""
+    half, width = 50.0, 10.0
+    grid = Grid(uniform(half, 8), uniform(width, 1))
+    loads = np.zeros((grid.up, grid.across, 5))
+    across, along = (decks.weights(lines(parts)) for parts in (grid.rows, grid.columns))
+    loads[..., 2] = pressure * np.outer(across, along)
+    loads[:, -1] = 0.0  # a value there would be a displacement
+    plate = decks.material(FIBRES, 4 * (0.0,) + 4 * (90.0,), 0.25)
+    held = decks.supports(grid, f"01001 11011 01001 {end} 01001")
+    return decks.deck(grid, (held, decks.forces(loads), plate, *others), NEWTON)
+
+
+@case
+def _cylindrical_bending() -> Sequence[Value]:
+    pinned, clamped, sliding = "11101", "11111", "01101"
+    strong = 0.1
+    bent, linear = strip(sliding, strong), strip(sliding, strong, [decks.MITC])
+    return [
+        middle(strip(pinned, 0.01)),
+        middle(strip(pinned, -0.01)),
+        middle(strip(clamped, 0.03)),
+        middle(bent) / middle(linear),
+    ]
+
+
+def disc(rim: str, pressure: float) -> Deck:
+    """A quarter of a circular plate under a pressure, its elements those of a square, mapped."""
+    radius = 100.0
+    grid = Grid(uniform(1.0, ELEMENTS), uniform(1.0, ELEMENTS))
+    x, y = (at.ravel() for at in np.meshgrid(lines(grid.columns), lines(grid.rows)))
+    places = radius * np.stack([x * np.sqrt(1.0 - y**2 / 2.0), y * np.sqrt(1.0 - x**2 / 2.0)], 1)
+    cards = (NodeValues(n, 0, tuple(place)) for n, place in enumerate(places.tolist(), start=1))
+    held = decks.supports(grid, f"{QUARTER} {rim}")
+    plate = decks.material(ALUMINIUM, [0.0], THICKNESS)
+    made = decks.deck(grid, (held, plate, *STRETCHES), NEWTON, model.Coordinates(tuple(cards)))
+    loads = pressure * areas(made)
+    loads[(x == 1.0) | (y == 1.0)] = 0.0  # a value there would be a displacement
+    field = np.zeros((grid.nodes, 5))
+    field[:, 2] = loads
+    return replace(made, segments=(*made.segments, decks.forces(field)))
+
+
+def areas(made: Deck) -> Floats:
+    """Integrals of the nodes' shape functions, (numnp,)."""
+    plate = build_plate(made, generate(made))
+    found = np.zeros(len(plate.mesh.coordinates))
+    for family in plate.families:
+        at = interpolate(family, plate.rules.bending)
+        np.add.at(found, family.nodes, at.jxw @ at.N)
+    return found
+
+
+@case
+def _stretching_disc() -> Sequence[Value]:
+    rims = zip((CLAMPED, RESTS), PRESSURES, strict=True)
+    return [middle(disc(rim, pressure)) / THICKNESS for rim, pressure in rims]
+
+
+@case
+def _stretching_impact() -> Sequence[Value]:
+    """A mass on the middle of a clamped square plate, until both peaks are over."""
+    side, end = 100.0, 1.7e-3
+    sections = graded(side, 8, side / 2.0, 2.0)
+    grid = Grid(sections, sections)
+    segments = (
+        decks.supports(grid, f"00000 {CLAMPED} {CLAMPED}"),
+        Projectile(0, 0, 1e-3),
+        Impact(grid.nearest(side / 2.0, side / 2.0)[0], 3, VELOCITY),
+        Patch("HERT", 8.0, side / 2.0, side / 2.0),
+        decks.elastic(1e5),
+        *STRETCHES,
+        decks.material(ALUMINIUM, [0.0], THICKNESS),
+    )
+    made = decks.deck(grid, segments, ())
+    dt = rounded_time_step(critical_time_step(build_plate(made, generate(made))))
+    found = decks.result_of(replace(made, macros=decks.impact_program(dt, round(end / dt))))
+    balance = np.abs(found.energy.balance_error).max() / found.energy.attributes["initial"]
+    return [found.plate_w.max(), found.force.max(), balance]
