@@ -13,15 +13,19 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.grid import Grid, boundary_cards, lines, uniform
-from fecm.deck.model import Deck, Impact, LoadTable, NodeValues, Patch, Ply, Projectile
+from fecm.deck.model import Deck, ElementNodes, Impact, LoadTable, NodeValues, Patch, Ply, Projectile
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
 from fecm.verification import decks
+from tests.builders import Floats, Ints
 
 ISOTROPIC = decks.isotropic(70e3, 0.3, 2.7e-9, 5.0 / 6.0)
 CROSS = Ply(1.53e-9, 0.3, 141e3, 9700.0, 5500.0, 5500.0 * 5.0 / 6.0, 3700.0 * 5.0 / 6.0)
 MASS = 1e-3  # 1 kg
+# Places of an element's nodes on the grid of its mid-sides, along a row and up.
+HALVES = ((0, 2, 2, 0, 1, 2, 1, 0, 1), (0, 0, 2, 2, 0, 1, 2, 1, 1))
+RIMS = {"clamped_immovable": (1, 1, 1, 1, 1), "ss_movable": (0, 0, 1, 0, 0)}
 # Codes of u, v, w, theta_x and theta_y: inside, and on the left, bottom, right and top edge.
 SUPPORTS = {
     "clamped_immovable": "00000 11111 11111 11111 11111",
@@ -101,23 +105,60 @@ def pulsed_square(n: int, pressure: float, end: float, duration: float = 20e-6) 
     return replace(made, macros=decks.program(program), tables=(table,))
 
 
-def struck_disc(edges: str, n: int, velocity: float, end: float) -> Deck:
-    """An impact in the middle of a disc, radius 50 and thickness 2: n x n elements, mapped."""
+def disc_mesh(radius: float, core: int, rings: int) -> tuple[Floats, Ints]:
+    """Mesh a disc about the origin with core^2 + 4 core rings curved 9-node elements.
+
+    A square with bulging sides is in the middle, four blocks are between it and the rim.
+    """
+    side = np.linspace(-1.0, 1.0, 2 * core + 1)
+
+    def bulging(s: Floats, t: Floats) -> Floats:
+        """Points of the square, on its side s = 1 as functions of t."""
+        by_t, by_s = 1.0 + 0.12 * (1.0 - t**2), 1.0 + 0.12 * (1.0 - s**2)
+        return 0.45 * np.stack([s * by_t, t * by_s], axis=-1)
+
+    # In a block the rows run along the side, counter-clockwise, the columns outwards.
+    outwards = np.linspace(0.0, 1.0, 2 * rings + 1)[:, None]
+    rim = np.stack([np.cos(np.pi / 4.0 * side), np.sin(np.pi / 4.0 * side)], axis=-1)
+    inner = bulging(np.ones_like(side), side)
+    block = (1.0 - outwards) * inner[:, None] + outwards * rim[:, None]
+    grids = [bulging(*np.meshgrid(side, side))]
+    for _ in range(4):
+        grids.append(block)
+        block = np.stack([-block[..., 1], block[..., 0]], axis=-1)
+    points = np.concatenate([grid.reshape(-1, 2) for grid in grids])
+    rounded = np.round(points, 9) + 0.0
+    _, first, numbers = np.unique(rounded, axis=0, return_index=True, return_inverse=True)
+    parts = np.split(numbers.ravel(), np.cumsum([grid[..., 0].size for grid in grids])[:-1])
+    elements = []
+    for grid, part in zip(grids, parts, strict=True):
+        of_grid = part.reshape(grid.shape[:2])
+        rows, columns = np.mgrid[0 : len(of_grid) - 1 : 2, 0 : of_grid.shape[1] - 1 : 2]
+        right, up = np.array(HALVES)
+        elements.append(of_grid[rows.ravel()[:, None] + up, columns.ravel()[:, None] + right])
+    return radius * points[first], np.concatenate(elements).astype(np.int32) + 1
+
+
+def struck_disc(edges: str, core: int, rings: int, velocity: float, end: float) -> Deck:
+    """An impact in the middle of a disc, radius 50 and thickness 2."""
     radius = 50.0
-    grid = Grid(uniform(2.0, n), uniform(2.0, n))
-    x, y = (at.ravel() - 1.0 for at in np.meshgrid(lines(grid.columns), lines(grid.rows)))
-    places = radius * np.stack([x * np.sqrt(1.0 - y**2 / 2.0), y * np.sqrt(1.0 - x**2 / 2.0)], 1)
-    cards = (NodeValues(i, 0, tuple(place)) for i, place in enumerate(places.tolist(), start=1))
-    rim = {"clamped_immovable": "11111", "ss_movable": "00100"}[edges]
+    places, elements = disc_mesh(radius, core, rings)
+    from_middle = np.hypot(*places.T)
+    codes = np.zeros((len(places), 5), dtype=int)
+    codes[np.isclose(from_middle, radius)] = RIMS[edges]
+    points = (NodeValues(n, 0, tuple(at)) for n, at in enumerate(places.tolist(), start=1))
+    nodes = (ElementNodes(n, tuple(of), 0) for n, of in enumerate(elements.tolist(), start=1))
     segments = (
-        decks.supports(grid, "00000" + 4 * f" {rim}"),
+        model.Elements(tuple(nodes)),
+        model.Coordinates(tuple(points)),
+        boundary_cards(codes),
         Projectile(0, 0, MASS),
-        Impact(int(np.hypot(x, y).argmin()) + 1, 3, velocity),
+        Impact(int(from_middle.argmin()) + 1, 3, velocity),
         Patch("DISC", 5.0, 0.0, 0.0),
         decks.elastic(1e5),
         decks.MITC,
         model.Nonlinear(),
         decks.material(ISOTROPIC, [0.0], 2.0),
     )
-    made = decks.deck(grid, segments, (), model.Coordinates(tuple(cards)))
+    made = Deck("disc", model.Control(len(places), len(elements), 1, 2, 5, 9), segments, ())
     return with_time_step(made, end, IMPACT)

@@ -1,0 +1,184 @@
+"""Impacts and pulses on plates that stretch as they bend.
+
+The reference tables are those of von Karman plates in first-order shear deformation theory, of
+independent programs in mm, N, s:
+
+- nonlinear_impacts.csv: rectangular plates hit by 1 kg, Hertz's pressure on a circle of 8 mm;
+  Legendre-Ritz, explicit in time.  Rows with the changes from 12 to 16 functions in a direction are
+  within 2e-4, the others within 1e-3.  nonlinear_histories.csv: every 15th row of three of them;
+- nonlinear_impacts_circular.csv: circular plates hit by 1 kg, uniform pressure on a circle of 5 mm;
+  spectral elements in the radius, the largest force within 2e-3;
+- nonlinear_pulses.csv: free vibration after a pulse of pressure of 20 us; spectral, within 1e-6.
+  nonlinear_pulse_history.csv: every 10th row of one of them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicSpline
+from scipy.special import ellipk
+
+from fecm.results.result import Result
+from fecm.verification.decks import result_of
+from tests.builders import Floats, table
+from tests.nonlinear_impacts import (
+    pulsed_square,
+    struck_disc,
+    struck_rectangle,
+    without_nonlinearity,
+)
+
+Row = dict[str, str]
+# Beyond the end of the contact.
+LONGER = 1.02
+
+
+def worst_balance(found: Result) -> float:
+    """Largest error of the energy balance, relative to the initial energy."""
+    energy = found.energy
+    return float(np.abs(energy.balance_error).max() / energy.attributes["initial"])
+
+
+def contact_end(found: Result) -> float:
+    """Time at which the force was last above zero."""
+    return float(found.time[found.force > 0.0][-1])
+
+
+def struck(row: Row, n: int) -> Result:
+    """The impact of a row of the table of rectangular plates."""
+    velocity, end = float(row["velocity_mm_per_s"]), LONGER * float(row["contact_end_s"])
+    return result_of(struck_rectangle(row["case"], n, velocity, end))
+
+
+def rows(name: str, key: str, quick: set[tuple[str, str]]) -> list[object]:
+    """Rows of a table of impacts; those whose key and target are not quick are marked long."""
+    return [
+        pytest.param(
+            row,
+            id=f"{row[key]} {row['target_w_over_h']} h",
+            marks=() if (row[key], row["target_w_over_h"]) in quick else pytest.mark.long,
+        )
+        for row in table(name)
+    ]
+
+
+# The linear limit ---------------------------------------------------------------------------------
+
+
+def test_an_impact_of_a_ten_thousandth_of_the_velocity_is_that_of_the_linear_plate() -> None:
+    made = struck_rectangle("iso_clamped_immovable", 8, 1e-4 * 2271.56, 4e-4)
+    linear, found = result_of(without_nonlinearity(made)), result_of(made)
+    peak = linear.force.max()
+    assert peak > 0.0
+    assert np.abs(found.force - linear.force).max() < 1e-6 * peak
+    assert np.abs(found.plate_w - linear.plate_w).max() < 1e-6 * linear.plate_w.max()
+    assert not np.array_equal(found.force, linear.force)
+
+
+# Free vibration after a pulse ---------------------------------------------------------------------
+
+
+def vibration(row: Row, n: int) -> tuple[CubicSpline, Floats, float]:
+    """Deflection in the middle after a pulse, the first three times it vanishes, and its peak."""
+    end = 1.01 * (float(row["zero1_s"]) + float(row["period_s_zero1_to_zero3"]))
+    found = result_of(pulsed_square(n, float(row["p0_N_per_mm2"]), end)).tape3
+    w = CubicSpline(found.time, found.w[:, 0])
+    zeros = w.roots(extrapolate=False)[:3]
+    turns = w.derivative().roots(extrapolate=False)
+    return w, zeros, float(w(turns[turns < zeros[0]]).max())
+
+
+PULSES = [
+    pytest.param(row, id=row["p0_N_per_mm2"], marks=() if row["p0_N_per_mm2"] == "1" else pytest.mark.long)
+    for row in table("nonlinear_pulses.csv")
+]
+
+
+@pytest.mark.parametrize("row", PULSES)
+def test_the_period_and_first_peak_after_a_pulse_are_the_spectral_ones(row: Row) -> None:
+    _, zeros, peak = vibration(row, 8)
+    assert zeros[2] - zeros[0] == pytest.approx(float(row["period_s_zero1_to_zero3"]), rel=1e-4)
+    assert zeros[:2] == pytest.approx([float(row["zero1_s"]), float(row["zero2_s"])], rel=1e-4)
+    assert peak == pytest.approx(float(row["first_peak_over_h"]), rel=1e-4)
+
+
+@pytest.mark.long
+def test_the_motion_after_a_pulse_is_the_spectral_one_at_every_time() -> None:
+    (row,) = [row for row in table("nonlinear_pulses.csv") if row["p0_N_per_mm2"] == "0.6"]
+    w, _, peak = vibration(row, 8)
+    history = table("nonlinear_pulse_history.csv")
+    t, wanted = (np.array([float(r[k]) for r in history]) for k in ("t_s", "w_centre_mm"))
+    kept = (t > w.x[0]) & (t < w.x[-1])
+    assert kept.sum() > 50
+    assert np.abs(w(t[kept]) - wanted[kept]).max() < 2e-4 * peak
+
+
+def test_a_plate_at_a_quarter_of_its_thickness_vibrates_as_chu_and_herrmanns_oscillator() -> None:
+    (row,) = [row for row in table("nonlinear_pulses.csv") if row["p0_N_per_mm2"] == "0.1"]
+    _, zeros, amplitude = vibration(row, 4)
+    # x'' + x + beta x^3 = 0 for a square plate whose edges hold the displacement across them; the
+    # frequency of the linear plate is Kirchhoff's.
+    nu, E, rho, side, h = 0.3, 70e3, 2.7e-9, 100.0, 1.0
+    beta = 0.75 * (2.0 * (3.0 - nu**2) + 4.0 * nu) / 4.0 * amplitude**2
+    linear = 2.0 * np.pi**2 / side**2 * np.sqrt(E * h**2 / 12.0 / (1.0 - nu**2) / rho)
+    duffing = np.pi * np.sqrt(1.0 + beta) / 2.0 / ellipk(beta / 2.0 / (1.0 + beta))
+    ratio = 2.0 * np.pi / (zeros[2] - zeros[0]) / linear
+    assert amplitude == pytest.approx(0.24, rel=0.01)
+    assert duffing - 1.0 > 0.027
+    assert ratio == pytest.approx(duffing, rel=5e-4)
+
+
+# Impacts ------------------------------------------------------------------------------------------
+
+QUICK = {("iso_clamped_immovable", "3.0"), ("cross_ss_immovable", "2.0")}
+
+
+@pytest.mark.parametrize("row", rows("nonlinear_impacts.csv", "case", QUICK))
+def test_impacts_on_a_coarse_mesh_follow_the_spectral_solution(row: Row) -> None:
+    found = struck(row, 16)
+    assert found.force.max() == pytest.approx(float(row["peak_N"]), rel=1.1e-2)
+    assert found.plate_w.max() == pytest.approx(float(row["W_max_mm"]), rel=1e-3)
+    assert contact_end(found) == pytest.approx(float(row["contact_end_s"]), rel=3e-3)
+    assert worst_balance(found) < 2e-6
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("row", rows("nonlinear_impacts.csv", "case", set()))
+def test_impacts_on_a_fine_mesh_follow_the_spectral_solution(row: Row) -> None:
+    found = struck(row, 32)
+    assert found.force.max() == pytest.approx(float(row["peak_N"]), rel=2e-3)
+    # Rows of fewer functions are themselves within 1e-3 only.
+    within = 2e-4 if row["W_change_12_16"] else 1e-3
+    assert found.plate_w.max() == pytest.approx(float(row["W_max_mm"]), rel=within)
+    assert contact_end(found) == pytest.approx(float(row["contact_end_s"]), rel=3e-3)
+    assert worst_balance(found) < 1e-6
+    history = [r for r in table("nonlinear_histories.csv")
+               if (r["case"], r["target_w_over_h"]) == (row["case"], row["target_w_over_h"])]
+    if history:
+        t, force, w = (np.array([float(r[k]) for r in history]) for k in ("t_s", "F_N", "W_mm"))
+        off = np.abs(np.interp(t, found.time, found.plate_w) - w).max()
+        assert off < 1e-3 * w.max()
+        off = np.abs(np.interp(t, found.time, found.force) - force)
+        assert np.sqrt((off**2).mean()) < 1e-2 * force.max()
+
+
+@pytest.mark.parametrize("row", rows("nonlinear_impacts_circular.csv", "edge", set()))
+def test_impacts_on_circular_plates_follow_the_axisymmetric_solution(row: Row) -> None:
+    velocity, end = float(row["velocity_mm_per_s"]), LONGER * float(row["contact_end_s"])
+    found = result_of(struck_disc(row["edge"], 16, 12, velocity, end))
+    assert found.force.max() == pytest.approx(float(row["peak_N"]), rel=1e-2)
+    assert found.plate_w.max() == pytest.approx(float(row["W_max_mm"]), rel=2e-3)
+    assert worst_balance(found) < 1e-6
+
+
+def test_an_impact_on_a_coarse_disc_deflects_it_as_the_axisymmetric_solution() -> None:
+    (row,) = [
+        row
+        for row in table("nonlinear_impacts_circular.csv")
+        if (row["edge"], row["target_w_over_h"]) == ("clamped_immovable", "3")
+    ]
+    end = 1.3 * float(row["t_peak_s"])
+    found = result_of(struck_disc(row["edge"], 8, 4, float(row["velocity_mm_per_s"]), end))
+    assert found.plate_w.max() == pytest.approx(float(row["W_max_mm"]), rel=1e-3)
+    assert found.force.max() == pytest.approx(float(row["peak_N"]), rel=0.02)
