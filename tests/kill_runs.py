@@ -1,10 +1,10 @@
 """Kills checkpointing runs at random moments, resumes them and compares what comes out, by hand.
 
-    python -m tests.kill_runs --count 200 --seed 0 [--workers 2] [--sweeps]
+    python -m tests.kill_runs --count 200 --seed 0 [--workers 2] [--sweeps | --nonlinear]
 
 Each trial starts a run with checkpoints, kills it (SIGKILL) after a random time, sometimes kills
 the resumed run as well, resumes it, and compares the result byte by byte with that of a run that
-nothing disturbed.
+nothing disturbed. With ``--nonlinear`` the plate stretches as it bends.
 
 With ``--sweeps`` each trial starts a sweep of several plates, every second one with two worker
 processes. It kills the sweep up to four times, sometimes damages a finished part after a kill,
@@ -26,6 +26,7 @@ from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from tests.decks import LONGER, PROGRAM, small
+from tests.nonlinear_impacts import struck_rectangle, with_rows
 
 FECM = [sys.executable, "-m", "fecm"]
 QUIET = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
@@ -34,6 +35,12 @@ SWEEP = [
     "layup=" + ",".join(f"[{angle}/{angle - 90}]" for angle in range(0, 80, 10)), "-o",
 ]  # fmt: skip
 SWEPT = small(PROGRAM.replace(".5E-6", ".2E-6").replace("LOOP         10", "LOOP        500"))
+
+
+def stretching() -> str:
+    """A deck of a plate that stretches as it bends, with as many steps and stored rows."""
+    made = struck_rectangle("cross_ss_immovable", 12, 1667.3332, 3.6e-3)
+    return with_rows(made, 100).to_text()
 
 
 def status_or_kill(command: list[str], folder: Path, seconds: float | None) -> int | None:
@@ -124,11 +131,13 @@ def main() -> int:
     parser.add_argument("--count", type=int, default=200)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--workers", type=int, default=2)
-    parser.add_argument("--sweeps", action="store_true")
+    kind = parser.add_mutually_exclusive_group()
+    kind.add_argument("--sweeps", action="store_true")
+    kind.add_argument("--nonlinear", action="store_true")
     options = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        (folder / "deck.inp").write_text(LONGER)
+        (folder / "deck.inp").write_text(stretching() if options.nonlinear else LONGER)
         (folder / "sweep.inp").write_text(SWEPT)
         command = SWEEP if options.sweeps else [*FECM, "run", "deck.inp", "-o"]
         begin = time.monotonic()

@@ -13,7 +13,7 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.grid import Grid, boundary_cards, lines, uniform
-from fecm.deck.model import Deck, ElementNodes, Impact, LoadTable, NodeValues, Patch, Ply, Projectile
+from fecm.deck.model import Deck, ElementNodes, Impact, LoadTable, Macro, NodeValues, Patch, Ply, Projectile
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
@@ -44,6 +44,13 @@ def with_time_step(made: Deck, end: float, program: str) -> Deck:
 
 
 IMPACT = "LMAS DT={dt} LOOP={steps} TIME RODP={steps} NEXT"
+
+
+def with_rows(made: Deck, every: int) -> Deck:
+    """The same impact with strains and displacements stored every so many steps."""
+    *before, row, end = made.macros
+    rows = (replace(row, value=float(every)), Macro("DISP", value=float(every)))
+    return replace(made, macros=(*before, *rows, end))
 
 
 def without_nonlinearity(made: Deck) -> Deck:

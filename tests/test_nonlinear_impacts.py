@@ -14,11 +14,16 @@ independent programs in mm, N, s:
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from scipy.interpolate import CubicSpline
 from scipy.special import ellipk
 
+import fecm
+from fecm.mechanics import kernels
+from fecm.mechanics.stiffness_product import KERNELS, NUMPY
 from fecm.results.result import Result
 from fecm.verification.decks import result_of
 from tests.builders import Floats, table
@@ -26,6 +31,7 @@ from tests.nonlinear_impacts import (
     pulsed_square,
     struck_disc,
     struck_rectangle,
+    with_rows,
     without_nonlinearity,
 )
 
@@ -182,3 +188,17 @@ def test_an_impact_on_a_coarse_disc_deflects_it_as_the_axisymmetric_solution() -
     found = result_of(struck_disc(row["edge"], 8, 4, float(row["velocity_mm_per_s"]), end))
     assert found.plate_w.max() == pytest.approx(float(row["W_max_mm"]), rel=1e-3)
     assert found.force.max() == pytest.approx(float(row["peak_N"]), rel=0.02)
+
+
+# Threads -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("solver", [NUMPY, KERNELS])
+def test_a_run_does_not_depend_on_the_number_of_threads(solver: str, tmp_path: Path) -> None:
+    if solver == KERNELS and kernels.LIBRARY is None:
+        pytest.skip("this installation has no compiled kernels")
+    made = with_rows(struck_rectangle("iso_clamped_immovable", 32, 2271.56, 1e-5), 20)
+    for threads in (1, 2):
+        path = tmp_path / f"{threads}.h5"
+        fecm.run_one(made, output=path, threads=threads, solver=solver)
+    assert (tmp_path / "1.h5").read_bytes() == (tmp_path / "2.h5").read_bytes()
