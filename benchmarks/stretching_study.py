@@ -98,7 +98,9 @@ def references() -> dict[str, list[tuple[float, float, float]]]:
     found: dict[str, list[tuple[float, float, float]]] = {}
     with (ROOT / "tests" / "data" / "linear_error.csv").open(newline="") as file:
         for row in csv.DictReader(file):
-            values = (float(row[name]) for name in ("energy_mJ", "nonlinear_peak_N", "linear_peak_N"))
+            values = (
+                float(row[name]) for name in ("energy_mJ", "nonlinear_peak_N", "linear_peak_N")
+            )
             found.setdefault(row["case"], []).append(tuple(values))  # type: ignore[arg-type]
     return found
 
@@ -120,7 +122,9 @@ def study() -> dict[str, list[tuple[float, float, float]]]:
                 both = zip((found.force, linear.force), forces, strict=True)
                 differences += [abs(ours / theirs - 1.0) for ours, theirs in both]
             rows.append((found.ratio, found.force, linear.force))
-        cells = [f"{linear:.0f}, {force:.0f} N ({linear / force - 1.0:.0%})" for _, force, linear in rows]
+        cells = [
+            f"{linear:.0f}, {force:.0f} N ({linear / force - 1.0:.0%})" for _, force, linear in rows
+        ]
         print("|", name, "|", " | ".join(cells).replace("-", "−"), "|")
         if differences:
             print(f"    within {max(differences):.1%} of {reference}", flush=True)
@@ -135,7 +139,14 @@ def picture(table: dict[str, list[tuple[float, float, float]]]) -> Picture:
     for (name, rows), colour in zip(table.items(), style.COLOURS, strict=False):
         ratio, force, linear = np.array(rows).T
         dashed = "free" in name
-        ax.plot(ratio, linear / force, "o-" if not dashed else "o--", markersize=3, color=colour, label=name)
+        ax.plot(
+            ratio,
+            linear / force,
+            "o-" if not dashed else "o--",
+            markersize=3,
+            color=colour,
+            label=name,
+        )
     ax.axhline(1.0, color="0.6", label="_")
     ax.set(
         xlabel="deflection of the stretched plate over its thickness",

@@ -13,7 +13,17 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.grid import Grid, boundary_cards, lines, uniform
-from fecm.deck.model import Deck, ElementNodes, Impact, LoadTable, Macro, NodeValues, Patch, Ply, Projectile
+from fecm.deck.model import (
+    Deck,
+    ElementNodes,
+    Impact,
+    LoadTable,
+    Macro,
+    NodeValues,
+    Patch,
+    Ply,
+    Projectile,
+)
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate

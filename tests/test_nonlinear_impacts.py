@@ -94,7 +94,9 @@ def vibration(row: Row, n: int) -> tuple[CubicSpline, Floats, float]:
 
 
 PULSES = [
-    pytest.param(row, id=row["p0_N_per_mm2"], marks=() if row["p0_N_per_mm2"] == "1" else pytest.mark.long)
+    pytest.param(
+        row, id=row["p0_N_per_mm2"], marks=() if row["p0_N_per_mm2"] == "1" else pytest.mark.long
+    )
     for row in table("nonlinear_pulses.csv")
 ]
 
@@ -114,8 +116,8 @@ def test_the_motion_after_a_pulse_is_the_spectral_one_at_every_time() -> None:
     history = table("nonlinear_pulse_history.csv")
     t, wanted = (np.array([float(r[k]) for r in history]) for k in ("t_s", "w_centre_mm"))
     kept = (t > w.x[0]) & (t < w.x[-1])
-    assert kept.sum() > 50
-    assert np.abs(w(t[kept]) - wanted[kept]).max() < 2e-4 * peak
+    assert kept.sum() > 30
+    assert np.abs(w(t[kept]) - wanted[kept]).max() < 1e-4 * peak
 
 
 def test_a_plate_at_a_quarter_of_its_thickness_vibrates_as_chu_and_herrmanns_oscillator() -> None:
@@ -141,6 +143,7 @@ QUICK = {("iso_clamped_immovable", "3.0"), ("cross_ss_immovable", "2.0")}
 @pytest.mark.parametrize("row", rows("nonlinear_impacts.csv", "case", QUICK))
 def test_impacts_on_a_coarse_mesh_follow_the_spectral_solution(row: Row) -> None:
     found = struck(row, 16)
+    # The force rings with modes that this mesh does not resolve, and the linear plate's as much.
     assert found.force.max() == pytest.approx(float(row["peak_N"]), rel=1.1e-2)
     assert found.plate_w.max() == pytest.approx(float(row["W_max_mm"]), rel=1e-3)
     assert contact_end(found) == pytest.approx(float(row["contact_end_s"]), rel=3e-3)
@@ -157,17 +160,37 @@ def test_impacts_on_a_fine_mesh_follow_the_spectral_solution(row: Row) -> None:
     assert found.plate_w.max() == pytest.approx(float(row["W_max_mm"]), rel=within)
     assert contact_end(found) == pytest.approx(float(row["contact_end_s"]), rel=3e-3)
     assert worst_balance(found) < 1e-6
-    history = [r for r in table("nonlinear_histories.csv")
-               if (r["case"], r["target_w_over_h"]) == (row["case"], row["target_w_over_h"])]
-    if history:
-        t, force, w = (np.array([float(r[k]) for r in history]) for k in ("t_s", "F_N", "W_mm"))
-        off = np.abs(np.interp(t, found.time, found.plate_w) - w).max()
-        assert off < 1e-3 * w.max()
-        off = np.abs(np.interp(t, found.time, found.force) - force)
-        assert np.sqrt((off**2).mean()) < 1e-2 * force.max()
 
 
-@pytest.mark.parametrize("row", rows("nonlinear_impacts_circular.csv", "edge", set()))
+@pytest.mark.long
+@pytest.mark.parametrize("case", ["cross_ss_immovable", "iso_clamped_immovable", "iso_ss_movable"])
+def test_force_and_deflection_follow_the_spectral_solution_at_every_time(case: str) -> None:
+    history = [row for row in table("nonlinear_histories.csv") if row["case"] == case]
+    target = history[0]["target_w_over_h"]
+    (row,) = [
+        row
+        for row in table("nonlinear_impacts.csv")
+        if (row["case"], row["target_w_over_h"]) == (case, target)
+    ]
+    found = struck(row, 32)
+    t, force, w = (np.array([float(r[k]) for r in history]) for k in ("t_s", "F_N", "W_mm"))
+    kept = t < found.time[-1]
+    assert kept.sum() > 90
+    off = np.interp(t, found.time, found.plate_w) - w
+    assert np.abs(off[kept]).max() < 4e-4 * w.max()
+    off = np.interp(t, found.time, found.force) - force
+    assert np.sqrt((off[kept] ** 2).mean()) < 4e-3 * force.max()
+
+
+CIRCULAR = [
+    pytest.param(row, id=f"{row['edge']} {row['target_w_over_h']} h")
+    for row in table("nonlinear_impacts_circular.csv")
+    if row["target_w_over_h"] in ("1", "3")
+]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("row", CIRCULAR)
 def test_impacts_on_circular_plates_follow_the_axisymmetric_solution(row: Row) -> None:
     velocity, end = float(row["velocity_mm_per_s"]), LONGER * float(row["contact_end_s"])
     found = result_of(struck_disc(row["edge"], 16, 12, velocity, end))
@@ -198,3 +221,33 @@ def test_a_run_does_not_depend_on_the_number_of_threads(tmp_path: Path) -> None:
     for threads in (1, 2):
         fecm.run_one(made, output=tmp_path / f"{threads}.h5", threads=threads)
     assert (tmp_path / "1.h5").read_bytes() == (tmp_path / "2.h5").read_bytes()
+
+
+# The drop-weight test ------------------------------------------------------------------------------
+
+WINDOWS = {"w held, u v free": "free", "w u v held": "held"}
+DROPS = [
+    pytest.param(row, id=f"{row['laminate'][8:25]} {WINDOWS[row['window']]} {row['energy_mJ']} mJ")
+    for row in table("nonlinear_d7136.csv")
+    if row["window"] in WINDOWS
+]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("row", DROPS)
+def test_the_drop_weight_test_is_that_of_another_program_of_finite_elements(row: Row) -> None:
+    thick = "3s" in row["laminate"]
+    deck = fecm.impact(
+        fecm.Plate.on_fixture("D7136"),
+        fecm.Laminate(
+            "[45/0/-45/90]3s" if thick else "[45/0/-45/90]2s", "IM7/8552", 0.184 if thick else 0.131
+        ),
+        energy=float(row["energy_mJ"]),
+        units="mm-N-s",
+        nonlinear=True,
+        in_plane=WINDOWS[row["window"]],
+    )
+    found = result_of(deck)
+    assert found.force.max() == pytest.approx(float(row["nonlinear_peak_N"]), rel=2e-4)
+    assert found.plate_w.max() == pytest.approx(float(row["nonlinear_W_mm"]), rel=1e-4)
+    assert worst_balance(found) < 1e-7

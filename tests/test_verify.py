@@ -422,13 +422,13 @@ def test_figures_of_plates_that_stretch_are_those_of_the_reference_files() -> No
         for r in reference("nonlinear_circles.csv")
         if (r["load"], r["w0_over_h"]) == ("uniform", "1")
     }
-    assert stretching.PRESSURES == (discs["clamped_immovable"], discs["ss_movable"])
+    assert (discs["clamped_immovable"], discs["ss_movable"]) == stretching.PRESSURES
     (impact,) = [
         r
         for r in reference("nonlinear_impacts.csv")
         if (r["case"], r["target_w_over_h"]) == ("iso_clamped_immovable", "1.0")
     ]
-    assert stretching.VELOCITY == float(impact["velocity_mm_per_s"])
+    assert float(impact["velocity_mm_per_s"]) == stretching.VELOCITY
     for quantity, column in (("largest w", "W_max_mm"), ("largest force", "peak_N")):
         given = float(impact[column])
         assert check_of("stretching-impact", quantity).expected == pytest.approx(given, rel=1e-7)

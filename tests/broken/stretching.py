@@ -29,9 +29,7 @@ def without_component(component: int) -> Any:
 def untied(monkeypatch: pytest.MonkeyPatch) -> None:
     """Take the quadratic strains at the points of quadrature."""
     points = gauss(3)
-    own = SimpleNamespace(
-        tying_points=lambda *_: points, tying_weights=lambda *_: np.eye(9)
-    )
+    own = SimpleNamespace(tying_points=lambda *_: points, tying_weights=lambda *_: np.eye(9))
     monkeypatch.setattr(membrane, "assumed_shear", own)
     monkeypatch.setattr(membrane, "TYING", 9)
     monkeypatch.setattr(membrane, "_CORNERS", points)
