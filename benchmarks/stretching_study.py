@@ -123,9 +123,10 @@ def study() -> dict[str, list[tuple[float, float, float]]]:
                 differences += [abs(ours / theirs - 1.0) for ours, theirs in both]
             rows.append((found.ratio, found.force, linear.force))
         cells = [
-            f"{linear:.0f}, {force:.0f} N ({linear / force - 1.0:.0%})" for _, force, linear in rows
+            f"{linear:.0f} / {force:.0f} ({linear / force - 1.0:.0%})".replace("-", "−")
+            for _, force, linear in rows
         ]
-        print("|", name, "|", " | ".join(cells).replace("-", "−"), "|")
+        print("|", name, "|", " | ".join(cells).replace("%", " %"), "|")
         if differences:
             print(f"    within {max(differences):.1%} of {reference}", flush=True)
         table[name] = rows

@@ -223,7 +223,7 @@ def test_a_run_does_not_depend_on_the_number_of_threads(tmp_path: Path) -> None:
     assert (tmp_path / "1.h5").read_bytes() == (tmp_path / "2.h5").read_bytes()
 
 
-# The drop-weight test ------------------------------------------------------------------------------
+# The drop-weight test ----------------------------------------------------------------------------
 
 WINDOWS = {"w held, u v free": "free", "w u v held": "held"}
 DROPS = [
