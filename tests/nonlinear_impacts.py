@@ -150,7 +150,8 @@ def disc_mesh(radius: float, core: int, rings: int) -> tuple[Floats, Ints]:
     elements = []
     for grid, part in zip(grids, parts, strict=True):
         of_grid = part.reshape(grid.shape[:2])
-        rows, columns = np.mgrid[0 : len(of_grid) - 1 : 2, 0 : of_grid.shape[1] - 1 : 2]
+        above, beside = grid.shape[0] - 1, grid.shape[1] - 1
+        rows, columns = np.mgrid[0:above:2, 0:beside:2]
         right, up = np.array(HALVES)
         elements.append(of_grid[rows.ravel()[:, None] + up, columns.ravel()[:, None] + right])
     return radius * points[first], np.concatenate(elements).astype(np.int32) + 1
@@ -163,12 +164,14 @@ def struck_disc(edges: str, core: int, rings: int, velocity: float, end: float) 
     from_middle = np.hypot(*places.T)
     codes = np.zeros((len(places), 5), dtype=int)
     codes[np.isclose(from_middle, radius)] = RIMS[edges]
+    held = boundary_cards(codes)
+    assert held is not None
     points = (NodeValues(n, 0, tuple(at)) for n, at in enumerate(places.tolist(), start=1))
     nodes = (ElementNodes(n, tuple(of), 0) for n, of in enumerate(elements.tolist(), start=1))
     segments = (
         model.Elements(tuple(nodes)),
         model.Coordinates(tuple(points)),
-        boundary_cards(codes),
+        held,
         Projectile(0, 0, MASS),
         Impact(int(from_middle.argmin()) + 1, 3, velocity),
         Patch("DISC", 5.0, 0.0, 0.0),

@@ -22,6 +22,7 @@ from scipy.interpolate import CubicSpline
 from scipy.special import ellipk
 
 import fecm
+from fecm.authoring.mesh import InPlane
 from fecm.results.result import Result
 from fecm.verification.decks import result_of
 from tests.builders import Floats, table
@@ -225,7 +226,7 @@ def test_a_run_does_not_depend_on_the_number_of_threads(tmp_path: Path) -> None:
 
 # The drop-weight test ----------------------------------------------------------------------------
 
-WINDOWS = {"w held, u v free": "free", "w u v held": "held"}
+WINDOWS: dict[str, InPlane] = {"w held, u v free": "free", "w u v held": "held"}
 DROPS = [
     pytest.param(row, id=f"{row['laminate'][8:25]} {WINDOWS[row['window']]} {row['energy_mJ']} mJ")
     for row in table("nonlinear_d7136.csv")
