@@ -1,7 +1,7 @@
 """Decks of impacts and pulses on plates that stretch as they bend.
 
 Units are mm, N, s.  Edges are named as in the reference data: ``clamped`` or ``ss``, and in the
-plane ``immovable``, ``normal`` (only the displacement across the edge is held) or ``movable``.
+plane ``immovable`` or ``movable``.
 """
 
 from __future__ import annotations
@@ -39,9 +39,7 @@ RIMS = {"clamped_immovable": (1, 1, 1, 1, 1), "ss_movable": (0, 0, 1, 0, 0)}
 # Codes of u, v, w, theta_x and theta_y: inside, and on the left, bottom, right and top edge.
 SUPPORTS = {
     "clamped_immovable": "00000 11111 11111 11111 11111",
-    "clamped_movable": "00000 00111 00111 00111 00111",
     "ss_immovable": "00000 11101 11110 11101 11110",
-    "ss_normal": "00000 10101 01110 10101 01110",
     "ss_movable": "00000 00101 00110 00101 00110",
 }
 

@@ -9,7 +9,9 @@ independent programs in mm, N, s:
 - nonlinear_impacts_circular.csv: circular plates hit by 1 kg, uniform pressure on a circle of 5 mm;
   spectral elements in the radius, the largest force within 2e-3;
 - nonlinear_pulses.csv: free vibration after a pulse of pressure of 20 us; spectral, within 1e-6.
-  nonlinear_pulse_history.csv: every 10th row of one of them.
+  nonlinear_pulse_history.csv: every 10th row of one of them;
+- nonlinear_d7136.csv: drop-weight tests by a prototype of the same elements in another program,
+  which shows agreement of two programs and nothing more.
 """
 
 from __future__ import annotations

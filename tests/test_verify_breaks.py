@@ -32,7 +32,7 @@ BREAKS = {
 
 
 # The program's own errors of a motion that cannot be.
-REFUSALS = ("ConvergenceError", "DivergenceError", "PlyError", "StudyError")
+REFUSALS = ("DivergenceError", "PlyError", "StudyError")
 ROWS = {
     (one.name, check.quantity)
     for one in CASES
