@@ -56,6 +56,26 @@ def tangent_stiffness(plate: PlateModel, field: Floats | None) -> sparse.csr_arr
     return (plate.stiffness + added[:, : plate.neq]).tocsr()
 
 
+def _in_plane_motions(plate: PlateModel) -> Floats:
+    """Translations and rotation in the plane: u and v of the nodes, (numnp, 2, 3)."""
+    coordinates = plate.mesh.coordinates
+    x, y = ((coordinates - coordinates.mean(axis=0)) / np.ptp(coordinates, axis=0).max()).T
+    motions = np.zeros((len(coordinates), 2, 3))
+    motions[:, 0, 0] = motions[:, 1, 1] = 1.0
+    motions[:, 0, 2], motions[:, 1, 2] = -y, x
+    return motions
+
+
+def rigid_in_plane(plate: PlateModel) -> Floats:
+    """Rigid motions in the plane that the supports leave free, (motions, neq)."""
+    motions = _in_plane_motions(plate)
+    held = motions[plate.mesh.equations[:, :2] == 0]
+    values, vectors = np.linalg.eigh(held.T @ held)
+    fields = np.zeros((*plate.mesh.equations.shape, 3))
+    fields[:, :2] = motions @ vectors
+    return fields[plate.mesh.equations > 0].T[values <= NOT_HELD * values[-1]]
+
+
 def in_plane_pins(plate: PlateModel) -> list[int]:
     """Equations, from 0, of as few dofs u and v as hold the plate in its plane.
 
@@ -63,11 +83,7 @@ def in_plane_pins(plate: PlateModel) -> list[int]:
     pins: they choose the rigid motion, and change no strain.
     """
     equations = plate.mesh.equations[:, :2]
-    coordinates = plate.mesh.coordinates
-    x, y = ((coordinates - coordinates.mean(axis=0)) / np.ptp(coordinates, axis=0).max()).T
-    motions = np.zeros((*equations.shape, 3))  # u and v of two translations and the rotation
-    motions[:, 0, 0] = motions[:, 1, 1] = 1.0
-    motions[:, 0, 2], motions[:, 1, 2] = -y, x
+    motions = _in_plane_motions(plate)
     held = motions[equations == 0]
     gram = held.T @ held
     pins: list[int] = []

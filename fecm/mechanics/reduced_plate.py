@@ -1,0 +1,338 @@
+"""A nonlinear plate in a few modes, for many impacts at one place.
+
+The deflection is a sum of bending modes q_i phi_i of the plate at rest.  The displacements u and v
+in the plane follow from s_ij = q_i q_j (A. A. Muravyov and S. A. Rizzi, Computers & Structures 81,
+2003, 1513), here by the element matrices and not by a fit:
+
+    u, v = U q + sum over i <= j of u_ij s_ij,    K_mm U = -K_mb phi,    K_mm u_ij = -r_ij,
+    r_ij = int B_m' A eps_q(i, j),
+
+where eps_q(i, j) is the part of the quadratic strains (:mod:`~fecm.mechanics.membrane`) that
+belongs to s_ij.  The strain energy is
+
+    1/2 sum omega_i^2 q_i^2 + q' C s + 1/2 s' Q s,    Q = int eps_ij A eps_kl,
+    C_i,kl = int N_i eps_q(k, l),    eps_ij = eps_q(i, j) + B_m u_ij,
+
+with the membrane force N_i = A B_m U_i + B kappa_i of a bending mode; U and C are zero unless the
+laminate couples bending and stretching.
+
+A static membrane has no inertia.  That matters where the edges are free in the plane: the lowest
+membrane modes psi_k are then hardly faster than the bending modes.  The few that the quadratic
+strains of the static deflection excite most are therefore coordinates as well.  With q_k of such a
+mode, C has the row psi_k' r, and Q the term sum over k of (psi_k' r)' (psi_k' r)/Omega_k^2 more,
+which is what their static displacement had taken away.
+
+The modes left out follow the contact force F statically, by what they add to the displacement under
+the load:
+
+    W = sum g_i q_i + F/k_r,    1/k_r = 1/k_b - sum g_i^2/omega_i^2,
+
+with the displacement g_i of a mode under the load and the static stiffness k_b of the linear plate
+there.  Each mode adds g_i^2/omega_i^2 to the static compliance: those that add most are kept.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from fecm._errors import FecmError
+from fecm._frozen import frozen
+from fecm._typing import Floats, Indices
+from fecm.mechanics.element_matrices import membrane_and_bending
+from fecm.mechanics.interpolation import NDOF, interpolate
+from fecm.mechanics.membrane import BLOCK, TYING, QuadraticStrains
+from fecm.mechanics.mesh import ElementBlock, equation_numbers
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.solutions import SingularStiffnessError, Tangent, rigid_in_plane
+
+# Residual of a mode relative to its eigenvalue; the error of the frequency is its square.
+CONVERGED = 1e-6
+# Vectors of the Krylov space per mode that is wanted, and in addition.
+VECTORS_PER_MODE, MORE_VECTORS = 12, 60
+# Steps between two solutions of the eigenvalue problem in the Krylov space.
+LOOK = 10
+# Size of a new vector relative to the last below which the Krylov space is complete.
+EXHAUSTED = 1e-12
+# Share of a mode in the static compliance below which the load does not move it.
+UNMOVED = 1e-10
+# Most membrane modes, their least share in the static compliance, and the largest of their
+# frequencies relative to that of the bending modes: a higher one would cost time steps.
+MEMBRANE_MODES, MEMBRANE_SHARE, MEMBRANE_FASTEST = 6, 0.01, 1.5
+
+
+class ReductionError(FecmError, ArithmeticError):
+    """The plate has no reduced model."""
+
+
+class Modes(NamedTuple):
+    """Modes that a load moves, those of the largest share in the static compliance first."""
+
+    stiffness: Floats  # (m,): squares of the angular frequencies
+    shapes: Floats  # (neq, m): unit modal mass
+    deflection: Floats  # (m,): displacement under the load; positive
+    compliance: float  # static displacement under a unit load
+
+    @property
+    def shares(self) -> Floats:
+        """Static displacement of each mode under a unit load, (m,)."""
+        return np.asarray(self.deflection**2 / self.stiffness)
+
+
+@frozen
+class ReducedPlate:
+    """A plate in n coordinates, of which the first m are bending modes, the others membrane modes.
+
+    Arrays over pairs are over the m (m + 1)/2 pairs i <= j of bending modes.
+    """
+
+    bending: int  # m
+    stiffness: Floats  # (n,): squares of the angular frequencies
+    deflection: Floats  # (n,): displacement under the load; 0 of membrane modes
+    flexibility: float  # 1/k_r: displacement of the modes left out per force
+    cubic: Floats  # C, (n, pairs)
+    quartic: Floats  # Q, (pairs, pairs)
+    damping: float = 0.0  # a of the damping matrix a M
+
+    @property
+    def fastest(self) -> float:
+        """Largest angular frequency of the bending modes."""
+        return float(np.sqrt(self.stiffness[: self.bending].max()))
+
+    @cached_property
+    def _pairs(self) -> tuple[Indices, Indices]:
+        """Modes i and j of the pairs."""
+        first, second = np.triu_indices(self.bending)
+        return first, second
+
+    @cached_property
+    def _tables(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Q and C in one matrix, the transpose of C, and sums over the pairs of a mode i and j."""
+        modes = np.arange(self.bending)[:, None]
+        of_first, of_second = ((index == modes).astype(float) for index in self._pairs)
+        return np.vstack([self.quartic, self.cubic]), self.cubic.T.copy(), of_first, of_second
+
+    def strain_energy(self, q: Floats) -> Floats:
+        """Strain energy of coordinates (n, cases): (cases,)."""
+        first, second = self._pairs
+        s = q[first] * q[second]
+        of_coordinates = q * (0.5 * self.stiffness[:, None] * q + self.cubic @ s)
+        of_pairs = 0.5 * s * (self.quartic @ s)
+        return np.asarray(of_coordinates.sum(axis=0) + of_pairs.sum(axis=0))
+
+    def internal_forces(self, q: Floats) -> Floats:
+        """Derivatives of the strain energy with respect to coordinates (n, cases)."""
+        of_pairs, of_coordinates, of_first, of_second = self._tables
+        first, second = (q[index] for index in self._pairs)
+        both = of_pairs @ (first * second)
+        n, forces = both[: len(first)], both[len(first) :]
+        n += of_coordinates @ q
+        forces += self.stiffness[:, None] * q
+        second *= n
+        first *= n
+        forces[: self.bending] += of_first @ second + of_second @ first
+        return forces
+
+
+def reduced_plate(
+    plate: PlateModel, contact: Floats, count: int, damping: float = 0.0
+) -> ReducedPlate:
+    """Reduce a plate to the bending modes that a load, (numnp, 5), moves most; at most `count`.
+
+    Raises ReductionError if the plate is not held, or if its modes do not converge.
+    """
+    bending = bending_modes(plate, contact, count)
+    plane = _in_plane(plate)
+    pairs = _integrated(plate, plane, bending.shapes)
+    cubic, quartic = pairs.cubic, pairs.quartic
+    stiffness, deflection = [bending.stiffness], [bending.deflection]
+    if plane.neq:
+        tangent = Tangent(plane)
+        quartic -= pairs.loads.T @ tangent.solve(pairs.loads)
+        first, second = np.triu_indices(len(bending.stiffness))
+        static = bending.deflection / bending.stiffness
+        membrane = _moved_modes(
+            tangent,
+            plane.mass,
+            pairs.loads @ (static[first] * static[second]),
+            MEMBRANE_MODES,
+            least=MEMBRANE_SHARE,
+            stiffest=MEMBRANE_FASTEST**2 * bending.stiffness.max(),
+            rigid=rigid_in_plane(plane),
+        )
+        rows = membrane.shapes.T @ pairs.loads
+        quartic += (rows.T / membrane.stiffness) @ rows
+        cubic = np.concatenate([cubic, rows])
+        stiffness.append(membrane.stiffness)
+        deflection.append(np.zeros(len(rows)))
+    return ReducedPlate(
+        bending=len(bending.stiffness),
+        stiffness=np.concatenate(stiffness),
+        deflection=np.concatenate(deflection),
+        flexibility=max(bending.compliance - float(bending.shares.sum()), 0.0),
+        cubic=cubic,
+        quartic=(quartic + quartic.T) / 2.0,
+        damping=damping,
+    )
+
+
+# Modes --------------------------------------------------------------------------------------------
+
+
+def bending_modes(plate: PlateModel, contact: Floats, count: int) -> Modes:
+    """Compute the modes with the largest shares in the displacement under a load, (numnp, 5).
+
+    The masses are lumped; those of u and v are left out, so that these follow statically.  Raises
+    ReductionError if the plate is not held.
+    """
+    free = plate.mesh.equations > 0
+    mass = plate.field(plate.mass, 0.0)
+    mass[:, :2] = 0.0
+    try:
+        return _moved_modes(Tangent(plate), mass[free], contact[free], count)
+    except SingularStiffnessError as error:
+        raise ReductionError(f"a reduced model needs a plate that is held: {error}") from None
+
+
+def _moved_modes(
+    tangent: Tangent,
+    mass: Floats,
+    load: Floats,
+    count: int,
+    *,
+    least: float = UNMOVED,
+    stiffest: float = np.inf,
+    rigid: Floats | None = None,
+) -> Modes:
+    """Modes with the largest shares in the displacement under a load, (neq,); at most `count`.
+
+    Those with less than the share `least`, and those with a square of the angular frequency beyond
+    `stiffest`, are left out.  `rigid` (motions, neq) are motions without strain, on which the load
+    does no work.
+
+    Lanczos iteration with K^-1 M, starting from the static displacement, finds the modes in the
+    order of their shares, and of modes of equal frequency the one that moves.
+    """
+    static = tangent.solve(load)
+    compliance = float(load @ static)
+    roots = np.sqrt(mass)
+    fixed = np.empty((0, len(mass)))
+    if rigid is not None:
+        fixed = np.linalg.qr((rigid * roots).T)[0].T / roots
+    few = len(fixed)
+    most = min(VECTORS_PER_MODE * count + MORE_VECTORS, int(np.count_nonzero(mass)) - few)
+    basis = np.concatenate([fixed, np.empty((most, len(mass)))])
+    inverse = np.zeros((most, most))  # K^-1 M in the basis
+    vector, _ = _made_orthogonal(static, fixed, mass)
+    for size in range(1, most + 1):
+        last, own = few + size - 1, basis[few : few + size]
+        basis[last] = vector / _norm(vector, mass)
+        vector = tangent.solve(mass * basis[last])
+        before = _norm(vector, mass)
+        vector, parts = _made_orthogonal(vector, basis[: last + 1], mass)
+        inverse[:size, size - 1] = parts[few:]
+        left = _norm(vector, mass)
+        exhausted = left <= EXHAUSTED * before
+        if not exhausted and size < most and (size < count or size % LOOK):
+            continue
+        values, vectors = np.linalg.eigh(inverse[:size, :size], UPLO="U")
+        moved = vectors.T @ (own @ load)
+        shares = np.where(values * stiffest >= 1.0, moved**2 * values, 0.0)
+        order = np.argsort(-shares, kind="stable")[:count]
+        order = order[shares[order] > least * compliance]
+        if exhausted or (left * np.abs(vectors[-1, order]) <= CONVERGED * values[order]).all():
+            signs = np.where(moved[order] < 0.0, -1.0, 1.0)
+            shapes = (signs * vectors[:, order]).T @ own
+            return Modes(1.0 / values[order], shapes.T, np.abs(moved[order]), compliance)
+    raise ReductionError(f"{count} modes did not converge; take fewer")
+
+
+def _made_orthogonal(vector: Floats, basis: Floats, mass: Floats) -> tuple[Floats, Floats]:
+    """Vector without its parts along an orthonormal basis (size, neq), and these parts, (size,)."""
+    total = np.zeros(len(basis))
+    for _ in range(2):  # Gram and Schmidt, twice for orthogonality to rounding
+        parts = basis @ (mass * vector)
+        vector = vector - parts @ basis
+        total += parts
+    return vector, total
+
+
+def _norm(vector: Floats, mass: Floats) -> float:
+    return float(np.sqrt(vector @ (mass * vector)))
+
+
+# Pairs of modes -----------------------------------------------------------------------------------
+
+
+class Pairs(NamedTuple):
+    """Quadratic strains of the pairs of bending modes, integrated."""
+
+    cubic: Floats  # (m, pairs): int N_i eps_q
+    quartic: Floats  # (pairs, pairs): int eps_q A eps_q, u and v held
+    loads: Floats  # (neq of the membrane, pairs): r
+
+
+def _in_plane(plate: PlateModel) -> PlateModel:
+    """The plate with only u and v free."""
+    codes = plate.mesh.codes.copy()
+    codes[:, 2:] = 1
+    return replace(plate, mesh=replace(plate.mesh, codes=codes, equations=equation_numbers(codes)))
+
+
+def _integrated(plate: PlateModel, plane: PlateModel, shapes: Floats) -> Pairs:
+    """Integrals over the pairs of modes, (neq, m)."""
+    from scipy import sparse  # 0.16 s, which most runs don't need
+
+    modes = shapes.shape[1]
+    count = modes * (modes + 1) // 2
+    fields = np.stack([plate.field(shape, 0.0) for shape in shapes.T], axis=2)  # (numnp, 5, m)
+    cubic, quartic = np.zeros((modes, count)), np.zeros((count, count))
+    loads = np.zeros((plane.neq, count))
+    for family in plate.families:
+        for block in family.blocks(BLOCK):
+            strains = _pair_strains(plate, block, fields[block.nodes, 2])
+            at = interpolate(block, plate.rules.bending)
+            linear = membrane_and_bending(at)  # (ne, points, 6, 5 nodes)
+            ne, nodes = block.nodes.shape
+            weight = at.jxw[:, :, None, None]
+            stresses = _rows(weight * (plate.laminate.A @ strains))
+            quartic += _rows(strains).T @ stresses
+            if plate.laminate.is_coupled:
+                AB = np.hstack([plate.laminate.A, plate.laminate.B])
+                own = fields[block.nodes].reshape(ne, 1, nodes * NDOF, modes)
+                cubic += _rows(weight * (AB @ (linear @ own))).T @ _rows(strains)
+            B = linear.reshape(ne, -1, 6, nodes, NDOF)[:, :, :3, :, :2].reshape(ne, -1, 2 * nodes)
+            forces = B.transpose(0, 2, 1) @ stresses.reshape(ne, -1, count)
+            numbers = plane.mesh.equations[block.nodes][:, :, :2].ravel()
+            held = np.flatnonzero(numbers > 0)
+            places = (numbers[held] - 1, held)
+            sums = sparse.csr_array((np.ones(len(held)), places), (plane.neq, len(numbers)))
+            loads += sums @ _rows(forces)
+    return Pairs(cubic, quartic, loads)
+
+
+def _rows(values: Floats) -> Floats:
+    """All axes but the last in one."""
+    return values.reshape(-1, values.shape[-1])
+
+
+def _pair_strains(plate: PlateModel, block: ElementBlock, w: Floats) -> Floats:
+    """eps_q(i, j) of the pairs of deflections w (ne, nodes, m): (ne, points, 3, pairs).
+
+    Their sum over all pairs, each times q_i q_j, is eps_q of the sum of q_i w_i.
+    """
+    tied = QuadraticStrains(block, plate.rules.bending)
+    slopes = [tied.slopes(own) for own in w.transpose(2, 1, 0)]
+    one, two = (np.stack(along, axis=1) for along in zip(*slopes, strict=True))  # (10, m, ne)
+    i, j = np.triu_indices(w.shape[2])
+    times = np.where(i == j, 0.5, 1.0)[:, None]
+    both = one[TYING:, i] * two[TYING:, j] + two[TYING:, i] * one[TYING:, j]
+    tied_components = (
+        times * one[:TYING, i] * one[:TYING, j],
+        times * two[:TYING, i] * two[:TYING, j],
+        times * both,
+    )
+    return np.ascontiguousarray(tied.at_points(tied_components).transpose(3, 1, 0, 2))

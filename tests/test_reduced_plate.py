@@ -1,0 +1,260 @@
+"""Nonlinear plates in a few modes: energy, motion, contact in series, and impacts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import ellipk
+
+from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, LinearPermanent
+from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.membrane import Membrane
+from fecm.mechanics.mesh import equation_numbers
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.points import DISC, patch_weights
+from fecm.mechanics.reduced_motion import ReducedMotion, SeriesLaw
+from fecm.mechanics.reduced_plate import (
+    ReducedPlate,
+    ReductionError,
+    bending_modes,
+    reduced_plate,
+)
+from fecm.mechanics.solutions import Tangent, modes, static_stiffness
+from tests.builders import (
+    Floats,
+    boundary,
+    distorted_square,
+    general_plate,
+    isotropic_plate,
+    nothing,
+    square,
+    with_restraints,
+)
+from tests.nonlinear_plates import RULES
+
+THICKNESS = 0.02  # of the isotropic plates, on the unit square
+
+
+def on_square(lam: Laminate, *, held: bool, n: int = 4, distorted: bool = False) -> PlateModel:
+    """Simply supported unit square, its edges held in the plane or free there."""
+    coordinates, elements = (distorted_square if distorted else square)(n, n)
+    edge = boundary(coordinates, elements)[:, 0]
+    restrained = nothing(coordinates)
+    restrained[edge, 2] = True
+    restrained[edge, :2] = held
+    mesh = with_restraints(coordinates, elements, restrained)
+    return PlateModel(mesh, lam, RULES, nonlinear=True)
+
+
+def patch_on(plate: PlateModel, x: float = 0.5, y: float = 0.5) -> Floats:
+    """A unit force on a disc, (numnp, 5)."""
+    contact = np.zeros(plate.mesh.equations.shape)
+    contact[:, 2] = patch_weights(plate.mesh, DISC, 0.1, x, y)
+    return contact
+
+
+def relaxed_energy(plate: PlateModel, field: Floats) -> float:
+    """Strain energy of the elements with w and rotations given, u and v in equilibrium."""
+    codes = plate.mesh.codes.copy()
+    codes[:, 2:] = 1
+    inner = replace(plate.mesh, codes=codes, equations=equation_numbers(codes))
+    membrane, free = Membrane(plate), plate.mesh.equations > 0
+
+    def forces(field: Floats) -> tuple[Floats, float]:
+        quadratic, work = membrane.forces(field)
+        total = np.zeros_like(field)
+        total[free] = plate.stiffness @ field[free]
+        return total + quadratic, work
+
+    found = field.copy()
+    in_plane = inner.equations > 0
+    found[in_plane] -= Tangent(replace(plate, mesh=inner)).solve(forces(field)[0][in_plane])
+    total, work = forces(found)
+    return 0.5 * float((found * total).sum() - work)
+
+
+@pytest.mark.parametrize("held", [True, False])
+@pytest.mark.parametrize("lam", [isotropic_plate(THICKNESS), general_plate()])
+def test_the_energy_is_that_of_the_elements_with_the_membrane_in_equilibrium(
+    lam: Laminate, held: bool
+) -> None:
+    plate = on_square(lam, held=held, distorted=True)
+    plate = plate if lam.is_coupled else replace(plate, preload=(1e-5, -2e-6, 3e-6))
+    contact = patch_on(plate, 0.6, 0.45)
+    shapes = bending_modes(plate, contact, 5).shapes
+    made = reduced_plate(plate, contact, 5)
+    q = np.array([0.7, -0.4, 0.3, 0.2, -0.1])
+    field = plate.field(shapes @ q, 0.0)
+    largest = np.abs(field[:, 2]).max()
+    q, field = q * lam.thickness / largest, field * lam.thickness / largest
+    first, second = np.triu_indices(5)
+    membrane = -(made.cubic[5:] @ (q[first] * q[second])) / made.stiffness[5:]
+    energy = made.strain_energy(np.append(q, membrane)[:, None])
+    assert made.bending == 5
+    assert energy[0] == pytest.approx(relaxed_energy(plate, field), rel=1e-11)
+    linear = 0.5 * float((made.stiffness[:5] * q * q).sum())
+    assert energy[0] > 1.05 * linear  # the plate does stretch
+
+
+def test_internal_forces_are_the_gradient_of_the_energy() -> None:
+    plate = on_square(general_plate(), held=False)
+    made = reduced_plate(plate, patch_on(plate), 4)
+    n = len(made.stiffness)
+    assert n > made.bending  # membrane modes too
+    q = 0.1 * np.cos(np.arange(n) + 1.0)[:, None]
+    step = 1e-5
+    moved = q + step * np.hstack([np.eye(n), -np.eye(n)])
+    energy = made.strain_energy(moved)
+    slope = (energy[:n] - energy[n:]) / (2.0 * step)
+    exact = made.internal_forces(q)[:, 0]
+    assert np.abs(slope - exact).max() < 1e-7 * np.abs(exact).max()
+
+
+def test_modes_are_those_of_the_plate_that_the_load_moves_most() -> None:
+    plate = on_square(isotropic_plate(THICKNESS), held=True, n=3)
+    oblong = plate.mesh.coordinates * (1.0, 0.73)  # no two modes of equal frequency
+    plate = replace(plate, mesh=replace(plate.mesh, coordinates=oblong))
+    contact = patch_on(plate, 0.4, 0.38)
+    found = bending_modes(plate, contact, 6)
+    every = modes(plate, plate.neq, consistent=False)
+    moved = every.shapes @ contact[plate.mesh.equations > 0]
+    shares = (moved / every.angular_frequency) ** 2
+    largest = np.argsort(-shares)[:6]
+    assert found.stiffness == pytest.approx(every.angular_frequency[largest] ** 2, rel=1e-9)
+    assert found.deflection == pytest.approx(np.abs(moved[largest]), rel=1e-6)
+    assert 1.0 / found.compliance == pytest.approx(static_stiffness(plate, contact), rel=1e-10)
+
+
+def test_a_central_load_finds_no_mode_that_it_does_not_move() -> None:
+    plate = on_square(isotropic_plate(THICKNESS), held=True)
+    found = bending_modes(plate, patch_on(plate), 10)
+    assert (found.shares > 1e-8 * found.compliance).all()
+
+
+def test_all_modes_leave_no_compliance_to_the_contact() -> None:
+    plate = on_square(isotropic_plate(THICKNESS), held=True, n=2)
+    made = reduced_plate(plate, patch_on(plate), 100)
+    assert made.bending < 100
+    assert made.flexibility < 1e-8 / static_stiffness(plate, patch_on(plate))
+
+
+def test_few_modes_and_the_spring_have_the_static_stiffness_of_the_plate() -> None:
+    plate = on_square(isotropic_plate(THICKNESS), held=True)
+    made = reduced_plate(plate, patch_on(plate), 3)
+    compliance = (made.deflection**2 / made.stiffness).sum() + made.flexibility
+    assert made.flexibility > 0.005 * compliance
+    assert 1.0 / compliance == pytest.approx(static_stiffness(plate, patch_on(plate)), rel=1e-10)
+
+
+def test_a_plate_that_is_not_held_has_no_reduced_model() -> None:
+    coordinates, elements = square(2, 2)
+    mesh = with_restraints(coordinates, elements, nothing(coordinates))
+    plate = PlateModel(mesh, isotropic_plate(THICKNESS), RULES, nonlinear=True)
+    with pytest.raises(ReductionError, match="a plate that is held"):
+        reduced_plate(plate, patch_on(plate), 3)
+
+
+# Motion ------------------------------------------------------------------------------------------
+
+
+def one_mode(quartic: float = 0.0, damping: float = 0.0) -> ReducedPlate:
+    """An oscillator of frequency 1 with the energy q^2/2 + quartic q^4/2."""
+    return ReducedPlate(
+        bending=1,
+        stiffness=np.array([1.0]),
+        deflection=np.array([1.0]),
+        flexibility=0.0,
+        cubic=np.zeros((1, 1)),
+        quartic=np.array([[quartic]]),
+        damping=damping,
+    )
+
+
+def test_a_linear_mode_under_a_constant_force_is_exact_at_any_step() -> None:
+    dt = 1.3
+    motion = ReducedMotion(one_mode(), dt, 1)
+    # Central differences from rest: half of the force in the first step.
+    found = [motion.advance(np.array([0.5 if step == 0 else 1.0]))[0] for step in range(20)]
+    exact = 1.0 - np.cos(dt * np.arange(1, 21))
+    assert np.abs(found - exact).max() < 1e-12
+
+
+def test_the_period_of_a_duffing_oscillator_is_that_of_jacobi() -> None:
+    quartic, dt = 0.4, 0.02
+    motion = ReducedMotion(one_mode(quartic), dt, 1)
+    pushed = [motion.advance(np.array([1.0 if step < 60 else 0.0]))[0] for step in range(3000)]
+    w = np.array(pushed[100:])
+    amplitude = np.abs(w).max()
+    # q'' + q + 2 c q^3 = 0: T = 4 K(m)/sqrt(1 + e), e = 2 c A^2, m = e/(2 (1 + e)).
+    e = 2.0 * quartic * amplitude**2
+    period = 4.0 * ellipk(e / (2.0 * (1.0 + e))) / np.sqrt(1.0 + e)
+    rising = np.flatnonzero((w[:-1] < 0.0) & (w[1:] >= 0.0))
+    at = rising - w[rising] / (w[rising + 1] - w[rising])
+    measured = dt * (at[-1] - at[0]) / (len(at) - 1)
+    assert e > 0.3
+    assert measured == pytest.approx(period, rel=1e-4)
+
+
+def test_the_energy_is_kept_without_a_force_and_falls_by_the_damping() -> None:
+    dt, damping = 0.05, 0.03
+    for a in (0.0, damping):
+        motion = ReducedMotion(one_mode(0.2, a), dt, 1)
+        for _ in range(20):
+            motion.advance(np.array([1.0]))
+        none = np.zeros(1)
+        motion.advance(none)
+        before = motion.energy(none)[0]
+        steps = round(40.0 * np.pi / dt)
+        for _ in range(steps):
+            motion.advance(none)
+        after = motion.energy(none)[0]
+        # Mass-proportional damping takes a v^2, on average close to a times the energy.
+        expected = before * np.exp(-a * steps * dt)
+        assert after == pytest.approx(expected, rel=2e-4 if a == 0.0 else 0.1)
+
+
+def test_no_case_depends_on_the_others() -> None:
+    plate = on_square(isotropic_plate(THICKNESS), held=True, n=2)
+    made = reduced_plate(plate, patch_on(plate), 4)
+    forces = np.linspace(1e-6, 1e-4, 70)
+    dt = 0.2 / made.fastest
+    together, alone = ReducedMotion(made, dt, 70), ReducedMotion(made, dt, 1)
+    w = [together.advance(forces)[41] for _ in range(30)]
+    own = [alone.advance(forces[41:42])[0] for _ in range(30)]
+    assert w == own
+
+
+# Contact in series -------------------------------------------------------------------------------
+
+
+def test_a_law_in_series_with_a_spring_has_the_sum_of_their_displacements() -> None:
+    k, flexibility = 2.0, 0.6
+    cases = np.ones(3)
+    inner = HystereticLaw(LinearPermanent(k * cases, 0.1 * cases, 0.3 * cases, 2.5 * cases))
+    law = SeriesLaw(inner, flexibility)
+    memory, last = law.start(), ContactPoint(0.0 * cases, 0.0 * cases)
+    depths = np.concatenate([np.linspace(0.05, 1.0, 20), np.linspace(0.95, 0.3, 14), [0.8, 1.4]])
+    for depth in depths:
+        own = depth * np.array([1.0, 0.5, -1.0])
+        force, memory = law.trial(memory, last, own)
+        point = ContactPoint(own, force)
+        memory_of_law = memory
+        memory = law.accept(memory, last, own)
+        again, _ = inner.trial(memory_of_law, law.of_law(last), law.of_law(point).indentation)
+        assert force == pytest.approx(again, rel=1e-6, abs=1e-12)
+        last = point
+    assert last.force[2] == 0.0
+    # On the first loading curve again: a + k a^1.5/k_r = 1.4.
+    a = law.of_law(last).indentation[0]
+    assert a + flexibility * k * a**1.5 == pytest.approx(1.4, rel=1e-8)
+    assert law.permanent(memory, last)[0] == pytest.approx(0.3 * (a - 0.1), rel=1e-8)
+
+
+def test_a_spring_softer_than_the_contact_converges() -> None:
+    cases = np.ones(1)
+    inner = HystereticLaw(LinearPermanent(1e6 * cases, 1e9 * cases, 0.0 * cases, 1.5 * cases))
+    law = SeriesLaw(inner, 1.0)
+    force, _ = law.trial(law.start(), ContactPoint(0.0 * cases, 0.0 * cases), cases)
+    assert (force / 1e6) ** (2.0 / 3.0) + force == pytest.approx(cases, rel=1e-8)
