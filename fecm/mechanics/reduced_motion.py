@@ -40,13 +40,16 @@ class ReducedMotion:
         self._inertia = dt * dt * np.sinc(phase / (2.0 * np.pi)) ** 2  # dt^2 psi
         self._of_velocity = 1.0 / np.sinc(phase / np.pi)
         self._damping = 0.5 * plate.damping * self._inertia / dt
+        self._damped = np.zeros((shape[0], TILE))  # what it has taken, up to half a step
 
     def advance(self, force: Floats) -> Floats:
         """Take a step under the contact forces at its start, (cases,).
 
         Returns the displacement of the coordinates under the load, (cases,).
         """
-        self._increment = self._next_increment(force)
+        before, self._increment = self._increment, self._next_increment(force)
+        if self.plate.damping:
+            self._damped += self.plate.damping * self.dt * self._square_of_velocity(before)
         self._q += self._increment
         for q, internal in zip(self._q, self._internal, strict=True):
             internal[:] = self.plate.internal_forces(q)
@@ -54,12 +57,19 @@ class ReducedMotion:
         return np.asarray(moved.ravel()[: self._cases])
 
     def energy(self, force: Floats) -> Floats:
-        """Kinetic and strain energy after the last step, under the forces there, (cases,)."""
-        moved = self._increment + self._next_increment(force)
-        velocity = self._of_velocity * moved / (2.0 * self.dt)
+        """Energy after the last step, under the forces there, with what the damping has taken.
+
+        Kinetic and strain energy, (cases,).
+        """
+        square = self._square_of_velocity(self._next_increment(force))
         strain = np.array([self.plate.strain_energy(q) for q in self._q])
-        energy = 0.5 * (velocity * velocity).sum(axis=1) + strain
-        return np.asarray(energy.ravel()[: self._cases])
+        damped = self._damped + 0.5 * self.plate.damping * self.dt * square
+        return np.asarray((0.5 * square + strain + damped).ravel()[: self._cases])
+
+    def _square_of_velocity(self, other: Floats) -> Floats:
+        """Sum of the squares of the velocities between the last increments and others."""
+        velocity = self._of_velocity * (self._increment + other) / (2.0 * self.dt)
+        return np.asarray((velocity * velocity).sum(axis=1))
 
     def _next_increment(self, force: Floats) -> Floats:
         """Increments of the coordinates in the next step."""
