@@ -22,7 +22,7 @@ from fecm.results import hdf5_writer
 from fecm.results.hdf5_reader import read
 from fecm.results.result import result_of
 from fecm.simulation.run import simulate
-from fecm.sweeps.api import carry_out, check_draws, problem_of
+from fecm.sweeps.api import carry_out, check_draws, modes_of, problem_of
 from fecm.sweeps.batch import deck_of
 from fecm.sweeps.case import Case, CasesError, Value
 from fecm.sweeps.cases import read_cases
@@ -35,7 +35,18 @@ from fecm.sweeps.limits import Limit, parse_exceed
 from fecm.sweeps.memory import check_memory
 from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.parts import PartialResults, alone
-from fecm.sweeps.plan import MEASURES, Measure, Plan, Task, plan, shares_plate, tasks
+from fecm.sweeps.plan import (
+    MEASURES,
+    MODES,
+    MOST_MODES,
+    REDUCED,
+    Measure,
+    Plan,
+    Task,
+    plan,
+    shares_plate,
+    tasks,
+)
 from fecm.sweeps.random import (
     DESIGNS,
     Design,
@@ -62,7 +73,7 @@ GROUPS = {
     "Random values": ("random", "samples", "seed", "design", "sensitivity", "exceed"),
     "Search": ("find", "until"),
     "Result": ("output", "history", "measure", "full", "overwrite"),
-    "Computation": ("workers", "scheduler", "scheduler_file"),
+    "Computation": ("model", "modes", "workers", "scheduler", "scheduler_file"),
 }
 
 
@@ -87,6 +98,8 @@ class Options:
     measure: tuple[str, ...]
     full: tuple[int, ...] | None  # cases that are also run in full
     overwrite: bool
+    model: str | None
+    modes: int | None
     workers: int
     scheduler: str | None
     scheduler_file: Path | None
@@ -117,6 +130,8 @@ class Options:
             raise click.UsageError("give only one of --workers, --scheduler and --scheduler-file")
         if self.full and self.find:
             raise click.UsageError("--full runs given velocities: --vary velocity=FOUND --full 0")
+        if self.modes is not None and self.model is None:
+            raise click.UsageError("--modes needs --model reduced")
 
     def _check_random(self) -> None:
         """Raise UsageError if the options of random values do not fit together."""
@@ -222,6 +237,18 @@ class Options:
     help="Also run these cases in full, into SWEEP-CASE.h5; cases count from 0.",
 )
 @option(
+    "--model",
+    type=click.Choice([REDUCED]),
+    help="Compute the cases of a nonlinear plate (NONL) together, in a few bending modes, instead "
+    "of by full runs; three of these check it.",
+)
+@option(
+    "--modes",
+    type=click.IntRange(1, MOST_MODES),
+    metavar="M",
+    help=f"Bending modes of --model reduced.  [default: {MODES}]",
+)
+@option(
     "--workers",
     type=click.IntRange(1, 1024),
     default=1,
@@ -273,12 +300,14 @@ def sweep(options: Options) -> None:
         extra=(Measure.DEFLECTION,) if options.refine else options.measure,
         design=design,
         limits=options.exceed,
+        modes=modes_of(options.model, options.modes),
     )
     check_draws(planned)
     if not options.refine:
         note(*doubtful_values(problem, cases))
     if design is not None:
-        shared = shares_plate(problem) and not planned.settings.in_full
+        reduced = planned.settings.modes is not None
+        shared = reduced or (shares_plate(problem) and not planned.settings.in_full)
         note(*filter(None, (doubt(design), cost(cases, design, shared=shared))))
     here = options.workers if scheduler is None else 0
     check_memory(problem, planned, here, streamed=True)
@@ -287,7 +316,7 @@ def sweep(options: Options) -> None:
             f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the deck "
             "restrains at every node, are free there except where w is held"
         )
-    if problem.plate.nonlinear:
+    if planned.settings.modes is None and problem.plate.nonlinear:
         note(expected(problem, planned, here))
 
     click.get_current_context().with_resource(alone(path))

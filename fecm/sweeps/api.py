@@ -6,6 +6,7 @@ import pickle
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -27,7 +28,17 @@ from fecm.sweeps.limits import Limit, parse_exceed
 from fecm.sweeps.memory import check_memory
 from fecm.sweeps.outcome import Outcome, Status, merge
 from fecm.sweeps.parts import DamagedPartError, PartialResults
-from fecm.sweeps.plan import BuildFunction, Measure, MeasureFunction, Plan, Task, plan, tasks
+from fecm.sweeps.plan import (
+    MODES,
+    REDUCED,
+    BuildFunction,
+    Measure,
+    MeasureFunction,
+    Plan,
+    Task,
+    plan,
+    tasks,
+)
 from fecm.sweeps.random import (
     REMEDY,
     DesignKind,
@@ -36,6 +47,7 @@ from fecm.sweeps.random import (
     parse_law,
     random_cases,
 )
+from fecm.sweeps.reduced_check import compared, trials
 from fecm.sweeps.refine import refined_cases
 from fecm.sweeps.result import SweepResult, result_of
 from fecm.sweeps.result_file import save
@@ -112,9 +124,44 @@ def carry_out(
 
     Tasks that `parts` has stored are not run again; with it, the result has no forces.  `done` is
     called with each task and its outcome, including tasks finished earlier, `idle` regularly,
-    `note` with messages for the user.  Raises SchedulerError if the scheduler cannot be used.
+    `note` with messages for the user.  Raises SchedulerError if the scheduler cannot be used, and
+    CasesError if full runs show that the reduced model of the plan does not hold.
     """
-    outcomes: list[Outcome] = []
+    run = partial(
+        _outcomes,
+        workers=workers,
+        scheduler=scheduler,
+        executor=executor,
+        parts=parts,
+        idle=idle,
+        note=note,
+    )
+    whole = tasks(problem, made)
+    model = None
+    if made.settings.modes is not None:
+        fulls, models = trials(made, len(whole))
+        found = run([*fulls, *models], done=lambda task, outcome: None)
+        in_full = [outcome for task, outcome in found if task.settings.modes is None]
+        by_model = [outcome for task, outcome in found if task.settings.modes is not None]
+        model = compared(made.settings.modes, in_full, by_model)
+    outcomes = [outcome for _, outcome in run(whole, done=done)]
+    history = made.settings.history and parts is None
+    return result_of(made, merge(outcomes, history=history), model)
+
+
+def _outcomes(
+    whole: Sequence[Task],
+    *,
+    workers: int,
+    scheduler: object,
+    executor: Executor | None,
+    parts: PartialResults | None,
+    done: schedule.Done,
+    idle: schedule.Idle,
+    note: Callable[[str], None],
+) -> list[tuple[Task, Outcome]]:
+    """Run tasks, or take their stored outcomes; see :func:`carry_out`."""
+    outcomes: list[tuple[Task, Outcome]] = []
     left: list[Task] = []
 
     def keep(task: Task, outcome: Outcome, *, new: bool = True) -> None:
@@ -122,10 +169,10 @@ def carry_out(
             if new and not any(text.startswith(schedule.LOST) for text in outcome.status):
                 parts.put(task, outcome)  # cases that were lost with their worker may be run again
             outcome.force = None
-        outcomes.append(outcome)
+        outcomes.append((task, outcome))
         done(task, outcome)
 
-    for task in tasks(problem, made):
+    for task in whole:
         before = None
         try:
             before = None if parts is None else parts.get(task)
@@ -145,8 +192,7 @@ def carry_out(
         for task in left:
             idle()
             keep(task, schedule.attempt(task))
-    history = made.settings.history and parts is None
-    return result_of(made, merge(outcomes, history=history))
+    return outcomes
 
 
 def sweep(
@@ -165,6 +211,8 @@ def sweep(
     history: bool = False,
     build: BuildFunction | None = None,
     measure: MeasureFunction | str | Sequence[str] | None = None,
+    model: Literal["reduced"] | None = None,
+    modes: int | None = None,
     workers: int = 1,
     scheduler: object = None,
     executor: Executor | None = None,
@@ -220,6 +268,11 @@ def sweep(
         More columns of the summary: ``"max_deflection"``, ``"gages"``, ``"failure"``.  A callable
         takes the :class:`Result` of a case and returns numbers by name, without units; each case is
         then run in full, with all that its deck stores.
+    model : {"reduced"}, optional
+        Compute the cases of a nonlinear plate together, in a few bending modes, instead of by full
+        runs; :attr:`SweepResult.reduced` has its differences from three of these.
+    modes : int, optional
+        Number of bending modes of that model; 21 by default.
     workers : int
         Worker processes on this machine.  With more than 1, a script needs
         ``if __name__ == "__main__"``.
@@ -240,8 +293,8 @@ def sweep(
     Raises
     ------
     CasesError
-        If the cases are invalid, options exclude each other, no case has a deck, or `measure`
-        returns different names in different cases.
+        If the cases are invalid, options exclude each other, no case has a deck, `measure` returns
+        different names in different cases, or the reduced model differs too much from full runs.
     DeckError
         If the deck has errors.
     NotEnoughMemoryError
@@ -301,6 +354,7 @@ def sweep(
         extra=measures,
         design=drawn,
         limits=_limits(exceed),
+        modes=modes_of(model, modes),
     )
     check_draws(planned)
     for text in doubtful_values(problem, made) if build is None else ():
@@ -345,6 +399,17 @@ def _check_options(
         raise CasesError(f"random is {random!r}; write a mapping such as {example}")
     if build is not None and not callable(build):
         raise CasesError(f"build is {build!r}, not a function")
+
+
+def modes_of(model: str | None, modes: int | None) -> int | None:
+    """Bending modes of a model; None of full runs.  CasesError if there is no such model."""
+    if model is None:
+        if modes is not None:
+            raise CasesError("modes are those of the reduced model, which is not asked for")
+        return None
+    if model != REDUCED:
+        raise CasesError(f"unknown model {model!r}; there is {REDUCED!r}")
+    return MODES if modes is None else modes
 
 
 def _check_means(workers: int, scheduler: object, executor: object) -> None:

@@ -1,7 +1,8 @@
 """Run cases of a sweep: together if they share a plate, otherwise one by one.
 
 Cases share a plate if they differ only in projectile, impact velocity or contact law.  The plate is
-then stepped once under a unit force; every case follows by convolution with its response.
+then stepped once under a unit force; every case follows by convolution with its response.  Those of
+a nonlinear plate are run in full, or by the reduced model.
 """
 
 from __future__ import annotations
@@ -35,7 +36,8 @@ from fecm.sweeps.limits import THRESHOLD
 from fecm.sweeps.memory import ADVANCED_BYTES
 from fecm.sweeps.outcome import Outcome, merge, outcome_of
 from fecm.sweeps.plan import Measure, Plan, Settings, Task, shares_plate
-from fecm.sweeps.responses import Hits, impacts, largest_sums, plate_response
+from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
+from fecm.sweeps.responses import Hits, Impacts, impacts, largest_sums, plate_response
 from fecm.sweeps.strike import Strike
 from fecm.sweeps.timing import Clock, lengthened, with_clock
 from fecm.sweeps.values import plate_values
@@ -58,6 +60,7 @@ def run(task: Task) -> Outcome:
             tuple(of_plate.items()),
             settings.clock,
             settings.measures,
+            modes=settings.modes,
             history=settings.history,
         )
     except CasesError as error:
@@ -125,12 +128,32 @@ def _prepared(
     clock: Clock | None,
     measures: tuple[Measure, ...],
     *,
+    modes: int | None,
     history: bool,
 ) -> tuple[Problem, Runs]:
     """The problem of a plate, given by values of names, and what runs its strikes."""
     case: Case = dict(of_plate)
     checked = with_clock(apply_case(deck, case), clock, case)
+    if modes is not None:
+        return checked, _reduced_runs(checked, modes, measures, history=history)
     return checked, runs_of(checked, measures, history=history)
+
+
+def _reduced_runs(
+    checked: Problem, modes: int, measures: Sequence[Measure], *, history: bool
+) -> Runs:
+    """Return the function that runs strikes of the plate of a problem in bending modes."""
+    plate = reduced(checked, modes)
+
+    def runs(strikes: Strikes, judged: bool) -> Outcome:
+        return merge(
+            [
+                _together(checked, plate.halved(times), measures, history, some, judged)
+                for times, some in by_halvings(plate, strikes).items()
+            ]
+        )
+
+    return runs
 
 
 def runs_of(checked: Problem, measures: Sequence[Measure] = (), *, history: bool = True) -> Runs:
@@ -160,6 +183,15 @@ class Plate(NamedTuple):
     dt: float
     node_mass: float
     strains: dict[str, Floats]  # response of every gage that is measured, by the name of its column
+
+    @property
+    def steps(self) -> int:
+        """Number of steps."""
+        return len(self.response)
+
+    def impacts(self, hits: Hits) -> Impacts:
+        """Compute many impacts."""
+        return impacts(self.response, self.dt, self.node_mass, hits)
 
 
 def _plate(checked: Problem, *, gages: bool) -> Plate:
@@ -211,18 +243,18 @@ def _ordered(strikes: Strikes) -> _Ordered:
 
 def _together(
     checked: Problem,
-    plate: Plate,
+    plate: Plate | ReducedImpacts,
     measures: Sequence[Measure],
     history: bool,
     strikes: Strikes,
     judged: bool,
 ) -> Outcome:
-    """Run cases by the response of their plate; if judged, those with doubtful energies in full."""
-    steps, dt = len(plate.response), plate.dt
+    """Run cases of a plate; if judged, those with doubtful energies in full."""
+    steps, dt = plate.steps, plate.dt
     require(ADVANCED_BYTES * steps * len(strikes), f"{len(strikes)} cases of {steps} steps")
     with np.errstate(all="ignore"):
         ordered = _ordered(strikes)
-        struck = impacts(plate.response, dt, plate.node_mass, ordered.hits)
+        struck = plate.impacts(ordered.hits)
         metrics = summarise(
             struck.force,
             np.add.accumulate(np.full(steps, dt)),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Any
@@ -26,11 +26,15 @@ from fecm.sweeps.find import FIRST_VELOCITIES, Search, Sought, Until, search_of
 from fecm.sweeps.limits import Limit, check_limits
 from fecm.sweeps.random import Design
 from fecm.sweeps.timing import Clock, clock_of
-from fecm.sweeps.values import Changes, check_names, names_of, plate_values
+from fecm.sweeps.values import REFINE, Changes, check_names, names_of, plate_values
 
 BuildFunction = Callable[[dict[str, Any]], Deck]  # of a case, whose values are any
 MeasureFunction = Callable[[Result], Mapping[str, float]]
 MOST_TOGETHER = 2048  # cases advanced together
+MOST_REDUCED = 256  # of the reduced model, whose steps cost more
+REDUCED = "reduced"  # name of that model
+MODES = 21  # bending modes of the reduced model
+MOST_MODES = 40
 # Names that keep the critical time step of the deck.
 _KEEPING = {*names_of(Changes.STRIKE, Changes.PLACE), "duration"}
 
@@ -57,6 +61,7 @@ class Settings:
     build: BuildFunction | None = None  # makes the deck of a case
     measure: MeasureFunction | None = None  # computes more columns from the result of a case
     measures: tuple[Measure, ...] = ()  # more columns
+    modes: int | None = None  # bending modes of the reduced model; None of full plates
 
     @property
     def in_full(self) -> bool:
@@ -79,7 +84,7 @@ class Plan:
         """Hash that identifies the outcomes of this sweep."""
         own = self.settings
         parts = [__version__, own.deck.to_text(), self.cases, own.history, own.search]
-        text = json.dumps([*parts, own.measures, MOST_TOGETHER])
+        text = json.dumps([*parts, own.measures, own.modes, MOST_TOGETHER])
         return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -104,11 +109,13 @@ def plan(
     extra: Sequence[str] = (),
     design: Design | None = None,
     limits: Sequence[Limit] = (),
+    modes: int | None = None,
 ) -> Plan:
     """Create the plan of a sweep; `extra` are names of :class:`Measure`, `until` is sought.
 
-    Raises CasesError if the deck has no impact, names exclude each other, or the deck lacks what is
-    searched or measured.
+    With `modes` the cases are those of the reduced model.  Raises CasesError if the deck has no
+    impact, names exclude each other, the deck lacks what is searched or measured, or the reduced
+    model does not give it.
     """
     deck, search = checked.deck, search_of(until)
     if search is not None and search.quantity is Sought.EXPOSURE:
@@ -134,7 +141,10 @@ def plan(
         build=build,
         measure=measure,
         measures=measures,
+        modes=modes,
     )
+    if modes is not None:
+        _check_reduced(checked, cases[0], settings)
     return Plan(settings, tuple(cases), design, tuple(limits))
 
 
@@ -165,10 +175,36 @@ def _check_limits(
     check_limits(limits, known, threshold=has_threshold)
 
 
+def _check_reduced(checked: Problem, names: Collection[str], settings: Settings) -> None:
+    """Raise CasesError if the reduced model is not for a deck, or does not give what is asked."""
+    modes = settings.modes
+    if not (isinstance(modes, int) and 1 <= modes <= MOST_MODES):
+        raise CasesError(f"the reduced model takes 1 to {MOST_MODES} bending modes, not {modes!r}")
+    if settings.build or settings.measure or {*settings.measures} - {Measure.DEFLECTION}:
+        raise CasesError(
+            "the reduced model has forces and deflections only, of a deck: no build, and none of "
+            "measure but max_deflection"
+        )
+    if settings.search is not None:
+        raise CasesError("searches take full runs: leave out the reduced model")
+    if REFINE in names or "dt" in names:
+        raise CasesError("the reduced model has a time step of its own: dt and refine can't vary")
+    if not checked.deck.has(Nonlinear):
+        raise CasesError("the reduced model is for decks with NONL; cases of others share a run")
+    if not _only_impacts(checked):
+        raise CasesError(
+            "the reduced model starts at rest, with impact steps of one size: the deck has other "
+            "steps, nodal forces or prescribed displacements"
+        )
+
+
 def shares_plate(checked: Problem) -> bool:
-    """Whether a program has only impact steps of one size, and a linear plate no other loads."""
-    if checked.deck.has(Nonlinear):
-        return False
+    """Whether cases of a linear plate share a response: see :func:`_only_impacts`."""
+    return not checked.deck.has(Nonlinear) and _only_impacts(checked)
+
+
+def _only_impacts(checked: Problem) -> bool:
+    """Whether a program has only impact steps of one size, and the plate no other loads."""
     words = [macro.word for macro in flat(checked.program)]
     sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
     if "RODP" not in words or len(sizes) != 1 or words.index("DT") > words.index("RODP"):
@@ -178,6 +214,8 @@ def shares_plate(checked: Problem) -> bool:
 
 def runs_together(checked: Problem, made: Plan) -> int:
     """Most runs advanced together."""
+    if made.settings.modes is not None:
+        return min(MOST_REDUCED, len(made.cases))
     if made.settings.in_full or not shares_plate(checked):
         return 1
     return min(MOST_TOGETHER, len(made.cases) * _runs_of_case(made))

@@ -28,6 +28,7 @@ from fecm.sweeps.convergence import Convergence, convergence
 from fecm.sweeps.outcome import About, Column, Outcome, Status, was_run
 from fecm.sweeps.plan import Plan
 from fecm.sweeps.random_result import RandomResult, evaluate, open_ends
+from fecm.sweeps.reduced_check import ReducedModel
 from fecm.sweeps.values import REFINE, dimension_of
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def summary(result: SweepResult) -> list[str]:
         lines.append(f"failed            for {others} other reason{'s' * (others > 1)}")
     if result.random is not None and failed:
         lines.append(f"failed share      {(~fine).mean():.3%} of the draws")
-    return lines
+    return [*lines, *(() if result.reduced is None else result.reduced.lines())]
 
 
 def _extremes(result: SweepResult) -> Iterator[str]:
@@ -187,6 +188,8 @@ class SweepResult:
         Names of the units; empty if the deck states none.
     random : RandomResult or None
         Statistics, sensitivity indices and probabilities of a random sweep.
+    reduced : ReducedModel or None
+        Full runs beside the reduced model; None if the cases are not by that model.
     """
 
     cases: dict[str, Column]
@@ -199,6 +202,7 @@ class SweepResult:
     title: str = ""
     units: dict[str, str] = field(default_factory=dict)
     random: RandomResult | None = None
+    reduced: ReducedModel | None = None
 
     def __len__(self) -> int:
         return len(self.dt)
@@ -383,7 +387,7 @@ def _grid(cases: Mapping[str, Column], count: int) -> tuple[dict[str, Column], N
     return {}, np.arange(count)
 
 
-def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
+def result_of(plan: Plan, outcome: Outcome, reduced: ReducedModel | None = None) -> SweepResult:
     """Create the result from a plan and its outcome."""
     cases = {name: np.array([case[name] for case in plan.cases]) for name in plan.cases[0]}
     columns, deck = outcome.columns, plan.settings.deck
@@ -404,6 +408,7 @@ def result_of(plan: Plan, outcome: Outcome) -> SweepResult:
         title=deck.title,
         units=unit_names(deck),
         random=random,
+        reduced=reduced,
     )
 
 

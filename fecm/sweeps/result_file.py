@@ -12,6 +12,7 @@ from fecm._version import __version__
 from fecm.results import schema
 from fecm.results.errors import ResultFileError
 from fecm.results.metrics import COLUMNS, SUMMARY, VALIDITY, VERDICTS, described
+from fecm.sweeps import reduced_check
 from fecm.sweeps.outcome import Column, Forces
 from fecm.sweeps.random_file import attributes, random_of, stored
 from fecm.sweeps.result import SweepResult
@@ -63,6 +64,12 @@ def save(
             _write_forces(sink, len(result), int(result.steps.max()), forces)
         for one in () if result.random is None else stored(result.random):
             _write(sink, one.path, one.values, one.text, one.dimension, one.axes)
+        if result.reduced is not None:
+            sink.attributes(reduced_check.GROUP, reduced_check.attributes(result.reduced))
+            for name, text in reduced_check.TEXTS.items():
+                path, values = f"{reduced_check.GROUP}/{name}", result.reduced.columns[name]
+                dimension = reduced_check.DIMENSIONS.get(name, "")
+                _write(sink, path, values, text, dimension, ("trials",))
         for group, text in GROUPS.items():
             sink.attributes(group, {"description": text})
         for name, limit in result.convergence.items():
@@ -164,6 +171,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
         title=str(contents.attributes.get("title", "")),
         units=schema.declared_units(contents.attributes),
         random=random_of(contents, cases, summary, len(steps["dt"])),
+        reduced=reduced_check.reduced_of(contents),
     )
 
 

@@ -1,0 +1,170 @@
+"""Sweeps of nonlinear plates by the reduced model, beside full runs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+import fecm
+from fecm.api import load_deck
+from fecm.results.metrics import RATIO
+from fecm.sweeps import api
+from fecm.sweeps.case import CasesError
+from fecm.sweeps.plan import Task, plan, tasks
+from fecm.sweeps.reduced import by_halvings, reduced
+from fecm.sweeps.strike import strike_of
+from tests.calls import call
+from tests.test_nonlinear_decks import forces, text
+from tests.test_nonlinear_sweeps import BLOW, DECK, LINEAR, PROGRAM
+
+SPEEDS = [300.0, 600.0, 900.0]
+ENOUGH = 8  # modes of this plate
+ROD = BLOW.replace("PROJ\n0, 0, 2e-5\n\n", "PROJ\n4, 0, .5, 1e7, 2e-4\n1, 1, .5\n4, 0, .5\n\n")
+GAGED = text(PROGRAM, data=BLOW + "GAGE\n1, .5, .5, .01, 0.\n\n")
+
+
+@pytest.fixture(scope="module")
+def swept() -> fecm.SweepResult:
+    """The impacts in all modes of the plate that the load moves."""
+    return fecm.sweep(DECK, {"velocity": SPEEDS}, model="reduced", measure="max_deflection")
+
+
+def test_in_all_modes_the_cases_are_those_of_full_runs(swept: fecm.SweepResult) -> None:
+    full = fecm.sweep(DECK, {"velocity": SPEEDS}, measure="max_deflection")
+    assert full[RATIO][2] > 1.0  # the plate does stretch
+    assert set(swept.summary) == set(full.summary)
+    for name in ("peak_force", "max_deflection", "max_indentation", "permanent_indentation"):
+        np.testing.assert_allclose(swept[name], full[name], rtol=1e-4)
+    for name in ("impulse", "rebound_velocity", "energy_absorbed"):
+        np.testing.assert_allclose(swept[name], full[name], rtol=1e-4)
+    np.testing.assert_allclose(swept["contact_time"], full["contact_time"], rtol=5e-3)
+    assert swept["validity"].tolist() == full["validity"].tolist()
+
+
+def test_three_full_runs_are_stored_beside_the_cases_and_shown(
+    swept: fecm.SweepResult, tmp_path: Path
+) -> None:
+    assert swept.reduced is not None
+    assert swept.reduced.columns["case"].tolist() == [0, 1, 2]
+    assert swept.reduced.columns["peak_force"] == pytest.approx(swept["peak_force"], rel=1e-12)
+    assert np.abs(swept.reduced.difference("peak_force")).max() < 1e-4
+    (tmp_path / "d.inp").write_text(DECK)
+    given = ("--vary", "velocity=300:900:5", "--model", "reduced", "--modes", str(ENOUGH))
+    done = call("sweep", "d.inp", *given, "-o", "s.h5", cwd=tmp_path)
+    assert done.exit_code == 0, done.stderr
+    lines = done.stdout.splitlines()
+    start = next(n for n, line in enumerate(lines) if "reduced model" in line)
+    assert f"{ENOUGH} modes of bending" in lines[start]
+    assert [line.split("(case ")[1].rstrip(")") for line in lines[start + 1 : start + 4]] == [
+        "0", "2", "4"
+    ]  # fmt: skip
+    stored = fecm.load_sweep(tmp_path / "s.h5")
+    assert stored.reduced is not None
+    assert stored.reduced.modes == ENOUGH
+    shown = f"peak {stored.reduced.difference('peak_force')[0]:+.2%}"
+    assert shown in lines[start + 1]
+    assert shown in call("info", "s.h5", cwd=tmp_path).stdout
+    with h5py.File(tmp_path / "s.h5") as file:
+        assert file["reduced/full_peak_force"].shape == (3,)
+        assert file["reduced"].attrs["modes"] == ENOUGH
+
+
+def test_too_few_modes_are_refused_before_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
+    ran: list[Task] = []
+    own = api._outcomes
+
+    def counted(whole: Any, **more: Any) -> Any:
+        ran.extend(whole)
+        return own(whole, **more)
+
+    monkeypatch.setattr(api, "_outcomes", counted)
+    with pytest.raises(CasesError, match=r"1 mode differs by \+.* case \d.*2%.*more modes"):
+        fecm.sweep(DECK, {"velocity": [100.0, *SPEEDS]}, model="reduced", modes=1)
+    assert [task.numbers for task in ran] == [(0,), (2,), (3,)] * 2
+
+
+def test_a_case_does_not_depend_on_the_others(swept: fecm.SweepResult) -> None:
+    others = {"velocity": [900.0, 450.0], "k": [5e4, 7e4]}
+    again = fecm.sweep(DECK, others, model="reduced", measure="max_deflection")
+    for name in ("peak_force", "max_deflection", "impulse", "permanent_indentation"):
+        assert again[name][0] == swept[name][2]
+
+
+def test_random_values_are_by_the_model_too() -> None:
+    found = fecm.sweep(
+        DECK,
+        random={"k": "uniform:4e4,6e4"},
+        samples=16,
+        exceed={"peak_force": 150.0},
+        model="reduced",
+        modes=ENOUGH,
+    )
+    assert found.random is not None
+    assert found.reduced is not None
+    assert found.reduced.columns["case"].shape == (3,)
+    assert found.random.statistics["peak_force"].draws == 16
+    assert 150.0 < found["peak_force"].min() < found["peak_force"].max() < 210.0
+
+
+def test_an_elastic_rod_hits_the_reduced_plate_as_the_full_one() -> None:
+    deck = text(PROGRAM, data=ROD)
+    given = {"velocity": [300.0]}
+    model, full = fecm.sweep(deck, given, model="reduced"), fecm.sweep(deck, given)
+    assert model["peak_force"] == pytest.approx(full["peak_force"], rel=1e-3)
+    assert model["rebound_velocity"] == pytest.approx(full["rebound_velocity"], rel=2e-3)
+
+
+def test_cases_of_many_velocities_are_few_tasks() -> None:
+    (problem,) = load_deck(DECK).problems
+    cases: list[Any] = [{"velocity": float(v)} for v in range(1, 301)]
+    made = tasks(problem, plan(problem, cases, modes=5))
+    assert [len(task.numbers) for task in made] == [256, 44]
+
+
+def test_a_stiff_contact_halves_the_time_step_of_its_cases() -> None:
+    (problem,) = load_deck(DECK).problems
+    made = reduced(problem, 3)
+    soft = strike_of(problem.deck)
+    stiff = soft.with_constant("k", 1e4 * soft.law.k)
+    groups = by_halvings(made, {0: soft, 1: stiff, 2: soft})
+    times = {number: n for n, group in groups.items() for number in group}
+    assert times[0] == times[2] < times[1]
+    halved = made.halved(times[1])
+    assert halved.dt * halved.steps == pytest.approx(made.dt * made.steps, rel=1e-14)
+    assert made.dt * made.steps == pytest.approx(600 * 4e-7, rel=1e-12)
+
+
+NOT_GIVEN: list[tuple[str, dict[str, Any], str]] = [
+    (LINEAR, {}, "for decks with NONL"),
+    (DECK, {"until": 50.0, "vary": {"k": [5e4]}}, "searches take full runs"),
+    (DECK, {"measure": lambda result: {"w": 0.0}}, "forces and deflections only"),
+    (GAGED, {"measure": "gages"}, "forces and deflections only"),
+    (DECK, {"vary": {"dt": [4e-7]}}, "time step of its own"),
+    (DECK, {"vary": None, "refine": [1, 2]}, "time step of its own"),
+    (DECK, {"modes": 0}, "1 to 40 bending modes, not 0"),
+    (DECK, {"modes": 41}, "1 to 40 bending modes, not 41"),
+    (DECK, {"model": None, "modes": 5}, "not asked for"),
+    (DECK, {"model": "linear"}, "unknown model 'linear'"),
+    (DECK, {"vary": {"velocity": [0.0]}}, "no case has an energy"),
+    (text(PROGRAM, data=BLOW + forces(1.0)), {}, "starts at rest"),
+]
+
+
+@pytest.mark.parametrize(("deck", "given", "reason"), NOT_GIVEN)
+def test_what_the_model_does_not_give_is_refused(
+    deck: str, given: dict[str, Any], reason: str
+) -> None:
+    options: dict[str, Any] = {"vary": {"velocity": [600.0]}, "model": "reduced"}
+    with pytest.raises(CasesError, match=reason):
+        fecm.sweep(deck, **(options | given))
+
+
+def test_modes_without_the_model_are_a_usage_error(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(DECK)
+    done = call("sweep", "d.inp", "--vary", "velocity=300", "--modes", "5", cwd=tmp_path)
+    assert done.exit_code == 2
+    assert "--modes needs --model reduced" in done.stderr
