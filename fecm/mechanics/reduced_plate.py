@@ -54,7 +54,9 @@ CONVERGED = 1e-6
 # Vectors of the Krylov space per mode that is wanted, and in addition.
 VECTORS_PER_MODE, MORE_VECTORS = 12, 60
 # Steps between two solutions of the eigenvalue problem in the Krylov space.
-LOOK = 10
+LOOK = 20
+# Relative difference of the squares of frequencies that are equal.
+EQUAL = 1e-8
 # Size of a new vector relative to the last below which the Krylov space is complete.
 EXHAUSTED = 1e-12
 # Share of a mode in the static compliance below which the load does not move it.
@@ -227,27 +229,56 @@ def _moved_modes(
     basis = np.concatenate([fixed, np.empty((most, len(mass)))])
     inverse = np.zeros((most, most))  # K^-1 M in the basis
     vector, _ = _made_orthogonal(static, fixed, mass)
+    before = np.empty(0)
     for size in range(1, most + 1):
         last, own = few + size - 1, basis[few : few + size]
         basis[last] = vector / _norm(vector, mass)
         vector = tangent.solve(mass * basis[last])
-        before = _norm(vector, mass)
+        whole = _norm(vector, mass)
         vector, parts = _made_orthogonal(vector, basis[: last + 1], mass)
         inverse[:size, size - 1] = parts[few:]
         left = _norm(vector, mass)
-        exhausted = left <= EXHAUSTED * before
+        exhausted = left <= EXHAUSTED * whole
         if not exhausted and size < most and (size < count or size % LOOK):
             continue
-        values, vectors = np.linalg.eigh(inverse[:size, :size], UPLO="U")
+        values, vectors = _moved(inverse[:size, :size], own @ load)
         moved = vectors.T @ (own @ load)
-        shares = np.where(values * stiffest >= 1.0, moved**2 * values, 0.0)
+        shares = moved**2 * values
+        error = left * np.abs(vectors[-1])
+        unknown = (error > CONVERGED * values) & (shares > UNMOVED * compliance)
+        known = int(unknown.argmax()) if unknown.any() else len(values)
+        shares[known:] = 0.0
+        shares[values * stiffest < 1.0] = 0.0
         order = np.argsort(-shares, kind="stable")[:count]
         order = order[shares[order] > least * compliance]
-        if exhausted or (left * np.abs(vectors[-1, order]) <= CONVERGED * values[order]).all():
+        # Modes beyond the known frequencies: their shares are less than those of the chosen ones,
+        # together or if none moves more than a known one; or they are too stiff.
+        full = len(order) == count
+        together = compliance - shares.sum() <= (shares[order[-1]] if full else least * compliance)
+        alone = full and (moved[:known] ** 2).max() * values[known - 1] <= shares[order[-1]]
+        stiff = known < len(values) and (values[known] + error[known]) * stiffest < 1.0
+        same = len(before) == len(order) and np.allclose(before, values[order], CONVERGED, 0.0)
+        if exhausted or together or (same and (alone or stiff)):
             signs = np.where(moved[order] < 0.0, -1.0, 1.0)
             shapes = (signs * vectors[:, order]).T @ own
             return Modes(1.0 / values[order], shapes.T, np.abs(moved[order]), compliance)
+        before = values[order]
     raise ReductionError(f"{count} modes did not converge; take fewer")
+
+
+def _moved(inverse: Floats, load: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues and vectors of K^-1 M in the basis, by ascending frequency.
+
+    Of modes of equal frequency only that which moves under the load, whose parts along the basis
+    are given, is left: rounding adds the others to the Krylov space.
+    """
+    values, vectors = np.linalg.eigh(inverse, UPLO="U")
+    values, vectors = values[::-1], vectors[:, ::-1]
+    moved = vectors.T @ load
+    starts = np.flatnonzero(np.append(True, values[1:] < (1.0 - EQUAL) * values[:-1]))
+    combined = np.add.reduceat(moved * vectors, starts, axis=1)
+    size = np.sqrt(np.add.reduceat(moved**2, starts))
+    return values[starts], combined / np.where(size > 0.0, size, 1.0)
 
 
 def _made_orthogonal(vector: Floats, basis: Floats, mass: Floats) -> tuple[Floats, Floats]:

@@ -73,7 +73,8 @@ def rigid_in_plane(plate: PlateModel) -> Floats:
     values, vectors = np.linalg.eigh(held.T @ held)
     fields = np.zeros((*plate.mesh.equations.shape, 3))
     fields[:, :2] = motions @ vectors
-    return fields[plate.mesh.equations > 0].T[values <= NOT_HELD * values[-1]]
+    free = values <= NOT_HELD * values[-1]
+    return np.asarray(fields[plate.mesh.equations > 0].T[free])
 
 
 def in_plane_pins(plate: PlateModel) -> list[int]:

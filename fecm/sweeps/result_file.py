@@ -67,9 +67,10 @@ def save(
         if result.reduced is not None:
             sink.attributes(reduced_check.GROUP, reduced_check.attributes(result.reduced))
             for name, text in reduced_check.TEXTS.items():
-                path, values = f"{reduced_check.GROUP}/{name}", result.reduced.columns[name]
+                values = result.reduced.columns[name]
                 dimension = reduced_check.DIMENSIONS.get(name, "")
-                _write(sink, path, values, text, dimension, ("trials",))
+                place = f"{reduced_check.GROUP}/{name}"
+                _write(sink, place, values, text, dimension, ("trials",))
         for group, text in GROUPS.items():
             sink.attributes(group, {"description": text})
         for name, limit in result.convergence.items():
