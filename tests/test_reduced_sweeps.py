@@ -163,6 +163,15 @@ def test_what_the_model_does_not_give_is_refused(
         fecm.sweep(deck, **(options | given))
 
 
+def test_a_refused_sweep_leaves_nothing_behind(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(DECK)
+    given = ("sweep", "d.inp", "--vary", "velocity=900", "--model", "reduced", "--modes")
+    refused = call(*given, "1", cwd=tmp_path)
+    assert refused.exit_code == 2
+    assert "take more modes" in refused.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["d.inp"]
+
+
 def test_modes_without_the_model_are_a_usage_error(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(DECK)
     done = call("sweep", "d.inp", "--vary", "velocity=300", "--modes", "5", cwd=tmp_path)

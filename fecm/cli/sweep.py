@@ -425,7 +425,7 @@ def _carry_out(
                 idle=idle,
                 note=note,
             )
-    except SchedulerError:
+    except (CasesError, SchedulerError):
         parts.clear()
         raise
     except (KeyboardInterrupt, SystemExit):
