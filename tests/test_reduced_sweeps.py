@@ -17,7 +17,9 @@ from fecm.sweeps.case import CasesError
 from fecm.sweeps.plan import Task, plan, tasks
 from fecm.sweeps.reduced import by_halvings, reduced
 from fecm.sweeps.strike import strike_of
+from tests.builders import table
 from tests.calls import call
+from tests.nonlinear_impacts import struck_rectangle
 from tests.test_nonlinear_decks import forces, text
 from tests.test_nonlinear_sweeps import BLOW, DECK, LINEAR, PROGRAM
 
@@ -43,6 +45,31 @@ def test_in_all_modes_the_cases_are_those_of_full_runs(swept: fecm.SweepResult) 
         np.testing.assert_allclose(swept[name], full[name], rtol=1e-4)
     np.testing.assert_allclose(swept["contact_time"], full["contact_time"], rtol=5e-3)
     assert swept["validity"].tolist() == full["validity"].tolist()
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("case", ["iso_ss_movable", "iso_clamped_immovable", "cross_ss_immovable"])
+def test_impacts_up_to_twice_the_thickness_are_those_of_a_spectral_program(case: str) -> None:
+    """The table is that of nonlinear_impacts.csv, see test_nonlinear_impacts.py."""
+    rows = [row for row in table("nonlinear_impacts.csv") if row["case"] == case]
+    rows = [row for row in rows if float(row["target_w_over_h"]) <= 2.0]
+    wanted = {
+        name: np.array([float(row[name]) for row in rows])
+        for name in ("velocity_mm_per_s", "peak_N", "W_max_mm", "contact_end_s")
+    }
+    deck = struck_rectangle(case, 16, 1.0, 1.02 * float(wanted["contact_end_s"].max()))
+    found = fecm.sweep(
+        deck,
+        {"velocity": wanted["velocity_mm_per_s"].tolist()},
+        model="reduced",
+        measure="max_deflection",
+    )
+    np.testing.assert_allclose(found["peak_force"], wanted["peak_N"], rtol=1e-2)
+    np.testing.assert_allclose(found["max_deflection"], wanted["W_max_mm"], rtol=1e-3)
+    np.testing.assert_allclose(found["last_contact"], wanted["contact_end_s"], rtol=1e-2)
+    assert found.reduced is not None
+    assert np.abs(found.reduced.difference("peak_force")).max() < 1e-2
+    assert np.abs(found.reduced.difference(RATIO)).max() < 1e-3
 
 
 def test_three_full_runs_are_stored_beside_the_cases_and_shown(
