@@ -18,6 +18,7 @@ from fecm.mechanics.reduced_motion import ReducedMotion, SeriesLaw
 from fecm.mechanics.reduced_plate import (
     ReducedPlate,
     ReductionError,
+    _moved,
     bending_modes,
     reduced_plate,
 )
@@ -128,9 +129,21 @@ def test_modes_are_those_of_the_plate_that_the_load_moves_most() -> None:
 
 
 def test_a_central_load_finds_no_mode_that_it_does_not_move() -> None:
-    plate = on_square(isotropic_plate(THICKNESS), held=True)
-    found = bending_modes(plate, patch_on(plate), 10)
+    plate = on_square(isotropic_plate(THICKNESS), held=True, n=8)
+    found = bending_modes(plate, patch_on(plate), 14)
     assert (found.shares > 1e-8 * found.compliance).all()
+    assert (np.diff(np.sort(found.stiffness)) > 1e-6 * found.stiffness.max()).all()
+
+
+def test_modes_of_equal_frequency_are_the_one_that_moves() -> None:
+    turned, _ = np.linalg.qr(np.random.default_rng(5).standard_normal((5, 5)))
+    inverse = turned @ np.diag([3.0, 2.0, 2.0, 2.0 - 1e-11, 1.0]) @ turned.T
+    load = np.array([1.0, -2.0, 0.5, 3.0, 1.5])
+    values, vectors = _moved(inverse, load)
+    assert values == pytest.approx([3.0, 2.0, 1.0])
+    assert inverse @ vectors == pytest.approx(vectors * values, abs=1e-9)
+    # Together they move as far as all modes, and none of equal frequency is left to move.
+    assert ((vectors.T @ load) ** 2).sum() == pytest.approx(float(load @ load), rel=1e-12)
 
 
 def test_all_modes_leave_no_compliance_to_the_contact() -> None:
@@ -247,6 +260,18 @@ def test_a_law_in_series_with_a_spring_has_the_sum_of_their_displacements() -> N
     a = law.of_law(last).indentation[0]
     assert a + flexibility * k * a**1.5 == pytest.approx(1.4, rel=1e-8)
     assert law.permanent(memory, last)[0] == pytest.approx(0.3 * (a - 0.1), rel=1e-8)
+
+
+def test_no_trial_depends_on_the_other_cases() -> None:
+    def force(k: Floats) -> Floats:
+        one = np.ones(len(k))
+        law = SeriesLaw(HystereticLaw(LinearPermanent(k, 1e9 * one, 0.0 * one, 1.5 * one)), 0.1)
+        found, _ = law.trial(law.start(), ContactPoint(0.0 * one, 0.0 * one), one)
+        return found
+
+    rigidities = np.array([0.1, 2.0, 1e5])
+    together = force(rigidities)
+    assert together.tolist() == [float(force(k)[0]) for k in rigidities[:, None]]
 
 
 def test_a_spring_softer_than_the_contact_converges() -> None:

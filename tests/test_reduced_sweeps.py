@@ -11,11 +11,15 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
+from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
+from fecm.mechanics.projectile import RigidMass
+from fecm.mechanics.reduced_plate import ReducedPlate
 from fecm.results.metrics import RATIO
 from fecm.sweeps import api
 from fecm.sweeps.case import CasesError
 from fecm.sweeps.plan import Task, plan, tasks
-from fecm.sweeps.reduced import by_halvings, reduced
+from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
+from fecm.sweeps.responses import Hits
 from fecm.sweeps.strike import strike_of
 from tests.builders import table
 from tests.calls import call
@@ -24,7 +28,7 @@ from tests.test_nonlinear_decks import forces, text
 from tests.test_nonlinear_sweeps import BLOW, DECK, LINEAR, PROGRAM
 
 SPEEDS = [300.0, 600.0, 900.0]
-ENOUGH = 8  # modes of this plate
+ENOUGH = 4  # modes of this plate, which has few nodes
 ROD = BLOW.replace("PROJ\n0, 0, 2e-5\n\n", "PROJ\n4, 0, .5, 1e7, 2e-4\n1, 1, .5\n4, 0, .5\n\n")
 GAGED = text(PROGRAM, data=BLOW + "GAGE\n1, .5, .5, .01, 0.\n\n")
 
@@ -150,6 +154,31 @@ def test_cases_of_many_velocities_are_few_tasks() -> None:
     cases: list[Any] = [{"velocity": float(v)} for v in range(1, 301)]
     made = tasks(problem, plan(problem, cases, modes=5))
     assert [len(task.numbers) for task in made] == [256, 44]
+
+
+def test_a_rod_takes_a_step_in_which_a_wave_crosses_one_element_at_most() -> None:
+    (problem,) = load_deck(text(PROGRAM, data=ROD)).problems
+    made = reduced(problem, 1)
+    (times,) = by_halvings(made, {0: strike_of(problem.deck)})
+    assert times > 0
+    assert made.halved(times).dt <= 0.5 / 4 * (2e-4 / 1e7) ** 0.5
+
+
+def test_the_compliance_left_out_is_in_series_with_the_contact() -> None:
+    # A plate that does not move but by the spring: the energy of the projectile is that of both.
+    k, c, mass, speeds = 1e5, 2e-5, 1e-3, np.array([500.0, 2000.0])
+    none = np.zeros((1, 1))
+    plate = ReducedPlate(1, np.array([1e16]), np.array([1e-3]), c, cubic=none, quartic=none)
+    law = LinearPermanent(*(np.full(2, x) for x in (k, 1e9, 0.0, 1.5)))
+    hits = Hits([RigidMass(mass)], np.zeros(2, np.intp), np.ones(2), HystereticLaw(law), speeds)
+    found = ReducedImpacts(plate, 2e-7, 5000).impacts(hits)
+    peak = found.force.max(axis=0)
+    assert found.force[-1].max() == 0.0
+    assert found.error.max() < 1e-4
+    stored = 0.4 * peak ** (5.0 / 3.0) / k ** (2.0 / 3.0) + 0.5 * c * peak**2
+    np.testing.assert_allclose(stored, 0.5 * mass * speeds**2, rtol=1e-4)
+    np.testing.assert_allclose(found.deflection[0], c * peak, rtol=1e-6)
+    np.testing.assert_allclose(found.indentation.largest, (peak / k) ** (2.0 / 3.0), rtol=1e-4)
 
 
 def test_a_stiff_contact_halves_the_time_step_of_its_cases() -> None:

@@ -31,7 +31,7 @@ from fecm.sweeps.timing import duration_of
 PLATE_PHASE = 0.5
 PROJECTILE_PHASE = 0.2
 # A contact that is still stiffer is left to the balance of energy.
-MOST_HALVINGS = 6
+MOST_HALVINGS = 10
 
 
 @dataclass(frozen=True)
