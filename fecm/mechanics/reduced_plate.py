@@ -41,6 +41,7 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._frozen import frozen
+from fecm._memory import require
 from fecm._typing import Floats, Indices
 from fecm.mechanics.element_matrices import membrane_and_bending
 from fecm.mechanics.interpolation import NDOF, interpolate
@@ -319,6 +320,9 @@ def _integrated(plate: PlateModel, plane: PlateModel, shapes: Floats) -> Pairs:
 
     modes = shapes.shape[1]
     count = modes * (modes + 1) // 2
+    # Loads of the pairs and their solutions, and the strains of some elements.
+    bytes_of_pairs = 8 * count * (3 * plane.neq + 4 * BLOCK * 3 * len(plate.rules.bending.xi))
+    require(bytes_of_pairs, "the reduced model of the plate")
     fields = np.stack([plate.field(shape, 0.0) for shape in shapes.T], axis=2)  # (numnp, 5, m)
     cubic, quartic = np.zeros((modes, count)), np.zeros((count, count))
     loads = np.zeros((plane.neq, count))
