@@ -12,6 +12,8 @@ from fecm.deck import DeckError, Finding, read_deck
 from fecm.deck.format import format_deck
 from fecm.deck.macros import WORDS, estimate_work
 from fecm.deck.model import (
+    Cure,
+    Expansion,
     Impact,
     Indentation,
     Macro,
@@ -212,6 +214,9 @@ def test_a_new_deck_has_a_time_step_that_a_person_can_read() -> None:
         Nonlinear(),
         Preload(50.0),
         Preload(-1 / 3, 0.0, 1e-300),
+        Cure(-100.0, expansions=(Expansion(1, 2e-8, 22.5e-6),)),
+        Cure(0.0),
+        Cure(-1 / 3, 0.1 + 0.2, (Expansion(1, 1e-7 / 3, 0.0, 0.0, 6e-3), Expansion(2, -1e-6))),
     ],
     ids=repr,
 )

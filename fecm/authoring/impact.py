@@ -13,7 +13,7 @@ from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.authoring.contact import AnyContact, Sphere, law_of
 from fecm.authoring.fixtures import DropWeight
-from fecm.authoring.laminate import Laminate, Plies, damages, plies_of, toughness
+from fecm.authoring.laminate import Laminate, Plies, cured, damages, plies_of, toughness
 from fecm.authoring.mesh import InPlane, placed, supported
 from fecm.authoring.numerics import AUTO, FULL, MITC, Numerics, Quadrature
 from fecm.authoring.parameters import ObjectError, check_positive, in_units, is_finite
@@ -57,6 +57,7 @@ class Request:
     gages: Iterable[GagePlace] = ()
     damage: bool = False
     giic: float | None = None
+    cure: float | str | None = None
     title: str = ""
 
     @property
@@ -123,6 +124,7 @@ def impact(
     gages: Iterable[tuple[float, float, float, float]] = (),
     damage: bool = False,
     giic: float | None = None,
+    cure: float | str | None = None,
     title: str = "",
 ) -> model.Deck:
     """Deck of an impact, as `fecm new` writes it.
@@ -180,6 +182,10 @@ def impact(
         Add strengths and toughness of a named ply.
     giic : float, optional
         Toughness G_IIc of the delamination threshold, force/length; a named ply's by default.
+    cure : float or str, optional
+        Residual stresses of the cure of a named ply with coefficients of expansion: temperature of
+        use minus stress-free temperature, K; or both, ``"177:20"``.  ``":20"`` takes the
+        stress-free temperature of the ply.
     title : str, optional
         Title of the deck.
 
@@ -221,6 +227,7 @@ def impact(
             gages=gages,
             damage=damage,
             giic=giic,
+            cure=cure,
             title=title,
         )
     )
@@ -269,6 +276,7 @@ def author(asked: Request) -> Authored:
         patch,
         _gages(asked.gages),
         *damage,
+        cured(plies, asked.cure),
         law,
         asked.numerics.shear_segment(nonlinear=asked.nonlinear),
         model.Nonlinear() if asked.nonlinear else None,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
@@ -11,7 +12,7 @@ from fecm.authoring.parameters import ObjectError
 from fecm.deck import catalogue
 from fecm.deck.catalogue import MATERIALS, SYSTEMS, NamedPly
 from fecm.deck.layup import parse_layup
-from fecm.deck.model import Delamination, Integration, Layer, Material, Ply, Segment
+from fecm.deck.model import Cure, Delamination, Integration, Layer, Material, Ply, Segment
 from fecm.mechanics.laminate import laminate as stiffness_of
 
 ORDER = 3  # integration order of stiffness and mass
@@ -154,3 +155,39 @@ def damages(plies: Plies, giic: float | None, notes: list[str]) -> list[Segment]
         raise ObjectError(f"`damage`: {named.name} has {'; '.join(missing)}")
     notes += [f"{named.name} has {text}" for text in missing]
     return [segment for segment in (strengths, delamination) if segment is not None]
+
+
+def cured(plies: Plies, cure: float | str | None) -> Cure | None:
+    """CURE segment of a named ply for a change of temperature, or for ``"177:20"``."""
+    if cure is None:
+        return None
+    named = plies.named
+    if named is None or (expansion := named.expansion) is None:
+        lacks = f"{named.name} has no" if named else "it needs a named ply with"
+        raise ObjectError(
+            f"`cure`: {lacks} alpha1 and alpha2; a file of your own plies may have them (fecm new "
+            "--materials)"
+        )
+    return Cure(delta_t=_cooling(cure, named), expansions=(expansion,))
+
+
+def _cooling(cure: float | str, named: NamedPly) -> float:
+    """Temperature of use minus stress-free temperature, K."""
+    before, colon, after = str(cure).rpartition(":")
+    own = named.values.get("stress_free_temperature")
+    if colon and not before.strip():
+        if own is None:
+            raise ObjectError(
+                f"`cure` is {cure!r}: the stress-free temperature of {named.name} is not known"
+            )
+        before = str(own)
+    try:
+        change = float(after) - (float(before) if colon else 0.0)
+    except ValueError:
+        change = math.nan
+    if not math.isfinite(change):
+        raise ObjectError(
+            f"`cure` is {cure!r}, not a change of temperature, as -100, or a stress-free "
+            "temperature and one of use, as 177:20"
+        )
+    return float(f"{change:.9g}")

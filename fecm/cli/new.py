@@ -26,7 +26,14 @@ from fecm.cli.common import DASH, RefusedError, echo, note, write_text
 from fecm.cli.help import GroupedCommand, typical
 from fecm.cli.laminate_options import PLIES, LaminateOptions, laminate_options
 from fecm.cli.options import FILE_PATH, POSITIVE, Finite, Parsed, assignment, collected, list_of
-from fecm.deck.catalogue import CONTACTS, MATERIALS, STRENGTHS, NamedContact, NamedPly
+from fecm.deck.catalogue import (
+    CONTACTS,
+    EXPANSIONS,
+    MATERIALS,
+    STRENGTHS,
+    NamedContact,
+    NamedPly,
+)
 from fecm.deck.format import format_deck
 from fecm.deck.grid import IN_PLANE, SUPPORTS
 from fecm.deck.model import Deck, Indentation, Material, Nonlinear, Patch, Shear
@@ -43,6 +50,7 @@ LINES = (
     ("E1", "E2", "nu12", "nu23", "G12", "G13", "G23", "density", "thickness"),
     (*STRENGTHS, "S13", "S23"),
     ("GIc", "GIIc"),
+    (*EXPANSIONS, "stress_free_temperature"),
 )
 
 PROJECTILES: dict[str, tuple[str, Callable[..., Rod | RigidMass]]] = {
@@ -92,6 +100,7 @@ GROUPS = {
         "units",
         "damage",
         "giic",
+        "cure",
     ),
     "Supports": ("fixture", "support", "edges", "in_plane"),
     "Impact": ("energy", "velocity", "at", "projectile", "contact", "law"),
@@ -124,6 +133,7 @@ class Options:
     laminate: LaminateOptions
     damage: bool
     giic: float | None
+    cure: str | None
     support: Support
     edges: tuple[tuple[str, Support], ...]
     fixture: str | None
@@ -237,6 +247,13 @@ class Options:
     metavar="G",
     help="Toughness G_IIc of the delamination threshold (DELA), force/length; goes before that "
     "of a named ply.",
+)
+@option(
+    "--cure",
+    metavar="DT|FREE:USE",
+    help="Residual stresses of the cure (CURE) of a named ply with coefficients of expansion: "
+    "change of temperature since the plies were free of stress, as in -100; or the stress-free "
+    "temperature, by default that of the ply, and the one of use, as in 177:20 or :20.",
 )
 @option(
     "--support",
@@ -424,6 +441,7 @@ def _author(options: Options, given: Collection[str]) -> Authored:
             preload=options.preload,
             damage=options.damage,
             giic=options.giic,
+            cure=options.cure,
             title=options.title,
         )
     )

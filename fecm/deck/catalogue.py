@@ -13,7 +13,7 @@ from importlib import resources
 
 from fecm._frozen import frozen
 from fecm._inputs import parsed_toml
-from fecm.deck.model import Allowables, Delamination, Indentation, Ply, Units
+from fecm.deck.model import Allowables, Delamination, Expansion, Indentation, Ply, Units
 from fecm.deck.units import COEFFICIENT, DENSITY, MODULUS, TOUGHNESS, in_si
 
 # Systems of units: names of length, force and time.
@@ -51,9 +51,15 @@ KEYS = ELASTIC | {
     "GIc": TOUGHNESS,
     "GIIc": TOUGHNESS,
     "thickness": "length",
+    # Expansions per kelvin, and a temperature in degrees Celsius.
+    "alpha1": "",
+    "alpha2": "",
+    "stress_free_temperature": "",
 }
 TEXTS = ("source", "assumed", "units")
 SLOPES = ("p_plus", "p_minus")  # of Puck's criterion
+EXPANSIONS = ("alpha1", "alpha2")
+LARGEST_EXPANSION = 1e-3  # per kelvin
 STRENGTHS = ("XT", "XC", "YT", "YC", "S12")
 SYSTEM_OF_FILES = "mm-N-s"  # system of units of a file that names none
 NU23 = 0.4  # of a ply whose nu23 is not known
@@ -105,6 +111,14 @@ class NamedPly:
         return Allowables(
             xt=xt, xc=xc, yt=yt, yc=yc, s12=s12, s13=s13, s23=s23, p_plus=plus, p_minus=minus
         )
+
+    @property
+    def expansion(self) -> Expansion | None:
+        """Thermal expansion; None if a coefficient is not known."""
+        alpha1, alpha2 = (self.values.get(key) for key in EXPANSIONS)
+        if alpha1 is None or alpha2 is None:
+            return None
+        return Expansion(alpha1=alpha1, alpha2=alpha2)
 
     def delamination(self, system: str) -> Delamination | None:
         """Toughness G_IIc in a system of units; None if it is not known."""
@@ -161,6 +175,8 @@ def _constant(name: str, key: str, value: object) -> float:
         raise ValueError(f"[{name}] {key}: {value:g} is not a positive number{hint}")
     if key in SLOPES and not 0.0 < value < 1.0:
         raise ValueError(f"[{name}] {key}: {value:g} is not between 0 and 1")
+    if key in EXPANSIONS and abs(value) > LARGEST_EXPANSION:
+        raise ValueError(f"[{name}] {key}: {value:g} is above {LARGEST_EXPANSION:g} per kelvin")
     return float(value)
 
 

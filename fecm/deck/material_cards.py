@@ -259,3 +259,55 @@ class Preload(Segment, keyword="PREL"):
     def forces(self) -> tuple[float, float, float]:
         """N0x, N0y and N0xy."""
         return self.n_x, self.n_y, self.n_xy
+
+
+@frozen
+class Expansion(Record):
+    """CURE card: (I5,5X,4F10.0); free strains of a material along and across its fibres."""
+
+    material: int = 1
+    # Per kelvin.
+    alpha1: float = 0.0
+    alpha2: float = 0.0
+    # Per per cent of weight of moisture.
+    beta1: float = 0.0
+    beta2: float = 0.0
+
+    optional: ClassVar[int] = 2
+    fields: ClassVar[Fields] = layout(
+        "I5? material|mat", "X5", "F10 alpha1", "F10 alpha2", "F10 beta1", "F10 beta2"
+    )
+
+
+@frozen
+class Cure(Segment, keyword="CURE"):
+    """CURE: (2F10.0) and expansions; what has happened since the plies were free of stress.
+
+    It is not in the report's program.
+    """
+
+    delta_t: float  # temperature of use minus stress-free temperature, K
+    delta_c: float = 0.0  # moisture taken up, per cent of weight
+    expansions: tuple[Expansion, ...] = ()
+
+    optional: ClassVar[int] = 1
+    fields: ClassVar[Fields] = layout(
+        "F10 change of temperature|delta T", "F10 change of moisture|delta C"
+    )
+
+    @classmethod
+    def read(cls, head: Card, cards: CardStream) -> Self | None:
+        """Read the changes and the expansions."""
+        changes = cards.single(head, cls)
+        return changes and replace(changes, expansions=cards.until_blank(head, Expansion))
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards."""
+        yield from super().cards(control)
+        for record in self.expansions:
+            yield record.to_card()
+        yield ""
+
+    def expansion(self, material: int) -> Expansion | None:
+        """Expansion of a material; None if it has none."""
+        return next((one for one in self.expansions if one.material == material), None)

@@ -18,8 +18,10 @@ from fecm.deck.impact_cards import Impact, Indentation, Patch, Projectile, RodDi
 from fecm.deck.macros import LoadTable, Macro
 from fecm.deck.material_cards import (
     Allowables,
+    Cure,
     Damping,
     Delamination,
+    Expansion,
     Integration,
     Layer,
     Material,
@@ -42,11 +44,11 @@ from fecm.deck.record import Control, Record
 from fecm.deck.segment import NumberedSegment, Segment
 
 __all__ = [
-    "Allowables", "Boundary", "Control", "Coordinates", "Damping", "Deck", "Delamination",
-    "ElementNodes", "Elements", "Forces", "Gage", "Gages", "Impact", "Indentation", "Integration",
-    "Layer", "LoadTable", "Macro", "Material", "NodeCodes", "NodeValues", "Nonlinear",
-    "NumberedSegment", "Page", "Patch", "Ply", "Preload", "PrintOption", "Projectile", "Record",
-    "RodDiameter", "Segment", "Shear", "Units",
+    "Allowables", "Boundary", "Control", "Coordinates", "Cure", "Damping", "Deck", "Delamination",
+    "ElementNodes", "Elements", "Expansion", "Forces", "Gage", "Gages", "Impact", "Indentation",
+    "Integration", "Layer", "LoadTable", "Macro", "Material", "NodeCodes", "NodeValues",
+    "Nonlinear", "NumberedSegment", "Page", "Patch", "Ply", "Preload", "PrintOption", "Projectile",
+    "Record", "RodDiameter", "Segment", "Shear", "Units",
 ]  # fmt: skip
 
 TITLE = "FECM"
@@ -70,6 +72,7 @@ SEGMENTS: dict[str, type[Segment]] = {
     "DAMP": Damping,
     "NONL": Nonlinear,
     "PREL": Preload,
+    "CURE": Cure,
     "GAGE": Gages,
     "UNIT": Units,
     "PRIN": PrintOption,

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._frozen import frozen
-from fecm._typing import Array, Bools, Floats
+from fecm._typing import Array, Bools, Floats, Indices
 from fecm.mechanics.failure import CRITERIA
 from fecm.mechanics.ply_stresses import FailureEnvelope
 
@@ -41,20 +41,27 @@ class OutsideLoad:
         found = [*self._of_plies(envelope), self._of_interfaces(envelope)]
         return {name: np.array([getattr(one, name) for one in found]) for name in Largest._fields}
 
-    def _of_plies(self, envelope: FailureEnvelope) -> list[Largest]:
-        """Of each criterion of the plies."""
-        near, plies = self.near.ravel(), envelope.plies
+    def worst_states(self, envelope: FailureEnvelope) -> Indices | None:
+        """States of the largest exposures of the plies, (criteria,); None if none counts."""
+        near, exposure = self.near.ravel(), envelope.plies.exposure
         if near.all():
-            return [NONE] * len(CRITERIA)
-        at_points = plies.exposure.reshape(len(CRITERIA), near.size, -1)
+            return None
+        at_points = exposure.reshape(len(CRITERIA), near.size, -1)
         # Points under the load are hidden for the search, which is much faster than one in a copy.
         hidden = at_points[:, near]
         at_points[:, near] = -1.0
-        states = plies.exposure.argmax(axis=1)
+        states = np.asarray(exposure.argmax(axis=1))
         at_points[:, near] = hidden
+        return states
+
+    def _of_plies(self, envelope: FailureEnvelope) -> list[Largest]:
+        """Of each criterion of the plies."""
+        plies = envelope.plies
+        if (states := self.worst_states(envelope)) is None:
+            return [NONE] * len(CRITERIA)
         found = []
         for number, state in enumerate(states.tolist()):
-            point, ply_and_face = divmod(state, at_points.shape[2])
+            point, ply_and_face = divmod(state, plies.exposure.shape[1] // self.near.size)
             exposure, mode = float(plies.exposure[number, state]), int(plies.mode[number, state])
             place = float(self.x.flat[point]), float(self.y.flat[point])
             found.append(Largest(exposure, mode, ply_and_face // 2 + 1, *place))

@@ -1,10 +1,10 @@
 """Failure criteria of plies: exposure and mode of stress states.
 
-The exposure f = 1/R is the reciprocal of the factor on all stresses that reaches failure; it is
-linear in the load.  Stresses are in the axes of the ply; a ply fails at f = 1.  Criteria: maximum
-stress, Tsai and Wu 1971, Hashin 1980 (with S_T = YC/2, for which the compressive matrix criterion
-is a sum of squares), Puck's plane criterion (Puck and Schürmann 1998), and a quadratic criterion of
-the interlaminar shear stresses.
+The exposure f = 1/R is the reciprocal of the factor on all stresses that reaches failure; without
+residual stresses it is linear in the load.  Stresses are in the axes of the ply; a ply fails at
+f = 1.  Criteria: maximum stress, Tsai and Wu 1971, Hashin 1980 (with S_T = YC/2, for which the
+compressive matrix criterion is a sum of squares), Puck's plane criterion (Puck and Schürmann 1998),
+and a quadratic criterion of the interlaminar shear stresses.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import reduce
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,9 @@ MODES = (
     "inter-fibre C",
     "interlaminar shear",
 )
+
+LARGEST_FACTOR = 1e9  # on stresses, beyond which they don't lead to failure
+FACTOR_ERROR = 1e-12  # relative
 
 Codes = NDArray[np.int8]
 # Values of a criterion by mode; the exposure is the largest.
@@ -130,6 +133,53 @@ def puck_limits(ply: Strengths) -> tuple[float, float]:
 
 
 CRITERIA = {"max_stress": max_stress, "tsai_wu": tsai_wu, "hashin": hashin, "puck": puck}
+
+
+class PlyExposure(NamedTuple):
+    """Largest exposure of a criterion in the plies of a laminate."""
+
+    criterion: str
+    exposure: float
+    mode: str
+    ply: int  # from 1 at the struck face
+
+
+def largest_in_plies(ply: Strengths, stresses: Floats) -> list[PlyExposure]:
+    """Largest exposure of each criterion under stresses of the plies, (plies, faces, 3)."""
+    s1, s2, tau = np.moveaxis(stresses, -1, 0)
+    found = []
+    for name, criterion in CRITERIA.items():
+        candidates = criterion(ply, s1, s2, tau)
+        exposure = exposure_of(candidates)
+        worst = int(exposure.argmax())
+        mode = MODES[modes_of(candidates).flat[worst]]
+        number = worst // exposure.shape[1] + 1
+        found.append(PlyExposure(name, float(exposure.flat[worst]), mode, number))
+    return found
+
+
+def load_factor(ply: Strengths, criterion: str, at_rest: Floats, added: Floats) -> float:
+    """Factor on stresses `added` to those at rest, (3,) each, at which the exposure is 1.
+
+    By bisection, as the exposure is not proportional to the factor.  0 if the stresses at rest
+    reach 1 alone, infinite if no factor does.
+    """
+
+    def exposure(factor: float) -> float:
+        s1, s2, tau = (at_rest + factor * added)[:, None]
+        return float(exposure_of(CRITERIA[criterion](ply, s1, s2, tau))[0])
+
+    if exposure(0.0) >= 1.0:
+        return 0.0
+    low, high = 0.0, 1.0
+    while exposure(high) < 1.0:
+        low, high = high, 2.0 * high
+        if high > LARGEST_FACTOR:
+            return math.inf
+    while high - low > FACTOR_ERROR * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if exposure(middle) < 1.0 else (low, middle)
+    return high
 
 
 def interlaminar(ply: Strengths, tau_13: Floats, tau_23: Floats) -> Floats:

@@ -8,8 +8,9 @@ An initial membrane force N0 adds the constant strain A^-1 N0.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import NamedTuple
+from copy import copy
+from dataclasses import dataclass, field
+from typing import Self
 
 import numpy as np
 
@@ -150,7 +151,7 @@ class PlyStresses:
         *,
         nonlinear: bool = False,
     ) -> None:
-        self._initial = initial
+        self.initial = initial
         self.members = np.arange(len(mesh.elements)) if members is None else members
         elements = mesh.elements[self.members]
         self.z = laminate.plies.z
@@ -192,8 +193,8 @@ class PlyStresses:
                 strains[family.rows, :, :3] += quadratic.strains(w)
                 if curved is not None:
                     gradients[family.rows, :, :3] += quadratic.gradients(w, curved)
-        if self._initial is not None:
-            strains[..., :3] += self._initial
+        if self.initial is not None:
+            strains[..., :3] += self.initial
         return strains, gradients
 
     def evaluate(self, field: Floats) -> dict[str, Floats]:
@@ -250,28 +251,9 @@ def is_complete(elements: Ints) -> Bools:
     return np.asarray(nodes[:, :9].all(axis=1) & ~nodes[:, 9:].any(axis=1))
 
 
-class UniformExposure(NamedTuple):
-    """Largest exposure of a criterion under a uniform midplane strain."""
-
-    criterion: str
-    exposure: float
-    mode: str
-    ply: int  # from 1 at the struck face
-
-
-def uniform_exposures(
-    laminate: Laminate, strengths: failure.Strengths, strain: Floats
-) -> list[UniformExposure]:
-    """Largest exposure of each criterion under a uniform midplane strain, (3,)."""
-    stresses = np.moveaxis(in_plane_stresses(laminate)[:, 0, :, :3] @ strain, 1, 0)
-    found = []
-    for name, criterion in failure.CRITERIA.items():
-        candidates = criterion(strengths, *stresses)
-        exposure = failure.exposure_of(candidates)
-        ply = int(exposure.argmax())
-        mode = failure.MODES[int(failure.modes_of(candidates)[ply])]
-        found.append(UniformExposure(name, float(exposure[ply]), mode, ply + 1))
-    return found
+def uniform_stresses(laminate: Laminate, strain: Floats) -> Floats:
+    """Stresses of the plies, (plies, 2, 3), under a uniform midplane strain, (3,)."""
+    return np.asarray(in_plane_stresses(laminate)[..., :3] @ strain)
 
 
 # Largest exposures over time: of all states, and modes only where an exposure rises ---------------
@@ -295,12 +277,28 @@ class Maxima:
 
 
 @dataclass
+class WorstStates:
+    """The state of stress with the largest exposure of each criterion of the plies so far."""
+
+    exposure: Floats  # (criteria,)
+    state: Indices  # (criteria,): its ply and face, 0 at the lower face of ply 1
+    added: Floats  # (criteria, 3): its stresses less those at rest
+
+    @classmethod
+    def none(cls) -> WorstStates:
+        """No exposure yet."""
+        count = len(failure.CRITERIA)
+        return cls(np.zeros(count), np.zeros(count, dtype=np.intp), np.zeros((count, 3)))
+
+
+@dataclass
 class FailureEnvelope:
     """Largest exposures over time."""
 
     # (criteria, states): states are elements, points, plies and faces.
     plies: Maxima
     interfaces: Maxima  # (elements, plies - 1)
+    worst: WorstStates = field(default_factory=WorstStates.none)  # only with residual stresses
 
 
 class FailureMonitor:
@@ -313,6 +311,7 @@ class FailureMonitor:
         plies = len(laminate.plies.angles)
         # Stresses (components, plies * 2) and (interfaces, plies beside, tau_13 tau_23).
         self._in_plane = in_plane_stresses(laminate).transpose(3, 2, 0, 1).reshape(6, -1).copy()
+        self._add(np.zeros((plies, 2, 3)))
         tau = interlaminar_stresses(laminate)[0][:-1, 2].reshape(plies - 1, 2, 12)
         angles = np.deg2rad(laminate.plies.angles)
         c, s = np.cos(angles), np.sin(angles)
@@ -320,14 +319,36 @@ class FailureMonitor:
         beside = np.stack([turn[:-1], turn[1:]], axis=1)
         self._shear = np.einsum("ibct,itg->gibc", beside, tau).reshape(12, -1)
 
+    def _add(self, residual: Floats) -> None:
+        """Add residual stresses, (plies, 2, 3), to those of every strain."""
+        self.has_residual = bool(residual.any())
+        # Components by plies and faces; at rest with those of the initial strain.
+        self._residual = residual.reshape(-1, 3).T.copy()
+        self._at_rest = self._residual
+        if (initial := self.stresses.initial) is not None:
+            per_strain = self._in_plane.reshape(6, 3, -1)[:3]
+            self._at_rest = self._residual + np.tensordot(initial, per_strain, 1)
+
+    def with_residual(self, residual: Floats) -> Self:
+        """The same criteria for plies with residual stresses, (plies, 2, 3), in their axes.
+
+        The interlaminar criterion does not depend on them.
+        """
+        made = copy(self)
+        made._add(residual)
+        return made
+
     def start(self) -> FailureEnvelope:
         """No exposure yet."""
         elements, points, plies = self.stresses.shape
         states = Maxima.none(len(failure.CRITERIA), elements * points * plies * 2)
         return FailureEnvelope(states, Maxima.none(elements, max(plies - 1, 0)))
 
-    def update(self, envelope: FailureEnvelope, field: Floats, time: float) -> None:
-        """Raise the exposures to those of a displacement field, (numnp, 5)."""
+    def update(self, envelope: FailureEnvelope, field: Floats, time: float) -> Floats:
+        """Raise the exposures to those of a displacement field, (numnp, 5).
+
+        Returns its strains and curvatures, (elements, points, 6).
+        """
         strains, gradients = self.stresses.strains(field)
         self._raise_plies(envelope.plies, strains.reshape(-1, 6), time)
         interfaces, shear = envelope.interfaces, gradients.reshape(-1, 12) @ self._shear
@@ -338,11 +359,34 @@ class FailureMonitor:
         higher = worst > interfaces.exposure
         interfaces.exposure[higher], interfaces.time[higher] = worst[higher], time
         interfaces.mode[higher] = failure.MODES.index("interlaminar shear")
+        return strains
+
+    def follow(self, envelope: FailureEnvelope, worst: Indices, strains: Floats) -> None:
+        """Keep the stresses at the worst states, (criteria,), where their exposure has risen."""
+        kept, per_strain = envelope.worst, self._in_plane.reshape(6, 3, -1)
+        for number, (exposure, state) in enumerate(
+            zip(envelope.plies.exposure, worst, strict=True)
+        ):
+            if exposure[state] > kept.exposure[number]:
+                point, own = divmod(int(state), per_strain.shape[2])
+                kept.exposure[number], kept.state[number] = exposure[state], own
+                kept.added[number] = strains.reshape(-1, 6)[point] @ per_strain[:, :, own]
+                kept.added[number] -= self._at_rest[:, own] - self._residual[:, own]
+
+    def load_factors(self, worst: WorstStates) -> dict[str, float]:
+        """Factors on the stresses less those at rest at which the exposures are 1."""
+        return {
+            name: failure.load_factor(self._strengths, name, self._at_rest[:, own], added)
+            for name, own, added in zip(failure.CRITERIA, worst.state, worst.added, strict=True)
+        }
 
     def _raise_plies(self, plies: Maxima, strains: Floats, time: float) -> None:
         """Raise the exposures of all plies to those of strains, (elements * points, 6)."""
         for start in range(0, len(strains), BLOCK):
-            stresses = np.split(strains[start : start + BLOCK] @ self._in_plane, 3, axis=1)
+            total = strains[start : start + BLOCK] @ self._in_plane
+            if self.has_residual:
+                total += self._residual.ravel()
+            stresses = np.split(total, 3, axis=1)
             s1, s2, tau = (np.ascontiguousarray(part).ravel() for part in stresses)
             first = start * self._in_plane.shape[1] // 3
             for number, criterion in enumerate(failure.CRITERIA.values()):

@@ -16,9 +16,10 @@ from fecm.plot import style
 from fecm.plot.data import mesh_of, on_plate, reach, require
 from fecm.plot.kinds import Picture, PlotError, Width
 from fecm.results.errors import NotStoredError, ResultFileError
-from fecm.results.plies import Plies, rows_at
+from fecm.results.plies import CURE_STRESS, Plies, rows_at
 from fecm.results.result import Result
 
+THIN = 0.6  # width of the line of residual stresses
 LARGE_RESIDUAL = 0.1  # over the largest interlaminar stress: a note says so
 # A parabola through the lower, middle and upper value of a ply, at some parts of its thickness.
 _PARTS = np.linspace(0.0, 1.0, 9)
@@ -33,6 +34,7 @@ class Stress(NamedTuple):
     label: str
     z: Array  # (plies, n), from the midplane
     values: Array  # (plies, n)
+    residual: Array | None = None  # of CURE, of the same shape; None where there is none
 
 
 def thickness(
@@ -45,7 +47,8 @@ def thickness(
     """Stresses of the plies of one element over z, the struck face at the top.
 
     In-plane stresses are in the axes of each ply, interlaminar ones in those of the plate; the last
-    graph is the resultant of these.  sigma_z is not computed.
+    graph is the resultant of these.  sigma_z is not computed.  A thin line is the residual stress
+    of CURE, which the others do not contain.
 
     Of `at` (length) at most one place selects the nearest element with ply stresses, and its
     nearest point; of `times` (the deck's unit) at most one the nearest stored row.  By default both
@@ -53,7 +56,7 @@ def thickness(
     """
     ((name, result),) = results.items()
     plies, point = _chosen(result, name, at, times)
-    drawn = _stresses(plies, point)
+    drawn = _stresses(plies, point, result)
     _warn(result, name, plies)
     z = plies.z
     columns = 2 if width == "column" else 3
@@ -61,11 +64,14 @@ def thickness(
     figure, axes = style.panels(width, lines, columns, sharey=True, ratio=1.8 / columns)
     place = style.scale_of(results, "length", [z])
     for ax, one in zip(axes, drawn, strict=False):
-        stress = style.scale_of(results, "force/length^2", [one.values])
+        shown = [one.values] if one.residual is None else [one.values, one.residual]
+        stress = style.scale_of(results, "force/length^2", shown)
         for face in np.unique(z[:, ::2]):
             ax.axhline(face, color="0.6", lw=0.4, ls=":")
         ax.axvline(0.0, color="0.6", lw=0.4)
         ax.plot(one.values.ravel(), one.z.ravel(), color=style.colours()[0])
+        if one.residual is not None:
+            ax.plot(one.residual.ravel(), one.z.ravel(), color=style.colours()[1], lw=THIN)
         stress.name(ax.xaxis, one.label)
         ax.set_ylim(z[-1, 2], z[0, 0])
     for ax in axes[len(drawn) :]:
@@ -76,18 +82,24 @@ def thickness(
     x, y = plies.x[0, point], plies.y[0, point]
     where = f"{x:.4g}, {y:.4g} {style.literal(result.unit('length'))}".rstrip()
     time = clock.show(float(plies.time[0]))
-    figure.suptitle(f"element {plies.element[0]} at {where}, time {time}", fontsize=8.0)
+    title = f"element {plies.element[0]} at {where}, time {time}"
+    if drawn[0].residual is not None:
+        title += "\nthin: residual stress (CURE)"
+    figure.suptitle(title, fontsize=8.0)
     return Picture(figure)
 
 
-def _stresses(plies: Plies, point: int) -> list[Stress]:
+def _stresses(plies: Plies, point: int, result: Result) -> list[Stress]:
     """Stresses at a point; those between the plies only where they are computed."""
     faces = plies.z[:, ::2]
+    residual: list[Array | None] = [None] * 3
+    if CURE_STRESS in result:
+        residual = list(np.moveaxis(result[CURE_STRESS], -1, 0))
     xz, yz, z = (values @ _PARABOLA for values in (plies.tau_xz[0, 0], plies.tau_yz[0, 0], plies.z))
     found = [
-        Stress(r"$\sigma_1$", faces, plies.sigma_1[0, 0, point]),
-        Stress(r"$\sigma_2$", faces, plies.sigma_2[0, 0, point]),
-        Stress(r"$\tau_{12}$", faces, plies.tau_12[0, 0, point]),
+        Stress(r"$\sigma_1$", faces, plies.sigma_1[0, 0, point], residual[0]),
+        Stress(r"$\sigma_2$", faces, plies.sigma_2[0, 0, point], residual[1]),
+        Stress(r"$\tau_{12}$", faces, plies.tau_12[0, 0, point], residual[2]),
     ]
     if np.isfinite([xz, yz]).all():
         found += [

@@ -24,12 +24,19 @@ from fecm.mechanics.plate_motion import Load, PlateMotion
 from fecm.mechanics.ply_stresses import FailureMonitor, PlyStresses
 from fecm.mechanics.points import GageArray, gages
 from fecm.mechanics.projectile import STEPS, RodMethod, Transducer
+from fecm.mechanics.residual_stresses import Residual
 from fecm.mechanics.stiffness_product import AUTO, CSR, KERNELS, SOLVERS, Workers, available
 from fecm.mechanics.strains import StrainField
 from fecm.mechanics.stretching import Stretching
 from fecm.mechanics.symmetry import restrain_resting_dofs, symmetry_reduction
 from fecm.problem.generate import generate
-from fecm.problem.parts import build_law, build_plate, build_projectile, build_station
+from fecm.problem.parts import (
+    build_law,
+    build_plate,
+    build_projectile,
+    build_station,
+    residual_of_deck,
+)
 from fecm.problem.problem import ContactPatch, Problem
 
 ENERGY_LIMIT = 0.1  # relative error of the energy balance that ends a run
@@ -104,6 +111,13 @@ class ImpactModel:
     outside: OutsideLoad | None  # where their exposures count; None without FAIL
     # (numel, points): where plate theory does not hold; None without PLYS and FAIL.
     under_load: Bools | None
+    cure: Residual | None  # residual stresses of the plies; None without CURE
+
+    @property
+    def is_stressed_at_rest(self) -> bool:
+        """Whether FAIL has exposures to find before anything moves."""
+        has_residual = self.failure is not None and self.failure.has_residual
+        return self.failure is not None and (has_residual or self.plate.is_preloaded)
 
 
 def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactModel:
@@ -120,7 +134,8 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         law = chosen.law or build_law(deck, slips)
         impact = ImpactSystem(motion, rod, law, conditions, STEPS[chosen.rod_method.integrator])
     compiled = motion.solver == KERNELS
-    plies, failure = _stresses(problem, plate, compiled=compiled)
+    cure = residual_of_deck(deck, plate.laminate)
+    plies, failure = _stresses(problem, plate, cure, compiled=compiled)
     stress_points = plate.strain_field(problem.rules[2])
     under_load = outside = None
     if plies or failure:
@@ -149,6 +164,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         failure=failure,
         outside=outside,
         under_load=under_load,
+        cure=cure,
     )
 
 
@@ -204,7 +220,7 @@ def _conditions(
 
 
 def _stresses(
-    problem: Problem, plate: PlateModel, *, compiled: bool
+    problem: Problem, plate: PlateModel, cure: Residual | None, *, compiled: bool
 ) -> tuple[PlyStresses | None, FailureMonitor | None]:
     """Ply stresses of PLYS, and the failure criteria of FAIL; None where there is no such macro."""
     words = {macro.word: macro for macro in flat(problem.program)}
@@ -223,6 +239,8 @@ def _stresses(
             problem.mesh, plate.laminate, points, initial=initial, nonlinear=plate.nonlinear
         )
         failure = kind(stresses, plate.laminate, problem.deck.require(model.Allowables))
+        if cure is not None:
+            failure = failure.with_residual(cure.stresses)
     return plies, failure
 
 

@@ -22,6 +22,7 @@ from fecm.problem.problem import Problem
 from fecm.problem.rules import (
     buckling,
     contact,
+    cure,
     damage,
     damping,
     gages,
@@ -49,6 +50,7 @@ ALONE: tuple[type[model.Segment], ...] = (
     model.Delamination,
     model.Damping,
     model.Preload,
+    model.Cure,
     model.Projectile,
     model.Shear,
     model.Units,
@@ -150,6 +152,8 @@ def check_segment(segment: model.Segment, findings: Findings) -> None:
             apply(damping.OF_DAMPING, findings, segment)
         case model.Preload():
             apply(preload.ALONE, findings, segment)
+        case model.Cure():
+            apply(cure.OF_CURE, findings, segment)
         case model.Projectile():
             _check_projectile(segment, findings)
         case model.Shear():
@@ -236,6 +240,7 @@ def check_values(checked: Problem, findings: Findings) -> None:
     apply_first(damping.VALUES, findings, checked)
     apply_first(damage.STRENGTHS, findings, checked)
     apply(damage.VALUES, findings, checked)
+    apply(cure.VALUES, findings, checked)
     apply(gages.VALUES, findings, checked)
     if checked.has_impact:
         apply((*contact.OF_COEFFICIENT, *patch.VALUES), findings, checked)

@@ -25,11 +25,13 @@ from fecm.mechanics.projectile import (
     Transducer,
     report_rod,
 )
+from fecm.mechanics.residual_stresses import Residual, residual_stresses
 from fecm.problem.generate import rod_diameters
 
 # Dofs, from 0.
 W = 2
 THETA_X = 3
+MATERIAL = 1  # number of the material of MATE
 
 
 def rules(material: model.Material) -> tuple[Quadrature, Quadrature, Quadrature]:
@@ -134,6 +136,17 @@ def laminate_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> Laminate:
     plain = laminate_of(deck.require(model.Material), isotropic_g12=isotropic_g12)
     stiffness = equilibrium_shear_stiffness(plain) if shear.equilibrium else plain.shear
     return replace(plain, shear=shear.factor * stiffness)
+
+
+def residual_of_deck(deck: Deck, laminate: Laminate) -> Residual | None:
+    """Residual stresses of the plies of a deck; None without a CURE segment."""
+    if (cure := deck.last(model.Cure)) is None:
+        return None
+    free = cure.expansion(MATERIAL) or model.Expansion()
+    along = free.alpha1 * cure.delta_t + free.beta1 * cure.delta_c
+    across = free.alpha2 * cure.delta_t + free.beta2 * cure.delta_c
+    plies = np.ones(len(laminate.plies.angles))
+    return residual_stresses(laminate, along * plies, across * plies)
 
 
 def has_assumed_shear(deck: Deck) -> bool:

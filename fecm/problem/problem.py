@@ -14,16 +14,18 @@ from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, move
 from fecm.deck.model import Deck
 from fecm.mechanics.buckling import buckling_factor
 from fecm.mechanics.elements import Quadrature
-from fecm.mechanics.failure import CRITERIA
+from fecm.mechanics.failure import CRITERIA, PlyExposure, largest_in_plies
 from fecm.mechanics.laminate import Laminate, effective_rigidity, threshold_force
 from fecm.mechanics.mesh import ElementBlock, Mesh, element_blocks, element_centres
 from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.ply_stresses import uniform_stresses
 from fecm.mechanics.points import RADIUS_PER_THICKNESS, patch_weights
+from fecm.mechanics.residual_stresses import Residual
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.symmetry import half_turn_images, restrain_resting_dofs
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.contact_estimates import ContactStep, contact_step
-from fecm.problem.parts import W, build_plate, rules
+from fecm.problem.parts import W, build_plate, residual_of_deck, rules
 from fecm.problem.span import Span, unsupported
 from fecm.results.linear_plate import in_plane_of
 from fecm.results.validity import Judge
@@ -198,6 +200,23 @@ class Problem:
             threshold_force(rigidity, card.toughness, n) for n in (number, max(1, interfaces), 1)
         )
         return Threshold(force, rigidity, number, interfaces, (least, largest))
+
+    @cached_property
+    def residual(self) -> Residual | None:
+        """Residual stresses of the plies; None without a CURE segment."""
+        return residual_of_deck(self.deck, self.laminate)
+
+    @property
+    def worst_at_rest(self) -> PlyExposure | None:
+        """Largest exposure before anything moves; None without stresses then, or strengths."""
+        strengths, preloaded = self.deck.last(model.Allowables), self.plate.is_preloaded
+        if strengths is None or (self.residual is None and not preloaded):
+            return None
+        stresses = uniform_stresses(self.laminate, self.plate.preload_strain)
+        if self.residual is not None:
+            stresses += self.residual.stresses
+        exposures = largest_in_plies(strengths, stresses)
+        return max(exposures, key=lambda one: one.exposure)
 
     @cached_property
     def judge(self) -> Judge:

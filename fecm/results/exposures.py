@@ -11,6 +11,9 @@ from fecm.results.errors import ResultFileError
 from fecm.results.stored import Stored
 
 FEWEST = 20  # evaluations of FAIL during contact below which maxima may be missed
+# Attributes of a criterion's group, with CURE.
+AT_REST = "at_rest"
+LOAD_FACTOR = "load_factor"
 
 
 @frozen
@@ -24,6 +27,10 @@ class LargestExposure:
     x: float
     y: float
     time: float
+    # With CURE; None without it.
+    at_rest: float | None = None  # largest exposure of the residual stresses alone
+    # Factor on all other stresses at the place at which the exposure is 1.
+    load_factor: float | None = None
 
     @property
     def plies(self) -> str:
@@ -54,6 +61,7 @@ def largest_exposures(stored: Stored) -> list[LargestExposure]:
             raise ResultFileError(
                 f"failure/{criterion}/mode has the mode {code}, which has no name"
             )
+        about = stored.attributes_of(f"failure/{criterion}")
         found.append(
             LargestExposure(
                 criterion,
@@ -63,9 +71,16 @@ def largest_exposures(stored: Stored) -> list[LargestExposure]:
                 x=float(x[at].mean()),
                 y=float(y[at].mean()),
                 time=float(stored[f"failure/{criterion}/time"][place]),
+                at_rest=_number(about.get(AT_REST)),
+                load_factor=_number(about.get(LOAD_FACTOR)),
             )
         )
     return found
+
+
+def _number(value: object) -> float | None:
+    """An attribute that is a number; None if there is none."""
+    return float(value) if isinstance(value, int | float) else None
 
 
 def _near(stored: Stored, criterion: str) -> Array:

@@ -20,6 +20,7 @@ from fecm.results.stored import Stored, model_of
 
 IN_PLANE = ("sigma_1", "sigma_2", "tau_12")
 INTERLAMINAR = ("tau_xz", "tau_yz")
+CURE_STRESS = "plies/cure_stress"  # residual stresses of CURE, of the entire plate
 
 
 @frozen

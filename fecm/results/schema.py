@@ -263,6 +263,12 @@ class PlyRows(Rows):
         "tau_xz and tau_yz of equilibrium at z = h/2, removed linearly in z",
         "force/length^2",
     ]
+    cure_stress: Annotated[
+        Floats,
+        "layers faces components",
+        "residual stress of CURE in the axes of the ply, which the others do not contain",
+        "force/length^2",
+    ]
 
 
 class Exposure(Group):
@@ -362,7 +368,13 @@ def _datasets(group: str, kind: type[Group], outer: str = "") -> Iterator[Datase
 DATASETS = {d.path: d for name, kind in GROUP_TYPES.items() for d in _datasets(name, kind)}
 
 # Sizes of axes that every result has.
-FIXED = {"faces": 2, "levels": 3, "directions": 2, "criteria": len(ALL_CRITERIA)}
+FIXED = {
+    "faces": 2,
+    "levels": 3,
+    "directions": 2,
+    "components": 3,
+    "criteria": len(ALL_CRITERIA),
+}
 # Dimension scales: name and description by size.
 SCALES = {
     "numnp": ("node", "number of the node"),
@@ -380,6 +392,7 @@ SCALES = {
     "faces": ("face", "face of the ply: 1 at its lower z, 2 at its upper z"),
     "levels": ("level", "level in the ply: 1 at its lower z, 2 at its middle, 3 at its upper z"),
     "directions": ("direction", "1 is xz, 2 is yz"),
+    "components": ("component", "name of the stress in the axes of the ply"),
     "criteria": ("criterion", "name of the failure criterion"),
     "gages": ("gage", "position of the gage among the gages, from 1"),
     "cases": ("case", "number of the case, from 0"),
@@ -396,6 +409,7 @@ AXIS_NAMES: dict[str | int, tuple[str, ...]] = {
     "ndf": DOF_NAMES,
     "ndm": AXES,
     "criteria": ALL_CRITERIA,
+    "components": ("sigma_1", "sigma_2", "tau_12"),
     "statistics": ("draws", "mean", "standard_deviation", "1 %", "5 %", "50 %", "95 %", "99 %"),
     "bounds": ("lower", "upper"),
 }

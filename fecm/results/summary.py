@@ -123,7 +123,7 @@ def _exposures(result: Result) -> list[str]:
     for exposure in largest:
         force = reached.get(exposure.criterion)
         known = "" if force is None else f"; reaches 1 at {_rounded(result, force, 'force')}"
-        lines.append(f"{_exposure(result, exposure)}{known}")
+        lines.append(f"{_exposure(result, exposure)}{known}{_at_rest(exposure)}")
     count = evaluations_in_contact(result)
     if count is not None and "history/force" in result:
         lines.append(_line("evaluations", f"{count} of FAIL during contact"))
@@ -158,6 +158,16 @@ def _exposure(result: Result, largest: LargestExposure) -> str:
         f"{where(largest.criterion, largest.ply)} at ({largest.x:.6g}, {largest.y:.6g}), "
         f"time {_quantity(result, largest.time, 'time')}",
     )
+
+
+def _at_rest(largest: LargestExposure) -> str:
+    """What residual stresses contribute: with them the exposure is not proportional to the load."""
+    if largest.at_rest is None:
+        return ""
+    said = f"; at rest {largest.at_rest:.3g}"
+    if largest.load_factor is None or not math.isfinite(largest.load_factor):
+        return said
+    return f"{said}, 1 at {largest.load_factor:.4g} of the load's stresses"
 
 
 def _delamination(result: Result) -> str:

@@ -235,8 +235,12 @@ def _evaluate_failure(run: Simulation, steps: Steps, times: Times, fields: Float
     envelope, monitor, outside = run.state.failure, run.model.failure, run.model.outside
     if envelope is not None and monitor is not None and outside is not None:
         for step, time, field in zip(steps, times, fields, strict=True):
-            monitor.update(envelope, field, time)
+            strains = monitor.update(envelope, field, time)
+            if monitor.has_residual and (worst := outside.worst_states(envelope)) is not None:
+                monitor.follow(envelope, worst, strains)
             run.recorder.row("exposures", step, time, outside.largest(envelope))
+            for other in run.others:
+                other.monitor.update(other.envelope, field, time)
 
 
 # What is done with displacement fields, (rows, numnp, 5), at every N-th step of RODP or pass.

@@ -14,7 +14,9 @@ from fecm.mechanics.ply_stresses import FailureEnvelope
 from fecm.mechanics.strains import STRAINS
 from fecm.problem.build import ImpactModel
 from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR
+from fecm.results.exposures import LOAD_FACTOR
 from fecm.results.groups import STORED_BY
+from fecm.results.plies import CURE_STRESS
 from fecm.results.schema import DATASETS, FIXED, Dataset
 from fecm.results.sinks import RowBuffer, Sink
 from fecm.simulation.saved import subset
@@ -36,7 +38,19 @@ def _absent(model: ImpactModel) -> set[str]:
         absent.add(f"{MEMBRANE}/preload_energy")
     if model.stretching is None or not model.stretching.has_load:
         absent |= {f"{MEMBRANE}/force_at_load", f"{MEMBRANE}/moment_at_load"}
+    if model.cure is None:
+        absent.add(CURE_STRESS)
     return absent
+
+
+def exposures_of(found: FailureEnvelope) -> dict[str, Array]:
+    """Datasets of the largest exposures, those of plies as (states,)."""
+    arrays = {}
+    for part in ("exposure", "time", "mode"):
+        for name, values in zip(CRITERIA, getattr(found.plies, part), strict=True):
+            arrays[f"failure/{name}/{part}"] = values
+        arrays[f"failure/{INTERLAMINAR}/{part}"] = getattr(found.interfaces, part)
+    return arrays
 
 
 class Recorder:
@@ -50,7 +64,7 @@ class Recorder:
         has_impact = model.impact is not None
         self._room = {  # upper bound of the rows of each group
             **{group: sizes.passes[STORED_BY[group]] for group in AT_MACROS},
-            "exposures": sizes.passes["FAIL"] + model.plate.is_preloaded * bool(model.failure),
+            "exposures": sizes.passes["FAIL"] + model.is_stressed_at_rest,
             "tape8": has_impact * sizes.contact_rows,
             "tape9": has_impact * (sizes.steps if tapes else sizes.contact_rows),
             "history": has_impact * sizes.steps,
@@ -67,7 +81,8 @@ class Recorder:
         self._datasets = [
             (dataset, self._shape(dataset))
             for dataset in DATASETS.values()
-            if self._room.get(dataset.group) != 0 and dataset.path not in absent
+            if (self._room.get(dataset.group) != 0 or dataset.path == CURE_STRESS)
+            and dataset.path not in absent
         ]
         self._buffers: dict[str, RowBuffer] = {}
         for group in (*EVERY_STEP, "tape9", *AT_MACROS, MEMBRANE):
@@ -89,12 +104,13 @@ class Recorder:
             "npt": self._model.strains.shape[1],
             "nps": self._model.stress_points.shape[1],
             "gages": 0 if gages is None else len(gages.numbers),
+            "layers": len(self._model.plate.laminate.plies.angles),
             **FIXED,
         }
         if self._model.plies is not None:
-            numbers["members"], numbers["npp"], numbers["layers"] = self._model.plies.shape
+            numbers["members"], numbers["npp"], _ = self._model.plies.shape
         if self._model.failure is not None:
-            _, numbers["npp"], numbers["layers"] = self._model.failure.stresses.shape
+            _, numbers["npp"], _ = self._model.failure.stresses.shape
             numbers["interfaces"] = numbers["layers"] - 1
         if self._model.patch is not None:
             numbers["patch_nodes"] = np.count_nonzero(self._model.patch.weights)
@@ -143,6 +159,8 @@ class Recorder:
             found["plies/element"] = members + 1
             found["plies/z"] = model.plies.z
             found["plies/under_load"] = near[members].any(axis=1).astype(int)
+        if model.cure is not None:
+            found[CURE_STRESS] = model.cure.stresses
         if near is not None and model.failure is not None:
             x, y = model.stress_points.places(mesh.coordinates)
             found["failure/x"] = x
@@ -195,11 +213,12 @@ class Recorder:
 
     def failure(self, found: FailureEnvelope) -> None:
         """Store the largest exposures of FAIL."""
-        for part in ("exposure", "time", "mode"):
-            for name, values in zip(CRITERIA, getattr(found.plies, part), strict=True):
-                path = f"failure/{name}/{part}"
-                self._sink.write(path, 0, values.reshape(self._shape(DATASETS[path])))
-            self._sink.write(f"failure/{INTERLAMINAR}/{part}", 0, getattr(found.interfaces, part))
+        for path, values in exposures_of(found).items():
+            self._sink.write(path, 0, values.reshape(self._shape(DATASETS[path])))
+        monitor = self._model.failure
+        if monitor is not None and monitor.has_residual:
+            for name, factor in monitor.load_factors(found.worst).items():
+                self._sink.attributes(f"failure/{name}", {LOAD_FACTOR: factor})
 
     def finish(self) -> None:
         """Store the remaining rows and trim each dataset to its rows."""

@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from fecm._version import __version__
-from fecm.deck.model import Deck, Material
+from fecm.deck.model import Allowables, Cure, Deck, Material
 from fecm.deck.units import unit_names
-from fecm.mechanics.failure import MODES
+from fecm.mechanics.failure import MODES, largest_in_plies
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.problem.build import RunOptions
 from fecm.problem.problem import Problem, Threshold
 from fecm.problem.slips import mode_of
-from fecm.results.exposures import count_evaluations
+from fecm.results.exposures import AT_REST, count_evaluations
 from fecm.results.metrics import MOBILITY, VALIDITY
 from fecm.results.result import Result
 from fecm.results.schema import FORMAT_VERSION, KINEMATICS, Form, Kinematics
@@ -49,7 +49,7 @@ def run(simulation: Simulation) -> None:
     problem, state = simulation.problem, simulation.state
     if not state.position:
         _write_header(simulation)
-        _evaluate_preload(simulation)
+        _evaluate_at_rest(simulation)
         simulation.printer.problem(problem.deck, problem.mesh, simulation.model.plate)
     try:
         with np.errstate(all="ignore"):  # an overflow is reported as a divergence
@@ -89,11 +89,24 @@ def _write_header(simulation: Simulation) -> None:
     sink.text("deck", deck.text or deck.to_text(), "the cards of the problem")
     at_nodes = deck.require(Material).integration.points < 0 and "tapes" not in options.slips
     simulation.recorder.create("nodes" if at_nodes else "gauss")
+    _write_cure(simulation)
 
 
-def _evaluate_preload(simulation: Simulation) -> None:
-    """Let FAIL find the exposures of the plate at rest under its preload."""
-    if simulation.model.plate.is_preloaded:
+def _write_cure(simulation: Simulation) -> None:
+    """Store the changes of CURE, and the exposures of its residual stresses."""
+    model, deck = simulation.model, simulation.problem.deck
+    if model.cure is None or model.failure is None:
+        return
+    card, sink = deck.require(Cure), simulation.sink
+    changes = {"cure": card.delta_t, "moisture": card.delta_c}
+    sink.attributes("failure", changes if card.delta_c else {"cure": card.delta_t})
+    for one in largest_in_plies(deck.require(Allowables), model.cure.stresses):
+        sink.attributes(f"failure/{one.criterion}", {AT_REST: one.exposure})
+
+
+def _evaluate_at_rest(simulation: Simulation) -> None:
+    """Let FAIL find the exposures of the plate before anything moves."""
+    if simulation.model.is_stressed_at_rest:
         rest = np.zeros((1, *simulation.problem.mesh.equations.shape))
         STORING["FAIL"](simulation, [0], [0.0], rest)
 

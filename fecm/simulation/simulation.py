@@ -11,6 +11,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.deck.macros import load_factor
+from fecm.mechanics.ply_stresses import FailureEnvelope, FailureMonitor
 from fecm.mechanics.solutions import Tangent
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.problem import Problem
@@ -32,6 +33,14 @@ class Pace(NamedTuple):
 SINGLY = Pace(most=64, work=100_000)  # where each step is a call of Python
 TOGETHER = Pace(most=4096, work=20_000_000)  # where the kernels take many
 
+
+class Criteria(NamedTuple):
+    """Failure criteria of plies with other residual stresses, and their largest exposures."""
+
+    monitor: FailureMonitor
+    envelope: FailureEnvelope
+
+
 Observer = Callable[["Simulation"], object]
 
 
@@ -46,6 +55,7 @@ class Simulation:
     # Called with the simulation every `interval` steps; may write a checkpoint or raise.
     observers: Sequence[Observer] = ()
     on_macro: Observer = lambda simulation: None  # the same after every macro; must be fast
+    others: Sequence[Criteria] = ()  # that FAIL evaluates too; no checkpoint has them
 
     def __post_init__(self) -> None:
         problem, options = self.problem, self.options

@@ -30,7 +30,13 @@ from fecm.simulation.judge import ENERGY_WARNING
 from fecm.sweeps import find_in_full
 from fecm.sweeps.case import Case, CasesError, Value
 from fecm.sweeps.find import Runs, Sought, Strikes, found
-from fecm.sweeps.in_full import alone, problem_of_case, run_in_full, with_hit
+from fecm.sweeps.in_full import (
+    alone,
+    in_one_motion,
+    problem_of_case,
+    run_in_full,
+    with_hit,
+)
 from fecm.sweeps.judge import Peak, judge, threshold_of
 from fecm.sweeps.limits import THRESHOLD
 from fecm.sweeps.memory import ADVANCED_BYTES
@@ -49,6 +55,8 @@ UNIT = RigidMass(1.0)
 def run(task: Task) -> Outcome:
     """Run the cases of a task; a case that cannot be run becomes a row with the reason."""
     settings = task.settings
+    if settings.in_full and len(task.cases) > 1:
+        return merge(in_one_motion(settings, task.numbers, task.cases), history=settings.history)
     if settings.in_full:
         cases = zip(task.numbers, task.cases, strict=True)
         parts = [run_in_full(settings, number, case) for number, case in cases]

@@ -18,7 +18,8 @@ from fecm.sweeps.vary import apply_case
 
 THICKNESS = "thickness"
 LAMINATE = names_of(Changes.LAMINATE)
-_NUMBERS = (n for n in (*names_of(Changes.STRIKE), *LAMINATE) if kind_of(n) is Kind.NUMBER)
+_CHANGES = (Changes.RESIDUAL, Changes.STRIKE, Changes.LAMINATE)
+_NUMBERS = (n for n in names_of(*_CHANGES) if kind_of(n) is Kind.NUMBER)
 JUDGED = {"patch", *_NUMBERS} - {"angle"}
 FEW = 4  # plies below which a laminate as thin as two of them is possible
 

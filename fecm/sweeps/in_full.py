@@ -18,7 +18,9 @@ from fecm.results.exposures import count_evaluations
 from fecm.results.metrics import EVALUATIONS, HIT, Indentation, Projectiles, summarise
 from fecm.results.result import Result
 from fecm.results.sinks import MemorySink
-from fecm.simulation.run import simulate
+from fecm.simulation.recorder import exposures_of
+from fecm.simulation.run import run, simulate
+from fecm.simulation.simulation import Criteria, Simulation
 from fecm.sweeps import find_in_full
 from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.find import Sought
@@ -46,6 +48,9 @@ def run_in_full(settings: Settings, number: int, case: Case) -> Outcome:
                 return alone(number, replace(longer, deck=strike.deck()), settings.measures)
 
             level, start = float(search.level), strike_of(checked.deck)
+            at_rest = checked.worst_at_rest
+            if at_rest is not None and at_rest.exposure >= level:
+                raise CasesError(f"the plate at rest has the exposure {at_rest.exposure:.4g}")
             outcome = find_in_full.found(number, start, search.quantity, level, run)
         else:
             outcome = alone(number, checked, settings.measures, measure, case)
@@ -101,8 +106,55 @@ def alone(
         simulation = simulate(checked if measure else without_output(checked, measures), sink)
     except (DivergenceError, ArithmeticError) as error:
         return Outcome.failed({number: str(error)})
-    force, depth, times = (sink.arrays[f"history/{n}"] for n in ("force", "indentation", "time"))
-    about = sink.groups["history"]
+    result = Result(sink.arrays, sink.texts, sink.groups)
+    outcome = _outcome(number, checked, measures, result, simulation.state.dt)
+    if measure is not None:
+        outcome.columns |= _measured(measure, result, case or {})
+    return outcome
+
+
+def in_one_motion(
+    settings: Settings, numbers: Sequence[int], cases: Sequence[Case]
+) -> list[Outcome]:
+    """Run cases that differ in the residual stresses of their plies alone.
+
+    FAIL evaluates them together at every step of one run.
+    """
+    measures, sink = settings.measures, MemorySink()
+    try:
+        problems = [problem_of_case(settings, case) for case in cases]
+        simulation = Simulation(without_output(problems[0], measures), sink)
+        simulation.others = [_criteria(simulation, one) for one in problems[1:]]
+        run(simulation)
+    except (CasesError, DivergenceError, ArithmeticError) as error:
+        return [Outcome.failed({number: str(error)}) for number in numbers]
+    found = [{}, *(exposures_of(other.envelope) for other in simulation.others)]
+    outcomes = []
+    for number, case, one, arrays in zip(numbers, cases, problems, found, strict=True):
+        own = {path: values.reshape(sink.arrays[path].shape) for path, values in arrays.items()}
+        result = Result({**sink.arrays, **own}, sink.texts, sink.groups)
+        outcome = _outcome(number, one, measures, result, simulation.state.dt)
+        outcomes.append(with_hit(outcome, one, case))
+    return outcomes
+
+
+def _criteria(simulation: Simulation, checked: Problem) -> Criteria:
+    """Failure criteria of plies with the residual stresses of another case."""
+    monitor, residual = simulation.model.failure, checked.residual
+    assert monitor is not None
+    assert residual is not None
+    made = monitor.with_residual(residual.stresses)
+    envelope = made.start()
+    made.update(envelope, np.zeros(checked.mesh.equations.shape), 0.0)
+    return Criteria(made, envelope)
+
+
+def _outcome(
+    number: int, checked: Problem, measures: Sequence[Measure], result: Result, dt: float
+) -> Outcome:
+    """Columns of a case from its result."""
+    force, depth, times = (result[f"history/{n}"] for n in ("force", "indentation", "time"))
+    about = result.attributes_of("history")
     permanent = np.array([about.get("permanent_indentation", 0.0)])
     indentation = Indentation(np.maximum(depth.max(keepdims=True), 0.0), depth[-1:], permanent)
     own = strike_of(checked.deck)
@@ -119,18 +171,15 @@ def alone(
         metrics,
         last=force[-1:],
         steps=len(force),
-        dt=simulation.state.dt,
+        dt=dt,
         unsettled=np.array([about.get("unsettled_steps", 0)]),
         force=force[None],
     )
-    result = Result(sink.arrays, sink.texts, sink.groups)
     peaks = peaks_of(measures, result)
     judge(outcome, checked, measures, end=metrics.end, peaks=peaks, indentation=indentation.largest)
     if Measure.FAILURE in measures:
         count = np.array([float(count_evaluations(result))])
         outcome.columns |= dict.fromkeys(EVALUATIONS, count)
-    if measure is not None:
-        outcome.columns |= _measured(measure, result, case or {})
     return outcome
 
 

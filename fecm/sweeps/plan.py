@@ -26,7 +26,14 @@ from fecm.sweeps.find import FIRST_VELOCITIES, Search, Sought, Until, search_of
 from fecm.sweeps.limits import Limit, check_limits
 from fecm.sweeps.random import Design
 from fecm.sweeps.timing import Clock, clock_of
-from fecm.sweeps.values import REFINE, Changes, check_names, names_of, plate_values
+from fecm.sweeps.values import (
+    REFINE,
+    Changes,
+    check_names,
+    motion_values,
+    names_of,
+    plate_values,
+)
 
 BuildFunction = Callable[[dict[str, Any]], Deck]  # of a case, whose values are any
 MeasureFunction = Callable[[Result], Mapping[str, float]]
@@ -35,8 +42,9 @@ MOST_REDUCED = 256  # of the reduced model, whose steps cost more
 REDUCED = "reduced"  # name of that model
 MODES = 21  # bending modes of the reduced model
 MOST_MODES = 40
+MOST_IN_MOTION = 16  # full runs in one motion
 # Names that keep the critical time step of the deck.
-_KEEPING = {*names_of(Changes.STRIKE, Changes.PLACE), "duration"}
+_KEEPING = {*names_of(Changes.RESIDUAL, Changes.STRIKE, Changes.PLACE), "duration"}
 
 
 class Measure(StrEnum):
@@ -62,6 +70,12 @@ class Settings:
     measure: MeasureFunction | None = None  # computes more columns from the result of a case
     measures: tuple[Measure, ...] = ()  # more columns
     modes: int | None = None  # bending modes of the reduced model; None of full plates
+
+    @property
+    def shares_motion(self) -> bool:
+        """Whether full runs that differ in residual stresses alone are one motion."""
+        others = self.build, self.measure, self.search
+        return Measure.FAILURE in self.measures and all(other is None for other in others)
 
     @property
     def in_full(self) -> bool:
@@ -227,11 +241,17 @@ def _runs_of_case(made: Plan) -> int:
 
 
 def tasks(checked: Problem, made: Plan) -> list[Task]:
-    """Split a plan into tasks: cases that share a plate together, full runs one by one."""
+    """Split a plan into tasks.
+
+    These are cases that share a plate, full runs that share a motion, or single ones.
+    """
     together = max(1, runs_together(checked, made) // _runs_of_case(made))
+    common = plate_values
+    if made.settings.shares_motion:
+        together, common = MOST_IN_MOTION, motion_values
     plates: dict[object, list[int]] = {}
     for number, case in enumerate(made.cases):
-        plates.setdefault(frozenset(plate_values(case).items()), []).append(number)
+        plates.setdefault(frozenset(common(case).items()), []).append(number)
     parts = [
         tuple(numbers[start : start + together])
         for numbers in plates.values()

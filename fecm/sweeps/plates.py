@@ -98,6 +98,13 @@ def preload_force(name: str) -> PlateSetter:
     return changed
 
 
+def set_cure(deck: model.Deck, value: Value) -> model.Deck:
+    """Change the temperature of CURE, which has the coefficients of expansion."""
+    if (old := deck.last(model.Cure)) is None:
+        raise CasesError("cure_dT: the deck has no CURE, which has the coefficients of expansion")
+    return swapped(deck, old, replace(old, delta_t=float(value), source=None))
+
+
 def _common_thickness(name: str, deck: model.Deck) -> float:
     """Thickness of every ply; CasesError if they differ."""
     first, *others = (layer.thickness for layer in deck.require(model.Material).layers)

@@ -32,9 +32,10 @@ class Kind(Enum):
 class Changes(IntEnum):
     """What a value changes, in the order in which the values of a case are applied.
 
-    All but a strike need a run of the plate for each value.
+    All but residual stresses and a strike need a run of the plate for each value.
     """
 
+    RESIDUAL = auto()  # stresses of the plies, on which the motion does not depend
     LAMINATE = auto()
     PLATE = auto()  # mesh and supports
     PLACE = auto()  # where the force acts
@@ -129,6 +130,8 @@ PLATE_VALUES: tuple[Variable[PlateSetter], ...] = (
              meaning="the same for N0y"),
     Variable("preload_xy", Changes.LAMINATE, "force/length", plates.preload_force("n_xy"),
              meaning="the same for N0xy"),
+    Variable("cure_dT", Changes.RESIDUAL, "", plates.set_cure,
+             meaning="change of temperature of `CURE`, K; only exposures depend on it"),
     Variable("size", Changes.PLATE, "", plates.set_size, Kind.TEXT,
              meaning="`AxB`: sides of the plate; coordinates are scaled along x and y, and with "
                      "them the centre of the patch and the gages"),
@@ -170,12 +173,18 @@ def names_of(*changes: Changes) -> tuple[str, ...]:
 
 
 PLATE_NAMES = names_of(Changes.PLACE, Changes.LAMINATE, Changes.PLATE, Changes.TIME)
+RESIDUAL_NAMES = names_of(Changes.RESIDUAL)
 OF_PLATE = frozenset((*PLATE_NAMES, REFINE))  # which need another response of the plate
 
 
 def plate_values(case: Case) -> Case:
     """The values of a case that need another response of the plate."""
     return {name: value for name, value in case.items() if name in OF_PLATE}
+
+
+def motion_values(case: Case) -> Case:
+    """The values of a case that change its motion."""
+    return {name: value for name, value in case.items() if name not in RESIDUAL_NAMES}
 
 
 def kind_of(name: str) -> Kind:

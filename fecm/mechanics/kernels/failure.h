@@ -1,10 +1,11 @@
 /* Largest exposures of plies, with FailureMonitor's arithmetic; included once for each instruction set.
  *
  * Layout.  A state of stress is a ply at one of its faces; four states are computed at once, from the
- * strains of a point, (6,), and a table of stresses per strain, (6, 3, width).  `width` is the number
- * of states in fours; lanes beyond the last state compute zeros and are not stored.
+ * strains of a point, (6,), a table of stresses per strain, (6, 3, width), and the stresses without
+ * strain, (3, width).  `width` is the number of states in fours; lanes beyond the last state compute
+ * zeros and are not stored.
  *
- * Sums run over the six strains in their order.  Of equal exposures of one criterion the first mode
+ * Sums run over the six strains in their order, after the stress without strain.  Of equal exposures of one criterion the first mode
  * stays, and of equal exposures in time the first time.  A call is one thread's.
  */
 
@@ -57,7 +58,8 @@ TARGET void NAME(failure)(const Failure *f, const double *strains, double now) {
     const Ply ply = f->ply; /* a copy, which no store changes */
     for (int64_t point = 0; point < f->points; point++, strains += 6)
         for (int64_t first = 0; first < width; first += 4) {
-            half s[3] = {{0}};
+            half s[3];
+            for (int c = 0; c < 3; c++) s[c] = NAME(load)(f->residual + c * width + first);
             const double *stress = f->in_plane + first;
             for (int k = 0; k < 6; k++)
                 for (int c = 0; c < 3; c++, stress += width) s[c] += strains[k] * NAME(load)(stress);

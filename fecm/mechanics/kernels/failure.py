@@ -46,6 +46,7 @@ class Failure(Structure):
 
     ===========  =============================  ============================================
     `in_plane`   (6, 3, width)                  stresses per midplane strain and curvature
+    `residual`   (3, width)                     stresses without strain
     `exposure`   (criteria, points, states)     largest exposure so far
     `time`       (criteria, points, states)     when it was reached
     `mode`       (criteria, points, states)     its mode of failure
@@ -57,6 +58,7 @@ class Failure(Structure):
         ("states", c_int64),
         ("width", c_int64),  # number of states, filled up to fours
         ("in_plane", Doubles),
+        ("residual", Doubles),
         ("ply", Ply),
         ("exposure", Doubles),
         ("time", Doubles),
@@ -72,6 +74,11 @@ class CompiledMonitor(FailureMonitor):
         """Stresses per strain, (6, 3, states); states are filled up to fours."""
         stresses = self._in_plane.reshape(6, 3, -1)
         return np.pad(stresses, ((0, 0), (0, 0), (0, -stresses.shape[2] % 4)))
+
+    def _add(self, residual: Floats) -> None:
+        super()._add(residual)
+        # States are filled up to fours.
+        self._without_strain = np.pad(self._residual, ((0, 0), (0, -self._residual.shape[1] % 4)))
 
     @cached_property
     def _ply(self) -> Ply:
@@ -96,6 +103,7 @@ class CompiledMonitor(FailureMonitor):
             states=self._in_plane.shape[1] // 3,
             width=self._table.shape[2],
             in_plane=self._table,
+            residual=self._without_strain,
             ply=self._ply,
             exposure=plies.exposure,
             time=plies.time,

@@ -184,6 +184,7 @@ static const Entry FIELDS[] = {
     FIELD(Failure, states),
     FIELD(Failure, width),
     FIELD(Failure, in_plane),
+    FIELD(Failure, residual),
     FIELD(Failure, ply),
     FIELD(Failure, exposure),
     FIELD(Failure, time),

@@ -169,6 +169,7 @@ typedef struct {
 typedef struct {
     int64_t points, states, width;
     const double *in_plane; /* (6, 3, width): stresses per strain */
+    const double *residual; /* (3, width): stresses without strain */
     Ply ply;
     double *exposure, *time; /* (CRITERIA, points, states) */
     int8_t *mode;

@@ -10,7 +10,8 @@ from fecm.deck import model
 from fecm.deck.macros import Loop, every, flat
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import MODULUS, TOUGHNESS, in_si, unit_names
-from fecm.mechanics.ply_stresses import uniform_exposures
+from fecm.mechanics.failure import largest_in_plies
+from fecm.mechanics.ply_stresses import uniform_stresses
 from fecm.problem.problem import Problem
 from fecm.problem.rules.units import USED, has_real_moduli, likely_unit, looks_like, needed_unit
 from fecm.results.criteria import spelt
@@ -326,7 +327,8 @@ def preload_beyond_strength(problem: Problem) -> Reports:
     strengths, card = problem.deck.last(model.Allowables), problem.deck.last(model.Preload)
     if strengths is None or card is None:
         return
-    exposures = uniform_exposures(problem.laminate, strengths, problem.plate.preload_strain)
+    stresses = uniform_stresses(problem.laminate, problem.plate.preload_strain)
+    exposures = largest_in_plies(strengths, stresses)
     worst = max(exposures, key=lambda one: one.exposure)
     if worst.exposure >= 1.0:
         what = f"{worst.mode}, {spelt(worst.criterion)}, ply {worst.ply}"

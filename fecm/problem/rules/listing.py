@@ -20,6 +20,7 @@ LATER_SEGMENTS = (
     model.Patch,
     model.Nonlinear,
     model.Preload,
+    model.Cure,
 )
 
 
@@ -65,7 +66,9 @@ def too_many_layers(problem: Problem) -> Reports:
     "E603",
     Subject.LISTING,
     "The deck has a word that the printed program does not have.",
-    cause="These are PATC, PLYS, FAIL, ALLO, DELA, DAMP, NONL, PREL, SHEA MITC and SHEA EQUI.",
+    cause=(
+        "These are PATC, PLYS, FAIL, ALLO, DELA, DAMP, NONL, PREL, CURE, SHEA MITC and SHEA EQUI."
+    ),
     remedy=REMEDY,
 )
 def later_words(problem: Problem) -> Reports:

@@ -1,0 +1,181 @@
+"""Rules about the CURE segment: residual stresses of cure and moisture."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm.deck import model
+from fecm.deck.catalogue import EXPANSIONS, LARGEST_EXPANSION
+from fecm.deck.macros import flat
+from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.deck.units import quantity, unit_names, unit_of
+from fecm.mechanics.failure import largest_in_plies
+from fecm.problem.parts import MATERIAL
+from fecm.problem.problem import Problem
+from fecm.results.criteria import spelt
+
+LARGEST_BETA = 0.1  # strain per per cent of weight
+LARGEST_CHANGE = 500.0  # K
+LARGEST_WARP = 0.1  # rise of the free plate over its thickness, above which it is told
+MOISTURE = ("beta1", "beta2")
+
+
+@rule(
+    "E453",
+    Subject.LAMINATE,
+    "CURE has no coefficients of expansion of the plies.",
+    cause="Its second card is missing, or of another material; or alpha1 and alpha2 are 0.",
+    remedy="After the changes a card with the material (blank: 1), alpha1 and alpha2.",
+)
+def missing_expansion(card: model.Cure) -> Reports:
+    """Find a change of temperature or moisture without what it does to the plies."""
+    hint = "its fields are the material (columns 1-5, blank: 1), alpha1 (11-20) and alpha2 (21-30)"
+    for one in card.expansions:
+        if one.material != MATERIAL:
+            message = f"The deck has no material {one.material}, only {MATERIAL}, that of MATE."
+            yield Report(message, one.place("material"), hint)
+    if (free := card.expansion(MATERIAL)) is None:
+        yield Report(f"CURE has no card of material {MATERIAL}, that of MATE.", card.place(), hint)
+        return
+    for change, value, names in (
+        ("temperature", card.delta_t, EXPANSIONS),
+        ("moisture", card.delta_c, MOISTURE),
+    ):
+        if value and not any(getattr(free, name) for name in names):
+            both = " and ".join(names)
+            message = f"CURE changes the {change} by {value:g}, but {both} are 0."
+            yield Report(message, free.place(names[0]), hint)
+
+
+@rule(
+    "E454",
+    Subject.LAMINATE,
+    "A coefficient of thermal expansion on CURE is above 10⁻³ per kelvin.",
+    cause="Fibres and resins have 10⁻⁶ to 10⁻⁴.",
+    remedy="Coefficients per kelvin: 22.5E-6, not 22.5.",
+)
+def implausible_expansion(card: model.Cure) -> Reports:
+    """Find coefficients of expansion that are given in millionths."""
+    for one in card.expansions:
+        for name in EXPANSIONS:
+            value = getattr(one, name)
+            if abs(value) > LARGEST_EXPANSION:
+                message = f"{name} = {value:g} is above {LARGEST_EXPANSION:g}; it is per kelvin."
+                hint = f"{value:g} millionths are {value * 1e-6:.4g}"
+                yield Report(message, one.place(name), hint)
+
+
+@rule(
+    "W473",
+    Subject.LAMINATE,
+    "A coefficient of moisture expansion on CURE is above 0.1.",
+    cause="It is the strain per per cent of weight. Books have the strain at 100 %.",
+    remedy="A hundredth of the book's value: 0.006 for 0.6.",
+)
+def implausible_moisture(problem: Problem) -> Reports:
+    """Find moisture coefficients that are not per per cent."""
+    card = problem.deck.last(model.Cure)
+    for one in () if card is None else card.expansions:
+        for name in MOISTURE:
+            value = getattr(one, name)
+            if abs(value) > LARGEST_BETA:
+                message = f"{name} = {value:g} is large for a strain per per cent of weight."
+                hint = f"{value:g} at 100 % is {value / 100.0:.4g} per per cent"
+                yield Report(message, one.place(name), hint)
+
+
+@rule(
+    "W462",
+    Subject.LAMINATE,
+    "The change of temperature on CURE is above 500 K.",
+    remedy="Temperature of use minus stress-free temperature, in kelvin.",
+)
+def large_change(problem: Problem) -> Reports:
+    """Find changes of temperature that no resin withstands."""
+    card = problem.deck.last(model.Cure)
+    if card is not None and abs(card.delta_t) > LARGEST_CHANGE:
+        message = f"The change of temperature is {card.delta_t:g} K, above {LARGEST_CHANGE:g}."
+        hint = "it is the temperature of use minus the stress-free temperature: -155 from 177 to 22"
+        yield Report(message, card.place("change of temperature"), hint)
+
+
+@rule(
+    "W463",
+    Subject.DAMAGE,
+    "The laminate cracks before any load.",
+    cause="The residual stresses of CURE alone reach the strength of a ply.",
+    remedy="The values of CURE and ALLO, or another layup.",
+)
+def cracks_at_rest(problem: Problem) -> Reports:
+    """Find residual stresses beyond the strength of a ply."""
+    strengths, card = problem.deck.last(model.Allowables), problem.deck.last(model.Cure)
+    if strengths is None or card is None or problem.residual is None:
+        return
+    exposures = largest_in_plies(strengths, problem.residual.stresses)
+    worst = max(exposures, key=lambda one: one.exposure)
+    if worst.exposure >= 1.0:
+        where = f"{worst.mode}, {spelt(worst.criterion)}, ply {worst.ply}"
+        message = (
+            f"The laminate cracks before any load: the residual stresses of CURE reach exposure "
+            f"{worst.exposure:.3g} ({where})."
+        )
+        yield Report(message, card.place(), "strengths and moduli must be in the same unit")
+
+
+def _largest_curvature(curvature: Floats) -> float:
+    """Largest principal curvature in size of kappa_x, kappa_y and the twist kappa_xy."""
+    x, y, xy = curvature
+    return float(abs(x + y) / 2.0 + np.hypot((x - y) / 2.0, xy / 2.0))
+
+
+@rule(
+    "W464",
+    Subject.LAMINATE,
+    "The laminate is not symmetric and warps as it cools.",
+    cause=(
+        "The free plate rises by more than a tenth of its thickness. It is taken as flat when it "
+        "is mounted, without the forces that flatten it."
+    ),
+    remedy="A symmetric laminate, or accept it.",
+)
+def warped_plate(problem: Problem) -> Reports:
+    """Find laminates that are not flat after the cure."""
+    card, residual = problem.deck.last(model.Cure), problem.residual
+    if card is None or residual is None:
+        return
+    rise = _largest_curvature(residual.curvature) * problem.longer_side**2 / 8.0
+    thickness = problem.laminate.thickness
+    if rise > LARGEST_WARP * thickness:
+        said = quantity(rise, unit_of("length", unit_names(problem.deck)), 3)
+        message = (
+            f"The free plate warps by {said} over its longer side, {rise / thickness:.2g} "
+            "times its thickness: the laminate is not symmetric."
+        )
+        hint = "the plate is taken as flat when mounted; what flattens it is not in the model"
+        yield Report(message, card.place(), hint)
+
+
+@rule(
+    "W465",
+    Subject.LAMINATE,
+    "CURE is without PLYS and FAIL.",
+    cause="Residual stresses change neither the motion nor the force.",
+    remedy="FAIL, with ALLO, in the loop of RODP.",
+)
+def cure_without_stresses(problem: Problem) -> Reports:
+    """Find residual stresses that the program never uses."""
+    card = problem.deck.last(model.Cure)
+    if card is not None and {"PLYS", "FAIL"}.isdisjoint(m.word for m in flat(problem.program)):
+        message = "CURE has no effect without PLYS or FAIL: motion and force don't depend on it."
+        yield Report(message, card.place(), "put FAIL, with ALLO, into the loop of RODP")
+
+
+OF_CURE = (missing_expansion, implausible_expansion)
+VALUES = (
+    implausible_moisture,
+    large_change,
+    cracks_at_rest,
+    warped_plate,
+    cure_without_stresses,
+)
