@@ -256,6 +256,11 @@ def of_the_first(exposures: Any) -> Any:
     return np.broadcast_to(exposures[..., :1], exposures.shape)
 
 
+def unturned(plate: laminates.Laminate) -> laminates.Laminate:
+    """A laminate whose plies seem to lie along x."""
+    return replace(plate, plies=replace(plate.plies, angles=0.0 * plate.plies.angles))
+
+
 def of_the_last(exposures: Any) -> Any:
     return np.broadcast_to(exposures[..., -1:], exposures.shape)
 

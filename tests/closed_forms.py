@@ -16,7 +16,12 @@ from scipy.special import beta, j1
 
 from fecm._typing import Floats
 from fecm.deck.model import Ply
-from tests.closed_forms_plies import equilibrium_shear, exposures, interlaminar
+from tests.closed_forms_plies import (
+    equilibrium_shear,
+    exposures,
+    interlaminar,
+    residual_stresses,
+)
 from tests.closed_forms_preload import preloaded
 from tests.closed_forms_statistics import ishigami, lognormal, wilson
 from tests.closed_forms_stretching import strips
@@ -442,6 +447,7 @@ EXPECTED: dict[str, Sequence[float | None]] = {
         partial(stiffness, *bending_and_shear(PAGANO, (0.0, 90.0, 0.0), H)), PAGANO
     ),
     "failure-states": (*exposures(), *interlaminar()),
+    "residual-stresses": residual_stresses(),
     "random-values": (*ishigami(), *lognormal(115.0, 0.08), *wilson(3, 40)),
     "refinement": (1.7, 1.0),
     "identification": (1.0e6, 100.0),

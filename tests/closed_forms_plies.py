@@ -162,3 +162,34 @@ def interlaminar() -> list[float]:
         beside = [turn(angle) @ tau for angle in ANGLES[number : number + 2]]
         found.append(max(math.hypot(t13 / S13, t23 / S23) for t13, t23 in beside))
     return found
+
+
+# Residual stresses -------------------------------------------------------------------------------
+
+# T300/5208 (Tsai and Hahn 1980), Pa and per kelvin.
+COOLED = Ply(1600.0, 0.28, 181e9, 10.3e9, 7.17e9, 7.17e9, 3.68e9)
+ALPHA = np.array([0.02e-6, 22.5e-6, 0.0])
+
+
+def residual_stresses() -> tuple[float, ...]:
+    """Midplane strain, curvature and stresses of the first ply of Kaw's [0/90], and of [0/90]s.
+
+    The free laminate takes the strains of the least energy.  In balanced symmetric laminates they
+    are the same in x and in y.
+    """
+    h, dt = 0.01, -75.0
+    weighted, wanted = [], []
+    for low, high, angle in plies([0.0, 90.0], h):
+        root = np.linalg.cholesky(turned_stiffness(COOLED, angle)).T
+        free = ALPHA[[1, 0, 2]] if angle else ALPHA
+        for point in (-1.0, 1.0):
+            z = (low + high) / 2.0 + point / math.sqrt(3.0) * (high - low) / 2.0
+            weighted.append(root @ np.hstack([np.eye(3), z / h * np.eye(3)]))
+            wanted.append(root @ free * dt)
+    found = np.linalg.lstsq(np.vstack(weighted), np.concatenate(wanted), rcond=None)[0]
+    strain, curvature = found[:3], found[3:] / h
+    q = turned_stiffness(COOLED, 0.0)
+    lower, upper = (q @ (strain + z * curvature - ALPHA * dt) for z in (-h / 2.0, 0.0))
+    common = -100.0 * q[:, :2].sum(axis=0)[:2] @ ALPHA[:2] / q[:2, :2].sum()
+    across = float((q @ (np.array([common, common, 0.0]) + 100.0 * ALPHA))[1])
+    return strain[0], curvature[0], lower[0], upper[0], lower[1], upper[1], across, across

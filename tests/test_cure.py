@@ -44,8 +44,7 @@ THERMAL = "CURE\n{dt:g},\n,.02E-6,22.5E-6\n\nEXPE"
 
 def residual(plate: Laminate, dt: float, free: Expansion = ALPHA) -> Residual:
     """Residual stresses of a laminate of one material."""
-    ones = np.ones(len(plate.plies.angles))
-    return residual_stresses(plate, free.alpha1 * dt * ones, free.alpha2 * dt * ones)
+    return residual_stresses(plate, free.alpha1 * dt, free.alpha2 * dt)
 
 
 # Stresses ----------------------------------------------------------------------------------------

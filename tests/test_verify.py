@@ -152,7 +152,7 @@ def test_of_a_field_the_value_farthest_from_the_expected_one_counts() -> None:
 # Cases with independent figures that are stated, and compared with references below.
 STATED = {
     "static-bending", "frequencies", "wave-fronts", "dispersion", "rod-pulse", "infinite-plate",
-    "supported-plate", "patch-impact", "failure", "small-mass", "large-mass",
+    "supported-plate", "patch-impact", "failure", "cured-failure", "small-mass", "large-mass",
     "contact-coefficient", "stretching-plate", "stretching-disc", "stretching-impact",
 }  # fmt: skip
 
@@ -394,6 +394,12 @@ def test_figures_of_damage_are_those_of_the_reference_files() -> None:
         for r in reference("first_ply_failure_chain.csv")
     }
     assert [check.expected for check in chosen(["failure"])[0].checks] == list(first.values())
+    cured = [
+        float(r["q0 at first failure (Pa)"])
+        for r in reference("thermal_first_failure.csv")
+        if float(r["dT_K"]) == -100.0
+    ]
+    assert [check.expected for check in chosen(["cured-failure"])[0].checks] == cured
     figures = {
         ("threshold", "isotropic"): ("threshold_loads.csv", 0, "F threshold"),
         ("small-mass", "F T"): ("zener_olsson_small_mass.csv", 4, "F_max/(M V/T) = F_max/(k^.4 "

@@ -308,6 +308,12 @@ class Cure(Segment, keyword="CURE"):
             yield record.to_card()
         yield ""
 
+    def strains(self, material: int) -> tuple[float, float]:
+        """Free strains of a material along and across its fibres."""
+        free = self.expansion(material) or Expansion()
+        along = free.alpha1 * self.delta_t + free.beta1 * self.delta_c
+        return along, free.alpha2 * self.delta_t + free.beta2 * self.delta_c
+
     def expansion(self, material: int) -> Expansion | None:
         """Expansion of a material; None if it has none."""
         return next((one for one in self.expansions if one.material == material), None)

@@ -30,10 +30,10 @@ class Residual(NamedTuple):
     curvature: Floats  # (3,): kappa_x, kappa_y, kappa_xy, 1/length
 
 
-def free_strains(laminate: Laminate, along: Floats, across: Floats) -> Floats:
+def free_strains(laminate: Laminate, along: Floats | float, across: Floats | float) -> Floats:
     """Free strains xx, yy, xy of the plies in the laminate's axes, (plies, 3).
 
-    `along` and `across` (plies,) are those along and across the fibres.
+    `along` and `across` the fibres, of all plies or (plies,).
     """
     angles = np.deg2rad(laminate.plies.angles)
     m, n = np.cos(angles), np.sin(angles)
@@ -47,14 +47,27 @@ def free_strains(laminate: Laminate, along: Floats, across: Floats) -> Floats:
     )
 
 
-def residual_stresses(laminate: Laminate, along: Floats, across: Floats) -> Residual:
+def residual_stresses(
+    laminate: Laminate, along: Floats | float, across: Floats | float
+) -> Residual:
     """Residual stresses of a free laminate whose plies would strain by `along` and `across`.
 
     Parameters
     ----------
     laminate : Laminate
-    along, across : ndarray (plies,)
-        Free strains alpha dT + beta dC along and across the fibres of each ply.
+    along, across : float or ndarray (plies,)
+        Free strains alpha dT + beta dC along and across the fibres, of all plies or of each.
+
+    Examples
+    --------
+    Two plies of T300/5208 at 0 and 90 degrees, cooled by 100 K, in MPa:
+
+    >>> from fecm.deck.catalogue import MATERIALS
+    >>> from fecm.mechanics.laminate import laminate
+    >>> ply = MATERIALS["T300/5208"].converted("mm-N-s")
+    >>> plate = laminate(ply, (0.0, 90.0, 90.0, 0.0), [0.125] * 4)
+    >>> residual_stresses(plate, -2e-6, -2.25e-3).stresses[0, 0].round(2)
+    array([-21.27,  21.27,   0.  ])
     """
     free = free_strains(laminate, along, across)
     plies = laminate.plies

@@ -142,11 +142,7 @@ def residual_of_deck(deck: Deck, laminate: Laminate) -> Residual | None:
     """Residual stresses of the plies of a deck; None without a CURE segment."""
     if (cure := deck.last(model.Cure)) is None:
         return None
-    free = cure.expansion(MATERIAL) or model.Expansion()
-    along = free.alpha1 * cure.delta_t + free.beta1 * cure.delta_c
-    across = free.alpha2 * cure.delta_t + free.beta2 * cure.delta_c
-    plies = np.ones(len(laminate.plies.angles))
-    return residual_stresses(laminate, along * plies, across * plies)
+    return residual_stresses(laminate, *cure.strains(MATERIAL))
 
 
 def has_assumed_shear(deck: Deck) -> bool:

@@ -14,9 +14,12 @@ from fecm.deck.catalogue import MATERIALS
 from fecm.deck.grid import Grid, lines, uniform
 from fecm.deck.model import Gage, LoadTable, Macro, Patch, Ply, Segment
 from fecm.mechanics.buckling import buckling_factor
+from fecm.mechanics.laminate import laminate
+from fecm.mechanics.residual_stresses import residual_stresses
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
+from fecm.results.exposures import largest_exposures
 from fecm.results.result import Result
 from fecm.verification import decks
 from fecm.verification.case import Value, case
@@ -27,6 +30,7 @@ FEWER = 6  # of 12 a side
 THICKNESS = 0.1
 STIFF = Ply(1.0, 0.25, 25.0, 1.0, 0.5, 0.5, 0.2)  # Pagano's
 CROSS = (0.0, 90.0, 0.0)
+QUASI = (45.0, 0.0, -45.0, 90.0)
 
 
 @case
@@ -193,11 +197,12 @@ def bent(
     thickness: float = THICKNESS,
     word: str = "PLYS",
     *others: Segment,
+    q: float = 1.0,
 ) -> Result:
-    """Run a simply supported square under q = cos(pi x) cos(pi y), its origin in the middle."""
+    """Run a simply supported square under q cos(pi x) cos(pi y), its origin in the middle."""
     along = np.cos(np.pi * np.array(lines(uniform(0.5, ELEMENTS))))
     plate = decks.material(ply, angles, thickness / len(angles), points=2)
-    macros, load = decks.program(f"TANG FORM SOLV STRE {word}"), np.outer(along, along)
+    macros, load = decks.program(f"TANG FORM SOLV STRE {word}"), q * np.outer(along, along)
     made = decks.quarter_plate(ELEMENTS, plate, macros, load, others=[decks.MITC, *others])
     return decks.result_of(made)
 
@@ -238,3 +243,42 @@ def _failure() -> Sequence[Value]:
     assert strengths is not None
     found = bent(named.ply, (0.0, 90.0, 90.0, 0.0), 0.01, "FAIL", strengths)
     return [1.0 / found[f"failure/{name}/exposure"].max() for name in ("max_stress", "tsai_wu")]
+
+
+def cured(dt: float) -> model.Cure:
+    """Change of temperature of the named ply T300/5208."""
+    expansion = MATERIALS["T300/5208"].expansion
+    assert expansion is not None
+    return model.Cure(dt, expansions=(expansion,))
+
+
+@case
+def _residual_stresses() -> Sequence[Value]:
+    ply, cold = MATERIALS["T300/5208"].ply, cured(-100.0)
+    kaw = laminate(ply, (0.0, 90.0), (0.005, 0.005))
+    found = residual_stresses(kaw, *cured(-75.0).strains(1))
+    lower, upper = found.stresses[0]
+    across = [
+        bent(ply, angles, 0.01, "PLYS", cold)["plies/cure_stress"][0, 0, 1]
+        for angles in ((0.0, 90.0, 90.0, 0.0), 4 * QUASI + 4 * QUASI[::-1])
+    ]
+    return [
+        found.strain[0],
+        found.curvature[0],
+        lower[0],
+        upper[0],
+        lower[1],
+        upper[1],
+        *across,
+    ]
+
+
+@case
+def _cured_failure() -> Sequence[Value]:
+    named = MATERIALS["T300/5208"]
+    strengths = named.allowables("m-N-s")
+    assert strengths is not None
+    q, angles = 5e4, (0.0, 90.0, 90.0, 0.0)
+    found = bent(named.ply, angles, 0.01, "FAIL", strengths, cured(-100.0), q=q)
+    factors = {one.criterion: one.load_factor for one in largest_exposures(found)}
+    return [q * (factors[name] or 0.0) for name in ("max_stress", "tsai_wu", "puck")]

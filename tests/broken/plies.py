@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fecm.mechanics import (
-    failure,
-    ply_stresses,
-)
+from fecm.mechanics import failure, ply_stresses, residual_stresses
 from fecm.mechanics.ply_stresses import FailureMonitor
 from tests.breaks import (
     Breaks,
@@ -18,6 +15,7 @@ from tests.breaks import (
     mirrored,
     of_the_first,
     of_the_last,
+    unturned,
     without_q26,
     without_shear_stress,
 )
@@ -65,6 +63,21 @@ BREAKS: Breaks = {
         changed(ply_stresses, "in_plane_stresses",
                 lambda found: found * np.array([1.0, 0.9, 1.0])[:, None]),
         {"ply-stresses": ("σ2",), "failure": ("",)},
+    ),
+    "free strains of a ply in its own axes": (
+        instead(residual_stresses, "free_strains",
+                lambda right, plate, along, across: right(unturned(plate), along, across)),
+        {"residual-stresses": ("",)},
+    ),
+    "a free plate that stays flat": (
+        changed(residual_stresses, "in_plane_stresses",
+                lambda found: np.concatenate([found[..., :3], 0.0 * found[..., 3:]], axis=-1)),
+        {"residual-stresses": ("σ1 of [0/90], outer", "σ2 of [0/90], outer")},
+    ),
+    "FAIL takes half of the residual stresses": (
+        instead(FailureMonitor, "with_residual",
+                lambda right, self, stresses: right(self, 0.5 * stresses)),
+        {"cured-failure": ("",)},
     ),
     "interlaminar stresses of x and y exchanged": (
         changed(ply_stresses, "interlaminar_stresses",
