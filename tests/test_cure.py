@@ -8,9 +8,12 @@ theory and the criteria on the total stress.
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Literal
 
+import h5py
 import numpy as np
 import pytest
 
@@ -19,12 +22,12 @@ from fecm.api import load_deck
 from fecm.deck.catalogue import MATERIALS, read_plies
 from fecm.deck.grid import lines, uniform
 from fecm.deck.layup import parse_layup
-from fecm.deck.model import Allowables, Cure, Deck, Expansion
+from fecm.deck.model import Allowables, Cure, Deck, Expansion, Preload
 from fecm.mechanics.failure import CRITERIA, exposure_of, load_factor
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.mechanics.residual_stresses import Residual, residual_stresses
-from fecm.results.exposures import largest_exposures
+from fecm.results.exposures import LargestExposure, largest_exposures
 from fecm.results.metrics import EXPOSURES
 from fecm.simulation.run import run
 from fecm.simulation.simulation import Simulation
@@ -247,6 +250,47 @@ def test_the_factor_on_a_static_load_reaches_an_exposure_of_1() -> None:
     )
     assert again.exposure == pytest.approx(1.0, rel=1e-9)
     assert again.load_factor == pytest.approx(1.0, rel=1e-9)
+
+
+def test_summary_and_json_have_what_the_residual_stresses_contribute(tmp_path: Path) -> None:
+    path = tmp_path / "d.inp"
+    path.write_text(struck(-6.0).to_text())
+    done = call("run", path, cwd=tmp_path)
+    (line,) = [row for row in done.stdout.splitlines() if row.startswith("  tsai wu")]
+    result = fecm.load(tmp_path / "d.h5")
+    (one,) = [one for one in largest_exposures(result) if one.criterion == "tsai_wu"]
+    assert one.at_rest is not None
+    assert one.load_factor is not None
+    assert f"; at rest {one.at_rest:.3g}, 1 at {one.load_factor:.4g} of the load's" in line
+    told = json.loads(call("info", tmp_path / "d.h5", "--format", "json").stdout)
+    failure = told["metrics"]["failure"]
+    assert failure["at_rest"]["tsai_wu"] == pytest.approx(one.at_rest)
+    assert failure["load_factor"]["tsai_wu"] == pytest.approx(one.load_factor)
+    assert "interlaminar" not in failure["at_rest"]
+    with h5py.File(tmp_path / "d.h5", "r+") as file:
+        file["failure/puck"].attrs["at_rest"] = "much"
+    broken = call("info", tmp_path / "d.h5")
+    assert_unusable(broken)
+    assert "the attribute at_rest of failure/puck is much, not a number" in broken.stderr
+
+
+def test_the_factor_acts_on_the_load_alone_under_a_preload() -> None:
+    assert STRENGTHS is not None
+    plate = decks.material(PLY, (0.0, 90.0, 90.0, 0.0), 0.0025, points=3)
+    along = np.outer(*[np.cos(np.pi * np.array(lines(uniform(0.5, 4))))] * 2)
+
+    def largest(load: float) -> LargestExposure:
+        others = [decks.MITC, STRENGTHS, Preload(2e5, 1e5), Cure(-50.0, expansions=(ALPHA,))]
+        macros = decks.program("TANG FORM SOLV FAIL")
+        made = decks.quarter_plate(4, plate, macros, load * along, others=others)
+        return largest_exposures(decks.result_of(made))[0]
+
+    one = largest(5e4)
+    assert one.load_factor is not None
+    assert one.load_factor != pytest.approx(1.0, rel=0.01)
+    assert largest(5e4 * one.load_factor).exposure == pytest.approx(1.0, rel=1e-9)
+    at_rest = residual(laminate(PLY, (0.0, 90.0, 90.0, 0.0), [0.0025] * 4), -50.0).stresses
+    assert one.at_rest == pytest.approx(at_rest.max() / STRENGTHS.yt, rel=1e-12)
 
 
 def test_a_run_begins_with_the_exposures_at_rest() -> None:

@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 from fecm._text import shown
+from fecm.mechanics.failure import CRITERIA
+from fecm.results.exposures import AT_REST, LOAD_FACTOR
 from fecm.results.schema import DATASETS, FIXED
 
 
@@ -36,6 +38,7 @@ def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str])
 NUMBERS = {
     "threshold": ("force", "time", "margin"),
     "patch": ("x", "y", "radius"),
+    **{f"failure/{name}": (AT_REST, LOAD_FACTOR) for name in CRITERIA},
 }
 TEXTS = {"failure": ("modes",)}
 COMPLETE = ("threshold",)  # groups that have all of these attributes

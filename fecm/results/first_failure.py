@@ -11,7 +11,7 @@ import numpy as np
 from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.results.criteria import ALL_CRITERIA, where
-from fecm.results.exposures import evaluations_in_contact
+from fecm.results.exposures import AT_REST, LOAD_FACTOR, evaluations_in_contact
 from fecm.results.stored import Stored
 
 NEEDED = tuple(f"exposures/{name}" for name in ("time", "exposure", "mode", "ply", "x", "y"))
@@ -110,7 +110,10 @@ def _history(stored: Stored) -> _History:
 
 
 def failure_metrics(stored: Stored) -> dict[str, Any]:
-    """Evaluations, largest exposures and first failures as plain values; empty without FAIL."""
+    """Evaluations, largest exposures and first failures as plain values; empty without FAIL.
+
+    With CURE also the exposures at rest and the load factors.
+    """
     if "failure/x" not in stored:
         return {}
     largest = []
@@ -120,4 +123,15 @@ def failure_metrics(stored: Stored) -> dict[str, Any]:
         "evaluations_in_contact": evaluations_in_contact(stored),
         "largest": dict(zip(ALL_CRITERIA, largest, strict=False)),
         "first": [asdict(one) for one in first_failures(stored)],
+        **_of_cure(stored),
     }
+
+
+def _of_cure(stored: Stored) -> dict[str, dict[str, float]]:
+    """Attributes of the criteria that runs with CURE have, by criterion."""
+    known = {name: stored.attributes_of(f"failure/{name}") for name in ALL_CRITERIA}
+    found = {
+        attribute: {name: float(own[attribute]) for name, own in known.items() if attribute in own}
+        for attribute in (AT_REST, LOAD_FACTOR)
+    }
+    return {attribute: values for attribute, values in found.items() if values}
