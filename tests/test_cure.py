@@ -473,6 +473,7 @@ CODES = ("E453", "E454", "W462", "W463", "W464", "W465", "W473")
             "The deck has no material 2, only 1",
         ),
         (Cure(-1.0, expansions=(Expansion(1, -1.0, 2e-5),)), "E454", "alpha1 = -1 is above 0.001"),
+        (Cure(-1.0, expansions=(ALPHA, ALPHA)), "E453", "Material 1 has a second card"),
         (Cure(-501.0, expansions=(ALPHA,)), "W462", "change of temperature is -501 K, above 500."),
         (Cure(-450.0, expansions=(ALPHA,)), "W463", "cracks before any load"),
         (Cure(-200.0, expansions=(ALPHA,)), "W464", "warps by 0.0173 over its longer side, 0.16"),

@@ -58,8 +58,7 @@ KEYS = ELASTIC | {
 }
 TEXTS = ("source", "assumed", "units")
 SLOPES = ("p_plus", "p_minus")  # of Puck's criterion
-EXPANSIONS = ("alpha1", "alpha2")
-LARGEST_EXPANSION = 1e-3  # per kelvin
+EXPANSIONS = Expansion.THERMAL
 STRENGTHS = ("XT", "XC", "YT", "YC", "S12")
 SYSTEM_OF_FILES = "mm-N-s"  # system of units of a file that names none
 NU23 = 0.4  # of a ply whose nu23 is not known
@@ -175,8 +174,8 @@ def _constant(name: str, key: str, value: object) -> float:
         raise ValueError(f"[{name}] {key}: {value:g} is not a positive number{hint}")
     if key in SLOPES and not 0.0 < value < 1.0:
         raise ValueError(f"[{name}] {key}: {value:g} is not between 0 and 1")
-    if key in EXPANSIONS and abs(value) > LARGEST_EXPANSION:
-        raise ValueError(f"[{name}] {key}: {value:g} is above {LARGEST_EXPANSION:g} per kelvin")
+    if key in EXPANSIONS and abs(value) > Expansion.LARGEST:
+        raise ValueError(f"[{name}] {key}: {value:g} is above {Expansion.LARGEST:g} per kelvin")
     return float(value)
 
 

@@ -273,6 +273,9 @@ class Expansion(Record):
     beta1: float = 0.0
     beta2: float = 0.0
 
+    THERMAL: ClassVar[tuple[str, ...]] = ("alpha1", "alpha2")
+    MOISTURE: ClassVar[tuple[str, ...]] = ("beta1", "beta2")
+    LARGEST: ClassVar[float] = 1e-3  # of alpha1 and alpha2 in size
     optional: ClassVar[int] = 2
     fields: ClassVar[Fields] = layout(
         "I5? material|mat", "X5", "F10 alpha1", "F10 alpha2", "F10 beta1", "F10 beta2"

@@ -52,6 +52,8 @@ def residual_stresses(
 ) -> Residual:
     """Residual stresses of a free laminate whose plies would strain by `along` and `across`.
 
+    NaN of a laminate without stiffness.
+
     Parameters
     ----------
     laminate : Laminate
@@ -76,7 +78,10 @@ def residual_stresses(
     N = (stress * (upper - lower)).sum(axis=0)
     M = (stress * (upper**2 - lower**2)).sum(axis=0) / 2.0
     ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
-    mean = np.linalg.solve(ABD, np.concatenate([N, M]))
+    try:
+        mean = np.linalg.solve(ABD, np.concatenate([N, M]))
+    except np.linalg.LinAlgError:
+        mean = np.full(6, np.nan)
     # T Qbar (eps0 + z kappa) of the laminate, less T Qbar e of the ply.
     per_strain = in_plane_stresses(laminate)
     total = per_strain @ mean - np.einsum("pfij,pj->pfi", per_strain[..., :3], free)

@@ -6,7 +6,6 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.deck import model
-from fecm.deck.catalogue import EXPANSIONS, LARGEST_EXPANSION
 from fecm.deck.macros import flat
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import quantity, unit_names, unit_of
@@ -18,14 +17,16 @@ from fecm.results.criteria import spelt
 LARGEST_BETA = 0.1  # strain per per cent of weight
 LARGEST_CHANGE = 500.0  # K
 LARGEST_WARP = 0.1  # rise of the free plate over its thickness, above which it is told
-MOISTURE = ("beta1", "beta2")
 
 
 @rule(
     "E453",
     Subject.LAMINATE,
     "CURE has no coefficients of expansion of the plies.",
-    cause="Its second card is missing, or of another material; or alpha1 and alpha2 are 0.",
+    cause=(
+        "Its second card is missing, of another material or given twice; or alpha1 and alpha2 are "
+        "0."
+    ),
     remedy="After the changes a card with the material (blank: 1), alpha1 and alpha2.",
 )
 def missing_expansion(card: model.Cure) -> Reports:
@@ -35,12 +36,16 @@ def missing_expansion(card: model.Cure) -> Reports:
         if one.material != MATERIAL:
             message = f"The deck has no material {one.material}, only {MATERIAL}, that of MATE."
             yield Report(message, one.place("material"), hint)
+    for one in card.expansions[1:]:
+        if one.material == card.expansions[0].material:
+            message = f"Material {one.material} has a second card of expansions."
+            yield Report(message, one.place("material"), "remove one of them")
     if (free := card.expansion(MATERIAL)) is None:
         yield Report(f"CURE has no card of material {MATERIAL}, that of MATE.", card.place(), hint)
         return
     for change, value, names in (
-        ("temperature", card.delta_t, EXPANSIONS),
-        ("moisture", card.delta_c, MOISTURE),
+        ("temperature", card.delta_t, model.Expansion.THERMAL),
+        ("moisture", card.delta_c, model.Expansion.MOISTURE),
     ):
         if value and not any(getattr(free, name) for name in names):
             both = " and ".join(names)
@@ -58,10 +63,10 @@ def missing_expansion(card: model.Cure) -> Reports:
 def implausible_expansion(card: model.Cure) -> Reports:
     """Find coefficients of expansion that are given in millionths."""
     for one in card.expansions:
-        for name in EXPANSIONS:
+        for name in one.THERMAL:
             value = getattr(one, name)
-            if abs(value) > LARGEST_EXPANSION:
-                message = f"{name} = {value:g} is above {LARGEST_EXPANSION:g}; it is per kelvin."
+            if abs(value) > one.LARGEST:
+                message = f"{name} = {value:g} is above {one.LARGEST:g}; it is per kelvin."
                 hint = f"{value:g} millionths are {value * 1e-6:.4g}"
                 yield Report(message, one.place(name), hint)
 
@@ -77,7 +82,7 @@ def implausible_moisture(problem: Problem) -> Reports:
     """Find moisture coefficients that are not per per cent."""
     card = problem.deck.last(model.Cure)
     for one in () if card is None else card.expansions:
-        for name in MOISTURE:
+        for name in one.MOISTURE:
             value = getattr(one, name)
             if abs(value) > LARGEST_BETA:
                 message = f"{name} = {value:g} is large for a strain per per cent of weight."
