@@ -211,6 +211,13 @@ def test_fail_judges_the_sum_of_residual_and_mechanical_stresses() -> None:
         assert about["at_rest"] == pytest.approx(at_rest, rel=1e-12)
 
 
+def test_motion_force_and_stresses_between_plies_do_not_depend_on_the_cure() -> None:
+    cold, plain = fecm.run_one(struck(-6.0)), fecm.run_one(struck(0.0))
+    own = [path for path in plain if path.startswith(("history", "energy", "tape"))]
+    for path in (*own, "failure/interlaminar/exposure", "failure/interlaminar/time"):
+        np.testing.assert_array_equal(cold[path], plain[path], err_msg=path)
+
+
 @pytest.mark.parametrize("solver", ["kernels", "numpy"])
 def test_without_a_change_a_run_stores_what_it_does_without_the_card(
     solver: Literal["kernels", "numpy"],

@@ -65,6 +65,22 @@ def test_thickness_shows_six_components_with_jumps_at_the_faces_of_plies(plies: 
 
 
 @pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
+def test_a_thin_line_has_the_residual_stresses_of_the_cure(plies: Result) -> None:
+    text = plies.deck.replace("UNIT", "CURE\n-100.,\n,1.E-6,2.E-5\n\nUNIT")
+    cured = run(text)
+    figure: Any = plot(cured, "thickness")
+    assert figure.get_suptitle().endswith("\nthin: residual stress (CURE)")
+    for number, axes in enumerate(figure.axes[:3]):
+        load, thin = axes.get_lines()[-2:]
+        assert thin.get_linewidth() < load.get_linewidth()
+        residual = cured["plies/cure_stress"][..., number].ravel()
+        np.testing.assert_allclose(thin.get_xdata(), residual, rtol=1e-12)
+        np.testing.assert_array_equal(thin.get_ydata(), load.get_ydata())
+    stored = plies["plies/sigma_1"]
+    np.testing.assert_array_equal(cured["plies/sigma_1"], stored)  # those of the load alone
+
+
+@pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
 def test_thickness_without_a_place_is_that_of_the_largest_stress_outside_the_load(
     plies: Result,
 ) -> None:
