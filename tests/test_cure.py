@@ -353,6 +353,15 @@ def test_cases_that_differ_in_the_cure_alone_share_their_motion(
     assert forces[0] == forces[1]
 
 
+def test_the_command_says_how_many_runs_the_draws_take(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(struck(0.0).to_text())
+    options = ("--random", "cure_dT=normal:-3,1", "--samples", "16", "--measure", "failure")
+    done = call("sweep", "d.inp", *options, "-o", "s.h5", cwd=tmp_path)
+    assert done.exit_code == 0, done.stderr
+    told = "16 draws are run in full; those that differ in cure_dT alone, together"
+    assert told in done.stderr
+
+
 def test_a_search_finds_the_velocity_at_which_residual_and_other_stresses_reach_1() -> None:
     (velocity,) = fecm.sweep(struck(-6.0), until={"exposure": 1.0})["found_velocity"]
     (free,) = fecm.sweep(struck(0.0), until={"exposure": 1.0})["found_velocity"]

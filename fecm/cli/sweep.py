@@ -308,7 +308,9 @@ def sweep(options: Options) -> None:
     if design is not None:
         reduced = planned.settings.modes is not None
         shared = reduced or (shares_plate(problem) and not planned.settings.in_full)
-        note(*filter(None, (doubt(design), cost(cases, design, shared=shared))))
+        motions = planned.settings.shares_motion
+        told = cost(cases, design, shared=shared, motions=motions)
+        note(*filter(None, (doubt(design), told)))
     here = options.workers if scheduler is None else 0
     check_memory(problem, planned, here, streamed=True)
     if count := freed(tasks(problem, planned)):

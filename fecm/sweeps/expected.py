@@ -8,7 +8,7 @@ from fecm.problem.problem import Problem
 from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.find_in_full import USUAL
 from fecm.sweeps.in_full import alone
-from fecm.sweeps.plan import Plan
+from fecm.sweeps.plan import Plan, tasks
 from fecm.sweeps.timing import duration_of, lengthened
 from fecm.sweeps.values import REFINE
 
@@ -31,13 +31,19 @@ def expected(problem: Problem, made: Plan, workers: int) -> str:
     each = 1
     if made.settings.search is not None:
         each, runs = USUAL, f"about {USUAL} full runs each"
+    chosen = made.cases
+    if made.settings.shares_motion:
+        chosen = tuple(task.cases[0] for task in tasks(problem, made))
+        if len(chosen) < count:
+            runs = f"{len(chosen)} full run{'' if len(chosen) == 1 else 's'}"
+            count = len(chosen)
     text = f"a nonlinear plate has no impulse response: {cases}, {runs}"
     try:
         begin, step = _costs(problem, made)
     except CasesError:  # no run of a few steps
         return text
     duration = duration_of(problem)
-    steps = sum(_full_steps(case, duration, problem.work.steps) for case in made.cases)
+    steps = sum(_full_steps(case, duration, problem.work.steps) for case in chosen)
     seconds = each * (begin * count + step * steps)
     where = f" by {workers} workers" if workers > 1 else ""
     if not workers:

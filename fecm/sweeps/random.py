@@ -12,7 +12,15 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.sweeps.case import Case, CasesError, check_count
-from fecm.sweeps.values import NAMES, PLATE_NAMES, Kind, check_free, kind_of, plate_values
+from fecm.sweeps.values import (
+    NAMES,
+    PLATE_NAMES,
+    RESIDUAL_NAMES,
+    Kind,
+    check_free,
+    kind_of,
+    plate_values,
+)
 
 DesignKind = Literal["lhs", "sobol", "mc"]
 DESIGNS: tuple[DesignKind, ...] = get_args(DesignKind)
@@ -237,13 +245,20 @@ def random_cases(design: Design, varied: Sequence[Case]) -> list[Case]:
     return [{**case, **row} for case in varied for row in rows]
 
 
-def cost(cases: Sequence[Case], design: Design, *, shared: bool) -> str:
-    """Say how many plates a random sweep needs, and which names cause them."""
+def cost(cases: Sequence[Case], design: Design, *, shared: bool, motions: bool) -> str:
+    """Say how many plates a random sweep needs, and which names cause them.
+
+    Cases may share the response of a plate, or motions that do not depend on residual stresses.
+    """
     given = f"{design.draws} draws"
     if len(cases) != design.draws:
         given = f"{len(cases)} cases of {given}"
     if not shared:
-        return f"{given} are run in full, one by one"
+        residual = [name for name in cases[0] if motions and name in RESIDUAL_NAMES]
+        how = (
+            f"; those that differ in {residual[0]} alone, together" if residual else ", one by one"
+        )
+        return f"{given} are run in full{how}"
     plates = len({frozenset(plate_values(case).items()) for case in cases})
     causes = [name for name in design.laws if name in PLATE_NAMES]
     if not causes:
