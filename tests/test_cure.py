@@ -474,7 +474,7 @@ def messages(card: Cure) -> dict[str, str]:
     return {f.code: f.message for f in found if f.code in CODES}
 
 
-CODES = ("E453", "E454", "W462", "W463", "W464", "W465", "W473")
+CODES = ("E453", "E454", "W462", "W463", "W464", "W465", "W496")
 
 
 @pytest.mark.parametrize(
@@ -493,7 +493,7 @@ CODES = ("E453", "E454", "W462", "W463", "W464", "W465", "W473")
         (Cure(-501.0, expansions=(ALPHA,)), "W462", "change of temperature is -501 K, above 500."),
         (Cure(-450.0, expansions=(ALPHA,)), "W463", "cracks before any load"),
         (Cure(-200.0, expansions=(ALPHA,)), "W464", "warps by 0.0173 over its longer side, 0.16"),
-        (Cure(0.0, 0.1, (Expansion(beta2=0.6),)), "W473", "beta2 = 0.6 is large"),
+        (Cure(0.0, 0.1, (Expansion(beta2=0.6),)), "W496", "beta2 = 0.6 is large"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_a_cure_is_told(card: Cure, code: str, message: str) -> None:

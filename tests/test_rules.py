@@ -285,7 +285,7 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "W462": plate(with_card("CURE", "-600.,", ",.02E-6,22.5E-6", "")),
     "W463": plate(with_card("CURE", "-400.,", ",.02E-6,22.5E-6", "")),
     "W464": more("CURE\n-200.,\n,.02E-6,22.5E-6\n\n"),
-    "W473": plate(with_card("CURE", ",.5", ",.02E-6,22.5E-6,,.6", "")),
+    "W496": plate(with_card("CURE", ",.5", ",.02E-6,22.5E-6,,.6", "")),
     "W465": more("CURE\n-100.,\n,.02E-6,22.5E-6\n\n"),
     "E501": macros("XXXX\n"),
     "E502": wrong("loop-without-next"),

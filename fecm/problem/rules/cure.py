@@ -72,7 +72,7 @@ def implausible_expansion(card: model.Cure) -> Reports:
 
 
 @rule(
-    "W473",
+    "W496",
     Subject.LAMINATE,
     "A coefficient of moisture expansion on CURE is above 0.1.",
     cause="It is the strain per per cent of weight. Books have the strain at 100 %.",
