@@ -104,6 +104,10 @@ def in_strains(component: int, unknown: int) -> Break:
     return instead(StrainField, "evaluate", broken)
 
 
+def of_one_material(right: Any, layers: Any, plies: Any, *others: Any, **kwargs: Any) -> Any:
+    return right(layers, dict.fromkeys(plies, plies[1]), *others, **kwargs)
+
+
 def without_shea(right: Any, deck: Any, **kwargs: Any) -> Any:
     kept = tuple(segment for segment in deck.segments if not isinstance(segment, Shear))
     return right(replace(deck, segments=kept), **kwargs)
@@ -112,9 +116,10 @@ def without_shea(right: Any, deck: Any, **kwargs: Any) -> Any:
 def without_coupling(names: str) -> Break:
     """Forget B in some of the stress resultants."""
 
-    def broken(right: Any, strains: Any, laminate: Any, *others: Any) -> Any:
-        poor = right(strains, replace(laminate, B=0.0 * laminate.B), *others)
-        rich = right(strains, laminate, *others)
+    def broken(right: Any, strains: Any, laminates: Any, *others: Any) -> Any:
+        uncoupled = [(replace(laminate, B=0.0 * laminate.B), rows) for laminate, rows in laminates]
+        poor = right(strains, uncoupled, *others)
+        rich = right(strains, laminates, *others)
         return rich | {name: found for name, found in poor.items() if name[0] == names}
 
     return instead(strains, "strains_and_resultants", broken)
@@ -247,9 +252,11 @@ def without_q26(moments: Any) -> Any:
     return moments
 
 
-def mirrored(right: Any, monitor: Any, stresses: Any, laminate: Any, strengths: Any) -> None:
-    plies = replace(laminate.plies, angles=-laminate.plies.angles)
-    right(monitor, stresses, replace(laminate, plies=plies), strengths)
+def mirrored(right: Any, monitor: Any, stresses: Any, strengths: Any) -> None:
+    (zone,) = stresses.zones
+    plies = replace(zone.laminate.plies, angles=-zone.laminate.plies.angles)
+    stresses.zones = [replace(zone, laminate=replace(zone.laminate, plies=plies))]
+    right(monitor, stresses, strengths)
 
 
 def of_the_first(exposures: Any) -> Any:

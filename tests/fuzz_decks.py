@@ -29,6 +29,9 @@ FORC = (
 OWN = (
     "PROJ\n    3    0       1.0     30.E6 .0006875\n    1    1      0.22\n    3    0     0.625\n\n"
     "SHEA MITC EQUI\n  0.822467\nPATC\nHERT           0.3       1.0       0.9\n"
+    "MATS\n    2\n.00003,.3,15000.,15000.,6000.,6000.,6000.\n\n"
+    "LAMS\n    2    1\n    1   0.     0.070    2\n\nZONE\n    2    4    2    2\n\n"
+    "ALLO\n1.E5,1.E5,5.E3,2.E4,9.E3\n\n1.E5,1.E5,5.E3,2.E4,9.E3,,,2\n\n"
     "GAGE\n    1           0.5       0.5     0.053       45.\n\n"
 )
 SPECIAL = [

@@ -154,5 +154,5 @@ def test_pucks_modes_meet_without_a_jump() -> None:
 
 
 def test_interlaminar_exposure_is_a_quadratic_sum() -> None:
-    found = interlaminar(Ply5(s13=60.0, s23=40.0), np.array([36.0]), np.array([32.0]))
+    found = interlaminar(60.0, 40.0, np.array([36.0]), np.array([32.0]))
     assert found[0] == pytest.approx(1.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+from dataclasses import replace
 
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -10,6 +11,7 @@ from hypothesis import strategies as st
 from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.model import (
+    Allowables,
     Boundary,
     Control,
     Coordinates,
@@ -21,17 +23,25 @@ from fecm.deck.model import (
     Impact,
     Indentation,
     Integration,
+    LaminateNumber,
+    Laminates,
     Layer,
     Macro,
     Material,
+    MaterialNumber,
+    Materials,
     NodeCodes,
     NodeValues,
     Nonlinear,
+    NumberedLaminate,
+    NumberedPly,
     Page,
     Ply,
     Preload,
     PrintOption,
     Units,
+    Zone,
+    Zones,
 )
 from fecm.deck.reader import Reader
 from tests.decks import small
@@ -52,7 +62,9 @@ def decks(draw: st.DrawFn) -> Deck:
     nodes = st.integers(1, 99999)
     layers = draw(st.integers(1, 3))
     five = st.tuples(*[numbers] * 5)
-    layer = st.builds(Layer, counts, numbers, numbers)
+    layer = st.builds(Layer, counts, numbers, numbers, counts)
+    ply = st.builds(Ply, *[numbers] * 7)
+    strengths = st.builds(Allowables, *[numbers] * 10, counts)
     segments = draw(
         st.lists(
             st.one_of(
@@ -71,8 +83,27 @@ def decks(draw: st.DrawFn) -> Deck:
                 st.builds(
                     Material,
                     st.builds(Integration, counts, counts, counts, numbers, numbers),
-                    st.builds(Ply, *[numbers] * 7),
+                    ply,
                     st.tuples(*[layer] * layers),
+                ),
+                st.lists(
+                    st.builds(NumberedPly, st.builds(MaterialNumber, counts), ply), max_size=3
+                ).map(lambda plies: Materials(tuple(plies))),
+                st.lists(st.tuples(counts, st.lists(layer, max_size=3)), max_size=3).map(
+                    lambda given: Laminates(
+                        tuple(
+                            NumberedLaminate(LaminateNumber(number, len(own)), tuple(own))
+                            for number, own in given
+                        )
+                    )
+                ),
+                st.lists(st.builds(Zone, *[counts] * 4), max_size=4).map(
+                    lambda zones: Zones(tuple(zones))
+                ),
+                st.builds(
+                    lambda first, others: replace(first, others=tuple(others)),
+                    strengths,
+                    st.lists(strengths, max_size=2),
                 ),
                 st.builds(Impact, counts, counts, numbers),
                 st.builds(Indentation, *[numbers] * 4),

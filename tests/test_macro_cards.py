@@ -12,17 +12,28 @@ from fecm.deck import DeckError, Finding, read_deck
 from fecm.deck.format import format_deck
 from fecm.deck.macros import WORDS, estimate_work
 from fecm.deck.model import (
+    Allowables,
     Cure,
     Expansion,
     Impact,
     Indentation,
+    LaminateNumber,
+    Laminates,
+    Layer,
     Macro,
+    MaterialNumber,
+    Materials,
     Nonlinear,
+    NumberedLaminate,
+    NumberedPly,
     Patch,
+    Ply,
     Preload,
     Projectile,
     Segment,
     Shear,
+    Zone,
+    Zones,
 )
 from fecm.deck.reader import Reader
 from fecm.problem.slips import MODES
@@ -216,6 +227,16 @@ def test_a_new_deck_has_a_time_step_that_a_person_can_read() -> None:
         Preload(-1 / 3, 0.0, 1e-300),
         Cure(-100.0, expansions=(Expansion(1, 2e-8, 22.5e-6),)),
         Cure(0.0),
+        Materials((NumberedPly(MaterialNumber(2), Ply(*[1 / 3] * 7)),)),
+        Materials(()),
+        Laminates(
+            (
+                NumberedLaminate(LaminateNumber(2, 2), (Layer(1, 30.0, 0.1), Layer(2, 0.0, 0.1, 2))),
+                NumberedLaminate(LaminateNumber(3, 1), (Layer(1, 1 / 3, 0.1, 12),)),
+            )
+        ),
+        Zones((Zone(1, 0, 0, 2), Zone(2, 4, 2, 3))),
+        Allowables(*[100.0] * 10, 2, (Allowables(*[1 / 3] * 10), Allowables(*[50.0] * 10, 3))),
         Cure(-1 / 3, 0.1 + 0.2, (Expansion(1, 1e-7 / 3, 0.0, 0.0, 6e-3), Expansion(2, -1e-6))),
     ],
     ids=repr,

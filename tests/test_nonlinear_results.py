@@ -94,7 +94,7 @@ def test_resultants_are_those_of_the_strains_with_the_slopes() -> None:
     points = plate.strain_field(gauss(2))
     field = inclined(plate)
     quadratic = quadratic_strains_at(points, field)
-    found = strains_and_resultants(points, plate.laminate, field, plate.preload, quadratic)
+    found = strains_and_resultants(points, plate.rows_by_laminate, field, plate.preload, quadratic)
     A, B, D = plate.laminate.A, plate.laminate.B, plate.laminate.D
     N, M = A @ STRETCHED + B @ CURVATURE, B @ STRETCHED + D @ CURVATURE
     names = ["eps_xx", "eps_yy", "gamma_xy", "N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy"]

@@ -106,9 +106,47 @@ def random_deck(seed: int) -> tuple[str, str, tuple[str, ...]]:
     return text, LISTING if listing else "report", slips
 
 
+CORE = "2,\n.00003,.3,200000.,200000.,70000.,30000.,30000.\n"
+GLASS = "3,\n.00019,.27,6500000.,1900000.,750000.,700000.,600000.\n"
+
+
+def several_laminates(seed: int) -> str:
+    """A deck of report mode with two materials more, and laminates of zones."""
+    rng = np.random.default_rng([seed, 1])
+    plain = (random_deck(number) for number in range(1000 + 20 * seed, 1020 + 20 * seed))
+    text = next(text for text, mode, slips in plain if mode == "report" and not slips)
+    text = text.replace(",0,1,1,", ",0,0,0,")
+
+    def layer(n: int) -> str:
+        angle = rng.choice(["0.", "30.", "90.", "-60."])
+        return f"{n},{angle},{1e-3 * rng.integers(20, 60):.3f},{rng.integers(1, 4)}\n"
+
+    head, mate, rest = text.partition("MATE\n")
+    cards = rest.splitlines(keepends=True)
+    count = int(text.splitlines()[1].split(",")[2])
+    for n in range(2, 2 + count):
+        cards[n] = cards[n].rstrip() + f",{rng.integers(1, 4)}\n"
+    elements = int(text.splitlines()[1].split(",")[1])
+    words = f"MATS\n{CORE}{GLASS}\nLAMS\n"
+    for number in (2, 3):
+        layers = rng.integers(1, 5)
+        words += f"{number},{layers}\n" + "".join(layer(n) for n in range(1, layers + 1))
+    words += "\nZONE\n"
+    for _ in range(rng.integers(1, 4)):
+        first, last = np.sort(rng.integers(1, elements + 1, 2)).tolist()
+        words += f"{first},{last},{rng.integers(1, 4)},{rng.integers(1, 4)}\n"
+    text = f"{head}{words}\n{mate}{''.join(cards)}"
+    strengths = ALLO.rstrip() + "\n,\n" + "300000.,200000.,9000.,30000.,15000.,,,2\n\n"
+    return text.replace(ALLO, strengths) if rng.random() < 0.6 else text
+
+
 def compare(seed: int) -> None:
     """Compare the solvers on a deck."""
-    text, mode, slips = random_deck(seed)
+    agree(*random_deck(seed))
+
+
+def agree(text: str, mode: str = "report", slips: tuple[str, ...] = ()) -> None:
+    """Let every solver run a deck, and compare the results."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", FecmWarning)
         csr, array, *compiled = (
@@ -153,6 +191,13 @@ SHORT = (7, 11, 21, 22, 31, 36)
 )
 def test_every_solver_gives_the_same_result(seed: int) -> None:
     compare(seed)
+
+
+@pytest.mark.parametrize(
+    "seed", [pytest.param(n, marks=() if n < 4 else pytest.mark.long) for n in range(40)]
+)
+def test_every_solver_gives_the_same_result_of_several_laminates(seed: int) -> None:
+    agree(several_laminates(seed))
 
 
 if __name__ == "__main__":

@@ -137,6 +137,17 @@ def nonlinear_of_8_nodes() -> str:
     return wrong("assumed-shear-of-8-nodes")().replace("SHEA MITC", "NONL\nSHEA MITC")
 
 
+MATS = "MATS\n    2\n.00003,.3,15000.,15000.,6000.,6000.,6000.\n\n"
+
+
+def pad(*cards: str) -> Deck:
+    """The small plate, of one ply, with another laminate on an element."""
+    head = DATA_CARDS[: DATA_CARDS.index("    2  90.")].replace(".106", ".053")
+    lams = "LAMS\n    2    1\n    1   0.     0.070\n\nZONE\n    2              2\n\n"
+    made = small(data="".join(cards) + lams + head)
+    return lambda: made.replace("    4    2    2    5", "    4    1    2    5")
+
+
 CLAMPED = "11111"
 SYMMETRIC = "01010"  # v, theta_x: u is missing
 
@@ -281,6 +292,23 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "E493": nonlinear(*CLAMPED, program=PROGRAM + "CMAS\nEIGE          2\n"),
     "E494": nonlinear(*CLAMPED, orders="    2    3   -3"),
     "W495": nonlinear(*SYMMETRIC),
+    "E496": more(MATS.replace("    2\n", "    1\n")),
+    "E497": data("    2  90.     0.053", "    2  90.     0.053    2"),
+    "E498": more("ZONE\n    1    5\n\n"),
+    "E499": pad("PREL\n1.,,\n"),
+    "W466": lambda: small(
+        data=MATS + DATA_CARDS.replace("    2  90.     0.053", "    2  90.     0.053    2")
+    ),
+    "W496": more(MATS),
+    "W497": lambda: small(
+        data=MATS + DATA_CARDS.replace("    2  90.     0.053", "    2  90.     0.053    2")
+    ),
+    "W498": lambda: small(
+        PROGRAM.replace("DISP", "FAIL"),
+        data=MATS
+        + "ALLO\n1.E5,1.E5,5.E3,2.E4,9.E3\n\n"
+        + DATA_CARDS.replace("    2  90.     0.053", "    2  90.     0.053    2"),
+    ),
     "W461": plate(replaced(r"^(.{5}).{5}(     0\.184)$", r"\1 45.0\2")),
     "W462": plate(with_card("CURE", "-600.,", ",.02E-6,22.5E-6", "")),
     "W463": plate(with_card("CURE", "-400.,", ",.02E-6,22.5E-6", "")),

@@ -114,7 +114,7 @@ def test_supports_in_the_plane_that_hold_some_nodes_only_are_kept() -> None:
 def test_in_plane_unknowns_that_rest_do_not_limit_the_time_step() -> None:
     # Stiff plies at the faces: the plate is faster in its plane than in bending.
     held = model(LONG.read_text().replace("LOOP       4000", "LOOP       1000"))
-    assert not is_coupled(held.require(fecm.deck.model.Material))
+    assert not is_coupled(held)
     free = Deck(
         held.title,
         held.control,

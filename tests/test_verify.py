@@ -153,7 +153,7 @@ def test_of_a_field_the_value_farthest_from_the_expected_one_counts() -> None:
 STATED = {
     "static-bending", "frequencies", "wave-fronts", "dispersion", "rod-pulse", "infinite-plate",
     "supported-plate", "patch-impact", "failure", "cured-failure", "small-mass", "large-mass",
-    "contact-coefficient", "stretching-plate", "stretching-disc", "stretching-impact",
+    "contact-coefficient", "stretching-plate", "stretching-disc", "stretching-impact", "sandwich",
 }  # fmt: skip
 
 
@@ -167,6 +167,29 @@ def test_expected_values_are_those_of_closed_forms(one: Case) -> None:
             assert one.name in STATED, check.quantity
         if check.scale is not None and one.name in closed_forms.SCALES:
             assert check.scale == pytest.approx(closed_forms.SCALES[one.name], rel=1e-10)
+
+
+@pytest.mark.parametrize("ratio", [10, 100])
+def test_paganos_printed_sandwich_is_that_of_the_exact_solution(ratio: int) -> None:
+    own = [r for r in reference("several_materials.csv") if f"sandwich S={ratio}" in r["case"]]
+    upper, middle = (
+        next(r for r in own if "elasticity" in r["theory"] and float(r["z/h"]) == z)
+        for z in (0.5, 0.0)
+    )
+    (one,) = chosen(["sandwich"])
+    references = {
+        "σ1": float(upper["sx"]) / ratio**2,
+        "σ2": float(upper["sy"]) / ratio**2,
+        "τ12": float(upper["txy"]) / ratio**2,
+        "τ_xz": float(middle["txz"]) / ratio,
+        "τ_yz": float(middle["tyz"]) / ratio,
+        "100 w": 100.0 * float(middle["w"]) / ratio**4,
+    }
+    checks = [check for check in one.checks if check.quantity.endswith(f"a/h = {ratio}")]
+    assert len(checks) > 2
+    for check in checks:
+        name = next(name for name in references if check.quantity.startswith(name))
+        assert check.expected == pytest.approx(references[name], rel=2e-3)
 
 
 def test_the_deck_made_in_python_is_the_reports() -> None:

@@ -30,7 +30,6 @@ from fecm.cli.options import (
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.deck.units import unit_names
 from fecm.mechanics.laminate import Laminate
-from fecm.problem.parts import laminate_of_deck
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces
 from fecm.studies.waves import dispersion as compute
 
@@ -120,7 +119,9 @@ class Source:
             note(f"{deck} has {len(problems)} problems; the laminate of the first is used")
         if problems[0].plate.is_preloaded:
             note("PREL is left out: these are waves of the laminate without preload")
-        return laminate_of_deck(problems[0].deck), unit_names(problems[0].deck)
+        if problems[0].plate.others:
+            note("the plate has several laminates; these are waves of the one under the load")
+        return problems[0].laminate, unit_names(problems[0].deck)
 
 
 # The argument and the options of all three commands.

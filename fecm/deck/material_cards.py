@@ -13,6 +13,8 @@ from fecm.deck.record import Control, Record
 from fecm.deck.segment import Segment
 from fecm.deck.stream import CardStream
 
+MATERIAL = 1  # number of the material and of the laminate of MATE
+
 
 @frozen
 class Integration(Record):
@@ -63,15 +65,30 @@ class Ply(Record):
 
 @frozen
 class Layer(Record):
-    """Layer card of MATE: (I5,F5.0,F10.0); the number is not used for placing."""
+    """Layer card of MATE: (I5,F5.0,F10.0,I5); the number is not used for placing.
+
+    The material is not in the report's program.
+    """
 
     number: int
     angle: float  # fibre direction in degrees, counter-clockwise from the x-axis
     thickness: float  # length
+    material: int = MATERIAL
 
+    optional: ClassVar[int] = 1
     fields: ClassVar[Fields] = layout(
-        "I5 layer|lay", "F5 fibre angle|ang", "F10 layer thickness|thickness"
+        "I5 layer|lay",
+        "F5 fibre angle|ang",
+        "F10 layer thickness|thickness",
+        "I5? material|mat",
     )
+    # Fields of a card without a material.
+    plain: ClassVar[Fields] = fields[:-1]
+
+    def row(self) -> list[Value]:
+        """Values in the card's order; the material of MATE is a blank."""
+        *values, material = super().row()
+        return [*values, BLANK if material == MATERIAL else material]
 
 
 @frozen
@@ -87,7 +104,10 @@ class Material(Segment, keyword="MATE"):
         """Read both cards and the layers."""
         integration = cards.single(head, Integration)
         ply = cards.single(head, Ply)
-        layers = _read_layers(head, cards) if integration or ply else None
+        layers = None
+        if integration or ply:
+            said = "the control card says"
+            layers = read_layers(head, cards, cards.control.layers, said)
         if integration is None or ply is None or layers is None:
             return None
         return cls(integration, ply, layers, source=Source(head))
@@ -99,19 +119,22 @@ class Material(Segment, keyword="MATE"):
             yield record.to_card()
 
 
-def _read_layers(head: Card, cards: CardStream) -> tuple[Layer, ...] | None:
-    """Layer cards, as many as the control card says; None if one is missing or unreadable."""
-    count = cards.control.layers
-    layers: list[Layer] = []
-    for number in range(count):
-        card = cards.take_data()
-        if card is None or card.is_blank:
-            message = f"MATE has {number} layer cards where the control card says {count}."
-            cards.findings.add("E202", message, (card or cards.peek() or head).place)
-            return None
-        if (layer := cards.record(card, Layer)) is not None:
-            layers.append(layer)
-    return tuple(layers) if len(layers) == count else None
+def read_layers(
+    head: Card, cards: CardStream, count: int, said: str
+) -> tuple[Layer, ...] | None:
+    """Layer cards, as many as `said`; None if one is missing or unreadable."""
+    taken: list[Card] = []
+    while len(taken) < count and (card := cards.take_data()) is not None and not card.is_blank:
+        taken.append(card)
+    numbered = any(text.strip() for card in taken for _, text in card.cut(Layer.fields)[3:4])
+    fields = Layer.fields if numbered else Layer.plain
+    read = [cards.record(card, Layer, fields) for card in taken]
+    if len(taken) < count:
+        message = f"{head.keyword} has {len(taken)} layer cards where {said} {count}."
+        cards.findings.add("E202", message, (card or cards.peek() or head).place)
+        return None
+    layers = tuple(layer for layer in read if layer is not None)
+    return layers if len(layers) == count else None
 
 
 @frozen
@@ -159,7 +182,10 @@ class Shear(Segment, keyword="SHEA"):
 
 @frozen
 class Allowables(Segment, keyword="ALLO"):
-    """ALLO: (7F10.0) and (3F10.0); strengths of the ply (not in the report's program)."""
+    """ALLO: (7F10.0,I5) and (3F10.0); strengths of plies (not in the report's program).
+
+    A pair of cards for each material; `others` are those after the first.
+    """
 
     # Strengths along and across the fibres, in tension and compression: all positive, force/area.
     xt: float
@@ -174,15 +200,20 @@ class Allowables(Segment, keyword="ALLO"):
     # Puck's slopes; 0.35 and 0.3 if blank.
     p_plus: float = 0.35
     p_minus: float = 0.3
+    material: int = MATERIAL
+    others: tuple[Allowables, ...] = ()
 
-    fields: ClassVar[Fields] = layout(
-        "F10 XT", "F10 XC", "F10 YT", "F10 YC", "F10 S12", "F10? S13", "F10? S23"
+    numbered: ClassVar[Fields] = layout(
+        "F10 XT", "F10 XC", "F10 YT", "F10 YC", "F10 S12", "F10? S13", "F10? S23", "I5? material"
     )
+    # Fields of a card without a material.
+    fields: ClassVar[Fields] = numbered[:-1]
+    constants: ClassVar[Fields] = layout("F10? F12*", "F10? p+", "F10? p-")
     constants: ClassVar[Fields] = layout("F10? F12*", "F10? p+", "F10? p-")
 
     @classmethod
     def from_row(cls, values: Sequence[Value], source: Source | None) -> Self:
-        """Build the segment from its first card or from both."""
+        """Build the strengths of a material from its first card or from both."""
         count = len(cls.fields)
         *given, s12, s13, s23 = values[:count]
         s13 = s12 if s13 == BLANK else s13
@@ -191,24 +222,53 @@ class Allowables(Segment, keyword="ALLO"):
 
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self | None:
-        """Read the strengths and the constants, whose card may be missing."""
-        strengths = cards.single(head, cls)
-        card = cards.take_data()
-        if card is None:
-            return strengths
-        constants = cards.row(card, cls.constants)
-        if strengths is None or constants is None:
+        """Read the strengths of every material."""
+        first = cls._read_pair(head, cards)
+        others: list[Self] = []
+        while (card := cards.peek()) is not None and not card.is_keyword and not card.is_blank:
+            if (one := cls._read_pair(head, cards)) is not None:
+                others.append(one)
+        return first and replace(first, others=tuple(others))
+
+    @classmethod
+    def _read_pair(cls, head: Card, cards: CardStream) -> Self | None:
+        """Read the strengths of a material, and the constants, whose card may be missing."""
+        card = cards.peek()
+        numbered = card is not None and any(
+            text.strip() for _, text in card.cut(cls.numbered)[len(cls.fields) :][:1]
+        )
+        fields = cls.numbered if numbered else cls.fields
+        if (first := cards.take_data()) is None:
+            return cards.single(head, cls)
+        strengths = cards.row(first, fields)
+        second = cards.take_data()
+        constants = None if second is None else cards.row(second, cls.constants)
+        if strengths is None or (second is not None and constants is None):
+            cards.unsound.add(head.keyword)
             return None
-        values, _ = constants
-        return cls.from_row([*strengths.row()[: len(cls.fields)], *values], strengths.source)
+        values, source = strengths
+        count = len(cls.fields)
+        of_constants = [BLANK] * len(cls.constants) if constants is None else constants[0]
+        return cls.from_row([*values[:count], *of_constants, *values[count:]], source)
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
-        row = self.row()
-        count = len(self.fields)
         yield self.keyword
-        yield write_card(self.fields, row[:count])
-        yield write_card(self.constants, row[count:])
+        for one in (self, *self.others):
+            yield from one._pair()
+
+    def _pair(self) -> Iterator[str]:
+        """Text of the cards of this material."""
+        count = len(self.fields)
+        values = self.row()
+        is_plain = self.material == MATERIAL
+        fields = self.fields if is_plain else self.numbered
+        yield write_card(fields, [*values[:count], *([] if is_plain else [self.material])])
+        yield write_card(self.constants, values[count : count + len(self.constants)])
+
+    def of(self, material: int) -> Allowables | None:
+        """Strengths of a material; None if they are not given."""
+        return next((one for one in (self, *self.others) if one.material == material), None)
 
 
 @frozen

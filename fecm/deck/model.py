@@ -17,6 +17,7 @@ from fecm._tables import html_table
 from fecm.deck.impact_cards import Impact, Indentation, Patch, Projectile, RodDiameter
 from fecm.deck.macros import LoadTable, Macro
 from fecm.deck.material_cards import (
+    MATERIAL,
     Allowables,
     Cure,
     Damping,
@@ -42,13 +43,25 @@ from fecm.deck.mesh_cards import (
 from fecm.deck.output_cards import Gage, Gages, Page, PrintOption, Units
 from fecm.deck.record import Control, Record
 from fecm.deck.segment import NumberedSegment, Segment
+from fecm.deck.zone_cards import (
+    LaminateNumber,
+    Laminates,
+    MaterialNumber,
+    Materials,
+    NumberedLaminate,
+    NumberedPly,
+    Zone,
+    Zones,
+)
 
 __all__ = [
-    "Allowables", "Boundary", "Control", "Coordinates", "Cure", "Damping", "Deck", "Delamination",
-    "ElementNodes", "Elements", "Expansion", "Forces", "Gage", "Gages", "Impact", "Indentation",
-    "Integration", "Layer", "LoadTable", "Macro", "Material", "NodeCodes", "NodeValues",
-    "Nonlinear", "NumberedSegment", "Page", "Patch", "Ply", "Preload", "PrintOption", "Projectile",
-    "Record", "RodDiameter", "Segment", "Shear", "Units",
+    "Allowables", "Boundary", "Control", "Coordinates", "Cure", "Damping", "Deck",
+    "Delamination", "ElementNodes", "Elements", "Expansion", "Forces", "Gage", "Gages",
+    "Impact", "Indentation", "Integration", "LaminateNumber", "Laminates", "Layer", "LoadTable",
+    "Macro", "Material", "MaterialNumber", "Materials", "NodeCodes", "NodeValues", "Nonlinear",
+    "NumberedLaminate", "NumberedPly", "NumberedSegment", "Page", "Patch", "Ply", "Preload",
+    "PrintOption", "Projectile", "Record", "RodDiameter", "Segment", "Shear", "Units", "Zone",
+    "Zones",
 ]  # fmt: skip
 
 TITLE = "FECM"
@@ -61,6 +74,9 @@ SEGMENTS: dict[str, type[Segment]] = {
     "ELEM": Elements,
     "BOUN": Boundary,
     "MATE": Material,
+    "MATS": Materials,
+    "LAMS": Laminates,
+    "ZONE": Zones,
     "ROD": Impact,
     "EXPE": Indentation,
     "FORC": Forces,
@@ -143,6 +159,28 @@ class Deck(Record):
         if (segment := self.last(kind)) is None:
             raise LookupError(f"the deck has no {kind.keyword} segment")
         return segment
+
+    @property
+    def plies(self) -> dict[int, Ply]:
+        """Constants of the materials by number: 1 is MATE's, the others those of MATS.
+
+        Raises LookupError without a MATE segment.
+        """
+        card = self.last(Materials)
+        others = {} if card is None else {one.number: one.ply for one in card.plies}
+        return others | {MATERIAL: self.require(Material).ply}
+
+    @property
+    def layers(self) -> dict[int, tuple[Layer, ...]]:
+        """Layers of the laminates by number: 1 is MATE's, the others those of LAMS.
+
+        Without ZONE all elements have the first.  Raises LookupError without a MATE segment.
+        """
+        layers = {MATERIAL: self.require(Material).layers}
+        card = self.last(Laminates)
+        if card is not None and self.has(Zones):
+            layers |= {one.number: one.layers for one in card.laminates}
+        return layers
 
     def with_(self, **values: float | str | Sequence[float]) -> Deck:
         """Deck with other values, under the names that :func:`fecm.sweep` varies.

@@ -146,9 +146,14 @@ class CardStream:
             else:
                 found.append(record)
         complete = is_last is not None and bool(found) and is_last(found[-1])
-        if card is None and not complete:
+        if not complete:
+            self.end(head, card)
+        return tuple(found)
+
+    def end(self, head: Card, card: Card | None) -> None:
+        """Report that no blank card ends a segment, if `card`, which should be one, is None."""
+        if card is None:
             following = self.peek()
             message = f"The {head.keyword} cards are not ended by a blank card."
             hint = f"put a blank card {'before this one' if following else 'at the end'}"
             self.findings.add("E007", message, (following or head).place, hint)
-        return tuple(found)

@@ -61,6 +61,9 @@ class OutsideLoad:
             return [NONE] * len(CRITERIA)
         found = []
         for number, state in enumerate(states.tolist()):
+            if plies.exposure[number, state] < 0.0:  # no ply has strengths
+                found.append(NONE)
+                continue
             point, ply_and_face = divmod(state, plies.exposure.shape[1] // self.near.size)
             exposure, mode = float(plies.exposure[number, state]), int(plies.mode[number, state])
             place = float(self.x.flat[point]), float(self.y.flat[point])

@@ -10,6 +10,7 @@ and a quadratic criterion of the interlaminar shear stresses.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import NamedTuple, Protocol
@@ -132,7 +133,8 @@ def puck_limits(ply: Strengths) -> tuple[float, float]:
     return resistance, s * math.sqrt(1.0 + 2.0 * minus * resistance / s)
 
 
-CRITERIA = {"max_stress": max_stress, "tsai_wu": tsai_wu, "hashin": hashin, "puck": puck}
+Criterion = Callable[[Strengths, Floats, Floats, Floats], Candidates]
+CRITERIA: dict[str, Criterion] = {"max_stress": max_stress, "tsai_wu": tsai_wu, "hashin": hashin, "puck": puck}
 
 
 class PlyExposure(NamedTuple):
@@ -144,18 +146,36 @@ class PlyExposure(NamedTuple):
     ply: int  # from 1 at the struck face
 
 
-def largest_in_plies(ply: Strengths, stresses: Floats) -> list[PlyExposure]:
-    """Largest exposure of each criterion under stresses of the plies, (plies, faces, 3)."""
-    s1, s2, tau = np.moveaxis(stresses, -1, 0)
+def largest_in_plies(
+    strengths: Strengths | Sequence[Strengths | None], stresses: Floats
+) -> list[PlyExposure]:
+    """Largest exposure of each criterion under stresses of the plies, (plies, faces, 3).
+
+    The strengths are those of all plies or of each, None where they are not given; without any
+    there is no exposure.
+    """
+    given = strengths if isinstance(strengths, Sequence) else [strengths] * len(stresses)
     found = []
     for name, criterion in CRITERIA.items():
-        candidates = criterion(ply, s1, s2, tau)
-        exposure = exposure_of(candidates)
-        worst = int(exposure.argmax())
-        mode = MODES[modes_of(candidates).flat[worst]]
-        number = worst // exposure.shape[1] + 1
-        found.append(PlyExposure(name, float(exposure.flat[worst]), mode, number))
+        plies = [
+            _largest_in_ply(criterion, name, ply, number, stresses[number])
+            for number, ply in enumerate(given)
+            if ply is not None
+        ]
+        if plies:
+            found.append(max(plies, key=lambda one: one.exposure))
     return found
+
+
+def _largest_in_ply(
+    criterion: Criterion, name: str, ply: Strengths, number: int, stresses: Floats
+) -> PlyExposure:
+    """Largest exposure of a ply under the stresses of its faces, (faces, 3)."""
+    candidates = criterion(ply, *stresses.T)
+    exposure = exposure_of(candidates)
+    worst = int(exposure.argmax())
+    mode = MODES[modes_of(candidates)[worst]]
+    return PlyExposure(name, float(exposure[worst]), mode, number + 1)
 
 
 def load_factor(ply: Strengths, criterion: str, at_rest: Floats, added: Floats) -> float:
@@ -182,6 +202,8 @@ def load_factor(ply: Strengths, criterion: str, at_rest: Floats, added: Floats) 
     return high
 
 
-def interlaminar(ply: Strengths, tau_13: Floats, tau_23: Floats) -> Floats:
-    """Quadratic sum of the interlaminar shear stresses, in the axes of a ply."""
-    return np.hypot(tau_13 / ply.s13, tau_23 / ply.s23)
+def interlaminar(
+    s13: float | Floats, s23: float | Floats, tau_13: Floats, tau_23: Floats
+) -> Floats:
+    """Quadratic sum of the interlaminar shear stresses over their strengths, in a ply's axes."""
+    return np.hypot(tau_13 / s13, tau_23 / s23)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
@@ -45,6 +46,7 @@ class Plies:
     stiffness: Floats  # (n, 3, 3): plane-stress stiffness in the laminate's axes, force/area
     # (n, 2, 2): transverse shear stiffness in the laminate's axes, order xz, yz, force/area.
     shear: Floats
+    constants: tuple[PlyConstants, ...]  # (n,)
 
     @property
     def z(self) -> Floats:
@@ -65,16 +67,19 @@ class Laminate:
     # (2, 2): transverse shear stiffness (equation 2-19), force/length, order xz, yz: A*55, A*45;
     # A*45, A*44.
     shear: Floats
-    mass: float  # P of equation 2-24: density times thickness
-    rotary_inertia: float  # I of equation 2-24: density times thickness cubed over 12
+    mass: float  # P of equation 2-24: integral of the density through the thickness
+    rotary_inertia: float  # I of equation 2-24: integral of density times z squared
+    # Integral of density times z, mass/length: it couples u and theta_x, and is left out.
+    coupling_inertia: float
     thickness: float  # total thickness
     plies: Plies
 
     @property
     def unlike_interfaces(self) -> int:
-        """Number of interfaces between plies of different fibre angle, which can delaminate."""
+        """Number of interfaces which can delaminate: of another fibre angle or material."""
         turns = np.diff(self.plies.angles) % 180.0
-        return int(np.count_nonzero(turns))
+        changes = [one != other for one, other in pairwise(self.plies.constants)]
+        return int(np.count_nonzero((turns != 0.0) | np.array(changes, dtype=bool)))
 
     @property
     def is_coupled(self) -> bool:
@@ -127,7 +132,7 @@ def transformed_shear(g13: float, g23: float, angle: float) -> Floats:
 
 
 def laminate(
-    ply: PlyConstants,
+    ply: PlyConstants | Sequence[PlyConstants],
     angles: Sequence[float],
     thicknesses: Sequence[float],
     total: float | None = None,
@@ -136,8 +141,8 @@ def laminate(
 
     Parameters
     ----------
-    ply : PlyConstants
-        Constants of every layer.
+    ply : PlyConstants or sequence of PlyConstants
+        Constants of all layers, or of each.
     angles : sequence of float
         Fibre angles in degrees, starting at the struck face, z = -h/2.
     thicknesses : sequence of float
@@ -148,20 +153,38 @@ def laminate(
     faces = np.concatenate(([0.0], np.cumsum(thicknesses)))
     faces -= faces[-1] / 2.0
     lower, upper = faces[:-1, None, None], faces[1:, None, None]
-    q = reduced_stiffness(ply)
-    bars = np.array([transformed_stiffness(q, angle) for angle in angles])
-    shears = np.array([transformed_shear(ply.g13, ply.g23, angle) for angle in angles])
+    plies = tuple(ply) if isinstance(ply, Sequence) else (ply,) * len(angles)
+    layers = list(zip(plies, angles, strict=True))
+    bars = np.array([transformed_stiffness(reduced_stiffness(p), angle) for p, angle in layers])
+    shears = np.array([transformed_shear(p.g13, p.g23, angle) for p, angle in layers])
     h = float(faces[-1] - faces[0]) if total is None else total
+    mean, second, first = _mean_densities(plies, faces)
     return Laminate(
         A=(bars * (upper - lower)).sum(axis=0),
         B=(bars * (upper**2 - lower**2)).sum(axis=0) / 2.0,
         D=(bars * (upper**3 - lower**3)).sum(axis=0) / 3.0,
         shear=(shears * (upper - lower)).sum(axis=0),
-        mass=ply.density * h,
-        rotary_inertia=ply.density * h**3 / 12.0,
+        mass=mean * h,
+        rotary_inertia=second * h**3 / 12.0,
+        coupling_inertia=first * h**2,
         thickness=h,
-        plies=Plies(np.array(angles, dtype=float), faces, bars, shears),
+        plies=Plies(np.array(angles, dtype=float), faces, bars, shears, plies),
     )
+
+
+def _mean_densities(plies: Sequence[PlyConstants], faces: Floats) -> tuple[float, float, float]:
+    """Densities whose plate of one material has the same integrals of 1 and z squared.
+
+    The third is the integral of density times z over the thickness squared.
+    """
+    density = np.array([ply.density for ply in plies])
+    if (density == density[0]).all():
+        return plies[0].density, plies[0].density, 0.0
+    h = faces[-1] - faces[0]
+    mean = density @ np.diff(faces) / h
+    second = density @ np.diff(faces**3) / (h**3 / 4.0)
+    first = density @ np.diff(faces**2) / 2.0 / h**2
+    return float(mean), float(second), float(first)
 
 
 # Delamination threshold of a small-mass impact over the static one (Olsson, Donadon, Falzon 2006).

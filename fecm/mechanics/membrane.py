@@ -39,6 +39,7 @@ from fecm.mechanics.interpolation import (
     jacobian,
     local_shape_functions,
 )
+from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.strains import StrainField
@@ -172,6 +173,7 @@ class _Elements:
     table: Floats  # (2 points, 9): slopes in xi and in eta
     inverse: Floats  # (2, 2, points, ne): Jacobian's inverse, dxi_a/dx_i in row i and column a
     tied: QuadraticStrains
+    laminate: Laminate
 
 
 class Membrane:
@@ -182,7 +184,6 @@ class Membrane:
     """
 
     def __init__(self, plate: PlateModel, weights: Floats | None = None) -> None:
-        self._laminate = plate.laminate
         self._elements: list[_Elements] = []
         rule = plate.rules.bending
         for family in plate.families:
@@ -201,6 +202,7 @@ class Membrane:
                         table=np.concatenate([local[:, 0], local[:, 1]]),
                         inverse=inverse.transpose(2, 3, 1, 0).copy(),
                         tied=QuadraticStrains(block, rule),
+                        laminate=plate.laminate_of(block),
                     )
                 )
 
@@ -222,8 +224,8 @@ class Membrane:
 
     def _forces(self, part: _Elements, q: Floats) -> tuple[dict[int, Floats], float]:
         """Forces (9, ne) on the dofs of some elements, and the quadratic work."""
-        A, B, tied = self._laminate.A, self._laminate.B, part.tied
-        coupled = self._laminate.is_coupled
+        A, B, tied = part.laminate.A, part.laminate.B, part.tied
+        coupled = part.laminate.is_coupled
         one, two = tied.slopes(q[2])
         components = tied_components(one, two)
         quadratic = tied.at_points(components)
@@ -267,7 +269,7 @@ def tangent(plate: PlateModel, family: ElementBlock, field: Floats) -> Floats:
 
     The second derivative of the strain energy; exactly symmetric.
     """
-    rule, laminate = plate.rules.bending, plate.laminate
+    rule, laminate = plate.rules.bending, plate.laminate_of(family)
     ne, nn = family.nodes.shape
     at = interpolate(family, rule)
     linear = membrane_and_bending(at)

@@ -1,5 +1,7 @@
 """Mesh and equation numbers; blocks of elements, and groups of congruent ones.
 
+A block has elements of one laminate where these matter.
+
 Nodes, elements and equations are numbered from 1 as on the cards; row n - 1 of an array belongs to
 node or element n.  An absent node of an element and the equation of a restrained dof are 0.
 """
@@ -90,6 +92,7 @@ class ElementBlock:
     coordinates: Floats  # (ne, nn, 2): length
     present: Bools  # (shape.nodes,) of bool: which nodes of the shape are present
     shape: ElementShape  # triangle, quadrilateral or cubic quadrilateral
+    laminate: int = 0  # number from 0 of its laminate
 
     def blocks(self, size: int) -> Iterator[ElementBlock]:
         """Split into blocks of at most `size` elements."""
@@ -102,10 +105,12 @@ class ElementBlock:
         return replace(self, **{name: getattr(self, name)[members] for name in names})
 
 
-def element_blocks(elements: Ints, coordinates: Floats) -> list[ElementBlock]:
+def element_blocks(
+    elements: Ints, coordinates: Floats, laminates: Indices | None = None
+) -> list[ElementBlock]:
     """Sort elements, (numel, nen), node numbers from 1 or 0, into blocks with the same nodes.
 
-    Raises ValueError if a corner is missing: three for a triangle, four for the others.
+    With `laminates` (numel,), numbers from 0, a block has one laminate.  Raises ValueError if a corner is missing: three for a triangle, four for the others.
     """
     nodes = np.zeros((len(elements), max(MOST_NODES, elements.shape[1])), dtype=np.intp)
     nodes[:, : elements.shape[1]] = elements
@@ -121,8 +126,10 @@ def element_blocks(elements: Ints, coordinates: Floats) -> list[ElementBlock]:
             raise ValueError(
                 f"element {rows[0] + 1} lacks one of the {shape.corners} corners of a {shape.name}"
             )
-        members, places = nodes[rows][:, present] - 1, present[: shape.nodes]
-        found.append(ElementBlock(rows, members, coordinates[members], places, shape))
+        for number in (0,) if laminates is None else distinct(laminates[rows]).tolist():
+            own = rows if laminates is None else rows[laminates[rows] == number]
+            members, places = nodes[own][:, present] - 1, present[: shape.nodes]
+            found.append(ElementBlock(own, members, coordinates[members], places, shape, number))
     return found
 
 

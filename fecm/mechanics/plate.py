@@ -23,7 +23,7 @@ from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, jacobian_determinants
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.mesh import ElementBlock, Mesh, congruence, element_blocks, rigid_deflections
-from fecm.mechanics.strains import StrainField
+from fecm.mechanics.strains import Rows, StrainField
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -53,11 +53,42 @@ class PlateModel:
     # Uniform initial membrane force N0_x, N0_y, N0_xy, force/length; tension is positive.
     preload: tuple[float, float, float] = UNLOADED
     nonlinear: bool = False  # whether stretching follows from bending, see membrane.py
+    others: tuple[Laminate, ...] = ()  # laminates beside the first
+    # (numel,): number from 0 of the laminate of every element; without it, all have the first.
+    laminate_numbers: Indices | None = None
 
     @property
     def neq(self) -> int:
         """Number of equations."""
         return self.mesh.number_of_equations
+
+    @property
+    def laminates(self) -> tuple[Laminate, ...]:
+        """The laminates, in the order of their numbers."""
+        return (self.laminate, *self.others)
+
+    @property
+    def rows_by_laminate(self) -> list[tuple[Laminate, Rows]]:
+        """The laminates with the rows of their elements; all rows of a single one."""
+        numbers = self.laminate_numbers
+        if numbers is None:
+            return [(self.laminate, slice(None))]
+        return [(one, np.flatnonzero(numbers == n)) for n, one in enumerate(self.laminates)]
+
+    @property
+    def thicknesses(self) -> Floats:
+        """Thickness of every element, (numel, 1); of a single laminate (1, 1)."""
+        thickness = np.array([[laminate.thickness] for laminate in self.laminates])
+        return thickness if self.laminate_numbers is None else thickness[self.laminate_numbers]
+
+    def laminate_of(self, family: ElementBlock) -> Laminate:
+        """Laminate of the elements of a block."""
+        return self.laminates[family.laminate]
+
+    @property
+    def is_coupled(self) -> bool:
+        """Whether B of a laminate is not 0."""
+        return any(laminate.is_coupled for laminate in self.laminates)
 
     @property
     def is_preloaded(self) -> bool:
@@ -92,15 +123,16 @@ class PlateModel:
 
     @cached_property
     def families(self) -> list[ElementBlock]:
-        """The elements, in blocks with the same nodes present."""
-        return element_blocks(self.mesh.elements, self.mesh.coordinates)
+        """The elements, in blocks with the same nodes present and the same laminate."""
+        mesh = self.mesh
+        return element_blocks(mesh.elements, mesh.coordinates, self.laminate_numbers)
 
     def stiffness_of(self, family: ElementBlock) -> Floats:
         """Element stiffness matrices, (ne, 5 nn, 5 nn), with K_sigma of the preload.
 
         ``replace(plate, preload=UNLOADED)`` is the plate without it.
         """
-        K = element_matrices.stiffness(family, self.laminate, self.rules)
+        K = element_matrices.stiffness(family, self.laminate_of(family), self.rules)
         if self.is_preloaded:
             K += element_matrices.geometric_stiffness(family, self.preload, self.rules)
         return K
@@ -172,23 +204,37 @@ class PlateModel:
         """Lumped M, (neq,)."""
         mass = np.zeros(self._numbers.size)
         for family in self.families:
+            laminate = self.laminate_of(family)
             for block in family.blocks(BLOCK):
-                lumped = element_matrices.lumped_mass(block, self.laminate, self.rules.bending)
+                lumped = element_matrices.lumped_mass(block, laminate, self.rules.bending)
                 np.add.at(mass, self._numbers[block.nodes].ravel(), lumped.ravel())
         return mass[: self.neq]
 
     @cached_property
     def consistent_mass(self) -> sparse.csr_array:
         """Consistent M, sparse (neq, neq), with the bending rule; assembled on first access."""
-        laminate, rule = self.laminate, self.rules.bending
-        made = self.assembled(lambda f: element_matrices.consistent_mass(f, laminate, rule))
+        rule = self.rules.bending
+        made = self.assembled(
+            lambda f: element_matrices.consistent_mass(f, self.laminate_of(f), rule)
+        )
         return made[:, : self.neq].tocsr()
+
+    def _areas(self) -> list[float]:
+        """Area of every block, length squared."""
+        rule = self.rules.bending
+        areas = (jacobian_determinants(family, rule) @ rule.weights for family in self.families)
+        return [float(area.sum()) for area in areas]
 
     def area(self) -> float:
         """Area of the plate, length squared."""
-        rule = self.rules.bending
-        areas = (jacobian_determinants(family, rule) @ rule.weights for family in self.families)
-        return sum(float(area.sum()) for area in areas)
+        return sum(self._areas())
+
+    def total_mass(self) -> float:
+        """Mass of the plate."""
+        if not self.others:
+            return self.area() * self.laminate.mass
+        masses = (self.laminate_of(family).mass for family in self.families)
+        return sum(a * m for a, m in zip(self._areas(), masses, strict=True))
 
     def profile(self) -> int:
         """Number of entries of K from the first of each column: the listing's JDIAG(NEQ)."""

@@ -8,12 +8,15 @@ An initial membrane force N0 adds the constant strain A^-1 N0.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field
+from itertools import groupby
 from typing import Self
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics import failure
 from fecm.mechanics.elements import Quadrature, gauss
@@ -21,6 +24,7 @@ from fecm.mechanics.interpolation import interpolate, inverse_jacobian, local_sh
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.membrane import QuadraticStrains
 from fecm.mechanics.mesh import ElementBlock, Ints, Mesh, element_blocks
+from fecm.mechanics.strains import Rows
 
 
 def in_plane_stresses(laminate: Laminate) -> Floats:
@@ -133,18 +137,46 @@ def second_derivatives(family: ElementBlock) -> Floats:
     return np.linalg.solve(chain, _CURVED - curved @ slopes)
 
 
+# Laminates with the rows of their elements.
+Zones = Sequence[tuple[Laminate, Rows]]
+
+
+@frozen
+class _Zone:
+    """Stresses per strain of the plies of some elements."""
+
+    laminate: Laminate
+    rows: Rows  # of its elements among those of the stresses
+    in_plane: Floats
+    interlaminar: Floats
+    residual: Floats
+
+    @classmethod
+    def of(cls, laminate: Laminate, rows: Rows) -> Self:
+        """Those of a laminate."""
+        return cls(laminate, rows, in_plane_stresses(laminate), *interlaminar_stresses(laminate))
+
+    @property
+    def plies(self) -> int:
+        """Number of plies."""
+        return len(self.laminate.plies.angles)
+
+
 class PlyStresses:
     """Stresses of the plies of some elements: rows of the mesh, ascending; all by default.
 
     The rule has the points of the in-plane stresses; the interlaminar ones belong to the element's
     centre.  `initial` is a uniform midplane strain of the undeformed plate, (3,).  The midplane
     strains of a `nonlinear` plate are eps_l + eps_q; its elements have nine nodes.
+
+    Arrays have as many plies as the laminate with the most of them; they are NaN at those that an
+    element lacks.
     """
 
     def __init__(
         self,
         mesh: Mesh,
-        laminate: Laminate,
+        laminate: Laminate | Zones,
         rule: Quadrature,
         members: Indices | None = None,
         initial: Floats | None = None,
@@ -154,9 +186,11 @@ class PlyStresses:
         self.initial = initial
         self.members = np.arange(len(mesh.elements)) if members is None else members
         elements = mesh.elements[self.members]
-        self.z = laminate.plies.z
+        zones = [(laminate, slice(None))] if isinstance(laminate, Laminate) else laminate
+        self.zones = [_Zone.of(one, _among(self.members, rows)) for one, rows in zones]
+        most = max(zone.plies for zone in self.zones)
         # Numbers of elements, points of an element, and plies.
-        self.shape = (len(elements), len(rule.xi), len(laminate.plies.angles))
+        self.shape = (len(elements), len(rule.xi), most)
         self._families = [
             (
                 family,
@@ -166,8 +200,6 @@ class PlyStresses:
             )
             for family in element_blocks(elements, mesh.coordinates)
         ]
-        self._in_plane = in_plane_stresses(laminate)
-        self._interlaminar, self._residual = interlaminar_stresses(laminate)
 
     def strains(self, field: Floats) -> tuple[Floats, Floats]:
         """Strains of a displacement field, (numnp, 5), and their derivatives.
@@ -207,14 +239,27 @@ class PlyStresses:
             3) and residual (elements, 2), NaN in elements without 9 nodes.
         """
         strains, gradients = self.strains(field)
-        stress = np.einsum("lfcs,eps->ceplf", self._in_plane, strains)
-        shear = np.einsum("lptds,eds->telp", self._interlaminar, gradients)
-        residual = np.einsum("tds,eds->et", self._residual, gradients)
+        elements, points, plies = self.shape
+        stress = np.full((3, elements, points, plies, 2), np.nan)
+        shear = np.full((2, elements, plies, 3), np.nan)
+        residual = np.empty((elements, 2))
+        for zone in self.zones:
+            own, slopes = strains[zone.rows], gradients[zone.rows]
+            in_plane = np.einsum("lfcs,eps->ceplf", zone.in_plane, own)
+            stress[:, zone.rows, :, : zone.plies] = in_plane
+            interlaminar = np.einsum("lptds,eds->telp", zone.interlaminar, slopes)
+            shear[:, zone.rows, : zone.plies] = interlaminar
+            residual[zone.rows] = np.einsum("tds,eds->et", zone.residual, slopes)
         names = ("sigma_1", "sigma_2", "tau_12")
         found = dict(zip(names, stress, strict=True))
         found["tau_xz"], found["tau_yz"] = shear
         found["residual"] = residual
         return found
+
+
+def _among(members: Indices, rows: Rows) -> Rows:
+    """Positions among some elements of those in rows of the mesh."""
+    return rows if isinstance(rows, slice) else np.flatnonzero(np.isin(members, rows))
 
 
 class _Quadratic:
@@ -281,7 +326,7 @@ class WorstStates:
     """The state of stress with the largest exposure of each criterion of the plies so far."""
 
     exposure: Floats  # (criteria,)
-    state: Indices  # (criteria,): its ply and face, 0 at the lower face of ply 1
+    state: Indices  # (criteria,): its number among those of the plate
     added: Floats  # (criteria, 3): its stresses less those at rest
 
     @classmethod
@@ -295,54 +340,150 @@ class WorstStates:
 class FailureEnvelope:
     """Largest exposures over time."""
 
-    # (criteria, states): states are elements, points, plies and faces.
+    # (criteria, states): states are elements, points, plies and faces; :data:`UNKNOWN` of plies
+    # without strengths, or that an element lacks.
     plies: Maxima
-    interfaces: Maxima  # (elements, plies - 1)
+    interfaces: Maxima  # (elements, plies - 1); NaN where there is none
     worst: WorstStates = field(default_factory=WorstStates.none)  # only with residual stresses
+
+
+UNKNOWN = -1.0  # exposure that no criterion can find
+# Strengths of all plies, or of the plies of each laminate, None where they are not given.
+AllStrengths = failure.Strengths | Sequence[Sequence[failure.Strengths | None]]
+
+
+@frozen
+class Run:
+    """Neighbouring plies of the same strengths: states from the lower face of one to another's."""
+
+    strengths: failure.Strengths
+    states: slice
+
+
+def _runs(strengths: Sequence[failure.Strengths | None]) -> list[Run]:
+    """Runs of plies with strengths."""
+    found: list[Run] = []
+    first = 0
+    for own, group in groupby(strengths):
+        end = first + len(list(group))
+        if own is not None:
+            found.append(Run(own, slice(2 * first, 2 * end)))
+        first = end
+    return found
+
+
+class ZoneCriteria:
+    """Stresses and strengths of the plies of some elements."""
+
+    def __init__(
+        self,
+        zone: _Zone,
+        points: Rows,
+        strengths: Sequence[failure.Strengths | None],
+        initial: Floats | None,
+    ) -> None:
+        self.elements, self.points = zone.rows, points  # rows of its elements and their points
+        self.strengths, self.runs = strengths, _runs(strengths)
+        self._initial = initial
+        plies = zone.laminate.plies
+        # Stresses by components, plies and faces.
+        self.in_plane = zone.in_plane.transpose(3, 2, 0, 1).reshape(6, 3, -1).copy()
+        self.add(np.zeros((zone.plies, 2, 3)))
+        # Stresses by interfaces, plies beside, and tau_13, tau_23.
+        self.interfaces = zone.plies - 1
+        tau = zone.interlaminar[:-1, 2].reshape(self.interfaces, 2, 12)
+        angles = np.deg2rad(plies.angles)
+        c, s = np.cos(angles), np.sin(angles)
+        turn = np.array([[c, s], [-s, c]]).transpose(2, 0, 1)
+        beside = np.stack([turn[:-1], turn[1:]], axis=1)
+        self._shear = np.einsum("ibct,itg->gibc", beside, tau).reshape(12, -1)
+        # (interfaces,): the weaker strength of both plies; NaN where one is not known.
+        own = np.array([(np.nan, np.nan) if one is None else (one.s13, one.s23) for one in strengths])
+        self._weaker = np.minimum(own[:-1], own[1:])[:, :, None]
+
+    def add(self, residual: Floats) -> None:
+        """Add residual stresses, (plies, 2, 3), to those of every strain."""
+        self.has_residual = bool(residual.any())
+        # Components by plies and faces; at rest with those of the initial strain.
+        self.residual = residual.reshape(-1, 3).T.copy()
+        self.at_rest = self.residual
+        if self._initial is not None:
+            self.at_rest = self.residual + np.tensordot(self._initial, self.in_plane[:3], 1)
+        # Of each run, by its first state: stresses per strain, and without strain.
+        self.tables = {
+            run.states.start: (_in_fours(self.in_plane, run), _in_fours(self.residual, run))
+            for run in self.runs
+        }
+
+    def with_residual(self, residual: Floats) -> Self:
+        """The same with residual stresses, (plies, 2, 3)."""
+        made = copy(self)
+        made.add(residual)
+        return made
+
+    def between_plies(self, gradients: Floats) -> Floats:
+        """Exposures of the interfaces, (elements, interfaces), of derivatives of the strains."""
+        shear = gradients.reshape(-1, 12) @ self._shear
+        shear = shear.reshape(len(gradients), self.interfaces, 2, 2)
+        s13, s23 = self._weaker[:, 0], self._weaker[:, 1]
+        exposures = failure.interlaminar(s13, s23, shear[..., 0], shear[..., 1])
+        return np.asarray(exposures.max(axis=2))
+
+
+def _in_fours(values: Floats, run: Run) -> Floats:
+    """Columns of the states of a run, filled up to fours with zeros for the kernels."""
+    own = values[..., run.states]
+    filled = np.zeros((*own.shape[:-1], -(-own.shape[-1] // 4) * 4))
+    filled[..., : own.shape[-1]] = own
+    return filled
 
 
 class FailureMonitor:
     """Evaluates the failure criteria of all plies."""
 
-    def __init__(
-        self, stresses: PlyStresses, laminate: Laminate, strengths: failure.Strengths
-    ) -> None:
-        self.stresses, self._strengths = stresses, strengths
-        plies = len(laminate.plies.angles)
-        # Stresses (components, plies * 2) and (interfaces, plies beside, tau_13 tau_23).
-        self._in_plane = in_plane_stresses(laminate).transpose(3, 2, 0, 1).reshape(6, -1).copy()
-        self._add(np.zeros((plies, 2, 3)))
-        tau = interlaminar_stresses(laminate)[0][:-1, 2].reshape(plies - 1, 2, 12)
-        angles = np.deg2rad(laminate.plies.angles)
-        c, s = np.cos(angles), np.sin(angles)
-        turn = np.array([[c, s], [-s, c]]).transpose(2, 0, 1)
-        beside = np.stack([turn[:-1], turn[1:]], axis=1)
-        self._shear = np.einsum("ibct,itg->gibc", beside, tau).reshape(12, -1)
+    def __init__(self, stresses: PlyStresses, strengths: AllStrengths) -> None:
+        self.stresses = stresses
+        elements, points, _ = stresses.shape
+        self._zones: list[ZoneCriteria] = []
+        for number, zone in enumerate(stresses.zones):
+            rows = zone.rows
+            own = strengths[number] if isinstance(strengths, Sequence) else [strengths] * zone.plies
+            if not isinstance(rows, slice):
+                rows = (rows[:, None] * points + np.arange(points)).ravel()
+            self._zones.append(ZoneCriteria(zone, rows, own, stresses.initial))
+        self._zone_of = np.zeros(elements, dtype=np.intp)
+        for number, zone in enumerate(stresses.zones):
+            self._zone_of[zone.rows] = number
 
-    def _add(self, residual: Floats) -> None:
-        """Add residual stresses, (plies, 2, 3), to those of every strain."""
-        self.has_residual = bool(residual.any())
-        # Components by plies and faces; at rest with those of the initial strain.
-        self._residual = residual.reshape(-1, 3).T.copy()
-        self._at_rest = self._residual
-        if (initial := self.stresses.initial) is not None:
-            per_strain = self._in_plane.reshape(6, 3, -1)[:3]
-            self._at_rest = self._residual + np.tensordot(initial, per_strain, 1)
+    @property
+    def has_residual(self) -> bool:
+        """Whether the plies have residual stresses."""
+        return any(zone.has_residual for zone in self._zones)
 
-    def with_residual(self, residual: Floats) -> Self:
-        """The same criteria for plies with residual stresses, (plies, 2, 3), in their axes.
+    def with_residual(self, residual: Sequence[Floats]) -> Self:
+        """The same criteria for plies with residual stresses in their axes.
 
-        The interlaminar criterion does not depend on them.
+        Those of each laminate are (plies, 2, 3).  The interlaminar criterion does not depend on
+        them.
         """
         made = copy(self)
-        made._add(residual)
+        made._zones = [
+            zone.with_residual(own) for zone, own in zip(self._zones, residual, strict=True)
+        ]
         return made
 
     def start(self) -> FailureEnvelope:
         """No exposure yet."""
         elements, points, plies = self.stresses.shape
         states = Maxima.none(len(failure.CRITERIA), elements * points * plies * 2)
-        return FailureEnvelope(states, Maxima.none(elements, max(plies - 1, 0)))
+        interfaces = Maxima.none(elements, max(plies - 1, 0))
+        known = np.zeros((elements * points, plies * 2), dtype=bool)
+        for zone in self._zones:
+            for run in zone.runs:
+                known[zone.points, run.states] = True
+            interfaces.exposure[zone.elements, zone.interfaces :] = np.nan
+        states.exposure[:, ~known.ravel()] = UNKNOWN
+        return FailureEnvelope(states, interfaces)
 
     def update(self, envelope: FailureEnvelope, field: Floats, time: float) -> Floats:
         """Raise the exposures to those of a displacement field, (numnp, 5).
@@ -351,48 +492,91 @@ class FailureMonitor:
         """
         strains, gradients = self.stresses.strains(field)
         self._raise_plies(envelope.plies, strains.reshape(-1, 6), time)
-        interfaces, shear = envelope.interfaces, gradients.reshape(-1, 12) @ self._shear
-        shear = shear.reshape(*interfaces.exposure.shape, 2, 2)
-        worst = failure.interlaminar(self._strengths, shear[..., 0], shear[..., 1]).max(axis=2)
-        # Elements without nine nodes have no interlaminar stresses.
-        interfaces.exposure[np.isnan(worst)] = np.nan
-        higher = worst > interfaces.exposure
-        interfaces.exposure[higher], interfaces.time[higher] = worst[higher], time
-        interfaces.mode[higher] = failure.MODES.index("interlaminar shear")
+        for zone in self._zones:
+            self._raise_interfaces(zone, envelope.interfaces, gradients, time)
         return strains
+
+    @staticmethod
+    def _raise_interfaces(
+        zone: ZoneCriteria, interfaces: Maxima, gradients: Floats, time: float
+    ) -> None:
+        """Raise the exposures of interfaces."""
+        place = (zone.elements, slice(zone.interfaces))
+        worst = zone.between_plies(gradients[zone.elements])
+        # Elements without nine nodes have no interlaminar stresses.
+        before = np.where(np.isnan(worst), np.nan, interfaces.exposure[place])
+        higher = worst > before
+        interfaces.exposure[place] = np.where(higher, worst, before)
+        interfaces.time[place] = np.where(higher, time, interfaces.time[place])
+        mode = failure.MODES.index("interlaminar shear")
+        interfaces.mode[place] = np.where(higher, mode, interfaces.mode[place])
+
+    def _place(self, state: int) -> tuple[int, ZoneCriteria, int]:
+        """Point, zone, and number among the ply's faces of a state of the plate."""
+        _, points, plies = self.stresses.shape
+        point, own = divmod(state, 2 * plies)
+        return point, self._zones[self._zone_of[point // points]], own
 
     def follow(self, envelope: FailureEnvelope, worst: Indices, strains: Floats) -> None:
         """Keep the stresses at the worst states, (criteria,), where their exposure has risen."""
-        kept, per_strain = envelope.worst, self._in_plane.reshape(6, 3, -1)
+        kept = envelope.worst
         for number, (exposure, state) in enumerate(
-            zip(envelope.plies.exposure, worst, strict=True)
+            zip(envelope.plies.exposure, worst.tolist(), strict=True)
         ):
             if exposure[state] > kept.exposure[number]:
-                point, own = divmod(int(state), per_strain.shape[2])
-                kept.exposure[number], kept.state[number] = exposure[state], own
-                kept.added[number] = strains.reshape(-1, 6)[point] @ per_strain[:, :, own]
-                kept.added[number] -= self._at_rest[:, own] - self._residual[:, own]
+                point, zone, own = self._place(state)
+                kept.exposure[number], kept.state[number] = exposure[state], state
+                kept.added[number] = strains.reshape(-1, 6)[point] @ zone.in_plane[:, :, own]
+                kept.added[number] -= zone.at_rest[:, own] - zone.residual[:, own]
 
     def load_factors(self, worst: WorstStates) -> dict[str, float]:
-        """Factors on the stresses less those at rest at which the exposures are 1."""
-        return {
-            name: failure.load_factor(self._strengths, name, self._at_rest[:, own], added)
-            for name, own, added in zip(failure.CRITERIA, worst.state, worst.added, strict=True)
-        }
+        """Factors on the stresses less those at rest at which the exposures are 1.
+
+        NaN where no exposure was found.
+        """
+        factors = {}
+        for name, state, added in zip(
+            failure.CRITERIA, worst.state.tolist(), worst.added, strict=True
+        ):
+            _, zone, own = self._place(state)
+            strengths = zone.strengths[own // 2]
+            factors[name] = (
+                np.nan
+                if strengths is None
+                else failure.load_factor(strengths, name, zone.at_rest[:, own], added)
+            )
+        return factors
 
     def _raise_plies(self, plies: Maxima, strains: Floats, time: float) -> None:
         """Raise the exposures of all plies to those of strains, (elements * points, 6)."""
-        for start in range(0, len(strains), BLOCK):
-            total = strains[start : start + BLOCK] @ self._in_plane
-            if self.has_residual:
-                total += self._residual.ravel()
-            stresses = np.split(total, 3, axis=1)
-            s1, s2, tau = (np.ascontiguousarray(part).ravel() for part in stresses)
-            first = start * self._in_plane.shape[1] // 3
+        for zone in self._zones:
+            for run in zone.runs:
+                self._raise_run(zone, run, plies, strains, time)
+
+    def _raise_run(
+        self, zone: ZoneCriteria, run: Run, plies: Maxima, strains: Floats, time: float
+    ) -> None:
+        """Raise the exposures of plies of the same strengths."""
+        shape = (len(failure.CRITERIA), len(strains), -1)
+        exposures, times, modes = (
+            values.reshape(shape) for values in (plies.exposure, plies.time, plies.mode)
+        )
+        per_strain = zone.in_plane[:, :, run.states].reshape(6, -1)
+        residual = zone.residual[:, run.states].ravel()
+        rows = np.arange(len(strains))[zone.points]
+        for start in range(0, len(rows), BLOCK):
+            block = rows[start : start + BLOCK]
+            total = strains[block] @ per_strain
+            if zone.has_residual:
+                total += residual
+            s1, s2, tau = (np.ascontiguousarray(part) for part in np.split(total, 3, axis=1))
             for number, criterion in enumerate(failure.CRITERIA.values()):
-                candidates = criterion(self._strengths, s1, s2, tau)
+                candidates = criterion(run.strengths, s1, s2, tau)
                 exposure = failure.exposure_of(candidates)
-                own = plies.exposure[number, first : first + len(s1)]
-                (larger,) = np.nonzero(exposure > own)
-                own[larger], plies.time[number, first + larger] = exposure[larger], time
-                plies.mode[number, first + larger] = failure.modes_of(candidates, larger)
+                larger = exposure > exposures[number, block, run.states]
+                if not larger.any():
+                    continue
+                point, state = np.nonzero(larger)
+                at = (number, block[point], run.states.start + state)
+                exposures[at], times[at] = exposure[larger], time
+                modes[at] = failure.modes_of(candidates, np.flatnonzero(larger))

@@ -327,16 +327,17 @@ def _integrated(plate: PlateModel, plane: PlateModel, shapes: Floats) -> Pairs:
     cubic, quartic = np.zeros((modes, count)), np.zeros((count, count))
     loads = np.zeros((plane.neq, count))
     for family in plate.families:
+        laminate = plate.laminate_of(family)
         for block in family.blocks(BLOCK):
             strains = _pair_strains(plate, block, fields[block.nodes, 2])
             at = interpolate(block, plate.rules.bending)
             linear = membrane_and_bending(at)  # (ne, points, 6, 5 nodes)
             ne, nodes = block.nodes.shape
             weight = at.jxw[:, :, None, None]
-            stresses = _rows(weight * (plate.laminate.A @ strains))
+            stresses = _rows(weight * (laminate.A @ strains))
             quartic += _rows(strains).T @ stresses
-            if plate.laminate.is_coupled:
-                AB = np.hstack([plate.laminate.A, plate.laminate.B])
+            if laminate.is_coupled:
+                AB = np.hstack([laminate.A, laminate.B])
                 own = fields[block.nodes].reshape(ne, 1, nodes * NDOF, modes)
                 cubic += _rows(weight * (AB @ (linear @ own))).T @ _rows(strains)
             B = linear.reshape(ne, -1, 6, nodes, NDOF)[:, :, :3, :, :2].reshape(ne, -1, 2 * nodes)

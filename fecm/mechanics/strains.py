@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from functools import cached_property
 
 import numpy as np
@@ -27,13 +28,15 @@ GENERALISED_STRAINS = (
 RESULTANTS = ("N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy", "Q_x", "Q_y")
 STRAINS = ("kappa_x", "kappa_y", "kappa_xy", "gamma_yz", "gamma_xz")
 
+Rows = Indices | slice  # of elements
+
 # Elements per product: so few that BLAS uses one thread.
 STRAIN_BLOCK = 256
 
 
 def strains_and_resultants(
     strains: StrainField,
-    laminate: Laminate,
+    laminates: Sequence[tuple[Laminate, Rows]],
     field: Floats,
     preload: tuple[float, float, float],
     quadratic: Floats | None = None,
@@ -41,7 +44,7 @@ def strains_and_resultants(
     """Midplane strains, curvatures, transverse shear strains and resultants (equation 2-20).
 
     Each is (numel, npt), by the names of :data:`GENERALISED_STRAINS` and :data:`RESULTANTS`, of a
-    displacement field (numnp, 5).  The membrane forces include `preload`, N_x, N_y, N_xy of the
+    displacement field (numnp, 5).  Each laminate has rows of elements.  The membrane forces include `preload`, N_x, N_y, N_xy of the
     undeformed plate; the strains do not.  To the midplane strains of a nonlinear plate eps_q is
     added, its `quadratic` ones, (3, numel, npt).
     """
@@ -53,11 +56,15 @@ def strains_and_resultants(
     if quadratic is not None:
         membrane = membrane + quadratic
     curvature, shear = bending[:3], bending[[4, 3]]
-    N = np.tensordot(laminate.A, membrane, 1) + np.tensordot(laminate.B, curvature, 1)
+    N, M, Q = np.empty_like(membrane), np.empty_like(curvature), np.empty_like(shear)
+    for laminate, rows in laminates:
+        A, B, D = laminate.A, laminate.B, laminate.D
+        eps, kappa = membrane[:, rows], curvature[:, rows]
+        N[:, rows] = np.tensordot(A, eps, 1) + np.tensordot(B, kappa, 1)
+        M[:, rows] = np.tensordot(B, eps, 1) + np.tensordot(D, kappa, 1)
+        Q[:, rows] = np.tensordot(laminate.shear, shear[:, rows], 1)
     if any(preload):
         N += np.reshape(preload, (3, 1, 1))
-    M = np.tensordot(laminate.B, membrane, 1) + np.tensordot(laminate.D, curvature, 1)
-    Q = np.tensordot(laminate.shear, shear, 1)
     values = np.concatenate([membrane, curvature, shear, N, M, Q])
     return dict(zip((*GENERALISED_STRAINS, *RESULTANTS), values, strict=True))
 

@@ -58,7 +58,9 @@ class _Midplane(NamedTuple):
 class _Elements:
     """Some elements at the points of a rule."""
 
-    def __init__(self, block: ElementBlock, rule: Quadrature) -> None:
+    def __init__(self, plate: PlateModel, block: ElementBlock, rule: Quadrature) -> None:
+        self.laminate = plate.laminate_of(block)
+        self.compliance = np.linalg.inv(self.laminate.A)
         at = interpolate(block, rule)
         self.area = at.jxw  # (ne, points): that a point stands for
         self.x, self.y = np.einsum("pn,eni->iep", at.N, block.coordinates)
@@ -73,6 +75,14 @@ class _Elements:
         strains = strains_of(slopes[..., [0, 1, 3, 4]])
         stretch = self._tied.of(q[..., 2].T).transpose(2, 1, 0)
         return _Midplane(strains[..., :3] + stretch, strains[..., 3:], slopes[..., 2])
+
+    def forces(self, at: _Midplane) -> Floats:
+        """Membrane forces n, (ne, points, 3)."""
+        return np.asarray(at.strains @ self.laminate.A + at.curvatures @ self.laminate.B)
+
+    def moments(self, at: _Midplane) -> Floats:
+        """Moments, (ne, points, 3)."""
+        return np.asarray(at.strains @ self.laminate.B + at.curvatures @ self.laminate.D)
 
 
 def nowhere(x: Floats, y: Floats) -> Bools:
@@ -94,17 +104,16 @@ class Stretching:
         load: tuple[float, float] | None = None,
     ) -> None:
         self.has_load = load is not None
-        self._laminate = plate.laminate
-        self._compliance = np.linalg.inv(plate.laminate.A)
         self._preload = np.array(plate.preload)
         blocks = (block for family in plate.families for block in family.blocks(BLOCK))
-        parts = [_Elements(block, plate.rules.bending) for block in blocks]
+        parts = [_Elements(plate, block, plate.rules.bending) for block in blocks]
         self._parts = [(part, near(part.x, part.y)) for part in parts]
         self._sheared = []
         for family in plate.families:
             rule = assumed_shear.quadrature(family)
             area = jacobian_determinants(family, rule) * rule.weights
-            self._sheared.append((plate.strain_field(rule), family.rows, area))
+            shear = plate.laminate_of(family).shear
+            self._sheared.append((plate.strain_field(rule), family.rows, area, shear))
         self._at_load = [] if load is None else _elements_at(plate, load)
 
     def evaluate(self, field: Floats) -> Stretch:
@@ -112,8 +121,8 @@ class Stretching:
         energies, largest = np.zeros(3), np.full(3, -np.inf)
         for part, near in self._parts:
             at = part.midplane(field)
-            energies += self._energies(at, part.area)
-            largest = np.maximum(largest, self._largest(at, near))
+            energies += self._energies(part, at)
+            largest = np.maximum(largest, self._largest(part, at, near))
         membrane, bending, preload = energies.tolist()
         slope, strain, force = largest.tolist()
         force_at_load, moment_at_load = self._under_load(field)
@@ -128,51 +137,46 @@ class Stretching:
             moment_at_load=moment_at_load,
         )
 
-    def _forces(self, at: _Midplane) -> Floats:
-        """Membrane forces n, (ne, points, 3)."""
-        return np.asarray(at.strains @ self._laminate.A + at.curvatures @ self._laminate.B)
-
-    def _energies(self, at: _Midplane, area: Floats) -> Floats:
+    def _energies(self, part: _Elements, at: _Midplane) -> Floats:
         """Energies of the membrane, of bending and of the preload."""
-        A, B, D = self._laminate.A, self._laminate.B, self._laminate.D
-        n = self._forces(at)
+        A, B, D = part.laminate.A, part.laminate.B, part.laminate.D
+        n = part.forces(at)
         x, y = np.moveaxis(at.slopes, -1, 0)
         squares = np.stack([x * x, y * y, 2.0 * x * y], axis=-1)
         densities = [
-            (n * (n @ self._compliance)).sum(axis=-1),
+            (n * (n @ part.compliance)).sum(axis=-1),
             (at.curvatures * (at.curvatures @ (D - B @ np.linalg.solve(A, B)))).sum(axis=-1),
             squares @ self._preload,
         ]
-        return np.array([0.5 * (area * density).sum() for density in densities])
+        return np.array([0.5 * (part.area * density).sum() for density in densities])
 
     def _shear_energy(self, field: Floats) -> float:
         """Energy of the transverse shear."""
         energy = 0.0
-        for strains, rows, area in self._sheared:
+        for strains, rows, area, shear in self._sheared:
             gamma = strains.evaluate(field)[[4, 3]][:, rows]
-            density = np.einsum("iep,ij,jep->ep", gamma, self._laminate.shear, gamma)
+            density = np.einsum("iep,ij,jep->ep", gamma, shear, gamma)
             energy += 0.5 * float((area * density).sum())
         return energy
 
-    def _largest(self, at: _Midplane, near: Bools) -> Floats:
+    def _largest(self, part: _Elements, at: _Midplane, near: Bools) -> Floats:
         """Largest slope, strain of a face away from the load, and membrane force."""
         slope = np.hypot(at.slopes[..., 0], at.slopes[..., 1])
-        middle = at.strains + self._compliance @ self._preload
-        bent = 0.5 * self._laminate.thickness * at.curvatures
+        middle = at.strains + part.compliance @ self._preload
+        bent = 0.5 * part.laminate.thickness * at.curvatures
         # The third component of strains is twice that of their tensor.
         faces = [_size(strains * [1.0, 1.0, 0.5]) for strains in (middle - bent, middle + bent)]
         strain = np.where(near, 0.0, np.maximum(*faces))
-        mean, radius = principal_values(self._preload + self._forces(at))
+        mean, radius = principal_values(self._preload + part.forces(at))
         return np.array([slope.max(), strain.max(), (mean + radius).max()])
 
     def _under_load(self, field: Floats) -> tuple[float, float]:
         """Membrane force and moment at the load: means of the adjacent elements; 0 without it."""
-        B, D = self._laminate.B, self._laminate.D
-        states = [part.midplane(field) for part in self._at_load]
+        states = [(part, part.midplane(field)) for part in self._at_load]
         if not states:
             return 0.0, 0.0
-        force = np.mean([self._forces(at)[0, 0] for at in states], axis=0)
-        moment = np.mean([(at.strains @ B + at.curvatures @ D)[0, 0] for at in states], axis=0)
+        force = np.mean([part.forces(at)[0, 0] for part, at in states], axis=0)
+        moment = np.mean([part.moments(at)[0, 0] for part, at in states], axis=0)
         return float(_size(self._preload + force)), float(_size(moment))
 
 
@@ -191,7 +195,7 @@ def _size(tensor: Floats) -> Floats:
 def _elements_at(plate: PlateModel, place: tuple[float, float]) -> list[_Elements]:
     """The elements that contain a place, each at this place alone."""
     return [
-        _Elements(family.take(np.array([member])), Quadrature(xi[:1], xi[1:], np.ones(1)))
+        _Elements(plate, family.take(np.array([member])), Quadrature(xi[:1], xi[1:], np.ones(1)))
         for family in plate.families
         for member, _, xi in zip(*locate(family, np.array([place])), strict=True)
     ]

@@ -3,7 +3,8 @@
 In-plane dofs stay at rest if the laminate does not couple them to bending and no load acts in the
 plane.  If a half turn about the centre maps mesh, supports and loads onto themselves, the response
 to an impact at the centre has the same symmetry: w equals w of the image, the other dofs have the
-opposite sign, and half of the elements suffice.  Every laminate is invariant under the half turn.
+opposite sign, and half of the elements suffice.  Every laminate is invariant under the half turn;
+an element and its image must have the same.
 """
 
 from __future__ import annotations
@@ -118,7 +119,7 @@ def restrain_resting_dofs(plate: PlateModel, contact: Floats | None) -> PlateMod
     mesh = plate.mesh
     in_plane, others = mesh.equations[:, :2].any(), mesh.equations[:, 2:].any()
     pulled = mesh.forces[:, :2].any() or (contact is not None and contact[:, :2].any())
-    stretches = plate.laminate.is_coupled or plate.nonlinear
+    stretches = plate.is_coupled or plate.nonlinear
     if not (in_plane and others) or pulled or stretches:
         return plate
     return restrain_plane(plate)

@@ -30,7 +30,8 @@ def safe_time_step(model: PlateModel) -> float:
     fastest = 0.0
     for family in model.families:
         for block in family.take(congruence(family).representatives).blocks(BLOCK):
-            mass = element_matrices.lumped_mass(block, model.laminate, model.rules.bending)
+            laminate = model.laminate_of(block)
+            mass = element_matrices.lumped_mass(block, laminate, model.rules.bending)
             scale = 1.0 / np.sqrt(mass.reshape(len(block.rows), -1))
             with np.errstate(all="ignore"):
                 scaled = model.stiffness_of(block) * scale[:, :, None] * scale[:, None, :]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import field, replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from fecm.mechanics.impact_steps import ImpactSteps, supports
 from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.kernels.strains import CompiledStrains
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import Ints, Mesh
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import Load, PlateMotion
 from fecm.mechanics.ply_stresses import FailureMonitor, PlyStresses
@@ -35,7 +36,9 @@ from fecm.problem.parts import (
     build_plate,
     build_projectile,
     build_station,
-    residual_of_deck,
+    materials_of_deck,
+    residuals_of_deck,
+    strengths_of_deck,
 )
 from fecm.problem.problem import ContactPatch, Problem
 
@@ -111,7 +114,10 @@ class ImpactModel:
     outside: OutsideLoad | None  # where their exposures count; None without FAIL
     # (numel, points): where plate theory does not hold; None without PLYS and FAIL.
     under_load: Bools | None
-    cure: Residual | None  # residual stresses of the plies; None without CURE
+    # Residual stresses of the plies of each laminate; None without CURE.
+    cure: Sequence[Residual] | None
+    laminates: tuple[int, ...]  # numbers of the laminates on the cards
+    materials: Ints | None  # of the plies of each laminate; None if there is one material
 
     @property
     def is_stressed_at_rest(self) -> bool:
@@ -134,7 +140,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         law = chosen.law or build_law(deck, slips)
         impact = ImpactSystem(motion, rod, law, conditions, STEPS[chosen.rod_method.integrator])
     compiled = motion.solver == KERNELS
-    cure = residual_of_deck(deck, plate.laminate)
+    cure = residuals_of_deck(deck, plate.laminates)
     plies, failure = _stresses(problem, plate, cure, compiled=compiled)
     stress_points = plate.strain_field(problem.rules[2])
     under_load = outside = None
@@ -165,6 +171,8 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         outside=outside,
         under_load=under_load,
         cure=cure,
+        laminates=tuple(deck.layers),
+        materials=materials_of_deck(deck),
     )
 
 
@@ -220,27 +228,28 @@ def _conditions(
 
 
 def _stresses(
-    problem: Problem, plate: PlateModel, cure: Residual | None, *, compiled: bool
+    problem: Problem, plate: PlateModel, cure: Sequence[Residual] | None, *, compiled: bool
 ) -> tuple[PlyStresses | None, FailureMonitor | None]:
     """Ply stresses of PLYS, and the failure criteria of FAIL; None where there is no such macro."""
     words = {macro.word: macro for macro in flat(problem.program)}
     points = problem.rules[2]
     initial = plate.preload_strain if plate.is_preloaded else None
+    zones = plate.rows_by_laminate
     plies = failure = None
     if "PLYS" in words:  # the M elements nearest to the load, or all
         nearest = np.argsort(problem.distances.round(9), kind="stable")
         rows = np.sort(nearest[: int(words["PLYS"].second) or None])
         plies = PlyStresses(
-            problem.mesh, plate.laminate, points, rows, initial, nonlinear=plate.nonlinear
+            problem.mesh, zones, points, rows, initial, nonlinear=plate.nonlinear
         )
     if "FAIL" in words:
         kind = CompiledMonitor if compiled else FailureMonitor
         stresses = PlyStresses(
-            problem.mesh, plate.laminate, points, initial=initial, nonlinear=plate.nonlinear
+            problem.mesh, zones, points, initial=initial, nonlinear=plate.nonlinear
         )
-        failure = kind(stresses, plate.laminate, problem.deck.require(model.Allowables))
+        failure = kind(stresses, strengths_of_deck(problem.deck))
         if cure is not None:
-            failure = failure.with_residual(cure.stresses)
+            failure = failure.with_residual([one.stresses for one in cure])
     return plies, failure
 
 

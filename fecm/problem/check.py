@@ -39,6 +39,7 @@ from fecm.problem.rules import (
     shear,
     time_step,
     units,
+    zones,
 )
 from fecm.problem.rules import listing as listing_mode
 
@@ -71,7 +72,7 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
     compiled = compile_program(deck.macros, findings)
     apply(segments.OF_SEGMENTS, findings, deck, unsound)
     checked = _generated(deck, compiled, unsound, findings, listing=listing)
-    _check_each_segment(checked, findings)
+    _check_each_segment(checked, findings, unsound)
     if sound():
         _check_points(checked, findings)
     if sound():
@@ -116,11 +117,18 @@ def _check_shapes(checked: Problem, findings: Findings, *, listing: bool) -> Non
         apply(quadrature.OF_SHEAR_ORDER, findings, checked)
 
 
-def _check_each_segment(checked: Problem, findings: Findings) -> None:
+def _check_each_segment(checked: Problem, findings: Findings, unsound: set[str]) -> None:
     """Check each segment as far as that needs no sound mesh."""
     if checked.deck.has(model.Impact):
         check_impact(checked, findings)
     check_segments(checked.deck, findings)
+    if (card := checked.deck.last(model.Materials)) is not None:
+        apply(laminate.OF_MATERIALS, findings, card)
+    if (others := checked.deck.last(model.Laminates)) is not None:
+        for one in others.laminates:
+            apply(laminate.OF_LAYERS, findings, one)
+    if unsound.isdisjoint(zones.KEYWORDS) and apply(zones.OF_DECK, findings, checked.deck):
+        apply(zones.OF_CURE, findings, checked.deck)
 
 
 def check_impact(checked: Problem, findings: Findings) -> None:
@@ -229,7 +237,7 @@ def check_program(checked: Problem, findings: Findings) -> None:
 
 def check_values(checked: Problem, findings: Findings) -> None:
     """Warn of the valid values of a sound problem that look like a mistake."""
-    apply(laminate.VALUES, findings, checked)
+    apply((*laminate.VALUES, *zones.VALUES), findings, checked)
     apply(units.VALUES, findings, checked)
     apply(preload.VALUES, findings, checked)
     if checked.has_impact:

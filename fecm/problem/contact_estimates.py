@@ -37,9 +37,10 @@ def expected_peak(deck: model.Deck, plate: PlateModel) -> float:
     """
     impact, law = deck.require(model.Impact), deck.require(model.Indentation)
     mass, v = build_projectile(deck).total_mass, np.abs(np.float64(impact.velocity))
-    ratio = mass / (plate.area() * plate.laminate.mass)
+    ratio = mass / plate.total_mass()
     rigid = law.k**0.4 * (1.25 * mass) ** 0.6 * v**1.2
-    return float(min(rigid, wave_impedance(plate.laminate) * v * np.sqrt(1.0 + CLAMPED * ratio)))
+    impedance = max(map(wave_impedance, plate.laminates))
+    return float(min(rigid, impedance * v * np.sqrt(1.0 + CLAMPED * ratio)))
 
 
 def contact_stiffness(deck: model.Deck, plate: PlateModel) -> float:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 
+from fecm._typing import Indices
 from fecm.deck import model
+from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Deck, RodDiameter
 from fecm.mechanics import contact_law
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.laminate import Laminate, laminate
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import Ints, Mesh
 from fecm.mechanics.plate import UNLOADED, PlateModel
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
 from fecm.mechanics.projectile import (
@@ -31,7 +34,6 @@ from fecm.problem.generate import rod_diameters
 # Dofs, from 0.
 W = 2
 THETA_X = 3
-MATERIAL = 1  # number of the material of MATE
 
 
 def rules(material: model.Material) -> tuple[Quadrature, Quadrature, Quadrature]:
@@ -49,9 +51,9 @@ def rules(material: model.Material) -> tuple[Quadrature, Quadrature, Quadrature]
 def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> PlateModel:
     """Build the plate of a deck with the active slips."""
     bending, shear, points = rules(deck.require(model.Material))
-    laminate = laminate_of_deck(deck, isotropic_g12="g12" in slips)
+    first, *others = laminates_of_deck(deck, isotropic_g12="g12" in slips)
     if "small-stiffness" in slips:
-        laminate = laminate.without_small_entries()
+        first = first.without_small_entries()
     used = IntegrationRules(
         bending=bending,
         shear=bending if "shear-order" in slips else shear,
@@ -62,10 +64,12 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
     preload = deck.last(model.Preload)
     return PlateModel(
         mesh,
-        laminate,
+        first,
         used,
         preload=UNLOADED if preload is None else preload.forces,
         nonlinear=deck.has(model.Nonlinear),
+        others=tuple(others),
+        laminate_numbers=laminate_numbers(deck) if others else None,
     )
 
 
@@ -117,32 +121,89 @@ def build_law(
     return contact_law.HystereticLaw(constants)
 
 
+def laminate_numbers(deck: Deck) -> Indices:
+    """Number from 0 of the laminate of every element, (numel,), in the order of LAMS."""
+    order = {number: n for n, number in enumerate(deck.layers)}
+    numbers = np.zeros(deck.control.numel, dtype=np.intp)
+    for zone in deck.require(model.Zones).records:
+        numbers[np.array(zone.elements) - 1] = order[zone.laminate]
+    return numbers
+
+
 def laminate_of(material: model.Material, *, isotropic_g12: bool = False) -> Laminate:
-    """Laminate of a deck's MATE segment; its inertia uses the card's total thickness.
+    """Laminate of a MATE segment of one material; its inertia uses the card's total thickness.
 
     With `isotropic_g12` E1/2(1+nu12) replaces G12 where E1 = E2 (the slip ``g12``).
     """
-    ply = material.ply
-    if isotropic_g12 and ply.e1 == ply.e2:
-        ply = replace(ply, g12=ply.e1 / (2.0 * (1.0 + ply.nu12)))
-    angles = [layer.angle for layer in material.layers]
-    thicknesses = [layer.thickness for layer in material.layers]
-    return laminate(ply, angles, thicknesses, material.integration.thickness)
+    plies, total = {MATERIAL: material.ply}, material.integration.thickness
+    return _laminate_of(material.layers, plies, total, isotropic_g12=isotropic_g12)
 
 
-def laminate_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> Laminate:
-    """Laminate of a deck, with its shear correction factor; LookupError without a MATE segment."""
+def _laminate_of(
+    layers: Sequence[model.Layer],
+    plies: Mapping[int, model.Ply],
+    thickness: float | None,
+    *,
+    isotropic_g12: bool,
+) -> Laminate:
+    chosen = [plies[layer.material] for layer in layers]
+    if isotropic_g12:
+        chosen = [_with_isotropic_g12(ply) if ply.e1 == ply.e2 else ply for ply in chosen]
+    angles = [layer.angle for layer in layers]
+    thicknesses = [layer.thickness for layer in layers]
+    return laminate(chosen, angles, thicknesses, thickness)
+
+
+def _with_isotropic_g12(ply: model.Ply) -> model.Ply:
+    return replace(ply, g12=ply.e1 / (2.0 * (1.0 + ply.nu12)))
+
+
+def laminates_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> list[Laminate]:
+    """Laminates of a deck with its shear correction factor, that of MATE first.
+
+    Raises LookupError without a MATE segment.
+    """
     shear = deck.last(model.Shear) or model.Shear()
-    plain = laminate_of(deck.require(model.Material), isotropic_g12=isotropic_g12)
-    stiffness = equilibrium_shear_stiffness(plain) if shear.equilibrium else plain.shear
-    return replace(plain, shear=shear.factor * stiffness)
+    material, plies = deck.require(model.Material), deck.plies
+    found: list[Laminate] = []
+    for number, layers in deck.layers.items():
+        total = material.integration.thickness if number == MATERIAL else None
+        plain = _laminate_of(layers, plies, total, isotropic_g12=isotropic_g12)
+        stiffness = equilibrium_shear_stiffness(plain) if shear.equilibrium else plain.shear
+        found.append(replace(plain, shear=shear.factor * stiffness))
+    return found
 
 
-def residual_of_deck(deck: Deck, laminate: Laminate) -> Residual | None:
-    """Residual stresses of the plies of a deck; None without a CURE segment."""
+def residuals_of_deck(deck: Deck, laminates: Sequence[Laminate]) -> tuple[Residual, ...] | None:
+    """Residual stresses of the plies of each laminate of a deck; None without a CURE segment."""
     if (cure := deck.last(model.Cure)) is None:
         return None
-    return residual_stresses(laminate, *cure.strains(MATERIAL))
+    found: list[Residual] = []
+    for layers, own in zip(deck.layers.values(), laminates, strict=True):
+        free = np.array([cure.strains(layer.material) for layer in layers])
+        found.append(residual_stresses(own, *free.T))
+    return tuple(found)
+
+
+def strengths_of_deck(deck: Deck) -> list[list[model.Allowables | None]]:
+    """Strengths of the plies of each laminate; None where ALLO does not give them."""
+    card = deck.require(model.Allowables)
+    layups = deck.layers.values()
+    return [[card.of(layer.material) for layer in layers] for layers in layups]
+
+
+def materials_of_deck(deck: Deck) -> Ints | None:
+    """Numbers of the materials of the plies of each laminate, (laminates, plies), 0 where none is.
+
+    None if the deck has one material.
+    """
+    layups = list(deck.layers.values())
+    if not deck.has(model.Materials):
+        return None
+    numbers = np.zeros((len(layups), max(map(len, layups))), dtype=np.int32)
+    for row, layers in zip(numbers, layups, strict=True):
+        row[: len(layers)] = [layer.material for layer in layers]
+    return numbers
 
 
 def has_assumed_shear(deck: Deck) -> bool:
@@ -150,11 +211,27 @@ def has_assumed_shear(deck: Deck) -> bool:
     return (deck.last(model.Shear) or model.Shear()).assumed
 
 
+def is_coupled(deck: Deck) -> bool:
+    """Whether B of one of a deck's laminates is not 0; False where the segments are invalid."""
+    material = deck.last(model.Material)
+    if material is None:
+        return False
+    return _are_coupled(material, deck.last(model.Materials), deck.last(model.Laminates))
+
+
 @lru_cache(maxsize=256)
-def is_coupled(material: model.Material) -> bool:
-    """Whether B of a deck's laminate is not 0; False where the MATE segment is invalid."""
+def _are_coupled(
+    material: model.Material, materials: model.Materials | None, laminates: model.Laminates | None
+) -> bool:
+    """Whether B of one of the laminates is not 0."""
+    plies = {MATERIAL: material.ply} | {
+        one.number: one.ply for one in (materials.plies if materials else ())
+    }
+    layers = [material.layers, *(one.layers for one in (laminates.laminates if laminates else ()))]
     try:
         with np.errstate(all="ignore"):
-            return laminate_of(material).is_coupled
-    except (ArithmeticError, ValueError):
+            return any(
+                _laminate_of(own, plies, None, isotropic_g12=False).is_coupled for own in layers
+            )
+    except (ArithmeticError, LookupError, ValueError):
         return False

@@ -19,13 +19,13 @@ from fecm.mechanics.laminate import Laminate, effective_rigidity, threshold_forc
 from fecm.mechanics.mesh import ElementBlock, Mesh, element_blocks, element_centres
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import uniform_stresses
-from fecm.mechanics.points import RADIUS_PER_THICKNESS, patch_weights
+from fecm.mechanics.points import RADIUS_PER_THICKNESS, locate, patch_weights
 from fecm.mechanics.residual_stresses import Residual
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.symmetry import half_turn_images, restrain_resting_dofs
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.contact_estimates import ContactStep, contact_step
-from fecm.problem.parts import W, build_plate, residual_of_deck, rules
+from fecm.problem.parts import W, build_plate, residuals_of_deck, rules, strengths_of_deck
 from fecm.problem.span import Span, unsupported
 from fecm.results.linear_plate import in_plane_of
 from fecm.results.validity import Judge
@@ -92,8 +92,36 @@ class Problem:
 
     @property
     def laminate(self) -> Laminate:
-        """The laminate of report mode, with the shear correction factor."""
-        return self.plate.laminate
+        """The laminate of report mode under the load, with the shear correction factor."""
+        return self.plate.laminates[self.laminate_number]
+
+    @cached_property
+    def laminate_number(self) -> int:
+        """Number from 0 of the laminate under the load; that of element 1 without a load."""
+        place = self.load_place
+        return self._laminate_number_at(place) if place else self._laminate_numbers[0]
+
+    @cached_property
+    def _laminate_numbers(self) -> list[int]:
+        """Number from 0 of the laminate of every element."""
+        numbers = self.plate.laminate_numbers
+        return [0] * self.deck.control.numel if numbers is None else numbers.tolist()
+
+    def _laminate_number_at(self, place: tuple[float, float]) -> int:
+        """Number from 0 of the laminate at a place: of the first element that contains it."""
+        if self.plate.laminate_numbers is None:
+            return 0
+        rows = [
+            int(family.rows[member])
+            for family in self.families
+            for member in locate(family, np.array([place]))[0].tolist()
+        ]
+        return self._laminate_numbers[min(rows, default=0)]
+
+    @property
+    def used_laminates(self) -> list[int]:
+        """Numbers from 0 of the laminates of the elements."""
+        return sorted(set(self._laminate_numbers))
 
     @cached_property
     def moving_plate(self) -> PlateModel:
@@ -138,10 +166,10 @@ class Problem:
         """
         if (card := self.deck.last(model.Patch)) is None:
             return None
-        if (radius := card.radius) is None:
-            thickness = self.deck.require(model.Material).integration.thickness
-            radius = RADIUS_PER_THICKNESS[card.shape] * thickness
         x, y = (card.x, card.y) if card.x is not None and card.y is not None else self._struck
+        if (radius := card.radius) is None:
+            thickness = self.plate.laminates[self._laminate_number_at((x, y))].thickness
+            radius = RADIUS_PER_THICKNESS[card.shape] * thickness
         weights = patch_weights(self.mesh, card.shape, radius, x, y)
         images = half_turn_images(self.mesh.coordinates)
         if images is not None and np.allclose(weights, weights[images], 0.0, 1e-12):
@@ -203,20 +231,29 @@ class Problem:
 
     @cached_property
     def residual(self) -> Residual | None:
-        """Residual stresses of the plies; None without a CURE segment."""
-        return residual_of_deck(self.deck, self.laminate)
+        """Residual stresses of the plies under the load; None without a CURE segment."""
+        return None if self.residuals is None else self.residuals[self.laminate_number]
+
+    @cached_property
+    def residuals(self) -> tuple[Residual, ...] | None:
+        """Residual stresses of the plies of each laminate; None without a CURE segment."""
+        return residuals_of_deck(self.deck, self.plate.laminates)
 
     @property
     def worst_at_rest(self) -> PlyExposure | None:
         """Largest exposure before anything moves; None without stresses then, or strengths."""
-        strengths, preloaded = self.deck.last(model.Allowables), self.plate.is_preloaded
-        if strengths is None or (self.residual is None and not preloaded):
+        preloaded = self.plate.is_preloaded
+        if not self.deck.has(model.Allowables) or (self.residuals is None and not preloaded):
             return None
-        stresses = uniform_stresses(self.laminate, self.plate.preload_strain)
-        if self.residual is not None:
-            stresses += self.residual.stresses
-        exposures = largest_in_plies(strengths, stresses)
-        return max(exposures, key=lambda one: one.exposure)
+        strengths = strengths_of_deck(self.deck)
+        exposures: list[PlyExposure] = []
+        for number in self.used_laminates:
+            laminate = self.plate.laminates[number]
+            stresses = uniform_stresses(laminate, self.plate.preload_strain)
+            if self.residuals is not None:
+                stresses += self.residuals[number].stresses
+            exposures += largest_in_plies(strengths[number], stresses)
+        return max(exposures, key=lambda one: one.exposure, default=None)
 
     @cached_property
     def judge(self) -> Judge:
@@ -249,7 +286,7 @@ class Problem:
         an_element = len(self.rules[2].xi)
         points, field = control.numel * an_element, control.numnp * control.ndf
         gages = len(segment.records) if (segment := self.deck.last(model.Gages)) else 0
-        layers = len(self.deck.require(model.Material).layers)
+        layers = max(map(len, self.deck.layers.values()))
         chosen = next((int(m.second) for m in flat(self.program) if m.word == "PLYS"), 0)
         plies = (chosen or control.numel) * (layers * (6 * an_element + 6) + 2)
         history = work.steps * (18 + gages + bool(self.damping))

@@ -44,8 +44,12 @@ def equilibrium_change(problem: Problem) -> float | None:
     plate, contact = problem.moving_plate, problem.contact
     if contact is None or problem.deck.control.numel > MOST_SOLVED:
         return None
-    load, laminate = contact[plate.mesh.equations > 0], plate.laminate
-    softer = replace(plate, laminate=replace(laminate, shear=equilibrium_shear_stiffness(laminate)))
+    load = contact[plate.mesh.equations > 0]
+    first, *others = (
+        replace(laminate, shear=equilibrium_shear_stiffness(laminate))
+        for laminate in plate.laminates
+    )
+    softer = replace(plate, laminate=first, others=tuple(others))
     try:
         return compliance(softer, load) / compliance(plate, load) - 1.0
     except SingularStiffnessError:
@@ -79,7 +83,7 @@ class ProblemSummary:
         self.free_in_plane = int((plate.mesh.codes[:, :W] == 0).all(axis=1).sum())  # nodes
         self.preload = plate.preload  # N0x, N0y, N0xy
         self.A, self.B, self.D, self.shear = laminate.A, laminate.B, laminate.D, laminate.shear
-        self.plate_mass = plate.area() * laminate.mass
+        self.plate_mass = plate.total_mass()
         self.projectile_mass = build_projectile(deck).total_mass  # even without impact
         self.critical_time_step = float("nan")
         with suppress(UnsoundPlateError):  # the check reports it if the program takes steps

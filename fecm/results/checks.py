@@ -8,7 +8,7 @@ from typing import Any
 from fecm._text import shown
 from fecm.mechanics.failure import CRITERIA
 from fecm.results.exposures import AT_REST, LOAD_FACTOR
-from fecm.results.schema import DATASETS, FIXED
+from fecm.results.schema import FIXED, dataset_of
 
 
 def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str]) -> str:
@@ -18,7 +18,7 @@ def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str])
     """
     sizes: dict[str | int, tuple[int, str]] = {n: (s, "every result") for n, s in FIXED.items()}
     for path, shape in shapes.items():
-        if (dataset := DATASETS.get(path)) is None:
+        if (dataset := dataset_of(path, len(shape))) is None:
             continue
         if kinds[path] not in ("f" if dataset.dtype.startswith("f") else "iu"):
             return f"{path} has the wrong type: expected {dataset.dtype}"

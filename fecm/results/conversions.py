@@ -10,7 +10,7 @@ from fecm._typing import Array
 from fecm.deck.mesh_cards import AXES, DOF_NAMES
 from fecm.results.errors import NotStoredError
 from fecm.results.plies import rows_at
-from fecm.results.schema import DATASETS, SCALES, Dataset
+from fecm.results.schema import DATASETS, SCALES, Dataset, dataset_of
 from fecm.results.stored import Stored
 from fecm.results.vtk_cells import vtk_cells
 
@@ -44,7 +44,7 @@ def datatree(stored: Stored) -> xarray.DataTree:
     groups: dict[str, dict[str, tuple[list[str], Array, dict[str, str]]]] = {}
     for path in stored:
         values = stored[path]
-        dataset = DATASETS.get(path, Dataset(path, values.shape, ""))
+        dataset = dataset_of(path, values.ndim) or Dataset(path, values.shape, "")
         texts = {"long_name": dataset.description, "units": stored.unit(dataset.dimension)}
         attributes = {name: text for name, text in texts.items() if text}
         groups.setdefault(dataset.group, {})[dataset.name] = (

@@ -77,7 +77,8 @@ def lines(result: Result, name: str = "history") -> Iterator[str]:
     if any(array.shape != shape for array in arrays):
         choice = f"choose {', '.join(values[:-1])} or {values[-1]}"
         raise ExportError(f"the datasets of {name} do not fit into one table; {choice}")
-    known = schema.DATASETS[values[0]].shape if values[0] in schema.DATASETS else shape
+    dataset = schema.dataset_of(values[0], len(shape))
+    known = shape if dataset is None else dataset.shape
     axes = list(zip(known, shape, strict=True))[bool(clock) :]
     columns = _names(values)
     if len(values) == 1 and axes and len(names := NAMED.get(axes[-1][0], ())) >= axes[-1][1]:

@@ -30,7 +30,7 @@ from fecm.deck.mesh_cards import DOF_NAMES
 from fecm.results.blocks import row_blocks
 from fecm.results.hdf5_reader import Contents, read
 from fecm.results.missing import suggestion
-from fecm.results.schema import CONTACT, DATASETS, SCALES, Form
+from fecm.results.schema import CONTACT, DATASETS, SCALES, Form, dataset_of
 from fecm.results.tapes import SHEARS, TAPES, TapeText, W, last_digit, read_tapes
 
 # Names and first numbers of the axes of a sweep's datasets: cases count from 0, as in commands.
@@ -292,13 +292,14 @@ def _compare(
 
 def _own_scale(found: Comparison) -> float:
     """Scale of the differences of a dataset that is not its maximum; 0 if there is none."""
-    match SCALE_NAMES.get(found.path):
+    group, name = found.path.partition("/")[0], found.path.rpartition("/")[2]
+    match SCALE_NAMES.get(f"{group}/{name}" if group == "laminate" else found.path):
         case None:
             return 0.0
         case Scale.ENERGY:
             return _initial_energy(found) + _largest(found, "energy/external_work")
         case Scale.COUPLING:  # with the thickness h, A h and D / h have the order of B
-            return float((_largest(found, "laminate/A") * _largest(found, "laminate/D")) ** 0.5)
+            return float((_largest_laminate(found, "A") * _largest_laminate(found, "D")) ** 0.5)
         case Scale.INTERLAMINAR:
             return max(_largest(found, "plies/tau_xz"), _largest(found, "plies/tau_yz"))
         case Scale.RESULTANT:
@@ -334,8 +335,15 @@ def _largest_of(found: Comparison, names: Sequence[str]) -> float:
 
 def _inverse_thickness(found: Comparison) -> float:
     """sqrt(A/D), which is of the order of 1/h; 0 if it is not known."""
-    bending = _largest(found, "laminate/D") or np.inf
-    return float((_largest(found, "laminate/A") / bending) ** 0.5)
+    bending = _largest_laminate(found, "D") or np.inf
+    return float((_largest_laminate(found, "A") / bending) ** 0.5)
+
+
+def _largest_laminate(found: Comparison, name: str) -> float:
+    """Largest value of a stiffness matrix of the laminates."""
+    paths = {path for source in found.sources for path in source.shapes}
+    own = [p for p in paths if p.startswith("laminate/") and p.endswith(f"/{name}")]
+    return max((_largest(found, path) for path in own), default=0.0)
 
 
 def _initial_energy(found: Comparison) -> float:
@@ -427,7 +435,8 @@ def _place(found: Comparison, index: tuple[int, ...]) -> dict[str, Any]:
         return place | {name: first + i for (name, first), i in zip(axes, index, strict=False)}
     if clock is None and path.startswith("tape"):
         place["row"] = index[0] + 1
-    shape = DATASETS[path].shape if path in DATASETS else ()
+    dataset = dataset_of(path, len(source.shapes[path]))
+    shape = () if dataset is None else dataset.shape
     if len(shape) == len(source.shapes[path]):
         for axis, (size, i) in enumerate(zip(shape, index, strict=False)):
             if size == "ndf" and i < len(DOF_NAMES):

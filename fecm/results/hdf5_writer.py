@@ -186,7 +186,7 @@ def save(stored: Stored, path: Path, *, overwrite: bool) -> None:
         for name in stored:
             values = stored[name]
             own = schema.Dataset(name, values.shape, "", dtype=values.dtype.name)
-            sink.create(schema.DATASETS.get(name, own), values.shape)
+            sink.create(schema.dataset_of(name, values.ndim) or own, values.shape)
             sink.write(name, 0, values)
         for group in filter(None, stored._groups):
             sink.attributes(group, stored.attributes_of(group))

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from fecm._frozen import frozen
 from fecm._typing import Array, Bools, Floats, Indices
-from fecm.deck.model import Material, Ply
+from fecm.deck.model import Deck, Layer, Material, Ply
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.mesh import element_blocks
@@ -38,6 +39,8 @@ class Plies:
     element: Array  # (elements,): numbers
     x: Floats  # (elements, points), as `y`: places of the points, length
     y: Floats
+    # Of a plate of several laminates the next two are (elements, plies, ...), and NaN, as are the
+    # stresses, at plies that an element lacks.
     z: Floats  # (plies, 3): lower, middle and upper z, from the struck face at -h/2, length
     angles: Floats  # (plies,): of the fibres, degrees
     under_load: Bools  # (elements,): mask of those so near to the load that plate theory fails
@@ -100,11 +103,12 @@ class PlyGroup(PlyRows):
             name: stored[f"plies/{name}"][np.ix_(rows, members)]
             for name in (*IN_PLANE, *INTERLAMINAR, "residual")
         }
-        material = model_of(stored).last(Material)
-        if material is None or len(material.layers) != len(z):
-            raise ResultFileError(
-                f"the result's deck does not have the {len(z)} plies of its stresses"
-            )
+        deck = model_of(stored)
+        material = deck.last(Material)
+        count = z.shape[-2]
+        if material is None or not _fits(deck, z):
+            raise ResultFileError(f"the result's deck does not have the {count} plies of its stresses")
+        layups = _layups(stored, deck, numbers[members])
         points = points_of(
             stored,
             numbers[members],
@@ -117,11 +121,11 @@ class PlyGroup(PlyRows):
             element=numbers[members],
             x=points[..., 0],
             y=points[..., 1],
-            z=z,
-            angles=np.array([layer.angle for layer in material.layers]),
+            z=z if z.ndim == 2 else z[_positions(stored, deck, numbers[members])],
+            angles=_of_layers(layups, count, lambda layer: layer.angle),
             under_load=stored["plies/under_load"][members] != 0,
             **chosen,
-            **_strains(chosen, material.ply, isotropic_shear="g12" in stored.slips),
+            **_strains(chosen, _constants(deck, layups, count, "g12" in stored.slips)),
         )
 
 
@@ -137,18 +141,86 @@ def _members(numbers: Array, asked: Array) -> Indices:
     return np.array([place[int(number)] for number in asked], dtype=np.intp)
 
 
-def _strains(
-    stresses: Mapping[str, Floats], ply: Ply, *, isotropic_shear: bool
-) -> dict[str, Floats]:
-    """Strains of a ply by its compliance; the slip ``g12`` takes isotropic plies by E and nu."""
+Layup = tuple[Layer, ...]
+
+
+def _fits(deck: Deck, z: Floats) -> bool:
+    """Whether a deck has the laminates of stored z, and the materials of their layers."""
+    layups = deck.layers.values()
+    several = (len(layups),) if len(layups) > 1 else ()
+    known = deck.plies
+    return z.shape[:-1] == (*several, max(map(len, layups))) and all(
+        layer.material in known for layers in layups for layer in layers
+    )
+
+
+def _positions(stored: Stored, deck: Deck, numbers: Array) -> Indices:
+    """Positions among the deck's laminates of those of some elements."""
+    own = list(deck.layers)
+    found = stored["mesh/laminate"][numbers - 1]
+    if not np.isin(found, own).all():
+        raise ResultFileError("the result's deck does not have the laminates of its elements")
+    return np.array([own.index(number) for number in found.tolist()], dtype=np.intp)
+
+
+def _layups(stored: Stored, deck: Deck, numbers: Array) -> Layup | list[Layup]:
+    """Layers of the plate, or of each element where there are several laminates."""
+    first, *others = layups = list(deck.layers.values())
+    if not others:
+        return first
+    return [layups[position] for position in _positions(stored, deck, numbers)]
+
+
+def _of_layers(
+    layups: Layup | list[Layup], count: int, value: Callable[[Layer], float]
+) -> Floats:
+    """Values of the layers, (plies,), or of each element, (elements, plies), NaN where none is."""
+    if isinstance(layups, tuple):
+        return np.array([value(layer) for layer in layups])
+    found = np.full((len(layups), count), np.nan)
+    for row, layers in zip(found, layups, strict=True):
+        row[: len(layers)] = [value(layer) for layer in layers]
+    return found
+
+
+class _Constants(NamedTuple):
+    """Constants of plies that broadcast to their in-plane stresses."""
+
+    e1: float | Floats
+    e2: float | Floats
+    nu12: float | Floats
+    g12: float | Floats
+
+
+def _constants(
+    deck: Deck, layups: Layup | list[Layup], count: int, isotropic_shear: bool
+) -> _Constants:
+    """Constants of the plies; the slip ``g12`` takes isotropic plies by E and nu."""
+
+    def g12(ply: Ply) -> float:
+        if isotropic_shear and ply.e1 == ply.e2:
+            return ply.e1 / (2.0 * (1.0 + ply.nu12))
+        return ply.g12
+
+    plies = deck.plies
+    if len(plies) == 1:
+        (ply,) = plies.values()
+        return _Constants(ply.e1, ply.e2, ply.nu12, g12(ply))
+
+    def of(value: Callable[[Ply], float]) -> Floats:
+        values = _of_layers(layups, count, lambda layer: value(plies[layer.material]))
+        return values[..., None] if values.ndim == 1 else values[:, None, :, None]
+
+    return _Constants(of(lambda p: p.e1), of(lambda p: p.e2), of(lambda p: p.nu12), of(g12))
+
+
+def _strains(stresses: Mapping[str, Floats], ply: _Constants) -> dict[str, Floats]:
+    """Strains of plies by their compliance."""
     one, two, shear = (stresses[name] for name in IN_PLANE)
-    g12 = ply.g12
-    if isotropic_shear and ply.e1 == ply.e2:
-        g12 = ply.e1 / (2.0 * (1.0 + ply.nu12))
     return {
         "eps_1": (one - ply.nu12 * two) / ply.e1,
         "eps_2": two / ply.e2 - ply.nu12 * one / ply.e1,
-        "gamma_12": shear / g12,
+        "gamma_12": shear / ply.g12,
     }
 
 

@@ -7,6 +7,7 @@ The annotations of a group serve type checkers, editors and :data:`DATASETS`.
 """
 
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from enum import StrEnum
 from typing import Annotated, Any
 
@@ -116,10 +117,13 @@ class Mesh(Group):
     equations: Annotated[
         Int32s, "numnp ndf", "equation numbers from 1 of every unknown, 0 where restrained"
     ]
+    laminate: Annotated[
+        Int32s, "numel", "number of the laminate of every element, only with several"
+    ]
 
 
 class LaminateStiffness(Group):
-    """Stiffness of the laminate per area."""
+    """Stiffness of the laminate per area; of several, each has a group of its number in it."""
 
     A: Annotated[Floats, "3 3", "extensional stiffness, order xx, yy, xy", "force/length"]
     B: Annotated[Floats, "3 3", "coupling stiffness, order xx, yy, xy", "force"]
@@ -247,6 +251,9 @@ class PlyRows(Rows):
 
     element: Annotated[Int32s, "members", "number of every element with ply stresses"]
     z: Annotated[Floats, "layers levels", "lower, middle and upper z of every ply", "length"]
+    material: Annotated[
+        Int32s, "layers", "number of the material of every ply, only with several; 0 where none is"
+    ]
     under_load: Annotated[
         Int32s,
         "members",
@@ -367,6 +374,27 @@ def _datasets(group: str, kind: type[Group], outer: str = "") -> Iterator[Datase
 
 DATASETS = {d.path: d for name, kind in GROUP_TYPES.items() for d in _datasets(name, kind)}
 
+# Datasets that have one axis more in front, `laminates`, if there are several; NaN at plies that a
+# laminate lacks.
+BY_LAMINATE = ("plies/z", "plies/material", "plies/cure_stress")
+
+
+def by_laminate(dataset: Dataset) -> Dataset:
+    """Dataset of several laminates."""
+    return replace(dataset, shape=("laminates", *dataset.shape))
+
+
+def dataset_of(path: str, rank: int) -> Dataset | None:
+    """Dataset of a path, with so many axes; None if it is not in the schema."""
+    group, name = path.partition("/")[0], path.rpartition("/")[2]
+    known = DATASETS.get(f"{group}/{name}" if group == "laminate" else path)
+    if known is None:
+        return None
+    if path in BY_LAMINATE and rank > len(known.shape):
+        return by_laminate(known)
+    return replace(known, path=path)
+
+
 # Sizes of axes that every result has.
 FIXED = {
     "faces": 2,
@@ -394,6 +422,7 @@ SCALES = {
     "directions": ("direction", "1 is xz, 2 is yz"),
     "components": ("component", "name of the stress in the axes of the ply"),
     "criteria": ("criterion", "name of the failure criterion"),
+    "laminates": ("laminate_position", "position of the laminate among the laminates, from 1"),
     "gages": ("gage", "position of the gage among the gages, from 1"),
     "cases": ("case", "number of the case, from 0"),
     "steps": ("step", "number of time steps taken"),

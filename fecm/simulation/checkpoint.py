@@ -26,7 +26,7 @@ from fecm._version import __version__
 from fecm.mechanics import kernels
 from fecm.mechanics.stiffness_product import KERNELS
 from fecm.results.hdf5_writer import FileSink, Operation
-from fecm.results.schema import DATASETS
+from fecm.results.schema import dataset_of
 from fecm.simulation.simulation import Simulation
 
 FORMAT = 5
@@ -221,7 +221,11 @@ class Checkpointer:
             case Operation.ATTRIBUTES:
                 self._sink.attributes(entry["group"], entry["values"])
             case Operation.CREATE:
-                self._sink.create(DATASETS[entry["path"]], tuple(entry["shape"]))
+                shape = tuple(entry["shape"])
+                dataset = dataset_of(entry["path"], len(shape))
+                if dataset is None:
+                    raise CheckpointError(f"{self._spool} has an unknown dataset {entry['path']}")
+                self._sink.create(dataset, shape)
             case Operation.TEXT:
                 self._sink.text(entry["path"], entry["value"], entry["description"])
             case Operation.WRITE:

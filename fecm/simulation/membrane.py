@@ -41,7 +41,7 @@ def _time_step(simulation: Simulation, result: Result) -> Iterator[str]:
     if not simulation.state.plate.step or tension <= 0.0 or plate is not problem.moving_plate:
         return
     side = min(map(shortest_side, plate.families))
-    growth = tension * (2.0 * math.pi / side) ** 2 / plate.laminate.mass
+    growth = tension * (2.0 * math.pi / side) ** 2 / min(one.mass for one in plate.laminates)
     allowed = (2.0 / dt) ** 2
     if (2.0 / problem.safe_time_step) ** 2 + growth <= NEAR**2 * allowed:
         return

@@ -96,14 +96,14 @@ def _face_strains(simulation: Simulation, result: Result, group: str) -> Iterato
     With the uniform strain of the preload.
     """
     model, problem = simulation.model, simulation.problem
-    half = model.plate.laminate.thickness / 2.0
+    half = model.plate.thicknesses / 2.0
     preload = model.plate.preload_strain if model.plate.is_preloaded else np.zeros(3)
     has_membrane = group == "stresses"
     points = model.stress_points if has_membrane else model.strains
     names = [*MEMBRANE, *BENDING] if has_membrane else [*BENDING]
     for times, values in _blocks(result, group, names):
         sizes = [max(part.max(), -part.min()) for part in values]
-        if np.abs(preload).sum() + sum(sizes[:-3]) + half * sum(sizes[-3:]) < STRAIN:
+        if np.abs(preload).sum() + sum(sizes[:-3]) + half.max() * sum(sizes[-3:]) < STRAIN:
             continue  # a bound, as few runs come near the limit
         membrane = values[:-3] or [np.zeros(())] * 3
         curvature = [half * kappa for kappa in values[-3:]]

@@ -17,8 +17,10 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm.deck import model
 from fecm.deck.macros import WORDS
+from fecm.deck.material_cards import MATERIAL
 from fecm.deck.mesh_cards import DOF_NAMES
 from fecm.deck.model import Macro
+from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.strains import GENERALISED_STRAINS, RESULTANTS
@@ -94,6 +96,7 @@ class Printer:
                     self._control = segment.carriage_control
                 case _:
                     self._segment(segment, mesh, plate, echo)
+        self._others(deck, plate)
         if echo:
             self._page("Equation numbers")
             self._nodes(mesh.equations)
@@ -158,7 +161,7 @@ class Printer:
         self._table(("node", *DOF_NAMES), ((n + 1, *values[n].tolist()) for n in chosen.tolist()))
 
     def _material(self, material: model.Material, plate: PlateModel) -> None:
-        ply, card, laminate = material.ply, material.integration, plate.laminate
+        ply, card = material.ply, material.integration
         lines = [
             f"  {len(material.layers)} layers, total thickness {card.thickness:g}",
             f"  E1 {ply.e1:g}   E2 {ply.e2:g}   NU12 {ply.nu12:g}",
@@ -168,8 +171,29 @@ class Printer:
             "",
         ]
         self._page("Material", lines)
-        layers = ((n, one.angle, one.thickness) for n, one in enumerate(material.layers, start=1))
-        self._table(("layer", "angle", "thickness"), layers)
+        self._laminate(material.layers, plate.laminate)
+
+    def _others(self, deck: model.Deck, plate: PlateModel) -> None:
+        """Materials and laminates beside those of MATE."""
+        if (card := deck.last(model.Materials)) is not None:
+            names = [field.label for field in model.Ply.fields]
+            self._page("Other materials")
+            rows = ((one.number, *map(float, one.ply.row())) for one in card.plies)
+            self._table(("material", *names), rows)
+        (_, *others), (_, *laminates) = deck.layers.items(), plate.laminates
+        for (number, layers), laminate in zip(others, laminates, strict=True):
+            self._page(f"Laminate {number}")
+            self._laminate(layers, laminate)
+
+    def _laminate(self, layers: Sequence[model.Layer], laminate: Laminate) -> None:
+        """Layers and stiffness of a laminate."""
+        several = any(one.material != MATERIAL for one in layers)
+        header = ("layer", "angle", "thickness", *(["material"] if several else []))
+        rows = (
+            (n, one.angle, one.thickness, *([one.material] if several else []))
+            for n, one in enumerate(layers, start=1)
+        )
+        self._table(header, rows)
         for name in ("A", "B", "D", "shear"):
             self._write([f"  {name}", *map(_row, getattr(laminate, name).tolist()), ""])
 

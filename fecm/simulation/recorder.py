@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR
 from fecm.results.exposures import LOAD_FACTOR
 from fecm.results.groups import STORED_BY
 from fecm.results.plies import CURE_STRESS
-from fecm.results.schema import DATASETS, FIXED, Dataset
+from fecm.results.schema import BY_LAMINATE, DATASETS, FIXED, Dataset, by_laminate
 from fecm.results.sinks import RowBuffer, Sink
 from fecm.simulation.saved import subset
 from fecm.simulation.step_recorder import EVERY_STEP, OnBlock, StepRecorder
@@ -26,6 +27,8 @@ Steps = Sequence[int]  # of rows
 Times = Sequence[float]
 FAILURE = ("failure", *(f"failure/{name}" for name in ALL_CRITERIA))
 MEMBRANE = "membrane"
+LAMINATE = "laminate"
+MATERIAL = "plies/material"
 AT_MACROS = ("tape3", "tape8", "stresses", "plies", "exposures", "reactions", "modes")
 
 
@@ -40,7 +43,34 @@ def _absent(model: ImpactModel) -> set[str]:
         absent |= {f"{MEMBRANE}/force_at_load", f"{MEMBRANE}/moment_at_load"}
     if model.cure is None:
         absent.add(CURE_STRESS)
+    if not model.plate.others:
+        absent.add("mesh/laminate")
+    if model.materials is None or (model.plies is None and model.failure is None):
+        absent.add(MATERIAL)
     return absent
+
+
+def _of_laminates(dataset: Dataset, model: ImpactModel) -> list[Dataset]:
+    """A dataset as a plate of one laminate has it, or of several."""
+    if not model.plate.others:
+        return [dataset]
+    if dataset.group == LAMINATE:
+        return [replace(dataset, path=f"{LAMINATE}/{n}/{dataset.name}") for n in model.laminates]
+    return [by_laminate(dataset) if dataset.path in BY_LAMINATE else dataset]
+
+
+def _padded(parts: Sequence[Floats]) -> Floats:
+    """Arrays of plies of each laminate, (laminates, plies, ...), NaN at those that one lacks.
+
+    Those of a single laminate, (plies, ...).
+    """
+    if len(parts) == 1:
+        return parts[0]
+    most = max(map(len, parts))
+    found = np.full((len(parts), most, *parts[0].shape[1:]), np.nan)
+    for row, part in zip(found, parts, strict=True):
+        row[: len(part)] = part
+    return found
 
 
 def exposures_of(found: FailureEnvelope) -> dict[str, Array]:
@@ -48,6 +78,8 @@ def exposures_of(found: FailureEnvelope) -> dict[str, Array]:
     arrays = {}
     for part in ("exposure", "time", "mode"):
         for name, values in zip(CRITERIA, getattr(found.plies, part), strict=True):
+            if part == "exposure":
+                values = np.where(values < 0.0, np.nan, values)
             arrays[f"failure/{name}/{part}"] = values
         arrays[f"failure/{INTERLAMINAR}/{part}"] = getattr(found.interfaces, part)
     return arrays
@@ -80,9 +112,10 @@ class Recorder:
         absent = _absent(model)
         self._datasets = [
             (dataset, self._shape(dataset))
-            for dataset in DATASETS.values()
-            if (self._room.get(dataset.group) != 0 or dataset.path == CURE_STRESS)
-            and dataset.path not in absent
+            for known in DATASETS.values()
+            if (self._room.get(known.group) != 0 or known.path in (CURE_STRESS, MATERIAL))
+            and known.path not in absent
+            for dataset in _of_laminates(known, model)
         ]
         self._buffers: dict[str, RowBuffer] = {}
         for group in (*EVERY_STEP, "tape9", *AT_MACROS, MEMBRANE):
@@ -104,7 +137,8 @@ class Recorder:
             "npt": self._model.strains.shape[1],
             "nps": self._model.stress_points.shape[1],
             "gages": 0 if gages is None else len(gages.numbers),
-            "layers": len(self._model.plate.laminate.plies.angles),
+            "layers": max(len(one.plies.angles) for one in self._model.plate.laminates),
+            "laminates": len(self._model.plate.laminates),
             **FIXED,
         }
         if self._model.plies is not None:
@@ -129,7 +163,7 @@ class Recorder:
             self._sink.attributes("patch", values)
         if model.plate.is_preloaded:
             values = dict(zip(("N0_x", "N0_y", "N0_xy"), model.plate.preload, strict=True))
-            self._sink.attributes("laminate", values)
+            self._sink.attributes(LAMINATE, values)
             if self._room["gages"]:
                 self._sink.attributes("gages", {"preload": "excluded"})
         if model.under_load is not None and model.failure is not None:
@@ -142,11 +176,15 @@ class Recorder:
     def _constants(self) -> dict[str, Array]:
         """Datasets that do not change during the run."""
         model = self._model
-        mesh, laminate = model.plate.mesh, model.plate.laminate
+        mesh, laminates = model.plate.mesh, model.plate.laminates
         found: dict[str, Array] = {
-            **{f"mesh/{n}": getattr(mesh, n) for n in ("coordinates", "elements", "equations")},
-            **{f"laminate/{n}": getattr(laminate, n) for n in ("A", "B", "D", "shear")},
+            f"mesh/{n}": getattr(mesh, n) for n in ("coordinates", "elements", "equations")
         }
+        for number, laminate in zip(model.laminates, laminates, strict=True):
+            group = f"{LAMINATE}/{number}" if model.plate.others else LAMINATE
+            found |= {f"{group}/{n}": getattr(laminate, n) for n in ("A", "B", "D", "shear")}
+        if model.plate.laminate_numbers is not None:
+            found["mesh/laminate"] = np.array(model.laminates)[model.plate.laminate_numbers]
         if self._room["gages"] and model.gages is not None:
             found["gages/number"] = model.gages.numbers
         if (patch := model.patch) is not None:
@@ -157,10 +195,12 @@ class Recorder:
         if near is not None and self._room["plies"] and model.plies is not None:
             members = model.plies.members
             found["plies/element"] = members + 1
-            found["plies/z"] = model.plies.z
+            found["plies/z"] = _padded([one.plies.z for one in laminates])
             found["plies/under_load"] = near[members].any(axis=1).astype(int)
         if model.cure is not None:
-            found[CURE_STRESS] = model.cure.stresses
+            found[CURE_STRESS] = _padded([one.stresses for one in model.cure])
+        if model.materials is not None and (model.plies is not None or model.failure is not None):
+            found[MATERIAL] = model.materials if model.plate.others else model.materials[0]
         if near is not None and model.failure is not None:
             x, y = model.stress_points.places(mesh.coordinates)
             found["failure/x"] = x

@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 
 from fecm._version import __version__
-from fecm.deck.model import Allowables, Cure, Deck, Material
+from fecm.deck.model import Cure, Deck, Material
 from fecm.deck.units import unit_names
 from fecm.mechanics.failure import MODES, largest_in_plies
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.problem.build import RunOptions
+from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem, Threshold
 from fecm.problem.slips import mode_of
 from fecm.results.exposures import AT_REST, count_evaluations
@@ -100,8 +101,13 @@ def _write_cure(simulation: Simulation) -> None:
     card, sink = deck.require(Cure), simulation.sink
     changes = {"cure": card.delta_t, "moisture": card.delta_c}
     sink.attributes("failure", changes if card.delta_c else {"cure": card.delta_t})
-    for one in largest_in_plies(deck.require(Allowables), model.cure.stresses):
-        sink.attributes(f"failure/{one.criterion}", {AT_REST: one.exposure})
+    largest: dict[str, float] = {}
+    strengths = strengths_of_deck(deck)
+    for number in simulation.problem.used_laminates:
+        for one in largest_in_plies(strengths[number], model.cure[number].stresses):
+            largest[one.criterion] = max(largest.get(one.criterion, 0.0), one.exposure)
+    for criterion, exposure in largest.items():
+        sink.attributes(f"failure/{criterion}", {AT_REST: exposure})
 
 
 def _evaluate_at_rest(simulation: Simulation) -> None:

@@ -185,7 +185,7 @@ def estimate(problem: Problem) -> Estimate:
     if not velocity > 0.0:
         raise StudyError(f"the velocity of ROD is {velocity:g}: the projectile does not approach")
     k = deck.require(Indentation).k
-    ratio = mass / (problem.plate.area() * laminate.mass)
+    ratio = mass / problem.plate.total_mass()
     force = math.nan if problem.threshold is None else problem.threshold.force
     parameter = _inelasticity(problem, mass, velocity)
 
@@ -224,7 +224,7 @@ def velocity_at(problem: Problem, force: float) -> float:
     assert contact is not None  # the program has impact steps
     mass, velocity = build_projectile(deck).total_mass, deck.require(Impact).velocity
     k = deck.require(Indentation).k
-    if mass < problem.plate.area() * problem.laminate.mass:
+    if mass < problem.plate.total_mass():
         small = _on_infinite_plate(problem, mass)
         return _reaching(lambda v: small(v).peak, velocity, force)
     try:

@@ -140,10 +140,10 @@ def in_one_motion(
 
 def _criteria(simulation: Simulation, checked: Problem) -> Criteria:
     """Failure criteria of plies with the residual stresses of another case."""
-    monitor, residual = simulation.model.failure, checked.residual
+    monitor, residuals = simulation.model.failure, checked.residuals
     assert monitor is not None
-    assert residual is not None
-    made = monitor.with_residual(residual.stresses)
+    assert residuals is not None
+    made = monitor.with_residual([one.stresses for one in residuals])
     envelope = made.start()
     made.update(envelope, np.zeros(checked.mesh.equations.shape), 0.0)
     return Criteria(made, envelope)

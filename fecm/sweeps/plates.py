@@ -194,7 +194,7 @@ def set_support(deck: model.Deck, value: Value) -> model.Deck:
     if deck.has(model.Forces) or mesh.elements.shape[1] not in (4, 9) or not mesh.elements.all():
         raise CasesError("support: the deck must have no FORC, and all elements four or nine nodes")
     plate = PlateMesh(mesh.coordinates, mesh.elements.astype(int) - 1, {}, np.array([], int))
-    stretches = deck.has(model.Nonlinear) or is_coupled(deck.require(model.Material))
+    stretches = deck.has(model.Nonlinear) or is_coupled(deck)
     everywhere = (0, 0, 0, 0, 0) if stretches else (1, 1, 0, 0, 0)
     made = plate.supported(everywhere, {BOUNDARY: support})
     others = tuple(s for s in deck.segments if not isinstance(s, model.Boundary))

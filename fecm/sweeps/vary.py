@@ -6,7 +6,6 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
-from fecm.deck import model
 from fecm.deck.model import Deck
 from fecm.problem.parts import is_coupled
 from fecm.sweeps.case import Case, CasesError
@@ -56,8 +55,7 @@ def apply_case(deck: Deck, case: Case) -> Deck:
             made = setter(made, case[name])
     if not case.keys().isdisjoint(_STRIKE_SETTERS):
         made = strike(made, case).deck()
-    before = deck.last(model.Material)
-    if before and not is_coupled(before) and is_coupled(made.require(model.Material)):
+    if not is_coupled(deck) and is_coupled(made):
         made = free_in_plane(made)
     return replace(_timed(deck, made, case), text="")
 

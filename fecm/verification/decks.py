@@ -145,14 +145,16 @@ def quarter_plate(
     load: float | Floats = 0.0,
     codes: str = BENDING,
     others: Sequence[model.Segment] = (),
+    side: float = 1.0,
 ) -> model.Deck:
-    """Build a quarter of a simply supported square plate of side 1.
+    """Build a quarter of a simply supported square plate.
 
     x = 0 and y = 0 are lines of symmetry, and node 1 is the plate's middle.
     `elements` are those of a side, `load` is force/area at the nodes, (nodes along y, nodes along
     x), `codes` are supports such as `BENDING`, `others` further segments.
     """
-    grid = Grid(uniform(0.5, elements), uniform(0.5, elements))
+    half = uniform(side / 2.0, elements)
+    grid = Grid(half, half)
     along = weights(lines(grid.columns))
     loads = np.zeros((grid.up, grid.across, 5))
     loads[..., 2] = np.outer(along, along) * load

@@ -29,6 +29,7 @@ ELEMENTS = 8  # of 16 a side
 FEWER = 6  # of 12 a side
 THICKNESS = 0.1
 STIFF = Ply(1.0, 0.25, 25.0, 1.0, 0.5, 0.5, 0.2)  # Pagano's
+SANDWICH_CORE = Ply(0.2, 0.25, 0.04, 0.04, 0.016, 0.06, 0.06)
 CROSS = (0.0, 90.0, 0.0)
 QUASI = (45.0, 0.0, -45.0, 90.0)
 
@@ -224,6 +225,39 @@ def _ply_stresses() -> Sequence[Value]:
         (xz[:, 1, 1], np.sin(np.pi * x) * np.cos(np.pi * y)),
         (yz[:, 1, 1], np.cos(np.pi * x) * np.sin(np.pi * y)),
     ]
+
+
+def _pressed_sandwich(ratio: float) -> Result:
+    """Run Pagano's sandwich, a square of side 1, under q = cos(pi x) cos(pi y)."""
+    along = np.cos(np.pi * np.array(lines(uniform(0.5, ELEMENTS))))
+    parts = ((0.1, 1), (0.8, 2), (0.1, 1))  # of the thickness; material
+    layers = tuple(
+        model.Layer(n, 0.0, share / ratio, material)
+        for n, (share, material) in enumerate(parts, start=1)
+    )
+    plate = model.Material(model.Integration(3, 3, 2, 1.0 / ratio), STIFF, layers)
+    core = model.Materials((model.NumberedPly(model.MaterialNumber(2), SANDWICH_CORE),))
+    shear = model.Shear(assumed=True, equilibrium=True)
+    macros = decks.program("TANG FORM SOLV DISP PLYS STRE")
+    load = np.outer(along, along)
+    return decks.result_of(decks.quarter_plate(ELEMENTS, plate, macros, load, others=[shear, core]))
+
+
+@case
+def _sandwich() -> Sequence[Value]:
+    thin, thick = _pressed_sandwich(100.0), _pressed_sandwich(10.0)
+    x, y = decks.fields(thin, "stresses", "x y")
+    even, odd = np.cos(np.pi * x) * np.cos(np.pi * y), np.sin(np.pi * x) * np.sin(np.pi * y)
+    x, y = x.mean(axis=1), y.mean(axis=1)
+    along, across = np.sin(np.pi * x) * np.cos(np.pi * y), np.cos(np.pi * x) * np.sin(np.pi * y)
+    found: list[Value] = [
+        (thin[f"plies/{name}"][0, :, :, 2, 1] / 100.0**2, shape)
+        for name, shape in (("sigma_1", even), ("sigma_2", even), ("tau_12", odd))
+    ]
+    for ratio, result in ((100.0, thin), (10.0, thick)):
+        for name, shape in (("tau_xz", along), ("tau_yz", across)):
+            found.append((result[f"plies/{name}"][0, :, 1, 1] / ratio, -shape))
+    return [*found, 100.0 * thick.tape3.w[0, 0] / 10.0**3]
 
 
 @case

@@ -73,7 +73,7 @@ BREAKS: Breaks = {
         {"resultants": ("ε", "γ_xy", "N"), "cross-ply-plate": ("ω11", "w", "u")},
     ),
     "SHEA ignored": (
-        instead(parts, "laminate_of_deck", without_shea), {"resultants": ("γ_xz", "γ_yz")},
+        instead(parts, "laminates_of_deck", without_shea), {"resultants": ("γ_xz", "γ_yz")},
     ),
     "geometric stiffness doubled": (
         changed(element_matrices, "geometric_stiffness", doubled),

@@ -6,6 +6,7 @@ import numpy as np
 
 from fecm.mechanics import failure, ply_stresses, residual_stresses
 from fecm.mechanics.ply_stresses import FailureMonitor
+from fecm.problem import parts
 from tests.breaks import (
     Breaks,
     bent_with_stretching_held,
@@ -13,6 +14,7 @@ from tests.breaks import (
     in_plate_axes,
     instead,
     mirrored,
+    of_one_material,
     of_the_first,
     of_the_last,
     unturned,
@@ -49,6 +51,10 @@ BREAKS: Breaks = {
         without_shear_stress,
         {"failure-states": ("maximum stress, 90", "Tsai and Wu", "Hashin, 30", "Hashin, -45",
                             "Hashin, 90", "Puck, -45", "Puck, 90")},
+    ),
+    "one material for all layers": (
+        instead(parts, "_laminate_of", of_one_material),
+        {"sandwich": ("σ", "τ", "100 w")},
     ),
     "faces of a ply exchanged": (
         changed(ply_stresses, "in_plane_stresses", lambda found: found[:, ::-1]),

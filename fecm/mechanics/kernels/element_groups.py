@@ -38,7 +38,7 @@ class ElementKind(IntEnum):
 
 
 class Group(Structure):
-    """Elements with the same nodes present, and either a matrix or none.
+    """Elements with the same nodes present and the same laminate, and either a matrix or none.
 
     Arrays that a kind does not use are not set.  n is the number of dofs of an element, `nodes`
     times nd; (points) are those of bending, of shear or of tying.
@@ -69,6 +69,10 @@ class Group(Structure):
     Nonlinear plate:
     `parallelograms`  number                        whether the elements are
     `grid`            (9,)                          places of the nodes in rows of eta
+    All:
+    `stiffness`       (6, 6)                        of midplane strains and negative curvatures
+    `transverse`      (2, 2)                        transverse shear stiffness
+    `coupled`         number                        whether B is not 0
     ================  ============================  ==========================================
 
     With a preload `deflection` has the slopes at the points of bending last.
@@ -91,6 +95,9 @@ class Group(Structure):
         ("tied_t", Doubles),
         ("parallelograms", c_int64),
         ("grid", Integers),
+        ("stiffness", Doubles),
+        ("transverse", Doubles),
+        ("coupled", c_int64),
     )
 
 
@@ -134,10 +141,14 @@ class ElementGroup:
         if nonlinear:
             places = np.argsort(self.order)[membrane.grid(family)]
             fields["grid"] = places.astype(np.int32)
+        laminate = plate.laminate_of(family)
         self.structure = Group(
             kind=self.kind,
             nodes=nn,
             parallelograms=int(self.parallelograms),
+            stiffness=np.block([[laminate.A, -laminate.B], [-laminate.B, laminate.D]]),
+            transverse=np.ascontiguousarray(laminate.shear),
+            coupled=int(laminate.is_coupled),
             **{
                 name: value if isinstance(value, int) else np.ascontiguousarray(value)
                 for name, value in fields.items()

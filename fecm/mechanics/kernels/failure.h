@@ -54,20 +54,22 @@ INLINE void NAME(criteria)(const Ply *p, half s1, half s2, half tau, NAME(Worst)
 }
 
 TARGET void NAME(failure)(const Failure *f, const double *strains, double now) {
-    const int64_t states = f->states, width = f->width, all = f->points * states;
+    const int64_t states = f->states, width = f->width, stride = f->stride, all = f->rows * stride;
     const Ply ply = f->ply; /* a copy, which no store changes */
-    for (int64_t point = 0; point < f->points; point++, strains += 6)
+    for (int64_t point = 0; point < f->points; point++) {
+        const int64_t row = f->row ? f->row[point] : point;
+        const double *e = strains + 6 * row;
         for (int64_t first = 0; first < width; first += 4) {
             half s[3];
             for (int c = 0; c < 3; c++) s[c] = NAME(load)(f->residual + c * width + first);
             const double *stress = f->in_plane + first;
             for (int k = 0; k < 6; k++)
-                for (int c = 0; c < 3; c++, stress += width) s[c] += strains[k] * NAME(load)(stress);
+                for (int c = 0; c < 3; c++, stress += width) s[c] += e[k] * NAME(load)(stress);
             NAME(Worst) w[CRITERIA];
             NAME(criteria)(&ply, s[0], s[1], s[2], w);
             const int count = states - first < 4 ? (int)(states - first) : 4;
             for (int i = 0; i < CRITERIA; i++) {
-                const int64_t at = i * all + point * states + first;
+                const int64_t at = i * all + row * stride + f->first + first;
                 if (count == 4 && !NAME(any)(w[i].exposure > NAME(load)(f->exposure + at))) continue;
                 for (int lane = 0; lane < count; lane++)
                     if (w[i].exposure[lane] > f->exposure[at + lane]) {
@@ -76,4 +78,5 @@ TARGET void NAME(failure)(const Failure *f, const double *strains, double now) {
                     }
             }
         }
+    }
 }

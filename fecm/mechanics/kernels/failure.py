@@ -9,14 +9,11 @@ from __future__ import annotations
 
 import ctypes
 from ctypes import c_double, c_int64
-from functools import cached_property
-
-import numpy as np
 
 from fecm._typing import Floats
-from fecm.mechanics.failure import puck_limits
-from fecm.mechanics.kernels import LIBRARY, Codes, Doubles, Structure, floats
-from fecm.mechanics.ply_stresses import FailureMonitor, Maxima
+from fecm.mechanics.failure import Strengths, puck_limits
+from fecm.mechanics.kernels import LIBRARY, Codes, Doubles, Longs, Structure, floats
+from fecm.mechanics.ply_stresses import FailureMonitor, Maxima, Run, ZoneCriteria
 
 
 class Ply(Structure):
@@ -40,16 +37,19 @@ class Ply(Structure):
 
 
 class Failure(Structure):
-    """Largest exposures of `states` states of stress at `points` points.
+    """Largest exposures of `states` neighbouring states of stress at `points` points.
+
+    `rows`, `stride` and `first` place them in the arrays of all points.
 
     The arrays:
 
     ===========  =============================  ============================================
+    `row`        (points,)                      rows of the points; not set if these are all
     `in_plane`   (6, 3, width)                  stresses per midplane strain and curvature
     `residual`   (3, width)                     stresses without strain
-    `exposure`   (criteria, points, states)     largest exposure so far
-    `time`       (criteria, points, states)     when it was reached
-    `mode`       (criteria, points, states)     its mode of failure
+    `exposure`   (criteria, rows, stride)       largest exposure so far
+    `time`       (criteria, rows, stride)       when it was reached
+    `mode`       (criteria, rows, stride)       its mode of failure
     ===========  =============================  ============================================
     """
 
@@ -57,6 +57,10 @@ class Failure(Structure):
         ("points", c_int64),
         ("states", c_int64),
         ("width", c_int64),  # number of states, filled up to fours
+        ("rows", c_int64),  # points of the arrays
+        ("stride", c_int64),  # states of a point in the arrays
+        ("first", c_int64),  # of these states among them
+        ("row", Longs),
         ("in_plane", Doubles),
         ("residual", Doubles),
         ("ply", Ply),
@@ -66,45 +70,42 @@ class Failure(Structure):
     )
 
 
+def _ply(p: Strengths) -> Ply:
+    """Strengths for the kernels."""
+    resistance, critical = puck_limits(p)
+    return Ply(
+        xt=p.xt,
+        xc=p.xc,
+        yt=p.yt,
+        yc=p.yc,
+        s12=p.s12,
+        f12=p.f12,
+        p_plus=p.p_plus,
+        p_minus=p.p_minus,
+        resistance=resistance,
+        critical=critical,
+    )
+
+
 class CompiledMonitor(FailureMonitor):
     """The same exposures."""
 
-    @cached_property
-    def _table(self) -> Floats:
-        """Stresses per strain, (6, 3, states); states are filled up to fours."""
-        stresses = self._in_plane.reshape(6, 3, -1)
-        return np.pad(stresses, ((0, 0), (0, 0), (0, -stresses.shape[2] % 4)))
-
-    def _add(self, residual: Floats) -> None:
-        super()._add(residual)
-        # States are filled up to fours.
-        self._without_strain = np.pad(self._residual, ((0, 0), (0, -self._residual.shape[1] % 4)))
-
-    @cached_property
-    def _ply(self) -> Ply:
-        p = self._strengths
-        resistance, critical = puck_limits(p)
-        return Ply(
-            xt=p.xt,
-            xc=p.xc,
-            yt=p.yt,
-            yc=p.yc,
-            s12=p.s12,
-            f12=p.f12,
-            p_plus=p.p_plus,
-            p_minus=p.p_minus,
-            resistance=resistance,
-            critical=critical,
-        )
-
-    def _raise_plies(self, plies: Maxima, strains: Floats, time: float) -> None:
+    def _raise_run(
+        self, zone: ZoneCriteria, run: Run, plies: Maxima, strains: Floats, time: float
+    ) -> None:
+        table, residual = zone.tables[run.states.start]
+        some = not isinstance(zone.points, slice)
         structure = Failure(
-            points=len(strains),
-            states=self._in_plane.shape[1] // 3,
-            width=self._table.shape[2],
-            in_plane=self._table,
-            residual=self._without_strain,
-            ply=self._ply,
+            points=len(zone.points) if some else len(strains),
+            states=run.states.stop - run.states.start,
+            width=table.shape[2],
+            rows=len(strains),
+            stride=2 * self.stresses.shape[2],
+            first=run.states.start,
+            row=zone.points if some else None,
+            in_plane=table,
+            residual=residual,
+            ply=_ply(run.strengths),
             exposure=plies.exposure,
             time=plies.time,
             mode=plies.mode,

@@ -413,11 +413,11 @@ INLINE void NAME(stretch)(int coupled, int modes, const Plate *p, const Chunk *c
 }
 
 TARGET void NAME(membrane)(const Plate *p, const Chunk *chunk, const Block *b, const double *u, double *f, half *work) {
-    if (b->group->parallelograms && p->coupled)
+    if (b->group->parallelograms && b->group->coupled)
         NAME(stretch)(1, 1, p, chunk, b, u, f, work);
     else if (b->group->parallelograms)
         NAME(stretch)(0, 1, p, chunk, b, u, f, work);
-    else if (p->coupled)
+    else if (b->group->coupled)
         NAME(stretch)(1, 0, p, chunk, b, u, f, work);
     else
         NAME(stretch)(0, 0, p, chunk, b, u, f, work);

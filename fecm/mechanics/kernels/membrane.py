@@ -55,7 +55,7 @@ def numbers(
     at the tying points of e_11, (6, 2), along the second one at those of e_22, (6, 2), and along
     both at those of e_12, (4, 2, 2).
     """
-    centre, laminate = _centre(family), plate.laminate
+    centre, laminate = _centre(family), plate.laminate_of(family)
     to_global = membrane.covariant_to_global(centre)
     stiffness = np.stack([laminate.A, -laminate.B])[:, None]
     covariant = to_global.swapaxes(1, 2) @ stiffness @ to_global  # (2, ne, 3, 3)

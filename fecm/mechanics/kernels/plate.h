@@ -142,7 +142,7 @@ INLINE void NAME(tabulated)(int nd, int nodes, const Plate *p, const Chunk *c, c
     const int sloped = slopes + (p->preload ? 2 * nb : 0);
     lanes at_w[64], at_r[2][48], at_u[2][32], e[2][16], part[12];
     const lanes *w = x + first * nodes;
-    const double *C = p->stiffness, *S = p->shear;
+    const double *C = g->stiffness, *S = g->transverse;
     NAME(product)(g->deflection, sloped, nodes, w, at_w);
     for (int i = 0; i < 2; i++) {
         NAME(product)(g->rotations, 2 * nb + values, nodes, w + (1 + i) * nodes, at_r[i]);
@@ -309,10 +309,10 @@ INLINE void NAME(nodal)(half *f) {
  * Coefficients of x and y follow those of the dofs; `weight` are those of the points, and `factor`
  * that of the element.  With twice the slopes J of x and y, d their determinant and g twice the slopes
  * of a field, strains are adj(J) g/d and the area of a point is its weight times d/4. */
-INLINE void NAME(points)(int nd, int n, int bends, int shears, const Plate *p, const double *x, const double *weight,
-                         half factor, half (*c)[9], half (*force)[9]) {
+INLINE void NAME(points)(int nd, int n, int bends, int shears, const Plate *p, const Group *g, const double *x,
+                         const double *weight, half factor, half (*c)[9], half (*force)[9]) {
     const int w = nd - 3, fields = nd + 2;
-    const double *C = p->stiffness, *S = p->shear;
+    const double *C = g->stiffness, *S = g->transverse;
     half V[7][3][4] ALIGNED, D[7][3][4] ALIGNED; /* values and slopes along xi */
 #define SLOPES(i) ((i) >= nd || ((i) == w ? shears : bends))
 #define VALUES(i) ((i) > w && (i) < nd && shears)
@@ -401,10 +401,10 @@ INLINE void NAME(factorized)(int nd, const Plate *p, const Chunk *chunk, const B
         for (int i = 1; i < 9; i++)
             for (int axis = 0; axis < 2; axis++) c[nd + axis][i] = NAME(load)(b->data + LANES * (8 * axis + i) + 4 * side);
         if (nb == 3 && ns == 3) /* the usual numbers, for which loops are unrolled */
-            NAME(points)(nd, 3, 1, 1, p, xb, wb, factor, c, force);
+            NAME(points)(nd, 3, 1, 1, p, g, xb, wb, factor, c, force);
         else {
-            NAME(points)(nd, nb, 1, 0, p, xb, wb, factor, c, force);
-            NAME(points)(nd, ns, 0, 1, p, xs, ws, factor, c, force);
+            NAME(points)(nd, nb, 1, 0, p, g, xb, wb, factor, c, force);
+            NAME(points)(nd, ns, 0, 1, p, g, xs, ws, factor, c, force);
         }
         for (int dof = 0; dof < nd; dof++) {
             NAME(nodal)(force[dof]);

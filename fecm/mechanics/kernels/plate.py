@@ -112,8 +112,6 @@ class Plate(Structure):
 
     ===========  =========================  ===================================================
     `lane`       (rows, 8)                  places of the lanes where they don't follow
-    `stiffness`  (6, 6)                     of midplane strains and negative curvatures
-    `shear`      (2, 2)                     transverse shear stiffness
     `preload`    (3,)                       initial membrane force; not set without
     `mass`       (nodes,) or (nd, nodes)    lumped mass, part by part, divided by `ratio`
     `inverse`    as `mass`                  1 over it, 0 where it is 0
@@ -133,11 +131,8 @@ class Plate(Structure):
         ("most", c_int64),  # of the largest chunk
         ("chunk", POINTER(Chunk)),
         ("lane", Integers),
-        ("stiffness", Doubles),
-        ("shear", Doubles),
         ("preload", Doubles),
         ("nonlinear", c_int64),  # whether stretching follows from bending
-        ("coupled", c_int64),  # whether B is not 0
         ("transposed", c_int64),  # whether the inverse Jacobian is, the slip `jacobian`
         ("planes", c_int64),  # first dimension of `mass`: 1, or nd
         ("mass", Doubles),
@@ -213,7 +208,6 @@ class CompiledPlate:
 
         cuts = self._chunks(parts, places, leader)
         lanes = self._blocks(cuts, layout, groups, places)
-        laminate = plate.laminate
         self.structure = Plate(
             nd=nd,
             chunks=layout.chunks,
@@ -221,11 +215,8 @@ class CompiledPlate:
             most=int(places.sizes.max()),
             chunk=cuts,
             lane=_integers(lanes),
-            stiffness=np.block([[laminate.A, -laminate.B], [-laminate.B, laminate.D]]),
-            shear=np.ascontiguousarray(laminate.shear),
             preload=np.array(plate.preload) if plate.is_preloaded else None,
             nonlinear=int(nonlinear),
-            coupled=int(laminate.is_coupled),
             transposed=int(plate.rules.transposed_jacobian),
             planes=len(factor) // count,
             mass=factor,

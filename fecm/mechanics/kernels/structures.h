@@ -15,7 +15,7 @@
  * quadrature, factorized or by tables. */
 enum { ONE_MATRIX, TWO_MATRICES, FACTORIZED, TABULATED };
 
-/* Elements with the same nodes present, and either one matrix or none. */
+/* Elements with the same nodes present and the same laminate, and either one matrix or none. */
 typedef struct {
     int64_t kind, nodes;
     int64_t pairs;        /* TWO_MATRICES: node i < `pairs` is the image of i + `pairs` under half a turn */
@@ -30,6 +30,9 @@ typedef struct {
     /* Of a nonlinear plate: whether its elements are parallelograms; (9,): nodes by rows of eta. */
     int64_t parallelograms;
     const int32_t *grid;
+    /* Of the laminate: (6, 6) of strains and negative curvatures; (2, 2); whether B is not 0. */
+    const double *stiffness, *transverse;
+    int64_t coupled;
 } Group;
 
 /* Eight elements. */
@@ -60,9 +63,8 @@ typedef struct {
     int64_t nd, chunks, nodes, most; /* chunks but the last one; nodes of all, and of the largest */
     const Chunk *chunk;
     const int32_t *lane;             /* (rows, 8) */
-    const double *stiffness, *shear; /* (6, 6) of strains and negative curvatures; (2, 2) */
     const double *preload;           /* (3,): initial membrane force N0 x, y, xy; or NULL */
-    int64_t nonlinear, coupled;      /* whether the plate is, and B is not 0 */
+    int64_t nonlinear;               /* whether the plate is */
     int64_t transposed;              /* whether the Jacobian of FACTORIZED elements is */
     int64_t planes;                  /* of the next two: 1, or one for each dof */
     const double *mass, *inverse;    /* divided by `ratio`; of each node, or of each entry */
@@ -165,12 +167,14 @@ typedef struct {
     double xt, xc, yt, yc, s12, f12, p_plus, p_minus, resistance, critical;
 } Ply;
 
-/* Largest exposures of the states of stress (plies, faces) at points; `width` is `states` in fours. */
+/* Largest exposures of neighbouring states of stress (plies, faces) at points; `width` is `states` in
+ * fours.  In the arrays of all points, (CRITERIA, rows, stride), they begin at `first`. */
 typedef struct {
-    int64_t points, states, width;
+    int64_t points, states, width, rows, stride, first;
+    const int64_t *row;     /* (points,): of the points in these arrays; all if NULL */
     const double *in_plane; /* (6, 3, width): stresses per strain */
     const double *residual; /* (3, width): stresses without strain */
     Ply ply;
-    double *exposure, *time; /* (CRITERIA, points, states) */
+    double *exposure, *time; /* (CRITERIA, rows, stride) */
     int8_t *mode;
 } Failure;

@@ -7,16 +7,18 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.deck import model
 from fecm.deck.macros import flat
+from fecm.deck.material_cards import MATERIAL
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.mechanics.failure import largest_in_plies
-from fecm.problem.parts import MATERIAL
+from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
 from fecm.results.criteria import spelt
 
 LARGEST_BETA = 0.1  # strain per per cent of weight
 LARGEST_CHANGE = 500.0  # K
 LARGEST_WARP = 0.1  # rise of the free plate over its thickness, above which it is told
+FIELDS = "its fields are the material (columns 1-5, blank: 1), alpha1 (11-20) and alpha2 (21-30)"
 
 
 @rule(
@@ -31,13 +33,10 @@ LARGEST_WARP = 0.1  # rise of the free plate over its thickness, above which it 
 )
 def missing_expansion(card: model.Cure) -> Reports:
     """Find a change of temperature or moisture without what it does to the plies."""
-    hint = "its fields are the material (columns 1-5, blank: 1), alpha1 (11-20) and alpha2 (21-30)"
-    for one in card.expansions:
-        if one.material != MATERIAL:
-            message = f"The deck has no material {one.material}, only {MATERIAL}, that of MATE."
-            yield Report(message, one.place("material"), hint)
-    for one in card.expansions[1:]:
-        if one.material == card.expansions[0].material:
+    hint = FIELDS
+    materials = [one.material for one in card.expansions]
+    for position, one in enumerate(card.expansions):
+        if one.material in materials[:position]:
             message = f"Material {one.material} has a second card of expansions."
             yield Report(message, one.place("material"), "remove one of them")
     if (free := card.expansion(MATERIAL)) is None:
@@ -114,12 +113,17 @@ def large_change(problem: Problem) -> Reports:
 )
 def cracks_at_rest(problem: Problem) -> Reports:
     """Find residual stresses beyond the strength of a ply."""
-    strengths, card = problem.deck.last(model.Allowables), problem.deck.last(model.Cure)
-    if strengths is None or card is None or problem.residual is None:
+    card, residuals = problem.deck.last(model.Cure), problem.residuals
+    if not problem.deck.has(model.Allowables) or card is None or residuals is None:
         return
-    exposures = largest_in_plies(strengths, problem.residual.stresses)
-    worst = max(exposures, key=lambda one: one.exposure)
-    if worst.exposure >= 1.0:
+    strengths = strengths_of_deck(problem.deck)
+    exposures = [
+        one
+        for number in problem.used_laminates
+        for one in largest_in_plies(strengths[number], residuals[number].stresses)
+    ]
+    worst = max(exposures, key=lambda one: one.exposure, default=None)
+    if worst is not None and worst.exposure >= 1.0:
         where = f"{worst.mode}, {spelt(worst.criterion)}, ply {worst.ply}"
         message = (
             f"The laminate cracks before any load: the residual stresses of CURE reach exposure "

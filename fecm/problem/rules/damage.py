@@ -12,6 +12,7 @@ from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import MODULUS, TOUGHNESS, in_si, unit_names
 from fecm.mechanics.failure import largest_in_plies
 from fecm.mechanics.ply_stresses import uniform_stresses
+from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
 from fecm.problem.rules.units import USED, has_real_moduli, likely_unit, looks_like, needed_unit
 from fecm.results.criteria import spelt
@@ -57,11 +58,13 @@ MOST_TWIST = 0.1  # largest |D16| and |D26|, over (D11 D22)^(1/2), without a war
 )
 def invalid_strength(card: model.Allowables) -> Reports:
     """Find strengths that no ply has."""
-    for (name, _, _), value in zip(SHARES, card.row(), strict=False):
-        if isinstance(value, str) or not value > 0.0:
-            hint = "compressive strengths are positive on this card" if name in ("XC", "YC") else ""
-            message = f"The strength {name} is {value:g}; it must be positive."
-            yield Report(message, card.place(name), hint)
+    for one in (card, *card.others):
+        for (name, _, _), value in zip(SHARES, one.row(), strict=False):
+            if isinstance(value, str) or not value > 0.0:
+                is_known = name in ("XC", "YC")
+                hint = "compressive strengths are positive on this card" if is_known else ""
+                message = f"The strength {name} is {value:g}; it must be positive."
+                yield Report(message, one.place(name), hint)
 
 
 @rule(
@@ -72,13 +75,14 @@ def invalid_strength(card: model.Allowables) -> Reports:
 )
 def invalid_constant_of_criterion(card: model.Allowables) -> Reports:
     """Find constants that the criteria of Tsai-Wu and Puck don't allow."""
-    for name, value in (("p+", card.p_plus), ("p-", card.p_minus)):
-        if not 0.0 < value < 1.0:
-            message = f"Puck's slope {name} is {value:g}; it must be between 0 and 1."
-            yield Report(message, card.place(), "a blank takes 0.35 for p+ and 0.3 for p-")
-    if not abs(card.f12) < 1.0:
-        message = f"F12* is {card.f12:g}; it must be between -1 and 1."
-        yield Report(message, card.place(), "a blank takes -0.5")
+    for one in (card, *card.others):
+        for name, value in (("p+", one.p_plus), ("p-", one.p_minus)):
+            if not 0.0 < value < 1.0:
+                message = f"Puck's slope {name} is {value:g}; it must be between 0 and 1."
+                yield Report(message, one.place(), "a blank takes 0.35 for p+ and 0.3 for p-")
+        if not abs(one.f12) < 1.0:
+            message = f"F12* is {one.f12:g}; it must be between -1 and 1."
+            yield Report(message, one.place(), "a blank takes -0.5")
 
 
 @rule(
@@ -147,9 +151,21 @@ def twisted_threshold(problem: Problem) -> Reports:
 )
 def strengths_in_another_unit(problem: Problem) -> Reports:
     """Find strengths that no material of these moduli has."""
-    card, names = problem.deck.last(model.Allowables), unit_names(problem.deck)
-    ply = problem.deck.require(model.Material).ply
-    if card is None or not has_real_moduli(ply, names):  # otherwise W435 says so
+    for card, ply in _strengths(problem):
+        yield from _strengths_in_another_unit(card, ply, unit_names(problem.deck))
+
+
+def _strengths(problem: Problem) -> list[tuple[model.Allowables, model.Ply]]:
+    """Strengths and constants of the materials that have both."""
+    card, plies = problem.deck.last(model.Allowables), problem.deck.plies
+    given = () if card is None else (card, *card.others)
+    return [(one, plies[one.material]) for one in given if one.material in plies]
+
+
+def _strengths_in_another_unit(
+    card: model.Allowables, ply: model.Ply, names: dict[str, str]
+) -> Reports:
+    if not has_real_moduli(ply, names):  # W435 says so
         return
     own = in_si(MODULUS, names)
     guessed = likely_unit(ply.e1, MODULUS, USUAL_MODULUS) if own is None else ""
@@ -187,9 +203,11 @@ def strengths_in_another_unit(problem: Problem) -> Reports:
 )
 def strengths_in_another_order(problem: Problem) -> Reports:
     """Find strengths of a fibrous ply that are not in the order of the card."""
-    card, ply = problem.deck.last(model.Allowables), problem.deck.require(model.Material).ply
-    if card is None:
-        return
+    for card, ply in _strengths(problem):
+        yield from _strengths_in_another_order(card, ply)
+
+
+def _strengths_in_another_order(card: model.Allowables, ply: model.Ply) -> Reports:
     given = card.xt, card.xc, card.yt, card.yc
     faults = _faults(*given)
     if ply.e1 <= FIBROUS * ply.e2 or not faults or max(given) > ENDLESS * ply.e1:
@@ -258,7 +276,7 @@ def doubtful_toughness(problem: Problem) -> Reports:
 def too_many_delaminations(problem: Problem) -> Reports:
     """Find more delaminations than the laminate has room for."""
     card = problem.deck.last(model.Delamination)
-    plies = len(problem.deck.require(model.Material).layers)
+    plies = len(problem.laminate.plies.angles)
     if card is not None and card.number > max(1, plies - 1):
         interfaces = f"{plies} layers have {plies - 1} interfaces"
         message = f"DELA has {card.number:g} delaminations, but {interfaces}."
@@ -324,13 +342,19 @@ def few_evaluations(problem: Problem) -> Reports:
 )
 def preload_beyond_strength(problem: Problem) -> Reports:
     """Find a preload whose stresses reach the strength of a ply."""
-    strengths, card = problem.deck.last(model.Allowables), problem.deck.last(model.Preload)
-    if strengths is None or card is None:
+    card = problem.deck.last(model.Preload)
+    if not problem.deck.has(model.Allowables) or card is None:
         return
-    stresses = uniform_stresses(problem.laminate, problem.plate.preload_strain)
-    exposures = largest_in_plies(strengths, stresses)
-    worst = max(exposures, key=lambda one: one.exposure)
-    if worst.exposure >= 1.0:
+    strengths, strain = strengths_of_deck(problem.deck), problem.plate.preload_strain
+    exposures = [
+        one
+        for number in problem.used_laminates
+        for one in largest_in_plies(
+            strengths[number], uniform_stresses(problem.plate.laminates[number], strain)
+        )
+    ]
+    worst = max(exposures, key=lambda one: one.exposure, default=None)
+    if worst is not None and worst.exposure >= 1.0:
         what = f"{worst.mode}, {spelt(worst.criterion)}, ply {worst.ply}"
         message = f"The preload alone reaches exposure {worst.exposure:.3g} ({what})."
         yield Report(message, card.place(), "PREL is a force per length, tension positive")

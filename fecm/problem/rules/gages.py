@@ -70,7 +70,7 @@ def gage_off_the_plate(problem: Problem) -> Reports:
 )
 def gage_outside_laminate(problem: Problem) -> Reports:
     """Find gages above or below the faces."""
-    half = problem.deck.require(model.Material).integration.thickness / 2.0
+    half = max(one.thickness for one in problem.plate.laminates) / 2.0
     for record in problem.deck.require(model.Gages).records:
         if abs(record.z) > half * (1.0 + 1e-9):
             what = f"Gage {record.number} at z = {record.z:g} is outside the laminate"

@@ -59,9 +59,19 @@ def unknown_stress_points(material: model.Material) -> Reports:
         yield Report(message, card.place("stress-point order K"))
 
 
-def _invalid_constants(material: model.Material) -> list[tuple[str, float]]:
-    """Name and value of the ply's constants that must be positive and are not."""
-    ply = material.ply
+Plies = model.Material | model.Materials
+Layers = model.Material | model.NumberedLaminate
+
+
+def _plies_of(segment: Plies) -> list[model.Ply]:
+    """Materials of a segment."""
+    if isinstance(segment, model.Material):
+        return [segment.ply]
+    return [one.ply for one in segment.plies]
+
+
+def _invalid_constants(ply: model.Ply) -> list[tuple[str, float]]:
+    """Name and value of a ply's constants that must be positive and are not."""
     named = zip((field.name for field in ply.fields), map(float, ply.row()), strict=True)
     return [(name, value) for name, value in named if value <= 0.0 and name != POISSONS_RATIO]
 
@@ -70,12 +80,13 @@ def _invalid_constants(material: model.Material) -> list[tuple[str, float]]:
     "E403",
     Subject.LAMINATE,
     "A constant of the ply is not positive.",
-    remedy="Correct MATE.",
+    remedy="Correct MATE or MATS.",
 )
-def invalid_constant(material: model.Material) -> Reports:
+def invalid_constant(segment: Plies) -> Reports:
     """Find density and moduli that are not positive."""
-    for name, value in _invalid_constants(material):
-        yield Report(f"The {name} is {value:g}; it must be positive.", material.ply.place(name))
+    for ply in _plies_of(segment):
+        for name, value in _invalid_constants(ply):
+            yield Report(f"The {name} is {value:g}; it must be positive.", ply.place(name))
 
 
 @rule(
@@ -84,14 +95,14 @@ def invalid_constant(material: model.Material) -> Reports:
     "NU12² is not below E1/E2.",
     remedy="NU12 of fibre composites is 0.2 to 0.4.",
 )
-def impossible_poissons_ratio(material: model.Material) -> Reports:
+def impossible_poissons_ratio(segment: Plies) -> Reports:
     """Find a ratio under which the ply's stiffness is not positive definite."""
-    ply = material.ply
-    # The square of nu12 against E1/E2, written so that no number overflows.
-    if not _invalid_constants(material) and abs(ply.nu12) >= (ply.e1 / ply.e2) ** 0.5:
-        why = f"its square must stay below E1/E2 = {ply.e1 / ply.e2:g}"
-        message = f"Poisson's ratio NU12 = {ply.nu12:g} is too large: {why}."
-        yield Report(message, ply.place(POISSONS_RATIO))
+    for ply in _plies_of(segment):
+        # The square of nu12 against E1/E2, written so that no number overflows.
+        if not _invalid_constants(ply) and abs(ply.nu12) >= (ply.e1 / ply.e2) ** 0.5:
+            why = f"its square must stay below E1/E2 = {ply.e1 / ply.e2:g}"
+            message = f"Poisson's ratio NU12 = {ply.nu12:g} is too large: {why}."
+            yield Report(message, ply.place(POISSONS_RATIO))
 
 
 @rule(
@@ -100,9 +111,9 @@ def impossible_poissons_ratio(material: model.Material) -> Reports:
     "The thickness of a layer is not positive.",
     remedy="Correct the layer.",
 )
-def invalid_layer_thickness(material: model.Material) -> Reports:
+def invalid_layer_thickness(laminate: Layers) -> Reports:
     """Find layers without a thickness."""
-    for position, layer in enumerate(material.layers, start=1):
+    for position, layer in enumerate(laminate.layers, start=1):
         if layer.thickness <= 0.0:
             what = f"Layer {position} has the thickness {layer.thickness:g}"
             yield Report(f"{what}; it must be positive.", layer.place("layer thickness"))
@@ -114,9 +125,9 @@ def invalid_layer_thickness(material: model.Material) -> Reports:
     "The number of a layer differs from its position.",
     remedy="Layers are stacked in the order of their cards.",
 )
-def layer_out_of_order(material: model.Material) -> Reports:
+def layer_out_of_order(laminate: Layers) -> Reports:
     """Find layers whose numbers have no effect."""
-    for position, layer in enumerate(material.layers, start=1):
+    for position, layer in enumerate(laminate.layers, start=1):
         if layer.number != position:
             why = "layers are stacked in the order of their cards, whatever their numbers"
             message = f"Layer {position} has the number {layer.number}: {why}."
@@ -163,11 +174,11 @@ def layers_do_not_add_up(material: model.Material) -> Reports:
 )
 def moduli_exchanged(problem: Problem) -> Reports:
     """Find a ply that is stiffer across its fibres."""
-    ply = problem.deck.require(model.Material).ply
-    if ply.e1 / ply.e2 < LOWEST_RATIO:
-        why = "E1 is the modulus along the fibres"
-        message = f"E1 = {ply.e1:g} is less than half of E2 = {ply.e2:g}: {why}."
-        yield Report(message, ply.place("Young's modulus E1"))
+    for ply in problem.deck.plies.values():
+        if ply.e1 / ply.e2 < LOWEST_RATIO:
+            why = "E1 is the modulus along the fibres"
+            message = f"E1 = {ply.e1:g} is less than half of E2 = {ply.e2:g}: {why}."
+            yield Report(message, ply.place("Young's modulus E1"))
 
 
 @rule(
@@ -178,16 +189,16 @@ def moduli_exchanged(problem: Problem) -> Reports:
 )
 def doubtful_poissons_ratio(problem: Problem) -> Reports:
     """Find a ratio that no ply has, or that is the other one."""
-    ply = problem.deck.require(model.Material).ply
-    ratio, nu, place = ply.e1 / ply.e2, ply.nu12, ply.place(POISSONS_RATIO)
-    if abs(nu) > 1.0:
-        message = f"Poisson's ratio NU12 = {nu:g} is beyond 1: no ply has such a value."
-        yield Report(message, place, "NU12 of fibre composites is 0.2 to 0.4")
-    elif 0.0 < nu < 0.1 and ratio > 3.0 and 0.2 <= nu * ratio <= 0.45:
-        why = f"NU12 would be NU21 E1/E2 = {nu * ratio:.3g}"
-        message = f"Poisson's ratio NU12 = {nu:g} looks like NU21: {why}."
-        hint = "NU12 is the contraction across the fibres under a stress along them"
-        yield Report(message, place, hint)
+    for ply in problem.deck.plies.values():
+        ratio, nu, place = ply.e1 / ply.e2, ply.nu12, ply.place(POISSONS_RATIO)
+        if abs(nu) > 1.0:
+            message = f"Poisson's ratio NU12 = {nu:g} is beyond 1: no ply has such a value."
+            yield Report(message, place, "NU12 of fibre composites is 0.2 to 0.4")
+        elif 0.0 < nu < 0.1 and ratio > 3.0 and 0.2 <= nu * ratio <= 0.45:
+            why = f"NU12 would be NU21 E1/E2 = {nu * ratio:.3g}"
+            message = f"Poisson's ratio NU12 = {nu:g} looks like NU21: {why}."
+            hint = "NU12 is the contraction across the fibres under a stress along them"
+            yield Report(message, place, hint)
 
 
 @rule(
@@ -198,7 +209,7 @@ def doubtful_poissons_ratio(problem: Problem) -> Reports:
 )
 def large_angle(problem: Problem) -> Reports:
     """Find angles of more than half a turn."""
-    for layer in problem.deck.require(model.Material).layers:
+    for layer in _all_layers(problem):
         if abs(layer.angle) > LARGEST_ANGLE:
             message = f"The fibre angle {layer.angle:g} is beyond {LARGEST_ANGLE:g} degrees."
             hint = "angles are in degrees, counter-clockwise from the x-axis"
@@ -213,13 +224,17 @@ def large_angle(problem: Problem) -> Reports:
 )
 def angles_in_radians(problem: Problem) -> Reports:
     """Find angles that look like radians."""
-    layers = problem.deck.require(model.Material).layers
-    turned = [layer for layer in layers if layer.angle]
+    turned = [layer for layer in _all_layers(problem) if layer.angle]
     if turned and are_like_radians([layer.angle for layer in turned]):
         known = dict.fromkeys(layer.angle for layer in turned[:SHOWN_ANGLES])
         shown = ", ".join(f"{angle:g} is {math.degrees(angle):.0f} degrees" for angle in known)
         message = f"The fibre angles look like radians: {shown}."
         yield Report(message, turned[0].place("fibre angle"), "angles are in degrees")
+
+
+def _all_layers(problem: Problem) -> list[model.Layer]:
+    """Layers of all laminates."""
+    return [layer for layers in problem.deck.layers.values() for layer in layers]
 
 
 def are_like_radians(angles: Sequence[float]) -> bool:
@@ -231,13 +246,18 @@ def are_like_radians(angles: Sequence[float]) -> bool:
 
 
 def _is_too_thin(problem: Problem) -> bool:
-    thickness = problem.deck.require(model.Material).integration.thickness
-    return thickness < THINNEST * problem.longer_side
+    return _thickest(problem) < THINNEST * problem.longer_side
+
+
+def _thickest(problem: Problem) -> float:
+    """Thickness of the plate, the largest of several."""
+    laminates = problem.plate.laminates
+    return max(laminates[number].thickness for number in problem.used_laminates)
 
 
 def _thick_plate(problem: Problem) -> tuple[float, str]:
     """Thickness over the distance between supports, and the beginning of a sentence about it."""
-    thickness = problem.deck.require(model.Material).integration.thickness
+    thickness = _thickest(problem)
     span = problem.span
     share = thickness / span.length
     return share, f"thickness {thickness:g} is {share:.2g} of the {span.name} {span.length:.4g}"
@@ -256,7 +276,7 @@ def _thick_plate(problem: Problem) -> tuple[float, str]:
 def impossible_thickness(problem: Problem) -> Reports:
     """Find thicknesses for which there is no plate theory."""
     card, side = problem.deck.require(model.Material).integration, problem.longer_side
-    thickness, place = card.thickness, card.place("total thickness")
+    thickness, place = _thickest(problem), card.place("total thickness")
     hint = "thickness and coordinates must be in the same unit of length"
     if _is_too_thin(problem):
         of_side = f"{thickness / side:.2g} of the plate's longer side {side:g}"
@@ -297,6 +317,8 @@ OF_MATERIAL = (
     invalid_thickness,
     layers_do_not_add_up,
 )
+OF_MATERIALS = (invalid_constant, impossible_poissons_ratio)
+OF_LAYERS = (invalid_layer_thickness, layer_out_of_order)
 VALUES = (
     moduli_exchanged,
     doubtful_poissons_ratio,

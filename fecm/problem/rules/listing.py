@@ -21,6 +21,9 @@ LATER_SEGMENTS = (
     model.Nonlinear,
     model.Preload,
     model.Cure,
+    model.Materials,
+    model.Laminates,
+    model.Zones,
 )
 
 
@@ -67,7 +70,8 @@ def too_many_layers(problem: Problem) -> Reports:
     Subject.LISTING,
     "The deck has a word that the printed program does not have.",
     cause=(
-        "These are PATC, PLYS, FAIL, ALLO, DELA, DAMP, NONL, PREL, CURE, SHEA MITC and SHEA EQUI."
+        "These are PATC, PLYS, FAIL, ALLO, DELA, DAMP, NONL, PREL, CURE, MATS, LAMS, ZONE, "
+        "SHEA MITC and SHEA EQUI."
     ),
     remedy=REMEDY,
 )

@@ -248,7 +248,7 @@ def too_few_supports(problem: Problem) -> Reports:
 )
 def held_plane_of_coupled_laminate(problem: Problem) -> Reports:
     """Find in-plane restraints at every node of a laminate whose B is not zero."""
-    if holds_the_plane(problem.mesh.codes) and problem.laminate.is_coupled:
+    if holds_the_plane(problem.mesh.codes) and problem.plate.is_coupled:
         boundary = problem.deck.last(model.Boundary)
         why = "the plate is stiffer than its laminate"
         message = f"B is not zero, and u and v are restrained at every node: {why}."

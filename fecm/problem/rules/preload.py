@@ -7,6 +7,7 @@ import numpy as np
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import in_si, unit_names
+from fecm.mechanics.laminate import ROUNDING
 from fecm.problem.problem import Problem
 
 FORCE = "force/length"
@@ -36,7 +37,7 @@ def no_preload(card: model.Preload) -> Reports:
 def preload_of_coupled_laminate(problem: Problem) -> Reports:
     """Find a preload that would bend the plate."""
     card = problem.deck.last(model.Preload)
-    if card is not None and any(card.forces) and problem.laminate.is_coupled:
+    if card is not None and any(card.forces) and problem.plate.is_coupled:
         message = "B is not zero: the plate bends under the force of PREL, and is not flat."
         hint = "preload it by a static solution before the impact, with NONL: FORC, TANG to CONV"
         yield Report(message, card.place(), hint)
@@ -62,6 +63,25 @@ def large_preload(problem: Problem) -> Reports:
         yield Report(message, card.place(), hint)
 
 
+@rule(
+    "E499",
+    Subject.LAMINATE,
+    "PREL is with laminates of different stiffness.",
+    cause="Their strains under the same force differ: the forces in such a plate are not uniform.",
+    remedy="A static solution under that force before the impact, with `NONL`.",
+)
+def preload_of_unlike_laminates(problem: Problem) -> Reports:
+    """Find a preload whose strains would not fit together."""
+    card = problem.deck.last(model.Preload)
+    if card is None or not any(card.forces):
+        return
+    first, *others = (problem.plate.laminates[n].A for n in problem.used_laminates)
+    if any(np.abs(A - first).max() > ROUNDING * np.abs(first).max() for A in others):
+        message = "The laminates differ in A: a force in the plane is not uniform, as PREL says."
+        hint = "preload it by a static solution before the impact, with NONL: FORC, TANG to CONV"
+        yield Report(message, card.place(), hint)
+
+
 ALONE = (no_preload,)
-OF_PRELOAD = (preload_of_coupled_laminate,)
+OF_PRELOAD = (preload_of_coupled_laminate, preload_of_unlike_laminates)
 VALUES = (large_preload,)

@@ -139,7 +139,7 @@ def rod_out_of_range(card: model.Projectile, diameters: Floats) -> Reports:
 def doubtful_mass(problem: Problem) -> Reports:
     """Find masses in another unit."""
     deck, plate, projectile = problem.deck, problem.plate, build_projectile(problem.deck)
-    ratio = projectile.total_mass / (plate.area() * plate.laminate.mass)
+    ratio = projectile.total_mass / plate.total_mass()
     if LIGHTEST <= ratio <= HEAVIEST:
         return
     mass, names = projectile.total_mass, unit_names(deck)

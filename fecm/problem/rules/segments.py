@@ -23,6 +23,9 @@ SINGLE: Kinds = (
     model.Nonlinear,
     model.Preload,
     model.Cure,
+    model.Materials,
+    model.Laminates,
+    model.Zones,
 )
 
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 from fecm.deck import model
 from fecm.deck.findings import Place
+from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Ply, Record
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import (
@@ -172,8 +173,11 @@ def unreal_values(problem: Problem) -> Reports:
 def _judged(problem: Problem) -> list[tuple[str, Record, str, float]]:
     """Kind in :data:`REAL`, card, name and value of the fields that are judged."""
     deck = problem.deck
-    material = deck.require(model.Material)
-    ply, layer = material.ply, max(material.layers, key=lambda layer: layer.thickness)
+    ply = deck.require(model.Material).ply
+    layers = [layer for own in deck.layers.values() for layer in own]
+    # Other materials may be cores, which are thicker than plies and softer than any matrix.
+    plies = [layer for layer in layers if layer.material == MATERIAL] or layers
+    thickest = max(plies, key=lambda layer: layer.thickness)
     values: list[tuple[str, Record, str, float]] = [
         ("density", ply, "mass density", ply.density),
         ("fibre modulus", ply, "Young's modulus E1", ply.e1),
@@ -181,7 +185,7 @@ def _judged(problem: Problem) -> list[tuple[str, Record, str, float]]:
         ("matrix modulus", ply, "shear modulus G12", ply.g12),
         ("matrix modulus", ply, "shear modulus G13", ply.g13),
         ("matrix modulus", ply, "shear modulus G23", ply.g23),
-        ("ply thickness", layer, "layer thickness", layer.thickness),
+        ("ply thickness", thickest, "layer thickness", thickest.thickness),
     ]
     if not problem.has_impact:
         return values

@@ -1,0 +1,145 @@
+"""Cards of plates of several materials and laminates (not in the report's program)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import ClassVar, Self
+
+from fecm._frozen import frozen
+from fecm.deck.card import Card, Fields, Source, layout
+from fecm.deck.material_cards import Layer, Ply, read_layers
+from fecm.deck.record import Control, Record
+from fecm.deck.segment import NumberedSegment, Segment
+from fecm.deck.stream import CardStream
+
+
+@frozen
+class MaterialNumber(Record):
+    """First card of a material of MATS: (I5)."""
+
+    number: int
+
+    fields: ClassVar[Fields] = layout("I5 material|mat")
+
+
+@frozen
+class NumberedPly:
+    """A material of MATS."""
+
+    head: MaterialNumber
+    ply: Ply
+
+    @property
+    def number(self) -> int:
+        """Number of the material."""
+        return self.head.number
+
+
+@frozen
+class Materials(Segment, keyword="MATS"):
+    """MATS: materials beside that of MATE, a pair of cards each: (I5) and (7F10.0)."""
+
+    plies: tuple[NumberedPly, ...]
+
+    @classmethod
+    def read(cls, head: Card, cards: CardStream) -> Self | None:
+        """Read the pairs of cards up to a blank one."""
+        found: list[NumberedPly] = []
+        while (card := cards.take_data()) is not None and not card.is_blank:
+            number = cards.record(card, MaterialNumber)
+            ply = cards.single(head, Ply)
+            if number is None or ply is None:
+                cards.unsound.add(head.keyword)
+            else:
+                found.append(NumberedPly(number, ply))
+        cards.end(head, card)
+        return cls(tuple(found), source=Source(head))
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards."""
+        yield self.keyword
+        for one in self.plies:
+            yield one.head.to_card()
+            yield one.ply.to_card()
+        yield ""
+
+
+@frozen
+class LaminateNumber(Record):
+    """First card of a laminate of LAMS: (2I5)."""
+
+    number: int
+    layers: int  # number of its layer cards
+
+    fields: ClassVar[Fields] = layout("I5 laminate|lam", "I5 layers|lays")
+
+
+@frozen
+class NumberedLaminate:
+    """A laminate of LAMS, the first layer at z = -h/2."""
+
+    head: LaminateNumber
+    layers: tuple[Layer, ...]
+
+    @property
+    def number(self) -> int:
+        """Number of the laminate."""
+        return self.head.number
+
+
+@frozen
+class Laminates(Segment, keyword="LAMS"):
+    """LAMS: laminates beside that of MATE, (2I5) and the layer cards of each."""
+
+    laminates: tuple[NumberedLaminate, ...]
+
+    @classmethod
+    def read(cls, head: Card, cards: CardStream) -> Self | None:
+        """Read the laminates up to a blank card."""
+        found: list[NumberedLaminate] = []
+        while (card := cards.take_data()) is not None and not card.is_blank:
+            number = cards.record(card, LaminateNumber)
+            layers = None
+            if number is not None:
+                said = f"laminate {number.number} says"
+                layers = read_layers(head, cards, max(0, number.layers), said)
+            if number is None or layers is None:
+                cards.unsound.add(head.keyword)
+                cards.skip_data()  # where the next laminate begins is not known
+                return None
+            found.append(NumberedLaminate(number, layers))
+        cards.end(head, card)
+        return cls(tuple(found), source=Source(head))
+
+    def cards(self, control: Control) -> Iterator[str]:
+        """Text of the segment's cards."""
+        yield self.keyword
+        for one in self.laminates:
+            yield one.head.to_card()
+            for layer in one.layers:
+                yield layer.to_card()
+        yield ""
+
+
+@frozen
+class Zone(Record):
+    """A card of ZONE: (4I5); elements and their laminate."""
+
+    first: int
+    last: int  # as first if 0
+    step: int  # 1 if 0
+    laminate: int
+
+    fields: ClassVar[Fields] = layout(
+        "I5 first element|from", "I5 last element|to", "I5 step|step", "I5 laminate|lam"
+    )
+
+    @property
+    def elements(self) -> range:
+        """Numbers of its elements."""
+        return range(self.first, max(self.last, self.first) + 1, self.step or 1)
+
+
+@frozen
+class Zones(NumberedSegment[Zone], keyword="ZONE", record=Zone):
+    """ZONE: laminates of elements; those without a zone have that of MATE."""

@@ -1,0 +1,231 @@
+"""Rules about plates of several materials and laminates: MATS, LAMS, ZONE."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from fecm.deck import model
+from fecm.deck.macros import flat
+from fecm.deck.material_cards import MATERIAL
+from fecm.deck.record import Record
+from fecm.deck.rules import Report, Reports, Subject, reports, rule
+from fecm.mechanics.laminate import Laminate
+from fecm.problem.problem import Problem
+from fecm.problem.rules.cure import FIELDS
+
+LARGEST_COUPLING = 0.02  # of I1 over I0 h, from which on it is told
+# Segments whose unreadable cards would be missing materials and laminates.
+KEYWORDS = {kind.keyword for kind in (model.Material, model.Materials, model.Laminates)}
+SOFT_CORE = 1.0 / 50.0  # G13 of a core over that of the faces
+
+
+def _materials(deck: model.Deck) -> tuple[model.NumberedPly, ...]:
+    card = deck.last(model.Materials)
+    return () if card is None else card.plies
+
+
+def _laminates(deck: model.Deck) -> tuple[model.NumberedLaminate, ...]:
+    card = deck.last(model.Laminates)
+    return () if card is None else card.laminates
+
+
+def _numbers(deck: model.Deck) -> set[int]:
+    """Numbers of the materials."""
+    return {MATERIAL, *(one.number for one in _materials(deck))}
+
+
+@rule(
+    "E496",
+    Subject.LAMINATE,
+    "A number on MATS or LAMS is below 2, or taken.",
+    cause="Number 1 is the material, and the laminate, of MATE.",
+    remedy="A number from 2 for each.",
+)
+def number_taken(deck: model.Deck) -> Reports:
+    """Find materials and laminates whose numbers are not their own."""
+    heads = (("material", _materials(deck)), ("laminate", _laminates(deck)))
+    for kind, numbered in heads:
+        seen: set[int] = set()
+        for one in numbered:
+            if one.number <= MATERIAL or one.number in seen:
+                why = "taken" if one.number in seen else "that of MATE or less"
+                message = f"The number {one.number} of a {kind} is {why}."
+                yield Report(message, one.head.place(kind), f"a {kind} has a number from 2")
+            seen.add(one.number)
+
+
+def _in_layers(deck: model.Deck) -> Iterator[model.Layer]:
+    """Layers of all laminates, with or without a zone."""
+    material = deck.last(model.Material)
+    yield from () if material is None else material.layers
+    for laminate in _laminates(deck):
+        yield from laminate.layers
+
+
+@rule(
+    "E497",
+    Subject.LAMINATE,
+    "A card has a material that the deck does not have, or a laminate no layers.",
+    cause="Materials are that of MATE, number 1, and those of MATS.",
+    remedy="The material's cards on MATS, or another number.",
+)
+def missing_material(deck: model.Deck) -> Reports:
+    """Find layers and strengths of unknown materials."""
+    known = _numbers(deck)
+    strengths = deck.last(model.Allowables)
+    given: list[tuple[int, Record]] = [(layer.material, layer) for layer in _in_layers(deck)]
+    if strengths is not None:
+        given += [(one.material, one) for one in (strengths, *strengths.others)]
+    for number, record in given:
+        if number not in known:
+            numbers = ", ".join(map(str, sorted(known)))
+            message = f"The deck has no material {number}."
+            yield Report(message, record.place("material"), f"its materials are {numbers}")
+    for laminate in _laminates(deck):
+        if not laminate.layers:
+            message = f"Laminate {laminate.number} has no layers."
+            yield Report(message, laminate.head.place("layers"))
+
+
+@rule(
+    "E498",
+    Subject.LAMINATE,
+    "A zone has an element or a laminate that the deck does not have.",
+    remedy="Elements up to NUMEL; laminate 1 is that of MATE, the others are those of LAMS.",
+)
+def invalid_zone(deck: model.Deck) -> Reports:
+    """Find zones outside the plate, and without a laminate."""
+    card, count = deck.last(model.Zones), deck.control.numel
+    known = {MATERIAL, *(one.number for one in _laminates(deck))}
+    for zone in () if card is None else card.records:
+        last = zone.last or zone.first
+        for number, name in ((zone.first, "first element"), (last, "last element")):
+            if not 1 <= number <= count:
+                message = f"A zone has element {number}; the deck has elements 1 to {count}."
+                yield Report(message, zone.place(name))
+        if last < zone.first or zone.step < 0:
+            message = f"A zone from element {zone.first} to {last} by {zone.step} is empty."
+            yield Report(message, zone.place("last element"), "a blank step is 1")
+        if zone.laminate not in known:
+            numbers = ", ".join(map(str, sorted(known)))
+            message = f"The deck has no laminate {zone.laminate}."
+            yield Report(message, zone.place("laminate"), f"its laminates are {numbers}")
+
+
+@reports("E453")
+def missing_expansions(deck: model.Deck) -> Reports:
+    """Find materials of layers without coefficients of expansion, and unknown ones with them."""
+    if (card := deck.last(model.Cure)) is None or not deck.has(model.Material):
+        return
+    known = _numbers(deck)
+    for one in card.expansions:
+        if one.material not in known:
+            only = ", ".join(map(str, sorted(known)))
+            message = f"The deck has no material {one.material}, only {only}."
+            yield Report(message, one.place("material"), FIELDS)
+    used = {layer.material for layers in deck.layers.values() for layer in layers}
+    for number in sorted(used - {MATERIAL, *(one.material for one in card.expansions)}):
+        yield Report(f"CURE has no card of material {number}.", card.place(), FIELDS)
+
+
+@rule(
+    "W496",
+    Subject.LAMINATE,
+    "A material or a laminate of the deck is not used.",
+    cause="No layer has the material, or no zone the laminate.",
+    remedy="Material in columns 21-25 of a layer; ZONE; or remove the cards.",
+)
+def unused(problem: Problem) -> Reports:
+    """Find materials and laminates without effect."""
+    deck = problem.deck
+    in_layers = {layer.material for layers in deck.layers.values() for layer in layers}
+    for one in _materials(deck):
+        if one.number not in in_layers:
+            message = f"No layer of the plate has material {one.number}."
+            yield Report(message, one.head.place(), "a layer's material is in columns 21-25")
+    used = [number for n, number in enumerate(deck.layers) if n in problem.used_laminates]
+    for laminate in _laminates(deck):
+        if laminate.number not in used:
+            message = f"No element has laminate {laminate.number}."
+            yield Report(message, laminate.head.place(), "ZONE gives elements their laminates")
+
+
+def _used(problem: Problem) -> list[tuple[int, Laminate]]:
+    """Numbers and laminates of the elements."""
+    numbers, laminates = list(problem.deck.layers), problem.plate.laminates
+    return [(numbers[n], laminates[n]) for n in problem.used_laminates]
+
+
+@rule(
+    "W497",
+    Subject.LAMINATE,
+    "The mass of the laminate is not symmetric about its middle.",
+    cause="Its first moment I1 is above 0.02 of its mass times the thickness, and is left out.",
+    remedy="Accept it: the lowest frequencies change far less. Or a symmetric laminate.",
+)
+def coupled_inertia(problem: Problem) -> Reports:
+    """Find laminates whose inertia couples stretching and bending."""
+    for number, laminate in _used(problem):
+        share = abs(laminate.coupling_inertia) / (laminate.mass * laminate.thickness)
+        if share > LARGEST_COUPLING:
+            message = f"I1 of laminate {number} is {share:.2g} I0 h: it is left out."
+            hint = "I1 = 0.027 I0 h changes the lowest frequency of an example by 7E-6"
+            yield Report(message, problem.deck.require(model.Material).place(), hint)
+
+
+@rule(
+    "W466",
+    Subject.POINTS,
+    "A core is far softer in shear than the faces, and SHEA is without EQUI.",
+    cause=(
+        "G13 of a ply is below 1/50 of the largest. The sum of the plies' shear stiffnesses is "
+        "then several times too large."
+    ),
+    remedy="`SHEA EQUI`.",
+)
+def soft_core(problem: Problem) -> Reports:
+    """Find sandwich plates that are too stiff in shear."""
+    deck = problem.deck
+    shear = deck.last(model.Shear) or model.Shear()
+    if shear.equilibrium or shear.factor != 1.0:
+        return
+    for number, laminate in _used(problem):
+        moduli = [ply.g13 for ply in laminate.plies.constants]
+        if min(moduli) < SOFT_CORE * max(moduli):
+            ratio = max(moduli) / min(moduli)
+            message = (
+                f"Laminate {number} has a core whose G13 is {ratio:.3g} times below that of the "
+                "faces: the plate is too stiff in shear."
+            )
+            place = deck.require(model.Material).place()
+            yield Report(message, shear.place() or place, "use SHEA EQUI")
+
+
+@rule(
+    "W498",
+    Subject.DAMAGE,
+    "FAIL has no strengths of some layers.",
+    cause="Their exposures are not known (NaN), nor are those of the interfaces beside them.",
+    remedy="A pair of cards on ALLO for their material.",
+)
+def layers_without_strengths(problem: Problem) -> Reports:
+    """Find materials of layers that ALLO does not have."""
+    deck, card = problem.deck, problem.deck.last(model.Allowables)
+    if card is None or all(macro.word != "FAIL" for macro in flat(problem.program)):
+        return
+    for (number, layers), n in zip(deck.layers.items(), range(len(deck.layers)), strict=True):
+        if n not in problem.used_laminates:
+            continue
+        missing = [i for i, one in enumerate(layers, start=1) if card.of(one.material) is None]
+        if missing:
+            materials = sorted({layers[i - 1].material for i in missing})
+            named = "layer" if len(missing) == 1 else "layers"
+            listed = ", ".join(map(str, missing))
+            of = " and ".join(map(str, materials))
+            message = f"ALLO has no strengths of {named} {listed} of laminate {number}, material {of}."
+            yield Report(message, card.place(), "their exposures are NaN")
+
+
+OF_DECK = (number_taken, missing_material, invalid_zone)
+OF_CURE = (missing_expansions,)
+VALUES = (unused, coupled_inertia, soft_core, layers_without_strengths)
