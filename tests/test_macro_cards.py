@@ -231,7 +231,9 @@ def test_a_new_deck_has_a_time_step_that_a_person_can_read() -> None:
         Materials(()),
         Laminates(
             (
-                NumberedLaminate(LaminateNumber(2, 2), (Layer(1, 30.0, 0.1), Layer(2, 0.0, 0.1, 2))),
+                NumberedLaminate(
+                    LaminateNumber(2, 2), (Layer(1, 30.0, 0.1), Layer(2, 0.0, 0.1, 2))
+                ),
                 NumberedLaminate(LaminateNumber(3, 1), (Layer(1, 1 / 3, 0.1, 12),)),
             )
         ),

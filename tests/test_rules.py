@@ -299,7 +299,7 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "W466": lambda: small(
         data=MATS + DATA_CARDS.replace("    2  90.     0.053", "    2  90.     0.053    2")
     ),
-    "W496": more(MATS),
+    "W500": more(MATS),
     "W497": lambda: small(
         data=MATS + DATA_CARDS.replace("    2  90.     0.053", "    2  90.     0.053    2")
     ),

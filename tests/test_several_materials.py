@@ -188,7 +188,10 @@ def test_inertia_is_the_integral_of_the_density_by_layer() -> None:
 def test_residual_stresses_of_a_fibre_metal_laminate_are_those_of_the_least_energy() -> None:
     rows = table("thermal_several_materials.csv")
     shear = 72.4e9 / 2.66
-    metal, glass = Ply(2.7e3, 0.33, 72.4e9, 72.4e9, shear, shear, shear), MATERIALS["Scotchply-1002"].ply
+    metal, glass = (
+        Ply(2.7e3, 0.33, 72.4e9, 72.4e9, shear, shear, shear),
+        MATERIALS["Scotchply-1002"].ply,
+    )
     of_glass = MATERIALS["Scotchply-1002"].expansion
     assert of_glass is not None
     z = [float(row["z_m"]) for row in rows]
@@ -318,7 +321,9 @@ SOLVERS = [
 ]
 
 
-def assert_same(found: Result, wanted: Result, tolerance: float, less: Collection[str] = ()) -> None:
+def assert_same(
+    found: Result, wanted: Result, tolerance: float, less: Collection[str] = ()
+) -> None:
     """Datasets agree, relative to the largest of their values, and to bytes of exposures' places."""
     for path in wanted:
         if path in less or path.startswith("exposures/") or path.endswith("/mode"):
@@ -383,7 +388,9 @@ def test_stresses_and_exposures_are_those_of_each_elements_own_laminate() -> Non
         replace(problem.deck.require(model.Allowables), xt=1000.0 * n, s13=40.0 * n, others=())
         for n in (1, 2, 3)
     ]
-    of_plies = [[strengths[one.material - 1] for one in own] for own in problem.deck.layers.values()]
+    of_plies = [
+        [strengths[one.material - 1] for one in own] for own in problem.deck.layers.values()
+    ]
     of_plies[1][1] = None
     several = PlyStresses(problem.mesh, plate.rows_by_laminate, rule)
     found = several.evaluate(field)

@@ -119,9 +119,7 @@ class Material(Segment, keyword="MATE"):
             yield record.to_card()
 
 
-def read_layers(
-    head: Card, cards: CardStream, count: int, said: str
-) -> tuple[Layer, ...] | None:
+def read_layers(head: Card, cards: CardStream, count: int, said: str) -> tuple[Layer, ...] | None:
     """Layer cards, as many as `said`; None if one is missing or unreadable."""
     taken: list[Card] = []
     while len(taken) < count and (card := cards.take_data()) is not None and not card.is_blank:

@@ -134,7 +134,12 @@ def puck_limits(ply: Strengths) -> tuple[float, float]:
 
 
 Criterion = Callable[[Strengths, Floats, Floats, Floats], Candidates]
-CRITERIA: dict[str, Criterion] = {"max_stress": max_stress, "tsai_wu": tsai_wu, "hashin": hashin, "puck": puck}
+CRITERIA: dict[str, Criterion] = {
+    "max_stress": max_stress,
+    "tsai_wu": tsai_wu,
+    "hashin": hashin,
+    "puck": puck,
+}
 
 
 class PlyExposure(NamedTuple):

@@ -398,7 +398,9 @@ class ZoneCriteria:
         beside = np.stack([turn[:-1], turn[1:]], axis=1)
         self._shear = np.einsum("ibct,itg->gibc", beside, tau).reshape(12, -1)
         # (interfaces,): the weaker strength of both plies; NaN where one is not known.
-        own = np.array([(np.nan, np.nan) if one is None else (one.s13, one.s23) for one in strengths])
+        own = np.array(
+            [(np.nan, np.nan) if one is None else (one.s13, one.s23) for one in strengths]
+        )
         self._weaker = np.minimum(own[:-1], own[1:])[:, :, None]
 
     def add(self, residual: Floats) -> None:

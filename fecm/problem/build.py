@@ -239,9 +239,7 @@ def _stresses(
     if "PLYS" in words:  # the M elements nearest to the load, or all
         nearest = np.argsort(problem.distances.round(9), kind="stable")
         rows = np.sort(nearest[: int(words["PLYS"].second) or None])
-        plies = PlyStresses(
-            problem.mesh, zones, points, rows, initial, nonlinear=plate.nonlinear
-        )
+        plies = PlyStresses(problem.mesh, zones, points, rows, initial, nonlinear=plate.nonlinear)
     if "FAIL" in words:
         kind = CompiledMonitor if compiled else FailureMonitor
         stresses = PlyStresses(

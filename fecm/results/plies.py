@@ -107,7 +107,9 @@ class PlyGroup(PlyRows):
         material = deck.last(Material)
         count = z.shape[-2]
         if material is None or not _fits(deck, z):
-            raise ResultFileError(f"the result's deck does not have the {count} plies of its stresses")
+            raise ResultFileError(
+                f"the result's deck does not have the {count} plies of its stresses"
+            )
         layups = _layups(stored, deck, numbers[members])
         points = points_of(
             stored,
@@ -171,9 +173,7 @@ def _layups(stored: Stored, deck: Deck, numbers: Array) -> Layup | list[Layup]:
     return [layups[position] for position in _positions(stored, deck, numbers)]
 
 
-def _of_layers(
-    layups: Layup | list[Layup], count: int, value: Callable[[Layer], float]
-) -> Floats:
+def _of_layers(layups: Layup | list[Layup], count: int, value: Callable[[Layer], float]) -> Floats:
     """Values of the layers, (plies,), or of each element, (elements, plies), NaN where none is."""
     if isinstance(layups, tuple):
         return np.array([value(layer) for layer in layups])

@@ -268,9 +268,7 @@ def store_stresses(run: Simulation, n: int) -> None:
     plate, model, points = run.state.plate, run.model.plate, run.model.stress_points
     field = run.displacement_field()
     quadratic = quadratic_strains_at(points, field) if model.nonlinear else None
-    values = strains_and_resultants(
-        points, model.rows_by_laminate, field, model.preload, quadratic
-    )
+    values = strains_and_resultants(points, model.rows_by_laminate, field, model.preload, quadratic)
     run.recorder.row("stresses", plate.step, plate.time, values)
     run.printer.stresses(values, points.places(run.problem.mesh.coordinates), run.state.clock)
 

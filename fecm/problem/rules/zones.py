@@ -129,7 +129,7 @@ def missing_expansions(deck: model.Deck) -> Reports:
 
 
 @rule(
-    "W496",
+    "W500",
     Subject.LAMINATE,
     "A material or a laminate of the deck is not used.",
     cause="No layer has the material, or no zone the laminate.",
@@ -222,7 +222,9 @@ def layers_without_strengths(problem: Problem) -> Reports:
             named = "layer" if len(missing) == 1 else "layers"
             listed = ", ".join(map(str, missing))
             of = " and ".join(map(str, materials))
-            message = f"ALLO has no strengths of {named} {listed} of laminate {number}, material {of}."
+            message = (
+                f"ALLO has no strengths of {named} {listed} of laminate {number}, material {of}."
+            )
             yield Report(message, card.place(), "their exposures are NaN")
 
 
