@@ -205,6 +205,12 @@ def test_a_new_deck_has_a_time_step_that_a_person_can_read() -> None:
 # Cards written and read again --------------------------------------------------------------------
 
 
+STRENGTHS = Allowables(100.0, 90.0, 1 / 3, 30.0, 20.0, 10.0, 15.0, -0.4, 0.3, 0.25, material=2)
+STRENGTHS = replace(
+    STRENGTHS, others=(replace(STRENGTHS, material=1), replace(STRENGTHS, xt=50.0, material=3))
+)
+
+
 @pytest.mark.parametrize(
     "segment",
     [
@@ -238,7 +244,7 @@ def test_a_new_deck_has_a_time_step_that_a_person_can_read() -> None:
             )
         ),
         Zones((Zone(1, 0, 0, 2), Zone(2, 4, 2, 3))),
-        Allowables(*[100.0] * 10, 2, (Allowables(*[1 / 3] * 10), Allowables(*[50.0] * 10, 3))),
+        STRENGTHS,
         Cure(-1 / 3, 0.1 + 0.2, (Expansion(1, 1e-7 / 3, 0.0, 0.0, 6e-3), Expansion(2, -1e-6))),
     ],
     ids=repr,

@@ -207,7 +207,6 @@ class Allowables(Segment, keyword="ALLO"):
     # Fields of a card without a material.
     fields: ClassVar[Fields] = numbered[:-1]
     constants: ClassVar[Fields] = layout("F10? F12*", "F10? p+", "F10? p-")
-    constants: ClassVar[Fields] = layout("F10? F12*", "F10? p+", "F10? p-")
 
     @classmethod
     def from_row(cls, values: Sequence[Value], source: Source | None) -> Self:

@@ -64,15 +64,21 @@ def _turned(stiffness: Floats, angle: float) -> Floats:
 
 
 def effective_stiffness(
-    ply: PlyConstants, angles: Sequence[float], thicknesses: Sequence[float], nu23: float
+    ply: PlyConstants | Sequence[PlyConstants],
+    angles: Sequence[float],
+    thicknesses: Sequence[float],
+    nu23: float,
 ) -> Floats:
     """Stiffness of the homogeneous solid with the laminate's averages, (6, 6).
 
-    In-plane strains and out-of-plane stresses are those of all plies.
+    The constants are those of all plies, or of each.  In-plane strains and out-of-plane stresses
+    are those of all plies.
     """
     share = np.array(thicknesses) / np.sum(thicknesses)
-    own = ply_stiffness(ply, nu23)
-    C = np.array([_turned(own, angle) for angle in angles])
+    plies = ply if isinstance(ply, Sequence) else [ply] * len(angles)
+    C = np.array(
+        [_turned(ply_stiffness(own, nu23), angle) for own, angle in zip(plies, angles, strict=True)]
+    )
     aa, ab, bb = (C[:, rows][:, :, columns] for rows, columns in ((_A, _A), (_A, _B), (_B, _B)))
     R = np.linalg.inv(bb)
     Q = ab @ R

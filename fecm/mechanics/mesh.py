@@ -110,7 +110,9 @@ def element_blocks(
 ) -> list[ElementBlock]:
     """Sort elements, (numel, nen), node numbers from 1 or 0, into blocks with the same nodes.
 
-    With `laminates` (numel,), numbers from 0, a block has one laminate.  Raises ValueError if a corner is missing: three for a triangle, four for the others.
+    With `laminates` (numel,), numbers from 0, a block has one laminate.
+
+    Raises ValueError if a corner is missing: three for a triangle, four for the others.
     """
     nodes = np.zeros((len(elements), max(MOST_NODES, elements.shape[1])), dtype=np.intp)
     nodes[:, : elements.shape[1]] = elements

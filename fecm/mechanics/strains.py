@@ -44,9 +44,11 @@ def strains_and_resultants(
     """Midplane strains, curvatures, transverse shear strains and resultants (equation 2-20).
 
     Each is (numel, npt), by the names of :data:`GENERALISED_STRAINS` and :data:`RESULTANTS`, of a
-    displacement field (numnp, 5).  Each laminate has rows of elements.  The membrane forces include `preload`, N_x, N_y, N_xy of the
-    undeformed plate; the strains do not.  To the midplane strains of a nonlinear plate eps_q is
-    added, its `quadratic` ones, (3, numel, npt).
+    displacement field (numnp, 5).  Each laminate has rows of elements.
+
+    The membrane forces include `preload`, N_x, N_y, N_xy of the undeformed plate; the strains do
+    not.  To the midplane strains of a nonlinear plate eps_q is added, its `quadratic` ones,
+    (3, numel, npt).
     """
     bending = strains.evaluate(field)
     # The curvatures of the rotations (-u, -v) are the midplane strains of u and v.

@@ -15,11 +15,13 @@ from typing import Any, NamedTuple, TypeVar
 from fecm.deck import model
 from fecm.deck.catalogue import NU23, STANDARD, STEEL_MODULUS, STEEL_POISSON, SYSTEMS
 from fecm.deck.findings import Findings
+from fecm.deck.macros import compile_program
 from fecm.deck.units import MODULUS, in_si, unit_names
 from fecm.mechanics.contact_law import ContactParameters, hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
 from fecm.mechanics.projectile import Projectile, RigidMass, Rod
 from fecm.problem.check import check_impact, check_segment
+from fecm.problem.generate import generate
 from fecm.problem.parts import build_constants, build_projectile, projectile_segment
 from fecm.problem.problem import Problem
 from fecm.sweeps.case import CasesError, Value
@@ -146,18 +148,28 @@ def set_radius(strike: Strike, value: Value) -> Strike:
         raise CasesError(f"radius: the modulus of steel needs the units of the deck; {hint}")
     steel = STEEL_MODULUS * (in_si(MODULUS, SYSTEMS[STANDARD]) or 1.0) / unit
     try:
-        modulus = _indentation_modulus(strike.plate.require(model.Material))
+        modulus = _indentation_modulus(*_struck(strike.plate))
         k = hertz_coefficient(float(value), steel, STEEL_POISSON, modulus)
     except ValueError as error:
         raise CasesError(f"k cannot be estimated: {error}") from None
     return strike.with_constant("k", k)
 
 
+def _struck(deck: model.Deck) -> tuple[tuple[model.Layer, ...], tuple[model.Ply, ...]]:
+    """Layers under the load, and the material of each."""
+    layups, number = list(deck.layers.values()), 0
+    if len(layups) > 1:
+        program = compile_program(deck.macros, Findings())
+        number = Problem(deck, generate(deck), program).laminate_number
+    layers = layups[number]
+    return layers, tuple(deck.plies[layer.material] for layer in layers)
+
+
 @lru_cache(maxsize=256)
-def _indentation_modulus(material: model.Material) -> float:
-    angles = [layer.angle for layer in material.layers]
-    thicknesses = [layer.thickness for layer in material.layers]
-    return indentation_modulus(effective_stiffness(material.ply, angles, thicknesses, NU23))
+def _indentation_modulus(layers: tuple[model.Layer, ...], plies: tuple[model.Ply, ...]) -> float:
+    angles = [layer.angle for layer in layers]
+    thicknesses = [layer.thickness for layer in layers]
+    return indentation_modulus(effective_stiffness(plies, angles, thicknesses, NU23))
 
 
 def set_mass(strike: Strike, value: Value) -> Strike:

@@ -94,15 +94,15 @@ class CompiledMonitor(FailureMonitor):
         self, zone: ZoneCriteria, run: Run, plies: Maxima, strains: Floats, time: float
     ) -> None:
         table, residual = zone.tables[run.states.start]
-        some = not isinstance(zone.points, slice)
+        rows = None if isinstance(zone.points, slice) else zone.points
         structure = Failure(
-            points=len(zone.points) if some else len(strains),
+            points=len(strains) if rows is None else len(rows),
             states=run.states.stop - run.states.start,
             width=table.shape[2],
             rows=len(strains),
             stride=2 * self.stresses.shape[2],
             first=run.states.start,
-            row=zone.points if some else None,
+            row=rows,
             in_plane=table,
             residual=residual,
             ply=_ply(run.strengths),
