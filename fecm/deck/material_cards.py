@@ -75,7 +75,6 @@ class Layer(Record):
     thickness: float  # length
     material: int = MATERIAL
 
-    optional: ClassVar[int] = 1
     fields: ClassVar[Fields] = layout(
         "I5 layer|lay",
         "F5 fibre angle|ang",
@@ -85,10 +84,10 @@ class Layer(Record):
     # Fields of a card without a material.
     plain: ClassVar[Fields] = fields[:-1]
 
-    def row(self) -> list[Value]:
-        """Values in the card's order; the material of MATE is a blank."""
-        *values, material = super().row()
-        return [*values, BLANK if material == MATERIAL else material]
+    def to_card(self, fields: Fields | None = None) -> str:
+        """Text of the card; the material of MATE is not written."""
+        written = self.plain if self.material == MATERIAL else self.fields
+        return super().to_card(fields or written)
 
 
 @frozen
