@@ -87,8 +87,10 @@ class PlateModel:
 
     @property
     def is_coupled(self) -> bool:
-        """Whether B of a laminate is not 0."""
-        return any(laminate.is_coupled for laminate in self.laminates)
+        """Whether B of an element's laminate is not 0."""
+        if not self.others:
+            return self.laminate.is_coupled
+        return any(self.laminate_of(family).is_coupled for family in self.families)
 
     @property
     def is_preloaded(self) -> bool:
@@ -103,9 +105,13 @@ class PlateModel:
 
     @property
     def preload_strain(self) -> Floats:
-        """Midplane strain A^-1 N0 of the preload, (3,), where B is zero; NaN of a singular A."""
+        """Midplane strain A^-1 N0 of the preload, (3,), where B is zero; NaN of a singular A.
+
+        A is that of all elements' laminates.
+        """
+        laminate = self.laminate_of(self.families[0]) if self.others else self.laminate
         try:
-            return np.linalg.solve(self.laminate.A, np.array(self.preload))
+            return np.linalg.solve(laminate.A, np.array(self.preload))
         except np.linalg.LinAlgError:
             return np.full(3, np.nan)
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.layup import LayupError, parse_layup
+from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Layer, NodeCodes, NodeValues
 from fecm.mechanics.mesh import element_blocks, holds_the_plane
 from fecm.mechanics.points import locate
@@ -40,6 +41,8 @@ def swapped(deck: model.Deck, old: model.Segment | None, new: model.Segment) -> 
 def set_layup(deck: model.Deck, value: Value) -> model.Deck:
     """Change the angles and their number; all plies keep the thickness of the deck."""
     thickness = _common_thickness("layup", deck)
+    if any(layer.material != MATERIAL for layer in deck.require(model.Material).layers):
+        raise CasesError("layup: the plies of the deck have other materials than that of MATE")
     try:
         angles = parse_layup(str(value))
     except LayupError as error:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fecm.deck import model
+from fecm.deck.findings import Place
 from fecm.deck.macros import flat
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.record import Record
@@ -156,6 +157,14 @@ def _used(problem: Problem) -> list[tuple[int, Laminate]]:
     return [(numbers[n], laminates[n]) for n in problem.used_laminates]
 
 
+def _place(deck: model.Deck, number: int) -> Place | None:
+    """Place of the cards of a laminate."""
+    own = (one for one in _laminates(deck) if one.number == number)
+    if (found := next(own, None)) is not None:
+        return found.head.place()
+    return deck.require(model.Material).place()
+
+
 @rule(
     "W497",
     Subject.LAMINATE,
@@ -170,7 +179,7 @@ def coupled_inertia(problem: Problem) -> Reports:
         if share > LARGEST_COUPLING:
             message = f"I1 of laminate {number} is {share:.2g} I0 h: it is left out."
             hint = "I1 = 0.027 I0 h changes the lowest frequency of an example by 7E-6"
-            yield Report(message, problem.deck.require(model.Material).place(), hint)
+            yield Report(message, _place(problem.deck, number), hint)
 
 
 @rule(
@@ -197,8 +206,7 @@ def soft_core(problem: Problem) -> Reports:
                 f"Laminate {number} has a core whose G13 is {ratio:.3g} times below that of the "
                 "faces: the plate is too stiff in shear."
             )
-            place = deck.require(model.Material).place()
-            yield Report(message, shear.place() or place, "use SHEA EQUI")
+            yield Report(message, shear.place() or _place(deck, number), "use SHEA EQUI")
 
 
 @rule(
