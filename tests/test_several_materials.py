@@ -39,6 +39,7 @@ from fecm.deck.model import (
 from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.laminate import Laminate, laminate
+from fecm.mechanics.mesh import equation_numbers
 from fecm.mechanics.ply_stresses import (
     UNKNOWN,
     FailureMonitor,
@@ -504,3 +505,53 @@ def test_k_of_a_sphere_is_that_of_the_materials_under_the_load() -> None:
     away = Zones((Zone(1, 4, 1, 2),))
     assert k(materials(soft), laminates(layup), away) == pytest.approx(k(), rel=1e-12)
     assert alone < 0.99 * k()
+
+
+def test_lumped_and_consistent_masses_are_those_of_each_elements_own_laminate() -> None:
+    (problem,) = load_deck(unlike()).problems
+    free = replace(problem.mesh, codes=0 * problem.mesh.codes)
+    plate = replace(problem.plate, mesh=replace(free, equations=equation_numbers(free.codes)))
+    numbers = plate.laminate_numbers
+    assert numbers is not None
+    masses = np.array([one.mass for one in plate.laminates])[numbers]
+    inertias = np.array([one.rotary_inertia for one in plate.laminates])[numbers]
+    area = 60.0**2 / 16.0
+    expected = np.repeat([area * masses.sum(), area * inertias.sum()], (3, 2))
+    lumped = plate.mass.reshape(-1, 5).sum(axis=0)
+    np.testing.assert_allclose(lumped, expected, rtol=1e-12)
+    one_by_one = np.ones(plate.neq) @ plate.consistent_mass
+    np.testing.assert_allclose(one_by_one.reshape(-1, 5).sum(axis=0), expected, rtol=1e-12)
+
+
+def test_resultants_are_those_of_each_elements_own_laminate() -> None:
+    found = fecm.run_one(unlike(words="STRE=20"))
+    (problem,) = load_deck(unlike()).problems
+    names = ("eps_xx", "eps_yy", "gamma_xy", "kappa_x", "kappa_y", "kappa_xy")
+    strains = np.stack([found[f"stresses/{name}"][-1] for name in names])
+    for own, rows in problem.plate.rows_by_laminate:
+        ABD = np.block([[own.A, own.B], [own.B, own.D]])
+        expected = np.tensordot(ABD, strains[:, rows], 1)
+        for name, values in zip(
+            ("N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy"), expected, strict=True
+        ):
+            atol = 1e-12 * np.abs(values).max()
+            stored = found[f"stresses/{name}"][-1, rows]
+            np.testing.assert_allclose(stored, values, rtol=1e-9, atol=atol)
+
+
+def test_cure_takes_the_expansion_of_each_layers_material() -> None:
+    expansions = tuple(model.Expansion(n, 1e-6 * n, 2e-5 * n) for n in (1, 2, 3))
+    (problem,) = load_deck(unlike(model.Cure(-100.0, expansions=expansions))).problems
+    assert problem.residuals is not None
+    layups = problem.deck.layers.values()
+    for found, own, layers in zip(problem.residuals, problem.plate.laminates, layups, strict=True):
+        number = np.array([layer.material for layer in layers])
+        expected = residual_stresses(own, -1e-4 * number, -2e-3 * number)
+        atol = 1e-12 * np.abs(expected.stresses).max()
+        np.testing.assert_allclose(found.stresses, expected.stresses, rtol=1e-12, atol=atol)
+
+
+def test_an_interface_of_unlike_materials_can_delaminate() -> None:
+    plies = (HYBRID[0], HYBRID[1], HYBRID[1], HYBRID[1])
+    assert laminate(plies, [0.0, 0.0, 0.0, 90.0], [1.0] * 4).unlike_interfaces == 2
+    assert laminate(HYBRID[0], [0.0, 0.0, 180.0, 90.0], [1.0] * 4).unlike_interfaces == 1
