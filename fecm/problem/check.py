@@ -73,10 +73,10 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
     apply(segments.OF_SEGMENTS, findings, deck, unsound)
     checked = _generated(deck, compiled, unsound, findings, listing=listing)
     _check_each_segment(checked, findings, unsound)
-    if sound():
-        _check_points(checked, findings)
-    if sound():
-        with np.errstate(all="ignore"):  # numbers out of range end in a finding
+    with np.errstate(all="ignore"):  # numbers out of range end in a finding
+        if sound():
+            _check_points(checked, findings)
+        if sound():
             _check_run(checked, findings, sound)
     return checked
 
