@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Collection
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -52,6 +53,8 @@ from fecm.results.result import Result
 from fecm.verification import decks
 from tests.builders import Floats, table
 from tests.decks import DATA
+from tests.stopped_runs import StoppedError
+from tests.stopped_runs import run as run_to
 from tests.test_kernels import compiled
 
 SANDWICH = (
@@ -555,3 +558,17 @@ def test_an_interface_of_unlike_materials_can_delaminate() -> None:
     plies = (HYBRID[0], HYBRID[1], HYBRID[1], HYBRID[1])
     assert laminate(plies, [0.0, 0.0, 0.0, 90.0], [1.0] * 4).unlike_interfaces == 2
     assert laminate(HYBRID[0], [0.0, 0.0, 180.0, 90.0], [1.0] * 4).unlike_interfaces == 1
+
+
+def test_a_run_of_several_laminates_that_is_stopped_goes_on_to_the_same_bytes(
+    tmp_path: Path,
+) -> None:
+    deck = unlike().to_text()
+    whole, path = tmp_path / "whole.h5", tmp_path / "stopped.h5"
+    looks = run_to(deck, whole)
+    for stop in (2, looks - 1):
+        with pytest.raises(StoppedError):
+            run_to(deck, path, stop)
+        run_to(deck, path, resume=True)
+        assert path.read_bytes() == whole.read_bytes(), f"stopped at {stop}"
+        path.unlink()
