@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from fecm._frozen import frozen
 from fecm.authoring.laminate import Plies
 from fecm.authoring.parameters import ObjectError, check_positive
@@ -13,7 +15,7 @@ from fecm.deck.catalogue import (
     NamedContact,
     convert,
 )
-from fecm.deck.model import Indentation, Patch
+from fecm.deck.model import Indentation, Layer, Patch
 from fecm.deck.units import MODULUS
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
@@ -32,8 +34,8 @@ class Sphere:
     modulus: float | None = None
     poisson: float | None = None
 
-    def law(self, plies: Plies) -> tuple[Indentation, str]:
-        """Law of contact, and comment lines of the deck which say how k was computed."""
+    def law(self, plies: Plies, layers: Sequence[Layer]) -> tuple[Indentation, str]:
+        """Law of contact with layers, and comment lines of the deck which say how k was computed."""
         if self.radius is None:
             raise ObjectError("the `contact` estimate needs the sphere's radius")
         if self.modulus is None and plies.system is None:
@@ -45,17 +47,23 @@ class Sphere:
         if modulus is None:
             modulus = convert(STEEL_MODULUS, MODULUS, STANDARD, plies.system or STANDARD)
         poisson = STEEL_POISSON if self.poisson is None else self.poisson
-        angles = plies.layup.angles
+        materials = [plies.of(layer) for layer in layers]
         try:
-            stiffness = effective_stiffness(plies.ply, angles, [1.0] * len(angles), plies.nu23)
+            stiffness = effective_stiffness(
+                [one.ply for one in materials],
+                [layer.angle for layer in layers],
+                [layer.thickness for layer in layers],
+                [one.nu23 for one in materials],
+            )
             effective = indentation_modulus(stiffness)
             k = float(f"{hertz_coefficient(self.radius, modulus, poisson, effective):.6g}")
         except (ValueError, ArithmeticError) as error:
             raise ObjectError(f"k cannot be estimated: {error}; give a law") from None
+        ratios = " and ".join(dict.fromkeys(f"{one.nu23:g}" for one in materials))
         return Indentation(k, 0.0, 0.0, 1.5), (
             "! k of EXPE is estimated by the laminate's indentation modulus "
             f"{effective:.5g}: a sphere of radius {self.radius:g},\n"
-            f"! E {modulus:g} and nu {poisson:g}; nu23 of the ply {plies.nu23:g}.  "
+            f"! E {modulus:g} and nu {poisson:g}; nu23 of the ply {ratios}.  "
             "A measured k may be larger; the law is elastic.\n"
         )
 
@@ -131,15 +139,17 @@ def parse_patch(text: str) -> Patch | None:
 AnyContact = Indentation | NamedContact | Sphere | str
 
 
-def law_of(contact: AnyContact | None, plies: Plies) -> tuple[Indentation, str]:
+def law_of(
+    contact: AnyContact | None, plies: Plies, layers: Sequence[Layer]
+) -> tuple[Indentation, str]:
     """Indentation law in the units of the deck, and comment lines about one that is estimated."""
     match contact:
         case str():
-            return law_of(Contact.named(contact), plies)
+            return law_of(Contact.named(contact), plies, layers)
         case Indentation():
             return Indentation(*contact.values(), contact.word), ""
         case Sphere():
-            return contact.law(plies)
+            return contact.law(plies, layers)
         case NamedContact():
             if plies.system is None:
                 raise ObjectError(

@@ -13,17 +13,20 @@ from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.authoring.contact import AnyContact, Sphere, law_of
 from fecm.authoring.fixtures import DropWeight
-from fecm.authoring.laminate import Laminate, Plies, cured, damages, plies_of, toughness
+from fecm.authoring.laminate import Laminate, Layup, Plies, cured, damages, plies_of, toughness
 from fecm.authoring.mesh import InPlane, placed, supported
 from fecm.authoring.numerics import AUTO, FULL, MITC, Numerics, Quadrature
 from fecm.authoring.parameters import ObjectError, check_positive, in_units, is_finite
 from fecm.authoring.plate import Plate
+from fecm.authoring.zones import Zone, laminates_of, placed_zones
 from fecm.deck import model
 from fecm.deck.catalogue import STANDARD, SYSTEM, SYSTEMS, NamedContact
 from fecm.deck.findings import DeckError
 from fecm.deck.grid import IN_PLANE
+from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Control, Gage
 from fecm.deck.units import in_si, unit_of
+from fecm.mechanics.laminate import SOFT_CORE
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.parts import build_projectile, projectile_segment
 
@@ -59,6 +62,7 @@ class Request:
     giic: float | None = None
     cure: float | str | None = None
     title: str = ""
+    zones: Sequence[Zone] = ()
 
     @property
     def test(self) -> DropWeight | None:
@@ -126,6 +130,7 @@ def impact(
     giic: float | None = None,
     cure: float | str | None = None,
     title: str = "",
+    zones: Sequence[tuple[str | Sequence[float], Layup | Laminate]] = (),
 ) -> model.Deck:
     """Deck of an impact, as `fecm new` writes it.
 
@@ -188,6 +193,11 @@ def impact(
         stress-free temperature of the ply.
     title : str, optional
         Title of the deck.
+    zones : sequence of tuple, optional
+        Place and layup of parts of the plate, the later over the earlier.  A place is a rectangle
+        ``(x0, y0, x1, y1)``, which has the elements whose centres lie in it, or the name of a group
+        of elements of an imported mesh.  A layup has the materials and the ply thickness of
+        `laminate`; a `Laminate` has its own, by their names.  All laminates share the mid-plane.
 
     Returns
     -------
@@ -229,6 +239,7 @@ def impact(
             giic=giic,
             cure=cure,
             title=title,
+            zones=tuple(zones),
         )
     )
     loaded = load_deck(made.deck)
@@ -247,23 +258,27 @@ def author(asked: Request) -> Authored:
     fixture, test = asked.plate.fixture, asked.test
     if test is not None and asked.units not in (None, STANDARD):
         raise ObjectError(f"the fixture's standard is in {STANDARD}; leave out `units`")
-    plies = plies_of(asked.laminate, STANDARD if test else asked.units, notes)
+    laminates = laminates_of(asked.laminate, asked.zones)
+    plies, in_zones = plies_of(asked.laminate, laminates, STANDARD if test else asked.units, notes)
     strike, motion = asked.strike, _motion(asked, plies)
     if fixture is not None and test is not None:
-        strike, motion = _prescribed(test, strike, motion, plies.layup.thickness)
-        if not test.allows(plies.layup.thickness):
-            doubts.append(_doubt_of_thickness(fixture.name, test, plies.layup.thickness))
+        strike, motion = _prescribed(test, strike, motion, plies.thickness)
+        if not test.allows(plies.thickness):
+            doubts.append(_doubt_of_thickness(fixture.name, test, plies.thickness))
     patch = asked.numerics.contact_patch(prescribed=test is not None)
     _check_complete(asked, strike, motion, plies.system)
 
-    law, comment = law_of(strike.contact, plies)
+    mesh, node, patch = placed(asked.plate, plies, strike.at, patch, doubts)
+    zones = placed_zones(asked.zones, in_zones, mesh, node, doubts)
+    struck = plies.layups[zones.struck - MATERIAL]
+    law, comment = law_of(strike.contact, plies, struck)
     if comment:
         notes.append(
             f"k = {law.k:g} is estimated from the ply's constants (fecm indent estimate) for an "
             "elastic law; prefer a measured law"
         )
+        doubts += _doubts_of_core(plies, struck)
     damage = damages(plies, asked.giic, notes) if asked.damage else toughness(asked.giic)
-    mesh, node, patch = placed(asked.plate, plies.layup, strike.at, patch, doubts)
     stretches = asked.nonlinear or plies.is_coupled
     boundary, slides = supported(asked.plate, mesh, asked.in_plane, notes, stretches=stretches)
     segments = (
@@ -281,9 +296,10 @@ def author(asked: Request) -> Authored:
         asked.numerics.shear_segment(nonlinear=asked.nonlinear),
         model.Nonlinear() if asked.nonlinear else None,
         _preload(asked, plies),
-        plies.segment(),
+        *plies.segments(),
+        zones.card,
     )
-    control = Control(mesh.nodes, mesh.elements, len(plies.layup.angles), 2, 5, mesh.most_nodes)
+    control = Control(mesh.nodes, mesh.elements, len(plies.layups[0]), 2, 5, mesh.most_nodes)
     deck = model.Deck(asked.title, control, tuple(s for s in segments if s is not None), ())
     dt = asked.numerics.time_step(deck)
     if motion.energy is not None:
@@ -293,6 +309,17 @@ def author(asked: Request) -> Authored:
     deck = asked.numerics.with_program(deck, dt, motion.duration)
     comments = (fixture.comment if fixture else "") + slides + comment
     return Authored(deck, comments, notes, doubts)
+
+
+def _doubts_of_core(plies: Plies, layers: Sequence[model.Layer]) -> list[str]:
+    """Doubt an estimated k of a sandwich."""
+    moduli = [plies.of(layer).ply.g13 for layer in layers]
+    if min(moduli) >= SOFT_CORE * max(moduli):
+        return []
+    return [
+        "k is estimated of a sandwich, as if its core were spread over the thickness; its face "
+        "indents into the core, and the core is crushed: measure the law (`law`)"
+    ]
 
 
 def _check_kind(name: str, value: object, kind: type | UnionType) -> None:
@@ -322,7 +349,6 @@ def _motion(asked: Request, plies: Plies) -> Motion:
         dt=numerics.dt,
         every=numerics.every,
         giic=asked.giic,
-        ply_thickness=plies.thickness,
     )
     return motion
 
@@ -407,7 +433,7 @@ def _energy_note(deck: model.Deck, asked: Request, plies: Plies) -> str:
     joule = in_si("force*length", names)
     said = f"{energy * joule:.4g} J" if joule else f"{energy:.4g}"
     if asked.test is not None:
-        share = energy / plies.layup.thickness
+        share = energy / plies.thickness
         said += f" ({share / 1e3:.3g} J per mm of thickness)"
     speed = f"{velocity:.4g} {unit_of('length/time', names)}".rstrip()
     return f"energy {said}, {speed}"
@@ -419,7 +445,7 @@ def _doubts_of_energy(deck: model.Deck, asked: Request, plies: Plies) -> list[st
     if fixture is None or fixture.test is None:
         return []
     energy = _energy_of(deck)
-    share = energy / plies.layup.thickness
+    share = energy / plies.thickness
     if share >= fixture.test.least_energy:
         return []
     return [

@@ -1,22 +1,52 @@
-"""Layup and plies, their units, strengths and toughness."""
+"""Layups and their materials, their units, strengths, toughness and expansions."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 from fecm._frozen import frozen
-from fecm.authoring.parameters import ObjectError
+from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck import catalogue
 from fecm.deck.catalogue import MATERIALS, SYSTEMS, NamedPly
-from fecm.deck.layup import parse_layup
-from fecm.deck.model import Cure, Delamination, Integration, Layer, Material, Ply, Segment
+from fecm.deck.layup import parse_plies
+from fecm.deck.material_cards import MATERIAL
+from fecm.deck.model import (
+    Allowables,
+    Cure,
+    Delamination,
+    Expansion,
+    Integration,
+    LaminateNumber,
+    Laminates,
+    Layer,
+    Material,
+    MaterialNumber,
+    Materials,
+    NumberedLaminate,
+    NumberedPly,
+    Ply,
+    Segment,
+)
 from fecm.mechanics.laminate import laminate as stiffness_of
 
 ORDER = 3  # integration order of stiffness and mass
 NODAL_POINTS = -3  # where stresses are computed
+
+AnyPly = str | Ply | NamedPly
+# Angle, name of the material and thickness of a ply; what is left out is that of the laminate.
+Entry = float | tuple[float, str] | tuple[float, str, float]
+Layup = str | Sequence[Entry]
+
+
+class LaminatePly(NamedTuple):
+    """A ply of a laminate."""
+
+    angle: float  # degrees
+    name: str = ""  # of its material; empty if the layup has none
+    thickness: float | None = None  # length; None if the layup has none
 
 
 @frozen
@@ -25,89 +55,211 @@ class Laminate:
 
     Attributes
     ----------
-    layup : str or sequence of float
-        As in ``"[0/45]2s"``, or angles in degrees, from the struck face on.
-    ply : str or Ply or NamedPly
-        Name of a ply, which `fecm materials` lists, or constants in the deck's units.
-    ply_thickness : float, optional
-        Thickness of one ply, length; a named ply's own by default, where it is known.
+    layup : str or sequence
+        As in ``"[0/45]2s"``, or angles in degrees, from the struck face on.  Plies of several
+        materials have a letter, ``"[0C/90G]s"``, or are tuples of angle, name and, if it is not
+        `ply_thickness`, thickness: ``[(0, "C"), (0, "foam", 10.0)]``.
+    ply : str or Ply or NamedPly or dict, optional
+        Name of a ply, which `fecm materials` lists, or constants in the deck's units.  Of several
+        materials, these by the names in the layup; ``""`` is that of plies without a name.
+    ply_thickness : float or dict, optional
+        Thickness of one ply, length, also by the names of materials; a named ply's own by default,
+        where it is known.
 
     Examples
     --------
     >>> import fecm
     >>> fecm.Laminate("[0/45]s", "T300/5208", 0.125).angles
     (0.0, 45.0, 45.0, 0.0)
+    >>> hybrid = {"C": "IM7/8552", "G": "E-glass/MY750"}
+    >>> fecm.Laminate("[0C/90G]s", hybrid, {"C": 0.125, "G": 0.25}).thickness
+    0.75
     """
 
-    layup: str | Sequence[float]
-    ply: str | Ply | NamedPly
-    ply_thickness: float | None = None
+    layup: Layup
+    ply: AnyPly | Mapping[str, AnyPly] | None = None
+    ply_thickness: float | Mapping[str, float] | None = None
 
     @property
-    def angles(self) -> tuple[float, ...]:
-        """Angles of the plies, degrees."""
+    def plies(self) -> tuple[LaminatePly, ...]:
+        """Plies from the struck face on."""
         if isinstance(self.layup, str):
-            return tuple(parse_layup(self.layup))
+            return tuple(LaminatePly(*ply) for ply in parse_plies(self.layup))
         try:
-            if angles := tuple(map(float, self.layup)):
-                return angles
+            if plies := tuple(map(_ply_of, self.layup)):
+                return plies
         except (TypeError, ValueError):
             pass
         raise ObjectError(f"the layup {self.layup!r} is not a list of angles")
 
     @property
+    def angles(self) -> tuple[float, ...]:
+        """Angles of the plies, degrees."""
+        return tuple(ply.angle for ply in self.plies)
+
+    @property
     def thickness(self) -> float:
         """Total thickness, length; ValueError without the thickness of a ply."""
-        if self.ply_thickness is None:
-            raise ObjectError("`ply_thickness` is missing")
-        return float(f"{len(self.angles) * self.ply_thickness:.9g}")
+        return _total([self._thickness_of(ply) or _no_thickness() for ply in self.plies])
+
+    def material(self, name: str) -> object:
+        """What is given as the material of a name."""
+        given = self.ply if isinstance(self.ply, Mapping) else {"": self.ply}
+        if name in given:
+            return given[name]
+        if name in MATERIALS:
+            return name
+        known = ", ".join(filter(None, given)) or "only plies without a name"
+        said = f"the material {name!r}" if name else "a ply without a material"
+        raise ObjectError(f"`layup` has {said}; the materials given are {known}")
+
+    def _thickness_of(self, ply: LaminatePly) -> float | None:
+        """Thickness of a ply, where the laminate has it."""
+        if ply.thickness is not None:
+            return ply.thickness
+        given = self.ply_thickness
+        return given.get(ply.name) if isinstance(given, Mapping) else given
+
+    def thickness_of(self, ply: LaminatePly) -> float | None:
+        """Thickness of a ply, where the laminate has it; it is positive."""
+        thickness = self._thickness_of(ply)
+        check_positive(ply_thickness=thickness)
+        return thickness
 
 
-class Plies(NamedTuple):
-    """Plies of a laminate in the units of a deck."""
+def _ply_of(entry: Entry) -> LaminatePly:
+    if not isinstance(entry, tuple):
+        return LaminatePly(float(entry))
+    angle, name, *thickness = entry
+    if not isinstance(name, str):
+        raise TypeError
+    return LaminatePly(float(angle), name, *thickness)
 
-    layup: Laminate  # with the thickness of a ply
-    thickness: float  # of a ply
+
+def _no_thickness() -> float:
+    raise ObjectError("`ply_thickness` is missing")
+
+
+def _total(thicknesses: Sequence[float]) -> float:
+    """Thickness of a laminate, in the digits of a card."""
+    if len(set(thicknesses)) == 1:
+        return float(f"{len(thicknesses) * thicknesses[0]:.9g}")
+    return float(f"{math.fsum(thicknesses):.9g}")
+
+
+class Bound(NamedTuple):
+    """A material in the units of a deck."""
+
     ply: Ply
     named: NamedPly | None  # from which the constants are, if they have a name
-    system: str | None  # of units; None if the deck names none
 
     @property
     def nu23(self) -> float:
         """Poisson's ratio across the fibres."""
         return self.named.nu23 if self.named else catalogue.NU23
 
+
+class Plies(NamedTuple):
+    """Laminates in the units of a deck: that of the plate, and those of its zones."""
+
+    layups: tuple[tuple[Layer, ...], ...]
+    materials: tuple[Bound, ...]  # number 1 is the first
+    system: str | None  # of units; None if the deck names none
+
+    @property
+    def thickness(self) -> float:
+        """Thickness of the plate's laminate."""
+        return _total([layer.thickness for layer in self.layups[0]])
+
+    @property
+    def thickest(self) -> float:
+        """Thickness of the thickest laminate."""
+        return max(_total([layer.thickness for layer in layers]) for layers in self.layups)
+
+    @property
+    def said(self) -> str:
+        """Words about the thickest laminate."""
+        layers = max(self.layups, key=lambda one: _total([layer.thickness for layer in one]))
+        sizes = {f"{layer.thickness:g}" for layer in layers}
+        each = f" of `ply_thickness` {sizes.pop()}" if len(sizes) == 1 else ""
+        return f"{len(layers)} plies{each} are {self.thickest:g} thick"
+
+    @property
+    def named(self) -> list[tuple[int, NamedPly]]:
+        """Numbers of the materials that have names."""
+        numbered = enumerate(self.materials, start=MATERIAL)
+        return [(number, one.named) for number, one in numbered if one.named]
+
     @property
     def is_coupled(self) -> bool:
         """Whether bending and stretching are coupled."""
-        angles = self.layup.angles
-        return stiffness_of(self.ply, angles, [self.thickness] * len(angles)).is_coupled
-
-    def segment(self) -> Material:
-        """Material segment of the deck."""
-        layers = tuple(
-            Layer(n, angle, self.thickness) for n, angle in enumerate(self.layup.angles, start=1)
-        )
-        return Material(
-            Integration(ORDER, ORDER, NODAL_POINTS, self.layup.thickness), self.ply, layers
+        return any(
+            stiffness_of(
+                [self.of(layer).ply for layer in layers],
+                [layer.angle for layer in layers],
+                [layer.thickness for layer in layers],
+            ).is_coupled
+            for layers in self.layups
         )
 
+    def of(self, layer: Layer) -> Bound:
+        """Material of a layer."""
+        return self.materials[layer.material - MATERIAL]
 
-def plies_of(laminate: Laminate, units: str | None, notes: list[str]) -> Plies:
-    """Plies of a laminate in a system of units, by default that of a named ply's source.
+    def segments(self) -> list[Segment]:
+        """MATE, and MATS and LAMS where there are several materials and laminates."""
+        (first, *others), (own, *zones) = self.materials, self.layups
+        integration = Integration(ORDER, ORDER, NODAL_POINTS, self.thickness)
+        made: list[Segment] = [Material(integration, first.ply, own)]
+        if others:
+            numbered = enumerate(others, start=MATERIAL + 1)
+            made.append(Materials(tuple(NumberedPly(MaterialNumber(n), b.ply) for n, b in numbered)))
+        if zones:
+            heads = [LaminateNumber(n, len(z)) for n, z in enumerate(zones, start=MATERIAL + 1)]
+            made.append(Laminates(tuple(map(NumberedLaminate, heads, zones))))
+        return made
+
+
+def plies_of(
+    laminate: Laminate, zones: Sequence[Laminate], units: str | None, notes: list[str]
+) -> tuple[Plies, list[int]]:
+    """Laminates of a plate, by default in the units of the first named ply, and those of its zones.
+
+    Equal laminates have one number.
 
     Notes the thickness of a ply that its name gives.
     """
-    given = _known(laminate.ply)
-    named = given if isinstance(given, NamedPly) else None
-    system = units or (named.system if named else None)
-    ply = named.converted(system or named.system) if named else given
-    if not isinstance(ply, Ply):
-        raise ObjectError(f"`ply` is {ply!r}, not a name or a Ply")
-    thickness = laminate.ply_thickness
-    if thickness is None:
-        thickness = _own_thickness(named, system, notes)
-    return Plies(replace(laminate, ply_thickness=thickness), thickness, ply, named, system)
+    laminates = (laminate, *zones)
+    owners = {ply.name: one for one in reversed(laminates) for ply in reversed(one.plies)}
+    names = list(dict.fromkeys(ply.name for one in laminates for ply in one.plies))
+    known = {name: _known(owners[name].material(name)) for name in names}
+    named = {name: one for name, one in known.items() if isinstance(one, NamedPly)}
+    system = units or next((one.system for one in named.values()), None)
+    if named and len(named) < len(known) and units is None:
+        raise ObjectError("constants of a `ply` beside a named one need `units`, theirs")
+    numbers = {name: number for number, name in enumerate(names, start=MATERIAL)}
+    materials: list[Bound] = []
+    for name, one in known.items():
+        ply = one.converted(system or one.system) if isinstance(one, NamedPly) else one
+        if not isinstance(ply, Ply):
+            raise ObjectError(f"`ply` is {ply!r}, not a name or a Ply")
+        materials.append(Bound(ply, named.get(name)))
+    own: dict[str, float] = {}  # thickness of a material's plies where its name gives it
+
+    def layer(number: int, ply: LaminatePly, given: float | None) -> Layer:
+        if given is None:
+            if ply.name not in own:
+                own[ply.name] = _own_thickness(named.get(ply.name), system, notes)
+            given = own[ply.name]
+        return Layer(number, ply.angle, given, numbers[ply.name])
+
+    layups = [
+        tuple(layer(n, ply, one.thickness_of(ply)) for n, ply in enumerate(one.plies, start=1))
+        for one in laminates
+    ]
+    different = list(dict.fromkeys(layups))
+    in_zones = [different.index(one) + MATERIAL for one in layups[1:]]
+    return Plies(tuple(different), tuple(materials), system), in_zones
 
 
 def _known(ply: object) -> object:
@@ -136,51 +288,61 @@ def toughness(giic: float | None) -> list[Segment]:
 
 
 def damages(plies: Plies, giic: float | None, notes: list[str]) -> list[Segment]:
-    """Strengths and toughness of a named ply; notes what it does not have."""
-    named, system = plies.named, plies.system
-    if named is None or system is None:
+    """Strengths and least toughness of named plies; notes what they do not have."""
+    system = plies.system
+    if system is None or not plies.named:
         raise ObjectError("`damage` needs a named ply with strengths or toughness")
-    missing: list[str] = []
-    strengths = named.allowables(system)
-    if strengths is None:
-        lacks = " and ".join(key for key in catalogue.STRENGTHS if key not in named.values)
-        missing.append(
-            f"no {lacks}, so no failure exposures (ALLO, FAIL); a file of your own plies may have "
-            "them (fecm new --materials)"
-        )
-    delamination = named.delamination(system) if giic is None else Delamination(giic)
-    if delamination is None:
-        missing.append("no GIIc, so no delamination threshold (DELA); `giic` gives it")
-    if strengths is None and delamination is None:
-        raise ObjectError(f"`damage`: {named.name} has {'; '.join(missing)}")
-    notes += [f"{named.name} has {text}" for text in missing]
-    return [segment for segment in (strengths, delamination) if segment is not None]
+    strengths: list[Allowables] = []
+    known = [named.delamination(system) for _, named in plies.named]
+    toughnesses = [one.toughness for one in known if one] if giic is None else [giic]
+    lacking: list[str] = []
+    for number, named in plies.named:
+        missing: list[str] = []
+        if (own := named.allowables(system)) is not None:
+            strengths.append(replace(own, material=number))
+        else:
+            lacks = " and ".join(key for key in catalogue.STRENGTHS if key not in named.values)
+            missing.append(
+                f"no {lacks}, so no failure exposures (ALLO, FAIL); a file of your own plies may "
+                "have them (fecm new --materials)"
+            )
+        if not toughnesses:
+            missing.append("no GIIc, so no delamination threshold (DELA); `giic` gives it")
+        if missing:
+            lacking.append(f"{named.name} has {'; '.join(missing)}")
+    if not strengths and not toughnesses:
+        raise ObjectError(f"`damage`: {'; '.join(lacking)}")
+    notes += lacking
+    made: list[Segment] = []
+    if strengths:
+        made.append(replace(strengths[0], others=tuple(strengths[1:])))
+    if toughnesses:
+        made.append(Delamination(min(toughnesses)))
+    return made
 
 
 def cured(plies: Plies, cure: float | str | None) -> Cure | None:
-    """CURE segment of a named ply for a change of temperature, or for ``"177:20"``."""
+    """CURE segment of named plies for a change of temperature, or for ``"177:20"``."""
     if cure is None:
         return None
-    named = plies.named
-    if named is None or (expansion := named.expansion) is None:
-        lacks = f"{named.name} has no" if named else "it needs a named ply with"
-        raise ObjectError(
-            f"`cure`: {lacks} alpha1 and alpha2; a file of your own plies may have them (fecm new "
-            "--materials)"
-        )
-    return Cure(delta_t=_cooling(cure, named), expansions=(expansion,))
-
-
-def _cooling(cure: float | str, named: NamedPly) -> float:
-    """Temperature of use minus stress-free temperature, K."""
-    before, colon, after = str(cure).rpartition(":")
-    own = named.values.get("stress_free_temperature")
-    if colon and not before.strip():
-        if own is None:
+    expansions: list[Expansion] = []
+    for number, one in enumerate(plies.materials, start=MATERIAL):
+        if one.named is None or (expansion := one.named.expansion) is None:
+            lacks = f"{one.named.name} has no" if one.named else "it needs a named ply with"
             raise ObjectError(
-                f"`cure` is {cure!r}: the stress-free temperature of {named.name} is not known"
+                f"`cure`: {lacks} alpha1 and alpha2; a file of your own plies may have them (fecm "
+                "new --materials)"
             )
-        before = str(own)
+        expansions.append(replace(expansion, material=number))
+    named = [ply for _, ply in plies.named]
+    return Cure(delta_t=_cooling(cure, named), expansions=tuple(expansions))
+
+
+def _cooling(cure: float | str, plies: Sequence[NamedPly]) -> float:
+    """Temperature of use minus stress-free temperature, K; by default that of the plies."""
+    before, colon, after = str(cure).rpartition(":")
+    if colon and not before.strip():
+        before = str(_stress_free(cure, plies))
     try:
         change = float(after) - (float(before) if colon else 0.0)
     except ValueError:
@@ -191,3 +353,15 @@ def _cooling(cure: float | str, named: NamedPly) -> float:
             "temperature and one of use, as 177:20"
         )
     return float(f"{change:.9g}")
+
+
+def _stress_free(cure: float | str, plies: Sequence[NamedPly]) -> float:
+    """Stress-free temperature of the plies that have one."""
+    known = {ply.values.get("stress_free_temperature") for ply in plies} - {None}
+    if len(known) != 1:
+        names = " and ".join(ply.name for ply in plies)
+        why = "not the same" if known else "not known"
+        raise ObjectError(f"`cure` is {cure!r}: the stress-free temperature of {names} is {why}")
+    (own,) = known
+    assert own is not None
+    return own

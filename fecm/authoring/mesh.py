@@ -6,7 +6,7 @@ import math
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
-from fecm.authoring.laminate import Laminate
+from fecm.authoring.laminate import Plies
 from fecm.authoring.parameters import ObjectError, pair
 from fecm.authoring.plate import MOST, Plate
 from fecm.deck import grid as grids
@@ -34,7 +34,7 @@ class Placed(NamedTuple):
 
 def placed(
     plate: Plate,
-    laminate: Laminate,
+    plies: Plies,
     at: tuple[float, float] | None,
     patch: Patch | None,
     doubts: list[str],
@@ -44,11 +44,8 @@ def placed(
     mesh = plate.imported or grid_of(plate, place, None if patch is None else patch.radius)
     low, high = mesh.extent
     side = min(high[0] - low[0], high[1] - low[1])
-    if laminate.thickness >= side:
-        raise ObjectError(
-            f"{len(laminate.angles)} plies of `ply_thickness` {laminate.ply_thickness:g} are "
-            f"{laminate.thickness:g} thick, and the plate's shorter side is {side:g}"
-        )
+    if plies.thickest >= side:
+        raise ObjectError(f"{plies.said}, and the plate's shorter side is {side:g}")
     x, y = place or ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0)
     if not (low[0] <= x <= high[0] and low[1] <= y <= high[1]):
         raise ObjectError("`at` is outside the plate")

@@ -403,12 +403,12 @@ def estimate(
     Measured coefficients may be larger: that of the report's plate under the 0.5 in indenter is
     1.330e6 lb/in^1.5, where M gives 1.084e6 and E2 0.741e6.  By default the law is elastic.
     """
-    layup, thickness = laminate.layup, laminate.ply_thickness
-    assert layup is not None  # both options are required
-    assert thickness is not None
+    layup, thickness = laminate.angles, laminate.thickness
+    if thickness is None:
+        raise click.UsageError("--ply-thickness is of a layup without letters here")
     constants = laminate.constants()
     if nu23 is None:
-        nu23 = laminate.material.nu23 if laminate.material else catalogue.NU23
+        nu23 = laminate.named.nu23 if laminate.named else catalogue.NU23
     stiffness = effective_stiffness(constants, layup, [thickness] * len(layup), nu23)
     modulus = indentation_modulus(stiffness)
     k, by_e2 = sphere.coefficient(modulus), sphere.coefficient(constants.e2)

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Sequence
+import re
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from typing import NoReturn, TypeVar
 
 import click
 from click import option
 
 from fecm._frozen import frozen
+from fecm.authoring.laminate import Laminate as AuthoredLaminate
 from fecm.cli.options import (
     POSITIVE,
     Decorated,
@@ -21,48 +24,100 @@ from fecm.cli.options import (
 )
 from fecm.deck.catalogue import MATERIALS, SYSTEMS, NamedPly, read_plies
 from fecm.deck.findings import Findings
-from fecm.deck.layup import parse_layup
+from fecm.deck.layup import LayupPly, parse_plies
 from fecm.deck.model import Integration, Layer, Material, Ply
 from fecm.mechanics.laminate import Laminate
 from fecm.problem.check import check_segment
 from fecm.problem.parts import laminate_of
 
+T = TypeVar("T")
+
 _META = "fecm.plies"  # key of the plies of --materials among the values of a context
 
 PLIES = file_of(read_plies)
+LETTER = "[A-Z]"  # name of a material in a layup
+CORE = "K"  # letter of a core that has no other
 
 
 @frozen
 class LaminateOptions:
-    """Layup and ply."""
+    """Layup and plies; values by the letter of a material, empty for plies without one."""
 
-    layup: Sequence[float] | None  # angles, degrees
-    ply_thickness: float | None
+    layup: Sequence[LayupPly] | None
+    ply_thickness: dict[str, float] | None
     ply: Sequence[float] | None  # constants
-    material: NamedPly | None
+    material: dict[str, NamedPly] | None
     units: str | None  # system to which a named ply is converted
 
     def one_ply(self) -> Ply | NamedPly:
-        """The ply of one of the two options."""
-        if self.ply is not None and self.material is None:
+        """The ply of one of the two options, of a layup without letters."""
+        if self.ply is not None and self.named is None:
             return Ply(*self.ply)
-        if self.ply is not None or self.material is None:
+        if self.ply is not None or self.named is None:
             raise click.UsageError("give either --ply or --material")
-        return self.material
+        return self.named
+
+    @property
+    def named(self) -> NamedPly | None:
+        """The named ply of a layup without letters."""
+        return (self.material or {}).get("")
+
+    @property
+    def thickness(self) -> float | None:
+        """Thickness of a ply of a layup without letters."""
+        return (self.ply_thickness or {}).get("")
+
+    @property
+    def angles(self) -> list[float]:
+        """Angles of a layup of one material, degrees."""
+        plies = self.layup or ()
+        if letter := next((ply.name for ply in plies if ply.name), ""):
+            raise click.UsageError(
+                f"the layup has the material {letter}; this command takes one material: `fecm new` "
+                "writes a deck of several"
+            )
+        return [ply.angle for ply in plies]
 
     def constants(self) -> Ply:
         """Constants of the ply; of a named one in the units."""
         chosen = self.one_ply()
         return chosen if isinstance(chosen, Ply) else chosen.converted(self.units or chosen.system)
 
+    def authored(
+        self, plies: Mapping[str, Ply], cores: Sequence[tuple[str, float]]
+    ) -> AuthoredLaminate:
+        """Laminate of one or several materials.
+
+        `plies` are constants by name, `cores` names and thicknesses: of a letter, or of a material
+        that has the letter :data:`CORE`.
+        """
+        materials: dict[str, Ply | NamedPly] = {**(self.material or {}), **plies}
+        if self.ply is not None or not materials:
+            materials[""] = self.one_ply()
+        thicknesses = dict(self.ply_thickness or {})
+        default = thicknesses.get("")
+        known = MATERIALS | click.get_current_context().meta[_META] | materials
+        for name, thickness in cores:
+            letter = name if re.fullmatch(LETTER, name) else CORE
+            if letter != name and letter in materials:
+                raise click.UsageError(f"--core {name}: {CORE} is another material already")
+            materials[letter] = known[name] if name in known else _unknown(name, known)
+            thicknesses[letter] = thickness
+        used = {ply.name for ply in self.layup or ()}
+        if default is not None:
+            thicknesses = dict.fromkeys(materials, default) | thicknesses
+        if set(materials) == {""} and not any(used):
+            return AuthoredLaminate(self.angles, materials[""], default)
+        return AuthoredLaminate(self.layup or (), materials, thicknesses)
+
     def laminate(self) -> tuple[Laminate, dict[str, str]]:
         """Laminate, checked as in a deck, and the names of its units."""
-        thickness, material = self.ply_thickness, self.material
+        thickness, material = self.thickness, self.named
         if thickness is None and material is not None:
             thickness = material.value("thickness", self.units or material.system)
         if thickness is None:
             raise click.UsageError("--layup needs --ply-thickness")
-        angles = self.layup or ()
+        angles = self.angles
         layers = tuple(Layer(n, angle, thickness) for n, angle in enumerate(angles, start=1))
         integration = Integration(3, 3, -3, thickness * len(layers))
         segment = Material(integration, self.constants(), layers)
@@ -81,16 +136,18 @@ def laminate_options(
     return stacked(
         option(
             "--layup",
-            type=Parsed(parse_layup, "LAYUP"),
+            type=Parsed(parse_plies, "LAYUP"),
             required=required,
-            help='Layup from the struck face, as in "[0/45/0/-45/0]2s".',
+            help='Layup from the struck face, as in "[0/45/0/-45/0]2s"; with letters of materials '
+            'in `fecm new`, as in "[0C/90G]s".',
         ),
         option(
             "--ply-thickness",
-            type=POSITIVE,
+            type=Parsed(_thickness, "[LETTER=]T"),
+            multiple=True,
+            callback=_by_letter,
             required=thickness_required,
-            metavar="T",
-            help=f"Thickness of a ply.{own}",
+            help=f"Thickness of a ply, also of one material.{own}",
         ),
         option(
             "--ply",
@@ -100,8 +157,10 @@ def laminate_options(
         option(
             "--material",
             callback=_named,
-            type=Parsed(str, "NAME", MATERIALS),
-            help="Named ply, instead of --ply; `fecm materials` lists them.",
+            type=Parsed(str, "[LETTER=]NAME", MATERIALS),
+            multiple=True,
+            help="Named ply, instead of --ply; `fecm materials` lists them.  With a letter, as in "
+            "C=IM7/8552, that of the plies with this letter in the layup.",
         ),
         option(
             "--materials",
@@ -123,11 +182,58 @@ def laminate_options(
     )
 
 
-def _named(context: click.Context, parameter: click.Parameter, name: str | None) -> NamedPly | None:
-    """Callback of --material: the ply of a name."""
+def _lettered(text: str) -> tuple[str, str]:
+    """Letter and value of ``C=VALUE``; the letter is empty without one."""
+    match = re.fullmatch(rf"\s*({LETTER})\s*=\s*(.*)", text)
+    return (match[1], match[2]) if match else ("", text)
+
+
+def _thickness(text: str) -> tuple[str, float]:
+    """Read a thickness, perhaps with a letter."""
+    letter, value = _lettered(text)
+    return letter, float(POSITIVE.convert(value, None, None))
+
+
+def _by_letter(
+    context: click.Context, parameter: click.Parameter, given: Iterable[tuple[str, float]]
+) -> dict[str, float] | None:
+    """Callback of values by letter; None if there are none."""
+    return unique(given, context, parameter) or None
+
+
+def unique(
+    given: Iterable[tuple[str, T]], context: click.Context, parameter: click.Parameter
+) -> dict[str, T]:
+    """Values by name, none of which is given twice."""
+    found: dict[str, T] = {}
+    for name, value in given:
+        if name in found:
+            said = f"{name} is given twice" if name else "give it once, or with letters"
+            raise click.BadParameter(said, context, parameter)
+        found[name] = value
+    return found
+
+
+def _named(
+    context: click.Context, parameter: click.Parameter, names: Sequence[str]
+) -> dict[str, NamedPly] | None:
+    """Callback of --material: the plies of names, by letter; None if there are none."""
     plies: dict[str, NamedPly] = MATERIALS | context.meta[_META]
-    if name is None or name in plies:
-        return plies.get(name or "")
-    near = ", ".join(difflib.get_close_matches(name, plies, cutoff=0.4))
+    given = [("", name) if name in plies else _lettered(name) for name in names]
+    found = {
+        letter: plies[name] if name in plies else _unknown(name, plies, context, parameter)
+        for letter, name in unique(given, context, parameter).items()
+    }
+    return found or None
+
+
+def _unknown(
+    name: str,
+    plies: Iterable[str],
+    context: click.Context | None = None,
+    parameter: click.Parameter | None = None,
+) -> NoReturn:
+    """Refuse a name that no ply has."""
+    near = ", ".join(difflib.get_close_matches(name, filter(None, plies), cutoff=0.4))
     hint = f"did you mean {near}?" if near else "`fecm materials` lists them"
     raise click.BadParameter(f"{name!r} is not a named ply; {hint}", context, parameter)

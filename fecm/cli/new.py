@@ -17,14 +17,20 @@ from fecm.api import load_deck
 from fecm.authoring.contact import Sphere, parse_patch
 from fecm.authoring.fixtures import CUSTOM, FIXTURES
 from fecm.authoring.impact import Authored, Request, Strike, author
-from fecm.authoring.laminate import Laminate
 from fecm.authoring.mesh import InPlane
 from fecm.authoring.numerics import AUTO, EQUI, FULL, MITC, Numerics, Quadrature
 from fecm.authoring.parameters import ObjectError
 from fecm.authoring.plate import MOST, Plate, Support
+from fecm.authoring.zones import Zone
 from fecm.cli.common import DASH, RefusedError, echo, note, write_text
 from fecm.cli.help import GroupedCommand, typical
-from fecm.cli.laminate_options import PLIES, LaminateOptions, laminate_options
+from fecm.cli.laminate_options import (
+    LETTER,
+    PLIES,
+    LaminateOptions,
+    laminate_options,
+    unique,
+)
 from fecm.cli.options import FILE_PATH, POSITIVE, Finite, Parsed, assignment, collected, list_of
 from fecm.deck.catalogue import (
     CONTACTS,
@@ -36,7 +42,8 @@ from fecm.deck.catalogue import (
 )
 from fecm.deck.format import format_deck
 from fecm.deck.grid import IN_PLANE, SUPPORTS
-from fecm.deck.model import Deck, Indentation, Material, Nonlinear, Patch, Shear
+from fecm.deck.layup import parse_plies
+from fecm.deck.model import Deck, Indentation, Material, Nonlinear, Patch, Ply, Shear
 from fecm.mechanics.points import DISC, RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.plate_mesh import BOUNDARY
@@ -89,6 +96,33 @@ def _mesh(text: str) -> tuple[int, int] | Path:
     return path
 
 
+def _ply_of(text: str) -> tuple[str, Ply]:
+    """Name and constants of a material."""
+    name, equals, values = text.partition("=")
+    if not (name and equals):
+        raise ValueError(f"{text!r} is not NAME=RHO,NU12,E1,E2,G12,G13,G23")
+    return name, Ply(*list_of("RHO,NU12,E1,E2,G12,G13,G23", Finite(), [7])(values))
+
+
+def _core(text: str) -> tuple[str, float]:
+    """Name and thickness of a core."""
+    name, _, thickness = text.rpartition(":")
+    if not name:
+        raise ValueError(f"{text!r} is not NAME:T, as in Divinycell-H60:10")
+    return name, float(POSITIVE.convert(thickness, None, None))
+
+
+def _zone(text: str) -> Zone:
+    """Rectangle or group of a zone, and its layup."""
+    place, _, layup = text.rpartition(":")
+    if not place:
+        raise ValueError(f"{text!r} is not X0,Y0,X1,Y1:LAYUP or GROUP:LAYUP")
+    plies = parse_plies(layup)
+    if place.count(",") != 3:
+        return place, plies
+    return list_of("X0,Y0,X1,Y1", Finite(), [4])(place), plies
+
+
 GROUPS = {
     "Plate": ("size", "mesh", "grading", "columns", "rows", "nonlinear", "preload"),
     "Laminate": (
@@ -97,6 +131,9 @@ GROUPS = {
         "material",
         "file",
         "ply",
+        "ply_of",
+        "core",
+        "zone",
         "units",
         "damage",
         "giic",
@@ -134,6 +171,9 @@ class Options:
     damage: bool
     giic: float | None
     cure: str | None
+    ply_of: dict[str, Ply]
+    core: tuple[tuple[str, float], ...]
+    zone: tuple[Zone, ...]
     support: Support
     edges: tuple[tuple[str, Support], ...]
     fixture: str | None
@@ -235,6 +275,27 @@ class Options:
     "in the deck's units or with a unit, as in -50N/mm,0.",
 )
 @laminate_options(required=True)
+@option(
+    "--ply-of",
+    type=Parsed(_ply_of, "NAME=RHO,NU12,E1,E2,G12,G13,G23"),
+    multiple=True,
+    callback=lambda context, parameter, given: unique(given, context, parameter),
+    help="Constants of a material, in the deck's units: of a letter of the layup, or of a --core.",
+)
+@option(
+    "--core",
+    type=Parsed(_core, "NAME:T"),
+    multiple=True,
+    help="Core of a sandwich and its thickness, as in Divinycell-H60:10: a named material, which "
+    "is K in the layup, as in [0/90/K/90/0]; or a letter of the layup.",
+)
+@option(
+    "--zone",
+    type=Parsed(_zone, "X0,Y0,X1,Y1:LAYUP"),
+    multiple=True,
+    help="Layup of the elements whose centres lie in a rectangle, of the same materials; or of a "
+    "group of surfaces of the mesh, as in PATCH:[0/90]4s.  A later zone goes over an earlier one.",
+)
 @option(
     "--damage",
     is_flag=True,
@@ -419,7 +480,7 @@ def _author(options: Options, given: Collection[str]) -> Authored:
     return author(
         Request(
             plate,
-            Laminate(laminate.layup or (), laminate.one_ply(), laminate.ply_thickness),
+            laminate.authored(options.ply_of, options.core),
             Strike(
                 options.projectile,
                 contact if law is None else Indentation(*law),
@@ -443,6 +504,7 @@ def _author(options: Options, given: Collection[str]) -> Authored:
             giic=options.giic,
             cure=options.cure,
             title=options.title,
+            zones=options.zone,
         )
     )
 

@@ -67,7 +67,7 @@ def effective_stiffness(
     ply: PlyConstants | Sequence[PlyConstants],
     angles: Sequence[float],
     thicknesses: Sequence[float],
-    nu23: float,
+    nu23: float | Sequence[float],
 ) -> Floats:
     """Stiffness of the homogeneous solid with the laminate's averages, (6, 6).
 
@@ -76,9 +76,9 @@ def effective_stiffness(
     """
     share = np.array(thicknesses) / np.sum(thicknesses)
     plies = ply if isinstance(ply, Sequence) else [ply] * len(angles)
-    C = np.array(
-        [_turned(ply_stiffness(own, nu23), angle) for own, angle in zip(plies, angles, strict=True)]
-    )
+    ratios = nu23 if isinstance(nu23, Sequence) else [nu23] * len(angles)
+    layers = zip(plies, ratios, angles, strict=True)
+    C = np.array([_turned(ply_stiffness(own, ratio), angle) for own, ratio, angle in layers])
     aa, ab, bb = (C[:, rows][:, :, columns] for rows, columns in ((_A, _A), (_A, _B), (_B, _B)))
     R = np.linalg.inv(bb)
     Q = ab @ R

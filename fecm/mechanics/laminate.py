@@ -21,6 +21,7 @@ from fecm._typing import Floats
 # The slip ``small-stiffness`` sets entries of A, B and D below the first limit to 0, except
 # rounding errors below the second one, relative to A h^n.
 LISTING_LEAST = 1.0e-6
+SOFT_CORE = 1.0 / 50.0  # G13 of a sandwich's core over that of its faces, at most
 ROUNDING = 1.0e-12
 
 

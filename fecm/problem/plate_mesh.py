@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -29,7 +29,8 @@ from fecm.deck.model import Boundary, Coordinates, ElementNodes, Elements, NodeV
 Integers = NDArray[np.int_]
 # Kinds of cells by their number of nodes: meshio's name, which is that of the corners' number too.
 KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
-LINES = ("vertex", "line", "line3")
+DIMENSIONS = {"vertex": 0, "line": 1, "line3": 1}  # of the cells of groups of nodes
+LINES = tuple(DIMENSIONS)
 # Name of all sides that belong to one element, unless the mesh has a group of that name.
 BOUNDARY = "boundary"
 ELSEWHERE = (".xdmf", ".xmf")  # formats whose files name other files
@@ -50,6 +51,7 @@ class PlateMesh:
     cells: Integers  # nodes of the elements, from 0
     groups: dict[str, Integers]  # nodes by the name of a group, from 0
     middles: Integers  # nodes put in the middles of straight sides, from 0
+    surfaces: Mapping[str, Integers] = field(default_factory=dict)  # elements of groups, from 0
 
     def __repr__(self) -> str:
         return f"<{self.nodes} nodes, {self.elements} elements, groups {list(self.groups)}>"
@@ -196,27 +198,40 @@ def from_meshio(read: MeshLike, where: str = "") -> PlateMesh:
         must = "all must be triangles of 3 or 6 nodes, or all quadrilaterals of 4, 8 or 9"
         raise MeshError(f"{where}the mesh has {what}; {must}")
     groups: dict[str, list[Any]] = {}
+    surfaces: dict[str, list[Any]] = {}
+    first = 0  # number of the next element
     names = {(int(tag), int(dim)): name for name, (tag, dim) in read.field_data.items()}
     for number, block in enumerate(read.cells):
+        found, rows = groups, block.data
         if number in blocks:
-            continue
+            found, rows = surfaces, np.arange(len(block.data)) + first
+            first += len(block.data)
         if "gmsh:physical" in read.cell_data:
             tags = read.cell_data["gmsh:physical"][number]
             for tag in np.unique(tags[tags > 0]).tolist():
-                name = names.get((tag, 0 if block.type == "vertex" else 1), str(tag))
-                groups.setdefault(name, []).append(block.data[tags == tag])
+                name = names.get((tag, 2 if number in blocks else DIMENSIONS[block.type]), str(tag))
+                found.setdefault(name, []).append(rows[tags == tag])
         for name, sets in read.cell_sets.items():
             if not name.startswith("gmsh:") and name not in read.field_data:
-                groups.setdefault(name, []).append(block.data[np.asarray(sets[number], int)])
+                found.setdefault(name, []).append(rows[np.asarray(sets[number], int)])
     for name, rows in read.point_sets.items():
         groups.setdefault(name, []).append(rows)
-    flat = {name: np.concatenate([np.ravel(p) for p in parts]) for name, parts in groups.items()}
     cells = np.concatenate([block.data for block in blocks.values()])
-    return plate_mesh(read.points, cells, {k: v for k, v in flat.items() if len(v)}, where)
+    return plate_mesh(read.points, cells, _joined(groups), where, _joined(surfaces))
+
+
+def _joined(groups: Mapping[str, list[Any]]) -> dict[str, Integers]:
+    """Numbers of each group that has any."""
+    flat = {name: np.concatenate([np.ravel(p) for p in parts]) for name, parts in groups.items()}
+    return {name: numbers for name, numbers in flat.items() if len(numbers)}
 
 
 def plate_mesh(
-    points: ArrayLike, cells: ArrayLike, groups: Mapping[str, ArrayLike], where: str = ""
+    points: ArrayLike,
+    cells: ArrayLike,
+    groups: Mapping[str, ArrayLike],
+    where: str = "",
+    surfaces: Mapping[str, ArrayLike] | None = None,
 ) -> PlateMesh:
     """Elements of a plate from points and cells.
 
@@ -224,8 +239,8 @@ def plate_mesh(
     nodes replace a triangle; a quadrilateral of 8 nodes gets its centre as the ninth.
 
     The points, (n, 2) or (n, 3), are in a plane z = const.  Cells, (m, k), and groups have points
-    from 0; a cell has corners, mid-sides (the first between corners 1 and 2), centre.  `where`
-    begins messages.  Raises MeshError if they are not the mesh of a plane plate.
+    from 0; a cell has corners, mid-sides (the first between corners 1 and 2), centre.  Surfaces
+    have cells from 0.  `where` begins messages.  Raises MeshError if they are not the mesh of a plane plate.
     """
     try:
         places, nodes = np.array(points, float), np.array(cells)
@@ -244,7 +259,7 @@ def plate_mesh(
         low, high = places[:, 2].min(), places[:, 2].max()
         raise MeshError(f"{where}the mesh is not in a plane z = const: z is {low:g} to {high:g}")
     nodes = _turned(places[:, :2], nodes, size, where)
-    count = len(places)
+    count, asked = len(places), len(nodes)
     places, nodes, new = _quadrilaterals(places[:, :2], nodes, rows)
     used, numbers = np.unique(nodes, return_inverse=True)
     kept = {name: np.flatnonzero(np.isin(used, group)) for name, group in rows.items()}
@@ -252,7 +267,12 @@ def plate_mesh(
         raise MeshError(f"{where}no node of the group {lost[0]!r} belongs to an element")
     rounded = [[round_to(value, size) for value in place] for place in places[used].tolist()]
     middles = np.flatnonzero((used >= count) & (used < count + new))
-    made = PlateMesh(np.array(rounded), numbers.reshape(nodes.shape), kept, middles)
+    parts = len(nodes) // asked  # elements that replace a cell
+    zones = {
+        name: (parts * np.asarray(rows, int)[:, None] + np.arange(parts)).ravel()
+        for name, rows in (surfaces or {}).items()
+    }
+    made = PlateMesh(np.array(rounded), numbers.reshape(nodes.shape), kept, middles, zones)
     if (_sides(made.cells)[2] > 2).any():
         raise MeshError(f"{where}elements overlap: more than two share a side")
     return made

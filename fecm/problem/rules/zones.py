@@ -10,14 +10,13 @@ from fecm.deck.macros import flat
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.record import Record
 from fecm.deck.rules import Report, Reports, Subject, reports, rule
-from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.laminate import SOFT_CORE, Laminate
 from fecm.problem.problem import Problem
 from fecm.problem.rules.cure import FIELDS
 
 LARGEST_COUPLING = 0.02  # of I1 over I0 h, from which on it is told
 # Segments whose unreadable cards would be missing materials and laminates.
 KEYWORDS = {kind.keyword for kind in (model.Material, model.Materials, model.Laminates)}
-SOFT_CORE = 1.0 / 50.0  # G13 of a core over that of the faces
 
 
 def _materials(deck: model.Deck) -> tuple[model.NumberedPly, ...]:

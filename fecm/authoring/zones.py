@@ -1,0 +1,114 @@
+"""Zones of a plate that have a laminate of their own."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from fecm._typing import Bools, Indices
+from fecm.authoring.laminate import Laminate, Layup
+from fecm.authoring.mesh import AnyMesh
+from fecm.authoring.parameters import ObjectError
+from fecm.deck import model
+from fecm.deck.material_cards import MATERIAL
+from fecm.mechanics.mesh import Mesh
+from fecm.problem.generate import generate
+from fecm.problem.plate_mesh import PlateMesh
+
+SAME = 1e-6  # share of an element's size by which it may pass a zone's edge
+CORNERS = 4
+
+# A rectangle x0, y0, x1, y1 or the name of a group of elements, and a layup or a laminate.
+Place = str | Sequence[float]
+Zone = tuple[Place, Layup | Laminate]
+
+
+class Zones(NamedTuple):
+    """Laminates of the elements of a plate."""
+
+    struck: int  # number of the laminate under the load
+    card: model.Zones | None  # None if all elements have that of the plate
+
+
+def laminates_of(laminate: Laminate, zones: Sequence[Zone]) -> list[Laminate]:
+    """Laminates of the zones; a layup has the materials of the plate's laminate."""
+    try:
+        own = [layup for _, layup in zones]
+    except (TypeError, ValueError):
+        raise ObjectError(f"`zones` is {zones!r}, not pairs of a place and a layup") from None
+    return [one if isinstance(one, Laminate) else replace(laminate, layup=one) for one in own]
+
+
+def placed_zones(
+    zones: Sequence[Zone], laminates: Sequence[int], mesh: AnyMesh, node: int, doubts: list[str]
+) -> Zones:
+    """Elements of zones, the later ones over the earlier; `laminates` are the numbers of theirs.
+
+    A rectangle has the elements whose centres lie in it; one whose edge cuts elements is doubted.
+    """
+    if not zones:
+        return Zones(MATERIAL, None)
+    control = model.Control(mesh.nodes, mesh.elements, 1, 2, 5, mesh.most_nodes)
+    made = generate(model.Deck("", control, (mesh.coordinates(), mesh.element_cards()), ()))
+    numbers = np.full(mesh.elements, MATERIAL)
+    for (place, _), laminate in zip(zones, laminates, strict=True):
+        inside = _group(mesh, place) if isinstance(place, str) else _rectangle(made, place, doubts)
+        numbers[inside] = laminate
+    struck = int(numbers[(made.elements == node).any(axis=1)][0])
+    records = _runs(numbers)
+    return Zones(struck, model.Zones(records) if records else None)
+
+
+def _group(mesh: AnyMesh, name: str) -> Indices:
+    """Elements of a group of surfaces."""
+    surfaces = mesh.surfaces if isinstance(mesh, PlateMesh) else {}
+    if name not in surfaces:
+        known = f"its groups of elements are {', '.join(sorted(surfaces))}"
+        raise ObjectError(
+            f"`zone` {name!r} is no rectangle x0,y0,x1,y1 and no group of the mesh; "
+            f"{known if surfaces else 'it has no groups of elements'}"
+        )
+    return surfaces[name]
+
+
+def _rectangle(mesh: Mesh, place: Sequence[float], doubts: list[str]) -> Bools:
+    """Which elements have their centres in a rectangle."""
+    try:
+        x0, y0, x1, y1 = map(float, place)
+    except (TypeError, ValueError):
+        raise ObjectError(f"`zone` is at {place!r}, not x0, y0, x1 and y1 or a group") from None
+    said = f"`zone` {x0:g},{y0:g},{x1:g},{y1:g}"
+    if not (x0 < x1 and y0 < y1):
+        raise ObjectError(f"{said} is empty: x0 and y0 are its lower corner, x1 and y1 its upper")
+    corners = mesh.coordinates[mesh.elements[:, :CORNERS] - 1]
+    centres = corners.mean(axis=1)
+    low, high = np.array([x0, y0]), np.array([x1, y1])
+    inside = np.asarray(((centres >= low) & (centres <= high)).all(axis=1))
+    if not inside.any():
+        raise ObjectError(f"{said} has no element whose centre lies in it")
+    least, most = corners.min(axis=1), corners.max(axis=1)
+    slack = SAME * (most - least)
+    within = ((least >= low - slack) & (most <= high + slack)).all(axis=1)
+    beside = ((most <= low + slack) | (least >= high - slack)).any(axis=1)
+    if cut := int((~within & ~beside).sum()):
+        reach = ", ".join(f"{n:.6g}" for n in (*least[inside].min(0), *most[inside].max(0)))
+        doubts.append(
+            f"the edge of {said} cuts {cut} elements; those whose centres lie in it have its "
+            f"laminate, and it reaches over {reach}"
+        )
+    return inside
+
+
+def _runs(numbers: Indices) -> tuple[model.Zone, ...]:
+    """Cards of consecutive elements of one laminate; those of the plate's need none."""
+    starts = np.flatnonzero(np.diff(numbers, prepend=MATERIAL - 1))
+    ends = [*starts[1:].tolist(), len(numbers)]
+    runs = zip(starts.tolist(), ends, strict=True)
+    return tuple(
+        model.Zone(start + 1, end, 0, int(numbers[start]))
+        for start, end in runs
+        if numbers[start] != MATERIAL
+    )
