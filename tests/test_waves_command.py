@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from fecm.cli.laminate_options import LaminateOptions
+from fecm.deck.layup import LayupPly
 from fecm.plot.kinds import PlotError
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from tests.builders import general_plate, report_plate, table
@@ -343,8 +344,8 @@ def test_of_a_deck_with_several_problems_the_first_is_taken(tmp_path: Path) -> N
 
 def test_options_make_the_laminate_of_their_plies() -> None:
     options = LaminateOptions(
-        layup=(0.0, 30.0, 70.0),
-        ply_thickness=0.1,
+        layup=[LayupPly(0.0), LayupPly(30.0), LayupPly(70.0)],
+        ply_thickness={"": 0.1},
         ply=(1.5, 0.3, 20, 1.5, 0.9, 0.8, 0.5),
         material=None,
         units="m-N-s",

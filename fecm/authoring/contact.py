@@ -35,7 +35,7 @@ class Sphere:
     poisson: float | None = None
 
     def law(self, plies: Plies, layers: Sequence[Layer]) -> tuple[Indentation, str]:
-        """Law of contact with layers, and comment lines of the deck which say how k was computed."""
+        """Law of contact with layers, and comment lines which say how k was computed."""
         if self.radius is None:
             raise ObjectError("the `contact` estimate needs the sphere's radius")
         if self.modulus is None and plies.system is None:

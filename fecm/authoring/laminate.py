@@ -213,7 +213,9 @@ class Plies(NamedTuple):
         made: list[Segment] = [Material(integration, first.ply, own)]
         if others:
             numbered = enumerate(others, start=MATERIAL + 1)
-            made.append(Materials(tuple(NumberedPly(MaterialNumber(n), b.ply) for n, b in numbered)))
+            made.append(
+                Materials(tuple(NumberedPly(MaterialNumber(n), b.ply) for n, b in numbered))
+            )
         if zones:
             heads = [LaminateNumber(n, len(z)) for n, z in enumerate(zones, start=MATERIAL + 1)]
             made.append(Laminates(tuple(map(NumberedLaminate, heads, zones))))

@@ -24,13 +24,7 @@ from fecm.authoring.plate import MOST, Plate, Support
 from fecm.authoring.zones import Zone
 from fecm.cli.common import DASH, RefusedError, echo, note, write_text
 from fecm.cli.help import GroupedCommand, typical
-from fecm.cli.laminate_options import (
-    LETTER,
-    PLIES,
-    LaminateOptions,
-    laminate_options,
-    unique,
-)
+from fecm.cli.laminate_options import PLIES, LaminateOptions, laminate_options, unique
 from fecm.cli.options import FILE_PATH, POSITIVE, Finite, Parsed, assignment, collected, list_of
 from fecm.deck.catalogue import (
     CONTACTS,

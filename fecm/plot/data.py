@@ -26,8 +26,8 @@ LARGEST = 1e100  # larger numbers are refused: axes fail long before numbers ove
 MANY = 2000  # meshes with more elements are drawn with fewer points per element
 
 
-def require(result: Result, name: str, *paths: str) -> list[Array]:
-    """Datasets of a result.
+def require(result: Result, name: str, *paths: str, may_lack: bool = False) -> list[Array]:
+    """Datasets of a result, whose values may be NaN where they are not known with `may_lack`.
 
     Raises LackingError if one is missing (the message names the macro that stores it) or empty,
     PlotError if it holds numbers that an axis can't show.
@@ -38,7 +38,9 @@ def require(result: Result, name: str, *paths: str) -> list[Array]:
     for path in paths:
         if not result[path].size:
             raise LackingError(f"{name} has no rows of {path}")
-        if not (np.abs(result[path]) <= LARGEST).all():
+        values = result[path]
+        sound = np.abs(values) <= LARGEST
+        if not (sound | np.isnan(values) if may_lack else sound).all():
             raise PlotError(
                 f"{path} of {name} holds numbers beyond ±{LARGEST:g}, infinities or NaN, which "
                 "can't be drawn"

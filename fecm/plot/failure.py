@@ -141,13 +141,15 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
         path = f"failure/{criterion}/exposure"
         if criterion == BETWEEN and not quantity and path in result and not result[path].size:
             continue  # a single ply
-        (values,) = require(result, name, path)
+        # NaN: plies that an element does not have, or without strengths.
+        (values,) = require(result, name, path, may_lack=True)
         if criterion == BETWEEN:
-            field, outside = values.max(axis=1)[:, None], values[~whole[:, 0]]
+            field, outside = np.fmax.reduce(values, axis=1)[:, None], values[~whole[:, 0]]
         else:
-            field, outside = values.max(axis=(2, 3)), values[~under].max(axis=2)
+            at_faces = np.fmax.reduce(values, axis=3)
+            field, outside = np.fmax.reduce(at_faces, axis=2), at_faces[~under]
         if len(outside):
-            over_plies[criterion] = outside.max(axis=0)
+            over_plies[criterion] = np.fmax.reduce(outside, axis=0)
         if quantity or criterion != BETWEEN:
             fields.append(np.broadcast_to(field, under.shape))
     names = set(over_plies) - (set() if quantity else {BETWEEN})
@@ -156,7 +158,7 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
         raise PlotError(f"the load is over all elements of {name}: no exposure is left to show")
     worst = max(largest, key=lambda one: one.exposure)
     left_out = whole if quantity == BETWEEN else under
-    return Exposures(left_out, np.max(fields, axis=0), over_plies, worst)
+    return Exposures(left_out, np.fmax.reduce(fields, axis=0), over_plies, worst)
 
 
 def _cells(result: Result, name: str, count: int) -> Floats:
@@ -191,7 +193,7 @@ def _map(axes: Axes, cells: Floats, found: Exposures) -> None:
     """One cell per point."""
     outside = ~found.under_load
     values = found.over_plate[outside]
-    peak = float(values.max())
+    peak = float(np.nanmax(values))
     drawn = PolyCollection(
         list(cells[outside]),
         array=values,
@@ -220,7 +222,7 @@ def _bars(figure: Figure, axes: Axes, found: Exposures) -> None:
     between = found.over_plies.get(BETWEEN)
     entries: dict[str, Artist] = {}
     if plies:
-        largest = np.max(list(plies.values()), axis=0)
+        largest = np.fmax.reduce(list(plies.values()), axis=0)
         number = np.arange(1, len(largest) + 1)
         alone = next(iter(plies)) if len(plies) == 1 else ""
         axes.barh(number, largest, height=0.8, color=COLOUR_OF[alone] if alone else "0.85")
@@ -242,7 +244,9 @@ def _bars(figure: Figure, axes: Axes, found: Exposures) -> None:
     style.legend(figure, list(entries.values()), list(entries))
     count = max(map(len, found.over_plies.values()))
     axes.set_ylim(count + 0.6, 0.4)
-    axes.set_xlim(0.0, 1.05 * max(1.0, *(values.max() for values in found.over_plies.values())))
+    axes.set_xlim(
+        0.0, 1.05 * max(1.0, *(np.nanmax(values) for values in found.over_plies.values()))
+    )
     axes.yaxis.set_major_locator(MaxNLocator(TICKS, integer=True, min_n_ticks=1))
     axes.set_ylabel("Ply (1: struck face)" if plies else "Interface below ply (1: struck face)")
     axes.set_xlabel("Largest exposure")

@@ -240,7 +240,8 @@ def plate_mesh(
 
     The points, (n, 2) or (n, 3), are in a plane z = const.  Cells, (m, k), and groups have points
     from 0; a cell has corners, mid-sides (the first between corners 1 and 2), centre.  Surfaces
-    have cells from 0.  `where` begins messages.  Raises MeshError if they are not the mesh of a plane plate.
+    have cells from 0.  `where` begins messages.  Raises MeshError if they are not the mesh of a
+    plane plate.
     """
     try:
         places, nodes = np.array(points, float), np.array(cells)

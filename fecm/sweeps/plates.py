@@ -14,7 +14,6 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.layup import LayupError, parse_layup
-from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Layer, NodeCodes, NodeValues
 from fecm.mechanics.mesh import element_blocks, holds_the_plane
 from fecm.mechanics.points import locate
@@ -39,17 +38,55 @@ def swapped(deck: model.Deck, old: model.Segment | None, new: model.Segment) -> 
 
 
 def set_layup(deck: model.Deck, value: Value) -> model.Deck:
-    """Change the angles and their number; all plies keep the thickness of the deck."""
-    thickness = _common_thickness("layup", deck)
-    if any(layer.material != MATERIAL for layer in deck.require(model.Material).layers):
-        raise CasesError("layup: the plies of the deck have other materials than that of MATE")
+    """Change the angles and their number; all plies keep the thickness of the deck.
+
+    As many angles as the deck has layers leave each its own material and thickness.
+    """
     try:
         angles = parse_layup(str(value))
     except LayupError as error:
         raise CasesError(f"layup: {error}") from None
-    layers = [Layer(n, angle, thickness) for n, angle in enumerate(angles, start=1)]
+    old = deck.require(model.Material)
+    if any(layer.material != old.layers[0].material for layer in old.layers):
+        if len(angles) != len(old.layers):
+            raise CasesError(
+                f"layup: the {len(old.layers)} layers of the deck have several materials, and this "
+                f"layup {len(angles)} plies"
+            )
+        return swapped(deck, old, replace(old, layers=_each(old.layers, "angle", angles)))
+    thickness = _common_thickness("layup", deck)
+    number = old.layers[0].material
+    layers = [Layer(n, angle, thickness, number) for n, angle in enumerate(angles, start=1)]
     made = _with_layers(deck, layers, len(angles) * thickness)
     return replace(made, control=replace(deck.control, layers=len(layers), source=None))
+
+
+def set_layer_materials(deck: model.Deck, value: Value) -> model.Deck:
+    """Change the numbers of the materials of the layers, which are written as a layup's angles."""
+    old = deck.require(model.Material)
+    try:
+        numbers = parse_layup(str(value))
+    except LayupError as error:
+        raise CasesError(f"layer_materials: {error}") from None
+    known = sorted(deck.plies)
+    if unknown := [number for number in numbers if number not in known]:
+        listed = ", ".join(map(str, known))
+        raise CasesError(
+            f"layer_materials: the deck has no material {unknown[0]:g}; its materials are {listed}"
+        )
+    if len(numbers) != len(old.layers):
+        raise CasesError(
+            f"layer_materials: {len(numbers)} materials for the deck's {len(old.layers)} layers"
+        )
+    layers = _each(old.layers, "material", [int(number) for number in numbers])
+    return swapped(deck, old, replace(old, layers=layers))
+
+
+def _each(layers: Sequence[Layer], name: str, values: Sequence[float]) -> tuple[Layer, ...]:
+    """Layers with another value of a field for each."""
+    pairs = zip(layers, values, strict=True)
+    changed: list[tuple[Layer, dict[str, Any]]] = [(layer, {name: v}) for layer, v in pairs]
+    return tuple(replace(layer, **fields, source=None) for layer, fields in changed)
 
 
 def set_ply_thickness(deck: model.Deck, value: Value) -> model.Deck:

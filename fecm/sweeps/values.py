@@ -122,6 +122,9 @@ PLATE_VALUES: tuple[Variable[PlateSetter], ...] = (
              meaning="transverse shear modulus across the fibres"),
     Variable("layup", Changes.LAMINATE, "", plates.set_layup, Kind.TEXT,
              meaning="as in [`fecm new`](making.md), with the ply thickness of the deck"),
+    Variable("layer_materials", Changes.LAMINATE, "", plates.set_layer_materials, Kind.TEXT,
+             meaning="numbers of the materials of the layers, written as a layup's angles: "
+                     "`[1/2]s`; `layup` keeps each layer's"),
     Variable("angle", Changes.LAMINATE, "", plates.add_angle,
              meaning="degrees added to the angle of every ply"),
     Variable("preload_x", Changes.LAMINATE, "force/length", plates.preload_force("n_x"),

@@ -1,0 +1,262 @@
+"""Plates of several materials and laminates, by `fecm new` and by objects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.deck import Deck
+from fecm.deck.catalogue import MATERIALS
+from fecm.deck.layup import parse_plies
+from fecm.deck.model import Allowables, Cure, Delamination, Indentation, Material, Zones
+from fecm.problem.plate_mesh import plate_mesh
+from tests.calls import Done, call
+
+PLATE = ("--size", "40x30", "--mesh", "4x3", "--support", "simple", "--patch", "none")
+STRIKE = (
+    "--velocity", "2000", "--projectile", "mass:1e-3", "--duration", "2e-5",
+)  # fmt: skip
+LAW = ("--law", "5e4,0,0,1.5")
+HYBRID = (
+    "--layup", "[0C/90G]s", "--material", "C=IM7/8552", "--material", "G=E-glass/MY750",
+    "--ply-thickness", "C=.125", "--ply-thickness", "G=.25",
+)  # fmt: skip
+SANDWICH = (
+    "--layup", "[0/90/K/90/0]", "--material", "IM7/8552", "--ply-thickness", ".25",
+    "--core", "Divinycell-H60:5", "--shear-factor", "equi",
+)  # fmt: skip
+
+
+def new(*options: str | Path) -> Done:
+    return call("new", "-", *PLATE, *STRIKE, *options)
+
+
+def deck_of(*options: str | Path) -> Deck:
+    made = new(*LAW, *options)
+    assert made.exit_code == 0, made.stderr
+    return fecm.read_one(made.stdout)
+
+
+def rows(deck: Deck, laminate: int = 1) -> list[tuple[float, float, int]]:
+    return [(one.angle, one.thickness, one.material) for one in deck.layers[laminate]]
+
+
+def laminates(deck: Deck) -> list[int]:
+    """Laminate of every element."""
+    numbers = np.ones(deck.control.numel, int)
+    for zone in deck.require(Zones).records:
+        numbers[np.array(zone.elements) - 1] = zone.laminate
+    return numbers.tolist()
+
+
+def test_letters_of_a_layup_name_materials() -> None:
+    plies = parse_plies("[±45C/0_2/K]s")
+    names = [(ply.angle, ply.name) for ply in plies[:5]]
+    assert names == [(45, "C"), (-45, "C"), (0, ""), (0, ""), (0, "K")]
+    assert plies[5:] == plies[4::-1]
+
+
+def test_letters_bind_materials_and_their_thicknesses() -> None:
+    deck = deck_of(*HYBRID)
+    assert rows(deck) == [(0, 0.125, 1), (90, 0.25, 2), (90, 0.25, 2), (0, 0.125, 1)]
+    for number, name in ((1, "IM7/8552"), (2, "E-glass/MY750")):
+        assert deck.plies[number].e1 == MATERIALS[name].ply.e1
+    assert deck.require(Material).integration.thickness == 0.75
+
+
+def test_a_core_is_a_ply_of_its_own_thickness() -> None:
+    deck = deck_of(*SANDWICH)
+    assert rows(deck)[1:4] == [(90, 0.25, 1), (0, 5, 2), (90, 0.25, 1)]
+    assert (deck.plies[2].e1, deck.plies[2].g13) == (75.0, 20.0)
+
+
+def test_constants_of_one_material_have_a_name() -> None:
+    constants = "6e-11,.4,75,75,20,20,20"
+    options = ("--ply-of", f"foam={constants}", "--core", "foam:5", "--units", "mm-N-s")
+    deck = deck_of(*SANDWICH[:6], *options)
+    assert deck.plies == deck_of(*SANDWICH).plies
+    letter = ("--layup", "[0/F/0]", *SANDWICH[2:6], "--ply-of", f"F={constants}", "--core", "F:5")
+    assert rows(deck_of(*letter, "--units", "mm-N-s"))[1] == (0, 5, 2)
+    refused = new(*LAW, *letter)
+    assert refused.exit_code == 2
+    assert "need --units" in refused.stderr
+
+
+def test_a_zone_has_the_elements_whose_centres_lie_in_it() -> None:
+    deck = deck_of(*HYBRID, "--zone", "10,10,30,20:[0C/90G]2s")
+    assert laminates(deck) == [1] * 5 + [2] * 2 + [1] * 5
+    assert len(rows(deck, 2)) == 8
+    assert len(deck.plies) == 2
+
+
+def test_zones_go_over_each_other_in_their_order() -> None:
+    zones = ("--zone", "0,0,20,30:[0C]", "--zone", "0,0,10,30:[0C/90G]s", "--zone", "0,0,4,9:[0C]")
+    made = new(*LAW, *HYBRID, *zones[:4])
+    assert laminates(fecm.read_one(made.stdout)) == [1, 2, 1, 1] * 3
+    assert "cuts" not in made.stderr
+    empty = new(*LAW, *HYBRID, *zones[4:])
+    assert empty.exit_code == 2
+    assert "--zone 0,0,4,9 has no element whose centre lies in it" in empty.stderr
+
+
+def test_a_zone_that_cuts_elements_is_told() -> None:
+    made = new(*LAW, *HYBRID, "--zone", "9,10,26,20:[0C/90G]2s")
+    assert "cuts 2 elements" in made.stderr
+    assert "reaches over 10, 10, 30, 20" in made.stderr
+    assert laminates(fecm.read_one(made.stdout)) == [1] * 5 + [2] * 2 + [1] * 5
+
+
+def test_damage_has_strengths_of_every_material_and_the_least_toughness() -> None:
+    deck = deck_of("--layup", "[0A/90B]s", "--material", "A=AS4/8552", "--material", "B=IM7/8552",
+                   "--damage")  # fmt: skip
+    strengths = deck.require(Allowables)
+    found = {one.material: one.xt for one in (strengths, *strengths.others)}
+    assert found == {1: 2207.0, 2: 2326.2}
+    assert deck.require(Delamination).toughness == 0.7879
+
+
+def test_materials_without_strengths_are_named() -> None:
+    made = new(*LAW, *SANDWICH[:6], "--core", "F:5", "--ply-of", "F=6e-11,.4,75,75,20,20,20",
+               "--units", "mm-N-s", "--damage", "--layup", "[0/F/0]")  # fmt: skip
+    assert made.exit_code == 0
+    assert "W498" in made.stderr
+
+
+def test_cure_has_the_expansions_of_every_material() -> None:
+    deck = deck_of("--layup", "[0C/90G]s", "--material", "C=T300/914", "--material",
+                   "G=E-glass/MY750", "--ply-thickness", ".125", "--cure", ":20")  # fmt: skip
+    cure = deck.require(Cure)
+    assert cure.delta_t == -100.0
+    assert [(one.material, one.alpha1) for one in cure.expansions] == [(1, -1e-6), (2, 8.6e-6)]
+    other = new(*LAW, "--layup", "[0C/90G]s", "--material", "C=AS4/3501-6", "--material",
+                "G=E-glass/MY750", "--ply-thickness", ".125", "--cure", ":20")  # fmt: skip
+    assert other.exit_code == 2
+    assert "stress-free temperature of AS4/3501-6 and E-glass/MY750 is not the same" in other.stderr
+
+
+def test_k_is_that_of_the_laminate_under_the_impact() -> None:
+    zone = ("--zone", "0,0,40,30:[0G]8")
+    sphere = ("--contact", "estimate:8")
+    glass = new("--layup", "[0]8", "--material", "E-glass/MY750", "--ply-thickness", ".25", *sphere)
+    both = new(*HYBRID, *zone, *sphere)
+    k = [fecm.read_one(made.stdout).require(Indentation).k for made in (glass, both)]
+    assert k[0] == k[1]
+
+
+def test_k_of_a_sandwich_is_doubted() -> None:
+    assert "k is estimated of a sandwich" in new(*SANDWICH, "--contact", "estimate:8").stderr
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--layup", "[0X]", *HYBRID[2:]), "has the material 'X'; the materials given are C, G"),
+        (("--layup", "[0]", *HYBRID[2:]), "a ply without a material"),
+        ((*HYBRID, "--material", "C=T300/914"), "C is given twice"),
+        ((*HYBRID, "--zone", "1,1,1,2:[0C]"), "--zone 1,1,1,2 is empty"),
+        ((*HYBRID, "--zone", "pad:[0C]"), "no group of the mesh"),
+        ((*HYBRID, "--zone", "[0C]"), "is not X0,Y0,X1,Y1:LAYUP"),
+        ((*SANDWICH[:6], "--core", "balza:5"), "'balza' is not a named ply"),
+    ],
+)
+def test_mistakes_are_told(options: tuple[str, ...], message: str) -> None:
+    made = new(*LAW, *options)
+    assert made.exit_code == 2
+    assert message in " ".join(made.stderr.split())
+    assert "Traceback" not in made.stderr
+
+
+def objects(laminate: fecm.Laminate, **options: object) -> Deck:
+    plate = fecm.Plate.rectangle((40, 30), (4, 3), support="simple")
+    mass, law = fecm.RigidMass(1e-3), fecm.Contact(5e4, 0.0, 0.0, 1.5)
+    return fecm.impact(
+        plate,
+        laminate,
+        mass,
+        law,
+        velocity=2000.0,
+        duration=2e-5,
+        patch=None,
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def test_objects_make_the_same_deck() -> None:
+    bound = {"C": "IM7/8552", "G": "E-glass/MY750"}
+    wanted = deck_of(*HYBRID, "--zone", "10,10,30,20:[0C/90G]2s").to_text()
+    text = fecm.Laminate("[0C/90G]s", bound, {"C": 0.125, "G": 0.25})
+    c, g = (0, "C", 0.125), (90, "G", 0.25)
+    tuples = fecm.Laminate([c, g, g, c], bound, {"C": 0.125, "G": 0.25})
+    direct = fecm.Laminate([(0, "IM7/8552", 0.125), (90, "E-glass/MY750", 0.25)])
+    for laminate in (text, tuples):
+        assert laminate.thickness == 0.75
+        made = objects(laminate, zones=[((10, 10, 30, 20), "[0C/90G]2s")])
+        assert made.to_text() == wanted
+    own = objects(text, zones=[((10, 10, 30, 20), direct)])
+    assert rows(own, 2) == [(0, 0.125, 3), (90, 0.25, 4)]
+
+
+def test_groups_of_surfaces_carry_laminates() -> None:
+    points = [(x, y) for y in (0, 10, 20) for x in (0, 10, 20)]
+    cells = [
+        [0, 1, 4],
+        [0, 4, 3],
+        [
+            1,
+            2,
+            5,
+        ],
+        [1, 5, 4],
+        [3, 4, 7],
+        [3, 7, 6],
+        [4, 5, 8],
+        [4, 8, 7],
+    ]
+    made = plate_mesh(points, cells, {}, surfaces={"pad": [2, 3]})
+    centres = made.points[made.cells].mean(axis=1)
+    inside = np.flatnonzero((centres[:, 0] > 10) & (centres[:, 1] < 10))
+    assert made.surfaces["pad"].tolist() == inside.tolist()
+
+
+def test_physical_surfaces_of_gmsh_carry_laminates(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio")
+    points = [(10.0 * x, 10.0 * y, 0.0) for y in range(3) for x in range(4)]
+    cells = np.array([[n, n + 1, n + 5, n + 4] for n in (0, 1, 2, 4, 5, 6)])
+    tags = np.array([1, 2, 1, 1, 2, 1])
+    mesh = meshio.Mesh(
+        points, [("quad", cells)],
+        cell_data={"gmsh:physical": [tags], "gmsh:geometrical": [tags]},
+        field_data={"plate": np.array([1, 2]), "pad": np.array([2, 2])},
+    )  # fmt: skip
+    file = tmp_path / "plate.msh"
+    mesh.write(file, file_format="gmsh22")
+    made = call("new", "-", "--mesh", file, "--edge", "boundary=simple", *STRIKE, *LAW, *HYBRID,
+                "--zone", "pad:[0C/90G]2s")  # fmt: skip
+    assert made.exit_code == 0, made.stderr
+    assert laminates(fecm.read_one(made.stdout)) == [1, 2, 1, 1, 2, 1]
+
+
+def test_a_sweep_over_materials_of_layers_is_that_of_single_runs() -> None:
+    deck = objects(fecm.Laminate("[0C/90G]s", {"C": "IM7/8552", "G": "E-glass/MY750"}, 0.25))
+    dt = next(macro.value for macro in deck.macros if macro.word == "DT") / 4
+    swept = fecm.sweep(deck, {"layer_materials": ["[1/2]s", "[2/1]s"], "dt": [dt]})
+    other = objects(fecm.Laminate("[0G/90C]s", {"C": "IM7/8552", "G": "E-glass/MY750"}, 0.25))
+    peaks = [fecm.run(one.with_(dt=dt)).max_force for one in (deck, other)]
+    assert swept["peak_force"].tolist() == pytest.approx(peaks, rel=1e-9)
+    assert peaks[0] != peaks[1]
+
+
+def test_a_layup_of_a_sweep_keeps_the_material_of_each_layer() -> None:
+    deck = objects(fecm.Laminate("[0C/90G]s", {"C": "IM7/8552", "G": "E-glass/MY750"}, 0.25))
+    turned = deck.with_(layup="[30/60]s")
+    assert [(one.angle, one.material) for one in turned.layers[1]] == [
+        (30, 1), (60, 2), (60, 2), (30, 1),
+    ]  # fmt: skip
+    with pytest.raises(ValueError, match="several materials"):
+        deck.with_(layup="[0]3")
+    for numbers, why in (("[1/3]s", "no material 3"), ("[1/2]", "2 materials for the 4 layers")):
+        with pytest.raises(ValueError, match=why):
+            deck.with_(layer_materials=numbers)
