@@ -572,3 +572,14 @@ def test_a_run_of_several_laminates_that_is_stopped_goes_on_to_the_same_bytes(
         run_to(deck, path, resume=True)
         assert path.read_bytes() == whole.read_bytes(), f"stopped at {stop}"
         path.unlink()
+
+
+def test_a_soft_contact_is_doubtful_on_one_material_only() -> None:
+    soft = model.Indentation(500.0, 0.017, 0.094, 2.0)
+    names = model.Units("mm", "N", "s")
+    one, several = (
+        [finding.code for finding in load_deck(impact(soft, names, *others)).findings]
+        for others in ((), (materials(*HYBRID),))
+    )
+    assert "W476" in one
+    assert "W476" not in several
