@@ -26,21 +26,24 @@ LARGEST = 1e100  # larger numbers are refused: axes fail long before numbers ove
 MANY = 2000  # meshes with more elements are drawn with fewer points per element
 
 
-def require(result: Result, name: str, *paths: str, may_lack: bool = False) -> list[Array]:
-    """Datasets of a result, whose values may be NaN where they are not known with `may_lack`.
+def require(result: Result, name: str, *paths: str, padded: bool = False) -> list[Array]:
+    """Datasets of a result.
 
     Raises LackingError if one is missing (the message names the macro that stores it) or empty,
-    PlotError if it holds numbers that an axis can't show.
+    PlotError if it holds numbers that an axis can't show.  With `padded` NaN is allowed in results
+    of several laminates or materials: plies that an element lacks, or that have no strengths.
     """
+    padded &= "mesh/laminate" in result or "plies/material" in result
     for path in paths:
         if path not in result:
             raise LackingError(f"{name} has no {path}{remedy(path)}")
     for path in paths:
         if not result[path].size:
             raise LackingError(f"{name} has no rows of {path}")
-        values = result[path]
-        sound = np.abs(values) <= LARGEST
-        if not (sound | np.isnan(values) if may_lack else sound).all():
+        sound = np.abs(result[path]) <= LARGEST
+        if padded and sound.any():
+            sound |= np.isnan(result[path])
+        if not sound.all():
             raise PlotError(
                 f"{path} of {name} holds numbers beyond ±{LARGEST:g}, infinities or NaN, which "
                 "can't be drawn"

@@ -47,6 +47,7 @@ MARKS: tuple[style.Look, ...] = (
     OPEN | {"marker": "o", "ms": 4.0, "mew": 0.6},
     OPEN | {"marker": "x", "ms": 2.5, "mew": 0.6},
 )
+UNKNOWN = -1.0  # below every exposure: of plies without strengths, or not there
 MANY = 5000  # maps of more cells are drawn as pixels in PDF and SVG
 NAMED = 12  # elements under the load that a note names; the others it counts
 TICKS = 16  # numbers on the axis of the plies at most
@@ -141,15 +142,14 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
         path = f"failure/{criterion}/exposure"
         if criterion == BETWEEN and not quantity and path in result and not result[path].size:
             continue  # a single ply
-        # NaN: plies that an element does not have, or without strengths.
-        (values,) = require(result, name, path, may_lack=True)
+        (values,) = require(result, name, path, padded=True)
+        values = np.where(np.isnan(values), UNKNOWN, values)
         if criterion == BETWEEN:
-            field, outside = np.fmax.reduce(values, axis=1)[:, None], values[~whole[:, 0]]
+            field, outside = values.max(axis=1)[:, None], values[~whole[:, 0]]
         else:
-            at_faces = np.fmax.reduce(values, axis=3)
-            field, outside = np.fmax.reduce(at_faces, axis=2), at_faces[~under]
+            field, outside = values.max(axis=(2, 3)), values[~under].max(axis=2)
         if len(outside):
-            over_plies[criterion] = np.fmax.reduce(outside, axis=0)
+            over_plies[criterion] = _known(outside.max(axis=0))
         if quantity or criterion != BETWEEN:
             fields.append(np.broadcast_to(field, under.shape))
     names = set(over_plies) - (set() if quantity else {BETWEEN})
@@ -158,7 +158,12 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
         raise PlotError(f"the load is over all elements of {name}: no exposure is left to show")
     worst = max(largest, key=lambda one: one.exposure)
     left_out = whole if quantity == BETWEEN else under
-    return Exposures(left_out, np.fmax.reduce(fields, axis=0), over_plies, worst)
+    return Exposures(left_out, _known(np.max(fields, axis=0)), over_plies, worst)
+
+
+def _known(exposures: Floats) -> Floats:
+    """Exposures, NaN where no ply has strengths."""
+    return np.where(exposures == UNKNOWN, np.nan, exposures)
 
 
 def _cells(result: Result, name: str, count: int) -> Floats:
@@ -222,7 +227,7 @@ def _bars(figure: Figure, axes: Axes, found: Exposures) -> None:
     between = found.over_plies.get(BETWEEN)
     entries: dict[str, Artist] = {}
     if plies:
-        largest = np.fmax.reduce(list(plies.values()), axis=0)
+        largest = np.max(list(plies.values()), axis=0)
         number = np.arange(1, len(largest) + 1)
         alone = next(iter(plies)) if len(plies) == 1 else ""
         axes.barh(number, largest, height=0.8, color=COLOUR_OF[alone] if alone else "0.85")
@@ -244,9 +249,7 @@ def _bars(figure: Figure, axes: Axes, found: Exposures) -> None:
     style.legend(figure, list(entries.values()), list(entries))
     count = max(map(len, found.over_plies.values()))
     axes.set_ylim(count + 0.6, 0.4)
-    axes.set_xlim(
-        0.0, 1.05 * max(1.0, *(np.nanmax(values) for values in found.over_plies.values()))
-    )
+    axes.set_xlim(0.0, 1.05 * max(1.0, *map(np.nanmax, found.over_plies.values())))
     axes.yaxis.set_major_locator(MaxNLocator(TICKS, integer=True, min_n_ticks=1))
     axes.set_ylabel("Ply (1: struck face)" if plies else "Interface below ply (1: struck face)")
     axes.set_xlabel("Largest exposure")

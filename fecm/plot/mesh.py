@@ -7,7 +7,8 @@ from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib.collections import LineCollection
+from matplotlib import colormaps
+from matplotlib.collections import LineCollection, PolyCollection
 
 from fecm._typing import Bools
 from fecm.deck.model import Impact
@@ -29,6 +30,7 @@ class Support(StrEnum):
 
 
 HOLLOW: style.Look = {"mfc": "white", "mew": 0.7}
+FAINT = 0.45  # opacity of the laminates, over which the mesh is drawn
 # Marks of the supports.
 MARKS: dict[Support, style.Look] = {
     Support.CLAMPED: {"marker": "s", "color": style.COLOURS[0], "ms": 3.0},
@@ -72,6 +74,7 @@ def mesh(
     height = aspect(cut.points)
     ratio = height + (0.55 - 0.5 * height) / style.WIDTHS[width]
     figure, (axes,) = style.panels(width, ratio=ratio)
+    _colour_laminates(axes, result, name, cut)
     sides = [cut.points[edge] for edge in cut.edges]
     axes.add_collection(LineCollection(sides, colors="0.4", linewidths=0.4))
     for support, nodes in supports(result).items():
@@ -87,6 +90,22 @@ def mesh(
     place.name(axes.yaxis, "$y$")
     style.lines_legend(figure, axes)
     return Picture(figure)
+
+
+def _colour_laminates(axes: Axes, result: Result, name: str, cut: data.Patches) -> None:
+    """Fill the elements with a colour of their laminate, where there are several."""
+    if "mesh/laminate" not in result:
+        return
+    (of_elements,) = data.require(result, name, "mesh/laminate")
+    rows = np.concatenate([block.rows for block, _ in cut.parts])
+    numbers = np.unique(of_elements)
+    shades = colormaps[style.SEQUENTIAL](np.linspace(1.0, 0.25, len(numbers)))
+    for number, shade in zip(numbers, shades, strict=True):
+        own = [cut.points[edge] for edge, row in zip(cut.edges, rows, strict=True)
+               if of_elements[row] == number]
+        axes.add_collection(PolyCollection(own, facecolors=shade, alpha=FAINT, linewidths=0.0))
+        label = f"laminate {number}"
+        axes.plot([], [], "s", color=shade, alpha=FAINT, ms=5.0, label=label)
 
 
 def _mark_load(axes: Axes, result: Result, name: str) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from fecm.plot import style
 from fecm.plot.data import mesh_of, on_plate, reach, require
 from fecm.plot.kinds import Picture, PlotError, Width
 from fecm.results.errors import NotStoredError, ResultFileError
-from fecm.results.plies import CURE_STRESS, Plies, rows_at
+from fecm.results.plies import IN_PLANE, INTERLAMINAR, Plies, cure_stress_of, rows_at
 from fecm.results.result import Result
 
 THIN = 0.6  # width of the line of residual stresses
@@ -93,8 +94,9 @@ def _stresses(plies: Plies, point: int, result: Result) -> list[Stress]:
     """Stresses at a point; those between the plies only where they are computed."""
     faces = plies.z[:, ::2]
     residual: list[Array | None] = [None] * 3
-    if CURE_STRESS in result:
-        residual = list(np.moveaxis(result[CURE_STRESS], -1, 0))
+    cured = cure_stress_of(result, int(plies.element[0]))
+    if cured is not None:
+        residual = list(np.moveaxis(cured[: len(plies.z)], -1, 0))
     xz, yz, z = (values @ _PARABOLA for values in (plies.tau_xz[0, 0], plies.tau_yz[0, 0], plies.z))
     found = [
         Stress(r"$\sigma_1$", faces, plies.sigma_1[0, 0, point], residual[0]),
@@ -117,8 +119,15 @@ def _chosen(
     if len(at) > 1 or len(times) > 1:
         raise PlotError("the kind thickness shows one point at one time; give --at and --time once")
     sigma, stored, numbers, near = require(
-        result, name, "plies/sigma_1", "plies/time", "plies/element", "plies/under_load"
+        result,
+        name,
+        "plies/sigma_1",
+        "plies/time",
+        "plies/element",
+        "plies/under_load",
+        padded=True,
     )
+    sigma = np.nan_to_num(sigma)
     mesh = mesh_of(result, name)
     outside = near == 0
     try:
@@ -136,7 +145,17 @@ def _chosen(
         raise PlotError(f"{name}: {error}") from None
     if at:
         point = np.hypot(plies.x[0] - at[0][0], plies.y[0] - at[0][1]).argmin()
-    return plies, int(point)
+    return _own(plies), int(point)
+
+
+def _own(plies: Plies) -> Plies:
+    """The plies of one element, without those that only other laminates have."""
+    if plies.z.ndim == 2:
+        return plies
+    z = plies.z[0]
+    own = np.isfinite(z[:, 0])
+    names = (*IN_PLANE, *INTERLAMINAR)
+    return replace(plies, z=z[own], **{n: getattr(plies, n)[..., own, :] for n in names})
 
 
 def _nearest_element(mesh: tuple[Array, Floats], numbers: Array, at: Floats, name: str) -> int:

@@ -165,6 +165,17 @@ def _positions(stored: Stored, deck: Deck, numbers: Array) -> Indices:
     return np.array([own.index(number) for number in found.tolist()], dtype=np.intp)
 
 
+def cure_stress_of(stored: Stored, element: int) -> Floats | None:
+    """Residual stresses of the plies of an element, (plies, 2, 3); None without CURE."""
+    if CURE_STRESS not in stored:
+        return None
+    values = stored[CURE_STRESS]
+    if values.ndim == 3:
+        return values
+    (position,) = _positions(stored, model_of(stored), np.array([element]))
+    return np.asarray(values[position])
+
+
 def _layups(stored: Stored, deck: Deck, numbers: Array) -> Layup | list[Layup]:
     """Layers of the plate, or of each element where there are several laminates."""
     first, *others = layups = list(deck.layers.values())

@@ -65,6 +65,7 @@ def write_vtkhdf(
         _write_contact(root, result, steps)
         _write_strains(root, result, steps, note)
         _write_plies(root, result, steps, note)
+        _write_laminates(root, result, len(steps))
 
 
 def _write_mesh(root: h5py.Group, result: Result, times: Array) -> None:
@@ -196,11 +197,22 @@ def _write_plies(root: h5py.Group, result: Result, steps: Ints, note: Note) -> N
             ply[number * length : (number + 1) * length] = step[1]
 
 
+def _write_laminates(root: h5py.Group, result: Result, steps: int) -> None:
+    """Cell data: the number of each element's laminate, where there are several."""
+    if "mesh/laminate" in result:
+        numbers = result["mesh/laminate"]
+        field = _field(root, At.CELLS, "laminate", steps, numbers.shape)
+        field[:] = np.tile(numbers, steps)
+
+
 def _largest(row: Array) -> Array:
-    """Value of largest magnitude in (..., plies, levels) of every element, and its ply, (2, n)."""
+    """Value of largest magnitude in (..., plies, levels) of every element, and its ply, (2, n).
+
+    NaN, of plies that only other laminates have, is left out unless an element has nothing else.
+    """
     values = np.moveaxis(row, -2, 1)
     flat = values.reshape(len(values), -1)
-    place = np.abs(flat).argmax(axis=1)  # the first NaN, if there is one
+    place = np.where(np.isnan(flat), -1.0, np.abs(flat)).argmax(axis=1)
     found = flat[np.arange(len(flat)), place]
     ply = place // (flat.shape[1] // values.shape[1]) + 1.0
     return np.stack([found, np.where(np.isnan(found), np.nan, ply)])
