@@ -101,8 +101,11 @@ def _colour_laminates(axes: Axes, result: Result, name: str, cut: data.Patches) 
     numbers = np.unique(of_elements)
     shades = colormaps[style.SEQUENTIAL](np.linspace(1.0, 0.25, len(numbers)))
     for number, shade in zip(numbers, shades, strict=True):
-        own = [cut.points[edge] for edge, row in zip(cut.edges, rows, strict=True)
-               if of_elements[row] == number]
+        own = [
+            cut.points[edge]
+            for edge, row in zip(cut.edges, rows, strict=True)
+            if of_elements[row] == number
+        ]
         axes.add_collection(PolyCollection(own, facecolors=shade, alpha=FAINT, linewidths=0.0))
         label = f"laminate {number}"
         axes.plot([], [], "s", color=shade, alpha=FAINT, ms=5.0, label=label)

@@ -76,7 +76,7 @@ class ProblemSummary:
         self.title = deck.title
         self.nodes = deck.control.numnp
         self.elements = deck.control.numel
-        self.layers = deck.control.layers
+        self.layers = len(laminate.plies.angles)
         self.equations = plate.neq
         self.steps = problem.work.steps
         self.nonlinear = plate.nonlinear
@@ -105,6 +105,8 @@ class ProblemSummary:
         if self._leaves_out_equilibrium:
             self.equilibrium_change = equilibrium_change(problem)
         self.units = unit_names(deck)  # empty if the deck has none
+        # Number of the laminate of layers, A, B, D and shear, where there are several.
+        self._laminate = list(deck.layers)[problem.laminate_number] if plate.others else None
 
     def to_dict(self) -> dict[str, object]:
         """Plain values, for JSON."""
@@ -120,6 +122,8 @@ class ProblemSummary:
         lines = [self.title or "(no title)"]
         counts = ("nodes", "elements", "equations", "layers")
         lines += [f"  {name:20}{getattr(self, name)}" for name in counts]
+        if self._laminate:
+            lines.append(f"  laminate            {self._laminate}, under the load")
         for name, dimension in (("A", "force/length"), ("B", "force"), ("D", "force*length")):
             lines += _matrix(name, getattr(self, name), unit_of(dimension, self.units))
         lines += _matrix("shear xz, yz", self.shear, unit_of("force/length", self.units))

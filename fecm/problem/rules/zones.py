@@ -104,7 +104,7 @@ def invalid_zone(deck: model.Deck) -> Reports:
                 message = f"A zone has element {number}; the deck has elements 1 to {count}."
                 yield Report(message, zone.place(name))
         if last < zone.first or zone.step < 0:
-            message = f"A zone from element {zone.first} to {last} by {zone.step} is empty."
+            message = f"A zone from element {zone.first} to {last} by {zone.step or 1} is empty."
             yield Report(message, zone.place("last element"), "a blank step is 1")
         if zone.laminate not in known:
             numbers = ", ".join(map(str, sorted(known)))

@@ -1,0 +1,101 @@
+"""Pictures and exports of plates of several laminates."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from matplotlib.collections import PolyCollection
+
+import fecm
+from fecm.api import load_deck
+from fecm.deck import model
+from fecm.plot.failure import NAMES
+from fecm.problem.summary import ProblemSummary
+from fecm.results.result import Result
+from fecm.results.vtkhdf import write_vtkhdf
+from tests.pictures import legend_of, plot
+from tests.test_several_materials import unlike
+
+pytest.importorskip("matplotlib")
+
+
+@pytest.fixture(scope="module")
+def plate() -> Result:
+    """Laminates 1 and 3 below (elements 1 to 8, 3 in 3 and 4), laminate 2 above.
+
+    Only the middle ply of laminate 2 and those of laminate 1 have strengths.
+    """
+    alpha = (2e-8, 2.25e-5)
+    cure = model.Cure(-100.0, 0.0, tuple(model.Expansion(n, *alpha) for n in (1, 2, 3)))
+    return fecm.run_one(unlike(cure, words="PLYS=10 FAIL=5 DISP=10"))
+
+
+def test_the_mesh_shows_each_laminate_in_a_colour_with_its_elements(plate: Result) -> None:
+    figure: Any = plot(plate, "mesh")
+    assert {"laminate 1", "laminate 2", "laminate 3"} <= {*legend_of(figure)}
+    (axes,) = figure.axes
+    filled = [one for one in axes.collections if isinstance(one, PolyCollection)]
+    assert [len(one.get_paths()) for one in filled] == [6, 8, 2]
+    colours = {tuple(one.get_facecolor()[0]) for one in filled}
+    assert len(colours) == 3
+    third = [path.vertices for path in filled[2].get_paths()]
+    low, high = np.min(np.concatenate(third), axis=0), np.max(np.concatenate(third), axis=0)
+    assert (*low, *high) == (30.0, 0.0, 60.0, 15.0)
+
+
+@pytest.mark.parametrize(("at", "count", "half"), [((5.0, 5.0), 3, 0.75), ((55.0, 5.0), 2, 0.3)])
+def test_thickness_shows_the_plies_of_the_elements_own_laminate(
+    plate: Result, at: tuple[float, float], count: int, half: float
+) -> None:
+    figure: Any = plot(plate, "thickness", at=(at,))
+    sigma = figure.axes[0]
+    stress, residual = (line for line in sigma.lines if len(line.get_xdata()) > 2)
+    assert len(stress.get_xdata()) == len(residual.get_xdata()) == 2 * count
+    assert sigma.get_ylim() == pytest.approx((half, -half))
+    (position,) = {2: [2], 3: [0]}[count]
+    cured = plate["plies/cure_stress"][position, :count, :, 0].ravel()
+    scale = residual.get_xdata()[0] / cured[0]
+    np.testing.assert_allclose(residual.get_xdata(), scale * cured, rtol=1e-12)
+
+
+@pytest.mark.parametrize("quantity", ["", *NAMES[:1]])
+def test_failure_leaves_plies_without_strengths_blank(plate: Result, quantity: str) -> None:
+    figure: Any = plot(plate, "failure", quantity=quantity)
+    (cells,) = [c for c in figure.axes[0].collections if c.get_array() is not None]
+    drawn = np.ma.filled(cells.get_array(), np.nan)
+    # The largest at each point of the criteria that are shown, of the plies with strengths.
+    shown = (quantity,) if quantity else NAMES[:4]
+    with np.errstate(invalid="ignore"):
+        own = [np.fmax.reduce(plate[f"failure/{n}/exposure"], axis=(2, 3)) for n in shown]
+    wanted = np.max(own, axis=0)[plate["failure/under_load"] == 0]
+    np.testing.assert_array_equal(drawn, wanted)
+    assert np.isnan(drawn).any()  # laminate 3
+    assert np.isfinite(drawn).any()
+
+
+def test_vtkhdf_has_the_laminate_and_the_largest_stress_of_own_plies(
+    plate: Result, tmp_path: Path
+) -> None:
+    path = tmp_path / "plate.vtkhdf"
+    write_vtkhdf(plate, path)
+    with h5py.File(path) as file:
+        cells = file["VTKHDF/CellData"]
+        steps = int(file["VTKHDF/Steps"].attrs["NSteps"])
+        numbers = cells["laminate"][:].reshape(steps, 16)
+        assert (numbers == plate["mesh/laminate"]).all()
+        found = cells["sigma_1"][:].reshape(steps, 16)[-1]
+        ply = cells["sigma_1_ply"][:].reshape(steps, 16)[-1]
+    stored = plate["plies/sigma_1"][-1]
+    np.testing.assert_array_equal(np.abs(found), np.nanmax(np.abs(stored), axis=(1, 2, 3)))
+    assert ply[[2, 3]].max() == 2
+
+
+def test_the_summary_of_a_deck_names_the_laminate_under_the_load() -> None:
+    (problem,) = load_deck(unlike()).problems
+    summary = ProblemSummary(problem)
+    assert "  laminate            1, under the load" in summary.lines()
+    assert summary.layers == 3
