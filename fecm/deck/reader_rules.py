@@ -178,8 +178,8 @@ declare(
 declare(
     "E202",
     Subject.SEGMENTS,
-    "MATE has fewer layer cards than the control card says.",
-    remedy="Correct LAYER, or add layers.",
+    "MATE has fewer layer cards than the control card says, or LAMS not as many as a laminate's.",
+    remedy="Correct the number of layers, or the layer cards.",
 )
 declare(
     "W416",

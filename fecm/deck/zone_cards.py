@@ -98,11 +98,22 @@ class Laminates(Segment, keyword="LAMS"):
         """Read the laminates up to a blank card."""
         found: list[NumberedLaminate] = []
         while (card := cards.take_data()) is not None and not card.is_blank:
+            if found and _is_layer(card):
+                last = found[-1]
+                said = f"the {last.head.layers} of laminate {last.number}"
+                message = f"{head.keyword} has more layer cards than {said}."
+                cards.findings.add("E202", message, card.place)
+                cards.unsound.add(head.keyword)
+                cards.skip_data()
+                return None
             number = cards.record(card, LaminateNumber)
             layers = None
-            if number is not None:
+            if number is not None and number.layers < 1:
+                message = f"Laminate {number.number} has {number.layers} layers."
+                cards.findings.add("E202", message, number.place("layers"))
+            elif number is not None:
                 said = f"laminate {number.number} says"
-                layers = read_layers(head, cards, max(0, number.layers), said)
+                layers = read_layers(head, cards, number.layers, said)
             if number is None or layers is None:
                 cards.unsound.add(head.keyword)
                 cards.skip_data()  # where the next laminate begins is not known
@@ -119,6 +130,12 @@ class Laminates(Segment, keyword="LAMS"):
             for layer in one.layers:
                 yield layer.to_card()
         yield ""
+
+
+def _is_layer(card: Card) -> bool:
+    """Whether a card, which should begin a laminate, has a fibre angle and a thickness."""
+    texts = [text.strip() for _, text in card.cut(Layer.fields)]
+    return len(texts) > 2 and bool(texts[2]) and not texts[1].isdigit()
 
 
 @frozen
