@@ -14,11 +14,12 @@ import fecm
 from fecm.api import load_deck
 from fecm.deck import model
 from fecm.plot.failure import NAMES
+from fecm.plot.kinds import PlotError
 from fecm.problem.summary import ProblemSummary
 from fecm.results.result import Result
 from fecm.results.vtkhdf import write_vtkhdf
 from tests.pictures import legend_of, plot
-from tests.test_several_materials import unlike
+from tests.test_several_materials import HYBRID, impact, materials, unlike
 
 pytest.importorskip("matplotlib")
 
@@ -99,3 +100,30 @@ def test_the_summary_of_a_deck_names_the_laminate_under_the_load() -> None:
     summary = ProblemSummary(problem)
     assert "  laminate            1, under the load" in summary.lines()
     assert summary.layers == 3
+
+
+def without_strengths(*layers: int) -> Result:
+    """A short impact on three plies, of which some are of the material without strengths."""
+    layup = tuple(
+        (angle, 0.5, 2 if n in layers else 1) for n, angle in enumerate((0.0, 90.0, 30.0))
+    )
+    return fecm.run_one(impact(materials(HYBRID[0]), layup=layup, words="FAIL=5", steps=10))
+
+
+def test_failure_without_any_interface_of_known_strength_shows_the_plies() -> None:
+    figure: Any = plot(without_strengths(1), "failure")
+    assert "interlaminar" not in legend_of(figure)
+
+
+@pytest.mark.parametrize(
+    ("layers", "quantity", "message"),
+    [
+        ((0, 1, 2), "", "no ply of the result has strengths"),
+        ((1,), "interlaminar", "no pair of neighbouring plies of the result has strengths"),
+    ],
+)
+def test_failure_without_any_known_exposure_is_refused(
+    layers: tuple[int, ...], quantity: str, message: str
+) -> None:
+    with pytest.raises(PlotError, match=message):
+        plot(without_strengths(*layers), "failure", quantity=quantity)

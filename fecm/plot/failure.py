@@ -143,12 +143,17 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
         if criterion == BETWEEN and not quantity and path in result and not result[path].size:
             continue  # a single ply
         (values,) = require(result, name, path, padded=True)
+        if np.isnan(values).all():
+            if criterion == BETWEEN and not quantity:
+                continue  # no interface of two plies with strengths
+            what = "pair of neighbouring plies" if criterion == BETWEEN else "ply"
+            raise PlotError(f"no {what} of {name} has strengths (ALLO)")
         values = np.where(np.isnan(values), UNKNOWN, values)
         if criterion == BETWEEN:
             field, outside = values.max(axis=1)[:, None], values[~whole[:, 0]]
         else:
             field, outside = values.max(axis=(2, 3)), values[~under].max(axis=2)
-        if len(outside):
+        if (outside != UNKNOWN).any():
             over_plies[criterion] = _known(outside.max(axis=0))
         if quantity or criterion != BETWEEN:
             fields.append(np.broadcast_to(field, under.shape))
