@@ -178,7 +178,7 @@ declare(
 declare(
     "E202",
     Subject.SEGMENTS,
-    "MATE has fewer layer cards than the control card says, or LAMS not as many as a laminate's.",
+    "Layer cards are fewer than LAYER says, or not as many as a laminate of LAMS.",
     remedy="Correct the number of layers, or the layer cards.",
 )
 declare(
