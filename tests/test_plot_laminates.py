@@ -41,8 +41,8 @@ def test_the_mesh_shows_each_laminate_in_a_colour_with_its_elements(plate: Resul
     (axes,) = figure.axes
     filled = [one for one in axes.collections if isinstance(one, PolyCollection)]
     assert [len(one.get_paths()) for one in filled] == [6, 8, 2]
-    colours = {tuple(one.get_facecolor()[0]) for one in filled}
-    assert len(colours) == 3
+    colours = np.concatenate([np.asarray(one.get_facecolor()) for one in filled])
+    assert len(np.unique(colours, axis=0)) == 3
     third = [path.vertices for path in filled[2].get_paths()]
     low, high = np.min(np.concatenate(third), axis=0), np.max(np.concatenate(third), axis=0)
     assert (*low, *high) == (30.0, 0.0, 60.0, 15.0)
