@@ -18,6 +18,7 @@ from fecm._typing import Bools, Floats
 from fecm.deck.model import Material
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import CRITERIA
+from fecm.mechanics.ply_stresses import UNKNOWN
 from fecm.plot import style
 from fecm.plot.data import deck_of, mesh_of, require
 from fecm.plot.kinds import Picture, PlotError, Width
@@ -47,7 +48,6 @@ MARKS: tuple[style.Look, ...] = (
     OPEN | {"marker": "o", "ms": 4.0, "mew": 0.6},
     OPEN | {"marker": "x", "ms": 2.5, "mew": 0.6},
 )
-UNKNOWN = -1.0  # below every exposure: of plies without strengths, or not there
 MANY = 5000  # maps of more cells are drawn as pixels in PDF and SVG
 NAMED = 12  # elements under the load that a note names; the others it counts
 TICKS = 16  # numbers on the axis of the plies at most
