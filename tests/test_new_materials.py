@@ -244,7 +244,7 @@ def test_a_sweep_over_materials_of_layers_is_that_of_single_runs() -> None:
     dt = next(macro.value for macro in deck.macros if macro.word == "DT") / 4
     swept = fecm.sweep(deck, {"layer_materials": ["[1/2]s", "[2/1]s"], "dt": [dt]})
     other = objects(fecm.Laminate("[0G/90C]s", {"C": "IM7/8552", "G": "E-glass/MY750"}, 0.25))
-    peaks = [fecm.run(one.with_(dt=dt)).max_force for one in (deck, other)]
+    peaks = [fecm.run(one.with_(dt=dt)).history.force.max() for one in (deck, other)]
     assert swept["peak_force"].tolist() == pytest.approx(peaks, rel=1e-9)
     assert peaks[0] != peaks[1]
 
@@ -257,6 +257,20 @@ def test_a_layup_of_a_sweep_keeps_the_material_of_each_layer() -> None:
     ]  # fmt: skip
     with pytest.raises(ValueError, match="several materials"):
         deck.with_(layup="[0]3")
-    for numbers, why in (("[1/3]s", "no material 3"), ("[1/2]", "2 materials for the 4 layers")):
+    for numbers, why in (
+        ("[1/3]s", "no material 3"),
+        ("[1/2]", "2 materials for the deck's 4 layers"),
+    ):
         with pytest.raises(ValueError, match=why):
             deck.with_(layer_materials=numbers)
+
+
+def test_the_picture_of_failure_shows_plates_of_several_laminates(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    deck = deck_of(*SANDWICH, "--zone", "10,10,30,20:[0/90/0/K/0/90/0]", "--damage")
+    result = fecm.run(deck)
+    assert np.isnan(result["failure/max_stress/exposure"]).any()
+    result.save(tmp_path / "r.h5")
+    made = call("plot", tmp_path / "r.h5", "--kind", "failure", "-o", tmp_path / "r.png")
+    assert made.exit_code == 0, made.stderr
+    assert (tmp_path / "r.png").stat().st_size > 10_000
