@@ -13,6 +13,7 @@ from fecm.deck.catalogue import MATERIALS
 from fecm.deck.layup import parse_plies
 from fecm.deck.model import Allowables, Cure, Delamination, Indentation, Material, Zones
 from fecm.problem.plate_mesh import plate_mesh
+from fecm.results.exposures import largest_exposures
 from tests.calls import Done, call
 
 PLATE = ("--size", "40x30", "--mesh", "4x3", "--support", "simple", "--patch", "none")
@@ -241,12 +242,14 @@ def test_physical_surfaces_of_gmsh_carry_laminates(tmp_path: Path) -> None:
 
 def test_a_sweep_over_materials_of_layers_is_that_of_single_runs() -> None:
     deck = objects(fecm.Laminate("[0C/90G]s", {"C": "IM7/8552", "G": "E-glass/MY750"}, 0.25))
-    dt = next(macro.value for macro in deck.macros if macro.word == "DT") / 4
-    swept = fecm.sweep(deck, {"layer_materials": ["[1/2]s", "[2/1]s"], "dt": [dt]})
+    swept = fecm.sweep(deck, {"layer_materials": ["[1/2]s", "[2/1]s"], "dt": [1e-7]}, history=True)
     other = objects(fecm.Laminate("[0G/90C]s", {"C": "IM7/8552", "G": "E-glass/MY750"}, 0.25))
-    peaks = [fecm.run(one.with_(dt=dt)).history.force.max() for one in (deck, other)]
-    assert swept["peak_force"].tolist() == pytest.approx(peaks, rel=1e-9)
-    assert peaks[0] != peaks[1]
+    assert swept.force is not None
+    for force, one in zip(swept.force, (deck, other), strict=True):
+        single = fecm.run_one(one.with_(dt=1e-7)).history.force
+        largest = single.max()
+        assert force[: len(single)] == pytest.approx(single, abs=1e-9 * largest)
+    assert abs(swept.force[0] - swept.force[1]).max() > 0.1 * largest
 
 
 def test_a_layup_of_a_sweep_keeps_the_material_of_each_layer() -> None:
@@ -268,9 +271,21 @@ def test_a_layup_of_a_sweep_keeps_the_material_of_each_layer() -> None:
 def test_the_picture_of_failure_shows_plates_of_several_laminates(tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     deck = deck_of(*SANDWICH, "--zone", "10,10,30,20:[0/90/0/K/0/90/0]", "--damage")
-    result = fecm.run(deck)
+    result = fecm.run_one(deck)
     assert np.isnan(result["failure/max_stress/exposure"]).any()
     result.save(tmp_path / "r.h5")
     made = call("plot", tmp_path / "r.h5", "--kind", "failure", "-o", tmp_path / "r.png")
     assert made.exit_code == 0, made.stderr
     assert (tmp_path / "r.png").stat().st_size > 10_000
+
+
+def test_a_sweep_over_the_cure_of_several_materials_is_that_of_single_runs() -> None:
+    deck = deck_of("--layup", "[0C/90G]s", "--material", "C=T300/914", "--material",
+                   "G=E-glass/MY750", "--ply-thickness", ".25", "--cure", ":20", "--damage",
+                   "--zone", "10,10,30,20:[0C/90G]2s")  # fmt: skip
+    changes = [-100.0, -50.0]
+    found = fecm.sweep(deck, {"cure_dT": changes}, measure="failure")
+    for row, change in enumerate(changes):
+        single = fecm.run_one(deck.with_(cure_dT=change))
+        for one in largest_exposures(single):
+            assert found[f"exposure_{one.criterion}"][row] == pytest.approx(one.exposure, rel=1e-9)
