@@ -134,8 +134,12 @@ def new_deck(
     return deck.to_text()
 
 
+# A foam is the core of a sandwich: a plate of it alone is doubtful.
+PLIES = [name for name in MATERIALS if name != "Divinycell-H60"]
+
+
 @pytest.mark.parametrize("system", SYSTEMS)
-@pytest.mark.parametrize("name", MATERIALS)
+@pytest.mark.parametrize("name", PLIES)
 def test_no_ply_of_the_catalogue_has_a_finding_in_any_units(name: str, system: str) -> None:
     has_damage = {"XT", "GIIc"} & MATERIALS[name].values.keys()
     text = new_deck(name, system, 0.25, damage=bool(has_damage))
