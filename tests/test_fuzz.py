@@ -89,7 +89,9 @@ def decks(draw: st.DrawFn) -> Deck:
                 st.lists(
                     st.builds(NumberedPly, st.builds(MaterialNumber, counts), ply), max_size=3
                 ).map(lambda plies: Materials(tuple(plies))),
-                st.lists(st.tuples(counts, st.lists(layer, max_size=3)), max_size=3).map(
+                st.lists(
+                    st.tuples(counts, st.lists(layer, min_size=1, max_size=3)), max_size=3
+                ).map(
                     lambda given: Laminates(
                         tuple(
                             NumberedLaminate(LaminateNumber(number, len(own)), tuple(own))
