@@ -27,8 +27,11 @@ def run(
     slips: str = "",
     macros: bool = False,
     solver: str = AUTO,
+    interval: int = 1,
 ) -> int:
     """Run a deck into a file; stop with a checkpoint at the n-th look, between steps or macros.
+
+    There is a look every `interval` steps, or after each macro.
 
     Returns
     -------
@@ -52,7 +55,7 @@ def run(
         if macros:
             simulation.on_macro = look
         else:
-            simulation.observers, simulation.interval = (look,), 1
+            simulation.observers, simulation.interval = (look,), interval
         if resume:
             checkpointer.restore(simulation)
         simulate_run(simulation)

@@ -30,14 +30,12 @@ from fecm.mechanics.rod_modes import Modes
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.problem import Problem
-from fecm.results import hdf5_writer
 from fecm.results.result import Result
-from fecm.simulation.checkpoint import Checkpointer
-from fecm.simulation.run import run
-from fecm.simulation.simulation import Simulation
 from tests.builders import distorted_square, square
 from tests.calls import call
 from tests.decks import small
+from tests.stopped_runs import StoppedError
+from tests.stopped_runs import run as run_to
 from tests.test_element_decks import deck as element_deck
 
 compiled = pytest.mark.skipif(kernels.LIBRARY is None, reason="the kernels are not compiled")
@@ -161,28 +159,12 @@ def test_a_run_does_not_depend_on_the_number_of_threads(tmp_path: Path) -> None:
 @compiled
 def test_a_run_resumed_between_bursts_gives_the_same_bytes(tmp_path: Path) -> None:
     """Of a run that ends at an observer, as an interrupted one does."""
-    (problem,) = load_deck(REPORT.replace("4000", " 300")).problems
-
-    def run_to(path: Path, stop: int, *, resume: bool = False) -> None:
-        def look(simulation: Simulation) -> None:
-            if simulation.state.plate.step == stop:
-                checkpointer.write(simulation)
-                raise InterruptedError
-
-        with hdf5_writer.writing(path) as sink:
-            checkpointer = Checkpointer(path, sink)
-            simulation = Simulation(problem, sink, observers=(look,))
-            simulation.interval = 50
-            if resume:
-                checkpointer.restore(simulation)
-            run(simulation)
-        checkpointer.clear()
-
-    run_to(tmp_path / "whole.h5", 0)
-    with pytest.raises(InterruptedError):
-        run_to(tmp_path / "cut.h5", 150)
-    run_to(tmp_path / "cut.h5", 0, resume=True)
-    assert (tmp_path / "cut.h5").read_bytes() == (tmp_path / "whole.h5").read_bytes()
+    deck, whole, cut = REPORT.replace("4000", " 300"), tmp_path / "whole.h5", tmp_path / "cut.h5"
+    run_to(deck, whole, interval=50)
+    with pytest.raises(StoppedError):
+        run_to(deck, cut, 3, interval=50)
+    run_to(deck, cut, resume=True, interval=50)
+    assert cut.read_bytes() == whole.read_bytes()
 
 
 @compiled

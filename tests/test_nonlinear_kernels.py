@@ -14,7 +14,6 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.mechanics import kernels
 from fecm.mechanics.kernels import membrane
 from fecm.mechanics.kernels.plate import CompiledProduct
@@ -27,10 +26,6 @@ from fecm.mechanics.stiffness_product import (
     stiffness_operator,
 )
 from fecm.mechanics.symmetry import SymmetryReduction, symmetry_reduction, unreduced
-from fecm.results import hdf5_writer
-from fecm.simulation.checkpoint import Checkpointer
-from fecm.simulation.run import run
-from fecm.simulation.simulation import Simulation
 from tests.builders import (
     Floats,
     Ints,
@@ -44,6 +39,8 @@ from tests.builders import (
     with_restraints,
 )
 from tests.nonlinear_plates import RULES
+from tests.stopped_runs import StoppedError
+from tests.stopped_runs import run as run_to
 from tests.test_element_decks import deck as element_deck
 from tests.test_kernels import assert_close
 
@@ -235,25 +232,10 @@ def test_an_impact_on_a_stretched_plate_is_that_of_numpy(name: str) -> None:
 def test_a_run_resumed_between_bursts_of_a_stretched_plate_gives_the_same_bytes(
     tmp_path: Path,
 ) -> None:
-    (problem,) = load_deck(impact(distorted_square(4, 4), steps=200)).problems
-
-    def run_to(path: Path, stop: int, *, resume: bool = False) -> None:
-        def look(simulation: Simulation) -> None:
-            if simulation.state.plate.step == stop:
-                checkpointer.write(simulation)
-                raise InterruptedError
-
-        with hdf5_writer.writing(path) as sink:
-            checkpointer = Checkpointer(path, sink)
-            simulation = Simulation(problem, sink, observers=(look,))
-            simulation.interval = 50
-            if resume:
-                checkpointer.restore(simulation)
-            run(simulation)
-        checkpointer.clear()
-
-    run_to(tmp_path / "whole.h5", 0)
-    with pytest.raises(InterruptedError):
-        run_to(tmp_path / "cut.h5", 100)
-    run_to(tmp_path / "cut.h5", 0, resume=True)
-    assert (tmp_path / "cut.h5").read_bytes() == (tmp_path / "whole.h5").read_bytes()
+    deck = impact(distorted_square(4, 4), steps=200)
+    whole, cut = tmp_path / "whole.h5", tmp_path / "cut.h5"
+    run_to(deck, whole, interval=50)
+    with pytest.raises(StoppedError):
+        run_to(deck, cut, 2, interval=50)
+    run_to(deck, cut, resume=True, interval=50)
+    assert cut.read_bytes() == whole.read_bytes()

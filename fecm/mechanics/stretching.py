@@ -62,7 +62,7 @@ class _Elements:
         self.laminate = plate.laminate_of(block)
         self.compliance = np.linalg.inv(self.laminate.A)
         at = interpolate(block, rule)
-        self.area = at.jxw  # (ne, points): that a point stands for
+        self.area = at.jxw  # (ne, points): area that each point represents
         self.x, self.y = np.einsum("pn,eni->iep", at.N, block.coordinates)
         self._nodes, self._slopes = block.nodes, at.dN
         self._tied = QuadraticStrains(block, rule)

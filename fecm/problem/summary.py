@@ -100,7 +100,6 @@ class ProblemSummary:
         # Change of the static deflection under the load by SHEA EQUI; None where it does not apply
         # or is not computed.
         self.equilibrium_change: float | None = None
-        self._laminates = len(plate.laminates)
         self._leaves_out_equilibrium = leaves_out_equilibrium(problem)
         if self._leaves_out_equilibrium:
             self.equilibrium_change = equilibrium_change(problem)
@@ -127,10 +126,6 @@ class ProblemSummary:
         for name, dimension in (("A", "force/length"), ("B", "force"), ("D", "force*length")):
             lines += _matrix(name, getattr(self, name), unit_of(dimension, self.units))
         lines += _matrix("shear xz, yz", self.shear, unit_of("force/length", self.units))
-        if self._laminates > 1:
-            lines.append(
-                f"  laminates           {self._laminates}; these are of the one at the load"
-            )
         if self._leaves_out_equilibrium:
             lines.append(f"  shear factor        1; {self._said_change()}")
 

@@ -329,7 +329,7 @@ INLINE void NAME(sum_tied_strains)(const double *data, const NAME(Tied) *tied, h
     NAME(sum_gradient)(2, ALONG, 2, ALONG, xi, eta, force);
 }
 
-/* Forces on the coefficients of an element that is no parallelogram. */
+/* Forces on the coefficients of an element that is not a parallelogram. */
 INLINE void NAME(of_points)(int coupled, const double *data, const double *points, half (*c)[9], half (*force)[9]) {
     half e[3][9], linear[3][9], bent[3][9], moment[3][9], R[9][4], A[6], B[6];
     NAME(Tied) tied;

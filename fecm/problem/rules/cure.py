@@ -17,7 +17,7 @@ from fecm.results.criteria import spelt
 
 LARGEST_BETA = 0.1  # strain per per cent of weight
 LARGEST_CHANGE = 500.0  # K
-LARGEST_WARP = 0.1  # rise of the free plate over its thickness, above which it is told
+LARGEST_WARP = 0.1  # rise of the free plate over its thickness without a warning
 FIELDS = "its fields are the material (columns 1-5, blank: 1), alpha1 (11-20) and alpha2 (21-30)"
 
 

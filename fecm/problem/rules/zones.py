@@ -14,7 +14,7 @@ from fecm.mechanics.laminate import SOFT_CORE, Laminate
 from fecm.problem.problem import Problem
 from fecm.problem.rules.cure import FIELDS
 
-LARGEST_COUPLING = 0.02  # of I1 over I0 h, from which on it is told
+LARGEST_COUPLING = 0.02  # of I1 over I0 h without a warning
 # Segments whose unreadable cards would be missing materials and laminates.
 KEYWORDS = {kind.keyword for kind in (model.Material, model.Materials, model.Laminates)}
 
@@ -220,7 +220,7 @@ def layers_without_strengths(problem: Problem) -> Reports:
     deck, card = problem.deck, problem.deck.last(model.Allowables)
     if card is None or all(macro.word != "FAIL" for macro in flat(problem.program)):
         return
-    for (number, layers), n in zip(deck.layers.items(), range(len(deck.layers)), strict=True):
+    for n, (number, layers) in enumerate(deck.layers.items()):
         if n not in problem.used_laminates:
             continue
         missing = [i for i, one in enumerate(layers, start=1) if card.of(one.material) is None]
