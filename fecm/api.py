@@ -14,6 +14,7 @@ from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, read_deck
 from fecm.deck.source_text import load_text
 from fecm.mechanics.contact_law import Law
+from fecm.mechanics.own_law import own_law
 from fecm.mechanics.projectile import Integrator, MassMatrix, RodMethod
 from fecm.problem.build import ENERGY_LIMIT, RunOptions, check_options
 from fecm.problem.check import check, check_listing
@@ -102,7 +103,7 @@ def run_one(
     rod_integrator: Integrator = "wilson",
     energy_limit: float = ENERGY_LIMIT,
     progress: Progress | None = None,
-    law: Law | None = None,
+    law: Law | str | None = None,
 ) -> Result:
     """Run a deck with exactly one problem; parameters and errors are those of :func:`run`.
 
@@ -117,8 +118,8 @@ def run_one(
     >>> print(f"{result.force.max():.2f} lb")
     86.20 lb
     """
-    rod = RodMethod(rod_mass, rod_integrator)
-    choices = RunOptions(active_slips(mode, slips), solver, threads, rod, energy_limit, law)
+    rod, own = RodMethod(rod_mass, rod_integrator), own_law(law)
+    choices = RunOptions(active_slips(mode, slips), solver, threads, rod, energy_limit, own)
     return _run(deck, mode, force, choices, output, progress, one=True)[0]
 
 
@@ -134,7 +135,7 @@ def run(
     rod_integrator: Integrator = "wilson",
     energy_limit: float = ENERGY_LIMIT,
     progress: Progress | None = None,
-    law: Law | None = None,
+    law: Law | str | None = None,
 ) -> Result | list[Result]:
     """Run every problem of a deck.
 
@@ -167,9 +168,11 @@ def run(
         Relative error of the energy balance above which a run without slips ends.
     progress : callable, optional
         Called now and then with the number of steps taken and that of all steps of the problem.
-    law : Law, optional
-        Contact law instead of that of EXPE, which the deck has all the same; the name of its class
-        is stored as the attribute ``law`` of the result.
+    law : Law or str, optional
+        Contact law instead of that of EXPE, which the deck has all the same: an object with the
+        methods of :class:`~fecm.mechanics.contact_law.Law`, or the name of an entry point of the
+        group ``fecm.laws``.  The name of its class, or that of the entry point, is stored as the
+        attribute ``law`` of the result.
 
     Returns
     -------
@@ -185,6 +188,10 @@ def run(
     ValueError
         If the mode, a slip, the solver, the rod's mass or its integrator is unknown, a number is
         invalid, or the solver or a slip is not for a nonlinear plate.
+    LawError
+        If `law` lacks a method, raises an exception, or returns a value that is not a number.
+    ExtensionError
+        If no installed package has an entry point of that name.
     NotEnoughMemoryError
         If the run needs more memory than is free; a MemoryError.
     OSError
@@ -196,8 +203,8 @@ def run(
     >>> print(f"{result.force.max():.2f} lb")
     6.19 lb
     """
-    rod = RodMethod(rod_mass, rod_integrator)
-    choices = RunOptions(active_slips(mode, slips), solver, threads, rod, energy_limit, law)
+    rod, own = RodMethod(rod_mass, rod_integrator), own_law(law)
+    choices = RunOptions(active_slips(mode, slips), solver, threads, rod, energy_limit, own)
     results = _run(deck, mode, force, choices, output, progress, one=False)
     return results[0] if len(results) == 1 else results
 

@@ -15,6 +15,7 @@ from fecm.cli.options import (
     DECK_PATH,
     FILE_PATH,
     FORMAT_OPTION,
+    LAW_OPTION,
     Format,
     OneOf,
     Parsed,
@@ -25,6 +26,7 @@ from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
 from fecm.deck.units import unit_names, unit_of
 from fecm.identification.identify import CARDS, FREE, Identification, fit
+from fecm.mechanics.own_law import own_law
 from fecm.results.comparison import measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
 
@@ -41,6 +43,7 @@ class Options:
     picture: Path | None
     overwrite: bool
     form: Format
+    law: str | None  # name of a contact law of an installed package
 
 
 @click.command(
@@ -63,6 +66,7 @@ class Options:
     type=Parsed(filter_of, "FILTER"),
     help=f"Filter of the measurement, also applied to the computed force: {FILTER_HELP}",
 )
+@LAW_OPTION
 @option(
     "-o",
     "--output",
@@ -95,7 +99,9 @@ def identify(options: Options) -> None:
     problem = load_single(options.deck, "identify")
     units = unit_names(problem.deck)
     measured = measurement_of(options.measured, units)
-    found = fit(problem.deck, measured, options.free, options.sensor)
+    found = fit(
+        problem.deck, measured, options.free, options.sensor, own_law(options.law)
+    )
     targets.draw("histories:fit_picture", found, units)
     if output is not None:
         write_lines([found.deck.to_text()], output, overwrite=overwrite)

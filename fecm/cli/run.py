@@ -23,6 +23,7 @@ from fecm.cli.options import (
     DECK_PATH,
     FILE_PATH,
     FORMAT_OPTION,
+    LAW_OPTION,
     MODE_OPTION,
     POSITIVE,
     Finite,
@@ -30,6 +31,7 @@ from fecm.cli.options import (
     OneOf,
     collected,
 )
+from fecm.mechanics.own_law import LawError, own_law
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import (
     INTEGRATORS,
@@ -60,7 +62,7 @@ from fecm.simulation.simulation import Simulation
 
 GROUPS = {
     "Result": ("output", "overwrite", "printed", "form"),
-    "Model": ("mode", "slips", "rod_mass", "rod_integrator"),
+    "Model": ("mode", "law", "slips", "rod_mass", "rod_integrator"),
     "Computation": ("solver", "threads"),
     "Interrupted runs": ("interval", "resume"),
     "Limits": ("energy_limit", "fail_limit", "force"),
@@ -87,15 +89,17 @@ class Options:
     energy_limit: float
     fail_limit: float | None  # largest exposure that passes
     force: bool
+    law: str | None  # name of a contact law of an installed package
 
     def choices(self) -> RunOptions:
-        """What the computation needs to know; raises ValueError if a slip is unknown."""
+        """What the computation needs to know; raises ValueError if a slip or law is unknown."""
         return RunOptions(
             slips=active_slips(self.mode, self.slips),
             solver=self.solver,
             threads=self.threads,
             rod_method=RodMethod(self.rod_mass, self.rod_integrator),
             energy_limit=self.energy_limit,
+            law=own_law(self.law),
         )
 
 
@@ -127,6 +131,7 @@ class Job(NamedTuple):
     help="Result file.  [default: the deck's name with .h5, in this folder]",
 )
 @MODE_OPTION
+@LAW_OPTION
 @option(
     "--slip",
     "slips",
@@ -331,6 +336,8 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
     """Turn the errors of a run into messages."""
     try:
         yield
+    except LawError as error:
+        raise RefusedError(f"{error}; {path} was not written") from None
     except SingularStiffnessError as error:
         raise RefusedError(
             f"{error}: the plate is not restrained and has no static displacement; restrain "

@@ -15,8 +15,10 @@ from fecm.cli.common import FAILED, RefusedError, echo, note, progress
 from fecm.cli.decks import count_findings
 from fecm.cli.help import GroupedCommand, typical
 from fecm.cli.interrupts import signals
-from fecm.cli.options import DECK_PATH, FILE_PATH, OneOf, Parsed, collected, list_of
+from fecm.cli.options import DECK_PATH, FILE_PATH, LAW_OPTION, OneOf, Parsed, collected, list_of
 from fecm.deck.findings import DeckError
+from fecm.mechanics.own_law import LawError, own_law
+from fecm.problem.build import RunOptions
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.results.hdf5_reader import read
@@ -73,7 +75,7 @@ GROUPS = {
     "Random values": ("random", "samples", "seed", "design", "sensitivity", "exceed"),
     "Search": ("find", "until"),
     "Result": ("output", "history", "measure", "full", "overwrite"),
-    "Computation": ("model", "modes", "workers", "scheduler", "scheduler_file"),
+    "Computation": ("law", "model", "modes", "workers", "scheduler", "scheduler_file"),
 }
 
 
@@ -104,6 +106,7 @@ class Options:
     scheduler: str | None
     scheduler_file: Path | None
     allow_failed: bool
+    law: str | None  # name of a contact law of an installed package
 
     @property
     def path(self) -> Path:
@@ -236,6 +239,7 @@ class Options:
     type=list_of("CASE,...", click.IntRange(min=0)),
     help="Also run these cases in full, into SWEEP-CASE.h5; cases count from 0.",
 )
+@LAW_OPTION
 @option(
     "--model",
     type=click.Choice([REDUCED]),
@@ -301,6 +305,7 @@ def sweep(options: Options) -> None:
         design=design,
         limits=options.exceed,
         modes=modes_of(options.model, options.modes),
+        law=own_law(options.law),
     )
     check_draws(planned)
     if not options.refine:
@@ -443,8 +448,8 @@ def _run_in_full(planned: Plan, fulls: dict[int, Path], *, overwrite: bool) -> N
             if errors := prepared.errors(force=True):
                 raise CasesError(errors[0].message)
             with hdf5_writer.writing(path, overwrite=overwrite) as sink:
-                simulate(prepared.problems[0], sink)
-        except (CasesError, ArithmeticError) as error:
+                simulate(prepared.problems[0], sink, RunOptions(law=planned.settings.law))
+        except (CasesError, LawError, ArithmeticError) as error:
             note(f"case {case} was not run in full: {error}")
             continue
         echo(f"  case {case:<12} {path}")

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from fecm._typing import Floats
 from fecm.deck.model import Deck
 from fecm.identification.alignment import IdentifyError, contact_points
+from fecm.mechanics.contact_law import Law
 from fecm.results.comparison import Measurement
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Filter
@@ -51,11 +52,20 @@ class Model(NamedTuple):
     deck: Deck
     runs: Runs
     sensor: Filter | None
+    law: Law | None = None  # a user's contact law instead of the deck's
+
+    def strike(self, values: Mapping[str, float]) -> Strike:
+        """Strike of the deck with values, under the law of this model."""
+        return fitted(self.deck, values)._replace(own_law=self.law)
 
     def histories(self, trials: Sequence[Mapping[str, float]]) -> tuple[Floats, Floats]:
         """Times, from one duration before the contact on, and forces (times, trials)."""
-        found = self.runs({n: fitted(self.deck, one) for n, one in enumerate(trials)}, False)
+        found = self.runs({n: self.strike(one) for n, one in enumerate(trials)}, False)
         assert found.force is not None
+        failed = np.flatnonzero(~np.isfinite(found.force).all(axis=1))
+        if self.law is not None and len(failed):  # the run alone tells why
+            one = self.runs({0: self.strike(trials[failed[0]])}, True)
+            raise IdentifyError(str(one.status[0]))
         steps = found.force.shape[1]
         clock = float(found.columns["dt"][0]) * np.arange(-steps, steps + 1.0)
         forces = np.vstack([np.zeros((steps + 1, len(trials))), found.force.T])

@@ -42,6 +42,8 @@ from fecm.identification.misfit import (
     undescribed,
     wrong_model,
 )
+from fecm.mechanics.contact_law import Law
+from fecm.mechanics.own_law import own_law
 from fecm.mechanics.projectile import RigidMass
 from fecm.problem.parts import build_projectile
 from fecm.results.comparison import Measurement, measurement_of
@@ -51,7 +53,7 @@ from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.sweeps.api import problem_of
 from fecm.sweeps.batch import runs_of
 from fecm.sweeps.find import Runs
-from fecm.sweeps.plan import shares_plate
+from fecm.sweeps.plan import check_law, shares_plate
 from fecm.sweeps.strike import strike_of
 
 CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
@@ -138,6 +140,7 @@ def identify(
     force: Any,
     free: str | Sequence[str],
     filter: str | Filter | None = None,
+    law: Law | str | None = None,
 ) -> Identification:
     """Fit parameters of an impact to a measured contact force.
 
@@ -161,6 +164,9 @@ def identify(
     filter : str, optional
         Filter of the measurement, which the computed force passes too: ``"first-order:RISE"``,
         ``"moving-average:RISE"`` or ``"cfc:CLASS"``.
+    law : Law or str, optional
+        Contact law instead of that of EXPE, as in :func:`run`; the constants of EXPE can't be
+        fitted then.
 
     Returns
     -------
@@ -177,7 +183,12 @@ def identify(
     DeckError
         If the deck has errors.
     CasesError
-        If the deck has several problems, or its cases do not share a plate.
+        If the deck has several problems, its cases do not share a plate, or `law` takes the place
+        of a constant that is to be fitted.
+    LawError
+        If `law` is not a contact law, or fails.
+    ExtensionError
+        If no installed package has an entry point of the name `law`.
 
     Examples
     --------
@@ -191,7 +202,7 @@ def identify(
     measured = measurement_of((time, force), {})
     known = filter_of(filter) if isinstance(filter, str) else filter
     names = (free,) if isinstance(free, str) else tuple(free)
-    found = fit(problem_of(deck).deck, measured, names, known)
+    found = fit(problem_of(deck).deck, measured, names, known, own_law(law))
     for text in found.notes:
         warn(text)
     return found
@@ -214,15 +225,21 @@ def _shared(deck: Deck) -> Runs:
 
 
 def fit(
-    deck: Deck, measured: Measurement, free: Sequence[str], sensor: Filter | None = None
+    deck: Deck,
+    measured: Measurement,
+    free: Sequence[str],
+    sensor: Filter | None = None,
+    law: Law | None = None,
 ) -> Identification:
     """Fit parameters of a deck to a measurement; see :func:`identify`."""
     if not free or not set(free) <= set(FREE) or len(set(free)) < len(free):
         given = ", ".join(map(str, free)) or "none"
         raise StudyError(f"can't fit {given}; fit different ones of {', '.join(FREE)}")
+    if law is not None:
+        check_law(law, free)
     units = unit_names(deck)
     sensor = None if sensor is None else sensor.in_unit(units.get("time", ""))
-    model = Model(deck, _shared(deck), sensor)
+    model = Model(deck, _shared(deck), sensor, law)
     clock, own = model.histories([{}])
     width = check_measured(measured, clock, own[:, 0], units)
     if len(measured.time) < POINTS:
@@ -271,7 +288,9 @@ def _identification(
     rounded = {name: float(f"{value:.5g}") for name, value in values.items()}
     plates = {}
     if not fault:
-        plates = plate_errors(model, found, lambda deck: Model(deck, _shared(deck), model.sensor))
+        plates = plate_errors(
+            model, found, lambda deck: model._replace(deck=deck, runs=_shared(deck))
+        )
     made = Identification(
         values=values,
         errors=dict(zip(start, errors.tolist(), strict=True)),
@@ -346,7 +365,7 @@ def _notes(
         text = "the model does not describe the measurement down to its noise"
         text = f"{text}, and the standard errors are too small"
         yield f"neighbouring residuals have the correlation {near:.2f}: {text}"
-    fitted = model.runs({0: strike_of(found.deck)}, True)
+    fitted = model.runs({0: strike_of(found.deck)._replace(own_law=model.law)}, True)
     if not fitted.fine[0]:
         yield f"the run of the fitted deck fails: {fitted.status[0]}"
     # A measurement may end before the peak does; what the model lacks biases the parameters.

@@ -130,6 +130,13 @@ class ImpactSystem:
         couple_step(self.rod_step(dt), self.law, state, w)
 
 
+def _kept(iterating: Any, tried: Any, memory: Any) -> Any:
+    """Memory of a law after a trial; with one object per case, of the iterating cases alone."""
+    if isinstance(iterating, np.ndarray) and isinstance(tried, np.ndarray):
+        return np.where(iterating, tried, memory)
+    return tried
+
+
 def couple_step(
     step: TipStep[Any, Number], law: Law[Number], state: ContactState[Number], w: Number
 ) -> None:
@@ -142,8 +149,9 @@ def couple_step(
     # The force of a case is kept once its iteration has converged.
     iterating = np.ones(len(w), dtype=bool) if isinstance(w, np.ndarray) else True
     for _ in range(PASSES):
-        trial, memory = law.trial(memory, last, -tip - w)
+        trial, tried = law.trial(memory, last, -tip - w)
         force = select(iterating, trial, force)
+        memory = _kept(iterating, tried, memory)
         before, tip = tip, drift + step.weight * (base + step.gain * (carried + step.theta * force))
         iterating = iterating & ((abs(tip - before) < TOLERANCE * abs(tip)) ^ True)
         if not any_case(iterating):

@@ -63,7 +63,8 @@ class RunOptions:
     rod_method: RodMethod = field(default_factory=RodMethod)  # the rod's mass matrix and integrator
     # Error of the energy balance, relative to the supplied energy, that ends a run without slips.
     energy_limit: float = ENERGY_LIMIT
-    law: contact_law.Law | None = None  # contact law instead of the deck's
+    # Contact law instead of the deck's; see :func:`~fecm.mechanics.own_law.own_law`.
+    law: contact_law.Law | None = None
 
     def __post_init__(self) -> None:
         if self.solver not in SOLVERS:

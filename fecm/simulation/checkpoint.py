@@ -24,6 +24,7 @@ from fecm._files import beside, naming, open_ordinary, packed, sync
 from fecm._typing import Array
 from fecm._version import __version__
 from fecm.mechanics import kernels
+from fecm.mechanics.own_law import name_of
 from fecm.mechanics.stiffness_product import KERNELS
 from fecm.results.hdf5_writer import FileSink, Operation
 from fecm.results.schema import dataset_of
@@ -71,6 +72,7 @@ def identity(simulation: Simulation) -> dict[str, Any]:
             options.rod_method.mass,
             options.rod_method.integrator,
         ],
+        "a run with another contact law": None if options.law is None else name_of(options.law),
         "a run with another choice of --print": simulation.printer.is_on,
     }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from fecm.mechanics.contact_law import Law
+from fecm.mechanics.own_law import name_of
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import ImpactModel
@@ -9,12 +11,14 @@ from fecm.problem.contact_estimates import contact_step
 from fecm.problem.problem import Problem
 
 
-def likely_cause(problem: Problem, model: ImpactModel, dt: float) -> str:
-    """Explain a divergence, as far as the time step does."""
+def likely_cause(problem: Problem, model: ImpactModel, dt: float, law: Law | None = None) -> str:
+    """Explain a divergence, as far as the time step does; `law` is a user's instead of EXPE's."""
     plate = model.motion.plate
     try:
         critical = critical_time_step(plate)
-        contact = contact_step(problem.deck, plate, problem.contact, dt, critical)
+        contact = None
+        if law is None:
+            contact = contact_step(problem.deck, plate, problem.contact, dt, critical)
     except UnsoundPlateError as error:
         return str(error)
     side = "above" if dt > critical else "below"
@@ -29,4 +33,8 @@ def likely_cause(problem: Problem, model: ImpactModel, dt: float) -> str:
         )
     if len({macro.value for macro in problem.deck.macros if macro.word == "DT"}) > 1:
         return f"{cause}, but DT changes: steps that alternate diverge below the critical one"
+    if law is not None:
+        return (
+            f"{cause}, but it may be too large for the stiffness of the contact law {name_of(law)}"
+        )
     return cause

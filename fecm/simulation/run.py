@@ -12,6 +12,7 @@ from fecm._version import __version__
 from fecm.deck.model import Cure, Deck, Material
 from fecm.deck.units import unit_names
 from fecm.mechanics.failure import MODES, largest_in_plies
+from fecm.mechanics.own_law import name_of
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.problem.build import RunOptions
 from fecm.problem.parts import strengths_of_deck
@@ -64,7 +65,7 @@ def run(simulation: Simulation) -> None:
                 simulation.recorder.failure(state.failure)
             simulation.recorder.finish()
     except DivergenceError as diverged:
-        cause = likely_cause(problem, simulation.model, state.dt)
+        cause = likely_cause(problem, simulation.model, state.dt, simulation.options.law)
         raise DivergenceError(diverged.step, f"{diverged.reason}; {cause}") from None
     _write_footer(simulation)
 
@@ -83,7 +84,7 @@ def _write_header(simulation: Simulation) -> None:
         "solver": simulation.model.motion.solver,
         **({KINEMATICS: Kinematics.VON_KARMAN.value} if plate.nonlinear else {}),
         **options.rod_method.attributes,
-        **({} if options.law is None else {"law": type(options.law).__name__}),
+        **({} if options.law is None else {"law": name_of(options.law)}),
         **_units(deck),
     }
     sink.attributes("", attributes)

@@ -16,6 +16,8 @@ from fecm._errors import warn
 from fecm.api import LoadedDeck, Progress, load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
+from fecm.mechanics.contact_law import Law
+from fecm.mechanics.own_law import own_law
 from fecm.problem.problem import Problem
 from fecm.sweeps import schedule
 from fecm.sweeps.batch import deck_of
@@ -218,6 +220,7 @@ def sweep(
     executor: Executor | None = None,
     output: str | Path | None = None,
     progress: Progress | None = None,
+    law: Law | str | None = None,
 ) -> SweepResult:
     """Run a deck many times with varied values.
 
@@ -284,6 +287,10 @@ def sweep(
         Output file, which is overwritten.
     progress : callable, optional
         Called with the number of finished cases and that of all cases.
+    law : Law or str, optional
+        Contact law of all cases instead of that of EXPE, as in :func:`run`.  The cases still share
+        the response of their plate, but each asks the law in Python at every step.  The constants
+        of EXPE can't vary then, and the reduced model is not for such a law.
 
     Returns
     -------
@@ -301,6 +308,10 @@ def sweep(
         If the sweep needs more memory than is free; a MemoryError.
     SchedulerError
         If the scheduler cannot be used.
+    LawError
+        If `law` lacks a method; where it fails in a case, that is the status of the case.
+    ExtensionError
+        If no installed package has an entry point of the name `law`.
     OSError
         If a file cannot be read or written.
 
@@ -328,6 +339,7 @@ def sweep(
     if progress is not None and not callable(progress):
         raise CasesError(f"progress is {progress!r}, not a function")
     own, measures = _measures(measure)
+    own_contact = own_law(law)
     free = build is not None
     grid = {} if vary is None else vary
     made = combined(grid, free=free) if cases is None else checked(cases, free=free)
@@ -339,7 +351,7 @@ def sweep(
         if text := doubt(drawn):
             warn(text)
     if workers > 1 or isinstance(executor, ProcessPoolExecutor):
-        _check_sendable(workers > 1, build=build, measure=own)
+        _check_sendable(workers > 1, build=build, measure=own, law=own_contact)
     prepared = _prepared(deck, build, made)
     (problem,) = prepared.problems
     if refine is not None:
@@ -355,6 +367,7 @@ def sweep(
         design=drawn,
         limits=_limits(exceed),
         modes=modes_of(model, modes),
+        law=own_contact,
     )
     check_draws(planned)
     for text in doubtful_values(problem, made) if build is None else ():

@@ -20,7 +20,8 @@ from fecm._memory import require
 from fecm._typing import Floats
 from fecm.deck.macros import flat
 from fecm.deck.model import Deck, Nonlinear
-from fecm.mechanics.contact_law import HystereticLaw, stacked
+from fecm.mechanics.contact_law import HystereticLaw, Law, stacked
+from fecm.mechanics.own_law import CaseByCase
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_model
@@ -86,7 +87,7 @@ def _strikes(task: Task, checked: Problem) -> tuple[dict[int, Strike], dict[int,
     reasons: dict[int, str] = {}
     for number, case in zip(task.numbers, task.cases, strict=True):
         try:
-            made = strike(checked.deck, case)
+            made = strike(checked.deck, case)._replace(own_law=task.settings.law)
             made.check(checked)
             strikes[number] = made
         except CasesError as error:
@@ -174,7 +175,7 @@ def runs_of(checked: Problem, measures: Sequence[Measure] = (), *, history: bool
 
 def _one_by_one(checked: Problem, measures: Sequence[Measure], strikes: Strikes) -> list[Outcome]:
     return [
-        alone(number, replace(checked, deck=made.deck()), measures)
+        alone(number, replace(checked, deck=made.deck()), measures, law=made.own_law)
         for number, made in strikes.items()
     ]
 
@@ -238,7 +239,9 @@ def _ordered(strikes: Strikes) -> _Ordered:
     scale = np.where([units[row] is UNIT for row in order], mass, 1.0)
     all_strikes = list(strikes.values())
     ordered = [all_strikes[row] for row in order]
-    law = HystereticLaw(stacked([made.law for made in ordered]))
+    law: Law[Floats] = HystereticLaw(stacked([made.law for made in ordered]))
+    if (own := ordered[0].own_law) is not None:
+        law = CaseByCase(own, len(ordered))
     speed = np.array([made.velocity for made in ordered])
     numbers = list(strikes)
     return _Ordered(

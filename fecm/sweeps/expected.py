@@ -70,7 +70,7 @@ def _seconds(problem: Problem, made: Plan, steps: int) -> tuple[float, int]:
     """Seconds of a run of about so many steps, and their number."""
     short = lengthened(problem, min(1.0, steps / problem.work.steps))
     begin = time.perf_counter()
-    alone(0, short, made.settings.measures)
+    alone(0, short, made.settings.measures, law=made.settings.law)
     return time.perf_counter() - begin, short.work.steps
 
 

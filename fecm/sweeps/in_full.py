@@ -12,7 +12,10 @@ from fecm.api import LoadedDeck, load_deck
 from fecm.deck.macros import Body, Loop
 from fecm.deck.model import Deck, Macro
 from fecm.deck.units import unit_names
+from fecm.mechanics.contact_law import Law
+from fecm.mechanics.own_law import LawError
 from fecm.mechanics.plate_motion import DivergenceError
+from fecm.problem.build import RunOptions
 from fecm.problem.problem import Problem
 from fecm.results.exposures import count_evaluations
 from fecm.results.metrics import EVALUATIONS, HIT, Indentation, Projectiles, summarise
@@ -45,7 +48,8 @@ def run_in_full(settings: Settings, number: int, case: Case) -> Outcome:
 
             def run(strike: Strike, factor: int) -> Outcome:
                 longer = checked if factor == 1 else lengthened(checked, factor)
-                return alone(number, replace(longer, deck=strike.deck()), settings.measures)
+                deck = replace(longer, deck=strike.deck())
+                return alone(number, deck, settings.measures, law=settings.law)
 
             level, start = float(search.level), strike_of(checked.deck)
             at_rest = checked.worst_at_rest
@@ -53,7 +57,7 @@ def run_in_full(settings: Settings, number: int, case: Case) -> Outcome:
                 raise CasesError(f"the plate at rest has the exposure {at_rest.exposure:.4g}")
             outcome = find_in_full.found(number, start, search.quantity, level, run)
         else:
-            outcome = alone(number, checked, settings.measures, measure, case)
+            outcome = alone(number, checked, settings.measures, measure, case, law=settings.law)
     except CasesError as error:
         return Outcome.failed({number: str(error)})
     return outcome if settings.build else with_hit(outcome, checked, case)
@@ -99,12 +103,14 @@ def alone(
     measures: Sequence[Measure],
     measure: MeasureFunction | None = None,
     case: Case | None = None,
+    *,
+    law: Law | None = None,
 ) -> Outcome:
     """Run one case in full, without storing fields unless it is measured."""
-    sink = MemorySink()
+    sink, program = MemorySink(), checked if measure else without_output(checked, measures)
     try:
-        simulation = simulate(checked if measure else without_output(checked, measures), sink)
-    except (DivergenceError, ArithmeticError) as error:
+        simulation = simulate(program, sink, RunOptions(law=law))
+    except (DivergenceError, LawError, ArithmeticError) as error:
         return Outcome.failed({number: str(error)})
     result = Result(sink.arrays, sink.texts, sink.groups)
     outcome = _outcome(number, checked, measures, result, simulation.state.dt)
@@ -123,10 +129,11 @@ def in_one_motion(
     measures, sink = settings.measures, MemorySink()
     try:
         problems = [problem_of_case(settings, case) for case in cases]
-        simulation = Simulation(without_output(problems[0], measures), sink)
+        options = RunOptions(law=settings.law)
+        simulation = Simulation(without_output(problems[0], measures), sink, options)
         simulation.others = [_criteria(simulation, one) for one in problems[1:]]
         run(simulation)
-    except (CasesError, DivergenceError, ArithmeticError) as error:
+    except (CasesError, DivergenceError, LawError, ArithmeticError) as error:
         return [Outcome.failed({number: str(error)}) for number in numbers]
     found = [{}, *(exposures_of(other.envelope) for other in simulation.others)]
     outcomes = []

@@ -17,6 +17,8 @@ from typing import Any
 from fecm._version import __version__
 from fecm.deck.macros import flat
 from fecm.deck.model import Deck, Delamination, Gages, Nonlinear
+from fecm.mechanics.contact_law import Law
+from fecm.mechanics.own_law import name_of
 from fecm.problem.problem import Problem
 from fecm.results.metrics import COLUMNS, FOUND, GAGE, SUMMARY
 from fecm.results.metrics import THRESHOLD as OF_THRESHOLD
@@ -27,6 +29,7 @@ from fecm.sweeps.limits import Limit, check_limits
 from fecm.sweeps.random import Design
 from fecm.sweeps.timing import Clock, clock_of
 from fecm.sweeps.values import (
+    LAW_VALUES,
     REFINE,
     Changes,
     check_names,
@@ -70,6 +73,7 @@ class Settings:
     measure: MeasureFunction | None = None  # computes more columns from the result of a case
     measures: tuple[Measure, ...] = ()  # more columns
     modes: int | None = None  # bending modes of the reduced model; None of full plates
+    law: Law | None = None  # a user's contact law instead of the deck's
 
     @property
     def shares_motion(self) -> bool:
@@ -98,7 +102,8 @@ class Plan:
         """Hash that identifies the outcomes of this sweep."""
         own = self.settings
         parts = [__version__, own.deck.to_text(), self.cases, own.history, own.search]
-        text = json.dumps([*parts, own.measures, own.modes, MOST_TOGETHER])
+        law = () if own.law is None else (name_of(own.law),)
+        text = json.dumps([*parts, own.measures, own.modes, MOST_TOGETHER, *law])
         return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -124,10 +129,12 @@ def plan(
     design: Design | None = None,
     limits: Sequence[Limit] = (),
     modes: int | None = None,
+    law: Law | None = None,
 ) -> Plan:
     """Create the plan of a sweep; `extra` are names of :class:`Measure`, `until` is sought.
 
-    With `modes` the cases are those of the reduced model.  Raises CasesError if the deck has no
+    With `modes` the cases are those of the reduced model.  `law` is a user's contact law instead of
+    the deck's.  Raises CasesError if the deck has no
     impact, names exclude each other, the deck lacks what is searched or measured, or the reduced
     model does not give it.
     """
@@ -156,10 +163,22 @@ def plan(
         measure=measure,
         measures=measures,
         modes=modes,
+        law=law,
     )
+    if law is not None and build is None:
+        check_law(law, cases[0], modes)
     if modes is not None:
         _check_reduced(checked, cases[0], settings)
     return Plan(settings, tuple(cases), design, tuple(limits))
+
+
+def check_law(law: Law, names: Collection[str], modes: int | None = None) -> None:
+    """Raise CasesError if a user's law excludes values that vary, or the reduced model."""
+    own = f"the contact law {name_of(law)} takes the place of EXPE"
+    if constants := [name for name in names if name in LAW_VALUES]:
+        raise CasesError(f"{own}, so that {', '.join(constants)} would change nothing")
+    if modes is not None:
+        raise CasesError(f"{own}, which the reduced model needs: leave out the reduced model")
 
 
 def _measures(names: Sequence[str], deck: Deck) -> tuple[Measure, ...]:

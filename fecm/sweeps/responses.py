@@ -16,7 +16,13 @@ from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.mechanics import kernels
-from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, LinearPermanent
+from fecm.mechanics.contact_law import (
+    ContactParameters,
+    ContactPoint,
+    HystereticLaw,
+    Law,
+    LinearPermanent,
+)
 from fecm.mechanics.impact import ContactState, ImpactConditions, ImpactSystem, couple_step
 from fecm.mechanics.impact_steps import ImpactSteps, kernel_law, knows, supports
 from fecm.mechanics.impact_sweep import Found, Given, sweep
@@ -90,7 +96,7 @@ class Hits(NamedTuple):
     rods: Sequence[Projectile]  # the kinds of projectiles
     kind: NDArray[np.intp]  # (cases,), ascending
     scale: Floats  # (cases,): factor of the mass and stiffness of the kind
-    law: HystereticLaw[Floats]  # with arrays of constants
+    law: Law[Floats]  # of all cases
     speed: Floats  # (cases,): approach velocity
 
 
@@ -186,8 +192,9 @@ def impacts(response: Floats, dt: float, node_mass: float, hits: Hits) -> Impact
     `node_mass` is the mass that the contact force accelerates: the lumped mass of the impact node,
     or 1/(g M^-1 g) of a patch with the weights g.
     """
-    if kernels.LIBRARY is not None and knows(hits.law.constants):
-        return _by_kernels(response, dt, node_mass, hits)
+    law = hits.law
+    if kernels.LIBRARY is not None and isinstance(law, HystereticLaw) and knows(law.constants):
+        return _by_kernels(response, dt, node_mass, hits, law.constants)
     return by_numpy(response, node_mass, TipSteps(hits, dt, len(response)))[0]
 
 
@@ -262,9 +269,14 @@ def _modes(rod: Projectile) -> Modes:
     return Modes.of(rod.stiffness(), rod.mass())
 
 
-def _by_kernels(response: Floats, dt: float, node_mass: float, hits: Hits) -> Impacts:
+def _by_kernels(
+    response: Floats,
+    dt: float,
+    node_mass: float,
+    hits: Hits,
+    constants: ContactParameters[Floats],
+) -> Impacts:
     """Compute impacts by the compiled kernels, and projectiles by their modes."""
-    constants = hits.law.constants
     law = kernel_law(constants)
     rows: dict[Given, float | Floats] = {
         Given.K: constants.k,

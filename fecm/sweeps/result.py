@@ -18,6 +18,7 @@ from fecm._typing import Bools
 from fecm.deck.model import Delamination, Preload
 from fecm.deck.reader import Reader
 from fecm.deck.units import quantity, unit_names, unit_of
+from fecm.mechanics.own_law import name_of
 from fecm.results.errors import NotStoredError
 from fecm.results.linear_plate import TOO_SOFT, UNSAFE, InPlane, softness
 from fecm.results.metrics import COLUMNS, FOUND, RATIO, SUMMARY, THRESHOLD, VALIDITY, VERDICTS
@@ -47,7 +48,10 @@ def summary(result: SweepResult) -> list[str]:
     """Return summary lines: number of cases, smallest and largest peak or velocity, failures."""
     fine = result.fine
     failed = Counter(result["status"][~fine].tolist())
-    lines = [f"cases             {len(result)}", *_extremes(result), *_moved(result)]
+    lines = [f"cases             {len(result)}"]
+    if result.law:
+        lines.append(f"contact law       {result.law}, instead of EXPE")
+    lines += [*_extremes(result), *_moved(result)]
     for reason, times in failed.most_common(MOST_REASONS):
         lines.append(f"failed            {times}: {reason}")
     if (others := len(failed) - MOST_REASONS) > 0:
@@ -190,6 +194,8 @@ class SweepResult:
         Statistics, sensitivity indices and probabilities of a random sweep.
     reduced : ReducedModel or None
         Full runs beside the reduced model; None if the cases are not by that model.
+    law : str
+        Name of the contact law that took the place of EXPE; empty if none did.
     """
 
     cases: dict[str, Column]
@@ -203,6 +209,7 @@ class SweepResult:
     units: dict[str, str] = field(default_factory=dict)
     random: RandomResult | None = None
     reduced: ReducedModel | None = None
+    law: str = ""
 
     def __len__(self) -> int:
         return len(self.dt)
@@ -409,6 +416,7 @@ def result_of(plan: Plan, outcome: Outcome, reduced: ReducedModel | None = None)
         units=unit_names(deck),
         random=random,
         reduced=reduced,
+        law="" if plan.settings.law is None else name_of(plan.settings.law),
     )
 
 

@@ -86,7 +86,8 @@ def _write_attributes(sink: FileSink, result: SweepResult) -> None:
         "title": result.title,
     }
     units = {f"unit_{name}": unit for name, unit in result.units.items()}
-    sink.attributes("", about | units)
+    law = {"law": result.law} if result.law else {}
+    sink.attributes("", about | units | law)
     sink.text("deck", result.deck, "the cards of the deck that was varied")
     if result.random is not None:
         sink.axis_names["laws"] = tuple(result.random.design.laws)
@@ -173,6 +174,7 @@ def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
         units=schema.declared_units(contents.attributes),
         random=random_of(contents, cases, summary, len(steps["dt"])),
         reduced=reduced_check.reduced_of(contents),
+        law=str(contents.attributes.get("law", "")),
     )
 
 

@@ -177,6 +177,7 @@ def names_of(*changes: Changes) -> tuple[str, ...]:
 
 PLATE_NAMES = names_of(Changes.PLACE, Changes.LAMINATE, Changes.PLATE, Changes.TIME)
 RESIDUAL_NAMES = names_of(Changes.RESIDUAL)
+LAW_VALUES = ("k", "radius", "alpha_p", "s_p", "q")  # of EXPE
 OF_PLATE = frozenset((*PLATE_NAMES, REFINE))  # which need another response of the plate
 
 

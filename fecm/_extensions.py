@@ -1,0 +1,47 @@
+"""Objects that other installed packages offer by their entry points."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+
+from fecm._errors import FecmError, did_you_mean
+
+
+class Group(StrEnum):
+    """Groups of entry points that fecm looks up."""
+
+    LAWS = "fecm.laws"
+    CRITERIA = "fecm.criteria"
+
+
+WHAT = {Group.LAWS: "contact law", Group.CRITERIA: "failure criterion"}
+
+
+class ExtensionError(FecmError, ValueError):
+    """An object by a user, or one of an installed package, can't be used."""
+
+
+def installed(group: Group, name: str) -> object:
+    """Load the entry point of a group by its name.
+
+    Raises ExtensionError if there is none, several packages have one, or it can't be imported.
+    """
+    from importlib.metadata import entry_points  # 20 ms, and few runs need it
+
+    what = WHAT[group]
+    found = [one for one in entry_points(group=group) if one.name == name]
+    if not found:
+        known = sorted(entry_points(group=group).names)
+        listed = ", ".join(known) if known else "none"
+        raise ExtensionError(
+            f"no installed package offers the {what} {name!r}; entry points of the group {group}: "
+            f"{listed}{did_you_mean(name, known)}"
+        )
+    if len({one.value for one in found}) > 1:
+        places = ", ".join(sorted({one.value for one in found}))
+        raise ExtensionError(f"several installed packages offer the {what} {name!r}: {places}")
+    try:
+        return found[0].load()
+    except Exception as error:  # importing a package of others can raise anything
+        text = f"{type(error).__name__}: {error}"
+        raise ExtensionError(f"the {what} {name!r} of {found[0].value} can't be imported ({text})") from error
