@@ -15,6 +15,7 @@ from fecm.deck.reader import Reader, read_deck
 from fecm.deck.source_text import load_text
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import own_law
+from fecm.mechanics.own_projectile import LinearProjectile, own_projectile
 from fecm.mechanics.projectile import Integrator, MassMatrix, RodMethod
 from fecm.problem.build import ENERGY_LIMIT, RunOptions, check_options
 from fecm.problem.check import check, check_listing
@@ -104,6 +105,7 @@ def run_one(
     energy_limit: float = ENERGY_LIMIT,
     progress: Progress | None = None,
     law: Law | str | None = None,
+    projectile: LinearProjectile | None = None,
 ) -> Result:
     """Run a deck with exactly one problem; parameters and errors are those of :func:`run`.
 
@@ -118,8 +120,15 @@ def run_one(
     >>> print(f"{result.force.max():.2f} lb")
     86.20 lb
     """
-    rod, own = RodMethod(rod_mass, rod_integrator), own_law(law)
-    choices = RunOptions(active_slips(mode, slips), solver, threads, rod, energy_limit, own)
+    choices = RunOptions(
+        active_slips(mode, slips),
+        solver,
+        threads,
+        RodMethod(rod_mass, rod_integrator),
+        energy_limit,
+        law=own_law(law),
+        projectile=own_projectile(projectile),
+    )
     return _run(deck, mode, force, choices, output, progress, one=True)[0]
 
 
@@ -136,6 +145,7 @@ def run(
     energy_limit: float = ENERGY_LIMIT,
     progress: Progress | None = None,
     law: Law | str | None = None,
+    projectile: LinearProjectile | None = None,
 ) -> Result | list[Result]:
     """Run every problem of a deck.
 
@@ -173,6 +183,9 @@ def run(
         methods of :class:`~fecm.mechanics.contact_law.Law`, or the name of an entry point of the
         group ``fecm.laws``.  The name of its class, or that of the entry point, is stored as the
         attribute ``law`` of the result.
+    projectile : LinearProjectile, optional
+        Projectile instead of that of PROJ, by its mass and stiffness matrices, at the velocity of
+        ROD.  The name of its class is stored as the attribute ``projectile`` of the result.
 
     Returns
     -------
@@ -192,6 +205,8 @@ def run(
         If `law` lacks a method, raises an exception, or returns a value that is not a number.
     ExtensionError
         If no installed package has an entry point of that name.
+    ProjectileError
+        If the matrices of `projectile` are not those of one free elastic body.
     NotEnoughMemoryError
         If the run needs more memory than is free; a MemoryError.
     OSError
@@ -203,8 +218,15 @@ def run(
     >>> print(f"{result.force.max():.2f} lb")
     6.19 lb
     """
-    rod, own = RodMethod(rod_mass, rod_integrator), own_law(law)
-    choices = RunOptions(active_slips(mode, slips), solver, threads, rod, energy_limit, own)
+    choices = RunOptions(
+        active_slips(mode, slips),
+        solver,
+        threads,
+        RodMethod(rod_mass, rod_integrator),
+        energy_limit,
+        law=own_law(law),
+        projectile=own_projectile(projectile),
+    )
     results = _run(deck, mode, force, choices, output, progress, one=False)
     return results[0] if len(results) == 1 else results
 

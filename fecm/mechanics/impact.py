@@ -121,7 +121,9 @@ class ImpactSystem:
         if self._step is None or self._step.dt != dt:
             if not self.contact.keeps_first_step or self.first_dt is None:
                 self.first_dt = dt
-            self._step = self._integrator(self.rod_stiffness, self.rod_mass, dt, self.first_dt)
+            self._step = self._integrator(
+                self.rod_stiffness, self.rod_mass, dt, self.first_dt, self.rod.rigid
+            )
         return self._step
 
     def move_projectile(self, state: ImpactState, dt: float) -> None:

@@ -235,7 +235,7 @@ class ImpactSteps:
         self._system, self._threads = system, threads
         self._product = product = cast(CompiledProduct, system.motion.product)
         self._plate = product.plate
-        self._modes = Modes.of(system.rod_stiffness, system.rod_mass)
+        self._modes = Modes.of(system.rod_stiffness, system.rod_mass, system.rod.rigid)
         self._tip_shape = np.ascontiguousarray(self._modes.shapes[0])
         self._station = self._modes.shapes[station].copy()
         self._station[0] = 0.0

@@ -6,9 +6,8 @@ Such a law is one of single cases.  :class:`CaseByCase` applies it to many.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from numbers import Real
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,9 +22,6 @@ from fecm.mechanics.impact_steps import knows
 METHODS = ("start", "trial", "accept", "permanent")
 # Indentations beyond this, in any unit, are those of a diverging motion: no fault of the law.
 FAR = 1e30
-
-T = TypeVar("T")
-
 
 class LawError(FecmError, ValueError):
     """A contact law by a user lacks a method, raises an exception, or returns no number."""
@@ -43,13 +39,13 @@ class OwnLaw:
 
     def start(self) -> Any:
         """Memory before the first contact."""
-        return self._ask(0.0, self.law.start)
+        return self._ask("start", 0.0)
 
     def trial(self, memory: Any, last: ContactPoint, indentation: float) -> tuple[float, Any]:
         """Contact force at a trial indentation, and the memory after the trial."""
         if not math.isfinite(indentation):
             return indentation, memory
-        found = self._ask(indentation, self.law.trial, memory, last, indentation)
+        found = self._ask("trial", indentation, memory, last, indentation)
         try:
             force, memory = found
         except (TypeError, ValueError):
@@ -63,23 +59,22 @@ class OwnLaw:
         """Memory after a step that ends at an indentation."""
         if not math.isfinite(indentation):
             return memory
-        return self._ask(indentation, self.law.accept, memory, last, indentation)
+        return self._ask("accept", indentation, memory, last, indentation)
 
     def permanent(self, memory: Any, last: ContactPoint) -> float:
         """Permanent indentation after unloading from the last point (length)."""
         a = last.indentation
-        found = self._ask(a, self.law.permanent, memory, last)
+        found = self._ask("permanent", a, memory, last)
         return self._number("permanent indentation", found, a)
 
-    def _ask(self, indentation: float, method: Callable[..., T], *arguments: Any) -> T:
+    def _ask(self, method: str, indentation: float, *arguments: Any) -> Any:
         """Call a method of the law."""
         try:
-            return method(*arguments)
+            return getattr(self.law, method)(*arguments)
         except Exception as error:
             if isinstance(error, OverflowError) and abs(indentation) > FAR:
                 raise  # which the run reports as its divergence
-            name = method.__name__
-            text = f"{name} failed with {type(error).__name__}: {error}"
+            text = f"{method} failed with {type(error).__name__}: {error}"
             raise self._error(text, indentation) from error
 
     def _number(self, what: str, value: object, indentation: float) -> float:

@@ -15,6 +15,7 @@ import numpy as np
 from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.contact_law import Number
+from fecm.mechanics.own_projectile import OwnProjectile
 
 # The report's steel rod, in lb, in and s: a spherical cap of five steps, then the cylinder.
 REPORT_CAP = (0.22, 0.36, 0.43, 0.48, 0.50)
@@ -93,6 +94,11 @@ class Rod:
         """Mass of the rod."""
         return float(self.density * self.areas.sum() * self.length / self.elements)
 
+    @property
+    def rigid(self) -> Floats:
+        """Dofs of a unit rigid displacement, (n,): 1 of u and 0 of du/dx."""
+        return rigid_dofs(2 * self.elements + 2)
+
     def stiffness(self) -> Floats:
         """Stiffness matrix, equation 4-23: (n, n)."""
         ratios = [[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]]
@@ -158,6 +164,11 @@ class RigidMass:
         """The same projectile: lumped and consistent mass are equal."""
         return self
 
+    @property
+    def rigid(self) -> Floats:
+        """Dofs of a unit rigid displacement, (1,)."""
+        return np.ones(1)
+
     def stiffness(self) -> Floats:
         """Stiffness matrix, (1, 1): zero."""
         return np.zeros((1, 1))
@@ -175,7 +186,7 @@ class RigidMass:
         return np.zeros(len(deformation))
 
 
-Projectile = Rod | RigidMass
+Projectile = Rod | RigidMass | OwnProjectile
 
 
 @frozen
@@ -260,7 +271,8 @@ class RodIntegrator:
     :math:`y' = T y + h f`.
 
     `K` is the stiffness, `m` the lumped mass (n,) or a mass matrix (n, n); `constants_dt` is the
-    time step of the method's constants if that is not `dt` (the slip ``rod-dt``).
+    time step of the method's constants if that is not `dt` (the slip ``rod-dt``).  `rigid` has the
+    dofs of a unit rigid displacement, (n,), by default those of a rod.
 
     References
     ----------
@@ -270,7 +282,14 @@ class RodIntegrator:
     theta: ClassVar[float]  # time of equilibrium, as a fraction of the step
     inverse_beta: ClassVar[float]  # 1/beta, above 2
 
-    def __init__(self, K: Floats, m: Floats, dt: float, constants_dt: float | None = None) -> None:
+    def __init__(
+        self,
+        K: Floats,
+        m: Floats,
+        dt: float,
+        constants_dt: float | None = None,
+        rigid: Floats | None = None,
+    ) -> None:
         theta, tau, r = self.theta, dt if constants_dt is None else constants_dt, self.inverse_beta
         self.dt = dt
         self.n = n = len(m)
@@ -296,7 +315,7 @@ class RodIntegrator:
         acceleration[:, 0] = 0.0
         kept, relative = one.copy(), one.copy()
         kept[0, 0] = 0.0
-        relative[2::2, 0] = -1.0
+        relative[1:, 0] -= (rigid_dofs(n) if rigid is None else rigid)[1:]
         velocity = np.hstack([none, one, tau / 2.0 * one]) + tau / 2.0 * acceleration
         moved = np.hstack([none, dt * one, tau**2 / begin * one]) + tau**2 / r * acceleration
         displacement = np.hstack([kept, none, none]) + relative @ moved
@@ -346,8 +365,13 @@ def report_rod(density: float = REPORT_DENSITY) -> Rod:
     return Rod(REPORT_LENGTH, diameters, REPORT_MODULUS, density)
 
 
+def rigid_dofs(n: int) -> Floats:
+    """Dofs of a unit rigid displacement of a rod or rigid mass, (n,): 1 of u and 0 of du/dx."""
+    return np.arange(1.0, n + 1.0) % 2.0
+
+
 def rigid_approach(rod: Projectile, velocity: float, *, derivatives_too: bool = False) -> RodState:
     """Initial state of a rigid approach; `derivatives_too` moves du/dx too (``rod-start``)."""
     motion = np.zeros((3, len(rod.mass())))
-    motion[1, :: 1 if derivatives_too else 2] = -velocity
+    motion[1, slice(None) if derivatives_too else rod.rigid > 0.0] = -velocity
     return RodState(motion)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.mechanics.projectile import RodIntegrator, RodState
+from fecm.mechanics.projectile import RodIntegrator, RodState, rigid_dofs
 
 # Difference of squares of frequencies below which modes count as equal, relative to the largest.
 EQUAL = 1e-10
@@ -25,8 +25,11 @@ class Modes:
     weights: Floats  # (n, modes): the mass matrix times the shapes
 
     @classmethod
-    def of(cls, K: Floats, m: Floats) -> Modes:
-        """Modes of a free projectile with the dofs u and du/dx of its nodes."""
+    def of(cls, K: Floats, m: Floats, rigid: Floats | None = None) -> Modes:
+        """Modes of a free projectile.
+
+        `rigid` has the dofs of a unit rigid displacement, (n,), by default those of a rod.
+        """
         M = np.diag(m) if m.ndim == 1 else m
         inverse = np.linalg.inv(np.linalg.cholesky(M))
         values, vectors = np.linalg.eigh(inverse @ K @ inverse.T)
@@ -40,8 +43,7 @@ class Modes:
         far = abs(gap) > EQUAL * values[-1]
         change = np.where(far, S + overlap * exact, overlap) / np.where(far, gap, 2.0)
         shapes, values = (V + V @ change).astype(float), exact.astype(float)
-        rigid = np.zeros(len(m))
-        rigid[::2] = 1.0
+        rigid = rigid_dofs(len(m)) if rigid is None else rigid
         shapes[:, 0] = rigid / np.sqrt(rigid @ M @ rigid)
         values[0] = 0.0
         return cls(shapes, values, M @ shapes)
@@ -59,7 +61,7 @@ class Modes:
     def state(self, motion: Floats, tip: float, moved: float) -> RodState:
         """State with a motion of the modes and a displacement of the tip; `moved` in the step."""
         y = motion @ self.shapes.T
-        y[0, ::2] -= y[0, 0]
+        y[0] -= y[0, 0] * (self.shapes[:, 0] / self.shapes[0, 0])
         y[0, 0] = moved
         return RodState(y, tip)
 

@@ -20,6 +20,7 @@ from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.kernels.strains import CompiledStrains
 from fecm.mechanics.mesh import Ints, Mesh
+from fecm.mechanics.own_projectile import OwnProjectile
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import Load, PlateMotion
 from fecm.mechanics.ply_stresses import FailureMonitor, PlyStresses
@@ -65,6 +66,7 @@ class RunOptions:
     energy_limit: float = ENERGY_LIMIT
     # Contact law instead of the deck's; see :func:`~fecm.mechanics.own_law.own_law`.
     law: contact_law.Law | None = None
+    projectile: OwnProjectile | None = None  # a user's instead of the deck's
 
     def __post_init__(self) -> None:
         if self.solver not in SOLVERS:
@@ -131,7 +133,8 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     """Build the model of a checked problem, with its own plate unless a slip changes that."""
     chosen = options or RunOptions()
     deck, slips = problem.deck, chosen.slips
-    rod = build_projectile(deck, slips).with_mass(chosen.rod_method.mass)
+    own = chosen.projectile or build_projectile(deck, slips)
+    rod = own.with_mass(chosen.rod_method.mass)
     mesh, share = _mesh_with_rods_force(problem, slips)
     plate, mobile = _plates(problem, mesh, slips)
     motion, workers = _motion(problem, mobile, chosen)

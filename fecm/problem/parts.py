@@ -83,8 +83,8 @@ def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Project
 
 
 def projectile_segment(rod: Projectile, transducer: int = 0) -> model.Projectile:
-    """PROJ segment of a projectile."""
-    if isinstance(rod, RigidMass):
+    """PROJ segment of a projectile; a user's is a rigid mass there."""
+    if not isinstance(rod, Rod):
         return model.Projectile(0, 0, rod.total_mass)
     cards = [RodDiameter(n, 0, diameter) for n, diameter in enumerate(rod.diameters, start=1)]
     if len(set(rod.diameters)) == 1 < len(cards):  # those between two cards are generated
@@ -104,7 +104,7 @@ def build_constants(measured: model.Indentation) -> contact_law.ContactParameter
 def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> Transducer:
     """Build the transducer: PROJ's node, or the rod's middle (the next node under its slip)."""
     sign = 1.0 if "station" in slips else -1.0
-    if isinstance(projectile, RigidMass):
+    if not isinstance(projectile, Rod):
         return Transducer(0, sign)
     card = deck.last(model.Projectile)
     middle = projectile.elements // 2 + (2 if "station" in slips else 1)

@@ -19,6 +19,8 @@ from fecm.results.validity import CROSSED
 
 NEAR = 0.05  # of the time of the peak, up to which a row is that of the peak
 LISTED = 6  # most contacts and frequencies listed individually
+# Parts by the caller of the run: attribute, name, and the segment of the deck that they replace.
+OWN_PARTS = (("law", "contact law", "EXPE"), ("projectile", "projectile", "PROJ"))
 # Where a run has ended that has not decided its peak.
 UNDECIDED = {
     End.RISING: "in contact",
@@ -34,7 +36,11 @@ def _line(name: str, text: str) -> str:
 def summary(result: Result) -> list[str]:
     """Summarise a result, in the deck's units."""
     quantity = partial(_quantity, result)
-    lines: list[str] = []
+    lines = [
+        _line(what, f"{result.attributes[name]}, instead of {card}")
+        for name, what, card in OWN_PARTS
+        if name in result.attributes
+    ]
     clock = "history/time" if "history/force" in result else "energy/time"
     if clock in result:
         time = result[clock]

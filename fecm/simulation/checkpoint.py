@@ -73,6 +73,9 @@ def identity(simulation: Simulation) -> dict[str, Any]:
             options.rod_method.integrator,
         ],
         "a run with another contact law": None if options.law is None else name_of(options.law),
+        "a run with another projectile": (
+            None if options.projectile is None else options.projectile.name
+        ),
         "a run with another choice of --print": simulation.printer.is_on,
     }
 

@@ -85,6 +85,7 @@ def _write_header(simulation: Simulation) -> None:
         **({KINEMATICS: Kinematics.VON_KARMAN.value} if plate.nonlinear else {}),
         **options.rod_method.attributes,
         **({} if options.law is None else {"law": name_of(options.law)}),
+        **({} if options.projectile is None else {"projectile": options.projectile.name}),
         **_units(deck),
     }
     sink.attributes("", attributes)

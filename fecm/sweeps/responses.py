@@ -117,7 +117,9 @@ class TipSteps:
 
     def __init__(self, hits: Hits, dt: float, count: int) -> None:
         self.hits, self.dt = hits, dt
-        self._steps = [WilsonStep(rod.stiffness(), rod.mass(), dt) for rod in hits.rods]
+        self._steps = [
+            WilsonStep(rod.stiffness(), rod.mass(), dt, rigid=rod.rigid) for rod in hits.rods
+        ]
         self.theta, self.weight = self._steps[0].theta, self._steps[0].weight
         self._begin = self._steps[0].weights[0]
         self.gain: Floats = np.array([step.gain for step in self._steps])[hits.kind] / hits.scale
@@ -138,7 +140,7 @@ class TipSteps:
         step, cases = self._steps[kind], np.flatnonzero(self.hits.kind == kind)
         before = np.zeros((1, len(cases)))
         motion = np.zeros((3 * step.n, len(cases)))
-        motion[step.n : 2 * step.n : 2] = -self.hits.speed[cases]
+        motion[step.n : 2 * step.n][self.hits.rods[kind].rigid > 0.0] = -self.hits.speed[cases]
         # T^1, T^2, T^4, ...; column j of `reach` is the effect of a unit force after j steps.
         powers, reach = [step.T], step.h[:, None]
         while reach.shape[1] < BLOCK:
@@ -266,7 +268,7 @@ def balance_errors(force: Floats, work: Work, tips: TipSteps) -> Floats:
 
 @lru_cache(maxsize=8)
 def _modes(rod: Projectile) -> Modes:
-    return Modes.of(rod.stiffness(), rod.mass())
+    return Modes.of(rod.stiffness(), rod.mass(), rod.rigid)
 
 
 def _by_kernels(
@@ -291,7 +293,7 @@ def _by_kernels(
     force, found = np.empty((cases, len(response))), np.empty((len(Found), cases))
     starts = np.searchsorted(hits.kind, np.arange(len(hits.rods) + 1)).tolist()
     for rod, first, last in zip(hits.rods, starts[:-1], starts[1:], strict=True):
-        step = WilsonStep(rod.stiffness(), rod.mass(), dt)
+        step = WilsonStep(rod.stiffness(), rod.mass(), dt, rigid=rod.rigid)
         own = slice(first, last)
         sweep(_modes(rod), step, law.kind, response, given[:, own], force[own], found[:, own])
     lost = found[Found.LOST] + node_mass * found[Found.LARGEST_DDW] ** 2 / (8.0 * dt**2)
