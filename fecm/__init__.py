@@ -16,6 +16,7 @@ from fecm._errors import FecmError, FecmWarning
 from fecm._version import __version__
 
 if TYPE_CHECKING:
+    from fecm._extensions import ExtensionError
     from fecm.api import read_one, run, run_one
     from fecm.authoring.contact import Contact
     from fecm.authoring.impact import impact
@@ -25,6 +26,10 @@ if TYPE_CHECKING:
     from fecm.deck.model import Deck, Ply
     from fecm.deck.reader import read_deck
     from fecm.identification.identify import Identification, identify
+    from fecm.mechanics.contact_law import ContactPoint, Law
+    from fecm.mechanics.own_criterion import CriterionError, FailureCriterion
+    from fecm.mechanics.own_law import LawError
+    from fecm.mechanics.own_projectile import LinearProjectile, ProjectileError
     from fecm.mechanics.plate_motion import DivergenceError
     from fecm.mechanics.projectile import RigidMass, Rod
     from fecm.results.result import Result, load
@@ -34,15 +39,23 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Contact",
+    "ContactPoint",
+    "CriterionError",
     "Deck",
     "DeckError",
     "DivergenceError",
+    "ExtensionError",
+    "FailureCriterion",
     "FecmError",
     "FecmWarning",
     "Identification",
     "Laminate",
+    "Law",
+    "LawError",
+    "LinearProjectile",
     "Plate",
     "Ply",
+    "ProjectileError",
     "Result",
     "RigidMass",
     "Rod",
@@ -65,13 +78,21 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
     # takes 20 ms, and 900 ms with all of them.
     _HOMES = {
         "Contact": ("fecm.authoring.contact", "Contact"),
+        "ContactPoint": ("fecm.mechanics.contact_law", "ContactPoint"),
+        "CriterionError": ("fecm.mechanics.own_criterion", "CriterionError"),
         "Deck": ("fecm.deck.model", "Deck"),
         "DeckError": ("fecm.deck.findings", "DeckError"),
         "DivergenceError": ("fecm.mechanics.plate_motion", "DivergenceError"),
+        "ExtensionError": ("fecm._extensions", "ExtensionError"),
+        "FailureCriterion": ("fecm.mechanics.own_criterion", "FailureCriterion"),
         "Identification": ("fecm.identification.identify", "Identification"),
         "Laminate": ("fecm.authoring.laminate", "Laminate"),
+        "Law": ("fecm.mechanics.contact_law", "Law"),
+        "LawError": ("fecm.mechanics.own_law", "LawError"),
+        "LinearProjectile": ("fecm.mechanics.own_projectile", "LinearProjectile"),
         "Plate": ("fecm.authoring.plate", "Plate"),
         "Ply": ("fecm.deck.model", "Ply"),
+        "ProjectileError": ("fecm.mechanics.own_projectile", "ProjectileError"),
         "Result": ("fecm.results.result", "Result"),
         "RigidMass": ("fecm.mechanics.projectile", "RigidMass"),
         "Rod": ("fecm.mechanics.projectile", "Rod"),

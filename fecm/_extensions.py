@@ -44,4 +44,6 @@ def installed(group: Group, name: str) -> object:
         return found[0].load()
     except Exception as error:  # importing a package of others can raise anything
         text = f"{type(error).__name__}: {error}"
-        raise ExtensionError(f"the {what} {name!r} of {found[0].value} can't be imported ({text})") from error
+        raise ExtensionError(
+            f"the {what} {name!r} of {found[0].value} can't be imported ({text})"
+        ) from error

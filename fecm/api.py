@@ -14,6 +14,7 @@ from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, read_deck
 from fecm.deck.source_text import load_text
 from fecm.mechanics.contact_law import Law
+from fecm.mechanics.own_criterion import FailureCriterion, own_criteria
 from fecm.mechanics.own_law import own_law
 from fecm.mechanics.own_projectile import LinearProjectile, own_projectile
 from fecm.mechanics.projectile import Integrator, MassMatrix, RodMethod
@@ -106,6 +107,7 @@ def run_one(
     progress: Progress | None = None,
     law: Law | str | None = None,
     projectile: LinearProjectile | None = None,
+    criteria: Iterable[FailureCriterion | str] = (),
 ) -> Result:
     """Run a deck with exactly one problem; parameters and errors are those of :func:`run`.
 
@@ -128,6 +130,7 @@ def run_one(
         energy_limit,
         law=own_law(law),
         projectile=own_projectile(projectile),
+        criteria=own_criteria(criteria),
     )
     return _run(deck, mode, force, choices, output, progress, one=True)[0]
 
@@ -146,6 +149,7 @@ def run(
     progress: Progress | None = None,
     law: Law | str | None = None,
     projectile: LinearProjectile | None = None,
+    criteria: Iterable[FailureCriterion | str] = (),
 ) -> Result | list[Result]:
     """Run every problem of a deck.
 
@@ -186,6 +190,9 @@ def run(
     projectile : LinearProjectile, optional
         Projectile instead of that of PROJ, by its mass and stiffness matrices, at the velocity of
         ROD.  The name of its class is stored as the attribute ``projectile`` of the result.
+    criteria : iterable of FailureCriterion or str
+        Failure criteria that FAIL evaluates beside its own: functions, or names of entry points of
+        the group ``fecm.criteria``.  The result has a group ``failure/NAME`` of each.
 
     Returns
     -------
@@ -205,6 +212,8 @@ def run(
         If `law` lacks a method, raises an exception, or returns a value that is not a number.
     ExtensionError
         If no installed package has an entry point of that name.
+    CriterionError
+        If a function of `criteria` raises an exception, or does not return exposures.
     ProjectileError
         If the matrices of `projectile` are not those of one free elastic body.
     NotEnoughMemoryError
@@ -226,6 +235,7 @@ def run(
         energy_limit,
         law=own_law(law),
         projectile=own_projectile(projectile),
+        criteria=own_criteria(criteria),
     )
     results = _run(deck, mode, force, choices, output, progress, one=False)
     return results[0] if len(results) == 1 else results

@@ -166,11 +166,11 @@ def test_the_factor_of_a_single_stress_is_that_of_the_closed_form() -> None:
     card = Allowables(1500.0, 1500.0, 40.0, 246.0, 68.0, 68.0, 68.0)
     rest, pull = np.array([0.0, 21.0, 0.0]), np.array([0.0, 10.0, 0.0])
     for name in ("max_stress", "hashin", "puck", "tsai_wu"):
-        assert load_factor(card, name, rest, pull) == pytest.approx(1.9, rel=1e-11)
-    assert load_factor(card, "max_stress", rest, -pull) == pytest.approx(26.7, rel=1e-11)
+        assert load_factor(card, CRITERIA[name], rest, pull) == pytest.approx(1.9, rel=1e-11)
+    assert load_factor(card, CRITERIA["max_stress"], rest, -pull) == pytest.approx(26.7, rel=1e-11)
     # Where it fails at rest, and where nothing is added.
-    assert load_factor(card, "max_stress", 2.0 * rest, pull) == 0.0
-    assert load_factor(card, "tsai_wu", rest, 0.0 * pull) == np.inf
+    assert load_factor(card, CRITERIA["max_stress"], 2.0 * rest, pull) == 0.0
+    assert load_factor(card, CRITERIA["tsai_wu"], rest, 0.0 * pull) == np.inf
 
 
 # Runs --------------------------------------------------------------------------------------------

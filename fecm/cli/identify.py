@@ -99,9 +99,7 @@ def identify(options: Options) -> None:
     problem = load_single(options.deck, "identify")
     units = unit_names(problem.deck)
     measured = measurement_of(options.measured, units)
-    found = fit(
-        problem.deck, measured, options.free, options.sensor, own_law(options.law)
-    )
+    found = fit(problem.deck, measured, options.free, options.sensor, own_law(options.law))
     targets.draw("histories:fit_picture", found, units)
     if output is not None:
         write_lines([found.deck.to_text()], output, overwrite=overwrite)
@@ -118,6 +116,7 @@ def identify(options: Options) -> None:
 def _document(found: Identification) -> dict[str, object]:
     """JSON of a fit."""
     return {
+        **({"law": found.law} if found.law else {}),
         "values": {
             name: {"value": value, "error": found.errors[name], "start": found.start[name]}
             for name, value in found.values.items()
@@ -144,6 +143,8 @@ def _page(found: Identification, force: str) -> list[str]:
         f"converged    {'yes' if found.converged else 'no'}",
         f"accepted     {'yes' if found.accepted else 'no'}",
     ]
+    if found.law:
+        lines.append(f"law          {found.law}, instead of EXPE")
     for name, value in found.values.items():
         error, start = found.errors[name], found.start[name]
         lines.append(f"{name:<11}  {value:.5g} ± {error:.2g}, from {start:.5g}")

@@ -31,6 +31,7 @@ from fecm.cli.options import (
     OneOf,
     collected,
 )
+from fecm.mechanics.own_criterion import CriterionError, own_criteria
 from fecm.mechanics.own_law import LawError, own_law
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import (
@@ -62,7 +63,7 @@ from fecm.simulation.simulation import Simulation
 
 GROUPS = {
     "Result": ("output", "overwrite", "printed", "form"),
-    "Model": ("mode", "law", "slips", "rod_mass", "rod_integrator"),
+    "Model": ("mode", "slips", "law", "criteria", "rod_mass", "rod_integrator"),
     "Computation": ("solver", "threads"),
     "Interrupted runs": ("interval", "resume"),
     "Limits": ("energy_limit", "fail_limit", "force"),
@@ -89,10 +90,12 @@ class Options:
     energy_limit: float
     fail_limit: float | None  # largest exposure that passes
     force: bool
-    law: str | None  # name of a contact law of an installed package
+    # Names that installed packages give to a contact law and to failure criteria.
+    law: str | None
+    criteria: tuple[str, ...]
 
     def choices(self) -> RunOptions:
-        """What the computation needs to know; raises ValueError if a slip or law is unknown."""
+        """What the computation needs to know; ValueError if one is unknown."""
         return RunOptions(
             slips=active_slips(self.mode, self.slips),
             solver=self.solver,
@@ -100,6 +103,7 @@ class Options:
             rod_method=RodMethod(self.rod_mass, self.rod_integrator),
             energy_limit=self.energy_limit,
             law=own_law(self.law),
+            criteria=own_criteria(self.criteria),
         )
 
 
@@ -132,6 +136,14 @@ class Job(NamedTuple):
 )
 @MODE_OPTION
 @LAW_OPTION
+@option(
+    "--criterion",
+    "criteria",
+    metavar="NAME",
+    multiple=True,
+    help="Failure criterion that FAIL also evaluates, by the name that an installed package gives "
+    "it (entry points of the group fecm.criteria); may be repeated.",
+)
 @option(
     "--slip",
     "slips",
@@ -336,7 +348,7 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
     """Turn the errors of a run into messages."""
     try:
         yield
-    except LawError as error:
+    except (LawError, CriterionError) as error:
         raise RefusedError(f"{error}; {path} was not written") from None
     except SingularStiffnessError as error:
         raise RefusedError(

@@ -43,7 +43,7 @@ from fecm.identification.misfit import (
     wrong_model,
 )
 from fecm.mechanics.contact_law import Law
-from fecm.mechanics.own_law import own_law
+from fecm.mechanics.own_law import name_of, own_law
 from fecm.mechanics.projectile import RigidMass
 from fecm.problem.parts import build_projectile
 from fecm.results.comparison import Measurement, measurement_of
@@ -92,6 +92,9 @@ class Identification:
         The deck with the fitted values, rounded to five digits.
     notes : tuple of str
         Reasons to doubt the values.
+    law : str
+        Name of the contact law that took the place of EXPE, which the deck has all the same; empty
+        if none did.
     """
 
     values: dict[str, float]
@@ -106,6 +109,7 @@ class Identification:
     plate_errors: dict[str, dict[str, float]]
     deck: Deck
     notes: tuple[str, ...]
+    law: str = ""
 
     @property
     def residual(self) -> Floats:
@@ -304,6 +308,7 @@ def _identification(
         plate_errors=plates,
         deck=fitted(model.deck, rounded).deck(),
         notes=(),
+        law="" if model.law is None else name_of(model.law),
     )
     notes = filter(None, (fault, *_notes(made, found, measured, model)))
     return replace(made, notes=tuple(notes))

@@ -37,8 +37,10 @@ class OutsideLoad:
     y: Floats
 
     def largest(self, envelope: FailureEnvelope) -> dict[str, Array]:
-        """Fields of :class:`Largest`, (criteria,) each; the last criterion is the interlaminar."""
-        found = [*self._of_plies(envelope), self._of_interfaces(envelope)]
+        """Fields of :class:`Largest`, (criteria,) each: the interlaminar before those of users."""
+        plies = self._of_plies(envelope)
+        known = len(CRITERIA)
+        found = [*plies[:known], self._of_interfaces(envelope), *plies[known:]]
         return {name: np.array([getattr(one, name) for one in found]) for name in Largest._fields}
 
     def worst_states(self, envelope: FailureEnvelope) -> Indices | None:
@@ -46,7 +48,7 @@ class OutsideLoad:
         near, exposure = self.near.ravel(), envelope.plies.exposure
         if near.all():
             return None
-        at_points = exposure.reshape(len(CRITERIA), near.size, -1)
+        at_points = exposure.reshape(len(exposure), near.size, -1)
         # Points under the load are hidden for the search, which is much faster than one in a copy.
         hidden = at_points[:, near]
         at_points[:, near] = -1.0
@@ -58,7 +60,7 @@ class OutsideLoad:
         """Of each criterion of the plies."""
         plies = envelope.plies
         if (states := self.worst_states(envelope)) is None:
-            return [NONE] * len(CRITERIA)
+            return [NONE] * len(plies.exposure)
         found = []
         for number, state in enumerate(states.tolist()):
             if plies.exposure[number, state] < 0.0:  # no ply has strengths

@@ -10,7 +10,7 @@ and a quadratic criterion of the interlaminar shear stresses.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import NamedTuple, Protocol
@@ -60,10 +60,12 @@ class Strengths(Protocol):
     p_minus: float
 
 
-def modes_of(candidates: Candidates, where: Indices | None = None) -> Codes:
+def modes_of(
+    candidates: Candidates, where: Indices | None = None, modes: Sequence[str] = MODES
+) -> Codes:
     """Mode of the largest candidate, the first one of equals, at all or some flat indices."""
     values = np.stack([v if where is None else v.ravel()[where] for _, v in candidates])
-    codes = np.array([MODES.index(mode) for mode, _ in candidates], np.int8)
+    codes = np.array([modes.index(mode) for mode, _ in candidates], np.int8)
     return np.where(values.max(axis=0) > 0.0, codes[values.argmax(axis=0)], 0).astype(np.int8)
 
 
@@ -152,7 +154,9 @@ class PlyExposure(NamedTuple):
 
 
 def largest_in_plies(
-    strengths: Strengths | Sequence[Strengths | None], stresses: Floats
+    strengths: Strengths | Sequence[Strengths | None],
+    stresses: Floats,
+    criteria: Mapping[str, Criterion] = CRITERIA,
 ) -> list[PlyExposure]:
     """Largest exposure of each criterion under stresses of the plies, (plies, faces, 3).
 
@@ -161,7 +165,7 @@ def largest_in_plies(
     """
     given = strengths if isinstance(strengths, Sequence) else [strengths] * len(stresses)
     found = []
-    for name, criterion in CRITERIA.items():
+    for name, criterion in criteria.items():
         plies = [
             _largest_in_ply(criterion, name, ply, number, stresses[number])
             for number, ply in enumerate(given)
@@ -179,11 +183,12 @@ def _largest_in_ply(
     candidates = criterion(ply, *stresses.T)
     exposure = exposure_of(candidates)
     worst = int(exposure.argmax())
-    mode = MODES[modes_of(candidates)[worst]]
+    modes = ("none", *(mode for mode, _ in candidates))
+    mode = modes[modes_of(candidates, modes=modes)[worst]]
     return PlyExposure(name, float(exposure[worst]), mode, number + 1)
 
 
-def load_factor(ply: Strengths, criterion: str, at_rest: Floats, added: Floats) -> float:
+def load_factor(ply: Strengths, criterion: Criterion, at_rest: Floats, added: Floats) -> float:
     """Factor on stresses `added` to those at rest, (3,) each, at which the exposure is 1.
 
     By bisection, as the exposure is not proportional to the factor.  0 if the stresses at rest
@@ -192,7 +197,7 @@ def load_factor(ply: Strengths, criterion: str, at_rest: Floats, added: Floats) 
 
     def exposure(factor: float) -> float:
         s1, s2, tau = (at_rest + factor * added)[:, None]
-        return float(exposure_of(CRITERIA[criterion](ply, s1, s2, tau))[0])
+        return float(exposure_of(criterion(ply, s1, s2, tau))[0])
 
     if exposure(0.0) >= 1.0:
         return 0.0

@@ -23,6 +23,7 @@ METHODS = ("start", "trial", "accept", "permanent")
 # Indentations beyond this, in any unit, are those of a diverging motion: no fault of the law.
 FAR = 1e30
 
+
 class LawError(FecmError, ValueError):
     """A contact law by a user lacks a method, raises an exception, or returns no number."""
 
@@ -119,8 +120,7 @@ def own_law(given: Law | str | None) -> Law | None:
     missing = [method for method in METHODS if not callable(getattr(law, method, None))]
     if missing:
         raise LawError(
-            f"contact law {name} has no method {', '.join(missing)}; a law has "
-            f"{', '.join(METHODS)}"
+            f"contact law {name} has no method {', '.join(missing)}; a law has {', '.join(METHODS)}"
         )
     made = OwnLaw(law, name)
     made.trial(made.start(), ContactPoint(0.0, 0.0), 0.0)

@@ -41,7 +41,7 @@ class LinearProjectile(Protocol):
         """Masses of the dofs, (n,), or mass matrix, (n, n), positive definite."""
 
     def stiffness(self) -> Any:
-        """Stiffness matrix (force/length), (n, n), symmetric, singular for the rigid motion only."""
+        """Stiffness matrix (force/length), (n, n), symmetric; only a rigid motion has no force."""
 
 
 class OwnProjectile:

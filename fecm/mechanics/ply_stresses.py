@@ -24,6 +24,7 @@ from fecm.mechanics.interpolation import interpolate, inverse_jacobian, local_sh
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.membrane import QuadraticStrains
 from fecm.mechanics.mesh import ElementBlock, Ints, Mesh, element_blocks
+from fecm.mechanics.own_criterion import OwnCriterion, with_own
 from fecm.mechanics.strains import Rows
 
 
@@ -330,9 +331,8 @@ class WorstStates:
     added: Floats  # (criteria, 3): its stresses less those at rest
 
     @classmethod
-    def none(cls) -> WorstStates:
-        """No exposure yet."""
-        count = len(failure.CRITERIA)
+    def none(cls, count: int = len(failure.CRITERIA)) -> WorstStates:
+        """No exposure yet, of so many criteria."""
         return cls(np.zeros(count), np.zeros(count, dtype=np.intp), np.zeros((count, 3)))
 
 
@@ -443,8 +443,15 @@ def _in_fours(values: Floats, run: Run) -> Floats:
 class FailureMonitor:
     """Evaluates the failure criteria of all plies."""
 
-    def __init__(self, stresses: PlyStresses, strengths: AllStrengths) -> None:
+    def __init__(
+        self,
+        stresses: PlyStresses,
+        strengths: AllStrengths,
+        criteria: Sequence[OwnCriterion] = (),
+    ) -> None:
         self.stresses = stresses
+        # By name, those of users last, and the modes that their codes mean.
+        self.criteria, self.modes = with_own(criteria)
         elements, points, _ = stresses.shape
         self._zones: list[ZoneCriteria] = []
         for number, zone in enumerate(stresses.zones):
@@ -477,7 +484,7 @@ class FailureMonitor:
     def start(self) -> FailureEnvelope:
         """No exposure yet."""
         elements, points, plies = self.stresses.shape
-        states = Maxima.none(len(failure.CRITERIA), elements * points * plies * 2)
+        states = Maxima.none(len(self.criteria), elements * points * plies * 2)
         interfaces = Maxima.none(elements, max(plies - 1, 0))
         known = np.zeros((elements * points, plies * 2), dtype=bool)
         for zone in self._zones:
@@ -485,7 +492,7 @@ class FailureMonitor:
                 known[zone.points, run.states] = True
             interfaces.exposure[zone.elements, zone.interfaces :] = np.nan
         states.exposure[:, ~known.ravel()] = UNKNOWN
-        return FailureEnvelope(states, interfaces)
+        return FailureEnvelope(states, interfaces, WorstStates.none(len(self.criteria)))
 
     def update(self, envelope: FailureEnvelope, field: Floats, time: float) -> Floats:
         """Raise the exposures to those of a displacement field, (numnp, 5).
@@ -537,15 +544,15 @@ class FailureMonitor:
         NaN where no exposure was found.
         """
         factors = {}
-        for name, state, added in zip(
-            failure.CRITERIA, worst.state.tolist(), worst.added, strict=True
+        for (name, criterion), state, added in zip(
+            self.criteria.items(), worst.state.tolist(), worst.added, strict=True
         ):
             _, zone, own = self._place(state)
             strengths = zone.strengths[own // 2]
             factors[name] = (
                 np.nan
                 if strengths is None
-                else failure.load_factor(strengths, name, zone.at_rest[:, own], added)
+                else failure.load_factor(strengths, criterion, zone.at_rest[:, own], added)
             )
         return factors
 
@@ -559,7 +566,20 @@ class FailureMonitor:
         self, zone: ZoneCriteria, run: Run, plies: Maxima, strains: Floats, time: float
     ) -> None:
         """Raise the exposures of plies of the same strengths."""
-        shape = (len(failure.CRITERIA), len(strains), -1)
+        self._raise_by(range(len(self.criteria)), zone, run, plies, strains, time)
+
+    def _raise_by(
+        self,
+        numbers: Sequence[int],
+        zone: ZoneCriteria,
+        run: Run,
+        plies: Maxima,
+        strains: Floats,
+        time: float,
+    ) -> None:
+        """The same by some of the criteria, with NumPy."""
+        criteria = list(self.criteria.values())
+        shape = (len(criteria), len(strains), -1)
         exposures, times, modes = (
             values.reshape(shape) for values in (plies.exposure, plies.time, plies.mode)
         )
@@ -572,8 +592,8 @@ class FailureMonitor:
             if zone.has_residual:
                 total += residual
             s1, s2, tau = (np.ascontiguousarray(part) for part in np.split(total, 3, axis=1))
-            for number, criterion in enumerate(failure.CRITERIA.values()):
-                candidates = criterion(run.strengths, s1, s2, tau)
+            for number in numbers:
+                candidates = criteria[number](run.strengths, s1, s2, tau)
                 exposure = failure.exposure_of(candidates)
                 larger = exposure > exposures[number, block, run.states]
                 if not larger.any():
@@ -581,4 +601,4 @@ class FailureMonitor:
                 point, state = np.nonzero(larger)
                 at = (number, block[point], run.states.start + state)
                 exposures[at], times[at] = exposure[larger], time
-                modes[at] = failure.modes_of(candidates, np.flatnonzero(larger))
+                modes[at] = failure.modes_of(candidates, np.flatnonzero(larger), self.modes)

@@ -186,7 +186,8 @@ class RigidMass:
         return np.zeros(len(deformation))
 
 
-Projectile = Rod | RigidMass | OwnProjectile
+DeckProjectile = Rod | RigidMass  # that PROJ can describe
+Projectile = DeckProjectile | OwnProjectile
 
 
 @frozen

@@ -20,6 +20,7 @@ from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.kernels.strains import CompiledStrains
 from fecm.mechanics.mesh import Ints, Mesh
+from fecm.mechanics.own_criterion import OwnCriterion
 from fecm.mechanics.own_projectile import OwnProjectile
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import Load, PlateMotion
@@ -67,6 +68,7 @@ class RunOptions:
     # Contact law instead of the deck's; see :func:`~fecm.mechanics.own_law.own_law`.
     law: contact_law.Law | None = None
     projectile: OwnProjectile | None = None  # a user's instead of the deck's
+    criteria: tuple[OwnCriterion, ...] = ()  # of users, that FAIL evaluates too
 
     def __post_init__(self) -> None:
         if self.solver not in SOLVERS:
@@ -84,7 +86,12 @@ class OptionsError(FecmError, ValueError):
 
 
 def check_options(problem: Problem, options: RunOptions) -> None:
-    """Raise OptionsError if a nonlinear plate is to be run as only linear ones can be."""
+    """Raise OptionsError if a problem lacks what an option needs, or has what it excludes."""
+    if options.criteria and not problem.work.passes["FAIL"]:
+        names = ", ".join(one.name for one in options.criteria)
+        raise OptionsError(
+            f"criteria {names}: the program of the deck has no FAIL to evaluate them"
+        )
     if not problem.deck.has(model.Nonlinear):
         return
     if options.solver == CSR:
@@ -145,7 +152,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         impact = ImpactSystem(motion, rod, law, conditions, STEPS[chosen.rod_method.integrator])
     compiled = motion.solver == KERNELS
     cure = residuals_of_deck(deck, plate.laminates)
-    plies, failure = _stresses(problem, plate, cure, compiled=compiled)
+    plies, failure = _stresses(problem, plate, cure, chosen.criteria, compiled=compiled)
     stress_points = plate.strain_field(problem.rules[2])
     under_load = outside = None
     if plies or failure:
@@ -232,7 +239,12 @@ def _conditions(
 
 
 def _stresses(
-    problem: Problem, plate: PlateModel, cure: Sequence[Residual] | None, *, compiled: bool
+    problem: Problem,
+    plate: PlateModel,
+    cure: Sequence[Residual] | None,
+    criteria: Sequence[OwnCriterion],
+    *,
+    compiled: bool,
 ) -> tuple[PlyStresses | None, FailureMonitor | None]:
     """Ply stresses of PLYS, and the failure criteria of FAIL; None where there is no such macro."""
     words = {macro.word: macro for macro in flat(problem.program)}
@@ -249,7 +261,10 @@ def _stresses(
         stresses = PlyStresses(
             problem.mesh, zones, points, initial=initial, nonlinear=plate.nonlinear
         )
-        failure = kind(stresses, strengths_of_deck(problem.deck))
+        strengths = strengths_of_deck(problem.deck)
+        first = next((ply for plies in strengths for ply in plies if ply is not None), None)
+        own = [] if first is None else [one.with_modes(first) for one in criteria]
+        failure = kind(stresses, strengths, own)
         if cure is not None:
             failure = failure.with_residual([one.stresses for one in cure])
     return plies, failure

@@ -22,6 +22,7 @@ from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
 from fecm.mechanics.projectile import (
     LISTING_DENSITY,
     REPORT_DENSITY,
+    DeckProjectile,
     Projectile,
     RigidMass,
     Rod,
@@ -73,7 +74,7 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
     )
 
 
-def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Projectile:
+def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> DeckProjectile:
     """Build the projectile of a deck; without a PROJ segment the report's rod."""
     if (card := deck.last(model.Projectile)) is None:
         return report_rod(LISTING_DENSITY if "density" in slips else REPORT_DENSITY)
@@ -82,9 +83,9 @@ def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> Project
     return Rod(card.size, tuple(rod_diameters(card).tolist()), card.modulus, card.density)
 
 
-def projectile_segment(rod: Projectile, transducer: int = 0) -> model.Projectile:
-    """PROJ segment of a projectile; a user's is a rigid mass there."""
-    if not isinstance(rod, Rod):
+def projectile_segment(rod: DeckProjectile, transducer: int = 0) -> model.Projectile:
+    """PROJ segment of a projectile."""
+    if isinstance(rod, RigidMass):
         return model.Projectile(0, 0, rod.total_mass)
     cards = [RodDiameter(n, 0, diameter) for n, diameter in enumerate(rod.diameters, start=1)]
     if len(set(rod.diameters)) == 1 < len(cards):  # those between two cards are generated

@@ -6,17 +6,21 @@ from collections.abc import Mapping
 from typing import Any
 
 from fecm._text import shown
-from fecm.mechanics.failure import CRITERIA
+from fecm.results.criteria import OWN_CRITERIA, criteria_of
 from fecm.results.exposures import AT_REST, LOAD_FACTOR
 from fecm.results.schema import FIXED, dataset_of
 
 
-def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str]) -> str:
+def shape_error(
+    shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str], criteria: int
+) -> str:
     """Message about the first dataset with a wrong shape or type; empty if there is none.
 
-    Both are by path; kinds are NumPy's letters: ``"f"``, ``"i"``, ``"u"`` or ``"b"``.
+    `criteria` is the number of failure criteria.  The others are by path; kinds are NumPy's
+    letters: ``"f"``, ``"i"``, ``"u"`` or ``"b"``.
     """
     sizes: dict[str | int, tuple[int, str]] = {n: (s, "every result") for n, s in FIXED.items()}
+    sizes["criteria"] = (criteria, "this result")
     for path, shape in shapes.items():
         if (dataset := dataset_of(path, len(shape))) is None:
             continue
@@ -38,9 +42,8 @@ def shape_error(shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str])
 NUMBERS = {
     "threshold": ("force", "time", "margin"),
     "patch": ("x", "y", "radius"),
-    **{f"failure/{name}": (AT_REST, LOAD_FACTOR) for name in CRITERIA},
 }
-TEXTS = {"failure": ("modes",)}
+TEXTS = {"failure": ("modes", OWN_CRITERIA)}
 COMPLETE = ("threshold",)  # groups that have all of these attributes
 
 
@@ -49,7 +52,9 @@ def attribute_error(groups: Mapping[str, Mapping[str, Any]]) -> str:
 
     Attributes are by group and name.
     """
-    for table, fits, what in ((NUMBERS, _is_number, "a number"), (TEXTS, _is_texts, "texts")):
+    criteria = criteria_of(groups.get("failure", {}))
+    numbers = NUMBERS | {f"failure/{name}": (AT_REST, LOAD_FACTOR) for name in criteria}
+    for table, fits, what in ((numbers, _is_number, "a number"), (TEXTS, _is_texts, "texts")):
         for group, names in table.items():
             found = groups.get(group, {})
             missing = [name for name in names if name not in found]

@@ -2,10 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from fecm.mechanics.failure import CRITERIA
 
 INTERLAMINAR = "interlaminar"  # criterion of the interfaces; the others belong to plies
 ALL_CRITERIA = (*CRITERIA, INTERLAMINAR)
+
+
+OWN_CRITERIA = "own_criteria"  # attribute of failure: names of users' criteria of the plies
+
+
+def criteria_of(failure: Mapping[str, Any]) -> tuple[str, ...]:
+    """Names of the criteria of a result, from the attributes of its group ``failure``."""
+    own = failure.get(OWN_CRITERIA, ())
+    return (*ALL_CRITERIA, *(map(str, own) if isinstance(own, list | tuple) else ()))
 
 
 def spelt(criterion: str) -> str:

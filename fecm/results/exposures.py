@@ -6,7 +6,7 @@ import numpy as np
 
 from fecm._frozen import frozen
 from fecm._typing import Array
-from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR, plies_of
+from fecm.results.criteria import INTERLAMINAR, criteria_of, plies_of
 from fecm.results.errors import ResultFileError
 from fecm.results.stored import Stored
 
@@ -48,7 +48,7 @@ def largest_exposures(stored: Stored) -> list[LargestExposure]:
     x, y = stored["failure/x"], stored["failure/y"]
     modes = stored.attributes_of("failure").get("modes", ())
     found = []
-    for criterion in ALL_CRITERIA:
+    for criterion in criteria_of(stored.attributes_of("failure")):
         exposure = stored[f"failure/{criterion}/exposure"]
         outside = np.where(_near(stored, criterion), -1.0, exposure)
         if not outside.size or not (outside >= 0.0).any():

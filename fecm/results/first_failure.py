@@ -10,7 +10,7 @@ import numpy as np
 
 from fecm._frozen import frozen
 from fecm._typing import Floats
-from fecm.results.criteria import ALL_CRITERIA, where
+from fecm.results.criteria import criteria_of, where
 from fecm.results.exposures import AT_REST, LOAD_FACTOR, evaluations_in_contact
 from fecm.results.stored import Stored
 
@@ -55,11 +55,13 @@ def first_failures(stored: Stored, level: float = 1.0) -> list[FirstFailure]:
     if any(path not in stored for path in NEEDED):
         return []
     exposures, times = stored["exposures/exposure"], stored["exposures/time"]
-    modes = dict(enumerate(map(str, stored.attributes_of("failure").get("modes", ()))))
+    about = stored.attributes_of("failure")
+    modes = dict(enumerate(map(str, about.get("modes", ()))))
     history = _history(stored)
     found = []
-    for number, criterion in enumerate(ALL_CRITERIA):
-        exposure = exposures[:, number]
+    for number, (criterion, exposure) in enumerate(
+        zip(criteria_of(about), exposures.T, strict=False)
+    ):
         (reached,) = np.nonzero(exposure >= level)
         if not len(reached):
             continue
@@ -121,7 +123,7 @@ def failure_metrics(stored: Stored) -> dict[str, Any]:
         largest = stored["exposures/exposure"][-1].tolist()
     return {
         "evaluations_in_contact": evaluations_in_contact(stored),
-        "largest": dict(zip(ALL_CRITERIA, largest, strict=False)),
+        "largest": dict(zip(criteria_of(stored.attributes_of("failure")), largest, strict=False)),
         "first": [asdict(one) for one in first_failures(stored)],
         **_of_cure(stored),
     }
@@ -129,7 +131,8 @@ def failure_metrics(stored: Stored) -> dict[str, Any]:
 
 def _of_cure(stored: Stored) -> dict[str, dict[str, float]]:
     """Attributes of the criteria that runs with CURE have, by criterion."""
-    known = {name: stored.attributes_of(f"failure/{name}") for name in ALL_CRITERIA}
+    criteria = criteria_of(stored.attributes_of("failure"))
+    known = {name: stored.attributes_of(f"failure/{name}") for name in criteria}
     found = {
         attribute: {name: float(own[attribute]) for name, own in known.items() if attribute in own}
         for attribute in (AT_REST, LOAD_FACTOR)

@@ -10,6 +10,7 @@ from fecm._typing import Floats
 from fecm.deck.model import Deck
 from fecm.results import conversions, schema
 from fecm.results.checks import attribute_error, shape_error
+from fecm.results.criteria import criteria_of
 from fecm.results.end import End
 from fecm.results.errors import NotStoredError, ResultFileError
 from fecm.results.first_failure import FirstFailure, first_failures
@@ -311,7 +312,8 @@ def result_of(contents: Contents, model: Deck | None = None) -> Result:
     Raises ResultFileError if a dataset has the wrong shape or type, or an attribute the wrong type.
     """
     kinds = {name: dtype.kind for name, dtype in contents.dtypes.items()}
-    found = shape_error(contents.shapes, kinds) or attribute_error(contents.groups)
+    criteria = len(criteria_of(contents.groups.get("failure", {})))
+    found = shape_error(contents.shapes, kinds, criteria) or attribute_error(contents.groups)
     if found:
         raise ResultFileError(f"{contents.path}: {found}")
     attributes = {"": contents.attributes, **contents.groups}

@@ -374,6 +374,19 @@ def _datasets(group: str, kind: type[Group], outer: str = "") -> Iterator[Datase
 
 DATASETS = {d.path: d for name, kind in GROUP_TYPES.items() for d in _datasets(name, kind)}
 
+# A criterion of the plies, whose datasets those of users have too.
+_KNOWN_CRITERION = "failure/puck"
+
+
+def criterion_datasets(name: str) -> list[Dataset]:
+    """Datasets of a user's criterion of the plies."""
+    return [
+        replace(dataset, path=f"failure/{name}/{dataset.name}")
+        for dataset in DATASETS.values()
+        if dataset.group == _KNOWN_CRITERION
+    ]
+
+
 # Datasets that have one axis more in front, `laminates`, if there are several; NaN at plies that a
 # laminate lacks.
 BY_LAMINATE = ("plies/z", "plies/material", "plies/cure_stress")
@@ -388,6 +401,8 @@ def dataset_of(path: str, rank: int) -> Dataset | None:
     """Dataset of a path, with so many axes; None if it is not in the schema."""
     group, name = path.partition("/")[0], path.rpartition("/")[2]
     known = DATASETS.get(f"{group}/{name}" if group == "laminate" else path)
+    if known is None and group == "failure" and path.count("/") == 2:  # of a user's criterion
+        known = DATASETS.get(f"{_KNOWN_CRITERION}/{name}")
     if known is None:
         return None
     if path in BY_LAMINATE and rank > len(known.shape):
@@ -401,7 +416,6 @@ FIXED = {
     "levels": 3,
     "directions": 2,
     "components": 3,
-    "criteria": len(ALL_CRITERIA),
 }
 # Dimension scales: name and description by size.
 SCALES = {

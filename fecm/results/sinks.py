@@ -26,6 +26,7 @@ class MemorySink:
         self.arrays: dict[str, Array] = {}
         self.texts: dict[str, str] = {}
         self.groups: dict[str, dict[str, Any]] = {}
+        self.axis_names: dict[str | int, tuple[str, ...]] = {}  # which only files have
 
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
         """Set attributes of a group; ``""`` is the file itself."""

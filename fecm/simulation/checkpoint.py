@@ -76,6 +76,7 @@ def identity(simulation: Simulation) -> dict[str, Any]:
         "a run with another projectile": (
             None if options.projectile is None else options.projectile.name
         ),
+        "a run with other failure criteria": [one.name for one in options.criteria] or None,
         "a run with another choice of --print": simulation.printer.is_on,
     }
 
@@ -129,7 +130,13 @@ class Checkpointer:
             "spool": spooled._asdict(),
             "values": values,
         }
-        text = np.frombuffer(json.dumps(about).encode(), np.uint8)
+        try:
+            text = np.frombuffer(json.dumps(about).encode(), np.uint8)
+        except TypeError as error:  # of what a user's law remembers
+            raise CheckpointError(
+                f"{self._checkpoint} can't be written ({error}): a contact law remembers numbers, "
+                "texts, None, arrays, or tuples of them"
+            ) from None
         with beside(self._checkpoint, follow=False) as partial:
             partial.write_bytes(packed({"about": text, **arrays}))
         self._spooled = spooled

@@ -102,6 +102,11 @@ class Printer:
             self._nodes(mesh.equations)
         self._program(deck.macros)
 
+    def replaced(self, parts: Mapping[str, str]) -> None:
+        """Name the parts that replace those of the deck."""
+        if self.is_on and parts:
+            self._page("In place of the deck's", _values(parts))
+
     def _program(self, macros: Iterable[Macro]) -> None:
         """Echo the macro program, its loops indented."""
         self._page("Macro program")

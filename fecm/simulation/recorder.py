@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -10,22 +10,28 @@ import numpy as np
 
 from fecm._typing import Array, Floats
 from fecm.deck.macros import WorkEstimate
-from fecm.mechanics.failure import CRITERIA, MODES
+from fecm.mechanics.failure import CRITERIA
 from fecm.mechanics.ply_stresses import FailureEnvelope
 from fecm.mechanics.strains import STRAINS
 from fecm.problem.build import ImpactModel
-from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR
+from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR, OWN_CRITERIA
 from fecm.results.exposures import LOAD_FACTOR
 from fecm.results.groups import STORED_BY
 from fecm.results.plies import CURE_STRESS
-from fecm.results.schema import BY_LAMINATE, DATASETS, FIXED, Dataset, by_laminate
+from fecm.results.schema import (
+    BY_LAMINATE,
+    DATASETS,
+    FIXED,
+    Dataset,
+    by_laminate,
+    criterion_datasets,
+)
 from fecm.results.sinks import RowBuffer, Sink
 from fecm.simulation.saved import subset
 from fecm.simulation.step_recorder import EVERY_STEP, OnBlock, StepRecorder
 
 Steps = Sequence[int]  # of rows
 Times = Sequence[float]
-FAILURE = ("failure", *(f"failure/{name}" for name in ALL_CRITERIA))
 MEMBRANE = "membrane"
 LAMINATE = "laminate"
 MATERIAL = "plies/material"
@@ -73,11 +79,11 @@ def _padded(parts: Sequence[Floats]) -> Floats:
     return found
 
 
-def exposures_of(found: FailureEnvelope) -> dict[str, Array]:
-    """Datasets of the largest exposures, those of plies as (states,)."""
+def exposures_of(found: FailureEnvelope, criteria: Collection[str] = CRITERIA) -> dict[str, Array]:
+    """Datasets of the largest exposures of criteria, those of plies as (states,)."""
     arrays = {}
     for part in ("exposure", "time", "mode"):
-        for name, values in zip(CRITERIA, getattr(found.plies, part), strict=True):
+        for name, values in zip(criteria, getattr(found.plies, part), strict=True):
             if part == "exposure":
                 values = np.where(values < 0.0, np.nan, values)
             arrays[f"failure/{name}/{part}"] = values
@@ -93,6 +99,14 @@ class Recorder:
     ) -> None:
         self._sink = sink
         self._model = model
+        own = () if model.failure is None else tuple(model.failure.criteria)[len(CRITERIA) :]
+        self._own = own  # names of users' criteria
+        known_datasets = [
+            *DATASETS.values(),
+            *(d for name in own for d in criterion_datasets(name)),
+        ]
+        if own:
+            sink.axis_names["criteria"] = (*ALL_CRITERIA, *own)
         has_impact = model.impact is not None
         self._room = {  # upper bound of the rows of each group
             **{group: sizes.passes[STORED_BY[group]] for group in AT_MACROS},
@@ -103,7 +117,8 @@ class Recorder:
             "energy": sizes.steps,
             "gages": (model.gages is not None) * sizes.steps,
             MEMBRANE: 0,
-            **dict.fromkeys(FAILURE, int(model.failure is not None)),
+            "failure": int(model.failure is not None),
+            **{f"failure/{name}": int(model.failure is not None) for name in (*ALL_CRITERIA, *own)},
             "patch": int(model.patch is not None),
         }
         if model.stretching is not None:
@@ -112,7 +127,7 @@ class Recorder:
         absent = _absent(model)
         self._datasets = [
             (dataset, self._shape(dataset))
-            for known in DATASETS.values()
+            for known in known_datasets
             if (self._room.get(known.group) != 0 or known.path in (CURE_STRESS, MATERIAL))
             and known.path not in absent
             for dataset in _of_laminates(known, model)
@@ -140,6 +155,7 @@ class Recorder:
             "layers": max(len(one.plies.angles) for one in self._model.plate.laminates),
             "laminates": len(self._model.plate.laminates),
             **FIXED,
+            "criteria": len(ALL_CRITERIA) + len(self._own),
         }
         if self._model.plies is not None:
             numbers["members"], numbers["npp"], _ = self._model.plies.shape
@@ -167,7 +183,9 @@ class Recorder:
             if self._room["gages"]:
                 self._sink.attributes("gages", {"preload": "excluded"})
         if model.under_load is not None and model.failure is not None:
-            self._sink.attributes("failure", {"modes": list(MODES)})
+            self._sink.attributes("failure", {"modes": list(model.failure.modes)})
+            if self._own:
+                self._sink.attributes("failure", {OWN_CRITERIA: list(self._own)})
         for path, array in self._constants().items():
             self._sink.write(path, 0, array)
         if self._room["tape8"]:
@@ -253,9 +271,11 @@ class Recorder:
 
     def failure(self, found: FailureEnvelope) -> None:
         """Store the largest exposures of FAIL."""
-        for path, values in exposures_of(found).items():
-            self._sink.write(path, 0, values.reshape(self._shape(DATASETS[path])))
         monitor = self._model.failure
+        shapes = {dataset.path: shape for dataset, shape in self._datasets}
+        criteria = CRITERIA if monitor is None else monitor.criteria
+        for path, values in exposures_of(found, criteria).items():
+            self._sink.write(path, 0, values.reshape(shapes[path]))
         if monitor is not None and monitor.has_residual:
             for name, factor in monitor.load_factors(found.worst).items():
                 self._sink.attributes(f"failure/{name}", {LOAD_FACTOR: factor})

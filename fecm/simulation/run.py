@@ -53,6 +53,7 @@ def run(simulation: Simulation) -> None:
         _write_header(simulation)
         _evaluate_at_rest(simulation)
         simulation.printer.problem(problem.deck, problem.mesh, simulation.model.plate)
+        simulation.printer.replaced(_own_parts(simulation.options))
     try:
         with np.errstate(all="ignore"):  # an overflow is reported as a divergence
             simulation.interpreter.run(
@@ -84,8 +85,7 @@ def _write_header(simulation: Simulation) -> None:
         "solver": simulation.model.motion.solver,
         **({KINEMATICS: Kinematics.VON_KARMAN.value} if plate.nonlinear else {}),
         **options.rod_method.attributes,
-        **({} if options.law is None else {"law": name_of(options.law)}),
-        **({} if options.projectile is None else {"projectile": options.projectile.name}),
+        **_own_parts(options),
         **_units(deck),
     }
     sink.attributes("", attributes)
@@ -93,6 +93,16 @@ def _write_header(simulation: Simulation) -> None:
     at_nodes = deck.require(Material).integration.points < 0 and "tapes" not in options.slips
     simulation.recorder.create("nodes" if at_nodes else "gauss")
     _write_cure(simulation)
+
+
+def _own_parts(options: RunOptions) -> dict[str, str]:
+    """Names of the parts by users that replace those of the deck."""
+    parts = {}
+    if options.law is not None:
+        parts["law"] = name_of(options.law)
+    if options.projectile is not None:
+        parts["projectile"] = options.projectile.name
+    return parts
 
 
 def _write_cure(simulation: Simulation) -> None:
@@ -106,7 +116,8 @@ def _write_cure(simulation: Simulation) -> None:
     largest: dict[str, float] = {}
     strengths = strengths_of_deck(deck)
     for number in simulation.problem.used_laminates:
-        for one in largest_in_plies(strengths[number], model.cure[number].stresses):
+        stresses = model.cure[number].stresses
+        for one in largest_in_plies(strengths[number], stresses, model.failure.criteria):
             largest[one.criterion] = max(largest.get(one.criterion, 0.0), one.exposure)
     for criterion, exposure in largest.items():
         sink.attributes(f"failure/{criterion}", {AT_REST: exposure})

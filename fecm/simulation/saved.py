@@ -39,7 +39,8 @@ def restore(value: Any, path: str, stored: Mapping[str, Any], seen: set[int] | N
     if not names:
         new = stored[path]
         if not isinstance(value, np.ndarray):
-            return new
+            # The memory of a user's law, which JSON has made lists of.
+            return _tuples(new) if value is None or isinstance(value, tuple) else new
         if new.shape != value.shape or new.dtype != value.dtype:
             raise ValueError(f"{path} has another shape or type")
         value[...] = new
@@ -53,6 +54,11 @@ def restore(value: Any, path: str, stored: Mapping[str, Any], seen: set[int] | N
     for name, one in new.items():
         setattr(value, name, one)
     return value
+
+
+def _tuples(value: Any) -> Any:
+    """A value with tuples for its lists."""
+    return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 
 def subset(stored: Mapping[str, Any], prefix: str) -> dict[str, Any]:

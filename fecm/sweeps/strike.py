@@ -19,7 +19,7 @@ from fecm.deck.macros import compile_program
 from fecm.deck.units import MODULUS, in_si, unit_names
 from fecm.mechanics.contact_law import ContactParameters, Law, hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
-from fecm.mechanics.projectile import Projectile, RigidMass, Rod
+from fecm.mechanics.projectile import DeckProjectile, RigidMass, Rod
 from fecm.problem.check import check_impact, check_segment
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_constants, build_projectile, projectile_segment
@@ -38,7 +38,7 @@ class Strike(NamedTuple):
     impact: model.Impact | None
     indentation: model.Indentation | None
     card: model.Projectile | None  # None if the deck has the report's rod
-    projectile: Projectile
+    projectile: DeckProjectile
     own_law: Law | None = None  # a user's, instead of that of EXPE
 
     @property
@@ -67,7 +67,7 @@ class Strike(NamedTuple):
         changed: dict[str, Any] = {name: value}  # mypy compares each with every field
         return self._replace(indentation=replace(old, **changed, source=None))
 
-    def with_projectile(self, projectile: Projectile) -> Strike:
+    def with_projectile(self, projectile: DeckProjectile) -> Strike:
         """The strike of another projectile; a rod keeps the transducer of the deck."""
         transducer = 0
         if self.card is not None and isinstance(projectile, Rod):

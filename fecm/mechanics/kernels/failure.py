@@ -11,7 +11,7 @@ import ctypes
 from ctypes import c_double, c_int64
 
 from fecm._typing import Floats
-from fecm.mechanics.failure import Strengths, puck_limits
+from fecm.mechanics.failure import CRITERIA, Strengths, puck_limits
 from fecm.mechanics.kernels import LIBRARY, Codes, Doubles, Longs, Structure, floats
 from fecm.mechanics.ply_stresses import FailureMonitor, Maxima, Run, ZoneCriteria
 
@@ -111,3 +111,7 @@ class CompiledMonitor(FailureMonitor):
             mode=plies.mode,
         )
         LIBRARY.fecm_failure(ctypes.byref(structure), floats(strains), time)
+        # Those of users come after the criteria that the kernel has.
+        own = range(len(CRITERIA), len(self.criteria))
+        if own:
+            self._raise_by(own, zone, run, plies, strains, time)
