@@ -2,7 +2,7 @@
 =========================
 
 Hertz's law up to a force at which the surface yields, in the place of the deck's law. Any object
-with these four methods is a :class:`law <fecm.mechanics.contact_law.Law>`.
+with these four methods is a :class:`law <fecm.Law>`.
 """
 
 import fecm

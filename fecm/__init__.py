@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from fecm.deck.reader import read_deck
     from fecm.identification.identify import Identification, identify
     from fecm.mechanics.contact_law import ContactPoint, Law
+    from fecm.mechanics.failure import Strengths
     from fecm.mechanics.own_criterion import CriterionError, FailureCriterion
     from fecm.mechanics.own_law import LawError
     from fecm.mechanics.own_projectile import LinearProjectile, ProjectileError
@@ -59,6 +60,7 @@ __all__ = [
     "Result",
     "RigidMass",
     "Rod",
+    "Strengths",
     "SweepResult",
     "__version__",
     "examples",
@@ -96,6 +98,7 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "Result": ("fecm.results.result", "Result"),
         "RigidMass": ("fecm.mechanics.projectile", "RigidMass"),
         "Rod": ("fecm.mechanics.projectile", "Rod"),
+        "Strengths": ("fecm.mechanics.failure", "Strengths"),
         "SweepResult": ("fecm.sweeps.result", "SweepResult"),
         "identify": ("fecm.identification.identify", "identify"),
         "impact": ("fecm.authoring.impact", "impact"),

@@ -18,7 +18,7 @@ WHAT = {Group.LAWS: "contact law", Group.CRITERIA: "failure criterion"}
 
 
 class ExtensionError(FecmError, ValueError):
-    """An object by a user, or one of an installed package, can't be used."""
+    """No installed package offers an object by a name, or it can't be imported."""
 
 
 def installed(group: Group, name: str) -> object:

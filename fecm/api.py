@@ -16,8 +16,14 @@ from fecm.deck.source_text import load_text
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_criterion import FailureCriterion, own_criteria
 from fecm.mechanics.own_law import own_law
-from fecm.mechanics.own_projectile import LinearProjectile, own_projectile
-from fecm.mechanics.projectile import Integrator, MassMatrix, RodMethod
+from fecm.mechanics.own_projectile import LinearProjectile
+from fecm.mechanics.projectile import (
+    DeckProjectile,
+    Integrator,
+    MassMatrix,
+    RodMethod,
+    own_projectile,
+)
 from fecm.problem.build import ENERGY_LIMIT, RunOptions, check_options
 from fecm.problem.check import check, check_listing
 from fecm.problem.memory import check_memory
@@ -106,7 +112,7 @@ def run_one(
     energy_limit: float = ENERGY_LIMIT,
     progress: Progress | None = None,
     law: Law | str | None = None,
-    projectile: LinearProjectile | None = None,
+    projectile: DeckProjectile | LinearProjectile | None = None,
     criteria: Iterable[FailureCriterion | str] = (),
 ) -> Result:
     """Run a deck with exactly one problem; parameters and errors are those of :func:`run`.
@@ -148,7 +154,7 @@ def run(
     energy_limit: float = ENERGY_LIMIT,
     progress: Progress | None = None,
     law: Law | str | None = None,
-    projectile: LinearProjectile | None = None,
+    projectile: DeckProjectile | LinearProjectile | None = None,
     criteria: Iterable[FailureCriterion | str] = (),
 ) -> Result | list[Result]:
     """Run every problem of a deck.
@@ -187,7 +193,7 @@ def run(
         methods of :class:`~fecm.mechanics.contact_law.Law`, or the name of an entry point of the
         group ``fecm.laws``.  The name of its class, or that of the entry point, is stored as the
         attribute ``law`` of the result.
-    projectile : LinearProjectile, optional
+    projectile : LinearProjectile, Rod or RigidMass, optional
         Projectile instead of that of PROJ, by its mass and stiffness matrices, at the velocity of
         ROD.  The name of its class is stored as the attribute ``projectile`` of the result.
     criteria : iterable of FailureCriterion or str

@@ -60,6 +60,56 @@ made: fecm.Deck = fecm.impact(
     units="mm-N-s",
 ).with_(velocity=3.0, layup="[0/90]2s")
 
+
+class Linear:
+    """A contact law without memory."""
+
+    def start(self) -> None:
+        """No memory."""
+
+    def trial(
+        self, memory: None, last: fecm.ContactPoint, indentation: float
+    ) -> tuple[float, None]:
+        """A spring."""
+        return max(1e5 * indentation, 0.0), None
+
+    def accept(self, memory: None, last: fecm.ContactPoint, indentation: float) -> None:
+        """No memory."""
+
+    def permanent(self, memory: None, last: fecm.ContactPoint) -> float:
+        """The law is elastic."""
+        return 0.0 * last.force
+
+
+class TwoMasses:
+    """A projectile."""
+
+    def mass(self) -> list[float]:
+        """Both masses."""
+        return [1e-4, 2e-4]
+
+    def stiffness(self) -> NDArray[np.float64]:
+        """A spring between them."""
+        return 1e5 * np.array([[1.0, -1.0], [-1.0, 1.0]])
+
+
+def fibre_stress(
+    ply: fecm.Strengths,
+    s1: NDArray[np.float64],
+    s2: NDArray[np.float64],
+    tau: NDArray[np.float64],
+) -> dict[str, NDArray[np.float64]]:
+    """A failure criterion."""
+    return {"fibre tension": s1 / ply.xt, "fibre compression": -s1 / ply.xc}
+
+
+law: fecm.Law = Linear()
+own: fecm.Result = fecm.run_one(
+    deck, law=law, projectile=TwoMasses(), criteria=[fibre_stress, "norris"]
+)
+of_law: fecm.SweepResult = fecm.sweep(deck, {"velocity": [1.0]}, law="bilinear")
+fit: fecm.Identification = fecm.identify(deck, own.time, own.force, "velocity", law=law)
+
 result.plot("forse")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 result.forse  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
 result.tape3.u  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
@@ -72,4 +122,7 @@ fecm.sweep(deck, until="treshold")  # type: ignore[arg-type]  # pyright: ignore[
 fecm.sweep(deck, {"k": [1e6]}, executor=2)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.runn("plate.inp")  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]
 fecm.Plate.from_mesh("plate.msh", {"rim": "glued"})  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
+fecm.run_one(deck, law=TwoMasses())  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
+fecm.run_one(deck, projectile=law)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
+fecm.run_one(deck, criteria=[law])  # type: ignore[list-item]  # pyright: ignore[reportArgumentType]
 fecm.impact(plate, laminates[0], 5.0)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]

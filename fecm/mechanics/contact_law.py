@@ -214,8 +214,9 @@ class Law(Protocol[Number]):
     """A contact law: a force for each trial indentation, and a memory of the loading history.
 
     A step calls `trial` up to five times, as the contact iteration does, and `accept` once, with
-    the indentation at the end of the step.  The memory is of any immutable type; a law without one
-    gives the same force in loading and unloading.
+    the indentation at the end of the step.  The memory is of any immutable type, and the law itself
+    does not change: the cases of a sweep share it.  A law without a memory gives the same force in
+    loading and unloading.
 
     Examples
     --------

@@ -24,11 +24,11 @@ class FailureCriterion(Protocol):
     """A failure criterion of plies, for FAIL to evaluate beside its own.
 
     The exposure is the reciprocal of the factor on all stresses at which the ply fails: it is 0
-    without stress, and 1 at failure.  A sum of squares that is 1 at failure is its square.
+    without stress, and 1 at failure.  Of a quadratic criterion it is the square root.
 
     Examples
     --------
-    The criterion of Norris, of which the fibre's own term is left out:
+    The quadratic criterion of Norris:
 
     >>> import numpy as np
     >>> def norris(ply, s1, s2, tau):
@@ -37,9 +37,9 @@ class FailureCriterion(Protocol):
     ...     square = (s1 / x) ** 2 - s1 * s2 / (x * y) + (s2 / y) ** 2 + (tau / ply.s12) ** 2
     ...     return np.sqrt(square)
 
-    With modes of failure, of which the largest counts:
+    Two modes of failure, of which the larger exposure counts:
 
-    >>> def largest_strain_energy(ply, s1, s2, tau):
+    >>> def two_modes(ply, s1, s2, tau):
     ...     return {"fibre": abs(s1) / ply.xt, "matrix": np.hypot(s2 / ply.yt, tau / ply.s12)}
     """
 

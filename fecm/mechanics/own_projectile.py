@@ -131,10 +131,3 @@ class OwnProjectile:
 def _energy(matrix: Floats, x: Floats) -> Floats:
     """X' A x / 2 for each row of x (rows, n)."""
     return np.asarray(0.5 * np.einsum("ri,ij,rj->r", x, matrix, x))
-
-
-def own_projectile(given: LinearProjectile | None) -> OwnProjectile | None:
-    """The projectile that a user gives, checked; ProjectileError says what it lacks."""
-    if given is None or isinstance(given, OwnProjectile):
-        return given
-    return OwnProjectile(given)

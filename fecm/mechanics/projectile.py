@@ -15,7 +15,7 @@ import numpy as np
 from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.contact_law import Number
-from fecm.mechanics.own_projectile import OwnProjectile
+from fecm.mechanics.own_projectile import LinearProjectile, OwnProjectile
 
 # The report's steel rod, in lb, in and s: a spherical cap of five steps, then the cylinder.
 REPORT_CAP = (0.22, 0.36, 0.43, 0.48, 0.50)
@@ -188,6 +188,18 @@ class RigidMass:
 
 DeckProjectile = Rod | RigidMass  # that PROJ can describe
 Projectile = DeckProjectile | OwnProjectile
+
+
+def own_projectile(given: Projectile | LinearProjectile | None) -> Projectile | None:
+    """The projectile that a user gives, checked; ProjectileError says what it lacks."""
+    if given is None or isinstance(given, Projectile):
+        return given
+    return OwnProjectile(given)
+
+
+def name_of(projectile: Projectile) -> str:
+    """Name of the class of a projectile that a user has given, for messages and results."""
+    return projectile.name if isinstance(projectile, OwnProjectile) else type(projectile).__name__
 
 
 @frozen

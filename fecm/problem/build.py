@@ -21,12 +21,11 @@ from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.kernels.strains import CompiledStrains
 from fecm.mechanics.mesh import Ints, Mesh
 from fecm.mechanics.own_criterion import OwnCriterion
-from fecm.mechanics.own_projectile import OwnProjectile
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import Load, PlateMotion
 from fecm.mechanics.ply_stresses import FailureMonitor, PlyStresses
 from fecm.mechanics.points import GageArray, gages
-from fecm.mechanics.projectile import STEPS, RodMethod, Transducer
+from fecm.mechanics.projectile import STEPS, Projectile, RodMethod, Transducer
 from fecm.mechanics.residual_stresses import Residual
 from fecm.mechanics.stiffness_product import AUTO, CSR, KERNELS, SOLVERS, Workers, available
 from fecm.mechanics.strains import StrainField
@@ -67,7 +66,7 @@ class RunOptions:
     energy_limit: float = ENERGY_LIMIT
     # Contact law instead of the deck's; see :func:`~fecm.mechanics.own_law.own_law`.
     law: contact_law.Law | None = None
-    projectile: OwnProjectile | None = None  # a user's instead of the deck's
+    projectile: Projectile | None = None  # a user's instead of the deck's
     criteria: tuple[OwnCriterion, ...] = ()  # of users, that FAIL evaluates too
 
     def __post_init__(self) -> None:
@@ -159,7 +158,10 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         places = stress_points.places(mesh.coordinates)
         under_load = problem.under_load(*places)
         outside = OutsideLoad(under_load, *places) if failure else None
-    read, station = _gages(problem, mesh, plate), build_station(deck, rod, slips)
+    read, station = (
+        _gages(problem, mesh, plate),
+        build_station(deck, rod, slips, is_own=chosen.projectile is not None),
+    )
     steps = None
     if impact is not None and supports(impact):
         sums = None if read is None else motion.dof_sums(read.dof_indices, read.weights)

@@ -102,12 +102,17 @@ def build_constants(measured: model.Indentation) -> contact_law.ContactParameter
     return contact_law.LinearPermanent(*measured.values())
 
 
-def build_station(deck: Deck, projectile: Projectile, slips: frozenset[str]) -> Transducer:
-    """Build the transducer: PROJ's node, or the rod's middle (the next node under its slip)."""
+def build_station(
+    deck: Deck, projectile: Projectile, slips: frozenset[str], *, is_own: bool = False
+) -> Transducer:
+    """Build the transducer: PROJ's node, or the rod's middle (the next node under its slip).
+
+    PROJ's is not that of a projectile of a user.
+    """
     sign = 1.0 if "station" in slips else -1.0
     if not isinstance(projectile, Rod):
         return Transducer(0, sign)
-    card = deck.last(model.Projectile)
+    card = None if is_own else deck.last(model.Projectile)
     middle = projectile.elements // 2 + (2 if "station" in slips else 1)
     return Transducer(middle if card is None or not card.transducer else card.transducer, sign)
 

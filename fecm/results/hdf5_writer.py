@@ -16,6 +16,7 @@ from fecm._files import beside, check_outputs
 from fecm._typing import Array
 from fecm.deck.units import unit_of
 from fecm.results import schema
+from fecm.results.criteria import criteria_of
 from fecm.results.errors import ResultWriteError
 from fecm.results.groups import GROUPS
 from fecm.results.stored import Stored
@@ -67,7 +68,7 @@ class FileSink:
         if not group:
             self._units = schema.declared_units(values)
         for name, value in values.items():
-            if isinstance(value, list | tuple):
+            if isinstance(value, list | tuple) and all(isinstance(one, str) for one in value):
                 target.attrs.create(name, value, (len(value),), TEXT)
             else:
                 target.attrs[name] = value
@@ -181,6 +182,7 @@ def save(stored: Stored, path: Path, *, overwrite: bool) -> None:
     """Write a result as a file; see :meth:`fecm.Result.save`."""
     check_outputs([path], overwrite)
     with writing(path, overwrite=overwrite) as sink:
+        sink.axis_names["criteria"] = criteria_of(stored.attributes_of("failure"))
         sink.attributes("", stored.attributes)
         sink.text("deck", stored.deck, "the cards of the problem")
         for name in stored:

@@ -11,6 +11,7 @@ import numpy as np
 from fecm._version import __version__
 from fecm.deck.model import Cure, Deck, Material
 from fecm.deck.units import unit_names
+from fecm.mechanics import projectile
 from fecm.mechanics.failure import MODES, largest_in_plies
 from fecm.mechanics.own_law import name_of
 from fecm.mechanics.plate_motion import DivergenceError
@@ -101,7 +102,7 @@ def _own_parts(options: RunOptions) -> dict[str, str]:
     if options.law is not None:
         parts["law"] = name_of(options.law)
     if options.projectile is not None:
-        parts["projectile"] = options.projectile.name
+        parts["projectile"] = projectile.name_of(options.projectile)
     return parts
 
 

@@ -101,7 +101,7 @@ def _check_sendable(spawned: bool, **functions: object) -> None:
         try:
             pickle.dumps(function)
         except Exception:  # pickle raises several types
-            hint = "define it with def at the top level of a module"
+            hint = "define it at the top level of a module"
             raise CasesError(f"{name} can't be sent to worker processes; {hint}") from None
         own = getattr(function, "__module__", "") == "__main__"
         if spawned and own and not hasattr(sys.modules["__main__"], "__file__"):
