@@ -9,7 +9,7 @@ from typing import BinaryIO, Literal
 
 from fecm._errors import warn
 from fecm._frozen import frozen
-from fecm.deck.findings import DeckError, Finding
+from fecm.deck.findings import DeckError, Finding, Severity
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, read_deck
 from fecm.deck.source_text import load_text
@@ -25,12 +25,14 @@ from fecm.mechanics.projectile import (
     own_projectile,
 )
 from fecm.problem.build import ENERGY_LIMIT, RunOptions, check_options
-from fecm.problem.check import check, check_listing
+from fecm.problem.check import check as check_problem
+from fecm.problem.check import check_listing
 from fecm.problem.memory import check_memory
 from fecm.problem.problem import Problem
 from fecm.problem.rules.quadrature import HOURGLASS
 from fecm.problem.rules.time_step import UNSTABLE
 from fecm.problem.slips import LISTING, REPORT, active_slips
+from fecm.problem.summary import ProblemSummary, summarise
 from fecm.results.result import Result, load
 from fecm.results.sinks import MemorySink
 from fecm.simulation.run import simulate
@@ -75,12 +77,105 @@ def load_deck(path_or_text: str | Path | BinaryIO | Deck, mode: str = REPORT) ->
     for read in reader.problems():
         if reader.findings.closed:
             break
-        if (checked := check(read, reader.findings, listing=listing)) is not None:
+        if (checked := check_problem(read, reader.findings, listing=listing)) is not None:
             problems.append(checked)
     if listing and not reader.findings.errors:
         for problem in problems:
             check_listing(problem, reader.findings)
     return LoadedDeck(source, problems, list(reader.findings))
+
+
+@frozen
+class DeckCheck:
+    """What is known of a deck before it runs; ``str()`` is what ``fecm check`` prints.
+
+    Attributes
+    ----------
+    source : str
+        Name of the deck's file.
+    findings : tuple of Finding
+        Errors, warnings and notes, in the deck's order.
+    problems : tuple of ProblemSummary
+        Size, stiffness, masses and time step of each problem; empty if the deck has errors.
+    """
+
+    source: str
+    findings: tuple[Finding, ...]
+    problems: tuple[ProblemSummary, ...]
+
+    @property
+    def errors(self) -> tuple[Finding, ...]:
+        """Findings that make the deck unusable."""
+        return self._found(Severity.ERROR)
+
+    @property
+    def warnings(self) -> tuple[Finding, ...]:
+        """Findings that are probably mistakes."""
+        return self._found(Severity.WARNING)
+
+    @property
+    def ok(self) -> bool:
+        """Whether the deck has no errors."""
+        return not self.errors
+
+    def _found(self, severity: Severity) -> tuple[Finding, ...]:
+        return tuple(finding for finding in self.findings if finding.severity is severity)
+
+    def to_dicts(self) -> list[dict[str, object]]:
+        """Findings and problems as plain values: the lines of ``fecm check --format json``."""
+        found = [finding.to_dict(self.source) for finding in self.findings]
+        head = {"kind": "summary", "file": self.source}
+        return [*found, *({**head, **problem.to_dict()} for problem in self.problems)]
+
+    def __str__(self) -> str:
+        texts = [finding.render(self.source) for finding in self.findings]
+        return "\n".join([*texts, *(line for one in self.problems for line in one.lines())])
+
+    def __repr__(self) -> str:
+        counts = f"{len(self.errors)} errors, {len(self.warnings)} warnings"
+        return f"<fecm check of {self.source}: {counts}>"
+
+
+def check_loaded(loaded: LoadedDeck) -> DeckCheck:
+    """Summarise the problems of a deck that was loaded, if it has no errors."""
+    problems = () if loaded.errors() else loaded.problems
+    return DeckCheck(loaded.source, tuple(loaded.findings), tuple(map(summarise, problems)))
+
+
+def check(deck: str | Path | Deck, mode: Mode = "report") -> DeckCheck:
+    """Check a deck without running it.
+
+    Parameters
+    ----------
+    deck : str, Path or Deck
+        A file's path, a deck's text, or a model built in Python.
+    mode : str
+        ``"report"``, or ``"listing"``, which refuses what the printed program can't compute.
+
+    Returns
+    -------
+    DeckCheck
+        Findings, and a summary of each problem.  A deck with errors raises nothing.
+
+    Raises
+    ------
+    ValueError
+        If the mode is unknown.
+    OSError
+        If the file can't be read.
+
+    Examples
+    --------
+    >>> import fecm
+    >>> found = fecm.check(fecm.examples.path("impact-115"))
+    >>> found.ok, [finding.code for finding in found.warnings]
+    (True, ['W415'])
+    >>> (problem,) = found.problems
+    >>> print(f"{problem.nodes} nodes, DT at most {problem.critical_time_step:.3g} s")
+    609 nodes, DT at most 4.75e-07 s
+    """
+    active_slips(mode, ())  # refuses an unknown mode
+    return check_loaded(load_deck(deck, mode))
 
 
 def read_one(path_or_text: str | Path) -> Deck:

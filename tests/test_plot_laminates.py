@@ -15,7 +15,7 @@ from fecm.api import load_deck
 from fecm.deck import model
 from fecm.plot.failure import NAMES
 from fecm.plot.kinds import PlotError
-from fecm.problem.summary import ProblemSummary
+from fecm.problem.summary import summarise
 from fecm.results.result import Result
 from fecm.results.vtkhdf import write_vtkhdf
 from tests.pictures import legend_of, plot
@@ -97,7 +97,7 @@ def test_vtkhdf_has_the_laminate_and_the_largest_stress_of_own_plies(
 
 def test_the_summary_of_a_deck_names_the_laminate_under_the_load() -> None:
     (problem,) = load_deck(unlike()).problems
-    summary = ProblemSummary(problem)
+    summary = summarise(problem)
     assert "  laminate            1, under the load" in summary.lines()
     assert summary.layers == 3
 

@@ -39,7 +39,7 @@ from fecm.mechanics.solutions import modes
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.rules.damping import clamped_frequency
-from fecm.problem.summary import ProblemSummary
+from fecm.problem.summary import summarise
 from fecm.results.result import Result
 from fecm.results.summary import summary
 from fecm.studies.estimate import estimate
@@ -373,13 +373,13 @@ def test_a_preload_beyond_the_strength_of_a_ply_is_found() -> None:
 )
 def test_the_summary_has_the_buckling_load(card: str, line: str) -> None:
     (problem,) = load_deck(preloaded(card)).problems
-    assert f"  {line}" in ProblemSummary(problem).lines()
+    assert f"  {line}" in summarise(problem).lines()
 
 
 def test_a_plate_without_compression_has_no_line_about_buckling() -> None:
     for text in (base(), preloaded("1.0")):
         (problem,) = load_deck(text).problems
-        summary = ProblemSummary(problem)
+        summary = summarise(problem)
         assert summary.buckling_factor is None
         assert not any("buckling" in line for line in summary.lines())
 

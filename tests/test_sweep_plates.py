@@ -130,9 +130,9 @@ def test_in_plane_unknowns_that_rest_do_not_limit_the_time_step() -> None:
 
 
 def _critical(deck: Deck) -> list[str]:
-    from fecm.problem.summary import ProblemSummary
+    from fecm.problem.summary import summarise
 
-    made = ProblemSummary(load_deck(deck).problems[0])
+    made = summarise(load_deck(deck).problems[0])
     return [line for line in made.lines() if "critical" in line]
 
 

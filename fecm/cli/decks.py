@@ -17,7 +17,7 @@ from click import option
 from fecm._errors import FecmError
 from fecm._files import check_outputs
 from fecm._version import __version__
-from fecm.api import LoadedDeck, load_deck
+from fecm.api import LoadedDeck, check_loaded, load_deck
 from fecm.cli.common import (
     DASH,
     CheckFailedError,
@@ -36,7 +36,6 @@ from fecm.deck.units import unit_names, unit_of
 from fecm.problem.build import RunOptions
 from fecm.problem.problem import Problem
 from fecm.problem.slips import REPORT, active_slips
-from fecm.problem.summary import ProblemSummary
 
 
 def count_findings(findings: Sequence[Finding]) -> str:
@@ -149,23 +148,18 @@ def check(decks: tuple[Path, ...], mode: str, form: Format, strict: bool, mesh_e
 
 def _print(prepared: LoadedDeck, form: Format, *, brief: bool, passes: bool) -> None:
     """Print findings and, if there are no errors, a summary, or one line of a deck that passes."""
-    shown = form is Format.JSON or (form is Format.TEXT and not brief)
-    problems = prepared.problems if shown and not prepared.errors() else []
-    views = [ProblemSummary(problem) for problem in problems]
     if form is Format.JSON:
-        for finding in prepared.findings:
-            echo_json(finding.to_dict(prepared.source))
-        for view in views:
-            echo_json({"kind": "summary", "file": prepared.source, **view.to_dict()})
+        for values in check_loaded(prepared).to_dicts():
+            echo_json(values)
+    elif form is Format.TEXT and not brief:
+        echo(check_loaded(prepared))
     elif form is Format.TEXT:
         for finding in prepared.findings:
             echo(finding.render(prepared.source))
-        if brief and passes:
+        if passes:
             counts = Counter(finding.severity for finding in prepared.findings)
             found = [f"{n} {word}{'s' * (n != 1)}" for word, n in counts.items()]
             echo(f"{prepared.source}: {', '.join(found) or 'no findings'}")
-        for view in views:
-            echo("\n".join(view.lines()))
 
 
 def _compare_meshes(prepared: LoadedDeck, mode: str, form: Format) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from click import option
 
 from fecm._frozen import frozen
 from fecm._inputs import parsed_toml
-from fecm._text import printable, shown_apart
+from fecm._text import printable
 from fecm.cli.common import FAILED, echo_json
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
@@ -25,7 +26,7 @@ from fecm.cli.options import (
     collected,
     file_of,
 )
-from fecm.results.diff import SCALE_NAMES, Comparison, Difference, difference
+from fecm.results.diff import diff as compare
 
 
 @frozen
@@ -173,133 +174,29 @@ def diff(options: Options) -> None:
     Exit status: 0 equal, 1 different, 2 unusable file or call.
     """
     asked = options.tolerances()
-    found = difference(
-        options.a, options.b, asked.rtol, asked.atol, options.only, asked.exclude, asked.own
+    found = compare(
+        options.a,
+        options.b,
+        asked.rtol,
+        asked.atol,
+        only=options.only,
+        exclude=asked.exclude,
+        tol=_by_pattern(asked.own),
     )
     if options.form is Format.JSON:
-        echo_json(_document(found, asked, options))
+        echo_json(found.to_dict(same=not options.brief))
+    elif options.brief:
+        click.echo("\n".join([*map(printable, found.different), found.verdict]))
     else:
-        click.echo("\n".join(_page(found, asked, brief=options.brief)))
+        click.echo("\n".join(found.lines()))
     if not found.same:
         raise SystemExit(FAILED)
 
 
-def _document(found: Difference, asked: Tolerances, options: Options) -> dict[str, Any]:
-    """JSON of a comparison."""
-    shown = [c for c in found.compared if not (options.brief and c.same)]
-    return {
-        "verdict": "same" if found.same else "different",
-        "a": printable(str(options.a)),
-        "b": printable(str(options.b)),
-        "rtol": asked.rtol or 0.0,
-        "atol": asked.atol or 0.0,
-        "last_digit": found.to_last_digit,
-        "tol": dict(asked.own),
-        "datasets": [_entry(comparison) for comparison in shown],
-        "only_in_a": found.only[0],
-        "only_in_b": found.only[1],
-        "excluded": found.excluded,
-        "listed": found.listed,
-    }
-
-
-def _page(found: Difference, asked: Tolerances, *, brief: bool) -> list[str]:
-    """Lines about a comparison; the last one is the verdict."""
-    different = [c.path for c in found.compared if not c.same] + [*found.only[0], *found.only[1]]
-    lines = list(map(printable, sorted(different))) if brief else _lines(found)
-    count = len(found.compared) + len(found.only[0]) + len(found.only[1])
-    compared = f"{count} dataset{'s' * (count != 1)}"
-    within = f"rtol {asked.rtol or 0.0:g}, atol {asked.atol or 0.0:g}"
-    if found.to_last_digit:
-        within = "the last digit of the tapes"
-    if asked.own:
-        within += ", --tol"
-    if found.excluded:
-        within += f"; {len(found.excluded)} excluded"
-    if found.same:
-        return [*lines, f"same: {compared} within {within}"]
-    return [*lines, f"different: {len(different)} of {compared} at {within}"]
-
-
-def _lines(found: Difference) -> list[str]:
-    """One line per dataset, then what is listed."""
-    rows = {c.path: ("same" if c.same else "different", _describe(c)) for c in found.compared}
-    for source, names in zip("AB", found.only, strict=True):
-        rows.update(dict.fromkeys(names, (f"only in {source}", "")))
-    width = max((len(printable(name)) for name in rows), default=0)
-    lines = [
-        f"{word:10} {printable(name):{width}}  {text}".rstrip()
-        for name, (word, text) in sorted(rows.items())
-    ]
-    for item in found.listed:
-        values = item["a"], item["b"]
-        left, right = (
-            "nothing" if value is None else f"`{text}`"
-            for value, text in zip(values, shown_apart(*values), strict=True)
-        )
-        line = f" line {item['line']}" if item["line"] else ""
-        lines.append(f"listed     {printable(item['name'])}{line}: {left} against {right}")
-    return lines
-
-
-def _describe(found: Comparison) -> str:
-    """Shapes and types that differ, largest difference, number of differences and first one."""
-    parts: list[str] = []
-    if found.shapes[0] != found.shapes[1]:
-        left, right = ("x".join(map(str, shape)) or "single" for shape in found.shapes)
-        parts.append(f"shape {left} against {right}")
-    if found.types[0] != found.types[1]:
-        parts.append(f"type {found.types[0]} against {found.types[1]}")
-    if found.at and found.values:
-        quote = "`" if found.holds_texts else ""
-        left, right = (f"{quote}{value}{quote}" for value in shown_apart(*found.values))
-        text = f"{left} against {right}{_where(found.at)}"
-        if math.isfinite(found.largest):
-            name = SCALE_NAMES.get(found.path, "") if found.scale != found.maximum else ""
-            share = f"{found.relative:.2g} of {name or 'max'} {found.scale:.6g}"
-            text = f"largest {found.largest:.3g} ({share}), {text}"
-        parts.append(text)
-    if found.differing:
-        noun = "text" if found.holds_texts else "number"
-        parts.append(f"{found.differing} {noun}{'s differ' if found.differing > 1 else ' differs'}")
-    if found.first:
-        parts.append(f"first{_where(found.first)}")
-    return "; ".join(parts)
-
-
-def _where(place: dict[str, Any]) -> str:
-    """A place in words, with a leading blank."""
-    words: list[str] = []
-    if place["time"] is not None:
-        words.append(f"step {place['step']} (time {place['time']:.6g})")
-    words += [f"{n} {value}" for n, value in place.items() if n not in ("index", "step", "time")]
-    if place["step"] is not None and place["time"] is None:  # an index of a sweep's histories
-        words.append(f"step {place['step']}")
-    if not words and place["index"]:
-        words.append(f"index {', '.join(map(str, place['index']))}")
-    return f" at {', '.join(words)}" if words else ""
-
-
-def _entry(found: Comparison) -> dict[str, Any]:
-    """JSON of one dataset."""
-    numbers = found.comparable and not found.holds_texts
-    finite = numbers and math.isfinite(found.largest)
-    values = found.values or (None, None)
-    return {
-        "name": found.path,
-        "same": found.same,
-        "shape_a": list(found.shapes[0]),
-        "shape_b": list(found.shapes[1]),
-        "dtype_a": found.types[0],
-        "dtype_b": found.types[1],
-        "largest_difference": found.largest if finite else None,
-        "relative": found.relative if finite else None,
-        "maximum": found.maximum if numbers else None,
-        "scale": found.scale if numbers else None,
-        "tolerance": found.tolerance if numbers else None,
-        "differing": found.differing if found.comparable else None,
-        "at": found.at,
-        "a": values[0],
-        "b": values[1],
-        "first": found.first,
-    }
+def _by_pattern(own: Iterable[tuple[str, tuple[float, ...]]]) -> dict[str, tuple[float, ...]]:
+    """Tolerances by pattern, in the order in which each was given last."""
+    latest: dict[str, tuple[float, ...]] = {}
+    for pattern, values in own:
+        latest.pop(pattern, None)
+        latest[pattern] = values
+    return latest

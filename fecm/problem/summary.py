@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._memory import format_bytes
 from fecm._typing import Floats
 from fecm.deck.macros import flat
@@ -67,53 +68,89 @@ def larger_steps(problem: Problem) -> list[str]:
     return [f"time step         DT is at most {largest / least:.2f} of the critical one; {fewer}"]
 
 
+@frozen
 class ProblemSummary:
-    """A problem without errors in numbers."""
+    """A problem without errors in numbers, in the deck's units.
 
-    def __init__(self, problem: Problem) -> None:
-        deck, plate, laminate = problem.deck, problem.plate, problem.laminate
-        resolved = resolution(problem) if problem.has_impact else None
-        self.title = deck.title
-        self.nodes = deck.control.numnp
-        self.elements = deck.control.numel
-        self.layers = len(laminate.plies.angles)
-        self.equations = plate.neq
-        self.steps = problem.work.steps
-        self.nonlinear = plate.nonlinear
-        self.free_in_plane = int((plate.mesh.codes[:, :W] == 0).all(axis=1).sum())  # nodes
-        self.preload = plate.preload  # N0x, N0y, N0xy
-        self.A, self.B, self.D, self.shear = laminate.A, laminate.B, laminate.D, laminate.shear
-        self.plate_mass = plate.total_mass()
-        self.projectile_mass = build_projectile(deck).total_mass  # even without impact
-        self.critical_time_step = float("nan")
-        with suppress(UnsoundPlateError):  # the check reports it if the program takes steps
-            self.critical_time_step = problem.critical_time_step
-        # Factor on the preload at which the plate buckles, infinite if that is far away; None where
-        # the preload does not compress the plate.
-        self.buckling_factor = problem.buckling_factor if plate.is_compressed else None
-        self.time_steps = [m.value for m in flat(problem.program) if m.word == "DT"]
-        self.output_bytes = problem.output_bytes  # approximate size of the result
-        # Elements at the impact node per bending wave of the contact, and the estimated mesh error
-        # of the peak force, relative to it; None without impact.
-        self.elements_per_wave = None if resolved is None else resolved.elements
-        self.mesh_error = None if resolved is None else resolved.error
-        # Change of the static deflection under the load by SHEA EQUI; None where it does not apply
-        # or is not computed.
-        self.equilibrium_change: float | None = None
-        self._leaves_out_equilibrium = leaves_out_equilibrium(problem)
-        if self._leaves_out_equilibrium:
-            self.equilibrium_change = equilibrium_change(problem)
-        self.units = unit_names(deck)  # empty if the deck has none
-        # Number of the laminate of layers, A, B, D and shear, where there are several.
-        self._laminate = list(deck.layers)[problem.laminate_number] if plate.others else None
+    Attributes
+    ----------
+    title : str
+        Title of the deck.
+    nodes, elements, equations : int
+        Size of the mesh, and number of free degrees of freedom.
+    layers : int
+        Plies of the laminate under the load.
+    steps : int
+        Impact steps of the program.
+    nonlinear : bool
+        Whether the deck has NONL.
+    free_in_plane : int
+        Nodes whose u and v are both free.
+    preload : tuple of float
+        N0x, N0y and N0xy of PREL, force/length; zeros without it.
+    A, B, D : ndarray (3, 3)
+        Stiffness of the laminate under the load.
+    shear : ndarray (2, 2)
+        Its transverse shear stiffness, of xz and yz.
+    plate_mass, projectile_mass : float
+        Masses.
+    critical_time_step : float
+        Largest stable time step of the plate; NaN if a mass or stiffness is missing.
+    buckling_factor : float or None
+        Factor on the preload at which the plate buckles, infinite if that is far away; None where
+        the preload does not compress the plate.
+    time_steps : tuple of float
+        Every DT of the program; 0 takes 0.9 of the critical time step.
+    output_bytes : int
+        Approximate size of the result.
+    elements_per_wave : float or None
+        Elements at the impact node per bending wave of the contact; None without impact.
+    mesh_error : float or None
+        Estimated error of the peak force due to the mesh, relative to it.
+    equilibrium_change : float or None
+        Relative change of the static deflection under the load by SHEA EQUI; None where it does not
+        apply or is not computed.
+    units : dict
+        Names of the units; empty if the deck names none.
+    laminate : int or None
+        Number of the laminate under the load, where there are several.
+    leaves_out_equilibrium : bool
+        Whether SHEA EQUI would apply: an impact with SHEA MITC and the shear factor 1.
+    """
+
+    title: str
+    nodes: int
+    elements: int
+    layers: int
+    equations: int
+    steps: int
+    nonlinear: bool
+    free_in_plane: int
+    preload: tuple[float, float, float]
+    A: Floats
+    B: Floats
+    D: Floats
+    shear: Floats
+    plate_mass: float
+    projectile_mass: float
+    critical_time_step: float
+    buckling_factor: float | None
+    time_steps: tuple[float, ...]
+    output_bytes: int
+    elements_per_wave: float | None
+    mesh_error: float | None
+    equilibrium_change: float | None
+    units: dict[str, str]
+    laminate: int | None
+    leaves_out_equilibrium: bool
 
     def to_dict(self) -> dict[str, object]:
         """Plain values, for JSON."""
-        values = {name: v for name, v in vars(self).items() if not name.startswith("_")}
-        return {n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in values.items()}
+        values = vars(self).items()
+        return {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in values}
 
     def lines(self) -> list[str]:
-        """Lines of text."""
+        """Lines of text, as ``fecm check`` prints them."""
 
         def quantity(value: float, dimension: str) -> str:
             return f"{value:.4g} {unit_of(dimension, self.units)}".rstrip()
@@ -121,12 +158,12 @@ class ProblemSummary:
         lines = [self.title or "(no title)"]
         counts = ("nodes", "elements", "equations", "layers")
         lines += [f"  {name:20}{getattr(self, name)}" for name in counts]
-        if self._laminate:
-            lines.append(f"  laminate            {self._laminate}, under the load")
+        if self.laminate:
+            lines.append(f"  laminate            {self.laminate}, under the load")
         for name, dimension in (("A", "force/length"), ("B", "force"), ("D", "force*length")):
             lines += _matrix(name, getattr(self, name), unit_of(dimension, self.units))
         lines += _matrix("shear xz, yz", self.shear, unit_of("force/length", self.units))
-        if self._leaves_out_equilibrium:
+        if self.leaves_out_equilibrium:
             lines.append(f"  shear factor        1; {self._said_change()}")
 
         if self.nonlinear:
@@ -171,6 +208,43 @@ class ProblemSummary:
         if self.elements > MOST_SOLVED:
             return f"the change by SHEA EQUI is computed up to {MOST_SOLVED} elements"
         return "the plate is not held: no static deflection to compare with SHEA EQUI"
+
+
+def summarise(problem: Problem) -> ProblemSummary:
+    """Summarise a problem without errors."""
+    deck, plate, laminate = problem.deck, problem.plate, problem.laminate
+    resolved = resolution(problem) if problem.has_impact else None
+    critical = math.nan
+    with suppress(UnsoundPlateError):  # the check reports it if the program takes steps
+        critical = problem.critical_time_step
+    without_equilibrium = leaves_out_equilibrium(problem)
+    return ProblemSummary(
+        title=deck.title,
+        nodes=deck.control.numnp,
+        elements=deck.control.numel,
+        layers=len(laminate.plies.angles),
+        equations=plate.neq,
+        steps=problem.work.steps,
+        nonlinear=plate.nonlinear,
+        free_in_plane=int((plate.mesh.codes[:, :W] == 0).all(axis=1).sum()),
+        preload=plate.preload,
+        A=laminate.A,
+        B=laminate.B,
+        D=laminate.D,
+        shear=laminate.shear,
+        plate_mass=plate.total_mass(),
+        projectile_mass=build_projectile(deck).total_mass,  # even without impact
+        critical_time_step=critical,
+        buckling_factor=problem.buckling_factor if plate.is_compressed else None,
+        time_steps=tuple(macro.value for macro in flat(problem.program) if macro.word == "DT"),
+        output_bytes=problem.output_bytes,
+        elements_per_wave=None if resolved is None else resolved.elements,
+        mesh_error=None if resolved is None else resolved.error,
+        equilibrium_change=equilibrium_change(problem) if without_equilibrium else None,
+        units=unit_names(deck),
+        laminate=list(deck.layers)[problem.laminate_number] if plate.others else None,
+        leaves_out_equilibrium=without_equilibrium,
+    )
 
 
 def _matrix(name: str, values: Floats, unit: str) -> list[str]:
