@@ -17,7 +17,7 @@ from fecm._version import __version__
 
 if TYPE_CHECKING:
     from fecm._extensions import ExtensionError
-    from fecm.api import read_one, run, run_one
+    from fecm.api import DeckCheck, check, read_one, run, run_one
     from fecm.authoring.contact import Contact
     from fecm.authoring.impact import impact
     from fecm.authoring.laminate import Laminate
@@ -33,17 +33,22 @@ if TYPE_CHECKING:
     from fecm.mechanics.own_projectile import LinearProjectile, ProjectileError
     from fecm.mechanics.plate_motion import DivergenceError
     from fecm.mechanics.projectile import RigidMass, Rod
+    from fecm.results.diff import assert_same, diff
+    from fecm.results.difference import Difference
     from fecm.results.result import Result, load
     from fecm.sweeps.api import sweep
     from fecm.sweeps.result import SweepResult
     from fecm.sweeps.result_file import load as load_sweep
+    from fecm.verification import verify
 
 __all__ = [
     "Contact",
     "ContactPoint",
     "CriterionError",
     "Deck",
+    "DeckCheck",
     "DeckError",
+    "Difference",
     "DivergenceError",
     "ExtensionError",
     "FailureCriterion",
@@ -63,6 +68,9 @@ __all__ = [
     "Strengths",
     "SweepResult",
     "__version__",
+    "assert_same",
+    "check",
+    "diff",
     "examples",
     "identify",
     "impact",
@@ -73,6 +81,7 @@ __all__ = [
     "run",
     "run_one",
     "sweep",
+    "verify",
 ]
 
 if not TYPE_CHECKING:  # type checkers know the names from the imports above
@@ -83,7 +92,9 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "ContactPoint": ("fecm.mechanics.contact_law", "ContactPoint"),
         "CriterionError": ("fecm.mechanics.own_criterion", "CriterionError"),
         "Deck": ("fecm.deck.model", "Deck"),
+        "DeckCheck": ("fecm.api", "DeckCheck"),
         "DeckError": ("fecm.deck.findings", "DeckError"),
+        "Difference": ("fecm.results.difference", "Difference"),
         "DivergenceError": ("fecm.mechanics.plate_motion", "DivergenceError"),
         "ExtensionError": ("fecm._extensions", "ExtensionError"),
         "FailureCriterion": ("fecm.mechanics.own_criterion", "FailureCriterion"),
@@ -100,6 +111,9 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "Rod": ("fecm.mechanics.projectile", "Rod"),
         "Strengths": ("fecm.mechanics.failure", "Strengths"),
         "SweepResult": ("fecm.sweeps.result", "SweepResult"),
+        "assert_same": ("fecm.results.diff", "assert_same"),
+        "check": ("fecm.api", "check"),
+        "diff": ("fecm.results.diff", "diff"),
         "identify": ("fecm.identification.identify", "identify"),
         "impact": ("fecm.authoring.impact", "impact"),
         "load": ("fecm.results.result", "load"),
@@ -109,6 +123,7 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "run": ("fecm.api", "run"),
         "run_one": ("fecm.api", "run_one"),
         "sweep": ("fecm.sweeps.api", "sweep"),
+        "verify": ("fecm.verification", "verify"),
     }
 
     def __getattr__(name):

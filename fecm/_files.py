@@ -14,7 +14,7 @@ import os
 import stat
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TextIO
 
 from fecm._errors import FecmError
 
@@ -129,6 +129,16 @@ def beside(path: Path, *, overwrite: bool = True, follow: bool = True) -> Iterat
                     partial.unlink(missing_ok=True)
             with contextlib.suppress(OSError):
                 os.close(handle)
+
+
+@contextlib.contextmanager
+def writing(path: Path, *, overwrite: bool) -> Iterator[TextIO]:
+    """Open a text file that gets its final name when it is complete."""
+    with (
+        beside(path, overwrite=overwrite) as partial,
+        partial.open("w", encoding="utf-8", newline="\n") as file,
+    ):
+        yield file
 
 
 @contextlib.contextmanager

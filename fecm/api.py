@@ -168,11 +168,11 @@ def check(deck: str | Path | Deck, mode: Mode = "report") -> DeckCheck:
     --------
     >>> import fecm
     >>> found = fecm.check(fecm.examples.path("impact-115"))
-    >>> found.ok, [finding.code for finding in found.warnings]
-    (True, ['W415'])
+    >>> found.ok, len(found.warnings)
+    (True, 0)
     >>> (problem,) = found.problems
     >>> print(f"{problem.nodes} nodes, DT at most {problem.critical_time_step:.3g} s")
-    609 nodes, DT at most 4.75e-07 s
+    609 nodes, DT at most 5.07e-07 s
     """
     active_slips(mode, ())  # refuses an unknown mode
     return check_loaded(load_deck(deck, mode))

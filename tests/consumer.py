@@ -26,11 +26,22 @@ deck: fecm.Deck = fecm.read_one("plate.inp")
 again: fecm.Result = fecm.run_one(deck, progress=lambda step, steps: print(step / steps))
 axes: Axes = result.plot("loop", ax=result.plot("force"), against="displacement")
 similarity: float = result.compare("shot-3.csv").correlation
+checked: fecm.DeckCheck = fecm.check(deck, "listing")
+codes: list[str] = [finding.code for finding in checked.errors]
+critical: list[float] = [problem.critical_time_step for problem in checked.problems]
+stiffness: NDArray[np.float64] = checked.problems[0].D
+apart: fecm.Difference = fecm.diff("a.h5", result, 1e-6, tol={"tape8": 1e-5, "energy": (0, 1)})
+where: int | None = apart.datasets[0].at.step if apart.datasets[0].at else None
+fecm.assert_same(result, Path("trusted.h5"), rtol=1e-6, only="history")
+verified: bool = all(row.within for row in fecm.verify("isotropic-ply"))
+result.export("plate.vtkhdf", overwrite=True)
 sweep: fecm.SweepResult = fecm.sweep(deck, {"velocity": [1.0, 2.0]}, workers=2)
 pooled: fecm.SweepResult = fecm.sweep(deck, {"k": [1e6]}, executor=ThreadPoolExecutor())
 measured: fecm.SweepResult = fecm.sweep(
     build=lambda case: deck, vary={"width": [1.0]}, measure=lambda r: {"w": r.plate_w.max()}
 )
+fecm.assert_same(sweep, "sweep.h5")
+sweep.export("forces.csv", "history")
 peaks: xarray.DataArray = sweep.to_xarray().peak_force
 drawn: fecm.SweepResult = fecm.sweep(
     deck,
@@ -120,6 +131,8 @@ fecm.sweep(deck, {"velocity": 5.0})  # type: ignore[dict-item]  # pyright: ignor
 fecm.sweep(deck, random={"k": 3.0}, samples=16)  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
 fecm.sweep(deck, until="treshold")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.sweep(deck, {"k": [1e6]}, executor=2)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
+result.export("plate.vtu", to="vtu")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
+fecm.diff(deck, result)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.runn("plate.inp")  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]
 fecm.Plate.from_mesh("plate.msh", {"rim": "glued"})  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
 fecm.run_one(deck, law=TwoMasses())  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]

@@ -7,12 +7,11 @@ import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from time import monotonic as clock
-from typing import TextIO
 
 import click
 
 from fecm._errors import FecmError
-from fecm._files import beside
+from fecm._files import writing
 from fecm._json import jsonable
 from fecm._text import printable
 
@@ -93,16 +92,6 @@ def _by_the_minute(
             echo(f"{label}: {done} of {length} done{more and ', '}{more}", err=True)
 
     return advance
-
-
-@contextlib.contextmanager
-def writing(path: Path, *, overwrite: bool) -> Iterator[TextIO]:
-    """Open a text file that gets its final name when it is complete."""
-    with (
-        beside(path, overwrite=overwrite) as partial,
-        partial.open("w", encoding="utf-8", newline="\n") as file,
-    ):
-        yield file
 
 
 def write_text(path: Path, text: str, *, overwrite: bool) -> None:

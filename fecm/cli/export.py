@@ -14,11 +14,12 @@ from fecm.cli.options import DECK_PATH, FILE_PATH
 from fecm.cli.outputs import write_lines
 from fecm.results import csv
 from fecm.results.errors import ExportError
-from fecm.results.hdf5_reader import read
+from fecm.results.export import ExportFormat
+from fecm.results.export import export as write
+from fecm.results.hdf5_reader import Contents, read
 from fecm.results.result import load, result_of
 from fecm.results.schema import Form
 from fecm.results.tapes import tape_texts, write_tapes
-from fecm.results.vtkhdf import write_vtkhdf
 
 
 @click.command(
@@ -59,7 +60,7 @@ def tapes(result: Path, directory: Path, overwrite: bool) -> None:
 @click.option(
     "--to",
     "target",
-    type=click.Choice(["vtkhdf", "csv"]),
+    type=click.Choice([form.value for form in ExportFormat]),
     required=True,
     help="vtkhdf for ParaView and VTK, csv for spreadsheets.",
 )
@@ -101,20 +102,29 @@ def export(
     if path != DASH:
         check_outputs([path], overwrite, [result])
     try:
-        if target == "csv" and is_sweep:
-            # 50 ms, which the result of a run does not need.
-            from fecm.sweeps.csv import csv_lines
-            from fecm.sweeps.result_file import sweep_of
-
-            cases = sweep_of(contents, history=name == "history")
-            write_lines(csv_lines(cases, name), path, overwrite=overwrite)
-        elif target == "csv":
+        if is_sweep:
+            _write_sweep(contents, target, name, path, overwrite=overwrite)
+        elif path == DASH:
             write_lines(csv.lines(result_of(contents), name), path, overwrite=overwrite)
-        elif is_sweep:
-            raise ExportError("a sweep has no fields; --to csv writes its cases")
         else:
-            write_vtkhdf(result_of(contents), path, note, overwrite=overwrite)
+            form = ExportFormat(target)
+            asked = name if form is ExportFormat.CSV else ""
+            write(result_of(contents), path, form, asked, note, overwrite=overwrite)
     except ExportError as error:
         raise RefusedError(f"{result}: {error}") from None
     if path != DASH:
         echo(path)
+
+
+def _write_sweep(
+    contents: Contents, target: str, name: str, path: Path, *, overwrite: bool
+) -> None:
+    """Write a table of a sweep."""
+    if target != ExportFormat.CSV:
+        raise ExportError("a sweep has no fields; --to csv writes its cases")
+    # 50 ms, which the result of a run does not need.
+    from fecm.sweeps.csv import csv_lines
+    from fecm.sweeps.result_file import sweep_of
+
+    cases = sweep_of(contents, history=name == "history")
+    write_lines(csv_lines(cases, name), path, overwrite=overwrite)

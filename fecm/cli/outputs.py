@@ -11,8 +11,8 @@ from typing import Any
 
 import click
 
-from fecm._files import check_outputs
-from fecm.cli.common import DASH, RefusedError, note, writing
+from fecm._files import check_outputs, writing
+from fecm.cli.common import DASH, RefusedError, note
 from fecm.cli.options import FILE_PATH, Decorated, stacked
 from fecm.plot.kinds import SUFFIXES
 from fecm.plot.pictures import imported, require_matplotlib, save

@@ -11,11 +11,11 @@ from typing import NamedTuple
 import click
 from click import option
 
-from fecm._files import check_outputs
+from fecm._files import check_outputs, writing
 from fecm._frozen import frozen
 from fecm._memory import format_bytes
 from fecm.api import numbered
-from fecm.cli.common import CheckFailedError, RefusedError, echo, echo_json, note, progress, writing
+from fecm.cli.common import CheckFailedError, RefusedError, echo, echo_json, note, progress
 from fecm.cli.decks import load_valid
 from fecm.cli.help import GroupedCommand, typical
 from fecm.cli.interrupts import signals

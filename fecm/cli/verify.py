@@ -11,7 +11,7 @@ from fecm.cli.common import CheckFailedError, RefusedError
 from fecm.cli.help import typical
 from fecm.cli.options import FORMAT_OPTION, Format
 from fecm.verification import carry_out, chosen
-from fecm.verification.case import fields, page, table
+from fecm.verification.case import page, table
 
 
 @click.command(
@@ -47,7 +47,7 @@ def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: Format) 
         click.echo(page(rows), nl=False)
     elif form is Format.JSON:
         found = list(rows)
-        values = [fields(row) for row in found]
+        values = [row.to_dict() for row in found]
         told = {"ok": all(row.within for row in found), "rows": values}
         click.echo(json.dumps(told, ensure_ascii=False, allow_nan=False))
     else:

@@ -17,7 +17,7 @@ from fecm.results.errors import ExportError
 from fecm.results.groups import STORED_BY
 from fecm.results.missing import remedy, suggestion
 from fecm.results.plies import IN_PLANE, INTERLAMINAR
-from fecm.results.result import Result
+from fecm.results.stored import Stored
 
 CLOCK = ("step", "time", "number")  # key columns of rows: the instant, or the number of a mode
 # Axes with named positions become columns.
@@ -41,10 +41,11 @@ KEYS = {
 LABELS = {"gages": "gages/number", "members": "plies/element", "patch_nodes": "patch/node"}
 # Datasets of the table of ply stresses.
 PLIES = tuple(f"plies/{name}" for name in (*IN_PLANE, *INTERLAMINAR))
+HISTORY = "history"  # the group that is exported by default
 BLOCK = 100_000  # lines per block
 
 
-def lines(result: Result, name: str = "history") -> Iterator[str]:
+def lines(result: Stored, name: str = HISTORY) -> Iterator[str]:
     """Lines of one dataset such as ``tape3/w``, or of all datasets of a group such as ``history``.
 
     The first is the header.  Raises ExportError if there is no such dataset or group, or the
@@ -97,7 +98,7 @@ def _lines(header: Sequence[str], rows: Iterator[tuple[float, ...]]) -> Iterator
     return itertools.chain([",".join(header) + "\n"], texts)
 
 
-def _members(result: Result, name: str) -> list[str]:
+def _members(result: Stored, name: str) -> list[str]:
     """Paths of a dataset, or of a group's datasets in the schema's order."""
     if name in result:
         return [name]

@@ -93,7 +93,7 @@ def compare(pair: Pair, tolerances: tuple[float, float] | None) -> DatasetDiffer
     elif any(source.dtypes[pair.path].kind == "f" for source in pair.sources):
         rtol, atol = tolerances
         found.tolerance = atol + rtol * found.scale
-    if infinite or found.largest > (0.0 if tolerances is None else found.tolerance):
+    if infinite or found.largest_difference > (0.0 if tolerances is None else found.tolerance):
         _count(found, pair, to_last_digit=tolerances is None)
     return found
 
@@ -104,7 +104,7 @@ def _compare_texts(found: DatasetDifference, pair: Pair) -> None:
     rows = np.flatnonzero(left != right)
     found.differing = len(rows)
     if len(rows):
-        found.largest, found.at = math.inf, _place(pair, (int(rows[0]),))
+        found.largest_difference, found.at = math.inf, _place(pair, (int(rows[0]),))
         found.values = str(left[rows[0]]), str(right[rows[0]])
 
 
@@ -190,9 +190,9 @@ def _measure(found: DatasetDifference, pair: Pair) -> bool:
             continue  # no other difference is larger
         here = int((strange if strange.any() else apart).argmax())
         index = np.unravel_index(here, apart.shape)
-        if strange.any() or apart[index] > found.largest:
+        if strange.any() or apart[index] > found.largest_difference:
             infinite = bool(strange.any())
-            found.largest = np.inf if infinite else float(apart[index])
+            found.largest_difference = np.inf if infinite else float(apart[index])
             found.values = float(left[index]), float(right[index])
             place = (start + int(index[0]), *map(int, index[1:]))
     if place:

@@ -107,16 +107,14 @@ def diff(
     Examples
     --------
     >>> import fecm
-    >>> deck = fecm.examples.path("appendix")
-    >>> report, listing = (fecm.run_one(deck, mode) for mode in ("report", "listing"))
-    >>> found = fecm.diff(report, listing, rtol=1e-6, only=["history", "mesh"])
-    >>> found.same
-    False
-    >>> force = next(one for one in found.datasets if one.path == "history/force")
-    >>> print(force.at)
-    step 10 (time 2e-06)
-    >>> print(f"{force.largest:.3f} lb")
-    0.452 lb
+    >>> deck = fecm.read_one(fecm.examples.path("impact-115"))
+    >>> result, other = fecm.run_one(deck), fecm.run_one(deck.with_(velocity=116.0))
+    >>> found = fecm.diff(result, other, rtol=1e-6, only=["laminate", "history/force"])
+    >>> found.same, found.different
+    (False, ['history/force'])
+    >>> force = found.datasets[0]
+    >>> print(f"{force.largest_difference:.3f} lb of {force.maximum:.2f} lb")
+    0.768 lb of 85.76 lb
     """
     own = {name: _own_tolerance(name, values) for name, values in (tol or {}).items()}
     for name, value in {"rtol": rtol, "atol": atol}.items():
@@ -201,13 +199,14 @@ def assert_same(
     Examples
     --------
     >>> import fecm
-    >>> deck = fecm.examples.path("appendix")
-    >>> fecm.assert_same(fecm.run_one(deck), fecm.run_one(deck, solver="csr"))
+    >>> deck = fecm.examples.path("impact-115")
+    >>> fecm.run_one(deck).save("trusted.h5")
+    >>> fecm.assert_same(fecm.run_one(deck, solver="csr"), "trusted.h5")
     """
     __tracebackhide__ = True  # pytest shows the line of the test
     found = diff(result, trusted, rtol, atol, only=only, exclude=exclude, tol=tol)
     if not found.same:
-        head = f"the result (A, {found.a}) is not the trusted one (B, {found.b})"
+        head = f"the result, A: {found.a}, is not the trusted one, B: {found.b}"
         raise AssertionError("\n".join([head, *found.lines(same=False)]))
 
 
@@ -227,8 +226,10 @@ def _source(one: Compared, stack: contextlib.ExitStack) -> Source:
 
 
 def _name(one: Compared) -> str:
-    """Name of a result: its path, or its title."""
-    return str(one) if isinstance(one, str | Path) else repr(one).strip("<>")
+    """Path of a result; ``<memory>`` if it has none."""
+    if isinstance(one, Result) and isinstance(one._arrays, Contents):
+        return str(one._arrays.path)
+    return str(one) if isinstance(one, str | Path) else "<memory>"
 
 
 def _names(given: str | Sequence[str]) -> Sequence[str]:

@@ -56,7 +56,7 @@ class DatasetDifference:
 
     Attributes
     ----------
-    path : str
+    name : str
         Its name, such as ``history/force``.
     shapes : tuple
         Shapes in A and B.
@@ -70,7 +70,7 @@ class DatasetDifference:
         ``"max"``, or the scale of a dataset that may hold nothing but rounding errors.
     tolerance : float
         Largest difference of equal numbers.
-    largest : float
+    largest_difference : float
         Largest difference; infinite if only one of two numbers is finite.
     at : Place or None
         Place of the largest difference; None if all is equal.
@@ -82,14 +82,14 @@ class DatasetDifference:
         First row with one; None if the rows are no instants.
     """
 
-    path: str
+    name: str
     shapes: tuple[tuple[int, ...], tuple[int, ...]]
     types: tuple[str, str]
     maximum: float = 0.0
     scale: float = 0.0
     scale_name: str = MAX
     tolerance: float = 0.0
-    largest: float = 0.0
+    largest_difference: float = 0.0
     at: Place | None = None
     values: tuple[float, float] | tuple[str, str] | None = None
     differing: int = 0
@@ -113,7 +113,9 @@ class DatasetDifference:
     @property
     def relative(self) -> float:
         """Largest difference over the scale."""
-        return self.largest / self.scale if self.scale else self.largest and math.inf
+        if self.scale:
+            return self.largest_difference / self.scale
+        return math.inf if self.largest_difference else 0.0
 
     def __str__(self) -> str:
         """Shapes and types that differ, largest difference, number of differences, first one."""
@@ -138,24 +140,24 @@ class DatasetDifference:
         quote = "`" if self.holds_texts else ""
         left, right = (f"{quote}{value}{quote}" for value in shown_apart(*values))
         text = f"{left} against {right}{_at(at)}"
-        if not math.isfinite(self.largest):
+        if not math.isfinite(self.largest_difference):
             return text
         share = f"{self.relative:.2g} of {self.scale_name} {self.scale:.6g}"
-        return f"largest {self.largest:.3g} ({share}), {text}"
+        return f"largest {self.largest_difference:.3g} ({share}), {text}"
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, for JSON."""
         numbers = self.comparable and not self.holds_texts
-        finite = numbers and math.isfinite(self.largest)
+        finite = numbers and math.isfinite(self.largest_difference)
         values = self.values or (None, None)
         return {
-            "name": self.path,
+            "name": self.name,
             "same": self.same,
             "shape_a": list(self.shapes[0]),
             "shape_b": list(self.shapes[1]),
             "dtype_a": self.types[0],
             "dtype_b": self.types[1],
-            "largest_difference": self.largest if finite else None,
+            "largest_difference": self.largest_difference if finite else None,
             "relative": self.relative if finite else None,
             "maximum": self.maximum if numbers else None,
             "scale": self.scale if numbers else None,
@@ -245,7 +247,7 @@ class Difference:
     @property
     def different(self) -> list[str]:
         """Names of the datasets that differ, sorted."""
-        unequal = [found.path for found in self.datasets if not found.same]
+        unequal = [found.name for found in self.datasets if not found.same]
         return sorted([*unequal, *self.only_in_a, *self.only_in_b])
 
     @property
@@ -257,7 +259,7 @@ class Difference:
         if self.last_digit:
             within = "the last digit of the tapes"
         if self.tol:
-            within += ", --tol"
+            within += f"; own tolerances: {printable(', '.join(self.tol))}"
         if self.excluded:
             within += f"; {len(self.excluded)} excluded"
         if self.same:
@@ -279,7 +281,7 @@ class Difference:
             Whether datasets that are equal have a line too.
         """
         rows = {
-            found.path: ("same" if found.same else "different", str(found))
+            found.name: ("same" if found.same else "different", str(found))
             for found in self.datasets
             if same or not found.same
         }

@@ -14,7 +14,8 @@ from fecm.results.criteria import spelt, where
 from fecm.results.end import End
 from fecm.results.exposures import LargestExposure, evaluations_in_contact, largest_exposures
 from fecm.results.first_failure import FirstFailure, failure_metrics, first_failures
-from fecm.results.result import Result
+from fecm.results.run_metrics import end_of, metrics_of
+from fecm.results.stored import Stored
 from fecm.results.validity import CROSSED
 
 NEAR = 0.05  # of the time of the peak, up to which a row is that of the peak
@@ -33,7 +34,7 @@ def _line(name: str, text: str) -> str:
     return f"{name:18}{text}"
 
 
-def summary(result: Result) -> list[str]:
+def summary(result: Stored) -> list[str]:
     """Summarise a result, in the deck's units."""
     quantity = partial(_quantity, result)
     lines = [
@@ -68,7 +69,7 @@ def summary(result: Result) -> list[str]:
     return lines or ["nothing was stored"]
 
 
-def _preload(result: Result) -> list[str]:
+def _preload(result: Stored) -> list[str]:
     """Line of the initial membrane force of PREL."""
     given = result.attributes_of("laminate")
     forces = {f"N_{name}": given.get(f"N0_{name}") for name in ("x", "y", "xy")}
@@ -80,7 +81,7 @@ def _preload(result: Result) -> list[str]:
     return [_line("preload", ", ".join(named))] if named else []
 
 
-def _membrane(result: Result) -> str:
+def _membrane(result: Stored) -> str:
     """Share of the membrane in the strain energy of a nonlinear plate; empty if it is not known.
 
     It is that of the stored row nearest to the peak force; without contact that of the largest
@@ -104,7 +105,7 @@ def _membrane(result: Result) -> str:
     return f"{percent:.{0 if percent > 9.5 else 1}f} % of the strain energy {at}"
 
 
-def _delaminations(result: Result) -> str:
+def _delaminations(result: Stored) -> str:
     """How many delaminations the threshold assumes, and the forces for other numbers of them."""
     known = result.threshold
     band, number, interfaces = (
@@ -121,7 +122,7 @@ def _delaminations(result: Result) -> str:
     return f" (for {'; '.join([count, *texts])})"
 
 
-def _exposures(result: Result) -> list[str]:
+def _exposures(result: Stored) -> list[str]:
     """Lines about the largest exposures and the first failure."""
     largest, first = largest_exposures(result), first_failures(result)
     reached = {one.criterion: one.force for one in first if not math.isnan(one.force)}
@@ -141,7 +142,7 @@ def _exposures(result: Result) -> list[str]:
     return lines
 
 
-def _first_failure(result: Result, first: FirstFailure) -> str:
+def _first_failure(result: Stored, first: FirstFailure) -> str:
     """The first failure: mode, place, time, and force and energy of an impact."""
     rounded = partial(_rounded, result)
     texts = [
@@ -155,9 +156,9 @@ def _first_failure(result: Result, first: FirstFailure) -> str:
     return ", ".join(texts)
 
 
-def _exposure(result: Result, largest: LargestExposure) -> str:
+def _exposure(result: Stored, largest: LargestExposure) -> str:
     """Line of the largest exposure of a criterion."""
-    least = "at least " if result.end in UNDECIDED else ""
+    least = "at least " if end_of(result) in UNDECIDED else ""
     return _line(
         spelt(largest.criterion),
         f"{least}{largest.exposure:.4g}: {largest.mode}, "
@@ -176,28 +177,28 @@ def _at_rest(largest: LargestExposure) -> str:
     return f"{said}, 1 at {largest.load_factor:.4g} of the load's stresses"
 
 
-def _delamination(result: Result) -> str:
+def _delamination(result: Stored) -> str:
     """The threshold of delamination, and whether it is reached."""
     quantity, known = partial(_quantity, result), result.threshold
     force, crossing = quantity(float(known["force"]), "force"), float(known["time"])
     if math.isfinite(crossing):
         return f"{force} reached at time {quantity(crossing, 'time')}"
-    if (end := result.end) in UNDECIDED:
+    if (end := end_of(result)) in UNDECIDED:
         return f"{force} not reached by the end of the run, which is {UNDECIDED[end]}: open"
-    margin = result.metrics.get("threshold_margin", 1.0)
+    margin = metrics_of(result).get("threshold_margin", 1.0)
     return f"{force} not reached: the peak is {margin:.1%} below"
 
 
-def _rounded(result: Result, value: float, dimension: str) -> str:
+def _rounded(result: Stored, value: float, dimension: str) -> str:
     """An interpolated quantity, to four digits."""
     return _quantity(result, float(f"{value:.4g}"), dimension)
 
 
-def _quantity(result: Result, value: float, dimension: str) -> str:
+def _quantity(result: Stored, value: float, dimension: str) -> str:
     return shown_quantity(value, result.unit(dimension))
 
 
-def _impact(result: Result) -> list[str]:
+def _impact(result: Stored) -> list[str]:
     """Lines about forces, contacts, indentation and energy of an impact."""
     lines = [_line("peak force", _peak_force(result))]
     if intervals := _intervals(result):
@@ -207,12 +208,12 @@ def _impact(result: Result) -> list[str]:
             _line("largest indent", f"{_largest(result, indentation)}, permanent {_left(result)}"),
             _line("largest w", _largest(result, w, " under the load")),
         ]
-        if not math.isnan(result.metrics["rebound_velocity"]):
+        if not math.isnan(metrics_of(result)["rebound_velocity"]):
             lines.append(_line("rebound", _rebound(result)))
     return [*lines, _line("energy balance", _energy_balance(result))]
 
 
-def _peak_force(result: Result) -> str:
+def _peak_force(result: Stored) -> str:
     """Peak force, its time and step, and what is doubtful about it."""
     force, time = result["history/force"], result["history/time"]
     peak = int(np.argmax(force))
@@ -220,20 +221,20 @@ def _peak_force(result: Result) -> str:
     if force[peak] > 0.0:
         at = _quantity(result, time[peak], "time")
         text = f"{_quantity(result, force[peak], 'force')} at time {at} (step {peak + 1})"
-        if (end := result.end) in UNDECIDED:
+        if (end := end_of(result)) in UNDECIDED:
             text = f"at least {text}, as the run ends {UNDECIDED[end]}"
     doubt = _elastic(result, float(force[peak]))
     return f"{text} ({doubt})" if doubt else text
 
 
-def _intervals(result: Result) -> list[tuple[float, float]]:
+def _intervals(result: Stored) -> list[tuple[float, float]]:
     """First and last time of every contact."""
     force, time = result["history/force"], result["history/time"]
     edges = np.flatnonzero(np.diff(np.concatenate(([0], force > 0.0, [0])).astype(int)))
     return list(zip(time[edges[::2]], time[edges[1::2] - 1], strict=True))
 
 
-def _contacts(result: Result, intervals: list[tuple[float, float]]) -> str:
+def _contacts(result: Stored, intervals: list[tuple[float, float]]) -> str:
     """Times of the contacts."""
     texts = [
         f"{begin:.6g} to {_quantity(result, end, 'time')}" for begin, end in intervals[:LISTED]
@@ -247,24 +248,24 @@ def _contacts(result: Result, intervals: list[tuple[float, float]]) -> str:
     return ", ".join(texts)
 
 
-def _largest(result: Result, lengths: Floats, where: str = "") -> str:
+def _largest(result: Stored, lengths: Floats, where: str = "") -> str:
     """Largest of the lengths of every step, and its time."""
     time = result["history/time"][lengths.argmax()]
     value = _quantity(result, lengths.max(), "length")
     return f"{value}{where} at time {_quantity(result, time, 'time')}"
 
 
-def _left(result: Result) -> str:
+def _left(result: Stored) -> str:
     """Permanent indentation."""
-    if result.end is not End.OVER:
+    if end_of(result) is not End.OVER:
         return "open"
-    permanent = float(result.history.attributes["permanent_indentation"])
+    permanent = float(result.attributes_of("history")["permanent_indentation"])
     return _quantity(result, permanent, "length")
 
 
-def _rebound(result: Result) -> str:
+def _rebound(result: Stored) -> str:
     """What the projectile has left of its velocity and its energy."""
-    metrics = result.metrics
+    metrics = metrics_of(result)
     return (
         f"{_quantity(result, metrics['rebound_velocity'], 'length/time')}, "
         f"impulse {_quantity(result, metrics['impulse'], 'force*time')}, "
@@ -273,15 +274,15 @@ def _rebound(result: Result) -> str:
     )
 
 
-def _energy_balance(result: Result) -> str:
+def _energy_balance(result: Stored) -> str:
     """Largest error of the energy balance, of the initial energy."""
-    initial = float(result.energy.attributes["initial"])
+    initial = float(result.attributes_of("energy")["initial"])
     worst = float(np.abs(result["energy/balance_error"]).max())
     share = f"{worst / initial:.2g} of the initial" if initial else f"{worst:.3g}, initially"
     return f"worst error {share} {_quantity(result, initial, 'force*length')}"
 
 
-def _elastic(result: Result, peak: float) -> str:
+def _elastic(result: Stored, peak: float) -> str:
     """Why a peak force is that of an elastic plate only; empty if it may be real."""
     beyond = []
     if result.threshold and peak > CROSSED * (force := float(result.threshold["force"])):
@@ -291,7 +292,13 @@ def _elastic(result: Result, peak: float) -> str:
     return f"elastic: beyond {' and '.join(beyond)}" if beyond else ""
 
 
-def about_run(result: Result) -> dict[str, Any]:
+def page(result: Stored) -> list[str]:
+    """Title, summary and notes: what ``fecm run`` prints."""
+    lines = [*(_missing(result) or summary(result)), *(_line("note", n) for n in result.notes)]
+    return [result.title or "(no title)", *(f"  {line}" for line in lines)]
+
+
+def about_run(result: Stored) -> dict[str, Any]:
     """Steps, first and last time, metrics and summary of a run."""
     steps = len(result["history/time"]) if "history/time" in result else 0
     missing = _missing(result)
@@ -299,7 +306,7 @@ def about_run(result: Result) -> dict[str, Any]:
         "steps": steps,
         "time": result["history/time"][[0, -1]].tolist() if steps else None,
         "still_in_contact": result.still_in_contact,
-        "end": None if missing else result.end,
+        "end": None if missing else end_of(result),
         "validity": result.validity,
         "notes": list(result.notes),
         "metrics": {} if missing else _metrics(result),
@@ -307,20 +314,20 @@ def about_run(result: Result) -> dict[str, Any]:
     }
 
 
-def _metrics(result: Result) -> dict[str, Any]:
+def _metrics(result: Stored) -> dict[str, Any]:
     """Impact metrics, and those of FAIL under ``failure``."""
     failure = failure_metrics(result)
-    return {**result.metrics, "failure": failure} if failure else result.metrics
+    return {**metrics_of(result), "failure": failure} if failure else metrics_of(result)
 
 
-def _missing(result: Result) -> list[str]:
+def _missing(result: Stored) -> list[str]:
     """Reason why an incomplete file has no summary; empty if it has one."""
     needed = ("history/time", "history/indentation", "history/plate_w", "energy/balance_error")
     if "history/force" in result:
         if not len(result["history/force"]) or any(name not in result for name in needed):
             return ["no summary: history or energies are not complete"]
-        permanent = result.history.attributes.get("permanent_indentation")
-        initial = result.energy.attributes.get("initial")
+        permanent = result.attributes_of("history").get("permanent_indentation")
+        initial = result.attributes_of("energy").get("initial")
         if not all(isinstance(value, int | float) for value in (permanent, initial)):
             return ["no summary: permanent_indentation or the initial energy is missing"]
     return []

@@ -22,7 +22,7 @@ from fecm.results.errors import ExportError
 from fecm.results.hdf5_writer import new_hdf5
 from fecm.results.missing import remedy
 from fecm.results.plies import IN_PLANE, INTERLAMINAR
-from fecm.results.result import Result
+from fecm.results.stored import Stored
 from fecm.results.vtk_cells import Ints, vtk_cells
 
 Note = Callable[[str], None]
@@ -44,7 +44,7 @@ BLOCK = 4_000_000  # numbers per block of a field
 
 
 def write_vtkhdf(
-    result: Result, path: Path, note: Note = lambda text: None, *, overwrite: bool = True
+    result: Stored, path: Path, note: Note = lambda text: None, *, overwrite: bool = True
 ) -> None:
     """Write a result as VTKHDF, one time step per row of tape3.
 
@@ -68,7 +68,7 @@ def write_vtkhdf(
         _write_laminates(root, result, len(steps))
 
 
-def _write_mesh(root: h5py.Group, result: Result, times: Array) -> None:
+def _write_mesh(root: h5py.Group, result: Stored, times: Array) -> None:
     """The mesh, once, and the times at which it has fields."""
     coordinates = result["mesh/coordinates"]
     connectivity, offsets, types = vtk_cells(result["mesh/elements"])
@@ -118,7 +118,7 @@ def _write_displacements(root: h5py.Group, stored: Array, rows: Ints) -> None:
             dataset[start * numnp : start * numnp + len(values)] = values[:, columns]
 
 
-def _write_contact(root: h5py.Group, result: Result, steps: Ints) -> None:
+def _write_contact(root: h5py.Group, result: Stored, steps: Ints) -> None:
     """Field data: contact at each step; zero before the first step."""
     if "history/step" not in result:
         return
@@ -129,7 +129,7 @@ def _write_contact(root: h5py.Group, result: Result, steps: Ints) -> None:
         _field(root, At.TIME, name, len(steps), (1,))[:] = at_step
 
 
-def _write_strains(root: h5py.Group, result: Result, steps: Ints, note: Note) -> None:
+def _write_strains(root: h5py.Group, result: Stored, steps: Ints, note: Note) -> None:
     """Curvatures and transverse shear strains: at nodes if stored there, else cell means."""
     if "tape8/step" not in result:
         note("the result has no strains (tape8), which the macro RODP stores")
@@ -141,7 +141,7 @@ def _write_strains(root: h5py.Group, result: Result, steps: Ints, note: Note) ->
     numnp = len(result["mesh/coordinates"])
     npt = result["tape8/kappa_x"].shape[2]
     all_nodes = npt in NODAL_POINTS and not (elements[:, npt:] > 0).any()
-    at_nodes = all_nodes and result.tape8.attributes.get("location") == "nodes"
+    at_nodes = all_nodes and result.attributes_of("tape8").get("location") == "nodes"
     length = numnp if at_nodes else len(elements)
     there = elements[:, :npt] > 0
     points = elements[:, :npt][there] - 1
@@ -160,7 +160,7 @@ def _write_strains(root: h5py.Group, result: Result, steps: Ints, note: Note) ->
 
 
 def _rows_of(
-    result: Result, group: str, steps: Ints, what: str, note: Note
+    result: Stored, group: str, steps: Ints, what: str, note: Note
 ) -> tuple[Ints, NDArray[np.bool_]]:
     """Rows of a group at the time steps, and which of these have one."""
     stored = result[f"{group}/step"]
@@ -174,7 +174,7 @@ def _rows_of(
     return at, shared
 
 
-def _write_plies(root: h5py.Group, result: Result, steps: Ints, note: Note) -> None:
+def _write_plies(root: h5py.Group, result: Stored, steps: Ints, note: Note) -> None:
     """Cell data: of each component the value of largest magnitude, and the ply that has it."""
     if "plies/step" not in result:
         return
@@ -197,7 +197,7 @@ def _write_plies(root: h5py.Group, result: Result, steps: Ints, note: Note) -> N
             ply[number * length : (number + 1) * length] = step[1]
 
 
-def _write_laminates(root: h5py.Group, result: Result, steps: int) -> None:
+def _write_laminates(root: h5py.Group, result: Stored, steps: int) -> None:
     """Cell data: the number of each element's laminate, where there are several."""
     if "mesh/laminate" in result:
         numbers = result["mesh/laminate"]

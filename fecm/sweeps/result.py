@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._errors import did_you_mean
+from fecm._files import check_outputs, writing
 from fecm._tables import html_table
 from fecm._typing import Bools
 from fecm.deck.model import Delamination, Preload
@@ -333,6 +334,65 @@ class SweepResult:
         if self.force is not None:
             found = found.assign_coords(step=np.arange(1, self.force.shape[1] + 1))
         return found.set_coords(list(self.cases))
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write the sweep as a file, such as one in memory; ``fecm.load_sweep`` reads it.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+        overwrite : bool
+            Whether an existing file is replaced.
+
+        Raises
+        ------
+        OSError
+            If the file exists and may not be replaced, or can't be written.
+        """
+        from fecm.sweeps.result_file import save  # which imports this module
+
+        check_outputs([Path(path)], overwrite)
+        save(self, Path(path), overwrite=overwrite)
+
+    def export(
+        self,
+        path: str | Path,
+        table: Literal["cases", "history"] = "cases",
+        *,
+        overwrite: bool = False,
+    ) -> None:
+        """Write the cases, or their contact forces, as CSV, as ``fecm export`` does.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+        table : {"cases", "history"}
+            A row per case, or a row per step of every case.
+        overwrite : bool
+            Whether an existing file is replaced.
+
+        Raises
+        ------
+        ExportError
+            If there is no such table.
+        OSError
+            If the file exists and may not be replaced, or can't be written.
+
+        Examples
+        --------
+        >>> import fecm
+        >>> deck = fecm.examples.path("impact-115")
+        >>> found = fecm.sweep(deck, {"velocity": [100.0, 115.0, 130.0]})
+        >>> found.export("velocities.csv")
+        """
+        from fecm.sweeps.csv import csv_lines  # which imports this module
+
+        lines = csv_lines(self, table)
+        check_outputs([Path(path)], overwrite)
+        with writing(Path(path), overwrite=overwrite) as file:
+            file.writelines(lines)
 
     def plot(
         self,

@@ -19,12 +19,12 @@ from fecm.verification import (  # noqa: F401  (they fill CASE_OF)
 )
 from fecm.verification.case import CASE_OF, TABLES, Case, Row, carry_out
 
-__all__ = ["CASES", "Case", "Row", "UnknownCaseError", "carry_out", "chosen"]
+__all__ = ["CASES", "Case", "Row", "UnknownCaseError", "carry_out", "chosen", "verify"]
 
 CASES: tuple[Case, ...] = tuple(CASE_OF[name] for name in TABLES)
 
 
-class UnknownCaseError(FecmError, LookupError):
+class UnknownCaseError(FecmError, LookupError, ValueError):
     """The name of a case is unknown."""
 
 
@@ -35,3 +35,33 @@ def chosen(names: Iterable[str] = ()) -> list[Case]:
         if name not in CASE_OF:
             raise UnknownCaseError(f"unknown case {name}; the cases are {', '.join(TABLES)}")
     return [one for one in CASES if not wanted or one.name in wanted]
+
+
+def verify(*cases: str) -> list[Row]:
+    """Compare this program with closed forms and the literature.
+
+    Parameters
+    ----------
+    *cases : str
+        Names of cases, as ``fecm verify --list`` shows them; all cases without one.
+
+    Returns
+    -------
+    list of Row
+        One row per quantity; ``within`` says whether it is within its tolerance.
+
+    Raises
+    ------
+    UnknownCaseError
+        If a name is unknown; a ValueError.
+
+    Examples
+    --------
+    >>> import fecm
+    >>> rows = fecm.verify("isotropic-ply", "wave-fronts")
+    >>> all(row.within for row in rows)
+    True
+    >>> print(rows[0].check.quantity, "=", rows[0].check.source)
+    A11 (lb/in) = E h/(1 - ν²)
+    """
+    return [row for one in chosen(cases) for row in carry_out(one)]

@@ -49,15 +49,33 @@ class Verdict(StrEnum):
 
 @frozen
 class Check:
-    """Expected value of one quantity."""
+    """Expected value of one quantity.
 
-    quantity: str  # name and unit
+    Attributes
+    ----------
+    quantity : str
+        Name and unit.
+    expected : float
+        Expected value.
+    source : str
+        Its source.
+    tolerance : float
+        Largest admissible error.
+    why : str
+        Reason for the tolerance.
+    label : Label
+        What the check proves: ``"independent"``, ``"consistency"`` or ``"against change"``.
+    scale : float or None
+        Reference of the relative error; None for the expected value.
+    """
+
+    quantity: str
     expected: float
-    source: str  # of the expected value
-    tolerance: float  # largest admissible error
-    why: str  # reason for the tolerance
+    source: str
+    tolerance: float
+    why: str
     label: Label = Label.INDEPENDENT
-    scale: float | None = None  # reference of the relative error; None for the expected value
+    scale: float | None = None
 
 
 @frozen
@@ -72,12 +90,24 @@ class Case:
 
 @frozen
 class Row:
-    """Result of a check."""
+    """Result of a check.
 
-    case: str  # its name
+    Attributes
+    ----------
+    case : str
+        Name of the case.
+    check : Check
+        Quantity, expected value and tolerance.
+    got : float
+        Computed value; NaN if the computation failed.
+    failure : str
+        Why it failed; empty if it did not.
+    """
+
+    case: str
     check: Check
-    got: float  # NaN if the computation failed
-    failure: str = ""  # its reason
+    got: float
+    failure: str = ""
 
     @property
     def error(self) -> float:
@@ -94,6 +124,24 @@ class Row:
     def verdict(self) -> Verdict:
         """The verdict."""
         return Verdict.FINE if self.within else Verdict.FAILED
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values, for JSON; None for values that could not be computed."""
+        check = self.check
+        got, error = (value if math.isfinite(value) else None for value in (self.got, self.error))
+        return {
+            "case": self.case,
+            "source": check.source,
+            "quantity": check.quantity,
+            "expected": check.expected,
+            "got": got,
+            "error": error,
+            "tolerance": check.tolerance,
+            "why": check.why,
+            "label": check.label,
+            "verdict": self.verdict,
+            "failure": self.failure,
+        }
 
 
 CASE_OF: dict[str, Case] = {}
@@ -167,25 +215,6 @@ def table(cases: Sequence[Case], rows: Iterable[Row]) -> Iterator[str]:
         yield line(cells(row))
         if row.failure:
             yield f"  {row.failure}"
-
-
-def fields(row: Row) -> dict[str, Any]:
-    """Return a row as plain values; None for values that could not be computed."""
-    check = row.check
-    got, error = (value if math.isfinite(value) else None for value in (row.got, row.error))
-    return {
-        "case": row.case,
-        "source": check.source,
-        "quantity": check.quantity,
-        "expected": check.expected,
-        "got": got,
-        "error": error,
-        "tolerance": check.tolerance,
-        "why": check.why,
-        "label": check.label,
-        "verdict": row.verdict,
-        "failure": row.failure,
-    }
 
 
 def page(rows: Iterable[Row]) -> str:
