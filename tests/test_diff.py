@@ -498,3 +498,22 @@ def test_values_that_differ_are_shown_with_the_digits_that_differ(
     (listed,) = (line for line in done.stdout.splitlines() if " title" in line)
     titles = listed.split("`")[1::2]
     assert (titles[0][0], titles[1][0], titles[0][-1], titles[1][-1]) == ("…", "…", "b", "a")
+
+
+def test_the_coupling_of_a_numbered_laminate_is_judged_and_named_by_its_scale(
+    pair: tuple[Path, Callable[[Edit], Path]], tmp_path: Path
+) -> None:
+    _, changed = pair
+
+    def several(file: h5py.File) -> None:
+        for name in ("A", "B", "D"):
+            file[f"laminate/2/{name}"] = file[f"laminate/{name}"][()]
+
+    b = Path(shutil.copy(changed(several), tmp_path / "several.h5"))
+    with h5py.File(b, "r+") as file:
+        largest = [np.abs(file[f"laminate/2/{name}"][()]).max() for name in ("A", "D")]
+        scale = math.sqrt(math.prod(largest))
+        file["laminate/2/B"][0, 0] += 1e-3 * scale
+    done = diff(b, changed(several), "--only", "laminate")
+    assert f"of sqrt(max A * max D) {scale:.6g})" in told(done, "laminate/2/B")
+    assert diff(b, changed(several), "--rtol", "1.1e-3").exit_code == 0
