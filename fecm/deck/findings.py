@@ -122,9 +122,9 @@ class Findings:
 
     def __init__(self) -> None:
         self._all: list[Finding] = []
-        self.counts = Counter[str]()  # findings by code, including those that are not kept
-        self.error_count = 0
-        self.closed = False  # whether no more findings are kept, so that reading can stop
+        self.counts: Counter[str] = Counter()  # findings by code, including those that are not kept
+        self.error_count: int = 0
+        self.closed: bool = False  # whether no more findings are kept, so that reading can stop
 
     def add(self, code: str, message: str, place: Place | None = None, hint: str = "") -> None:
         """Add a finding; after :data:`MOST` errors report that there are more, and close."""

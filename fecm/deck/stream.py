@@ -36,14 +36,14 @@ class CardStream:
         blanks_are_zeros: bool = False,
         keeps_values: bool = False,
     ) -> None:
-        self.lines = text.removeprefix("\ufeff").splitlines()
+        self.lines: list[str] = text.removeprefix("\ufeff").splitlines()
         numbered = enumerate(self.lines, start=1)
         self._cards = [(n, line) for n, line in numbered if not line.startswith("!")]
         self._keywords = frozenset(keywords)
         self._blanks_are_zeros = blanks_are_zeros
         self._keeps_values = keeps_values
-        self.position = 0  # number of cards taken
-        self.findings = Findings()
+        self.position: int = 0  # number of cards taken
+        self.findings: Findings = Findings()
         self.read: dict[int, tuple[Fields, list[Value]]] = {}  # by line number
         self.control: Control  # of the problem that is read, once its control card was
         # Keywords of the problem's segments with unreadable cards.
