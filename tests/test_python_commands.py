@@ -132,6 +132,8 @@ def test_sweeps_compare_in_memory_too(tmp_path: Path) -> None:
     at = found.datasets[0].at
     assert at is not None
     assert at.axes == {"case": 1}
+    with pytest.raises(ValueError, match="a Deck is not a result"):
+        fecm.diff(sweep, fecm.read_one(small()))  # type: ignore[arg-type]
     with pytest.raises(ValueError, match="A is the result of a run and B the result of a sweep"):
         fecm.diff(fecm.run_one(small()), sweep)
 

@@ -21,7 +21,7 @@ from collections.abc import Collection, Mapping, Sequence
 from fnmatch import fnmatchcase
 from numbers import Real
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 from fecm._errors import FecmError
 from fecm.results.dataset_diff import CURVATURES, Pair, Source, compare
@@ -49,6 +49,7 @@ class IncomparableError(FecmError, ValueError):
     """The sources can't be compared, or lack the requested datasets."""
 
 
+@runtime_checkable
 class Savable(Protocol):
     """The result of a run or of a sweep."""
 
@@ -97,8 +98,8 @@ def diff(
     Raises
     ------
     IncomparableError
-        If only one is the result of a sweep, a name matches no dataset, nothing is left to
-        compare, or a tolerance is not a finite number from 0.
+        If one is not a result, or only one is that of a sweep, a name matches no dataset, nothing
+        is left to compare, or a tolerance is not a finite number from 0.
     ResultFileError
         If a file is not a result.
     OSError
@@ -214,6 +215,8 @@ def _source(one: Compared, stack: contextlib.ExitStack) -> Source:
     """Contents of a file, of a folder of tapes, or of a result, which may be in memory."""
     if isinstance(one, Result) and isinstance(one._arrays, Contents):
         return one._arrays
+    if not isinstance(one, str | Path | Savable):
+        raise IncomparableError(f"a {type(one).__name__} is not a result")
     if not isinstance(one, str | Path):
         import tempfile  # 3 ms at start
 
