@@ -132,8 +132,9 @@ class DeckCheck:
         return "\n".join([*texts, *(line for one in self.problems for line in one.lines())])
 
     def __repr__(self) -> str:
-        counts = f"{len(self.errors)} errors, {len(self.warnings)} warnings"
-        return f"<fecm check of {self.source}: {counts}>"
+        counts = {"error": len(self.errors), "warning": len(self.warnings)}
+        texts = (f"{count} {word}{'s' * (count != 1)}" for word, count in counts.items())
+        return f"<fecm check of {self.source}: {', '.join(texts)}>"
 
 
 def check_loaded(loaded: LoadedDeck) -> DeckCheck:
