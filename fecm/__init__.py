@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from fecm.results.difference import Difference
     from fecm.results.result import Result, load
     from fecm.sweeps.api import sweep
+    from fecm.sweeps.mesh_error import MeshError, mesh_error
     from fecm.sweeps.result import SweepResult
     from fecm.sweeps.result_file import load as load_sweep
     from fecm.verification import verify
@@ -59,6 +60,7 @@ __all__ = [
     "Law",
     "LawError",
     "LinearProjectile",
+    "MeshError",
     "Plate",
     "Ply",
     "ProjectileError",
@@ -76,6 +78,7 @@ __all__ = [
     "impact",
     "load",
     "load_sweep",
+    "mesh_error",
     "read_deck",
     "read_one",
     "run",
@@ -103,6 +106,7 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "Law": ("fecm.mechanics.contact_law", "Law"),
         "LawError": ("fecm.mechanics.own_law", "LawError"),
         "LinearProjectile": ("fecm.mechanics.own_projectile", "LinearProjectile"),
+        "MeshError": ("fecm.sweeps.mesh_error", "MeshError"),
         "Plate": ("fecm.authoring.plate", "Plate"),
         "Ply": ("fecm.deck.model", "Ply"),
         "ProjectileError": ("fecm.mechanics.own_projectile", "ProjectileError"),
@@ -118,6 +122,7 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "impact": ("fecm.authoring.impact", "impact"),
         "load": ("fecm.results.result", "load"),
         "load_sweep": ("fecm.sweeps.result_file", "load"),
+        "mesh_error": ("fecm.sweeps.mesh_error", "mesh_error"),
         "read_deck": ("fecm.deck.reader", "read_deck"),
         "read_one": ("fecm.api", "read_one"),
         "run": ("fecm.api", "run"),

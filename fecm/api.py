@@ -137,6 +137,15 @@ class DeckCheck:
         return f"<fecm check of {self.source}: {', '.join(texts)}>"
 
 
+def load_one(deck: str | Path | Deck, mode: str = REPORT) -> Problem:
+    """Load a deck with exactly one problem; raises as :func:`run_one` does."""
+    loaded = load_deck(deck, mode)
+    if loaded.errors():
+        raise DeckError(loaded.findings, loaded.source)
+    _check_one(loaded.problems)
+    return loaded.problems[0]
+
+
 def check_loaded(loaded: LoadedDeck) -> DeckCheck:
     """Summarise the problems of a deck that was loaded, if it has no errors."""
     problems = () if loaded.errors() else loaded.problems

@@ -65,6 +65,10 @@ def test_the_second_peak_is_that_of_the_plate_with_elements_of_half_the_side(
     assert found["peak_force"] == pytest.approx(coarse, rel=1e-9)
     assert found["refined_peak_force"] == pytest.approx(fine, rel=1e-9)
     assert found["relative_change"] == pytest.approx(fine / coarse - 1.0, rel=1e-6)
+    assert found["undecided"]  # as the force still rises at the end
+    in_python = fecm.mesh_error(deck)
+    assert in_python.refined_peak_force == found["refined_peak_force"]
+    assert in_python.relative_change == found["relative_change"]
     if "hertz" not in options:
         return
     text = call("check", deck, "--mesh-error").stdout
@@ -118,3 +122,20 @@ def test_a_deck_without_a_second_mesh_says_why(tmp_path: Path, text: str, reason
     done = call("check", deck, "--mesh-error")
     assert done.exit_code == 2
     assert f"fecm: error: {reason}" in done.stderr
+
+
+def test_the_largest_force_of_a_run_that_is_cut_off_is_not_called_a_peak(tmp_path: Path) -> None:
+    deck = tmp_path / "plate.inp"
+    deck.write_text(new("4x4", "--duration", "1.5e-4"))
+    whole = fecm.mesh_error(deck)
+    short = tmp_path / "short.inp"
+    short.write_text(new("4x4"))
+    counted: list[tuple[int, int]] = []
+    cut = fecm.mesh_error(short, progress=lambda done, steps: counted.append((done, steps)))
+    assert (whole.undecided, cut.undecided) == (False, True)
+    assert cut.peak_force < whole.peak_force
+    assert counted[-1][0] == counted[-1][1]
+    done = call("check", short, "--mesh-error")
+    assert "largest force so far" in done.stdout
+    assert "peak force  " not in done.stdout
+    assert "lower bounds" in done.stderr

@@ -26,6 +26,7 @@ from tests.test_check import WRONG
     "documented",
     [
         fecm.check,
+        fecm.mesh_error,
         fecm.diff,
         fecm.assert_same,
         fecm.verify,

@@ -24,6 +24,7 @@ from fecm.cli.common import (
     RefusedError,
     echo,
     echo_json,
+    note,
     progress,
     write_text,
 )
@@ -165,14 +166,14 @@ def _print(prepared: LoadedDeck, form: Format, *, brief: bool, passes: bool) -> 
 def _compare_meshes(prepared: LoadedDeck, mode: str, form: Format) -> None:
     """Print the mesh error of the peak force of every problem."""
     # 28 ms, which a check without --mesh-error does not need.
-    from fecm.sweeps.mesh_error import bisected, mesh_error
+    from fecm.sweeps.mesh_error import bisected, compare_peaks
 
     for problem in prepared.problems:
         units = unit_names(problem.deck)
         force, length = (unit_of(name, units) for name in ("force", "length"))
         fine = bisected(problem)
         with progress("fecm", problem.work.steps + fine.work.steps) as advance:
-            found = mesh_error(problem, fine, RunOptions(active_slips(mode, ())), advance)
+            found = compare_peaks(problem, fine, RunOptions(active_slips(mode, ())), advance)
         if form is Format.JSON:
             changes = {"change": found.change, "relative_change": found.relative_change}
             head = {"kind": "mesh_error", "file": prepared.source}
@@ -185,9 +186,12 @@ def _compare_meshes(prepared: LoadedDeck, mode: str, form: Format) -> None:
         )
         near = f"within {found.distance:.3g} {length}".rstrip()
         change = f"{found.change:+.3g} {force}".rstrip()
-        echo(f"  peak force          {coarse} on {found.elements} elements")
+        label = "largest force so far" if found.undecided else "peak force"
+        echo(f"  {label:20}{coarse} on {found.elements} elements")
         echo(f"    bisected          {refined} on {found.refined_elements}, {near} of the load")
         echo(f"    change            {change} ({about})")
+        if found.undecided:
+            note("a run ends before its peak: these forces are lower bounds; take more steps")
 
 
 SCHEMA = "https://json.schemastore.org/sarif-2.1.0.json"

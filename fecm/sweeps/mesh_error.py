@@ -4,17 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
 
-import numpy as np
-
+from fecm.api import Mode, Progress, load_one
 from fecm.deck.macros import flat
+from fecm.deck.model import Deck
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import RunOptions
 from fecm.problem.memory import check_memory
 from fecm.problem.problem import Problem
 from fecm.problem.refine import RefineError, refined
 from fecm.problem.resolution import resolution
+from fecm.problem.slips import active_slips
+from fecm.results.end import End
+from fecm.results.run_metrics import end_of
 from fecm.results.sinks import MemorySink
+from fecm.results.stored import Stored
 from fecm.simulation.run import run
 from fecm.simulation.simulation import Simulation
 from fecm.sweeps.case import CasesError
@@ -25,13 +30,26 @@ from fecm.sweeps.timing import stable_time_step, with_time_step
 
 @dataclass(frozen=True)
 class MeshError:
-    """Peak force on a mesh and on one with bisected elements around the load."""
+    """Peak force on a mesh and on one with bisected elements around the load.
+
+    Attributes
+    ----------
+    peak_force, refined_peak_force : float
+        Largest forces of both runs.
+    elements, refined_elements : int
+        Sizes of both meshes.
+    distance : float
+        Elements up to here from the load are bisected: a bending wave of the contact.
+    undecided : bool
+        Whether a run ends before its peak: its largest force is then a lower bound of it.
+    """
 
     peak_force: float
     refined_peak_force: float
     elements: int
     refined_elements: int
-    distance: float  # elements up to here are bisected: a bending wave of the contact
+    distance: float
+    undecided: bool
 
     @property
     def change(self) -> float:
@@ -42,6 +60,63 @@ class MeshError:
     def relative_change(self) -> float | None:
         """Change over the peak force; None without a contact."""
         return self.change / self.peak_force if self.peak_force else None
+
+
+def mesh_error(
+    deck: str | Path | Deck, mode: Mode = "report", *, progress: Progress | None = None
+) -> MeshError:
+    """Run a deck on its mesh and on one with bisected elements around the load.
+
+    Parameters
+    ----------
+    deck : str, Path or Deck
+        A deck with one problem, whose elements are quadrilaterals with 4 or 9 nodes.
+    mode : str
+        ``"report"`` or ``"listing"``.
+    progress : callable, optional
+        Called now and then with the number of steps taken and that of all steps of both runs.
+
+    Returns
+    -------
+    MeshError
+        Both peak forces; their change estimates the error of the deck's mesh.
+
+    Raises
+    ------
+    DeckError
+        If the deck has errors.
+    RefineError
+        If nothing hits the plate, or its elements cannot be bisected.
+    ValueError
+        If the deck has several problems, or none.
+    DivergenceError
+        If a motion grows without bound.
+    NotEnoughMemoryError
+        If a run needs more memory than is free.
+    OSError
+        If the file can't be read.
+
+    Examples
+    --------
+    >>> import fecm
+    >>> found = fecm.mesh_error(fecm.examples.path("impact-115"))
+    >>> print(f"{found.peak_force:.3f} lb, {found.refined_peak_force:.3f} lb")
+    85.013 lb, 85.101 lb
+    """
+    options = RunOptions(active_slips(mode, ()))
+    problem = load_one(deck, mode)
+    fine = bisected(problem)
+    steps, taken = problem.work.steps + fine.work.steps, 0
+
+    def advance(more: int) -> None:
+        nonlocal taken
+        taken += more
+        if progress is not None:
+            progress(taken, steps)
+
+    found = compare_peaks(problem, fine, options, advance)
+    advance(steps - taken)  # short runs have reported nothing
+    return found
 
 
 def bisected(problem: Problem) -> Problem:
@@ -68,7 +143,7 @@ def _distance(problem: Problem) -> float:
     return found.wave
 
 
-def mesh_error(
+def compare_peaks(
     problem: Problem, fine: Problem, options: RunOptions, advance: Callable[[int], object]
 ) -> MeshError:
     """Run a problem and its :func:`bisected` one, and compare their peak forces.
@@ -76,16 +151,22 @@ def mesh_error(
     `advance` is called with numbers of steps that were taken.  Raises DivergenceError if a motion
     grows without bound.  Raises NotEnoughMemoryError if a run needs more memory than is free.
     """
-    peak, refined_peak = (_peak_force(one, options, advance) for one in (problem, fine))
-    count, refined_count = problem.deck.control.numel, fine.deck.control.numel
-    return MeshError(peak, refined_peak, count, refined_count, _distance(problem))
+    coarse, refined = (_run(one, options, advance) for one in (problem, fine))
+    return MeshError(
+        peak_force=float(coarse["history/force"].max()),
+        refined_peak_force=float(refined["history/force"].max()),
+        elements=problem.deck.control.numel,
+        refined_elements=fine.deck.control.numel,
+        distance=_distance(problem),
+        undecided=any(end_of(one) in (End.RISING, End.BETWEEN) for one in (coarse, refined)),
+    )
 
 
-def _peak_force(problem: Problem, options: RunOptions, advance: Callable[[int], object]) -> float:
-    """Peak force of a run without stored fields."""
+def _run(problem: Problem, options: RunOptions, advance: Callable[[int], object]) -> Stored:
+    """Run a problem without storing fields."""
     plain = without_output(problem)
     check_memory(plain, solver=options.solver, in_memory=True)
     sink = MemorySink()
     observers = (lambda simulation: advance(simulation.interval),)
     run(Simulation(plain, sink, options, observers=observers))
-    return float(np.max(sink.arrays["history/force"]))
+    return Stored(sink.arrays, sink.texts, sink.groups, plain.deck)
