@@ -21,6 +21,7 @@ from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
 from fecm.mechanics.points import DISC, HERTZ
 
+ELASTIC_POWER = 1.5  # of unloading as of loading
 # Shapes of the contact patch.
 PATCHES = {"disc": DISC, "hertz": HERTZ}
 
@@ -33,6 +34,11 @@ class Sphere:
     # Elastic constants; None for steel.
     modulus: float | None = None
     poisson: float | None = None
+
+    def __repr__(self) -> str:
+        values = ("radius", self.radius), ("modulus", self.modulus), ("poisson", self.poisson)
+        given = ", ".join(f"{name}={value!r}" for name, value in values if value is not None)
+        return f"Contact.estimate({given})"
 
     def law(self, plies: Plies, layers: Sequence[Layer]) -> tuple[Indentation, str]:
         """Law of contact with layers, and comment lines which say how k was computed."""
@@ -60,7 +66,7 @@ class Sphere:
         except (ValueError, ArithmeticError) as error:
             raise ObjectError(f"k cannot be estimated: {error}; give a law") from None
         ratios = " and ".join(dict.fromkeys(f"{one.nu23:g}" for one in materials))
-        return Indentation(k, 0.0, 0.0, 1.5), (
+        return Indentation(k, 0.0, 0.0, ELASTIC_POWER), (
             "! k of EXPE is estimated by the laminate's indentation modulus "
             f"{effective:.5g}: a sphere of radius {self.radius:g},\n"
             f"! E {modulus:g} and nu {poisson:g}; nu23 of the ply {ratios}.  "
@@ -68,18 +74,21 @@ class Sphere:
         )
 
 
+@frozen
 class Contact(Indentation):
     """Measured indentation law in the deck's units; :meth:`named` and :meth:`estimate` find one.
+
+    With `k` alone the law is elastic: the force is k α^1.5 in loading and unloading.
 
     Parameters
     ----------
     k : float
         Contact coefficient, force/length^1.5.
-    alpha_p : float
+    alpha_p : float, optional
         Critical indentation (length), beyond which an indentation remains.
-    s_p : float
+    s_p : float, optional
         Slope of the permanent over the maximum indentation.
-    q : float
+    q : float, optional
         Power of the unloading curve.
 
     Examples
@@ -88,6 +97,10 @@ class Contact(Indentation):
     >>> fecm.Contact(1.912e6, 6.564e-4, 0.094, 2.0).k
     1912000.0
     """
+
+    alpha_p: float = 0.0
+    s_p: float = 0.0
+    q: float = ELASTIC_POWER
 
     @staticmethod
     def named(name: str) -> NamedContact:
@@ -114,6 +127,12 @@ class Contact(Indentation):
             Length; a standard's where it is not given.
         modulus, poisson : float, optional
             Elastic constants of the sphere; steel's where they are not given.
+
+        Examples
+        --------
+        >>> import fecm
+        >>> fecm.Contact.estimate(radius=8)
+        Contact.estimate(radius=8)
         """
         check_positive(radius=radius, modulus=modulus)
         return Sphere(radius, modulus, poisson)

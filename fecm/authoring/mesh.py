@@ -48,7 +48,8 @@ def placed(
         raise ObjectError(f"{plies.said}, and the plate's shorter side is {side:g}")
     x, y = place or ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0)
     if not (low[0] <= x <= high[0] and low[1] <= y <= high[1]):
-        raise ObjectError("`at` is outside the plate")
+        reach = f"x {low[0]:g} to {high[0]:g} and y {low[1]:g} to {high[1]:g}"
+        raise ObjectError(f"`at` is outside the plate: {x:g}, {y:g}, where it has {reach}")
     if isinstance(mesh, PlateMesh) and mesh.groups and not plate.supports:
         doubts.append(
             f"the plate is free: no group of the mesh has a support, of {', '.join(mesh.groups)}"

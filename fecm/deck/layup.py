@@ -4,6 +4,7 @@ Angles in degrees, from the struck face on, separated by ``/``.  ``_2`` or ``_{2
 ``±45`` (or ``+-45``) is 45/-45, a number after a group repeats it, ``s`` mirrors it, ``T``
 marks a total layup.  Groups may be nested.  A capital letter after an angle names the material of
 the ply, as in ``[0C/90G]s``; alone, as in ``[0/90/K/90/0]``, it is a ply at 0 degrees, a core say.
+An exponent has a small letter, ``1e-05``, as Python writes it.
 """
 
 from __future__ import annotations
@@ -18,7 +19,8 @@ MOST_PLIES = 10_000  # a layup of more plies is certainly a typo
 NESTING = 32  # deepest nesting of groups
 QUOTED = 60  # characters of a layup that a message quotes
 _PLY = re.compile(
-    r"(?:(?P<pair>±|\+-|\+/-)?(?P<angle>[+-]?(?:\d+(?:\.\d*)?|\.\d+))(?P<of>[A-Z])?"
+    r"(?:(?P<pair>±|\+-|\+/-)?"
+    r"(?P<angle>[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?)(?P<of>[A-Z])?"
     r"|(?P<alone>[A-Z]))(?:_\{?(?P<times>\d+)\}?)?"
 )
 _SUFFIX = re.compile(r"_?\{?(\d*)([sST]?)\}?")

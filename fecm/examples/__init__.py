@@ -6,6 +6,8 @@ from pathlib import Path
 
 from fecm._errors import did_you_mean
 
+__all__ = ["names", "path"]
+
 # What is in each file.
 CONTENTS = {
     "impact-115.inp": "the report's experiment at 115 in/s, with a contact patch (lbf, in, s)",
@@ -55,3 +57,7 @@ def path(name: str) -> Path:
     stems = [Path(known).stem for known in CONTENTS]
     others = did_you_mean(name, [*CONTENTS, *stems]) or f"; there are {', '.join(CONTENTS)}"
     raise ValueError(f"there is no example {name!r}{others}")
+
+
+def __dir__() -> list[str]:
+    return __all__

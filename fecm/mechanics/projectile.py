@@ -74,6 +74,14 @@ class Rod:
         """Rod of one diameter."""
         return cls(length, (float(diameter),) * elements, modulus, density)
 
+    def __repr__(self) -> str:
+        shape = f"Rod({self.length!r}, {self.diameters!r}, {self.modulus!r}, {self.density!r}"
+        if len(set(self.diameters)) == 1:
+            diameter = self.diameters[0]
+            shape = f"Rod.cylinder({self.length!r}, {diameter!r}, {self.modulus!r}, "
+            shape += f"{self.density!r}, elements={self.elements}"
+        return f"{shape}, consistent=True)" if self.consistent else f"{shape})"
+
     @property
     def elements(self) -> int:
         """Number of elements."""
