@@ -10,11 +10,10 @@ import numpy as np
 import fecm
 
 plate = fecm.Plate.rectangle((120, 80), (30, 20), support="simple")
-laminate = fecm.Laminate("[45/0/-45/90]2s", "AS4/8552", 0.13)
+laminate = fecm.Laminate("[45/0/-45/90]2s", "AS4/8552")
 ball, steel = fecm.RigidMass(2e-5), fecm.Contact.estimate(radius=8)  # t, mm
-impact = {"energy": 40, "duration": 1e-3, "units": "mm-N-s", "patch": "disc:4"}  # mJ, s
-deck = fecm.impact(plate, laminate, ball, steel, **impact)
-result = fecm.run_one(deck.to_text().replace("\nRODP ", "\nPLYS,,50\nRODP "))  # every 50th step
+impact = {"energy": 40, "duration": 1e-3, "patch": "disc:4", "plies": 50}  # mJ, s, mm, steps
+result = fecm.run_one(fecm.impact(plate, laminate, ball, steel, **impact))
 
 plies = result.plies()
 strain = abs(plies.eps_1)  # rows, elements, points, plies, faces

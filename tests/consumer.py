@@ -70,7 +70,14 @@ made: fecm.Deck = fecm.impact(
     energy=500.0,
     duration=1e-3,
     units="mm-N-s",
+    plies=(20, 4),
+    failure=True,
 ).with_(velocity=3.0, layup="[0/90]2s")
+angles: NDArray[np.float64] = np.array([1e-5, 45.0])
+turned: fecm.Deck = made.with_(layup=angles, projectile=rods[0], contact=fecm.Contact(k=1e5))
+other: fecm.Deck = made.with_(plate=plate, laminate=laminates[1], at=(30, 20), energy="10J")
+stored: fecm.Deck = turned.with_program(every=5, plies=True, failure=10)
+modes: fecm.Deck = stored.with_program("LMAS\nEIGE,,3")
 
 
 class Linear:
@@ -140,3 +147,7 @@ fecm.run_one(deck, law=TwoMasses())  # type: ignore[arg-type]  # pyright: ignore
 fecm.run_one(deck, projectile=law)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.run_one(deck, criteria=[law])  # type: ignore[list-item]  # pyright: ignore[reportArgumentType]
 fecm.impact(plate, laminates[0], 5.0)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
+made.with_(velosity=3.0)  # type: ignore[call-arg]  # pyright: ignore[reportCallIssue]
+made.with_(projectile=5.0)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
+made.with_(support="glued")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
+made.with_program(ply=20)  # type: ignore[call-arg]  # pyright: ignore[reportCallIssue]

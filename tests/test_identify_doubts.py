@@ -220,9 +220,11 @@ def test_errors_of_the_plate_are_those_of_a_fit_with_another_plate() -> None:
     free = ["k", "mass", "velocity", "offset"]
     force = np.interp(LONG, *_heavy_force()) + BASE
     found = fecm.identify(doubted(), LONG, force, free)
-    for name, values in (("thickness", {"thickness": 1.01 * 16 * 0.18}), ("e1", {})):
-        own = doubted().require(fecm.deck.model.Material).ply.e1
-        other = doubted().with_(**(values or {"e1": 1.01 * own}))
+    e1 = doubted().require(fecm.deck.model.Material).ply.e1
+    for name, other in (
+        ("thickness", doubted().with_(thickness=1.01 * 16 * 0.18)),
+        ("e1", doubted().with_(e1=1.01 * e1)),
+    ):
         again = fecm.identify(other, LONG, force, free)
         for one in free[:3]:
             change = again.values[one] - found.values[one]

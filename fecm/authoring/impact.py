@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from types import UnionType
 from typing import Literal, NamedTuple
 
 from fecm._errors import warn
@@ -13,10 +12,19 @@ from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.authoring.contact import AnyContact, Sphere, law_of
 from fecm.authoring.fixtures import DropWeight
-from fecm.authoring.laminate import Laminate, Layup, Plies, cured, damages, plies_of, toughness
+from fecm.authoring.laminate import (
+    Laminate,
+    Layup,
+    Plies,
+    cured,
+    damages,
+    plies_of,
+    strengths_of,
+    toughness,
+)
 from fecm.authoring.mesh import InPlane, placed, supported
 from fecm.authoring.numerics import AUTO, FULL, MITC, Numerics, Quadrature
-from fecm.authoring.parameters import ObjectError, check_positive, in_units, is_finite
+from fecm.authoring.parameters import ObjectError, check_kind, check_positive, in_units, is_finite
 from fecm.authoring.plate import Plate
 from fecm.authoring.zones import Zone, laminates_of, placed_zones
 from fecm.deck import model
@@ -72,14 +80,14 @@ class Request:
     def check(self) -> None:
         """Raise ObjectError if an argument is no object of fecm, or a text none of the choices."""
         strike, numerics = self.strike, self.numerics
-        _check_kind("plate", self.plate, Plate)
-        _check_kind("laminate", self.laminate, Laminate)
+        check_kind("plate", self.plate, Plate)
+        check_kind("laminate", self.laminate, Laminate)
         if numerics.patch is not None:
-            _check_kind("patch", numerics.patch, str | model.Patch)
+            check_kind("patch", numerics.patch, str | model.Patch)
         if strike.projectile is not None:
-            _check_kind("projectile", strike.projectile, AnyProjectile)
+            check_kind("projectile", strike.projectile, AnyProjectile)
         if strike.contact is not None:
-            _check_kind("contact", strike.contact, AnyContact)
+            check_kind("contact", strike.contact, AnyContact)
         _check_choice("shear", numerics.shear, (MITC, FULL))
         _check_choice("in_plane", self.in_plane, (None, *IN_PLANE))
         _check_choice("units", self.units, (None, *SYSTEMS))
@@ -118,6 +126,8 @@ def impact(
     duration: float | str | None = None,
     dt: float | None = None,
     every: int | None = None,
+    plies: int | bool | tuple[int, int] | None = None,
+    failure: int | bool | None = None,
     units: str | None = None,
     patch: str | model.Patch | None = AUTO,
     shear: Quadrature = "mitc",
@@ -161,6 +171,13 @@ def impact(
         Time step; 0.9 of the critical one by default.
     every : int, optional
         Steps between stored rows; about 200 rows by default.
+    plies : int or bool or tuple of int, optional
+        Store stresses and strains ply by ply, which :attr:`Result.plies` gives: the steps between
+        rows, True for about 20 rows, or the steps and how many elements nearest to the load.  They
+        are large; none by default.
+    failure : int or bool, optional
+        Evaluate the failure criteria, which need a named ply with strengths: the steps between
+        evaluations, or True for the rows of `every`.  By default where `damage` finds strengths.
     units : str, optional
         ``"in-lbf-s"``, ``"m-N-s"`` or ``"mm-N-s"``, to which a named ply and contact are converted;
         those of a named ply's source by default.
@@ -184,7 +201,7 @@ def impact(
     gages : iterable of tuple
         Place x, y and z from the mid-plane (length) and direction (degrees) of strain gages.
     damage : bool
-        Add strengths and toughness of a named ply.
+        Add strengths and toughness of a named ply, as far as they are known.
     giic : float, optional
         Toughness G_IIc of the delamination threshold, force/length; a named ply's by default.
     cure : float or str, optional
@@ -229,7 +246,7 @@ def impact(
             plate,
             laminate,
             Strike(projectile, contact, velocity, energy, at),
-            Numerics(patch, shear, shear_factor, duration, dt, every),
+            Numerics(patch, shear, shear_factor, duration, dt, every, plies, failure),
             units=units,
             in_plane=in_plane,
             nonlinear=nonlinear,
@@ -277,8 +294,10 @@ def author(asked: Request) -> Authored:
             f"k = {law.k:g} is estimated from the ply's constants (fecm indent estimate) for an "
             "elastic law; prefer a measured law"
         )
-        doubts += _doubts_of_core(plies, struck)
+        doubts += doubts_of_core(plies, struck)
     damage = damages(plies, asked.giic, notes) if asked.damage else toughness(asked.giic)
+    if asked.numerics.failure and not any(isinstance(s, model.Allowables) for s in damage):
+        damage = [strengths_of(plies), *damage]
     stretches = asked.nonlinear or plies.is_coupled
     boundary, slides = supported(asked.plate, mesh, asked.in_plane, notes, stretches=stretches)
     segments = (
@@ -311,7 +330,7 @@ def author(asked: Request) -> Authored:
     return Authored(deck, comments, notes, doubts)
 
 
-def _doubts_of_core(plies: Plies, layers: Sequence[model.Layer]) -> list[str]:
+def doubts_of_core(plies: Plies, layers: Sequence[model.Layer]) -> list[str]:
     """Doubt an estimated k of a sandwich."""
     moduli = [plies.of(layer).ply.g13 for layer in layers]
     if min(moduli) >= SOFT_CORE * max(moduli):
@@ -320,12 +339,6 @@ def _doubts_of_core(plies: Plies, layers: Sequence[model.Layer]) -> list[str]:
         "k is estimated of a sandwich, as if its core were spread over the thickness; its face "
         "indents into the core, and the core is crushed: measure the law (`law`)"
     ]
-
-
-def _check_kind(name: str, value: object, kind: type | UnionType) -> None:
-    """Refuse an argument that is no object of fecm."""
-    if not isinstance(value, kind):
-        raise ObjectError(f"`{name}` is {value!r}, not a {name} of fecm")
 
 
 def _check_choice(name: str, value: str | None, choices: Sequence[str | None]) -> None:

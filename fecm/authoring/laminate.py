@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from fecm._errors import did_you_mean
 from fecm._frozen import frozen
 from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck import catalogue
@@ -66,11 +67,18 @@ class Laminate:
         Thickness of one ply, length, also by the names of materials; a named ply's own by default,
         where it is known.
 
+    Raises
+    ------
+    ValueError
+        If the layup can't be read, there is no ply of a name, or a thickness is not positive.
+
     Examples
     --------
     >>> import fecm
     >>> fecm.Laminate("[0/45]s", "T300/5208", 0.125).angles
     (0.0, 45.0, 45.0, 0.0)
+    >>> fecm.Laminate("[0/90]2s", "AS4/8552").thickness
+    1.04
     >>> hybrid = {"C": "IM7/8552", "G": "E-glass/MY750"}
     >>> fecm.Laminate("[0C/90G]s", hybrid, {"C": 0.125, "G": 0.25}).thickness
     0.75
@@ -79,6 +87,15 @@ class Laminate:
     layup: Layup
     ply: AnyPly | Mapping[str, AnyPly] | None = None
     ply_thickness: float | Mapping[str, float] | None = None
+
+    def __post_init__(self) -> None:
+        given = self.ply.values() if isinstance(self.ply, Mapping) else [self.ply]
+        for one in given:
+            if one is not None:  # a zone's laminate may have the plate's material
+                _known(one)
+        for ply in self.plies:
+            self.material(ply.name)
+            self.thickness_of(ply)
 
     @property
     def plies(self) -> tuple[LaminatePly, ...]:
@@ -99,8 +116,23 @@ class Laminate:
 
     @property
     def thickness(self) -> float:
-        """Total thickness, length; ValueError without the thickness of a ply."""
-        return _total([self._thickness_of(ply) or _no_thickness() for ply in self.plies])
+        """Total thickness, length; ValueError without the thickness of a ply.
+
+        The own thickness of a named ply is in the units of its source.
+        """
+        named = [one for ply in self.plies if isinstance(one := self._bound(ply), NamedPly)]
+        system = named[0].system if named else None
+        return _total([self.thickness_of(ply) or self._own(ply, system) for ply in self.plies])
+
+    def _bound(self, ply: LaminatePly) -> Ply | NamedPly | None:
+        """Material of a ply; None if it has none."""
+        given = self.material(ply.name)
+        return None if given is None else _known(given)
+
+    def _own(self, ply: LaminatePly, system: str | None) -> float:
+        """Thickness that the name of a ply gives."""
+        bound = self._bound(ply)
+        return _own_thickness(bound if isinstance(bound, NamedPly) else None, system)
 
     def material(self, name: str) -> object:
         """What is given as the material of a name."""
@@ -113,16 +145,11 @@ class Laminate:
         said = f"the material {name!r}" if name else "a ply without a material"
         raise ObjectError(f"`layup` has {said}; the materials given are {known}")
 
-    def _thickness_of(self, ply: LaminatePly) -> float | None:
-        """Thickness of a ply, where the laminate has it."""
-        if ply.thickness is not None:
-            return ply.thickness
-        given = self.ply_thickness
-        return given.get(ply.name) if isinstance(given, Mapping) else given
-
     def thickness_of(self, ply: LaminatePly) -> float | None:
         """Thickness of a ply, where the laminate has it; it is positive."""
-        thickness = self._thickness_of(ply)
+        given = self.ply_thickness
+        common = given.get(ply.name) if isinstance(given, Mapping) else given
+        thickness = common if ply.thickness is None else ply.thickness
         check_positive(ply_thickness=thickness)
         return thickness
 
@@ -134,10 +161,6 @@ def _ply_of(entry: Entry) -> LaminatePly:
     if not isinstance(name, str):
         raise TypeError
     return LaminatePly(float(angle), name, *thickness)
-
-
-def _no_thickness() -> float:
-    raise ObjectError("`ply_thickness` is missing")
 
 
 def _total(thicknesses: Sequence[float]) -> float:
@@ -240,18 +263,19 @@ def plies_of(
     if named and len(named) < len(known) and units is None:
         raise ObjectError("constants of a `ply` beside a named one need `units`, theirs")
     numbers = {name: number for number, name in enumerate(names, start=MATERIAL)}
-    materials: list[Bound] = []
-    for name, one in known.items():
-        ply = one.converted(system or one.system) if isinstance(one, NamedPly) else one
-        if not isinstance(ply, Ply):
-            raise ObjectError(f"`ply` is {ply!r}, not a name or a Ply")
-        materials.append(Bound(ply, named.get(name)))
+    materials = [
+        Bound(one.converted(system or one.system), one)
+        if isinstance(one, NamedPly)
+        else Bound(one, None)
+        for one in known.values()
+    ]
     own: dict[str, float] = {}  # thickness of a material's plies where its name gives it
 
     def layer(number: int, ply: LaminatePly, given: float | None) -> Layer:
         if given is None:
             if ply.name not in own:
-                own[ply.name] = _own_thickness(named.get(ply.name), system, notes)
+                own[ply.name] = _own_thickness(named.get(ply.name), system)
+                notes.append(_note_of_thickness(own[ply.name], named[ply.name], system))
             given = own[ply.name]
         return Layer(number, ply.angle, given, numbers[ply.name])
 
@@ -264,24 +288,31 @@ def plies_of(
     return Plies(tuple(different), tuple(materials), system), in_zones
 
 
-def _known(ply: object) -> object:
+def _known(ply: object) -> Ply | NamedPly:
     """A ply; the named one of a name."""
-    if not isinstance(ply, str):
+    if isinstance(ply, Ply | NamedPly):
         return ply
+    if not isinstance(ply, str):
+        raise ObjectError(f"`ply` is {ply!r}, not a name or a Ply")
     if ply not in MATERIALS:
-        raise ObjectError(f"{ply!r} is not a named ply: {', '.join(MATERIALS)}")
+        others = did_you_mean(ply, MATERIALS) or f": {', '.join(MATERIALS)}"
+        raise ObjectError(f"{ply!r} is not a named ply{others}")
     return MATERIALS[ply]
 
 
-def _own_thickness(named: NamedPly | None, system: str | None, notes: list[str]) -> float:
+def _own_thickness(named: NamedPly | None, system: str | None) -> float:
     """Thickness of a named ply."""
     own = None if named is None or system is None else named.value("thickness", system)
-    if named is None or system is None or own is None:
+    if own is None:
         unknown = f": that of {named.name} is not known" if named else ""
         raise ObjectError(f"`ply_thickness` is missing{unknown}")
-    unit = SYSTEMS[system]["length"]
-    notes.append(f"the plies are {own:g} {unit} thick, as {named.name} is listed")
     return own
+
+
+def _note_of_thickness(own: float, named: NamedPly, system: str | None) -> str:
+    """Say the thickness that the name of a ply gives."""
+    unit = SYSTEMS[system or named.system]["length"]
+    return f"the plies are {own:g} {unit} thick, as {named.name} is listed"
 
 
 def toughness(giic: float | None) -> list[Segment]:
@@ -289,25 +320,53 @@ def toughness(giic: float | None) -> list[Segment]:
     return [] if giic is None else [Delamination(toughness=giic)]
 
 
-def damages(plies: Plies, giic: float | None, notes: list[str]) -> list[Segment]:
-    """Strengths and least toughness of named plies; notes what they do not have."""
-    system = plies.system
-    if system is None or not plies.named:
-        raise ObjectError("`damage` needs a named ply with strengths or toughness")
-    strengths: list[Allowables] = []
-    known = [named.delamination(system) for _, named in plies.named]
-    toughnesses = [one.toughness for one in known if one] if giic is None else [giic]
-    lacking: list[str] = []
+def strengths_of(plies: Plies) -> Allowables:
+    """ALLO segment of named plies, of which one at least has strengths."""
+    found, lacking = _strengths(plies)
+    if not found:
+        why = "; ".join(f"{name} has {lacks}" for name, lacks in lacking.items())
+        raise ObjectError(f"`failure` needs a named ply with strengths{why and ': '}{why}")
+    return replace(found[0], others=tuple(found[1:]))
+
+
+def _strengths(plies: Plies) -> tuple[list[Allowables], dict[str, str]]:
+    """Strengths of named plies, and what the others lack, by name."""
+    found: list[Allowables] = []
+    lacking: dict[str, str] = {}
     for number, named in plies.named:
-        missing: list[str] = []
-        if (own := named.allowables(system)) is not None:
-            strengths.append(replace(own, material=number))
+        if plies.system and (own := named.allowables(plies.system)) is not None:
+            found.append(replace(own, material=number))
         else:
             lacks = " and ".join(key for key in catalogue.STRENGTHS if key not in named.values)
-            missing.append(
+            lacking[named.name] = (
                 f"no {lacks}, so no failure exposures (ALLO, FAIL); a file of your own plies may "
                 "have them (fecm new --materials)"
             )
+    return found, lacking
+
+
+def toughness_of(plies: Plies) -> float:
+    """Least toughness G_IIc of named plies."""
+    if found := _toughnesses(plies):
+        return min(found)
+    raise ObjectError("no named ply with GIIc")
+
+
+def _toughnesses(plies: Plies) -> list[float]:
+    """Toughness G_IIc of the named plies that have it."""
+    known = [named.delamination(plies.system) for _, named in plies.named if plies.system]
+    return [one.toughness for one in known if one]
+
+
+def damages(plies: Plies, giic: float | None, notes: list[str]) -> list[Segment]:
+    """Strengths and least toughness of named plies; notes what they do not have."""
+    if plies.system is None or not plies.named:
+        raise ObjectError("`damage` needs a named ply with strengths or toughness")
+    strengths, without = _strengths(plies)
+    toughnesses = _toughnesses(plies) if giic is None else [giic]
+    lacking: list[str] = []
+    for _, named in plies.named:
+        missing = [without[named.name]] if named.name in without else []
         if not toughnesses:
             missing.append("no GIIc, so no delamination threshold (DELA); `giic` gives it")
         if missing:

@@ -12,6 +12,7 @@ from fecm.api import load_deck
 from fecm.authoring.contact import parse_patch
 from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck.model import Allowables, Deck, Impact, Indentation, Macro, Patch, Shear
+from fecm.deck.outputs import Rows, RowsOfPlies, with_outputs
 from fecm.mechanics.points import HERTZ
 from fecm.mechanics.solutions import static_stiffness
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
@@ -43,6 +44,8 @@ class Numerics:
     duration: float | str | None = None
     dt: float | None = None
     every: int | None = None  # steps between stored rows
+    plies: RowsOfPlies | None = None  # the same of ply stresses
+    failure: Rows | None = None  # the same of failure exposures, by default as `every`
 
     def contact_patch(self, *, prescribed: bool) -> Patch | None:
         """Contact patch; `prescribed` says whether a standard has the default one."""
@@ -73,11 +76,10 @@ class Numerics:
         steps = max(1, math.ceil(duration / dt - 1e-9))
         rows = float(self.every if self.every is not None else max(1, steps // ROWS))
         words = {"LMAS": 0.0, "DT": dt, "LOOP": float(steps), "TIME": 0.0}
-        words |= {"RODP": rows, "DISP": rows}
-        if deck.has(Allowables):
-            words["FAIL"] = rows
-        words["NEXT"] = 0.0
-        return tuple(Macro(word, value=value) for word, value in words.items())
+        words |= {"RODP": rows, "DISP": rows, "NEXT": 0.0}
+        macros = [Macro(word, value=value) for word, value in words.items()]
+        failure = deck.has(Allowables) if self.failure is None else self.failure
+        return with_outputs(macros, failure=failure, plies=self.plies)
 
     def with_program(self, deck: Deck, dt: float, duration: float | None) -> Deck:
         """The deck with its program; without a duration, it is longer than the contact."""

@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Sequence
 from numbers import Real
+from types import UnionType
 from typing import TypeGuard
 
 from fecm._errors import FecmError
@@ -37,6 +38,12 @@ def check_positive(**values: float | None) -> None:
     for name, value in values.items():
         if value is not None and not (isinstance(value, Real) and 0.0 < value < math.inf):
             raise ObjectError(f"`{name}` is {value!r}; it must be a positive number")
+
+
+def check_kind(name: str, value: object, kind: type | UnionType) -> None:
+    """Refuse a parameter that is no object of fecm."""
+    if not isinstance(value, kind):
+        raise ObjectError(f"`{name}` is {value!r}, not a {name} of fecm")
 
 
 def in_units(

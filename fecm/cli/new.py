@@ -38,6 +38,7 @@ from fecm.deck.format import format_deck
 from fecm.deck.grid import IN_PLANE, SUPPORTS
 from fecm.deck.layup import parse_plies
 from fecm.deck.model import Deck, Indentation, Material, Nonlinear, Patch, Ply, Shear
+from fecm.deck.outputs import RowsOfPlies
 from fecm.mechanics.points import DISC, RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.plate_mesh import BOUNDARY
@@ -135,7 +136,7 @@ GROUPS = {
     ),
     "Supports": ("fixture", "support", "edges", "in_plane"),
     "Impact": ("energy", "velocity", "at", "projectile", "contact", "law"),
-    "Numerics": ("patch", "shear", "shear_factor", "duration", "dt", "every"),
+    "Numerics": ("patch", "shear", "shear_factor", "duration", "dt", "every", "plies", "failure"),
 }
 
 
@@ -184,6 +185,8 @@ class Options:
     duration: str | None
     dt: float | None
     every: int | None
+    plies: tuple[int, ...] | None
+    failure: int | None
 
     def plate(self, given: Collection[str]) -> Plate:
         """Mesh and supports; `given` are the options on the command line."""
@@ -403,6 +406,19 @@ class Options:
     type=click.IntRange(min=1),
     help="Steps between stored rows.  [default: for about 200 rows]",
 )
+@option(
+    "--plies",
+    type=list_of("N[,M]", click.IntRange(min=1), [1, 2]),
+    help="Store ply stresses at every N-th step (PLYS), of all elements or the M nearest to the "
+    "load.",
+)
+@option(
+    "--failure",
+    type=click.IntRange(min=1),
+    metavar="N",
+    help="Evaluate the failure criteria at every N-th step (ALLO, FAIL); needs a named ply with "
+    "strengths.  [default with --damage: as --every]",
+)
 @option("--overwrite", is_flag=True, help="Replace an existing deck.")
 @collected(Options)
 def new(options: Options) -> None:
@@ -489,6 +505,8 @@ def _author(options: Options, given: Collection[str]) -> Authored:
                 options.duration,
                 options.dt,
                 options.every,
+                _rows_of_plies(options.plies),
+                options.failure,
             ),
             units=laminate.units,
             in_plane=options.in_plane,
@@ -501,6 +519,14 @@ def _author(options: Options, given: Collection[str]) -> Authored:
             zones=options.zone,
         )
     )
+
+
+def _rows_of_plies(given: tuple[int, ...] | None) -> RowsOfPlies | None:
+    """Steps between rows of ply stresses, and perhaps the number of elements."""
+    if given is None:
+        return None
+    steps, *elements = given
+    return (steps, elements[0]) if elements else steps
 
 
 def _additions(deck: Deck) -> list[str]:

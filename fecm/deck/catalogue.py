@@ -13,8 +13,8 @@ from importlib import resources
 
 from fecm._frozen import frozen
 from fecm._inputs import parsed_toml
-from fecm.deck.model import Allowables, Delamination, Expansion, Indentation, Ply, Units
-from fecm.deck.units import COEFFICIENT, DENSITY, MODULUS, TOUGHNESS, in_si
+from fecm.deck.model import Allowables, Deck, Delamination, Expansion, Indentation, Ply, Units
+from fecm.deck.units import COEFFICIENT, DENSITY, MODULUS, TOUGHNESS, in_si, unit_names
 
 # Systems of units: names of length, force and time.
 NAMES = ("in-lbf-s", "m-N-s", "mm-N-s")
@@ -31,6 +31,12 @@ def convert(value: float, dimension: str, system: str, other: str) -> float:
     if before is None or after is None:
         raise LookupError(f"no unit of {dimension}")
     return value if system == other else float(f"{value * (before / after):.6g}")
+
+
+def system_of(deck: Deck) -> str | None:
+    """System of units of a deck; None if it names none, or others."""
+    names = unit_names(deck)
+    return next((system for system, units in SYSTEMS.items() if units == names), None)
 
 
 # Keys of a ply in a TOML file, and their dimensions.

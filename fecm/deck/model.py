@@ -8,9 +8,9 @@ and elements between them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from textwrap import shorten
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar, Unpack
 
 from fecm._frozen import frozen
 from fecm._tables import html_table
@@ -53,6 +53,9 @@ from fecm.deck.zone_cards import (
     Zone,
     Zones,
 )
+
+if TYPE_CHECKING:
+    from fecm.sweeps.changes import Values
 
 __all__ = [
     "Allowables", "Boundary", "Control", "Coordinates", "Cure", "Damping", "Deck",
@@ -182,8 +185,23 @@ class Deck(Record):
             layers |= {one.number: one.layers for one in card.laminates}
         return layers
 
-    def with_(self, **values: float | str | Sequence[float]) -> Deck:
-        """Deck with other values, under the names that :func:`fecm.sweep` varies.
+    def with_(self, **values: Unpack[Values]) -> Deck:
+        """Deck with other values, under the names that :func:`fecm.sweep` varies, or other parts.
+
+        Parts go first: a `plate`, which is struck in its middle or at `at`; a `laminate`, whose
+        named plies bring strengths, toughness and expansions where the deck has them; a
+        `projectile`, at the velocity of the deck unless `velocity` or `energy` is given; and a
+        `contact`, an estimated one for the new laminate.
+
+        A time step of 0, or that which :func:`fecm.impact` takes for the deck's plate, follows a
+        new `plate` or `laminate`.  Any other is kept, also where values change the plate;
+        ``dt="auto"`` takes 0.9 of the critical one.
+
+        Parameters
+        ----------
+        **values : float or str or sequence or object
+            Values in the deck's units; energy, velocity, duration and preload also with a unit, as
+            in ``"10J"``, if the deck names its units.
 
         Raises
         ------
@@ -194,12 +212,65 @@ class Deck(Record):
         --------
         >>> import fecm
         >>> deck = fecm.read_one("decks/impact-115.inp")
-        >>> deck.with_(velocity=60, layup="[0/90]5s").control.layers
-        20
+        >>> deck.with_(velocity=60, layup=[0, 90, 90, 0]).control.layers
+        4
+        >>> "PROJ" in deck.with_(projectile=fecm.RigidMass(1e-4)).to_text()
+        True
         """
-        from fecm.sweeps.vary import with_values  # the one import that climbs
+        from fecm.sweeps.changes import with_values  # the one module that climbs
 
         return with_values(self, values)
+
+    def with_program(
+        self,
+        macros: str | Sequence[Macro] | None = None,
+        *,
+        every: int | None = None,
+        plies: int | bool | tuple[int, int] | None = None,
+        failure: int | bool | None = None,
+    ) -> Deck:
+        r"""Deck with another macro program, or one that stores other rows.
+
+        Parameters
+        ----------
+        macros : str or sequence of Macro, optional
+            The cards between MACR and END; the deck's own by default.
+        every : int, optional
+            Steps between stored rows of contact, strains and displacements (RODP, DISP).
+        plies : int or bool or tuple of int, optional
+            Steps between stored ply stresses (PLYS); with True about 20 rows, with False none.  A
+            second number takes so many elements nearest to the load instead of all.
+        failure : int or bool, optional
+            Steps between evaluations of the failure criteria (FAIL), which need strengths (ALLO);
+            with True those of RODP, with False none.
+
+        Raises
+        ------
+        ValueError
+            If a number is not whole and positive.
+        DeckError
+            If a text is not a macro program.
+
+        Examples
+        --------
+        >>> import fecm
+        >>> deck = fecm.read_one("decks/impact-115.inp")
+        >>> [macro.word for macro in deck.with_program(plies=50).macros]
+        ['LMAS', 'DT', 'LOOP', 'TIME', 'RODP', 'DISP', 'PLYS', 'NEXT']
+        >>> [macro.value for macro in deck.with_program("LMAS\nEIGE,3").macros]
+        [0.0, 3.0]
+        """
+        from fecm.deck.outputs import with_outputs  # 1 ms, and only what changes programs needs it
+
+        deck = self
+        if isinstance(macros, str):
+            from fecm.sweeps.changes import with_cards
+
+            deck = with_cards(self, macros)
+        elif macros is not None:
+            deck = replace(self, macros=tuple(macros))
+        made = with_outputs(deck.macros, every=every, plies=plies, failure=failure)
+        return replace(deck, macros=made, text="")
 
     def to_text(self) -> str:
         """Write the problem as cards, ended by STOP; reading them gives the same model.

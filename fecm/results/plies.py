@@ -91,7 +91,8 @@ class PlyGroup(PlyRows):
         """
         stored = self._stored
         if "plies/sigma_1" not in stored:
-            raise NotStoredError(f"the result has no ply stresses{remedy('plies')}")
+            way = "in Python run deck.with_program(plies=True)"
+            raise NotStoredError(f"the result has no ply stresses{remedy('plies')}; {way}")
         times, numbers, z = (stored[f"plies/{name}"] for name in ("time", "element", "z"))
         rows = np.arange(len(times))
         if time is not None:

@@ -148,22 +148,23 @@ def set_radius(strike: Strike, value: Value) -> Strike:
         hint = "add a UNIT segment, or vary k instead"
         raise CasesError(f"radius: the modulus of steel needs the units of the deck; {hint}")
     steel = STEEL_MODULUS * (in_si(MODULUS, SYSTEMS[STANDARD]) or 1.0) / unit
+    layers = struck_layers(strike.plate)
+    plies = tuple(strike.plate.plies[layer.material] for layer in layers)
     try:
-        modulus = _indentation_modulus(*_struck(strike.plate))
+        modulus = _indentation_modulus(layers, plies)
         k = hertz_coefficient(float(value), steel, STEEL_POISSON, modulus)
     except ValueError as error:
         raise CasesError(f"k cannot be estimated: {error}") from None
     return strike.with_constant("k", k)
 
 
-def _struck(deck: model.Deck) -> tuple[tuple[model.Layer, ...], tuple[model.Ply, ...]]:
-    """Layers under the load, and the material of each."""
+def struck_layers(deck: model.Deck) -> tuple[model.Layer, ...]:
+    """Layers under the load."""
     layups, number = list(deck.layers.values()), 0
     if len(layups) > 1:
         program = compile_program(deck.macros, Findings())
         number = Problem(deck, generate(deck), program).laminate_number
-    layers = layups[number]
-    return layers, tuple(deck.plies[layer.material] for layer in layers)
+    return layups[number]
 
 
 @lru_cache(maxsize=256)

@@ -208,10 +208,10 @@ def check_names(names: Collection[str]) -> None:
             raise CasesError(f"{given[0]} and {given[1]} exclude each other; vary one of them")
 
 
-def check_known(name: str, where: str) -> None:
-    """Raise CasesError if a name is none of the table."""
-    if name not in VARIABLES:
-        others = did_you_mean(name, NAMES) or f"; the names are {', '.join(NAMES)}"
+def check_known(name: str, where: str, known: Collection[str] = NAMES) -> None:
+    """Raise CasesError if a name is none of those known, by default those of the table."""
+    if name not in known:
+        others = did_you_mean(name, known) or f"; the names are {', '.join(known)}"
         raise CasesError(f"{where}: `{name}` cannot be varied{others}")
 
 

@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import replace
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from fecm.deck.model import Deck
 from fecm.problem.parts import is_coupled
-from fecm.sweeps.case import Case, CasesError
-from fecm.sweeps.cases import checked
+from fecm.sweeps.case import Case, CasesError, pair
 from fecm.sweeps.plates import PlateSetter, free_in_plane
 from fecm.sweeps.strike import Strike, StrikeSetter, strike_of
 from fecm.sweeps.timing import stable_time_step, with_time_step
 from fecm.sweeps.values import PLATE_VALUES, REFINEMENT, STRIKE_VALUES, Variable, check_names
+
+if TYPE_CHECKING:
+    from fecm.sweeps.objects import Objects
 
 _Setter = TypeVar("_Setter", PlateSetter, StrikeSetter)
 # Values are applied by what they change, and then in the order of the table, but for these: a layup
@@ -35,8 +37,8 @@ _PLATE_SETTERS = _in_order((REFINEMENT, *PLATE_VALUES))
 _STRIKE_SETTERS = _in_order(STRIKE_VALUES)
 
 
-def apply_case(deck: Deck, case: Case) -> Deck:
-    """Return a deck with the values of a case.
+def apply_case(deck: Deck, case: Case, objects: Objects | None = None) -> Deck:
+    """Return a deck with the values of a case, on top of objects.
 
     A layup uses the ply thickness of the deck, so that more plies give a thicker plate; the
     thickness of the laminate scales every layer.  A mass scales the density of a rod.  A time step
@@ -50,9 +52,16 @@ def apply_case(deck: Deck, case: Case) -> Deck:
     """
     check_names(case)
     made = deck
+    if objects is not None:
+        at = pair("at", str(case["at"])) if "at" in case else None
+        made = objects.with_plate(deck, at)
+        if objects.plate is not None:  # which is struck there already
+            case = {name: value for name, value in case.items() if name != "at"}
     for name, setter in _PLATE_SETTERS.items():
         if name in case:
             made = setter(made, case[name])
+    if objects is not None:
+        made = objects.with_strike(made)
     if not case.keys().isdisjoint(_STRIKE_SETTERS):
         made = strike(made, case).deck()
     if not is_coupled(deck) and is_coupled(made):
@@ -80,9 +89,3 @@ def _timed(deck: Deck, made: Deck, case: Case) -> Deck:
         return made
     given = all(macro.value for macro in deck.macros if macro.word == "DT")
     return with_time_step(made, dt, 0.0 if given else stable_time_step(deck), duration)
-
-
-def with_values(deck: Deck, values: Mapping[str, float | str | Sequence[float]]) -> Deck:
-    """Return a deck with other values; CasesError if a name is unknown or a value is invalid."""
-    (case,) = checked([values])
-    return apply_case(deck, case)
