@@ -176,3 +176,7 @@ class DeckError(FecmError, ValueError):
         self.findings = findings
         self.source = source
         super().__init__("\n".join(finding.render(source) for finding in findings))
+
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle the error with its arguments and its notes."""
+        return DeckError, (self.findings, self.source), self.__dict__

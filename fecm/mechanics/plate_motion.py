@@ -63,9 +63,9 @@ class DivergenceError(FecmError, ArithmeticError):
         self.step, self.reason = step, reason
         super().__init__(f"step {step}: {reason}")
 
-    def __reduce__(self) -> tuple[type[DivergenceError], tuple[int, str]]:
-        """Pickle the error with its arguments."""
-        return DivergenceError, (self.step, self.reason)
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle the error with its arguments and its notes."""
+        return DivergenceError, (self.step, self.reason), self.__dict__
 
 
 @dataclass(slots=True)
