@@ -94,6 +94,21 @@ def test_threads_and_processes_give_what_one_process_does() -> None:
             fecm.sweep(small(), GRID, executor=executor)
 
 
+def test_the_callers_dask_client_stays_open_and_the_default() -> None:
+    distributed = pytest.importorskip("distributed")
+    where = {"n_workers": 1, "threads_per_worker": 1, "processes": False}
+    serial = fecm.sweep(small(), GRID, history=True)
+    with distributed.LocalCluster(**where, dashboard_address=None) as cluster:
+        with distributed.Client(cluster) as client:
+            for scheduler in (cluster, client, cluster):
+                found = fecm.sweep(small(), GRID, history=True, scheduler=scheduler)
+                np.testing.assert_array_equal(found.force, serial.force)
+                assert client.status == "running"
+                assert distributed.default_client() is client
+            assert client.submit(sum, [2, 3]).result() == 5
+        assert fecm.sweep(small(), GRID, scheduler=cluster).fine.sum() == 6
+
+
 @pytest.mark.parametrize(
     "options",
     [{"workers": 2, "scheduler": "tcp://h:1"}, {"executor": 5}, {"scheduler": 5},

@@ -129,11 +129,13 @@ def _client(scheduler: Any) -> Any:
     except ImportError:
         raise SchedulerError("a scheduler needs Dask: pip install 'fecm[sweep]'") from None
     module: Any = distributed
+    is_cluster = hasattr(scheduler, "get_client")
     try:
-        if hasattr(scheduler, "get_client"):
-            return scheduler.get_client()
-        _check_address(address)
-        return module.Client(address, timeout=PATIENCE, set_as_default=False)
+        if not is_cluster:
+            _check_address(address)
+        # A client of its own: get_client of a cluster may return that of the caller.
+        where = scheduler if is_cluster else address
+        return module.Client(where, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, RuntimeError, TimeoutError) as error:
         raise SchedulerError(f"no Dask scheduler answers at {address} ({error})") from None
 
