@@ -37,6 +37,40 @@ def test_values_that_are_not_in_a_list_are_refused(given: dict[str, Any], messag
         fecm.sweep(small(), **given)
 
 
+def test_a_data_frame_is_a_table_of_cases() -> None:
+    pandas = pytest.importorskip("pandas")
+    table = pandas.DataFrame(
+        {"velocity": [50, 75.0, 115.0], "layup": ["[0/90]", "[90/0]", "[0]"], "impact_node": 13},
+        index=[7, 7, 9],
+    )
+    found = fecm.sweep(small(), cases=table, history=True)
+    rows = fecm.sweep(small(), cases=table.to_dict("records"), history=True)
+    assert list(found.cases) == ["velocity", "layup", "impact_node"]
+    for name in found.cases:
+        assert found[name].tolist() == rows[name].tolist() == table[name].tolist()
+    np.testing.assert_array_equal(found.force, rows.force)
+    again = fecm.sweep(small(), cases=found.to_dataframe()[["velocity", "layup"]], history=True)
+    np.testing.assert_array_equal(again.force, rows.force)
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows", "message"),
+    [
+        (["velocity", "velocity"], [[1.0, 2.0]], "column velocity is repeated"),
+        (["velocity"], [[1.0], [np.nan]], "case 1: velocity must be a finite number, not `nan`"),
+        (["velosity"], [[1.0]], "`velosity` cannot be varied; did you mean velocity?"),
+        ([0], [[1.0]], "`0` cannot be varied"),
+        (["velocity"], [], "at least one case"),
+    ],
+)
+def test_a_data_frame_that_is_no_table_of_cases_is_refused(
+    columns: list[Any], rows: list[Any], message: str
+) -> None:
+    pandas = pytest.importorskip("pandas")
+    with pytest.raises(CasesError, match=message):
+        fecm.sweep(small(), cases=pandas.DataFrame(rows, columns=columns))
+
+
 UNITS = "UNIT\nin lbf s\n"
 GRID: dict[str, list[Any]] = {"velocity": [100.0, 50.0, 75.0], "layup": ["[90/0]", "[x]", "[0/90]"]}
 

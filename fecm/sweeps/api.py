@@ -22,7 +22,7 @@ from fecm.problem.problem import Problem
 from fecm.sweeps import schedule
 from fecm.sweeps.batch import deck_of
 from fecm.sweeps.case import Case, CasesError
-from fecm.sweeps.cases import checked
+from fecm.sweeps.cases import Table, checked
 from fecm.sweeps.doubts import doubtful_values
 from fecm.sweeps.grid import combined
 from fecm.sweeps.in_full import built
@@ -200,7 +200,7 @@ def _outcomes(
 def sweep(
     deck: str | Path | Deck | None = None,
     vary: Mapping[str, Sequence[Any]] | None = None,
-    cases: Iterable[Mapping[str, Any]] | None = None,
+    cases: Iterable[Mapping[str, Any]] | Table | None = None,
     *,
     refine: Sequence[int] | None = None,
     random: Mapping[str, str] | None = None,
@@ -236,8 +236,8 @@ def sweep(
         Deck with a single problem; not with `build`.
     vary : mapping of str to sequence
         Values by name; all combinations are run.
-    cases : iterable of mapping, optional
-        Cases instead, one mapping each.
+    cases : iterable of mapping or DataFrame, optional
+        Cases instead: one mapping each, or a table with a column per name.
     refine : sequence of int, optional
         Factors 1, 2, 4, 8 or a part of them, instead: the sides of all elements and DT are divided
         by each.  :attr:`SweepResult.convergence` has orders, limits and error bands.

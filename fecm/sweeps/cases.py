@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol, runtime_checkable
 
 from fecm._measured_tables import read_rows
 from fecm.studies import StudyError
@@ -37,10 +37,32 @@ def read_cases(path: Path) -> list[Case]:
     return cases
 
 
+@runtime_checkable
+class Table(Protocol):
+    """A table with named columns, such as a DataFrame."""
+
+    @property
+    def columns(self) -> Any:
+        """Names of the columns."""
+
+    def __getitem__(self, name: Any, /) -> Any:
+        """Return the values of a column."""
+
+
+def _rows(table: Table) -> list[dict[Any, Any]]:
+    """The rows of a table as mappings; CasesError if a name is repeated."""
+    names = list(table.columns)
+    for name in names:
+        if names.count(name) > 1:
+            raise CasesError(f"column {name} is repeated")
+    columns = [list(table[name]) for name in names]
+    return [dict(zip(names, row, strict=True)) for row in zip(*columns, strict=True)]
+
+
 def checked(
-    cases: Iterable[Mapping[str, Any]], source: str = "", *, free: bool = False
+    cases: Iterable[Mapping[str, Any]] | Table, source: str = "", *, free: bool = False
 ) -> list[Case]:
-    """Validate cases given as mappings, which must all have the same names.
+    """Validate cases given as mappings, which must all have the same names, or as a table.
 
     With `free`, the names are any but those of results, and a value is a number or a text.  Raises
     CasesError if a case is invalid; the message states the source, or else the case's number.
@@ -48,6 +70,8 @@ def checked(
     check_name, read = (check_free, free_value_of) if free else (check_known, value_of)
     made: list[Case] = []
     remedy = 'write a list of mappings such as [{"velocity": 50.0}]'
+    if isinstance(cases, Table):
+        cases = _rows(cases)
     if not isinstance(cases, Iterable):
         raise CasesError(f"cases is {cases!r}; {remedy}")
     for number, case in enumerate(cases):

@@ -211,7 +211,7 @@ def check_names(names: Collection[str]) -> None:
 def check_known(name: str, where: str, known: Collection[str] = NAMES) -> None:
     """Raise CasesError if a name is none of those known, by default those of the table."""
     if name not in known:
-        others = did_you_mean(name, known) or f"; the names are {', '.join(known)}"
+        others = did_you_mean(str(name), known) or f"; the names are {', '.join(known)}"
         raise CasesError(f"{where}: `{name}` cannot be varied{others}")
 
 
