@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 import fecm
 from fecm.results.errors import ResultFileError
 from fecm.sweeps.case import CasesError
+from fecm.sweeps.distributions import Law
 from fecm.sweeps.plan import plan
-from fecm.sweeps.random import DESIGNS, Design, DesignKind, Law, matrix, random_cases, unit_samples
+from fecm.sweeps.random import DESIGNS, Design, DesignKind, matrix, random_cases, unit_samples
 from fecm.sweeps.statistics import QUANTILES, Indices, indices, wilson
 from tests.calls import Done, assert_unusable, call
 from tests.decks import DATA, DATA_CARDS, small
@@ -138,6 +139,11 @@ def test_laws_are_those_of_scipy() -> None:
     for law, exact in (
         (Law("normal", (3.0, 0.5)), stats.norm(3.0, 0.5)),
         (Law("lognormal", (3.0, 0.5)), stats.lognorm(0.5, scale=3.0)),
+        (Law("weibull", (3.0, 0.5)), stats.weibull_min(0.5, scale=3.0)),
+        (Law("weibull", (2.5e3, 20.0)), stats.weibull_min(20.0, scale=2.5e3)),
+        (Law("truncnormal", (3.0, 0.5, 2.9, 4.0)), stats.truncnorm(-0.2, 2.0, 3.0, 0.5)),
+        (Law("truncnormal", (0.0, 1.0, 5.0, 6.0)), stats.truncnorm(5.0, 6.0)),
+        (Law("truncnormal", (0.0, 1.0, -5.0, -4.0)), stats.truncnorm(-5.0, -4.0)),
         (Law("uniform", (-1.0, 3.0)), stats.uniform(-1.0, 4.0)),
         (Law("triangular", (-1.0, 0.5, 3.0)), stats.triang(0.375, -1.0, 4.0)),
         (Law("triangular", (0.0, 0.0, 3.0)), stats.triang(0.0, 0.0, 3.0)),
@@ -419,6 +425,15 @@ def test_the_cost_is_told_beforehand(folder: Path) -> None:
         (("--random", "k=lognormal:1e6", "--samples", 16), "lognormal:MEDIAN,SIGMA"),
         (("--random", "k=lognormal:1e6,nan", "--samples", 16), "lognormal:MEDIAN,SIGMA"),
         (("--random", "k=gauss:1,2", "--samples", 16), "the laws are normal:MEAN,SD"),
+        (("--random", "k=weibull:2e6,-5", "--samples", 16), "SCALE and SHAPE must be positive"),
+        (("--random", "k=weibull:2e6,1e-3", "--samples", 16), "beyond the range"),
+        (("--random", "k=truncnormal:2e6,1,3e6,2e6", "--samples", 16), "A less than B"),
+        (("--random", "k=truncnormal:2e6,1,3e6,4e6", "--samples", 16), "1e-06 or more"),
+        (("--random", "k=truncnormal:2e6,1,3e6", "--samples", 16), "truncnormal:MEAN,SD,A,B"),
+        ((*UNIFORM, "--correlation", "k=0.5"), "NAME,NAME=RHO"),
+        ((*UNIFORM, "--correlation", "k,q=x"), "RHO of k,q must be a finite number"),
+        ((*UNIFORM, "--correlation", "k,q=0.5"), "is not a pair of random names (k)"),
+        (("--vary", "k=1e6", "--correlation", "k,q=0.5"), "--correlation needs --random"),
         (("--random", "k", "--samples", 16), "NAME=LAW"),
         (("--random", "layup=uniform:1,2", "--samples", 16), "the names are velocity"),
         (("--random", "kk=uniform:1,2", "--samples", 16), "the names are velocity"),

@@ -29,6 +29,8 @@ from fecm.sweeps.batch import deck_of
 from fecm.sweeps.case import Case, CasesError, Value
 from fecm.sweeps.cases import read_cases
 from fecm.sweeps.convergence import table as table_of
+from fecm.sweeps.copula import Pair, correlation_of, parse_correlation
+from fecm.sweeps.distributions import FORMS, Law, parse_random
 from fecm.sweeps.doubts import doubtful_values, freed
 from fecm.sweeps.expected import expected
 from fecm.sweeps.find import Until, parse_until
@@ -53,11 +55,9 @@ from fecm.sweeps.random import (
     DESIGNS,
     Design,
     DesignKind,
-    Law,
     cost,
     design_of,
     doubt,
-    parse_random,
     random_cases,
 )
 from fecm.sweeps.random_tables import tables
@@ -72,7 +72,15 @@ NAMED = [f"{name}=" for name in NAMES]  # for the shell's completion
 
 GROUPS = {
     "Cases": ("vary", "cases", "refine"),
-    "Random values": ("random", "samples", "seed", "design", "sensitivity", "exceed"),
+    "Random values": (
+        "random",
+        "correlation",
+        "samples",
+        "seed",
+        "design",
+        "sensitivity",
+        "exceed",
+    ),
     "Search": ("find", "until"),
     "Result": ("output", "history", "measure", "full", "overwrite"),
     "Computation": ("law", "model", "modes", "workers", "scheduler", "scheduler_file"),
@@ -88,6 +96,7 @@ class Options:
     cases: Path | None  # table of the cases
     refine: tuple[int, ...] | None
     random: tuple[tuple[str, Law], ...]
+    correlation: tuple[tuple[Pair, float], ...]
     samples: int | None
     seed: int | None
     design: DesignKind | None
@@ -139,7 +148,7 @@ class Options:
     def _check_random(self) -> None:
         """Raise UsageError if the options of random values do not fit together."""
         if not self.random:
-            for name in ("samples", "seed", "design", "exceed", "sensitivity"):
+            for name in ("correlation", "samples", "seed", "design", "exceed", "sensitivity"):
                 if getattr(self, name) not in (None, (), False):
                     raise click.UsageError(f"--{name} needs --random NAME=LAW")
             return
@@ -149,6 +158,8 @@ class Options:
             raise click.UsageError("--random needs --samples N")
         if len(dict(self.random)) < len(self.random):
             raise click.UsageError("--random: a name is given twice")
+        if len(dict(self.correlation)) < len(self.correlation):
+            raise click.UsageError("--correlation: a pair is given twice")
 
 
 @click.command(
@@ -185,8 +196,15 @@ class Options:
     "--random",
     type=Parsed(parse_random, "NAME=LAW", NAMED),
     multiple=True,
-    help="Random value: normal:MEAN,SD, lognormal:MEDIAN,SIGMA, uniform:A,B or "
-    "triangular:A,MODE,B; may be repeated, together with --vary.",
+    help=f"Random value: {', '.join(FORMS[:-1])} or {FORMS[-1]}; may be repeated, together with "
+    "--vary.",
+)
+@option(
+    "--correlation",
+    type=Parsed(parse_correlation, "NAME,NAME=RHO"),
+    multiple=True,
+    help="Correlation of two random values (of their normal scores, if their laws are not normal); "
+    "may be repeated.",
 )
 @option("--samples", type=int, metavar="N", help="Number of samples of --random.")
 @option("--seed", type=int, metavar="S", help="Seed of --random.  [default: 0]")
@@ -366,12 +384,16 @@ def _cases(problem: Problem, options: Options) -> tuple[list[Case], Design | Non
         given = read_cases(options.cases)
     if not options.random:
         return given, None
+    laws = dict(options.random)
     design = design_of(
-        dict(options.random),
+        laws,
         options.samples,
         options.seed or 0,
         options.design or "lhs",
         sensitivity=options.sensitivity,
+        correlation=(
+            correlation_of([*laws], dict(options.correlation)) if options.correlation else ()
+        ),
     )
     return random_cases(design, given), design
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from fecm._errors import warn
 from fecm.api import LoadedDeck, Progress, load_deck
@@ -23,6 +24,8 @@ from fecm.sweeps import schedule
 from fecm.sweeps.batch import deck_of
 from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.cases import Table, checked
+from fecm.sweeps.copula import Pair, correlation_of
+from fecm.sweeps.distributions import HasQuantiles, law_of
 from fecm.sweeps.doubts import doubtful_values
 from fecm.sweeps.grid import combined
 from fecm.sweeps.in_full import built
@@ -46,7 +49,6 @@ from fecm.sweeps.random import (
     DesignKind,
     design_of,
     doubt,
-    parse_law,
     random_cases,
 )
 from fecm.sweeps.reduced_check import compared, trials
@@ -203,7 +205,8 @@ def sweep(
     cases: Iterable[Mapping[str, Any]] | Table | None = None,
     *,
     refine: Sequence[int] | None = None,
-    random: Mapping[str, str] | None = None,
+    random: Mapping[str, str | HasQuantiles] | None = None,
+    correlation: Mapping[Pair, float] | ArrayLike | Table | None = None,
     samples: int | None = None,
     seed: int = 0,
     design: DesignKind = "lhs",
@@ -241,10 +244,14 @@ def sweep(
     refine : sequence of int, optional
         Factors 1, 2, 4, 8 or a part of them, instead: the sides of all elements and DT are divided
         by each.  :attr:`SweepResult.convergence` has orders, limits and error bands.
-    random : mapping of str to str, optional
-        Laws of random values by name: ``"normal:MEAN,SD"``, ``"lognormal:MEDIAN,SIGMA"``,
-        ``"uniform:A,B"`` or ``"triangular:A,MODE,B"``.  With `vary` all combinations get the same
-        draws.
+    random : mapping of str to str or distribution, optional
+        Laws of random values by name: ``"normal:MEAN,SD"``, ``"truncnormal:MEAN,SD,A,B"``,
+        ``"lognormal:MEDIAN,SIGMA"``, ``"weibull:SCALE,SHAPE"``, ``"uniform:A,B"`` or
+        ``"triangular:A,MODE,B"``; or an object whose method ``ppf`` gives its quantiles, such as a
+        frozen distribution of :mod:`scipy.stats`.  With `vary` all combinations get the same draws.
+    correlation : mapping of pair to float, array_like or DataFrame, optional
+        Correlations of the random values by pairs of names, or as a matrix in the order of
+        `random`; those of the normal scores of values with other laws.
     samples : int, optional
         Number of samples of the design; with `random`.
     seed : int
@@ -332,8 +339,9 @@ def sweep(
     >>> found["w"].shape
     (2,)
     """
-    if random is None and (samples is not None or seed or sensitivity or exceed):
-        raise CasesError("samples, seed, sensitivity and exceed need random values")
+    of_random = samples is not None or correlation is not None or sensitivity or exceed
+    if random is None and (of_random or seed):
+        raise CasesError("correlation, samples, seed, sensitivity and exceed need random values")
     _check_options(vary, cases, refine, random, until, build, measure)
     _check_means(workers, scheduler, executor)
     if progress is not None and not callable(progress):
@@ -345,8 +353,9 @@ def sweep(
     made = combined(grid, free=free) if cases is None else checked(cases, free=free)
     drawn = None
     if random is not None:
-        laws = {name: parse_law(name, law, free=free) for name, law in random.items()}
-        drawn = design_of(laws, samples, seed, design, sensitivity=sensitivity)
+        laws = {name: law_of(name, law, free=free) for name, law in random.items()}
+        joined = () if correlation is None else correlation_of([*laws], correlation)
+        drawn = design_of(laws, samples, seed, design, sensitivity=sensitivity, correlation=joined)
         made = random_cases(drawn, made)
         if text := doubt(drawn):
             warn(text)

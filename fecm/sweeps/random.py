@@ -1,162 +1,36 @@
-"""Random sweeps: laws of the random values, and designs of the samples that are drawn."""
+"""Random sweeps: designs of the samples that are drawn."""
 
 from __future__ import annotations
 
 import math
 import warnings
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Mapping, Sequence
 from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 
 from fecm._typing import Floats
 from fecm.sweeps.case import Case, CasesError, check_count
-from fecm.sweeps.values import (
-    NAMES,
-    PLATE_NAMES,
-    RESIDUAL_NAMES,
-    Kind,
-    check_free,
-    kind_of,
-    plate_values,
-)
+from fecm.sweeps.copula import Correlation, correlated
+from fecm.sweeps.distributions import Law, OwnLaw
+from fecm.sweeps.values import PLATE_NAMES, RESIDUAL_NAMES, plate_values
 
 DesignKind = Literal["lhs", "sobol", "mc"]
 DESIGNS: tuple[DesignKind, ...] = get_args(DesignKind)
 FEWEST_SAMPLES = 16
 MARGIN = 2.0**-31  # from unit samples to 0 and 1: half the resolution of a Sobol' sequence
-LARGEST_SIGMA = 3.0  # of a lognormal law
-DOUBTFUL_SIGMA = 1.0  # from which a note asks whether it is meant
-REMEDY = "lognormal, uniform and triangular can be kept to possible values"
-
-
-class Distribution(NamedTuple):
-    """A distribution with the parameters of its text."""
-
-    parameters: str
-    rule: str  # what must hold for the parameters
-    holds: Callable[..., bool]
-    quantile: Callable[..., Floats]  # of probabilities between 0 and 1 and the parameters
-
-
-def _standard_normal(probability: Floats) -> Floats:
-    from scipy.special import ndtri  # takes 0.1 s to import
-
-    return np.asarray(ndtri(probability))
-
-
-def _normal(probability: Floats, mean: float, deviation: float) -> Floats:
-    return mean + deviation * _standard_normal(probability)
-
-
-def _lognormal(probability: Floats, median: float, sigma: float) -> Floats:
-    return median * np.exp(sigma * _standard_normal(probability))
-
-
-def _uniform(probability: Floats, a: float, b: float) -> Floats:
-    return a + (b - a) * probability
-
-
-def _triangular(probability: Floats, a: float, mode: float, b: float) -> Floats:
-    below = a + np.sqrt(probability * (b - a) * (mode - a))
-    above = b - np.sqrt((1.0 - probability) * (b - a) * (b - mode))
-    return np.where(probability * (b - a) < mode - a, below, above)
-
-
-NORMAL = "normal"
-LOGNORMAL = "lognormal"
-LAWS = {
-    NORMAL: Distribution(
-        "MEAN,SD", "SD must be positive", lambda mean, deviation: deviation > 0.0, _normal
-    ),
-    LOGNORMAL: Distribution(
-        "MEDIAN,SIGMA",
-        "MEDIAN and SIGMA must be positive",
-        lambda median, sigma: median > 0.0 and sigma > 0.0,
-        _lognormal,
-    ),
-    "uniform": Distribution("A,B", "A must be less than B", lambda a, b: a < b, _uniform),
-    "triangular": Distribution(
-        "A,MODE,B",
-        "MODE must be from A to B, and A less than B",
-        lambda a, mode, b: a < b and a <= mode <= b,
-        _triangular,
-    ),
-}
-
-
-class Law(NamedTuple):
-    """Distribution of a value: one of :data:`LAWS` with its parameters."""
-
-    kind: str
-    parameters: tuple[float, ...]
-
-    def __str__(self) -> str:
-        return f"{self.kind}:{','.join(f'{value:.12g}' for value in self.parameters)}"
-
-    def values(self, unit: Floats) -> Floats:
-        """Values at which the distribution function takes these values, between 0 and 1."""
-        return LAWS[self.kind].quantile(unit, *self.parameters)
-
-
-def parse_law(name: str, text: str, *, free: bool = False) -> Law:
-    """Read ``LAW:PARAMETERS`` of a name (any with `free`); CasesError if one of them is invalid."""
-    _check_random(name, free=free)
-    kind, _, given = (part.strip() for part in str(text).partition(":"))
-    if kind not in LAWS:
-        laws = ", ".join(f"{known}:{LAWS[known].parameters}" for known in LAWS)
-        raise CasesError(f"{name}: `{text}` is not a law; the laws are {laws}")
-    known = LAWS[kind]
-    parameters: tuple[float, ...] = ()
-    with suppress(ValueError):
-        parameters = tuple(map(float, given.split(",")))
-    wanted = known.parameters.count(",") + 1
-    if len(parameters) != wanted or not all(map(math.isfinite, parameters)):
-        raise CasesError(f"{name}: `{text}` is not {kind}:{known.parameters} with finite numbers")
-    if not known.holds(*parameters):
-        raise CasesError(f"{name}: `{text}`: {known.rule}")
-    law = Law(kind, parameters)
-    if kind == LOGNORMAL and parameters[1] > LARGEST_SIGMA:
-        raise CasesError(f"{name}: {_of_logarithm(law)}; it is at most {LARGEST_SIGMA:g}")
-    return law
-
-
-def _check_random(name: str, *, free: bool) -> None:
-    """Raise CasesError if a name can't have random values."""
-    if free:
-        check_free(name, "random")
-        return
-    numbers = [known for known in NAMES if kind_of(known) is Kind.NUMBER]
-    if name not in numbers:
-        raise CasesError(f"`{name}` cannot be random; the names are {', '.join(numbers)}")
-
-
-def _of_logarithm(law: Law) -> str:
-    """Say that SIGMA of a lognormal law is that of the logarithm, and what it would be of an SD."""
-    median, sigma = law.parameters
-    # The variance is m^2 s (s - 1) with the median m and s = exp(SIGMA^2).
-    meant = math.sqrt(math.log(0.5 + 0.5 * math.hypot(1.0, 2.0 * sigma / median)))
-    text = f"SIGMA of {law} is the standard deviation of the logarithm"
-    return f"{text}; a standard deviation of {sigma:g} is SIGMA {meant:.2g}"
-
-
-def parse_random(text: str) -> tuple[str, Law]:
-    """Read ``NAME=LAW:PARAMETERS``; CasesError if the text has another form, or is invalid."""
-    name, equals, law = (part.strip() for part in text.partition("="))
-    if not equals:
-        raise CasesError(f"`{text}`: write NAME=LAW, such as k=lognormal:1.9e6,0.15")
-    return name, parse_law(name, law)
+REMEDY = "truncnormal, lognormal, weibull, uniform and triangular can be kept to possible values"
 
 
 class Design(NamedTuple):
     """Design of a random sweep."""
 
-    laws: dict[str, Law]  # by the names of the random values
+    laws: Mapping[str, Law | OwnLaw]  # by the names of the random values
     samples: int
     seed: int = 0
     kind: DesignKind = "lhs"
     sensitivity: bool = False  # whether all cases of the sensitivity indices are run
+    correlation: Correlation = ()  # of the normal scores, in the order of laws; empty if none
 
     @property
     def draws(self) -> int:
@@ -170,7 +44,13 @@ class Design(NamedTuple):
 
 
 def design_of(
-    laws: Mapping[str, Law], samples: int | None, seed: int, kind: DesignKind, sensitivity: bool
+    laws: Mapping[str, Law | OwnLaw],
+    samples: int | None,
+    seed: int,
+    kind: DesignKind,
+    *,
+    sensitivity: bool,
+    correlation: Correlation = (),
 ) -> Design:
     """Check and create a design.  Raises CasesError if it is invalid."""
     for name, value in (("samples", samples), ("seed", seed)):
@@ -182,16 +62,16 @@ def design_of(
         raise CasesError(f"unknown design {kind}; the designs are {', '.join(DESIGNS)}")
     if seed < 0:
         raise CasesError(f"the seed must not be negative, not {seed}")
-    return Design(dict(laws), int(samples), int(seed), kind, sensitivity)
+    if sensitivity and correlation:
+        raise CasesError(
+            "Sobol' indices are those of independent values; leave out sensitivity or correlation"
+        )
+    return Design(dict(laws), int(samples), int(seed), kind, sensitivity, correlation)
 
 
 def doubt(design: Design) -> str:
     """What is doubtful about a design; empty if nothing is."""
-    texts = [
-        f"{name}: {_of_logarithm(law)}"
-        for name, law in design.laws.items()
-        if law.kind == LOGNORMAL and law.parameters[1] >= DOUBTFUL_SIGMA
-    ]
+    texts = [f"{name}: {text}" for name, law in design.laws.items() if (text := law.doubt())]
     if design.kind == "sobol" and design.samples & (design.samples - 1):
         why = "no power of 2, which a Sobol' design needs to be balanced"
         nearest = 2 ** round(math.log2(design.samples))
@@ -223,12 +103,15 @@ def matrix(design: Design) -> Floats:
     """
     count, halves = len(design.laws), 2 if design.sensitivity else 1
     unit = unit_samples(design.kind, design.samples, count * halves, design.seed)
+    if design.correlation:
+        scores = correlated(unit, design.correlation, stratified=design.kind == "lhs")
+        unit = np.clip(scores, MARGIN, 1.0 - MARGIN)
     values = np.empty_like(unit)
     for place, (name, law) in enumerate(design.laws.items()):
-        with np.errstate(over="ignore"):
+        try:
             values[:, place::count] = law.values(unit[:, place::count])
-        if not np.isfinite(values[:, place::count]).all():
-            raise CasesError(f"{name}: {law} is beyond the range of numbers")
+        except CasesError as error:
+            raise CasesError(f"{name}: {error}") from error.__cause__
     if not design.sensitivity:
         return values
     a, b = np.hsplit(values, 2)

@@ -10,8 +10,10 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.results.errors import ResultFileError
 from fecm.results.metrics import COLUMNS, VERDICTS
+from fecm.sweeps.copula import correlation_of
+from fecm.sweeps.distributions import Law, OwnLaw
 from fecm.sweeps.outcome import Column
-from fecm.sweeps.random import DESIGNS, Design, Law
+from fecm.sweeps.random import DESIGNS, Design
 from fecm.sweeps.random_result import Columns, Exceedance, RandomResult, exceedances
 from fecm.sweeps.statistics import INTERVAL_ENDS, QUANTILES, Indices, Statistics
 
@@ -25,6 +27,7 @@ INDEX_PARTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "first_interval": ("its 95 % interval", ("laws", "bounds")),
     "total_interval": ("its 95 % interval", ("laws", "bounds")),
 }
+OWN = "own"  # instead of the name of a law: that of an object, of which the file has a text
 GROUPS = {
     "random": "laws of the random values",
     "design": "design that the random values were drawn from",
@@ -82,8 +85,14 @@ def attributes(random: RandomResult) -> dict[str, dict[str, Any]]:
     }
     about = {name: getattr(design, name) for name in ("kind", "samples", "seed", "sensitivity")}
     made["design"] |= {**about, "names": list(design.laws), "notes": random.notes}
+    if design.correlation:
+        made["design"]["correlation"] = np.array(design.correlation)
     for name, law in design.laws.items():
-        made[f"random/{name}"] = {"law": law.kind, "parameters": np.array(law.parameters)}
+        made[f"random/{name}"] = (
+            {"law": law.kind, "parameters": np.array(law.parameters)}
+            if isinstance(law, Law)
+            else {"law": OWN, "text": law.text}
+        )
     return made
 
 
@@ -118,13 +127,21 @@ def random_of(
 def _design(contents: Contents) -> Design:
     groups = contents.groups
     about = groups["design"]
-    laws = {}
+    laws: dict[str, Law | OwnLaw] = {}
     for name in about["names"]:
         law = groups[f"random/{name}"]
-        laws[name] = Law(str(law["law"]), tuple(map(float, law["parameters"])))
-    kind = DESIGNS[DESIGNS.index(about["kind"])]
-    samples, seed = int(about["samples"]), int(about["seed"])
-    return Design(laws, samples, seed, kind, bool(about["sensitivity"]))
+        if law["law"] == OWN:
+            laws[name] = OwnLaw(str(law["text"]))
+        else:
+            laws[name] = Law(str(law["law"]), tuple(map(float, law["parameters"])))
+    return Design(
+        laws,
+        samples=int(about["samples"]),
+        seed=int(about["seed"]),
+        kind=DESIGNS[DESIGNS.index(about["kind"])],
+        sensitivity=bool(about["sensitivity"]),
+        correlation=correlation_of([*laws], about["correlation"]) if "correlation" in about else (),
+    )
 
 
 def _numbers(contents: Contents, path: str, shape: tuple[int, ...]) -> Floats:

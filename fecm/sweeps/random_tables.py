@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from fecm.sweeps.copula import pairs_of
 from fecm.sweeps.limits import THRESHOLD
 from fecm.sweeps.random_result import RandomResult
 from fecm.sweeps.statistics import QUANTILES
@@ -26,6 +27,11 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
     design, found = random.design, random.exceedance
     lines = [f"design            {design.kind}, {design.samples} samples, seed {design.seed}"]
     lines += [f"random            {name} {law}" for name, law in design.laws.items()]
+    lines += [
+        f"correlation       {a}, {b} {value:.6g}"
+        for (a, b), value in pairs_of([*design.laws], design.correlation).items()
+        if value
+    ]
     chosen = [name for name in MAIN if name in random.statistics][:MOST_PRINTED]
     labels = ["mean", "std. dev.", *(f"{q:.0%}".replace("%", " %") for q in QUANTILES)]
     count = len(next(iter(random.combinations.values()), [0]))

@@ -18,7 +18,8 @@ from fecm.mechanics.half_space import (
     ply_stiffness,
 )
 from fecm.sweeps.convergence import convergence
-from fecm.sweeps.random import Design, Law, matrix
+from fecm.sweeps.distributions import Law
+from fecm.sweeps.random import Design, matrix
 from fecm.sweeps.statistics import indices, statistics, wilson
 from fecm.verification import decks
 from fecm.verification.case import Value, case

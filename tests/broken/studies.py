@@ -6,7 +6,7 @@ import numpy as np
 
 from fecm.identification import fitting
 from fecm.mechanics import half_space
-from fecm.sweeps import convergence, statistics
+from fecm.sweeps import convergence, distributions, statistics
 from fecm.sweeps import random as random_values
 from fecm.sweeps.convolution import Convolution
 from tests.breaks import (
@@ -26,7 +26,7 @@ BREAKS: Breaks = {
         instead(random_values, "matrix", exchanged_matrices), {"random-values": ("first", "total")},
     ),
     "the median of a lognormal law taken for its mean": (
-        instead(random_values.Law, "values",
+        instead(distributions.Law, "values",
                 lambda right, law, unit: right(law, unit) * np.exp(-law.parameters[1] ** 2 / 2.0)),
         {"random-values": ("mean", "its")},
     ),

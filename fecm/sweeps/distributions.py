@@ -1,0 +1,261 @@
+"""Distributions of random values: named ones with parameters, and objects of the caller."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from fecm._text import shown
+from fecm._typing import Floats
+from fecm.sweeps.case import CasesError
+from fecm.sweeps.values import NAMES, Kind, check_free, kind_of
+
+LARGEST_SIGMA = 3.0  # of a lognormal law
+DOUBTFUL_SIGMA = 1.0  # from which a note asks whether it is meant
+DOUBTFUL_SHAPE = 200.0  # of a Weibull law, likewise
+LEAST_PART = 1e-6  # of a normal law, that is left of it between two ends
+LONGEST = 80  # characters of the text of an object
+
+
+class HasQuantiles(Protocol):
+    """A distribution that gives its quantiles, such as a frozen one of :mod:`scipy.stats`."""
+
+    def ppf(self, probabilities: Any, /) -> Any:
+        """Return the values (n,) at which the distribution function is `probabilities` (n,)."""
+
+
+class Distribution(NamedTuple):
+    """A distribution with the parameters of its text."""
+
+    parameters: str
+    rule: str  # what must hold for the parameters
+    holds: Callable[..., bool]
+    quantile: Callable[..., Floats]  # of probabilities between 0 and 1 and the parameters
+
+
+def standard_normal(probability: Floats) -> Floats:
+    """Quantiles of the standard normal distribution."""
+    from scipy.special import ndtri  # takes 0.1 s to import
+
+    return np.asarray(ndtri(probability))
+
+
+def standard_normal_probability(values: Floats | float) -> Floats:
+    """Values of the distribution function of the standard normal distribution."""
+    from scipy.special import ndtr  # takes 0.1 s to import
+
+    return np.asarray(ndtr(values))
+
+
+def _normal(probability: Floats, mean: float, deviation: float) -> Floats:
+    return mean + deviation * standard_normal(probability)
+
+
+def _truncated(probability: Floats, mean: float, deviation: float, a: float, b: float) -> Floats:
+    if a > mean:  # mirrored, because the upper tail has fewer digits than the lower
+        return -_truncated(1.0 - probability, -mean, deviation, -b, -a)
+    below, up_to = standard_normal_probability((np.array([a, b]) - mean) / deviation)
+    values = mean + deviation * standard_normal(below + probability * (up_to - below))
+    return np.clip(values, a, b)
+
+
+def _has_part(mean: float, deviation: float, a: float, b: float) -> bool:
+    """Whether a normal law can be truncated to what is between two ends."""
+    if not (deviation > 0.0 and a < b):
+        return False
+    ends = (np.array([a, b]) - mean) / deviation
+    below, up_to = standard_normal_probability(ends if a <= mean else -ends[::-1])
+    return bool(up_to - below >= LEAST_PART)
+
+
+def _lognormal(probability: Floats, median: float, sigma: float) -> Floats:
+    return median * np.exp(sigma * standard_normal(probability))
+
+
+def _weibull(probability: Floats, scale: float, shape: float) -> Floats:
+    return scale * (-np.log1p(-probability)) ** (1.0 / shape)
+
+
+def _uniform(probability: Floats, a: float, b: float) -> Floats:
+    return a + (b - a) * probability
+
+
+def _triangular(probability: Floats, a: float, mode: float, b: float) -> Floats:
+    below = a + np.sqrt(probability * (b - a) * (mode - a))
+    above = b - np.sqrt((1.0 - probability) * (b - a) * (b - mode))
+    return np.where(probability * (b - a) < mode - a, below, above)
+
+
+NORMAL = "normal"
+LOGNORMAL = "lognormal"
+WEIBULL = "weibull"
+LAWS = {
+    NORMAL: Distribution(
+        "MEAN,SD", "SD must be positive", lambda mean, deviation: deviation > 0.0, _normal
+    ),
+    "truncnormal": Distribution(
+        "MEAN,SD,A,B",
+        f"SD must be positive, A less than B, and {LEAST_PART:g} or more of normal:MEAN,SD from "
+        "A to B",
+        _has_part,
+        _truncated,
+    ),
+    LOGNORMAL: Distribution(
+        "MEDIAN,SIGMA",
+        "MEDIAN and SIGMA must be positive",
+        lambda median, sigma: median > 0.0 and sigma > 0.0,
+        _lognormal,
+    ),
+    WEIBULL: Distribution(
+        "SCALE,SHAPE",
+        "SCALE and SHAPE must be positive",
+        lambda scale, shape: scale > 0.0 and shape > 0.0,
+        _weibull,
+    ),
+    "uniform": Distribution("A,B", "A must be less than B", lambda a, b: a < b, _uniform),
+    "triangular": Distribution(
+        "A,MODE,B",
+        "MODE must be from A to B, and A less than B",
+        lambda a, mode, b: a < b and a <= mode <= b,
+        _triangular,
+    ),
+}
+FORMS = tuple(f"{name}:{known.parameters}" for name, known in LAWS.items())
+
+
+class Law(NamedTuple):
+    """Distribution of a value: one of :data:`LAWS` with its parameters."""
+
+    kind: str
+    parameters: tuple[float, ...]
+
+    def __str__(self) -> str:
+        return f"{self.kind}:{','.join(f'{value:.12g}' for value in self.parameters)}"
+
+    def values(self, unit: Floats) -> Floats:
+        """Values at which the distribution function takes these values, between 0 and 1."""
+        with np.errstate(over="ignore"):
+            values = LAWS[self.kind].quantile(unit, *self.parameters)
+        if not np.isfinite(values).all():
+            raise CasesError(f"{self} is beyond the range of numbers")
+        return values
+
+    def doubt(self) -> str:
+        """What is doubtful about the parameters; empty if nothing is."""
+        last = self.parameters[-1]
+        if self.kind == LOGNORMAL and last >= DOUBTFUL_SIGMA:
+            return _of_logarithm(self)
+        if self.kind == WEIBULL and last >= DOUBTFUL_SHAPE:
+            # The standard deviation is pi/(sqrt(6) SHAPE) of SCALE for a large SHAPE.
+            share = math.pi / (math.sqrt(6.0) * last)
+            return f"SHAPE of {self} is a standard deviation of {share:.2g} SCALE"
+        return ""
+
+
+@dataclass(frozen=True)
+class OwnLaw:
+    """Distribution of a value that is an object of the caller."""
+
+    text: str  # that describes it
+    source: HasQuantiles | None = field(default=None, compare=False)  # None if read from a file
+
+    def __str__(self) -> str:
+        return self.text
+
+    def values(self, unit: Floats) -> Floats:
+        """Values at which the distribution function takes these values, between 0 and 1."""
+        if self.source is None:
+            raise CasesError(f"a file has the draws of {self}, not the law")
+        try:
+            values = np.asarray(self.source.ppf(unit.ravel()), dtype=float)
+        except Exception as error:  # of the caller's function
+            raise CasesError(f"ppf of {self} failed: {error}") from error
+        if values.shape != (unit.size,):
+            shape = f"{values.shape} for probabilities {(unit.size,)}"
+            raise CasesError(f"ppf of {self} gives values of the shape {shape}")
+        if not np.isfinite(values).all():
+            raise CasesError(f"ppf of {self} gives values that are not finite")
+        return values.reshape(unit.shape)
+
+    def doubt(self) -> str:
+        """What is doubtful: nothing is known."""
+        return ""
+
+
+def law_of(name: str, given: str | HasQuantiles, *, free: bool = False) -> Law | OwnLaw:
+    """The law of a name (any with `free`): a text, or an object with a method ``ppf``.
+
+    Raises CasesError if it is neither, or a parameter is invalid.
+    """
+    if isinstance(given, str):
+        return parse_law(name, given, free=free)
+    _check_random(name, free=free)
+    if not callable(getattr(given, "ppf", None)):
+        raise CasesError(
+            f"{name}: {given!r} is not a law; write a text such as 'normal:115,10', or an object "
+            "with the method ppf, as the distributions of scipy.stats are"
+        )
+    return OwnLaw(_text_of(given), given)
+
+
+def _text_of(law: HasQuantiles) -> str:
+    """An object in words: name and parameters if it is a distribution of scipy, or its repr."""
+    kind = getattr(law, "dist", law)
+    text = type(law).__name__ if type(law).__repr__ is object.__repr__ else repr(law)
+    if isinstance(name := getattr(kind, "name", None), str):
+        named = [f"{key}={value}" for key, value in getattr(law, "kwds", {}).items()]
+        text = f"{name}({', '.join([*map(str, getattr(law, 'args', ())), *named])})"
+    return shown(" ".join(text.split()), LONGEST)
+
+
+def parse_law(name: str, text: str, *, free: bool = False) -> Law:
+    """Read ``LAW:PARAMETERS`` of a name (any with `free`); CasesError if one of them is invalid."""
+    _check_random(name, free=free)
+    kind, _, given = (part.strip() for part in str(text).partition(":"))
+    if kind not in LAWS:
+        raise CasesError(f"{name}: `{text}` is not a law; the laws are {', '.join(FORMS)}")
+    known = LAWS[kind]
+    parameters: tuple[float, ...] = ()
+    with suppress(ValueError):
+        parameters = tuple(map(float, given.split(",")))
+    wanted = known.parameters.count(",") + 1
+    if len(parameters) != wanted or not all(map(math.isfinite, parameters)):
+        raise CasesError(f"{name}: `{text}` is not {kind}:{known.parameters} with finite numbers")
+    if not known.holds(*parameters):
+        raise CasesError(f"{name}: `{text}`: {known.rule}")
+    law = Law(kind, parameters)
+    if kind == LOGNORMAL and parameters[1] > LARGEST_SIGMA:
+        raise CasesError(f"{name}: {_of_logarithm(law)}; it is at most {LARGEST_SIGMA:g}")
+    return law
+
+
+def _check_random(name: str, *, free: bool) -> None:
+    """Raise CasesError if a name can't have random values."""
+    if free:
+        check_free(name, "random")
+        return
+    numbers = [known for known in NAMES if kind_of(known) is Kind.NUMBER]
+    if name not in numbers:
+        raise CasesError(f"`{name}` cannot be random; the names are {', '.join(numbers)}")
+
+
+def _of_logarithm(law: Law) -> str:
+    """Say that SIGMA of a lognormal law is that of the logarithm, and what it would be of an SD."""
+    median, sigma = law.parameters
+    # The variance is m^2 s (s - 1) with the median m and s = exp(SIGMA^2).
+    meant = math.sqrt(math.log(0.5 + 0.5 * math.hypot(1.0, 2.0 * sigma / median)))
+    text = f"SIGMA of {law} is the standard deviation of the logarithm"
+    return f"{text}; a standard deviation of {sigma:g} is SIGMA {meant:.2g}"
+
+
+def parse_random(text: str) -> tuple[str, Law]:
+    """Read ``NAME=LAW:PARAMETERS``; CasesError if the text has another form, or is invalid."""
+    name, equals, law = (part.strip() for part in text.partition("="))
+    if not equals:
+        raise CasesError(f"`{text}`: write NAME=LAW, such as k=lognormal:1.9e6,0.15")
+    return name, parse_law(name, law)
