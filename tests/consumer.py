@@ -43,6 +43,7 @@ measured: fecm.SweepResult = fecm.sweep(
 )
 fecm.assert_same(sweep, "sweep.h5")
 sweep.export("forces.csv", "history")
+tabled: fecm.SweepResult = fecm.sweep(deck, cases=sweep.to_dataframe())
 peaks: xarray.DataArray = sweep.to_xarray().peak_force
 drawn: fecm.SweepResult = fecm.sweep(
     deck,
@@ -52,6 +53,25 @@ drawn: fecm.SweepResult = fecm.sweep(
     design="sobol",
     sensitivity=True,
     exceed={"peak_force": [500.0]},
+)
+
+
+class Measured:
+    """A law with the quantiles of three measured values."""
+
+    def ppf(self, probabilities: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Return quantiles."""
+        return np.quantile([1.8e6, 1.9e6, 2.1e6], probabilities)
+
+
+joint: fecm.SweepResult = fecm.sweep(
+    deck,
+    random={"k": Measured(), "e1": "weibull:140e3,20", "e2": "truncnormal:9e3,5e2,0,2e4"},
+    correlation={("e1", "e2"): 0.6},
+    samples=16,
+)
+matched: fecm.SweepResult = fecm.sweep(
+    deck, random={"k": "normal:1e6,1e5", "q": "uniform:2,3"}, correlation=np.eye(2), samples=16
 )
 if drawn.random is not None:
     mean: float = float(drawn.random.statistics["peak_force"].mean)
@@ -137,6 +157,7 @@ fecm.run_one("plate.inp", mode="raport")  # type: ignore[arg-type]  # pyright: i
 fecm.run_one("plate.inp", solver="gpu")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.sweep(deck, {"velocity": 5.0})  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
 fecm.sweep(deck, random={"k": 3.0}, samples=16)  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
+fecm.sweep(deck, correlation={"e1": 0.6})  # type: ignore[dict-item]  # pyright: ignore[reportArgumentType]
 fecm.sweep(deck, until="treshold")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.sweep(deck, {"k": [1e6]}, executor=2)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 result.export("plate.vtu", to="vtu")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
