@@ -9,6 +9,7 @@ from typing import BinaryIO, Literal
 
 from fecm._errors import warn
 from fecm._frozen import frozen
+from fecm._progress import once_a_minute
 from fecm.deck.findings import DeckError, Finding, Severity
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, read_deck
@@ -399,10 +400,14 @@ def _run_one(
     problem: Problem, choices: RunOptions, path: Path | None, progress: Progress | None
 ) -> Result:
     """Run one problem, into a file if there is a path."""
+    due = once_a_minute()
 
     def report(simulation: Simulation) -> None:
+        step, steps = simulation.state.plate.step, problem.work.steps
         if progress is not None:
-            progress(simulation.state.plate.step, problem.work.steps)
+            progress(step, steps)
+        if due():
+            LOGGER.info("%s: step %d of %d", problem.deck.title, step, steps)
 
     if path is None:
         memory = MemorySink()

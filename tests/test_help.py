@@ -10,7 +10,7 @@ import click
 import pytest
 
 from fecm import examples
-from fecm.cli import cli, common
+from fecm.cli import cli
 from tests.calls import assert_unusable, call
 from tests.decks import APPENDIX, small
 
@@ -137,16 +137,3 @@ def test_a_deck_in_place_of_a_result_is_told_to_be_run(
     done = call(*arguments, "d.inp", cwd=tmp_path)
     assert_unusable(done)
     assert "d.inp is a deck, not a result; `fecm run d.inp` makes one" in done.stderr
-
-
-def test_a_run_without_a_terminal_says_once_a_minute_how_far_it_is(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    now = 0.0
-    monkeypatch.setattr(common, "clock", lambda: now)
-    with common.progress("fecm", 1000, lambda _: "5 cases a second") as advance:
-        for step in range(1, 6):
-            now = 25.0 * step
-            advance(100)
-    lines = capsys.readouterr().err.splitlines()
-    assert lines == ["fecm: 300 of 1000 done, 5 cases a second"]

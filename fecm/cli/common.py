@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import contextlib
 import sys
+import threading
 from collections.abc import Callable, Iterator
+from itertools import count
 from pathlib import Path
-from time import monotonic as clock
 
 import click
 
 from fecm._errors import FecmError
 from fecm._files import writing
 from fecm._json import jsonable
+from fecm._progress import MINUTE
 from fecm._text import printable
 
 # Exit statuses.
@@ -20,7 +22,6 @@ FAILED = 1  # a check
 UNUSABLE = 2
 INTERRUPTED = 130
 
-MINUTE = 60.0  # seconds between two lines about the progress
 DASH = Path("-")  # standard input or output
 
 
@@ -69,7 +70,18 @@ def progress(
         yield lambda steps: None
         return
     if not sys.stderr.isatty():
-        yield _by_the_minute(label, length, remark)
+        done = 0
+
+        def advance(steps: int) -> None:
+            nonlocal done
+            done += steps
+
+        def line(minutes: int) -> str:
+            more = remark(None) if remark is not None else ""
+            return f"{label}: {done} of {length} done after {minutes} min{more and ', '}{more}"
+
+        with every_minute(line):
+            yield advance
         return
     with click.progressbar(
         length=length, label=label, file=sys.stderr, item_show_func=remark
@@ -77,21 +89,32 @@ def progress(
         yield bar.update
 
 
-def _by_the_minute(
-    label: str, length: int, remark: Callable[[object], str] | None
-) -> Callable[[int], object]:
-    """Return a function that counts steps, and at most once a minute says how many are done."""
-    done, last = 0, clock()
+@contextlib.contextmanager
+def every_minute(line: Callable[[int], str]) -> Iterator[None]:
+    """Print a line for every minute that the block takes, unless standard error is a terminal.
 
-    def advance(steps: int) -> None:
-        nonlocal done, last
-        done += steps
-        if clock() - last >= MINUTE:
-            last = clock()
-            more = remark(None) if remark is not None else ""
-            echo(f"{label}: {done} of {length} done{more and ', '}{more}", err=True)
+    `line` takes the number of minutes.  A thread prints, because the block may be a single call.
+    """
+    if sys.stderr.isatty():
+        yield
+        return
+    ended = threading.Event()
 
-    return advance
+    def tell() -> None:
+        for minutes in count(1):
+            if ended.wait(MINUTE):
+                return
+            echo(line(minutes), err=True)
+
+    teller = threading.Thread(target=tell, daemon=True)
+    with contextlib.suppress(RuntimeError):  # no more threads: the block goes on without lines
+        teller.start()
+    try:
+        yield
+    finally:
+        ended.set()
+        if teller.ident is not None:
+            teller.join()
 
 
 def write_text(path: Path, text: str, *, overwrite: bool) -> None:

@@ -8,7 +8,7 @@ import click
 from click import option
 
 from fecm._frozen import frozen
-from fecm.cli.common import DASH, FAILED, echo, echo_json, note
+from fecm.cli.common import DASH, FAILED, echo, echo_json, every_minute, note
 from fecm.cli.decks import load_single
 from fecm.cli.help import typical
 from fecm.cli.options import (
@@ -24,10 +24,11 @@ from fecm.cli.options import (
 )
 from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
+from fecm.deck.model import Deck
 from fecm.deck.units import unit_names, unit_of
 from fecm.identification.identify import CARDS, FREE, Identification, fit
 from fecm.mechanics.own_law import own_law
-from fecm.results.comparison import measurement_of
+from fecm.results.comparison import Measurement, measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
 
 
@@ -99,7 +100,7 @@ def identify(options: Options) -> None:
     problem = load_single(options.deck, "identify")
     units = unit_names(problem.deck)
     measured = measurement_of(options.measured, units)
-    found = fit(problem.deck, measured, options.free, options.sensor, own_law(options.law))
+    found = _fit(problem.deck, measured, options)
     targets.draw("histories:fit_picture", found, units)
     if output is not None:
         write_lines([found.deck.to_text()], output, overwrite=overwrite)
@@ -111,6 +112,19 @@ def identify(options: Options) -> None:
         echo("\n".join(_page(found, unit_of("force", units))))
     if not found.accepted:
         raise SystemExit(FAILED)
+
+
+def _fit(deck: Deck, measured: Measurement, options: Options) -> Identification:
+    """Fit, and say once a minute how many forces have been computed."""
+    forces = 0
+
+    def computed(more: int) -> None:
+        nonlocal forces
+        forces += more
+
+    with every_minute(lambda minutes: f"fecm: {forces} trial forces after {minutes} min"):
+        law = own_law(options.law)
+        return fit(deck, measured, options.free, options.sensor, law, computed)
 
 
 def _document(found: Identification) -> dict[str, object]:

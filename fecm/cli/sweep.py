@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 
 import click
@@ -11,7 +12,7 @@ from click import option
 from fecm._files import check_outputs
 from fecm._frozen import frozen
 from fecm.api import load_deck
-from fecm.cli.common import FAILED, RefusedError, echo, note, progress
+from fecm.cli.common import FAILED, RefusedError, echo, every_minute, note, progress
 from fecm.cli.decks import count_findings
 from fecm.cli.help import GroupedCommand, typical
 from fecm.cli.interrupts import signals
@@ -462,6 +463,11 @@ def _carry_out(
         raise
 
 
+def _in_full_for(case: int, minutes: int) -> str:
+    """Line about a case that is run in full."""
+    return f"fecm: case {case} is run in full, {minutes} min so far"
+
+
 def _run_in_full(planned: Plan, fulls: dict[int, Path], *, overwrite: bool) -> None:
     """Run chosen cases with all rows that their deck stores."""
     for case, path in fulls.items():
@@ -469,7 +475,10 @@ def _run_in_full(planned: Plan, fulls: dict[int, Path], *, overwrite: bool) -> N
             prepared = load_deck(deck_of(planned, case))
             if errors := prepared.errors(force=True):
                 raise CasesError(errors[0].message)
-            with hdf5_writer.writing(path, overwrite=overwrite) as sink:
+            with (
+                every_minute(partial(_in_full_for, case)),
+                hdf5_writer.writing(path, overwrite=overwrite) as sink,
+            ):
                 simulate(prepared.problems[0], sink, RunOptions(law=planned.settings.law))
         except (CasesError, LawError, ArithmeticError) as error:
             note(f"case {case} was not run in full: {error}")

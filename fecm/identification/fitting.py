@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple
@@ -53,6 +53,7 @@ class Model(NamedTuple):
     runs: Runs
     sensor: Filter | None
     law: Law | None = None  # a user's contact law instead of the deck's
+    computed: Callable[[int], object] = lambda forces: None  # called with the number of forces
 
     def strike(self, values: Mapping[str, float]) -> Strike:
         """Strike of the deck with values, under the law of this model."""
@@ -66,6 +67,7 @@ class Model(NamedTuple):
         if self.law is not None and len(failed):  # the run alone tells why
             one = self.runs({0: self.strike(trials[failed[0]])}, True)
             raise IdentifyError(str(one.status[0]))
+        self.computed(len(trials))
         steps = found.force.shape[1]
         clock = float(found.columns["dt"][0]) * np.arange(-steps, steps + 1.0)
         forces = np.vstack([np.zeros((steps + 1, len(trials))), found.force.T])

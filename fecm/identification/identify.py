@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -234,8 +234,12 @@ def fit(
     free: Sequence[str],
     sensor: Filter | None = None,
     law: Law | None = None,
+    computed: Callable[[int], object] = lambda forces: None,
 ) -> Identification:
-    """Fit parameters of a deck to a measurement; see :func:`identify`."""
+    """Fit parameters of a deck to a measurement; see :func:`identify`.
+
+    `computed` is called with the number of forces whenever some have been computed.
+    """
     if not free or not set(free) <= set(FREE) or len(set(free)) < len(free):
         given = ", ".join(map(str, free)) or "none"
         raise StudyError(f"can't fit {given}; fit different ones of {', '.join(FREE)}")
@@ -243,7 +247,7 @@ def fit(
         check_law(law, free)
     units = unit_names(deck)
     sensor = None if sensor is None else sensor.in_unit(units.get("time", ""))
-    model = Model(deck, _shared(deck), sensor, law)
+    model = Model(deck, _shared(deck), sensor, law, computed)
     clock, own = model.histories([{}])
     width = check_measured(measured, clock, own[:, 0], units)
     if len(measured.time) < POINTS:

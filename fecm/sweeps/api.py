@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecm._errors import warn
-from fecm.api import LoadedDeck, Progress, load_deck
+from fecm._progress import once_a_minute
+from fecm.api import LOGGER, LoadedDeck, Progress, load_deck
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
 from fecm.mechanics.contact_law import Law
@@ -383,6 +384,7 @@ def sweep(
         warn(text)
     here = workers if executor is None else getattr(executor, "_max_workers", 0)
     check_memory(problem, planned, 0 if scheduler is not None else here)
+    LOGGER.info("%s: %d cases", problem.deck.title, len(made))
     result = carry_out(
         problem,
         planned,
@@ -489,6 +491,7 @@ class _Watch:
     def __init__(self, cases: int, progress: Progress | None, *, same_names: bool) -> None:
         self.cases, self.progress, self.same_names = cases, progress, same_names
         self.finished = 0
+        self.due = once_a_minute()
         self.first: dict[str, int] = {}  # case by the names that it was the first to have
 
     def __call__(self, task: Task, outcome: Outcome) -> None:
@@ -502,3 +505,5 @@ class _Watch:
         self.finished += len(task.numbers)
         if self.progress is not None:
             self.progress(self.finished, self.cases)
+        if self.due():
+            LOGGER.info("%d of %d cases done", self.finished, self.cases)
