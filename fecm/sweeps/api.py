@@ -334,6 +334,13 @@ def sweep(
     >>> found.random.statistics["peak_force"].quantiles.shape
     (5,)
 
+    >>> from scipy.stats import gamma
+    >>> found = sweep("decks/appendix.inp",
+    ...               random={"k": gamma(40, scale=5e4), "velocity": "truncnormal:115,9,90,140"},
+    ...               correlation={("k", "velocity"): 0.5}, samples=16)
+    >>> bool(90.0 < found["velocity"].min() < found["velocity"].max() < 140.0)
+    True
+
     >>> def largest_w(result):
     ...     return {"w": result.plate_w.max()}
     >>> found = sweep("decks/appendix.inp", {"velocity": [50.0, 115.0]}, measure=largest_w)

@@ -162,15 +162,19 @@ class OwnLaw:
     """Distribution of a value that is an object of the caller."""
 
     text: str  # that describes it
-    source: HasQuantiles | None = field(default=None, compare=False)  # None if read from a file
+    source: HasQuantiles | None = field(default=None, compare=False)  # None if it was read
 
     def __str__(self) -> str:
         return self.text
 
+    def __reduce__(self) -> tuple[object, ...]:
+        """Pickle the text, so that a result does not depend on whether its laws can be pickled."""
+        return OwnLaw, (self.text,)
+
     def values(self, unit: Floats) -> Floats:
         """Values at which the distribution function takes these values, between 0 and 1."""
         if self.source is None:
-            raise CasesError(f"a file has the draws of {self}, not the law")
+            raise CasesError(f"a stored result has the draws of {self}, not the law")
         try:
             values = np.asarray(self.source.ppf(unit.ravel()), dtype=float)
         except Exception as error:  # of the caller's function
