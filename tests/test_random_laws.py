@@ -114,12 +114,20 @@ def test_indices_of_correlated_values_are_refused() -> None:
         fecm.sweep(small(), {"k": [1e6]}, correlation=given)
 
 
+class Measured:
+    """A law through three measured quantiles."""
+
+    def ppf(self, probabilities: NDArray[Any]) -> NDArray[Any]:
+        """Return quantiles."""
+        return np.asarray(np.interp(probabilities, [0.0, 0.5, 1.0], [90.0, 99.0, 120.0]))
+
+
 def test_an_object_with_quantiles_is_a_law(tmp_path: Path) -> None:
     from scipy import stats
 
     random: dict[str, Any] = {
         "k": stats.weibull_min(5, scale=2e6),
-        "velocity": SimpleNamespace(ppf=lambda p: np.interp(p, [0.0, 0.5, 1.0], [90.0, 99.0, 120])),
+        "velocity": Measured(),
     }
     text = {**random, "k": "weibull:2e6,5"}
     found = fecm.sweep(small(), random=random, samples=16, output=tmp_path / "s.h5")
@@ -128,6 +136,7 @@ def test_an_object_with_quantiles_is_a_law(tmp_path: Path) -> None:
     assert np.median(found["velocity"]) == pytest.approx(99.0, abs=1.0)
     assert found.random is not None
     assert str(found.random.design.laws["k"]) == "weibull_min(5, scale=2000000.0)"
+    assert str(found.random.design.laws["velocity"]) == "Measured"
     loaded = fecm.load_sweep(tmp_path / "s.h5").random
     assert loaded is not None
     assert loaded.design == found.random.design == pickle.loads(pickle.dumps(found)).random.design

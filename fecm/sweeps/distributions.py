@@ -208,10 +208,9 @@ def law_of(name: str, given: str | HasQuantiles, *, free: bool = False) -> Law |
 
 
 def _text_of(law: HasQuantiles) -> str:
-    """An object in words: name and parameters if it is a distribution of scipy, or its repr."""
-    kind = getattr(law, "dist", law)
+    """An object in words: of a frozen distribution its name and parameters, or else the repr."""
     text = type(law).__name__ if type(law).__repr__ is object.__repr__ else repr(law)
-    if isinstance(name := getattr(kind, "name", None), str):
+    if isinstance(name := getattr(getattr(law, "dist", None), "name", None), str):
         named = [f"{key}={value}" for key, value in getattr(law, "kwds", {}).items()]
         text = f"{name}({', '.join([*map(str, getattr(law, 'args', ())), *named])})"
     return shown(" ".join(text.split()), LONGEST)
