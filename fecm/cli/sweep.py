@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from functools import partial
 from pathlib import Path
 
 import click
@@ -463,11 +462,6 @@ def _carry_out(
         raise
 
 
-def _in_full_for(case: int, minutes: int) -> str:
-    """Line about a case that is run in full."""
-    return f"fecm: case {case} is run in full, {minutes} min so far"
-
-
 def _run_in_full(planned: Plan, fulls: dict[int, Path], *, overwrite: bool) -> None:
     """Run chosen cases with all rows that their deck stores."""
     for case, path in fulls.items():
@@ -476,7 +470,7 @@ def _run_in_full(planned: Plan, fulls: dict[int, Path], *, overwrite: bool) -> N
             if errors := prepared.errors(force=True):
                 raise CasesError(errors[0].message)
             with (
-                every_minute(partial(_in_full_for, case)),
+                every_minute(f"fecm: case {case} is run in full, {{}} min so far".format),
                 hdf5_writer.writing(path, overwrite=overwrite) as sink,
             ):
                 simulate(prepared.problems[0], sink, RunOptions(law=planned.settings.law))
