@@ -252,11 +252,11 @@ def without_q26(moments: Any) -> Any:
     return moments
 
 
-def mirrored(right: Any, monitor: Any, stresses: Any, strengths: Any) -> None:
+def mirrored(right: Any, monitor: Any, stresses: Any, strengths: Any, *rest: Any) -> None:
     (zone,) = stresses.zones
     plies = replace(zone.laminate.plies, angles=-zone.laminate.plies.angles)
     stresses.zones = [replace(zone, laminate=replace(zone.laminate, plies=plies))]
-    right(monitor, stresses, strengths)
+    right(monitor, stresses, strengths, *rest)
 
 
 def of_the_first(exposures: Any) -> Any:
