@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from fecm.authoring.impact import impact
     from fecm.authoring.laminate import Laminate
     from fecm.authoring.plate import Plate
+    from fecm.deck.catalogue import contacts, materials
     from fecm.deck.findings import DeckError
     from fecm.deck.model import Deck, Ply
     from fecm.deck.reader import read_deck
@@ -36,7 +37,11 @@ if TYPE_CHECKING:
     from fecm.results.diff import assert_same, diff
     from fecm.results.difference import Difference
     from fecm.results.result import Result, load
+    from fecm.studies.indentation_test.study import fit_indentation
+    from fecm.studies.rod_test.study import pulse_test
+    from fecm.studies.waves.study import waves
     from fecm.sweeps.api import sweep
+    from fecm.sweeps.estimate import estimate
     from fecm.sweeps.mesh_error import MeshError, mesh_error
     from fecm.sweeps.result import SweepResult
     from fecm.sweeps.result_file import load as load_sweep
@@ -72,19 +77,25 @@ __all__ = [
     "__version__",
     "assert_same",
     "check",
+    "contacts",
     "diff",
+    "estimate",
     "examples",
+    "fit_indentation",
     "identify",
     "impact",
     "load",
     "load_sweep",
+    "materials",
     "mesh_error",
+    "pulse_test",
     "read_deck",
     "read_one",
     "run",
     "run_one",
     "sweep",
     "verify",
+    "waves",
 ]
 
 if not TYPE_CHECKING:  # type checkers know the names from the imports above
@@ -117,18 +128,24 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "SweepResult": ("fecm.sweeps.result", "SweepResult"),
         "assert_same": ("fecm.results.diff", "assert_same"),
         "check": ("fecm.api", "check"),
+        "contacts": ("fecm.deck.catalogue", "contacts"),
         "diff": ("fecm.results.diff", "diff"),
+        "estimate": ("fecm.sweeps.estimate", "estimate"),
+        "fit_indentation": ("fecm.studies.indentation_test.study", "fit_indentation"),
         "identify": ("fecm.identification.identify", "identify"),
         "impact": ("fecm.authoring.impact", "impact"),
         "load": ("fecm.results.result", "load"),
         "load_sweep": ("fecm.sweeps.result_file", "load"),
+        "materials": ("fecm.deck.catalogue", "materials"),
         "mesh_error": ("fecm.sweeps.mesh_error", "mesh_error"),
+        "pulse_test": ("fecm.studies.rod_test.study", "pulse_test"),
         "read_deck": ("fecm.deck.reader", "read_deck"),
         "read_one": ("fecm.api", "read_one"),
         "run": ("fecm.api", "run"),
         "run_one": ("fecm.api", "run_one"),
         "sweep": ("fecm.sweeps.api", "sweep"),
         "verify": ("fecm.verification", "verify"),
+        "waves": ("fecm.studies.waves.study", "waves"),
     }
 
     def __getattr__(name):

@@ -5,21 +5,29 @@ from __future__ import annotations
 import contextlib
 import os
 import stat
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any, BinaryIO, TypeVar
 
 from fecm._errors import FecmError
 from fecm._files import NO_WAIT
 from fecm._memory import format_bytes, require
 
 LARGEST = 1_000_000_000  # bytes of a file; no mesh or measurement needs more
+LARGEST_SETTINGS = 1_000_000  # bytes of a file of settings, such as tolerances or plies
 BYTES_A_BYTE = 12  # memory of a table of numbers or of a mesh, per byte of its text
 MOST_DOTS = 100  # of a line of TOML: tomllib takes a time quadratic in the depth of a key
 
 
+T = TypeVar("T")
+
+
 class InputError(FecmError, OSError):
     """A file can't be read; the message says why."""
+
+
+class ContentError(FecmError, ValueError):
+    """The text of a file is not what was expected; the message names the file."""
 
 
 @contextlib.contextmanager
@@ -45,6 +53,19 @@ def read_input(path: Path, most: int = LARGEST) -> bytes:
             )
         require(BYTES_A_BYTE * size, f"{path}: reading it")
         return file.read()
+
+
+def parsed_file(path: Path, parse: Callable[[str], T]) -> T:
+    """What a function makes of the text of a file of settings.
+
+    A ValueError of the function becomes a ContentError; raises InputError and OSError as
+    :func:`read_input`.
+    """
+    data = read_input(path, LARGEST_SETTINGS)
+    try:
+        return parse(data.decode("utf-8-sig"))
+    except ValueError as error:
+        raise ContentError(f"{path}: {error}") from None
 
 
 def parsed_toml(text: str) -> dict[str, Any]:

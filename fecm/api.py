@@ -359,6 +359,28 @@ def _check_one(found: Sequence[object]) -> None:
         raise ValueError(f"the deck has {len(found)} problems, not one")
 
 
+def sole_problem(deck: str | Path | Deck, *, warns: bool = True) -> Problem:
+    """Checked problem of a deck that has one; with `warns`, warnings about it are FecmWarnings.
+
+    Raises DeckError if the deck has errors, apart from unstable motions, and ValueError if it does
+    not have exactly one problem.
+    """
+    prepared = load_deck(deck)
+    if prepared.errors(force=True):
+        raise DeckError(prepared.findings, prepared.source)
+    _check_one(prepared.problems)
+    if warns:
+        _warn_of(prepared)
+    return prepared.problems[0]
+
+
+def _warn_of(prepared: LoadedDeck) -> None:
+    """Warn of the findings that are warnings."""
+    for finding in prepared.findings:
+        if finding.severity == "warning":
+            warn(finding.render(prepared.source))
+
+
 def _run(
     deck: str | Path | Deck,
     mode: str,
@@ -378,9 +400,7 @@ def _run(
     for problem in prepared.problems:
         check_options(problem, choices)
     found = tuple(finding for finding in prepared.findings if finding.severity != "error")
-    for finding in found:
-        if finding.severity == "warning":
-            warn(finding.render(prepared.source))
+    _warn_of(prepared)
     results: list[Result] = []
     for number, problem in enumerate(prepared.problems, start=1):
         check_memory(problem, solver=choices.solver, in_memory=output is None)

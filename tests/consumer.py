@@ -148,6 +148,12 @@ own: fecm.Result = fecm.run_one(
 )
 of_law: fecm.SweepResult = fecm.sweep(deck, {"velocity": [1.0]}, law="bilinear")
 fit: fecm.Identification = fecm.identify(deck, own.time, own.force, "velocity", law=law)
+quick: float = fecm.estimate(deck).models["run"].peak_force
+speeds: NDArray[np.float64] = fecm.waves(laminates[0], units="mm-ms-kg").fronts([0.0]).velocity
+fitted: fecm.Contact | None = fecm.fit_indentation("test.csv", units=("mm", "N")).law
+struck: NDArray[np.float64] = fecm.pulse_test(deck, (force, force), stations=[0.5]).forces
+modulus: float | None = fecm.materials()["IM7/8552"].value("E1", "mm-ms-kg")
+coefficient: float = fecm.contacts()["report-0.5"].converted("mm-N-s").k
 
 result.plot("forse")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 result.forse  # type: ignore[attr-defined]  # pyright: ignore[reportAttributeAccessIssue]  # noqa: B018
@@ -167,6 +173,7 @@ fecm.Plate.from_mesh("plate.msh", {"rim": "glued"})  # type: ignore[dict-item]  
 fecm.run_one(deck, law=TwoMasses())  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.run_one(deck, projectile=law)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.run_one(deck, criteria=[law])  # type: ignore[list-item]  # pyright: ignore[reportArgumentType]
+fecm.pulse_test(deck, "sine:1,1", integrator="euler")  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 fecm.impact(plate, laminates[0], 5.0)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]
 made.with_(velosity=3.0)  # type: ignore[call-arg]  # pyright: ignore[reportCallIssue]
 made.with_(projectile=5.0)  # type: ignore[arg-type]  # pyright: ignore[reportArgumentType]

@@ -55,7 +55,26 @@ def test_a_deck_of_feap_is_recognised() -> None:
     (error,) = errors("FEAP * * plate\n    4    1    1    2    5    4\n")
     assert error.code == "E013"
     assert "FEAP" in error.message
-    assert "FECM" in error.hint
+    assert "the first word is FECM here, and the third number" in error.hint
+
+
+@pytest.mark.parametrize(
+    ("text", "program", "hint"),
+    [
+        ("*KEYWORD\n*NODE\n       1   0.0   0.0   0.0\n", "LS-DYNA", "mm-ms-kg"),
+        ("$# LS-DYNA Keyword file\n*KEYWORD\n", "LS-DYNA", "mm-ms-kg"),
+        ("SOL 101\nCEND\nBEGIN BULK\n", "Nastran", "takes a mesh"),
+        ("BEGIN BULK\nGRID,1,,0.,0.,0.\n", "Nastran", "takes a mesh"),
+        ("*NODE\n1, 0.0, 0.0\n", "Abaqus", "takes a mesh"),
+    ],
+)
+def test_an_input_of_another_code_is_named_with_what_can_be_done(
+    text: str, program: str, hint: str
+) -> None:
+    (error,) = errors(text)
+    assert error.code == "E013"
+    assert program in error.message
+    assert hint in error.hint
 
 
 def test_a_large_result_marks_the_macro_that_stores_most() -> None:

@@ -9,9 +9,10 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.deck.catalogue import MATERIALS, SYSTEMS, convert
+from fecm.deck.catalogue import MATERIALS
 from fecm.deck.findings import Finding
 from fecm.deck.model import Allowables, Damping, Ply
+from fecm.deck.unit_systems import NAMES, convert
 from fecm.deck.units import MASS
 from fecm.mechanics.mesh import Mesh
 from fecm.problem.rules.damping import clamped_frequency
@@ -125,8 +126,8 @@ def new_deck(
         fecm.RigidMass(own(2e-5, MASS)),
         fecm.Contact(own(k, "force/length^1.5"), 0.0, 0.0, 1.5),
         velocity=own(3000.0, "length/time"),
-        duration=3e-5,
-        dt=1e-8,
+        duration=own(3e-5, "time"),
+        dt=own(1e-8, "time"),
         every=1,
         units=system,
         damage=damage,
@@ -138,7 +139,7 @@ def new_deck(
 PLIES = [name for name in MATERIALS if name != "Divinycell-H60"]
 
 
-@pytest.mark.parametrize("system", SYSTEMS)
+@pytest.mark.parametrize("system", NAMES)
 @pytest.mark.parametrize("name", PLIES)
 def test_no_ply_of_the_catalogue_has_a_finding_in_any_units(name: str, system: str) -> None:
     has_damage = {"XT", "GIIc"} & MATERIALS[name].values.keys()

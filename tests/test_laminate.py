@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fecm.deck.model import Integration, Layer, Material, Ply
+from fecm.deck.model import Control, Deck, Integration, Layer, Material, Ply
 from fecm.mechanics.laminate import (
+    Laminate,
     laminate,
     reduced_stiffness,
     transformed_shear,
     transformed_stiffness,
 )
-from fecm.problem.parts import laminate_of
+from fecm.problem.parts import laminates_of_deck
 from tests.builders import (
     GENERAL_PLY,
     REPORT_ANGLES,
@@ -170,6 +171,12 @@ def material(ply: Ply, total: float) -> Material:
     """The report's stack of another ply, its card naming another thickness."""
     layers = tuple(Layer(n, angle, REPORT_LAYER) for n, angle in enumerate(REPORT_ANGLES, 1))
     return Material(Integration(3, 3, 3, total), ply, layers)
+
+
+def laminate_of(material: Material, *, isotropic_g12: bool = False) -> Laminate:
+    """Laminate of a deck with this MATE segment."""
+    deck = Deck("", Control(4, 1, len(material.layers), 2, 5, 4), (material,), ())
+    return laminates_of_deck(deck, isotropic_g12=isotropic_g12)[0]
 
 
 def test_a_decks_stiffness_is_the_layers_and_its_inertia_the_cards() -> None:

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import fecm
 from fecm.api import load_deck
 from fecm.deck import Deck
-from fecm.deck.catalogue import MATERIALS, SYSTEMS
-from fecm.deck.model import Allowables, Delamination
+from fecm.deck.catalogue import MATERIALS
+from fecm.deck.model import Allowables, Delamination, Indentation
+from fecm.deck.unit_systems import NAMES, UnitsError, system_named
 from tests.calls import Done, assert_unusable, call
 
 PLATE = (
@@ -67,11 +70,15 @@ def test_every_ply_is_plausible_and_has_a_source(name: str) -> None:
         assert 10 < min(strengths.yt, strengths.s12) < max(strengths.xt, strengths.xc) < 4000
 
 
-@pytest.mark.parametrize("units", SYSTEMS)
+@pytest.mark.parametrize("units", NAMES)
 def test_damage_adds_strengths_and_toughness_in_the_decks_units(units: str) -> None:
-    pascal, metre = {"mm-N-s": (1e6, 1e-3), "m-N-s": (1.0, 1.0), "in-lbf-s": (6894.757, 0.0254)}[
-        units
-    ]
+    pascal, metre = {
+        "mm-N-s": (1e6, 1e-3),
+        "m-N-s": (1.0, 1.0),
+        "in-lbf-s": (6894.757, 0.0254),
+        "mm-kN-ms": (1e9, 1e-3),
+        "mm-N-ms": (1e6, 1e-3),
+    }[units]
     deck = deck_of("--material", "IM7/8552", "--damage", "--units", units)
     allowables, delamination = deck.require(Allowables), deck.require(Delamination)
     assert allowables.xc * pascal == pytest.approx(1200.1e6, rel=1e-5)
@@ -117,7 +124,7 @@ def test_a_users_file_is_used_and_listed(tmp_path: Path) -> None:
         (OWN + "E1=1\n", "Cannot overwrite a value (at line 8"),
         (OWN.replace('"a test"', "7"), "[mine] source: 7 is not a text in quotes"),
         (OWN.replace("E2=9e3\nG12=5e3\n", ""), "[mine] E2 and G12 missing"),
-        ('units="psi"\n' + OWN, "[mine] units: 'psi' is none of in-lbf-s, m-N-s, mm-N-s"),
+        ('units="psi"\n' + OWN, "[mine] units: 'psi' is not a system of units: name length, force"),
         ("E1=1\n" + OWN, 'E1 is outside the table of a ply; begin each ply with ["its name"]'),
         (OWN + "XT 2000", "(at line 8, column 4)"),
         ("", "no plies"),
@@ -135,6 +142,45 @@ def test_a_file_that_cannot_be_meant_is_refused_with_the_place(
         assert str(file) in done.stderr
 
 
+def test_the_plies_are_listed_for_programs_as_python_has_them(tmp_path: Path) -> None:
+    lines = call("materials", "--units", "mm-ms-kg", "--format", "json").stdout.splitlines()
+    found = {row["name"]: row for row in map(json.loads, lines)}
+    assert found.keys() == fecm.materials().keys()
+    # Camanho, Maimi and Davila 2007, in GPa and kN/mm.
+    ply = found["IM7/8552"]
+    assert (ply["units"], ply["E1"], ply["XC"], ply["GIIc"]) == (
+        "mm-kN-ms",
+        171.42,
+        1.2001,
+        7.879e-4,
+    )
+    assert ply["alpha1"] is None
+    assert "Camanho" in ply["source"]
+    file = tmp_path / "mine.toml"
+    file.write_text(OWN)
+    (own,) = call("materials", file, "--format", "json").stdout.splitlines()
+    assert json.loads(own)["E1"] == fecm.materials(file)["mine"].values["E1"] == 140e3
+    file.write_text(OWN + "E3 = 1")
+    with pytest.raises(ValueError, match=r"mine\.toml: \[mine\] E3 is unknown") as caught:
+        fecm.materials(file)
+    assert isinstance(caught.value, fecm.FecmError)
+
+
+def test_named_plies_and_laws_of_python_make_a_deck() -> None:
+    law = fecm.contacts()["report-0.5"]
+    assert "Table 3.1" in law.source
+    deck = fecm.impact(
+        fecm.Plate.rectangle((60, 40), (4, 4), support="simple"),
+        fecm.Laminate("[0/90]s", fecm.materials()["IM7/8552"]),
+        fecm.RigidMass(1e-4),
+        law,
+        velocity=1000.0,
+        duration=1e-5,
+    )
+    # Table 3.1 of the report: 1.330e6 lbf/in^1.5.
+    assert deck.require(Indentation).k == pytest.approx(1.330e6 * 4.4482216 / 25.4**1.5, rel=1e-5)
+
+
 def test_the_nearest_names_are_shown_for_an_unknown_one() -> None:
     assert "did you mean IM7/8552" in new("--material", "IM7-8552").stderr
 
@@ -149,7 +195,7 @@ def test_the_nearest_names_are_shown_for_an_unknown_one() -> None:
     ],
 )  # fmt: skip
 def test_pucks_slopes_are_those_of_the_fibre(name: str, slopes: tuple[float, float]) -> None:
-    for units in SYSTEMS:
+    for units in NAMES:
         card = deck_of("--material", name, "--damage", "--units", units).require(Allowables)
         assert (card.p_plus, card.p_minus) == slopes
 
@@ -162,3 +208,51 @@ def test_a_users_ply_has_its_own_slopes(tmp_path: Path) -> None:
     assert (card.p_plus, card.p_minus) == (0.27, 0.30)
     file.write_text(f"{OWN}p_plus=1.0\n")
     assert "[mine] p_plus: 1 is not between 0 and 1" in call("materials", file).stderr
+
+
+# Consistent units as LS-DYNA's and Radioss's manuals list them: mass, length, time, and the force.
+@pytest.mark.parametrize(
+    ("given", "system"),
+    [
+        ("kg-mm-ms", "mm-kN-ms"), ("g-mm-ms", "mm-N-ms"), ("t-mm-s", "mm-N-s"),
+        ("kg-m-s", "m-N-s"), ("mm-ms-kg-kN", "mm-kN-ms"), ("s-lbf-in", "in-lbf-s"),
+        ("g-mm-us", "mm-MN-us"),
+    ],
+)  # fmt: skip
+def test_a_consistent_system_may_be_named_by_its_mass_or_its_force(given: str, system: str) -> None:
+    assert system_named(given) == system
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("mm-ms-kg-N", "the force of kg, mm and ms is kN"),
+        ("kg-in-s", "the force of kg, in and s is not one of N, kN"),
+        ("mm-N", "not a whole system"), ("mm-m-s", "name length, force and time"), ("", "''"),
+    ],
+)  # fmt: skip
+def test_a_system_that_is_not_consistent_is_refused_with_the_reason(given: str, words: str) -> None:
+    with pytest.raises(UnitsError, match=words):
+        system_named(given)
+    assert words in new("--material", "IM7/8552", "--units", given).stderr.replace("\n", " ")
+
+
+def test_an_impact_in_the_units_of_an_explicit_code_is_that_in_millimetres_and_newtons() -> None:
+    made = {
+        units: fecm.impact(
+            fecm.Plate.rectangle((60, 40), (4, 4), support="simple"),
+            fecm.Laminate("[0/90]s", "IM7/8552", 0.25),
+            fecm.RigidMass(mass),
+            "report-0.5",
+            velocity="3m/s",
+            duration="0.02ms",
+            dt=dt,
+            units=units,
+        )
+        for units, mass, dt in (("mm-N-s", 1e-4, 2e-7), ("kg-mm-ms", 0.1, 2e-4))
+    }
+    one, other = (fecm.run_one(deck) for deck in made.values())
+    # Fields of cards have six digits.
+    np.testing.assert_allclose(other.force * 1e3, one.force, rtol=2e-5)
+    np.testing.assert_allclose(other.time / 1e3, one.time, rtol=1e-12)
+    assert made["kg-mm-ms"].to_text().count("mm kN ms") == 1

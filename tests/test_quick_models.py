@@ -24,16 +24,16 @@ from fecm.mechanics.laminate import (
     laminate,
     threshold_force,
 )
-from fecm.mechanics.solutions import static_stiffness
-from fecm.problem.contact_estimates import wave_impedance
-from fecm.results.result import Result
-from fecm.results.summary import summary
-from fecm.studies.estimate import (
+from fecm.mechanics.quick_models import (
     contact_time,
     inelasticity,
     infinite_plate,
     static_plate,
 )
+from fecm.mechanics.solutions import static_stiffness
+from fecm.problem.contact_estimates import wave_impedance
+from fecm.results.result import Result
+from fecm.results.summary import summary
 from fecm.verification.decks import result_of
 from fecm.verification.impacts import struck_square
 from tests.builders import REPORT_ANGLES, report_plate, table

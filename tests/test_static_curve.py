@@ -15,9 +15,9 @@ import pytest
 from scipy.optimize import brentq
 
 from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.quick_models import curved_plate, static_plate
 from fecm.mechanics.solutions import ConvergenceError
 from fecm.mechanics.static_curve import StaticCurve, static_curve
-from fecm.studies.estimate import curved_plate, static_plate
 from tests.builders import Floats, table
 from tests.nonlinear_plates import disc, patch, rectangle
 from tests.test_nonlinear_statics import LAMINATES, isotropic

@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fecm.cli.laminate_options import LaminateOptions
-from fecm.deck.layup import LayupPly
+import fecm
 from fecm.plot.kinds import PlotError
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from tests.builders import general_plate, report_plate, table
@@ -278,14 +277,15 @@ def test_the_picture_of_fronts_shows_circle_rays_fronts_and_cusps() -> None:
         (("speeds", "--material", "report"), "give a DECK, or --layup"),
         (("speeds", LONG, "--layup", "0"), "--layup describes a laminate"),
         (("speeds", LONG, "--ply-thickness", "1"), "--ply-thickness describes a laminate"),
-        (("speeds", "--layup", "0"), "--layup needs --ply-thickness"),
+        (("speeds", "--layup", "0"), "give either --ply or --material"),
+        (("speeds", "--layup", "0", "--material", "report"), "--ply-thickness is missing"),
         (("speeds", "--layup", "0", "--ply-thickness", "-1"), "-1.0 is not in the range x>0"),
         (("speeds", *LAYUP), "give either --ply or --material"),
         (("speeds", *LAYUP, "--ply", "1,2"), "is not of the form RHO,NU12,E1"),
         (("speeds", *LAYUP, "--ply", "1,.3,1,1,-1,1,1"), "shear modulus G12 is -1"),
         (("speeds", *LAYUP, "--ply", "1,.3,1e300,1,1,1,1"), "too far apart"),
         (("dispersion", *LAYUP, "--ply", "1,.3,1e300,1,1,1,1"), "too far apart"),
-        (("speeds", *LAMINATE, "--units", "furlong"), "'furlong' is not one of 'in-lbf-s'"),
+        (("speeds", *LAMINATE, "--units", "furlong"), "'furlong' is not a system of units"),
         (("speeds", "--layup", "[0/", "--ply-thickness", "1"), "can't be read at its end"),
         (("dispersion", LONG, "--wavelengths", "1:2"), "FROM:TO:N"),
         (("dispersion", LONG, "--wavelengths", "2:1:5"), "FROM:TO:N"),
@@ -343,14 +343,9 @@ def test_of_a_deck_with_several_problems_the_first_is_taken(tmp_path: Path) -> N
 
 
 def test_options_make_the_laminate_of_their_plies() -> None:
-    options = LaminateOptions(
-        layup=[LayupPly(0.0), LayupPly(30.0), LayupPly(70.0)],
-        ply_thickness={"": 0.1},
-        ply=(1.5, 0.3, 20, 1.5, 0.9, 0.8, 0.5),
-        material=None,
-        units="m-N-s",
-    )
-    made, names = options.laminate()
+    ply = fecm.Ply(1.5, 0.3, 20, 1.5, 0.9, 0.8, 0.5)
+    waves = fecm.waves(fecm.Laminate("0/30/70", ply, 0.1), units="m-N-s")
+    made, names = waves.medium.laminate, waves.units
     assert names == {"length": "m", "force": "N", "time": "s"}
     assert made.thickness == pytest.approx(0.3)
     assert made.is_coupled

@@ -13,9 +13,9 @@ from fecm.deck.catalogue import (
     STEEL_MODULUS,
     STEEL_POISSON,
     NamedContact,
-    convert,
 )
 from fecm.deck.model import Indentation, Layer, Patch
+from fecm.deck.unit_systems import convert
 from fecm.deck.units import MODULUS
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus

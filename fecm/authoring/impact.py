@@ -20,6 +20,7 @@ from fecm.authoring.laminate import (
     damages,
     plies_of,
     strengths_of,
+    system_asked,
     toughness,
 )
 from fecm.authoring.mesh import InPlane, placed, supported
@@ -28,11 +29,12 @@ from fecm.authoring.parameters import ObjectError, check_kind, check_positive, i
 from fecm.authoring.plate import Plate
 from fecm.authoring.zones import Zone, laminates_of, placed_zones
 from fecm.deck import model
-from fecm.deck.catalogue import STANDARD, SYSTEM, SYSTEMS, NamedContact
+from fecm.deck.catalogue import STANDARD, SYSTEM, NamedContact
 from fecm.deck.findings import DeckError
 from fecm.deck.grid import IN_PLANE
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Control, Gage
+from fecm.deck.unit_systems import units_of
 from fecm.deck.units import in_si, unit_of
 from fecm.mechanics.laminate import SOFT_CORE
 from fecm.mechanics.projectile import RigidMass, Rod
@@ -90,7 +92,6 @@ class Request:
             check_kind("contact", strike.contact, AnyContact)
         _check_choice("shear", numerics.shear, (MITC, FULL))
         _check_choice("in_plane", self.in_plane, (None, *IN_PLANE))
-        _check_choice("units", self.units, (None, *SYSTEMS))
         if "\n" in self.title:
             raise ObjectError("`title` has more than one line")
 
@@ -179,8 +180,9 @@ def impact(
         Evaluate the failure criteria, which need a named ply with strengths: the steps between
         evaluations, or True for the rows of `every`.  By default where `damage` finds strengths.
     units : str, optional
-        ``"in-lbf-s"``, ``"m-N-s"`` or ``"mm-N-s"``, to which a named ply and contact are converted;
-        those of a named ply's source by default.
+        Units of length, force and time, as in ``"mm-N-s"``, or of length, time and mass, as in
+        ``"mm-ms-kg"``, to which a named ply and contact are converted; those of a named ply's
+        source by default.
     patch : str or Patch or None
         Area of the contact force: ``"disc"`` or ``"hertz"``, with ``":RADIUS"``, to which the mesh
         of a rectangle is then refined; None is a point force.  By default a disc.
@@ -270,13 +272,14 @@ def impact(
 def author(asked: Request) -> Authored:
     """Make the deck of a request without checking it."""
     asked.check()
+    units = system_asked(asked.units)
     notes: list[str] = []
     doubts: list[str] = []
     fixture, test = asked.plate.fixture, asked.test
-    if test is not None and asked.units not in (None, STANDARD):
+    if test is not None and units not in (None, STANDARD):
         raise ObjectError(f"the fixture's standard is in {STANDARD}; leave out `units`")
     laminates = laminates_of(asked.laminate, asked.zones)
-    plies, in_zones = plies_of(asked.laminate, laminates, STANDARD if test else asked.units, notes)
+    plies, in_zones = plies_of(asked.laminate, laminates, STANDARD if test else units, notes)
     strike, motion = asked.strike, _motion(asked, plies)
     if fixture is not None and test is not None:
         strike, motion = _prescribed(test, strike, motion, plies.thickness)
@@ -402,7 +405,7 @@ def _units(asked: Request, plies: Plies) -> model.Units | None:
     """UNIT segment; the report's decks have none."""
     if plies.system is None or (plies.system == SYSTEM and asked.units is None):
         return None
-    return model.Units(*SYSTEMS[plies.system].values())
+    return model.Units(*units_of(plies.system).values())
 
 
 def _projectile(projectile: AnyProjectile | None) -> model.Projectile | None:
@@ -442,7 +445,7 @@ def _energy_of(deck: model.Deck) -> float:
 def _energy_note(deck: model.Deck, asked: Request, plies: Plies) -> str:
     """Say energy and velocity of the projectile."""
     energy, velocity = _energy_of(deck), deck.require(model.Impact).velocity
-    names = SYSTEMS[plies.system] if plies.system else {}
+    names = units_of(plies.system) if plies.system else {}
     joule = in_si("force*length", names)
     said = f"{energy * joule:.4g} J" if joule else f"{energy:.4g}"
     if asked.test is not None:

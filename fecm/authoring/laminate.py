@@ -11,12 +11,15 @@ from fecm._errors import did_you_mean
 from fecm._frozen import frozen
 from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck import catalogue
-from fecm.deck.catalogue import MATERIALS, SYSTEMS, NamedPly
+from fecm.deck.catalogue import MATERIALS, NamedPly
+from fecm.deck.findings import Findings
 from fecm.deck.layup import parse_plies
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import (
     Allowables,
+    Control,
     Cure,
+    Deck,
     Delamination,
     Expansion,
     Integration,
@@ -31,7 +34,11 @@ from fecm.deck.model import (
     Ply,
     Segment,
 )
+from fecm.deck.unit_systems import UnitsError, system_named, units_of
+from fecm.mechanics.laminate import Laminate as Stiffness
 from fecm.mechanics.laminate import laminate as stiffness_of
+from fecm.problem.check import check_segment
+from fecm.problem.parts import laminates_of_deck
 
 ORDER = 3  # integration order of stiffness and mass
 NODAL_POINTS = -3  # where stresses are computed
@@ -288,6 +295,37 @@ def plies_of(
     return Plies(tuple(different), tuple(materials), system), in_zones
 
 
+def stiffness_of_laminate(
+    laminate: Laminate, units: str | None, notes: list[str]
+) -> tuple[Stiffness, dict[str, str]]:
+    """Stiffness and inertia of a laminate by itself, checked as in a deck, and names of its units.
+
+    Raises ObjectError if the laminate is incomplete or impossible.
+    """
+    plies, _ = plies_of(laminate, (), system_asked(units), notes)
+    control = Control(0, 0, len(plies.layups[0]), 2, 5, 4)
+    deck = Deck("", control, tuple(plies.segments()), ())
+    findings = Findings()
+    for segment in deck.segments:
+        check_segment(segment, findings)
+    if findings.errors:
+        raise ObjectError(findings.errors[0].message)
+    names = units_of(plies.system) if plies.system else {}
+    return laminates_of_deck(deck)[0], names
+
+
+def system_asked(units: str | None) -> str | None:
+    """Name of the system of units that is asked for."""
+    if units is None:
+        return None
+    if not isinstance(units, str):
+        raise ObjectError(f"`units` is {units!r}, not a text such as 'mm-N-s'")
+    try:
+        return system_named(units)
+    except UnitsError as error:
+        raise ObjectError(f"`units`: {error}") from None
+
+
 def _known(ply: object) -> Ply | NamedPly:
     """A ply; the named one of a name."""
     if isinstance(ply, Ply | NamedPly):
@@ -311,7 +349,7 @@ def _own_thickness(named: NamedPly | None, system: str | None) -> float:
 
 def _note_of_thickness(own: float, named: NamedPly, system: str | None) -> str:
     """Say the thickness that the name of a ply gives."""
-    unit = SYSTEMS[system or named.system]["length"]
+    unit = units_of(system or named.system)["length"]
     return f"the plies are {own:g} {unit} thick, as {named.name} is listed"
 
 

@@ -14,11 +14,11 @@ from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck.model import Allowables, Deck, Impact, Indentation, Macro, Patch, Shear
 from fecm.deck.outputs import Rows, RowsOfPlies, with_outputs
 from fecm.mechanics.points import HERTZ
+from fecm.mechanics.quick_models import contact_time
 from fecm.mechanics.solutions import static_stiffness
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate, build_projectile
-from fecm.studies.estimate import contact_time
 
 ROWS = 200  # default number of stored rows of strains and displacements
 # Simulated time over half a period of the projectile on the plate's static stiffness, and least

@@ -10,7 +10,7 @@ from types import UnionType
 from typing import TypeGuard
 
 from fecm._errors import FecmError
-from fecm.deck.catalogue import SYSTEMS
+from fecm.deck.unit_systems import units_of
 from fecm.deck.units import in_si, unit_in_si
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
@@ -65,7 +65,7 @@ def in_units(
         )
     if unit is None:
         return float(match[1])
-    own = in_si(dimension, SYSTEMS[system]) if system else None
+    own = in_si(dimension, units_of(system)) if system else None
     if own is None:
         raise ObjectError(f"`{name}` is {value!r}: give `units`, the deck's")
     return float(f"{float(match[1]) * known / own:.9g}")

@@ -13,12 +13,13 @@ from click import option
 from fecm._frozen import frozen
 from fecm.cli.common import RefusedError, echo, note
 from fecm.cli.help import Group, typical
-from fecm.cli.laminate_options import LaminateOptions, laminate_options
+from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options
 from fecm.cli.options import (
     DECK_PATH,
     FORMAT_OPTION,
     NOT_NEGATIVE,
     POSITIVE,
+    SYSTEM,
     Finite,
     Format,
     OneOf,
@@ -28,21 +29,23 @@ from fecm.cli.options import (
 )
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.deck import catalogue
-from fecm.deck.catalogue import CONTACTS, SYSTEM, SYSTEMS
+from fecm.deck.catalogue import CONTACTS
 from fecm.deck.model import Deck, Indentation
 from fecm.deck.reader import Reader
 from fecm.deck.source_text import load_text
-from fecm.deck.units import unit_names
+from fecm.deck.unit_systems import convert
+from fecm.deck.units import KNOWN, unit_names
 from fecm.mechanics import contact_law
 from fecm.mechanics.contact_law import LinearPermanent, YangSunPermanent, hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
 from fecm.problem.check import check_segment
 from fecm.problem.parts import build_constants
 from fecm.studies import StudyError
-from fecm.studies.indentation_test.constants import fit as fitted
 from fecm.studies.indentation_test.curves import LIMITS_Q
 from fecm.studies.indentation_test.measured import read_test
-from fecm.studies.indentation_test.output import card, lines, notes, plain
+from fecm.studies.indentation_test.study import fit_law
+
+PARAMETERS = ("acr", "columns", "units")  # of fits, which messages name
 
 
 @click.group(cls=Group)
@@ -93,6 +96,7 @@ class FitOptions:
 )
 @option(
     "--unit",
+    "--units",
     "units",
     type=list_of("LENGTH,FORCE", click.STRING, [2]),
     help="Units of the card, to which a file that names its units is converted.  [default: "
@@ -111,25 +115,21 @@ def fit(options: FitOptions) -> None:
     test = options.test
     if options.acr and options.q not in (None, contact_law.ACR_POWER):
         raise click.UsageError("--acr requires q = 5/2: equation 3-7 holds for no other power")
-    read = read_test(test, options.columns or (), options.units)
     try:
-        found = fitted(
-            read.indentation, read.force, retreat=options.turn, q=options.q, acr=options.acr
-        )
+        read = read_test(test, options.columns or (), options.units)
+    except StudyError as error:
+        raise RefusedError(as_options(str(error), PARAMETERS)) from None
+    try:
+        found = fit_law(read, q=options.q, acr=options.acr, turn=options.turn)
     except StudyError as error:
         raise RefusedError(f"{test}: {error}") from None
     names = {**read.units, "time": "s"} if read.units else {}
-    options.targets.draw("studies:fit_picture", read.indentation, read.force, found, names)
-    note(*notes(found))
+    options.targets.draw("studies:fit_picture", read.indentation, read.force, found.fit, names)
+    note(*(as_options(text, PARAMETERS) for text in found.notes))
     if options.form is Format.JSON:
-        click.echo(json.dumps({"file": str(test), "units": read.units or None, **plain(found)}))
-        return
-    own = tuple(read.units.values())
-    stated = "" if read.stated in (("", ""), own) else f" (the test: {', '.join(read.stated)})"
-    about = f"{', '.join(own)}{stated}" if own else "those of the test, which names none"
-    click.echo("\n".join([*lines(found), f"units           {about}"]))
-    if text := card(found):
-        click.echo(text)
+        click.echo(json.dumps({"file": str(test), **found.to_dict()}))
+    else:
+        click.echo(found)
 
 
 def _law(deck: Path) -> tuple[Deck, Indentation]:
@@ -276,12 +276,11 @@ def _permanent(
 def _report_length(deck: Deck, value: float, name: str, flag: str) -> float:
     """Convert a length of the report to the deck's unit, by default inches, and note it."""
     unit = unit_names(deck).get("length", "in")
-    system = {names["length"]: key for key, names in SYSTEMS.items()}.get(unit)
-    if system is None:
+    if unit not in KNOWN["length"]:
         message = f"the report's {name} is in inches and the deck's in {unit}: give {flag}"
         raise RefusedError(message)
     note(f"{name} is the report's {value:g} in; {flag} replaces it")
-    return catalogue.convert(value, "length", SYSTEM, system)
+    return convert(value, "length", catalogue.SYSTEM, f"{unit}-N-s")
 
 
 @frozen
@@ -428,8 +427,8 @@ def estimate(
 @click.argument("name", type=OneOf(list(CONTACTS)), metavar="[NAME]", required=False)
 @option(
     "--units",
-    type=click.Choice(list(SYSTEMS)),
-    default=SYSTEM,
+    type=SYSTEM,
+    default=catalogue.SYSTEM,
     show_default=True,
     help="Units of the parameters.",
 )

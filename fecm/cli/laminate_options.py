@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import NoReturn, TypeVar
 
 import click
@@ -14,6 +14,7 @@ from fecm._frozen import frozen
 from fecm.authoring.laminate import Laminate as AuthoredLaminate
 from fecm.cli.options import (
     POSITIVE,
+    SYSTEM,
     Decorated,
     Finite,
     Parsed,
@@ -22,13 +23,9 @@ from fecm.cli.options import (
     list_of,
     stacked,
 )
-from fecm.deck.catalogue import MATERIALS, SYSTEMS, NamedPly, read_plies
-from fecm.deck.findings import Findings
+from fecm.deck.catalogue import MATERIALS, NamedPly, read_plies
 from fecm.deck.layup import LayupPly, parse_plies
-from fecm.deck.model import Integration, Layer, Material, Ply
-from fecm.mechanics.laminate import Laminate
-from fecm.problem.check import check_segment
-from fecm.problem.parts import laminate_of
+from fecm.deck.model import Ply
 
 T = TypeVar("T")
 
@@ -110,22 +107,12 @@ class LaminateOptions:
             return AuthoredLaminate(self.angles, materials[""], default)
         return AuthoredLaminate(self.layup or (), materials, thicknesses)
 
-    def laminate(self) -> tuple[Laminate, dict[str, str]]:
-        """Laminate, checked as in a deck, and the names of its units."""
-        thickness, material = self.thickness, self.named
-        if thickness is None and material is not None:
-            thickness = material.value("thickness", self.units or material.system)
-        if thickness is None:
-            raise click.UsageError("--layup needs --ply-thickness")
-        angles = self.angles
-        layers = tuple(Layer(n, angle, thickness) for n, angle in enumerate(angles, start=1))
-        integration = Integration(3, 3, -3, thickness * len(layers))
-        segment = Material(integration, self.constants(), layers)
-        findings = Findings()
-        check_segment(segment, findings)
-        if findings.errors:
-            raise click.UsageError(findings.errors[0].message)
-        return laminate_of(segment), {} if self.units is None else SYSTEMS[self.units]
+
+def as_options(message: str, options: Collection[str]) -> str:
+    """A message with the options in place of the parameters that it quotes."""
+    names = "|".join(options)
+    name = {"edges": "edge"}
+    return re.sub(f"`({names})`", lambda m: "--" + name.get(m[1], m[1]).replace("_", "-"), message)
 
 
 def laminate_options(
@@ -173,10 +160,10 @@ def laminate_options(
         ),
         option(
             "--units",
-            type=click.Choice(list(SYSTEMS)),
-            metavar="SYSTEM",
-            help="in-lbf-s, m-N-s or mm-N-s: names the units, and converts a named ply to "
-            "them.  [default for a named ply: its source's]",
+            type=SYSTEM,
+            help="Names the units, and converts a named ply to them: in-lbf-s, mm-N-s, mm-ms-kg or "
+            "any others of length, time, and force or mass.  [default for a named ply: its "
+            "source's]",
         ),
         collected(LaminateOptions, "laminate"),
     )

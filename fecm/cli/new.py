@@ -22,18 +22,29 @@ from fecm.authoring.numerics import AUTO, EQUI, FULL, MITC, Numerics, Quadrature
 from fecm.authoring.parameters import ObjectError
 from fecm.authoring.plate import MOST, Plate, Support
 from fecm.authoring.zones import Zone
-from fecm.cli.common import DASH, RefusedError, echo, note, write_text
+from fecm.cli.common import DASH, RefusedError, echo, echo_json, note, write_text
 from fecm.cli.help import GroupedCommand, typical
-from fecm.cli.laminate_options import PLIES, LaminateOptions, laminate_options, unique
-from fecm.cli.options import FILE_PATH, POSITIVE, Finite, Parsed, assignment, collected, list_of
+from fecm.cli.laminate_options import PLIES, LaminateOptions, as_options, laminate_options, unique
+from fecm.cli.options import (
+    FILE_PATH,
+    FORMAT_OPTION,
+    POSITIVE,
+    SYSTEM,
+    Finite,
+    Format,
+    Parsed,
+    assignment,
+    collected,
+    list_of,
+)
 from fecm.deck.catalogue import (
     CONTACTS,
     EXPANSIONS,
-    MATERIALS,
     STRENGTHS,
     NamedContact,
     NamedPly,
 )
+from fecm.deck.catalogue import materials as named_plies
 from fecm.deck.format import format_deck
 from fecm.deck.grid import IN_PLANE, SUPPORTS
 from fecm.deck.layup import parse_plies
@@ -436,8 +447,8 @@ def new(options: Options) -> None:
     try:
         made = _author(options, given)
     except (ObjectError, ImportError) as error:
-        raise click.UsageError(_as_options(str(error), context.params)) from None
-    notes = [_as_options(text, context.params) for text in (*made.doubts, *made.notes)]
+        raise click.UsageError(as_options(str(error), context.params)) from None
+    notes = [as_options(text, context.params) for text in (*made.doubts, *made.notes)]
     notes += _additions(made.deck)
     text = made.comments + format_deck(made.deck.to_text())
     prepared = load_deck(text)
@@ -455,28 +466,32 @@ def new(options: Options) -> None:
 
 @click.command(
     epilog=typical(
-        "fecm materials",
         "fecm materials own-plies.toml",
+        "fecm materials --units mm-ms-kg --format json",
     )
 )
 @click.argument("plies", type=PLIES, metavar="[FILE.toml]", required=False)
-def materials(plies: dict[str, NamedPly] | None) -> None:
-    """List the named plies of `fecm new`, or those of a file, with their sources."""
-    for name, material in (plies or MATERIALS).items():
-        click.echo(f"{name} ({material.system})")
-        values = {"G13": material.ply.g13, "G23": material.ply.g23} | material.values
+@option(
+    "--units", type=SYSTEM, help="Units of the constants.  [default: those of each ply's source]"
+)
+@FORMAT_OPTION
+def materials(plies: dict[str, NamedPly] | None, units: str | None, form: Format) -> None:
+    """List the named plies of `fecm new`, or those of a file, with their sources.
+
+    With --format json, each ply is a JSON object on a line, null where a constant is not known.
+    """
+    for material in (plies or named_plies()).values():
+        system = units or material.system
+        if form is Format.JSON:
+            echo_json(material.to_dict(system))
+            continue
+        echo(f"{material.name} ({system})")
+        values = material.constants(system)
         for keys in LINES:
             if line := ", ".join(f"{key} {values[key]:g}" for key in keys if key in values):
-                click.echo(f"  {line}")
+                echo(f"  {line}")
         texts = "; ".join(filter(None, (material.source, material.assumed)))
-        click.echo(f"  {texts or '(no source)'}")
-
-
-def _as_options(message: str, options: Collection[str]) -> str:
-    """A message with the options in place of the parameters that it quotes."""
-    names = "|".join(options)
-    name = {"edges": "edge"}
-    return re.sub(f"`({names})`", lambda m: "--" + name.get(m[1], m[1]).replace("_", "-"), message)
+        echo(f"  {texts or '(no source)'}")
 
 
 def _author(options: Options, given: Collection[str]) -> Authored:

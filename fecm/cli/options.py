@@ -14,15 +14,14 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from fecm._errors import did_you_mean
-from fecm._inputs import InputError, read_input
+from fecm._inputs import InputError, parsed_file
+from fecm.deck.unit_systems import NAMES, system_named
 from fecm.problem.slips import MODES, REPORT
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 Decorated = Callable[..., None]
-
-MOST = 1_000_000  # bytes of a file whose contents are the value of an option
 
 
 def stacked(*options: Callable[[Decorated], Decorated]) -> Callable[[Decorated], Decorated]:
@@ -174,15 +173,16 @@ def file_of(parse: Callable[[str], Any]) -> Parsed:
 
     def read(path: str) -> Any:
         try:
-            return parse(read_input(Path(path), MOST).decode("utf-8-sig"))
+            return parsed_file(Path(path), parse)
         except InputError as error:
             raise ValueError(str(error)) from None
         except OSError as error:
             raise ValueError(f"{path} can't be read: {error.strerror}") from None
-        except ValueError as error:
-            raise ValueError(f"{path}: {error}") from None
 
     return Parsed(read, "FILE.toml")
+
+
+SYSTEM = Parsed(system_named, "SYSTEM", NAMES)
 
 
 def assignment(text: str) -> tuple[str, str]:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
 
 import click
 import numpy as np
@@ -13,14 +11,20 @@ from click import option
 
 from fecm._frozen import frozen
 from fecm._measured_tables import read_table
-from fecm._typing import Floats
 from fecm.cli.common import DASH, RefusedError
 from fecm.cli.decks import load_valid
 from fecm.cli.help import Group, typical
-from fecm.cli.options import DECK_PATH, FORMAT_OPTION, POSITIVE, Finite, Format, Parsed, collected
+from fecm.cli.options import (
+    DECK_PATH,
+    FORMAT_OPTION,
+    POSITIVE,
+    SYSTEM,
+    Finite,
+    Format,
+    Parsed,
+    collected,
+)
 from fecm.cli.outputs import OutputPaths, outputs
-from fecm.deck.catalogue import SYSTEMS
-from fecm.deck.units import unit_names
 from fecm.mechanics.projectile import (
     INTEGRATORS,
     LUMPED,
@@ -29,16 +33,15 @@ from fecm.mechanics.projectile import (
     WILSON,
     Integrator,
     MassMatrix,
-    RigidMass,
     Rod,
 )
-from fecm.problem.parts import build_projectile, build_station
 from fecm.studies import StudyError
 from fecm.studies.rod_test import pulse_test
 from fecm.studies.rod_test.calibration import calibrate as fit_sensitivity
 from fecm.studies.rod_test.filters import Filter, filter_of
-from fecm.studies.rod_test.pulse_test import Pulse, RodHistory
+from fecm.studies.rod_test.pulse_test import Pulse
 from fecm.studies.rod_test.recordings import recorded
+from fecm.studies.rod_test.study import Struck, rod_of, strike, uniform
 
 FILTER_HELP = (
     "first-order:RISE or moving-average:RISE, with the time RISE from 10 to 90 % of the "
@@ -78,15 +81,6 @@ class Shape:
     def given(self) -> list[str]:
         """Names of the options that are given."""
         return [name for name, value in vars(self).items() if value is not None]
-
-
-class Struck(NamedTuple):
-    """A rod under a pulse."""
-
-    rod: Rod
-    station: float  # where the force is computed by default
-    dt: float | None  # time step of the deck
-    units: Mapping[str, str]
 
 
 @frozen
@@ -131,9 +125,8 @@ class PulseOptions:
 )
 @option(
     "--units",
-    type=click.Choice(list(SYSTEMS)),
-    metavar="SYSTEM",
-    help="in-lbf-s, m-N-s or mm-N-s: names the units on the picture, without a deck.",
+    type=SYSTEM,
+    help="Names the units on the picture, without a deck, as in in-lbf-s.",
 )
 @option(
     "--dt",
@@ -184,26 +177,22 @@ def pulse(options: PulseOptions) -> None:
     The rod is the projectile of DECK, or uniform by --length, --modulus, --density and --diameter.
     Force is positive in compression.
     """
-    deck, shape = options.deck, options.shape
-    struck = _uniform(shape) if deck is None else _of_deck(deck, shape)
-    projectile, units = struck.rod.with_mass(options.mass_matrix), struck.units
-    history = pulse_test.simulate_pulse(
-        projectile,
+    struck = _uniform(options.shape) if options.deck is None else _of_deck(options)
+    found = strike(
+        struck,
         options.pulse,
-        options.dt or struck.dt or pulse_test.default_time_step(projectile),
-        options.duration or options.pulse.duration,
-        tuple(dict.fromkeys(options.stations)) or (struck.station,),
+        options.dt,
+        options.duration,
+        options.stations,
+        options.transducer,
+        options.mass_matrix,
         options.integrator,
     )
-    filtered = None
-    if options.transducer is not None:
-        transducer = options.transducer.in_unit(units.get("time", ""))
-        filtered = transducer(history.time, history.forces)
     targets = options.targets
-    targets.draw("studies:pulse_picture", history, filtered, units)
-    targets.write(*pulse_test.table(history, filtered))
+    targets.draw("studies:pulse_picture", found, found.filtered, found.units)
+    targets.write(*pulse_test.table(found, found.filtered))
     if targets.table != DASH:
-        _summarise(projectile, history)
+        click.echo(found)
 
 
 def _uniform(shape: Shape) -> Struck:
@@ -213,41 +202,20 @@ def _uniform(shape: Shape) -> Struck:
         needed = ("length", "modulus", "density", "diameter")
         missing = ", ".join(f"--{name}" for name in needed if name not in shape.given())
         raise click.UsageError(f"the rod lacks {missing}; or name a deck with a rod")
-    uniform = Rod(length, (diameter,) * (shape.elements or REPORT_ELEMENTS), modulus, density)
-    return Struck(uniform, length / 2.0, None, SYSTEMS[shape.units] if shape.units else {})
+    elements = shape.elements or REPORT_ELEMENTS
+    return uniform(Rod.cylinder(length, diameter, modulus, density, elements), shape.units)
 
 
-def _of_deck(deck: Path, shape: Shape) -> Struck:
+def _of_deck(options: PulseOptions) -> Struck:
     """The rod of the first problem of a deck."""
-    if given := shape.given():
+    deck, given = options.deck, options.shape.given()
+    assert deck is not None
+    if given:
         raise click.UsageError(f"--{given[0]} is for a rod without a deck; {deck} has one")
     problems = load_valid(deck)
     if not problems:
         raise RefusedError(f"{deck} contains no problem")
-    first = problems[0].deck
-    projectile = build_projectile(first)
-    if isinstance(projectile, RigidMass):
-        raise RefusedError(f"{deck}: the projectile is a rigid mass; a pulse needs a rod")
-    node = build_station(first, projectile, frozenset()).node
-    station = (node - 1) * projectile.length / projectile.elements
-    steps = [macro.value for macro in first.macros if macro.word == "DT" and macro.value > 0.0]
-    return Struck(projectile, station, steps[0] if steps else None, unit_names(first))
-
-
-def _summarise(struck: Rod, history: RodHistory) -> None:
-    """Print a summary."""
-    size = f"length {struck.length:g}, mass {struck.total_mass:.5g}"
-    click.echo(f"rod               {struck.elements} elements, {size}")
-    click.echo(f"steps             {len(history.time) - 1} of {history.time[1]:g}")
-
-    def peak(force: Floats) -> str:
-        row = abs(force).argmax()
-        return f"peak {force[row]:.6g} at time {history.time[row]:.6g}"
-
-    click.echo(f"applied           {peak(history.applied)}")
-    columns = history.stations, history.forces.T, history.mean_ratios
-    for x, force, ratio in zip(*columns, strict=True):
-        click.echo(f"force at {x:<8.4g} {peak(force)}; mean ratio to the applied {ratio:.3f}")
+    return rod_of(problems[0].deck)
 
 
 @rod.command(

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -13,10 +12,11 @@ import numpy as np
 from click import option
 
 from fecm._frozen import frozen
+from fecm.authoring.parameters import ObjectError
 from fecm.cli.common import RefusedError, note
 from fecm.cli.decks import load_valid
 from fecm.cli.help import Group, typical
-from fecm.cli.laminate_options import LaminateOptions, laminate_options
+from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options
 from fecm.cli.options import (
     DECK_PATH,
     NOT_NEGATIVE,
@@ -28,10 +28,8 @@ from fecm.cli.options import (
     stacked,
 )
 from fecm.cli.outputs import OutputPaths, outputs
-from fecm.deck.units import unit_names
-from fecm.mechanics.laminate import Laminate
-from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces
-from fecm.studies.waves import dispersion as compute
+from fecm.studies.waves.study import Waves, waves_of
+from fecm.studies.waves.study import waves as waves_in
 
 MOST = 1_000_000  # rows of a table; more are certainly a typo
 
@@ -97,19 +95,24 @@ class Source:
     laminate: LaminateOptions
     shear_factor: float
 
-    def medium(self) -> tuple[Medium, dict[str, str]]:
-        """Build the laminate, and name its units."""
-        if self.deck is None:
-            if self.laminate.layup is None:
-                message = "give a DECK, or --layup, --ply-thickness and --ply or --material"
-                raise click.UsageError(message)
-            laminate, units = self.laminate.laminate()
+    def waves(self) -> Waves:
+        """Waves in the laminate."""
+        if self.deck is not None:
+            found = self._of_deck(self.deck)
+        elif self.laminate.layup is None:
+            message = "give a DECK, or --layup, --ply-thickness and --ply or --material"
+            raise click.UsageError(message)
         else:
-            laminate, units = self._of_deck(self.deck)
-        return Medium(replace(laminate, shear=self.shear_factor * laminate.shear)), units
+            laminate, own = self.laminate.authored({}, ()), self.laminate
+            try:
+                found = waves_in(laminate, shear_factor=self.shear_factor, units=own.units)
+            except ObjectError as error:
+                raise click.UsageError(as_options(str(error), vars(own))) from None
+        note(*found.notes)
+        return found
 
-    def _of_deck(self, deck: Path) -> tuple[Laminate, dict[str, str]]:
-        """The laminate of a deck's first problem, and its units."""
+    def _of_deck(self, deck: Path) -> Waves:
+        """Waves in the laminate of a deck's first problem."""
         for name, value in vars(self.laminate).items():
             if value is not None:
                 given = name.replace("_", "-")
@@ -117,11 +120,7 @@ class Source:
         problems = load_valid(deck, "; no waves were computed", warnings=False)
         if len(problems) > 1:
             note(f"{deck} has {len(problems)} problems; the laminate of the first is used")
-        if problems[0].plate.is_preloaded:
-            note("PREL is left out: these are waves of the laminate without preload")
-        if problems[0].plate.others:
-            note("the plate has several laminates; these are waves of the one under the load")
-        return problems[0].laminate, unit_names(problems[0].deck)
+        return waves_of(problems[0], self.shear_factor)
 
 
 # The argument and the options of all three commands.
@@ -193,8 +192,8 @@ def dispersion(
 ) -> None:
     """Phase velocity and frequency of all modes against wavelength (figures 2.4, 2.5)."""
     _bound(5 * len(angles) * len(wavelengths))
-    medium, _ = source.medium()
-    curves = [compute(medium, angle, wavelengths) for angle in angles]
+    waves = source.waves()
+    curves = [waves.dispersion(angle, wavelengths) for angle in angles]
     rows = (
         (
             curve.angle,
@@ -205,9 +204,9 @@ def dispersion(
         )
         for curve in curves
         for row, wavelength in enumerate(curve.wavelength.tolist())
-        for place, mode in enumerate(MODES)
+        for place, mode in enumerate(curve.modes)
     )
-    targets.draw("waves:dispersion_picture", medium, curves)
+    targets.draw("waves:dispersion_picture", waves.medium, curves)
     targets.write("angle_deg,wavelength_over_h,mode,phase_velocity,angular_frequency", rows)
 
 
@@ -222,13 +221,12 @@ def dispersion(
 def speeds(step: float, source: Source, targets: OutputPaths) -> None:
     """Normal velocities of the five wave fronts (figures 2.7, 2.8)."""
     _bound(360.0 / step)
-    medium, units = source.medium()
-    surfaces = WaveSurfaces(medium)
-    fronts = surfaces.fronts(_normals(step))
+    waves = source.waves()
+    fronts = waves.fronts(_normals(step))
     rows = np.column_stack([fronts.normal, fronts.velocity]).tolist()
-    targets.draw("waves:speeds_picture", surfaces, units)
-    _note_names(surfaces)
-    targets.write(",".join(("angle_deg", *FRONTS)), rows)
+    targets.draw("waves:speeds_picture", waves.surfaces, waves.units)
+    _note_names(waves)
+    targets.write(",".join(("angle_deg", *fronts.modes)), rows)
 
 
 @waves.command(
@@ -265,27 +263,26 @@ def fronts(
 ) -> None:
     """Front positions and rays (figures 2.9 to 2.12); cusps go to standard error."""
     _bound(5 * len(times) * 360.0 / step)
-    medium, units = source.medium()
-    start = medium.laminate.thickness if radius is None else radius
-    surfaces = WaveSurfaces(medium)
-    found = surfaces.fronts(_normals(step))
+    waves = source.waves()
+    start = waves.thickness if radius is None else radius
+    found = waves.fronts(_normals(step))
     if not math.isfinite(max(times) * float(found.velocity.max()) + start):
         raise RefusedError("the positions of the fronts overflow at these times")
     positions = [found.positions(time, start).tolist() for time in times]
     rays, normals = found.ray_angle.tolist(), found.normal.tolist()
     rows = (
         (mode, normal, time, *positions[at][row][place], rays[row][place])
-        for place, mode in enumerate(FRONTS)
+        for place, mode in enumerate(found.modes)
         for row, normal in enumerate(normals)
         for at, time in enumerate(times)
     )
-    targets.draw("waves:fronts_picture", surfaces, times, start, units)
-    _note_names(surfaces)
+    targets.draw("waves:fronts_picture", waves.surfaces, times, start, waves.units)
+    _note_names(waves)
     for time in times:
-        cusps = surfaces.cusps(time, start)
+        cusps = waves.cusps(time, start)
         if not cusps:
             note(f"no cusps at time {time:g}")
-        for mode in FRONTS:
+        for mode in found.modes:
             if own := [cusp for cusp in cusps if cusp.mode == mode]:
                 texts = (f"normal {c.normal:.4f} deg at {c.x:.6g}, {c.y:.6g}" for c in own)
                 note(f"{mode} has {len(own)} cusps at time {time:g}: {'; '.join(texts)}")
@@ -297,8 +294,8 @@ def _bound(rows: float) -> None:
         raise RefusedError(f"the table would have {rows:.3g} rows; at most {MOST} are allowed")
 
 
-def _note_names(surfaces: WaveSurfaces) -> None:
+def _note_names(waves: Waves) -> None:
     """Note where the dominant component of a front is not that of its name."""
-    for front, runs in surfaces.misnamed().items():
+    for front, runs in waves.surfaces.misnamed().items():
         places = ", ".join(f"{first:g} to {last:g}" for first, last in runs)
         note(f"at normals {places} deg, another component dominates the front named {front}")

@@ -10,33 +10,26 @@ import math
 from collections.abc import Mapping
 from dataclasses import replace
 from importlib import resources
+from pathlib import Path
 
 from fecm._frozen import frozen
-from fecm._inputs import parsed_toml
-from fecm.deck.model import Allowables, Deck, Delamination, Expansion, Indentation, Ply, Units
-from fecm.deck.units import COEFFICIENT, DENSITY, MODULUS, TOUGHNESS, in_si, unit_names
+from fecm._inputs import parsed_file, parsed_toml
+from fecm.deck.model import Allowables, Deck, Delamination, Expansion, Indentation, Ply
+from fecm.deck.unit_systems import UnitsError, convert, system_named
+from fecm.deck.units import COEFFICIENT, DENSITY, MODULUS, TOUGHNESS, unit_names
 
-# Systems of units: names of length, force and time.
-NAMES = ("in-lbf-s", "m-N-s", "mm-N-s")
-SYSTEMS = {name: dict(zip(Units.NAMES, name.split("-"), strict=True)) for name in NAMES}
 # Units of the test standards, and the constants of steel in them.
 STANDARD = "mm-N-s"
 STEEL_MODULUS = 207e3
 STEEL_POISSON = 0.3
 
 
-def convert(value: float, dimension: str, system: str, other: str) -> float:
-    """A value in another system of units, with as many digits as the field of a card has."""
-    before, after = in_si(dimension, SYSTEMS[system]), in_si(dimension, SYSTEMS[other])
-    if before is None or after is None:
-        raise LookupError(f"no unit of {dimension}")
-    return value if system == other else float(f"{value * (before / after):.6g}")
-
-
 def system_of(deck: Deck) -> str | None:
     """System of units of a deck; None if it names none, or others."""
-    names = unit_names(deck)
-    return next((system for system, units in SYSTEMS.items() if units == names), None)
+    try:
+        return system_named("-".join(unit_names(deck).values()))
+    except UnitsError:
+        return None
 
 
 # Keys of a ply in a TOML file, and their dimensions.
@@ -72,13 +65,27 @@ NU23 = 0.4  # of a ply whose nu23 is not known
 
 @frozen
 class NamedPly:
-    """A ply with a name."""
+    """A ply with a name, which `fecm.Laminate` takes.
+
+    Attributes
+    ----------
+    name : str
+        Name of the ply.
+    values : dict of str to float
+        The constants that are known, as in `fecm materials`, in the units of `system`.
+    system : str
+        Units of length, force and time, as in ``"mm-N-s"``.
+    source : str
+        Publication of the constants.
+    assumed : str
+        What the source does not give.
+    """
 
     name: str
-    values: dict[str, float]  # constants by :data:`KEYS`, in the units of `system`
-    system: str  # a key of :data:`SYSTEMS`
-    source: str = ""  # publication of the constants
-    assumed: str = ""  # values that the source does not give
+    values: dict[str, float]
+    system: str
+    source: str = ""
+    assumed: str = ""
 
     @property
     def ply(self) -> Ply:
@@ -91,14 +98,41 @@ class NamedPly:
         return self.values.get("nu23", NU23)
 
     def value(self, key: str, system: str) -> float | None:
-        """A constant in a system of units; None if it is not known."""
+        """A constant of `values` in a system of units; None if it is not known.
+
+        Examples
+        --------
+        >>> materials()["IM7/8552"].value("E1", "mm-ms-kg")  # GPa
+        171.42
+        """
         value, dimension = self.values.get(key), KEYS[key]
         if value is None or not dimension:
             return value
         return convert(value, dimension, self.system, system)
 
+    def constants(self, system: str) -> dict[str, float]:
+        """Constants that are known, and G13 and G23, in a system of units."""
+        ply = self.converted(system)
+        known = {key: self.value(key, system) for key in self.values}
+        found = {"G13": ply.g13, "G23": ply.g23, **known}
+        return {key: value for key, value in found.items() if value is not None}
+
+    def to_dict(self, system: str) -> dict[str, object]:
+        """Name, units, all constants by :data:`KEYS`, and source; None where it is not known."""
+        constants = self.constants(system)
+        return {
+            "name": self.name,
+            "units": system,
+            **{key: constants.get(key) for key in KEYS},
+            "source": self.source,
+            "assumed": self.assumed,
+        }
+
     def converted(self, system: str) -> Ply:
-        """Elastic constants in a system of units; unchanged in their own."""
+        """Elastic constants in a system of units; unchanged in their own.
+
+        G13 is G12 and G23 is E2/(2 (1 + nu23)) where they are not known.
+        """
         density, nu12, e1, e2, g12 = (self.value(key, system) or 0.0 for key in ELASTIC)
         g13 = self.value("G13", system) or g12
         g23 = self.value("G23", system) or float(f"{e2 / (2.0 * (1.0 + self.nu23)):.6g}")
@@ -135,7 +169,7 @@ def read_plies(text: str) -> dict[str, NamedPly]:
     """Plies of a TOML file, by name.
 
     Each table is a ply: numbers by :data:`KEYS`, and the texts `source` and `assumed`.  `units`, of
-    the file or of a ply, is a key of :data:`SYSTEMS`; mm-N-s if it is missing.  Raises ValueError
+    the file or of a ply, is a system of units; mm-N-s if it is missing.  Raises ValueError
     if a name, value or unit cannot be meant, or the file is not TOML.
     """
     tables = parsed_toml(text)
@@ -162,9 +196,10 @@ def _ply(name: str, table: Mapping[str, object]) -> NamedPly:
         else:
             message = f"[{name}] {key} is unknown; the keys are {', '.join((*KEYS, *TEXTS))}"
             raise ValueError(message)
-    system = texts["units"]
-    if system not in SYSTEMS:
-        raise ValueError(f"[{name}] units: {system!r} is none of {', '.join(SYSTEMS)}")
+    try:
+        system = system_named(texts["units"])
+    except UnitsError as error:
+        raise ValueError(f"[{name}] units: {error}") from None
     if missing := [key for key in ELASTIC if key not in numbers]:
         raise ValueError(f"[{name}] {' and '.join(missing)} missing")
     values = {key: numbers[key] for key in KEYS if key in numbers}
@@ -190,6 +225,39 @@ def _text(file: str) -> str:
 
 
 MATERIALS = read_plies(_text("materials.toml"))
+
+
+def materials(file: str | Path | None = None) -> dict[str, NamedPly]:
+    """Named plies with their sources, as `fecm materials` lists them.
+
+    Parameters
+    ----------
+    file : str or Path, optional
+        TOML file of own plies; the catalogue of the package by default.
+
+    Returns
+    -------
+    dict of str to NamedPly
+        Plies by their names.
+
+    Raises
+    ------
+    ValueError
+        If a name, a value or a unit of the file cannot be meant, or it is not TOML.
+    OSError
+        If the file can't be read.
+
+    Examples
+    --------
+    >>> ply = materials()["IM7/8552"]
+    >>> ply.values["E1"], ply.system
+    (171420.0, 'mm-N-s')
+    >>> ply.converted("mm-ms-kg").e1  # GPa
+    171.42
+    """
+    return dict(MATERIALS) if file is None else parsed_file(Path(file), read_plies)
+
+
 SYSTEM = "in-lbf-s"  # system of units of the report
 # Constants of the report that are not the indenter's, in its units.
 ALPHA_P = 6.564e-4  # critical indentation
@@ -199,14 +267,24 @@ ALPHA_CR = 3.16e-3  # critical indentation of equation 3-7, from reference 14
 
 @frozen
 class NamedContact:
-    """A contact with a name."""
+    """A measured contact law with a name, which `fecm.impact` takes.
+
+    Attributes
+    ----------
+    name : str
+        Name of the law.
+    law : Indentation
+        Its constants in in, lbf and s.
+    source : str
+        Indenter, target and publication.
+    """
 
     name: str
-    law: Indentation  # constants in in, lbf and s
-    source: str  # indenter, target and publication
+    law: Indentation
+    source: str
 
     def converted(self, system: str) -> Indentation:
-        """Constants in a system of units, a key of :data:`~fecm.deck.catalogue.SYSTEMS`."""
+        """Constants in a system of units."""
         k = convert(self.law.k, COEFFICIENT, SYSTEM, system)
         return replace(self.law, k=k, alpha_p=convert(self.law.alpha_p, "length", SYSTEM, system))
 
@@ -215,3 +293,19 @@ CONTACTS = {
     name: NamedContact(name, Indentation(**table["law"]), table["source"])
     for name, table in parsed_toml(_text("contacts.toml")).items()
 }
+
+
+def contacts() -> dict[str, NamedContact]:
+    """Named contact laws with their sources, as `fecm indent contacts` lists them.
+
+    Returns
+    -------
+    dict of str to NamedContact
+        Laws by their names.
+
+    Examples
+    --------
+    >>> contacts()["report-0.5"].converted("mm-N-s").k  # N/mm^1.5
+    46215.5
+    """
+    return dict(CONTACTS)

@@ -38,13 +38,21 @@ class OtherFile(NamedTuple):
 
 TAKES_A_MESH = "`fecm new DECK --mesh FILE`, or fecm.Plate.from_mesh, takes a mesh from it"
 OTHER_FILES = (
+    OtherFile(
+        r"\*keyword\b|\$#",
+        "an input file of LS-DYNA",
+        "`fecm new --units mm-ms-kg` makes a deck in its units; `--mesh FILE` takes a mesh of "
+        "Gmsh, Abaqus, Nastran or VTK",
+    ),
+    OtherFile(r"sol +\d|cend\b|begin +bulk\b", "an input file of Nastran", TAKES_A_MESH),
     OtherFile(r"\*\*|\*[a-z]", "an input file of Abaqus or CalculiX", TAKES_A_MESH),
     OtherFile(r"\$MeshFormat", "a mesh of Gmsh", TAKES_A_MESH),
     OtherFile(
         r"feap\b",
         "an input file of FEAP",
-        "the first word is FECM here; COOR, ELEM and BOUN are read as FEAP reads them, MATE and "
-        "the program of macros are those of this program",
+        "the first word is FECM here, and the third number of the next card is that of the layers; "
+        "COOR, ELEM and BOUN are read as FEAP reads them; MATE and the program, MACR to END, are "
+        "those of this program",
     ),
 )
 

@@ -99,10 +99,8 @@ declare(
     "E013",
     Subject.FRAME,
     "The file is an input of another program.",
-    cause="Abaqus, CalculiX, Gmsh and FEAP are known.",
-    remedy=(
-        "`fecm new --mesh FILE` takes a mesh. FEAP: the cards differ in part, see [deck](deck.md)."
-    ),
+    cause="Abaqus, CalculiX, LS-DYNA, Nastran, Gmsh and FEAP are known.",
+    remedy=("`fecm new --mesh FILE` takes a mesh. FEAP: [what to change](deck.md#decks-of-feap)."),
 )
 
 # Numbers.

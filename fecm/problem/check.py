@@ -123,7 +123,7 @@ def _check_each_segment(checked: Problem, findings: Findings, unsound: set[str])
         check_impact(checked, findings)
     check_segments(checked.deck, findings)
     if (card := checked.deck.last(model.Materials)) is not None:
-        apply(laminate.OF_MATERIALS, findings, card)
+        check_segment(card, findings)
     if (others := checked.deck.last(model.Laminates)) is not None:
         for one in others.laminates:
             apply(laminate.OF_LAYERS, findings, one)
@@ -146,10 +146,12 @@ def check_segments(deck: model.Deck, findings: Findings) -> None:
 
 
 def check_segment(segment: model.Segment, findings: Findings) -> None:
-    """Check one of the segments of :data:`ALONE`."""
+    """Check one of the segments of :data:`ALONE`, or the other materials of layers."""
     match segment:
         case model.Material():
             apply(laminate.OF_MATERIAL, findings, segment)
+        case model.Materials():
+            apply(laminate.OF_MATERIALS, findings, segment)
         case model.Indentation():
             apply(contact.OF_LAW, findings, segment)
         case model.Allowables():

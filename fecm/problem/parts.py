@@ -136,15 +136,6 @@ def laminate_numbers(deck: Deck) -> Indices:
     return numbers
 
 
-def laminate_of(material: model.Material, *, isotropic_g12: bool = False) -> Laminate:
-    """Laminate of a MATE segment of one material; its inertia uses the card's total thickness.
-
-    With `isotropic_g12` E1/2(1+nu12) replaces G12 where E1 = E2 (the slip ``g12``).
-    """
-    plies, total = {MATERIAL: material.ply}, material.integration.thickness
-    return _laminate_of(material.layers, plies, total, isotropic_g12=isotropic_g12)
-
-
 def _laminate_of(
     layers: Sequence[model.Layer],
     plies: Mapping[int, model.Ply],

@@ -13,9 +13,10 @@ from functools import lru_cache
 from typing import Any, NamedTuple, TypeVar
 
 from fecm.deck import model
-from fecm.deck.catalogue import NU23, STANDARD, STEEL_MODULUS, STEEL_POISSON, SYSTEMS
+from fecm.deck.catalogue import NU23, STANDARD, STEEL_MODULUS, STEEL_POISSON
 from fecm.deck.findings import Findings
 from fecm.deck.macros import compile_program
+from fecm.deck.unit_systems import units_of
 from fecm.deck.units import MODULUS, in_si, unit_names
 from fecm.mechanics.contact_law import ContactParameters, Law, hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
@@ -147,7 +148,7 @@ def set_radius(strike: Strike, value: Value) -> Strike:
     if unit is None:
         hint = "add a UNIT segment, or vary k instead"
         raise CasesError(f"radius: the modulus of steel needs the units of the deck; {hint}")
-    steel = STEEL_MODULUS * (in_si(MODULUS, SYSTEMS[STANDARD]) or 1.0) / unit
+    steel = STEEL_MODULUS * (in_si(MODULUS, units_of(STANDARD)) or 1.0) / unit
     layers = struck_layers(strike.plate)
     plies = tuple(strike.plate.plies[layer.material] for layer in layers)
     try:

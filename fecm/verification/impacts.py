@@ -13,12 +13,12 @@ from fecm.deck import model
 from fecm.deck.grid import Grid, refined, uniform
 from fecm.deck.model import Deck, Impact, Indentation, Patch, Projectile
 from fecm.mechanics.laminate import effective_rigidity, laminate
+from fecm.mechanics.quick_models import inelasticity, infinite_plate, static_plate
 from fecm.mechanics.solutions import static_stiffness
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
 from fecm.results.result import Result
-from fecm.studies.estimate import inelasticity, infinite_plate, static_plate
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.plan import plan
 from fecm.verification import decks

@@ -6,6 +6,7 @@ import fecm
 from fecm.mechanics import (
     assumed_shear,
     points,
+    quick_models,
 )
 from fecm.mechanics import impact as impacts
 from fecm.mechanics import laminate as laminates
@@ -19,7 +20,6 @@ from fecm.mechanics.contact_law import (
 from fecm.mechanics.impact import ImpactSystem
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.problem import parts
-from fecm.studies import estimate
 from tests.breaks import (
     Breaks,
     changed,
@@ -119,15 +119,15 @@ BREAKS: Breaks = {
         {"threshold": ("the report", "the same")},
     ),
     "a tenth of the plate's inertia missing in Zener's parameter": (
-        instead(estimate, "infinite_plate", lambda right, *a: right(*a[:-1], a[-1] / 0.9**0.5)),
+        instead(quick_models, "infinite_plate", lambda right, *a: right(*a[:-1], a[-1] / 0.9**0.5)),
         {"small-mass": ("F T", "t_peak")},
     ),
     "4 for 8 in Zener's parameter": (
-        changed(estimate, "inelasticity", doubled),
+        changed(quick_models, "inelasticity", doubled),
         {"small-mass": ("λ", "largest force on")},
     ),
     "nine tenths of the plate's stiffness": (
-        instead(estimate, "static_plate", lambda right, *a: right(*a[:-1], 0.9 * a[-1])),
+        instead(quick_models, "static_plate", lambda right, *a: right(*a[:-1], 0.9 * a[-1])),
         {"large-mass": ("largest",)},
     ),
 }  # fmt: skip

@@ -10,6 +10,7 @@ from fecm.deck.findings import Place
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Ply, Record
 from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.deck.unit_systems import MASSES, force_of
 from fecm.deck.units import (
     COEFFICIENT,
     DENSITY,
@@ -63,7 +64,6 @@ REAL = {
     "velocity": Range(VELOCITY, 0.01, 1000.0, 5.0, "m/s"),
     "contact coefficient": Range(COEFFICIENT, 1e6, 1e12, 1e9, "N/m^1.5"),
 }
-MASSES = {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "t": 1e3, "tonne": 1e3}
 # Names that are no units of length, force or time.
 OTHERS = {
     "mass": (*MASSES, "ton", "lbm", "slug"),
@@ -129,12 +129,8 @@ def unit_of_another_kind(card: model.Units) -> Reports:
         if name in KNOWN[wanted] or kind == wanted:
             continue
         message = f"`{name}` on UNIT is a unit of {kind}, not of {wanted}"
-        length, time = KNOWN["length"].get(card.length), KNOWN["time"].get(card.time)
-        if wanted == "force" and name in MASSES and length and time:
-            force = MASSES[name] * length / time**2
-            same = (known for known, size in KNOWN["force"].items() if _same(size, force))
-            if unit := next(same, ""):
-                message += f"; with {card.length}, {name} and {card.time} the force is in {unit}"
+        if wanted == "force" and (unit := force_of(name, card.length, card.time)):
+            message += f"; with {card.length}, {name} and {card.time} the force is in {unit}"
         hint = "UNIT names the units of length, force and time in this order, as in mm N s"
         yield Report(f"{message}.", card.place(), hint)
 

@@ -60,7 +60,7 @@ def read_test(
     if units is None and not (length and force):
         raise StudyError(
             f"{path}: one column is in {length or force}, the other has no unit; state both, or "
-            "use --unit LENGTH,FORCE"
+            "give both in `units`"
         )
     missing = units or (length, force)
     length, force = length or missing[0], force or missing[1]
@@ -88,7 +88,7 @@ def _place(table: Table, name: str, column: str) -> int:
     raise StudyError(
         f"{table.path}: the columns are {names}; one must be named {column or name}"
         + (f" (or {', '.join(NAMES[name][1:])})" if not column else "")
-        + "; --columns INDENTATION,FORCE selects others by name or number"
+        + "; `columns` of indentation and force selects others by name or number"
     )
 
 

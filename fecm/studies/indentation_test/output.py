@@ -6,6 +6,7 @@ from dataclasses import asdict
 from typing import Any
 
 from fecm._tables import aligned
+from fecm.authoring.contact import Contact
 from fecm.deck.model import Indentation
 from fecm.mechanics.contact_law import LinearPermanent, YangSunPermanent
 from fecm.studies.indentation_test.constants import Cycle, Fit
@@ -18,17 +19,23 @@ NOT_ZERO = 2.0  # standard errors within which a slope does not differ from 0
 BAD = 0.05  # scatter that triggers a note
 
 
-def card(fit: Fit) -> str:
-    """Return the EXPE segment; empty if the test does not determine all parameters."""
+def law(fit: Fit) -> Contact | None:
+    """Return the law in the digits of a card; None if the test does not determine it."""
     relation = fit.relation()
     if isinstance(relation, YangSunPermanent):
         values, word = (relation.k, relation.alpha_cr, 0.0, relation.q), Indentation.ACR
     elif isinstance(relation, LinearPermanent):
         values, word = (relation.k, relation.alpha_p, relation.s_p, relation.q), ""
     else:
-        return ""
+        return None
     k, alpha, s_p, q = (float(f"{value:.{DIGITS}g}") for value in values)
-    return Indentation(k, alpha, s_p, q, word).text()
+    return Contact(k, alpha, s_p, q, word)
+
+
+def card(fit: Fit) -> str:
+    """Return the EXPE segment; empty if the test does not determine all parameters."""
+    found = law(fit)
+    return found.text() if found else ""
 
 
 def notes(fit: Fit) -> list[str]:
@@ -41,7 +48,7 @@ def notes(fit: Fit) -> list[str]:
     elif fit.line is None and fit.critical is None:
         found.append(
             "no card: s_p and alpha_p require two or more peaks with a permanent indentation; "
-            "--acr requires one"
+            "`acr` requires one"
         )
     if fit.solution.at_limit:
         found.append("a value is at a bound of the fit: the law does not fit this test")

@@ -31,10 +31,20 @@ AROUND = 360 * STEPS  # steps over all normals
 
 @frozen
 class Cusp:
-    """A cusp of a front."""
+    """A cusp of a front.
 
-    mode: str  # one of :data:`FRONTS`
-    normal: float  # angle of the front's normal at the cusp, degrees
+    Attributes
+    ----------
+    mode : str
+        Name of the front.
+    normal : float
+        Angle of the front's normal at the cusp, degrees.
+    x, y : float
+        Place of the cusp, length.
+    """
+
+    mode: str
+    normal: float
     x: float
     y: float
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -28,12 +29,27 @@ _PAIRS = np.array(list(combinations(range(5), 2)))  # candidates for the two in-
 
 @frozen
 class Dispersion:
-    """Harmonic waves in one direction, modes in the order of :data:`MODES`."""
+    """Harmonic waves in one direction.
 
-    angle: float  # direction of propagation, degrees
-    wavelength: Floats  # over thickness, (n,)
-    phase_velocity: Floats  # length/time, (n, 5)
-    angular_frequency: Floats  # radian/time, (n, 5)
+    Attributes
+    ----------
+    modes : tuple of str
+        Names of the modes, in the order of the columns.
+    angle : float
+        Direction of propagation, degrees.
+    wavelength : ndarray (n,)
+        Over the thickness.
+    phase_velocity : ndarray (n, modes)
+        Length/time.
+    angular_frequency : ndarray (n, modes)
+        Radian/time.
+    """
+
+    modes: ClassVar[tuple[str, ...]] = MODES
+    angle: float
+    wavelength: Floats
+    phase_velocity: Floats
+    angular_frequency: Floats
 
 
 def dispersion(medium: Medium, angle: float, wavelengths: ArrayLike) -> Dispersion:

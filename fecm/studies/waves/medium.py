@@ -19,10 +19,8 @@ OUT_OF_RANGE = "the laminate's constants are too large or too far apart to compu
 class Medium:
     """An infinite laminate; raises StudyError if stiffness or inertia is not positive definite."""
 
-    laminate: Laminate  # stiffness, mass P and rotary inertia I
-    # R of equation 2-24, the first moment of the density about the midplane (mass/length); zero if
-    # all plies have the same density.
-    coupling_inertia: float = 0.0
+    # Stiffness, mass P, rotary inertia I, and R, the first moment of density about the midplane.
+    laminate: Laminate
 
     def __post_init__(self) -> None:
         try:
@@ -30,9 +28,15 @@ class Medium:
                 np.linalg.cholesky(_correlation(matrix))
         except np.linalg.LinAlgError:
             raise StudyError("the laminate's stiffness is not positive definite") from None
-        p, r, i = self.laminate.mass, self.coupling_inertia, self.laminate.rotary_inertia
+        p, r, i = self._inertias
         if not (p > 0.0 and i > 0.0 and abs(r) < (p * i) ** 0.5):
             raise StudyError("the laminate's inertia is not positive definite")
+
+    @property
+    def _inertias(self) -> tuple[float, float, float]:
+        """P, R and I of equation 2-24."""
+        laminate = self.laminate
+        return laminate.mass, laminate.coupling_inertia, laminate.rotary_inertia
 
     @cached_property
     def section(self) -> Floats:
@@ -44,7 +48,7 @@ class Medium:
     @property
     def inertia(self) -> Floats:
         """Inertia of u_n, u_t, phi_n, phi_t, w, (5, 5): the right sides of 2-22 and 2-23."""
-        p, r, i = self.laminate.mass, self.coupling_inertia, self.laminate.rotary_inertia
+        p, r, i = self._inertias
         matrix = np.diag([p, p, i, i, p])
         matrix[[0, 1, 2, 3], [2, 3, 0, 1]] = r
         return matrix

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import permutations
+from typing import ClassVar
 
 import numpy as np
 
@@ -36,13 +37,28 @@ FRONTS = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shea
 
 @frozen
 class Fronts:
-    """The five fronts for a series of normals, in the order of :data:`FRONTS`."""
+    """The five fronts for a series of normals.
 
-    normal: Floats  # angles, (n,), degrees
-    velocity: Floats  # normal velocity c_n, (n, 5), length/time
-    slope: Floats  # its derivative with respect to the normal's angle (radian), (n, 5)
-    curvature: Floats  # its second derivative, (n, 5)
-    share: Floats  # of u_n, u_t, phi_n, phi_t, w (last axis) in the kinetic energy, (n, 5, 5)
+    Attributes
+    ----------
+    modes : tuple of str
+        Names of the fronts, in the order of the columns.
+    normal : ndarray (n,)
+        Angles of the normals, degrees.
+    velocity : ndarray (n, 5)
+        Normal velocity c_n, length/time.
+    slope, curvature : ndarray (n, 5)
+        Its first and second derivative with respect to the angle of the normal (radian).
+    share : ndarray (n, 5, 5)
+        Share of u_n, u_t, phi_n, phi_t, w (last axis) in the kinetic energy.
+    """
+
+    modes: ClassVar[tuple[str, ...]] = FRONTS
+    normal: Floats
+    velocity: Floats
+    slope: Floats
+    curvature: Floats
+    share: Floats
 
     @property
     def ray(self) -> Floats:

@@ -1,0 +1,237 @@
+"""The free rod of a projectile under a pulse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import field
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from fecm._errors import StudyError
+from fecm._frozen import frozen
+from fecm._typing import Floats
+from fecm.api import sole_problem
+from fecm.authoring.laminate import system_asked
+from fecm.authoring.parameters import check_positive
+from fecm.deck.model import Deck
+from fecm.deck.unit_systems import units_of
+from fecm.deck.units import unit_names
+from fecm.mechanics.projectile import (
+    INTEGRATORS,
+    MASSES,
+    Integrator,
+    MassMatrix,
+    RigidMass,
+    Rod,
+)
+from fecm.problem.parts import build_projectile, build_station
+from fecm.studies.rod_test.filters import Filter, filter_of
+from fecm.studies.rod_test.pulse_test import (
+    Pulse,
+    RodHistory,
+    default_time_step,
+    pulse_of,
+    simulate_pulse,
+    table_pulse,
+)
+
+
+@frozen
+class Struck:
+    """A rod under a pulse: where its force is computed, and with which time step, by default."""
+
+    rod: Rod
+    station: float
+    dt: float | None
+    units: dict[str, str]
+
+
+@frozen
+class PulseTest(RodHistory):
+    """History of a rod under a pulse; printed, it is the summary of `fecm rod`.
+
+    Attributes
+    ----------
+    rod : Rod
+        The rod.
+    time : ndarray (rows,)
+        Times from 0.
+    applied : ndarray (rows,)
+        Force on the struck end, positive in compression.
+    stations : tuple of float
+        Distances from the struck end.
+    forces : ndarray (rows, stations)
+        Forces at the stations.
+    accelerations : ndarray (rows, 3)
+        Of the struck end, the middle and the far end.
+    filtered : ndarray (rows, stations) or None
+        Forces behind the filter, if there is one.
+    units : dict of str to str
+        Names of the units; empty if they are not known.
+    """
+
+    rod: Rod
+    filtered: Floats | None = None
+    units: dict[str, str] = field(default_factory=dict)
+
+    def __str__(self) -> str:
+        size = f"length {self.rod.length:g}, mass {self.rod.total_mass:.5g}"
+        lines = [
+            f"rod               {self.rod.elements} elements, {size}",
+            f"steps             {len(self.time) - 1} of {self.time[1]:g}",
+            f"applied           {self._peak(self.applied)}",
+        ]
+        columns = self.stations, self.forces.T, self.mean_ratios
+        for x, force, ratio in zip(*columns, strict=True):
+            about = f"mean ratio to the applied {ratio:.3f}"
+            lines.append(f"force at {x:<8.4g} {self._peak(force)}; {about}")
+        return "\n".join(lines)
+
+    def _peak(self, force: Floats) -> str:
+        row = abs(force).argmax()
+        return f"peak {force[row]:.6g} at time {self.time[row]:.6g}"
+
+
+def pulse_test(
+    rod: Rod | str | Path | Deck,
+    pulse: str | Path | tuple[ArrayLike, ArrayLike],
+    *,
+    dt: float | None = None,
+    duration: float | None = None,
+    stations: Iterable[float] = (),
+    filter: str | Filter | None = None,
+    mass_matrix: MassMatrix = "lumped",
+    integrator: Integrator = "wilson",
+    units: str | None = None,
+) -> PulseTest:
+    """Compute forces and accelerations of a free rod under a pulse on one end (report, 4.2).
+
+    Parameters
+    ----------
+    rod : Rod, str, Path or Deck
+        The rod, or a deck with a single problem, whose projectile it is.
+    pulse : str, Path or tuple of array_like
+        ``"gauss:F0,TAU,B"``, F0 exp(-(t - TAU)^2/4 B^2); ``"sine:F0,B"``, F0 sin(pi t/B) until B; a
+        table of time and force, or both as arrays (points,), linear between the points.
+    dt : float, optional
+        Time step; the deck's, or 0.8 of the travel time of a wave through an element, by default.
+    duration : float, optional
+        Simulated time; TAU + 10 B, 1.5 B, or the table's by default.
+    stations : iterable of float
+        Distances from the struck end at which forces are computed; by default the middle, or the
+        deck's transducer.
+    filter : str, optional
+        Filter of these forces: ``"first-order:RISE"``, ``"moving-average:RISE"`` or
+        ``"cfc:CLASS"``.
+    mass_matrix : str
+        ``"lumped"``, as in the report's program, or ``"consistent"``.
+    integrator : str
+        ``"wilson"``, as in the report's program, or ``"average-acceleration"``.
+    units : str, optional
+        Units of a `Rod`, as in ``"mm-N-s"``, which a filter of a class needs.
+
+    Returns
+    -------
+    PulseTest
+        The history.
+
+    Raises
+    ------
+    DeckError
+        If the deck has errors.
+    StudyError
+        If the pulse, the filter or a station is invalid, the projectile is a rigid mass, the steps
+        are more than two million, or the motion is not finite.
+    ValueError
+        If a number is not positive, or the deck has several problems, or none.
+    OSError
+        If the table can't be read.
+
+    Examples
+    --------
+    >>> import fecm
+    >>> rod = fecm.Rod.cylinder(1.0, 0.625, 30e6, 7.33e-4)
+    >>> found = fecm.pulse_test(rod, "gauss:1000,200e-6,40e-6", stations=[0.5])
+    >>> print(f"mean ratio to the applied force: {found.mean_ratios[0]:.3f}")  # report: 0.498
+    mean ratio to the applied force: 0.498
+    """
+    check_positive(dt=dt, duration=duration)
+    for name, value, known in (
+        ("mass_matrix", mass_matrix, MASSES),
+        ("integrator", integrator, INTEGRATORS),
+    ):
+        if value not in known:
+            raise StudyError(f"`{name}` is {value!r}, none of {', '.join(known)}")
+    if isinstance(rod, Rod):
+        struck = uniform(rod, units)
+    elif units is not None:
+        raise StudyError("`units` are those of the deck; leave them out")
+    else:
+        struck = rod_of(sole_problem(rod, warns=False).deck)
+    chosen = filter_of(filter) if isinstance(filter, str) else filter
+    return strike(
+        struck, _pulse(pulse), dt, duration, tuple(stations), chosen, mass_matrix, integrator
+    )
+
+
+def uniform(rod: Rod, units: str | None) -> Struck:
+    """A rod by itself, in a system of units."""
+    system = system_asked(units)
+    return Struck(rod, rod.length / 2.0, None, units_of(system) if system else {})
+
+
+def rod_of(deck: Deck) -> Struck:
+    """The rod of a checked deck; StudyError if the projectile is a rigid mass."""
+    projectile = build_projectile(deck)
+    if isinstance(projectile, RigidMass):
+        raise StudyError("the projectile is a rigid mass; a pulse needs a rod")
+    node = build_station(deck, projectile, frozenset()).node
+    station = (node - 1) * projectile.length / projectile.elements
+    steps = [macro.value for macro in deck.macros if macro.word == "DT" and macro.value > 0.0]
+    return Struck(projectile, station, steps[0] if steps else None, unit_names(deck))
+
+
+def strike(
+    struck: Struck,
+    pulse: Pulse,
+    dt: float | None,
+    duration: float | None,
+    stations: tuple[float, ...],
+    transducer: Filter | None,
+    mass_matrix: MassMatrix,
+    integrator: Integrator,
+) -> PulseTest:
+    """Simulate a test; raises StudyError as :func:`pulse_test`."""
+    rod = struck.rod.with_mass(mass_matrix)
+    history = simulate_pulse(
+        rod,
+        pulse,
+        dt or struck.dt or default_time_step(rod),
+        duration or pulse.duration,
+        tuple(dict.fromkeys(stations)) or (struck.station,),
+        integrator,
+    )
+    filtered = None
+    if transducer is not None:
+        own = transducer.in_unit(struck.units.get("time", ""))
+        filtered = own(history.time, history.forces)
+    return PulseTest(**vars(history), rod=rod, filtered=filtered, units=struck.units)
+
+
+def _pulse(pulse: str | Path | tuple[ArrayLike, ArrayLike]) -> Pulse:
+    """A pulse from a text, a table or arrays."""
+    if isinstance(pulse, str | Path):
+        return pulse_of(str(pulse))
+    try:
+        time, force = (np.asarray(values, dtype=np.float64) for values in pulse)
+    except (TypeError, ValueError):
+        raise StudyError("a pulse is a text, a path, or arrays of time and force") from None
+    if time.ndim != 1 or time.shape != force.shape or len(time) < 2:
+        raise StudyError("time and force of a pulse are two arrays of the same length, 2 or more")
+    if not (np.isfinite(force).all() and np.isfinite(time).all() and (np.diff(time) > 0.0).all()):
+        raise StudyError("the times of a pulse must increase, and all values must be finite")
+    if time[-1] <= 0.0:
+        raise StudyError("the pulse ends before time 0")
+    return table_pulse(time, force)

@@ -1,0 +1,263 @@
+"""An impact by quick models and by the run itself, side by side."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict
+from pathlib import Path
+
+from fecm._errors import warn
+from fecm._frozen import frozen
+from fecm._tables import aligned
+from fecm.api import sole_problem
+from fecm.deck.model import Deck
+from fecm.deck.units import quantity, unit_names, unit_of
+from fecm.problem.problem import Problem
+from fecm.results.linear_plate import TOO_SOFT, UNSAFE
+from fecm.results.metrics import RATIO
+from fecm.results.validity import Judge
+from fecm.studies.estimate import Estimate as QuickEstimate
+from fecm.studies.estimate import estimate as by_quick_models
+from fecm.sweeps.api import carry_out
+from fecm.sweeps.plan import plan
+
+RUN = "run"  # name of the row of the run itself
+# Columns of the table, and their dimensions.
+COLUMNS = {
+    "peak_force": "force",
+    "duration": "time",
+    "threshold": "force",
+    "velocity": "length/time",
+    "energy": "force*length",
+}
+
+
+@frozen
+class ModelEstimate:
+    """An impact by one model, or by the run itself.
+
+    Attributes
+    ----------
+    peak_force, duration : float
+        Of the contact; NaN where the run ends before they are known.
+    threshold : float
+        Delamination threshold that the model reaches, force; NaN without DELA.
+    velocity, energy : float
+        Of the projectile at the threshold; NaN without DELA.
+    applies : bool
+        Whether the impact is in the range of the model.
+    """
+
+    peak_force: float
+    duration: float
+    threshold: float
+    velocity: float
+    energy: float
+    applies: bool
+
+
+@frozen
+class Estimate:
+    """Quick estimates of an impact beside its run; printed, it is the page of `fecm estimate`.
+
+    Attributes
+    ----------
+    title : str
+        Title of the deck.
+    response : str
+        Class of the response by the mass ratio.
+    mass_ratio : float
+        Mass of the projectile over that of the plate.
+    inelasticity : float
+        Zener's parameter lambda.
+    stiffness : float
+        Static stiffness of the plate under its load, force/length; NaN for a free plate.
+    models : dict of str to ModelEstimate
+        ``"infinite plate"``, ``"static plate"`` and ``"nonlinear static plate"``, as far as the
+        plate has them, and the ``"run"``.
+    remarks : dict of str to str
+        What models neglect, ``"damping"`` and ``"preload"``, and how good or why missing the
+        static model of a nonlinear plate is, ``"stretching"``.
+    notes : tuple of str
+        Reasons to doubt the numbers.
+    units : dict of str to str
+        Names of the deck's units; empty if it states none.
+    """
+
+    title: str
+    response: str
+    mass_ratio: float
+    inelasticity: float
+    stiffness: float
+    models: dict[str, ModelEstimate]
+    remarks: dict[str, str]
+    notes: tuple[str, ...]
+    units: dict[str, str]
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain values, as `fecm estimate --format json` prints them."""
+        stretching = self.remarks.get("stretching")
+        about = {"nonlinear": stretching} if stretching else {}
+        return {
+            "class": self.response,
+            "mass_ratio": self.mass_ratio,
+            "lambda": self.inelasticity,
+            "stiffness": self.stiffness,
+            **about,
+            "models": [{"model": name, **asdict(one)} for name, one in self.models.items()],
+        }
+
+    def __str__(self) -> str:
+        free = " (the plate is free: no static model)" if math.isnan(self.stiffness) else ""
+        lines = [
+            f"class       M/M_plate = {self.mass_ratio:.4g}, {self.response}",
+            f"lambda      {self.inelasticity:.4g}",
+            f"stiffness   {self._text(self.stiffness, 'force/length')}{free}",
+            *(f"{about:<12}{text}" for about, text in self.remarks.items()),
+        ]
+        table = [["model", *(name.replace("_", " ") for name in COLUMNS)]]
+        table += (self._row(name, one) for name, one in self.models.items())
+        return "\n".join(
+            [self.title or "(no title)", *(f"  {line}" for line in (*lines, *aligned(table)))]
+        )
+
+    def _row(self, model: str, one: ModelEstimate) -> list[str]:
+        """Cells of a model."""
+        cells = [model if one.applies else f"{model} (out of range)"]
+        for name, dimension in COLUMNS.items():
+            # Of the models force and duration are known, of the run only if its contact ends.
+            missing = "open" if name in ("peak_force", "duration") else "-"
+            cells.append(self._text(getattr(one, name), dimension, missing))
+        return cells
+
+    def _text(self, value: float, dimension: str, missing: str = "-") -> str:
+        """A value with its unit."""
+        return missing if math.isnan(value) else quantity(value, unit_of(dimension, self.units), 5)
+
+
+def estimate(deck: str | Path | Deck) -> Estimate:
+    """Estimate an impact by quick models, and compare them with its run.
+
+    The infinite plate is for small masses, the static plate for large ones, that of a deck with
+    NONL linear and nonlinear.  With a DELA segment, velocity and energy are those at which the peak
+    force reaches the delamination threshold.  The models without a mesh neglect DAMP, and the
+    infinite plate neglects PREL.  The notes of the result are :class:`FecmWarning`.
+
+    Parameters
+    ----------
+    deck : str, Path or Deck
+        Deck with a single problem.
+
+    Returns
+    -------
+    Estimate
+        The models and the run.
+
+    Raises
+    ------
+    DeckError
+        If the deck has errors.
+    StudyError
+        If it has no impact, or the projectile does not approach.
+    ValueError
+        If the deck has several problems, or none.
+
+    References
+    ----------
+    R. Olsson, "Impact response of orthotropic composite plates predicted from a one-parameter
+    differential equation", AIAA J. 30 (1992) 1587-1596; C. Zener, Phys. Rev. 59 (1941) 669-673.
+
+    Examples
+    --------
+    >>> import fecm
+    >>> found = fecm.estimate(fecm.examples.path("drop-weight"))
+    >>> found.response
+    'quasi-static: the static plate applies, which underestimates the force by about 10 %'
+    >>> static, run = found.models["static plate"], found.models["run"]
+    >>> print(f"{static.peak_force:.0f} and {run.peak_force:.0f} {found.units['force']}")
+    4650 and 4790 N
+    """
+    found = estimate_problem(sole_problem(deck))
+    for text in found.notes:
+        warn(text)
+    return found
+
+
+def estimate_problem(problem: Problem) -> Estimate:
+    """Estimate the impact of a checked problem; raises StudyError as :func:`estimate`."""
+    quick = by_quick_models(problem)
+    own, bent, doubts = _run_itself(problem, quick.mass)
+    if not problem.plate.nonlinear:
+        bent = [*_bent_statically(quick, problem.judge), *bent]
+    if bent:
+        bent = [f"beyond {problem.judge.limit} h {TOO_SOFT}; {UNSAFE}", *bent]
+    remarks: dict[str, str] = {}
+    if problem.damping:
+        remarks["damping"] = "in the run only: the models without a mesh neglect DAMP"
+    if problem.plate.is_preloaded:
+        remarks["preload"] = "in the static plate and the run: the infinite plate neglects PREL"
+    if quick.remark:
+        remarks["stretching"] = quick.remark
+    return Estimate(
+        title=problem.deck.title,
+        response=quick.response,
+        mass_ratio=quick.mass_ratio,
+        inelasticity=quick.parameter,
+        stiffness=quick.stiffness,
+        models={**_rows(quick), RUN: own},
+        remarks=remarks,
+        notes=(*bent, *doubts),
+        units=unit_names(problem.deck),
+    )
+
+
+def _rows(quick: QuickEstimate) -> dict[str, ModelEstimate]:
+    """Rows of the quick models."""
+    return {
+        one.name: ModelEstimate(
+            one.impact.peak,
+            one.impact.duration,
+            one.threshold,
+            one.velocity,
+            0.5 * quick.mass * one.velocity**2,
+            one.applies,
+        )
+        for one in quick.models
+    }
+
+
+def _run_itself(problem: Problem, mass: float) -> tuple[ModelEstimate, list[str], list[str]]:
+    """Row of the run itself, by the kernel of sweeps, its deflections, and what is open in it."""
+    own = carry_out(problem, plan(problem, [{}]))
+    swept, doubts = {"the run": own}, []
+    threshold = velocity = math.nan
+    if problem.threshold is not None:
+        threshold = problem.threshold.force
+        swept["the run at the threshold"] = carry_out(problem, plan(problem, [{}], until=threshold))
+        velocity = float(swept["the run at the threshold"]["found_velocity"][0])
+    peak, duration = (float(own[name][0]) for name in ("peak_force", "contact_time"))
+    if math.isnan(duration):
+        doubts.append("the run ends before its contact does: what is open needs a longer duration")
+    doubts += [f"{name}: {one['status'][0]}" for name, one in swept.items() if not one.fine.all()]
+    h, judge = problem.judge.thickness, problem.judge
+    bent = [text for name, one in swept.items() for text in _bent(name, one[RATIO][0] * h, judge)]
+    energy = 0.5 * mass * velocity**2
+    row = ModelEstimate(peak, duration, threshold, velocity, energy, applies=True)
+    return row, bent, doubts
+
+
+def _bent_statically(quick: QuickEstimate, judge: Judge) -> list[str]:
+    """Notes about deflections of the static model."""
+    static = quick.models[-1]
+    return [
+        *_bent("the static plate", static.impact.peak / quick.stiffness, judge),
+        *_bent("the static plate at the threshold", static.threshold / quick.stiffness, judge),
+    ]
+
+
+def _bent(where: str, deflection: float, judge: Judge) -> list[str]:
+    """Note about a deflection beyond the linear plate; a free plate has none (NaN)."""
+    ratio = deflection / judge.thickness
+    if not ratio > judge.limit:
+        return []
+    return [f"{where} deflects by {ratio:.3g} h: {judge.softness(ratio)}"]
