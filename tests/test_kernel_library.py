@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import importlib
+import shlex
 import shutil
 import subprocess
 import sys
 import types
-from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +19,7 @@ from fecm.mechanics import kernels
 ROOT = Path(__file__).parent.parent
 SOURCE = Path(kernels.__file__).parent / "kernels.c"
 CC = shutil.which("cc") or shutil.which("gcc") or ""
+compiled = pytest.mark.skipif(kernels.LIBRARY is None, reason="the kernels are not compiled")
 needs_compiler = pytest.mark.skipif(not CC, reason="there is no C compiler")
 FAST = ["-ffast-math", "-Ofast", "-funsafe-math-optimizations"]
 
@@ -76,27 +77,96 @@ def test_flags_of_the_user_do_not_flush_small_numbers_to_zero(
     assert asked.stdout == "True\n"
 
 
-def test_a_compiler_that_writes_nothing_leaves_numpy(
-    hook: Any, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    pytest.importorskip("setuptools")
+# A compiler that writes an empty library and its arguments.
+COMPILER = """
+import sys
+from pathlib import Path
+target = sys.argv[sys.argv.index("-o") + 1]
+Path(target).touch()
+Path(sys.argv[1]).write_text("\\n".join(sys.argv))
+"""
+
+
+def built(hook: Any, monkeypatch: pytest.MonkeyPatch, **environment: str) -> tuple[Any, list[str]]:
+    """What the hook adds to a wheel, and its warnings."""
     said: list[str] = []
-    monkeypatch.setenv("CC", "true")
+    for name in ("CC", "CFLAGS", "LDFLAGS", hook.PLATFORM):
+        monkeypatch.delenv(name, raising=False)
+    for name, value in environment.items():
+        monkeypatch.setenv(name, value)
     build = hook.CustomBuildHook()
     build.target_name, build.root = "wheel", str(ROOT)
     build.app = types.SimpleNamespace(display_warning=said.append)
     data: dict[str, Any] = {"force_include": {}}
-    build.initialize("standard", data)
-    build.finalize("standard", data, "")
+    try:
+        build.initialize("standard", data)
+    finally:
+        build.finalize("standard", data, "")
+    return data, said
+
+
+def test_a_compiler_that_writes_nothing_leaves_numpy(
+    hook: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    data, (warning,) = built(hook, monkeypatch, CC="true")
     assert data == {"force_include": {}}
-    assert len(said) == 1
-    assert "the compiler wrote no library" in said[0]
-    assert "fecm uses NumPy" in said[0]
+    assert "the compiler wrote no library" in warning
+    assert "fecm uses NumPy" in warning
+
+
+@pytest.mark.parametrize("compiler", ["true", "false", "no-such-compiler"])
+def test_a_wheel_for_a_named_platform_has_kernels_or_is_not_built(
+    compiler: str, hook: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with pytest.raises((OSError, subprocess.SubprocessError)):
+        built(hook, monkeypatch, CC=compiler, FECM_PLATFORM="win_amd64")
+
+
+@pytest.mark.parametrize(
+    ("platform", "library"),
+    [
+        ("manylinux_2_17_x86_64.manylinux2014_x86_64", "libfecm.so"),
+        ("musllinux_1_2_aarch64", "libfecm.so"),
+        ("macosx_11_0_arm64", "libfecm.dylib"),
+        ("win_amd64", "libfecm.dll"),
+    ],
+)
+def test_a_wheel_is_for_any_python_and_has_the_library_of_its_platform(
+    platform: str, library: str, hook: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "cc.py").write_text(COMPILER)
+    command = shlex.join([sys.executable, str(tmp_path / "cc.py"), str(tmp_path / "arguments")])
+    data, said = built(hook, monkeypatch, CC=command, CFLAGS="-Ofast -DX", FECM_PLATFORM=platform)
+    (target,) = data.pop("force_include").values()
+    assert target == f"fecm/mechanics/kernels/{library}"
+    assert data == {"pure_python": False, "tag": f"py3-none-{platform}"}
+    assert said == []
+    arguments = (tmp_path / "arguments").read_text().split("\n")
+    assert arguments.index("-Ofast") < arguments.index("-O3")
+    assert ("-mmacosx-version-min=11.0" in arguments) == platform.startswith("mac")
+
+
+def test_a_wheel_for_any_platform_has_no_kernels(
+    hook: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    assert built(hook, monkeypatch, CC="false", FECM_PLATFORM="any") == ({"force_include": {}}, [])
+
+
+@compiled
+def test_the_library_knows_nothing_of_python() -> None:
+    assert b"PyModule" not in kernels.PATH.read_bytes()
+
+
+@compiled
+@pytest.mark.skipif(not Path("/proc/cpuinfo").exists(), reason="asks Linux")
+def test_the_kernels_use_avx2_where_the_system_knows_it() -> None:
+    flags = Path("/proc/cpuinfo").read_text().split()
+    assert kernels.LIBRARY.fecm_has_avx2() == ("avx2" in flags and "fma" in flags)
 
 
 def loaded_from(path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
     """What is loaded where the library is this file."""
-    monkeypatch.setattr(kernels, "find_spec", lambda name: ModuleSpec(name, None, origin=str(path)))
+    monkeypatch.setattr(kernels, "PATH", path)
     return kernels._load()
 
 
@@ -108,18 +178,18 @@ def test_a_library_without_a_stamp_is_not_used(monkeypatch: pytest.MonkeyPatch) 
 def test_a_file_that_is_no_library_is_not_used(
     content: bytes, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = tmp_path / "_compiled.so"
+    path = tmp_path / "libfecm.so"
     path.write_bytes(content)
     assert loaded_from(path, monkeypatch) is None
 
 
-@pytest.mark.skipif(kernels.LIBRARY is None, reason="the kernels are not compiled")
+@compiled
 @pytest.mark.skipif(sys.platform != "linux", reason="judges ELF files")
 @pytest.mark.parametrize("eighths", range(8))
 def test_a_library_cut_short_is_not_loaded(
     eighths: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     whole = Path(kernels.LIBRARY._name).read_bytes()
-    path = tmp_path / "_compiled.so"
+    path = tmp_path / "libfecm.so"
     path.write_bytes(whole[: max(100, len(whole) * eighths // 8)])
     assert loaded_from(path, monkeypatch) is None

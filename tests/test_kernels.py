@@ -6,7 +6,6 @@ import ctypes
 import itertools
 import shutil
 import subprocess
-import sysconfig
 from dataclasses import replace
 from pathlib import Path
 
@@ -295,10 +294,7 @@ def test_info_shows_whether_the_kernels_are_compiled() -> None:
     "options", [["-fsyntax-only"], pytest.param(["-O1"], marks=pytest.mark.long)], ids=" ".join
 )
 def test_the_kernels_compile_without_a_warning(options: list[str], tmp_path: Path) -> None:
-    include = sysconfig.get_paths()["include"]
-    if not Path(include, "Python.h").exists():
-        pytest.skip("needs Python's headers")
-    command = ["cc", *WARNINGS, *options, "-DFECM_STAMP=0", "-c", f"-I{include}"]
+    command = ["cc", *WARNINGS, *options, "-DFECM_STAMP=0", "-c"]
     command += [str(SOURCES / "kernels.c"), "-o", str(tmp_path / "kernels.o")]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stderr) == (0, "")

@@ -15,9 +15,9 @@ This one finds and loads the library.
 from __future__ import annotations
 
 import ctypes
+import sys
 import zlib
 from ctypes import POINTER, c_double, c_int, c_int8, c_int32, c_int64, c_void_p
-from importlib.util import find_spec
 from io import SEEK_END
 from pathlib import Path
 from struct import Struct
@@ -58,6 +58,11 @@ FUNCTIONS = {
     "fecm_constants": (c_void_p, []),
 }
 
+# Library that the build puts beside this file; it knows nothing of Python.
+PATH = Path(__file__).with_name(
+    "libfecm" + {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
+)
+
 ELF64 = b"\x7fELF\x02\x01"  # begin of a little-endian 64-bit ELF file
 # e_phoff and e_phnum of its header; p_offset and p_filesz of a segment's.
 ELF_HEADER = Struct("<32x Q 16x H")
@@ -69,16 +74,13 @@ def _load() -> ctypes.CDLL | None:
 
     One of other sources, left by an earlier installation in place, is not used.
     """
-    found = find_spec(f"{__name__}._compiled")
-    if found is None or found.origin is None:
-        return None
     try:
-        if not _is_whole(Path(found.origin)):
+        if not _is_whole(PATH):
             return None
-        library = ctypes.CDLL(found.origin)
+        library = ctypes.CDLL(str(PATH))
         if library.fecm_stamp() != stamp(Path(__file__).parent):
             return None
-    except (OSError, AttributeError):  # no library, or an older one without a stamp
+    except (OSError, AttributeError):  # no library, or one without a stamp
         return None
     for name, (result, arguments) in FUNCTIONS.items():
         function = getattr(library, name)

@@ -39,19 +39,18 @@
 #if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__)
 #error "divergence is found by isfinite(), and sums have a fixed order: compile without -ffast-math"
 #endif
-#define Py_LIMITED_API 0x030B0000
-#include <Python.h>
 #include <math.h>
+#include <pthread.h>
+#include <sched.h>
 #include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-#ifndef _WIN32
-#include <pthread.h>
-#include <sched.h>
-#endif
-#ifdef __x86_64__
+/* GCC for Windows does not align the stack for these registers. */
+#if defined __x86_64__ && (defined __clang__ || !defined _WIN32)
+#define HAS_AVX2_CODE
+#include <cpuid.h>
 #include <immintrin.h>
 #endif
 
@@ -120,7 +119,19 @@ static const double OF_CORNERS[] = {1.0 / 4.0, 0.86602540378443865, 3.0 / 4.0};
 #undef TARGET
 #include "fields.h"
 
-#if defined(__x86_64__)
+#ifdef HAS_AVX2_CODE
+/* Whether processor and system know AVX2 and FMA. */
+static int with_avx2;
+
+__attribute__((constructor)) static void ask_processor(void) {
+    const unsigned fma = 1u << 12, saved = 3u << 27, avx2 = 1u << 5, registers = 6;
+    unsigned a, b, c, d, kept, high;
+    if (!__get_cpuid(1, &a, &b, &c, &d) || (c & (fma | saved)) != (fma | saved)) return;
+    __asm__("xgetbv" : "=a"(kept), "=d"(high) : "c"(0));
+    if ((kept & registers) != registers || !__get_cpuid_count(7, 0, &a, &b, &c, &d)) return;
+    with_avx2 = (b & avx2) != 0;
+}
+
 #define NAME(name) name##_avx2
 #define INLINE static inline __attribute__((always_inline, target("avx2,fma")))
 #define TARGET static __attribute__((target("avx2,fma")))
@@ -132,7 +143,7 @@ static const double OF_CORNERS[] = {1.0 / 4.0, 0.86602540378443865, 3.0 / 4.0};
 #undef NAME
 #undef INLINE
 #undef TARGET
-#define CHOSEN(name) (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma") ? name##_avx2 : name##_any)
+#define CHOSEN(name) (with_avx2 ? name##_avx2 : name##_any)
 #else
 #define CHOSEN(name) name##_any
 #endif
@@ -140,9 +151,16 @@ static const double OF_CORNERS[] = {1.0 / 4.0, 0.86602540378443865, 3.0 / 4.0};
 #define INLINE static inline __attribute__((always_inline))
 #define TARGET static
 #define ROOT(x) ((half){sqrt((x)[0]), sqrt((x)[1]), sqrt((x)[2]), sqrt((x)[3])})
+#ifdef HAS_AVX2_CODE
+#pragma GCC push_options
+#pragma GCC optimize("O1") /* for few processors; more takes GCC as long as all the rest */
+#endif
 #include "plate.h"
 #include "sweep.h"
 #include "failure.h"
+#ifdef HAS_AVX2_CODE
+#pragma GCC pop_options
+#endif
 
 /* Work that threads share: products K u, each followed by what one of them does alone. */
 typedef struct {
@@ -166,11 +184,7 @@ static void meet(Job *job) {
         return;
     }
     for (int spins = 0; atomic_load(&job->round) == round; spins++)
-        if (spins > 1000) {
-#ifndef _WIN32
-            sched_yield();
-#endif
-        }
+        if (spins > 1000) sched_yield();
 }
 
 /* Take the step of the plate without K u: the displacement under the last internal force. */
@@ -265,7 +279,6 @@ static void take_steps(Job *job, int64_t thread) {
     }
 }
 
-#ifndef _WIN32
 typedef struct {
     Job *job;
     int64_t thread;
@@ -277,14 +290,9 @@ static void *thread_main(void *given) {
     take_steps(share->job, share->thread);
     return NULL;
 }
-#endif
 
 /* Carry out a job on its threads, on fewer if the system has no more. */
 static void carry_out(Job *job) {
-#ifdef _WIN32
-    job->threads = 1;
-    take_steps(job, 0);
-#else
     pthread_t others[MOST_THREADS];
     Share shares[MOST_THREADS];
     const int64_t wanted = job->threads;
@@ -296,7 +304,6 @@ static void carry_out(Job *job) {
     atomic_store(&job->ready, 1);
     take_steps(job, 0);
     for (int64_t i = 1; i < job->threads; i++) pthread_join(others[i], NULL);
-#endif
 }
 
 /* Allocate the memory of a job and carry it out; returns 0 if there is not enough memory. */
@@ -419,7 +426,3 @@ EXPORT const Entry *fecm_constants(void) { return CONSTANTS; }
 EXPORT int fecm_stamp(void) { return FECM_STAMP; }
 
 EXPORT int fecm_has_avx2(void) { return CHOSEN(run_chunk) != run_chunk_any; }
-
-static PyModuleDef module = {PyModuleDef_HEAD_INIT, "_compiled", NULL, -1, NULL, NULL, NULL, NULL, NULL};
-
-PyMODINIT_FUNC PyInit__compiled(void) { return PyModule_Create(&module); }
