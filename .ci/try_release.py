@@ -42,7 +42,7 @@ def main() -> None:
         wanted += oldest(anywhere)
     # Nothing that is installed beside, and no compiler.
     environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
-    environment["CC"] = "no-compiler"
+    environment |= {"CC": "no-compiler", "PYTHONUTF8": "1"}
     with tempfile.TemporaryDirectory() as folder:
         venv.create(folder, with_pip=True)
         (python,) = (*Path(folder).glob("bin/python"), *Path(folder).glob("Scripts/python.exe"))
