@@ -97,6 +97,8 @@ UNUSED = {
 }
 LOADED = """
 import os, sys
+import numpy
+numpys = set(sys.modules)  # of which NumPy 1 has more than NumPy 2
 from fecm.cli import main
 for arguments, names in %r.items():
     if not (child := os.fork()):
@@ -105,7 +107,7 @@ for arguments, names in %r.items():
             main(arguments.split())
         except SystemExit as end:
             assert not end.code, arguments
-        loaded = [name for name in names.split() if name in sys.modules]
+        loaded = [name for name in names.split() if name in sys.modules.keys() - numpys]
         print(arguments, "imports", *loaded, file=sys.stderr, flush=True)
         os._exit(len(loaded))
     assert not os.waitpid(child, 0)[1]
