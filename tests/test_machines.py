@@ -187,14 +187,19 @@ def test_a_schema_refuses_what_the_command_does_not_print(folder: Path) -> None:
         assert not validator.is_valid({k: v for k, v in said.items() if k != key})
 
 
-def shell_step(number: int, folder: Path, **inputs: str) -> subprocess.CompletedProcess[str]:
-    """Run a shell step of the action with fecm on the path, as a runner does."""
+FECM = f'exec "{sys.executable}" -m fecm "$@"'
+
+
+def shell_step(
+    number: int, folder: Path, *, program: str = FECM, **inputs: str
+) -> subprocess.CompletedProcess[str]:
+    """Run a shell step of the action with fecm, or another program, on the path, as a runner does."""
     steps = [
         s for s in yaml.safe_load((ROOT / "action.yml").read_text())["runs"]["steps"] if "run" in s
     ]
     tool = folder / "bin" / "fecm"
     tool.parent.mkdir(exist_ok=True)
-    tool.write_text(f'#!/bin/sh\nexec "{sys.executable}" -m fecm "$@"\n')
+    tool.write_text(f"#!/bin/sh\n{program}\n")
     tool.chmod(0o755)
     path = {"PATH": f"{tool.parent}:{os.environ['PATH']}", "RUNNER_TEMP": str(folder)}
     assert inputs.keys() == steps[number]["env"].keys()
@@ -209,7 +214,7 @@ def shell_step(number: int, folder: Path, **inputs: str) -> subprocess.Completed
 
 
 @pytest.mark.long
-@pytest.mark.skipif(sys.platform == "win32", reason="the step needs bash")
+@pytest.mark.posix
 def test_the_steps_of_the_action_fail_for_a_wrong_deck_and_for_another_result(folder: Path) -> None:
     def check(decks: str, strict: str = "false") -> int:
         return shell_step(1, folder, DECKS=decks, STRICT=strict, SARIF="f.sarif").returncode
@@ -224,6 +229,32 @@ def test_the_steps_of_the_action_fail_for_a_wrong_deck_and_for_another_result(fo
     for result, status in (("trusted.h5", 0), ("plate.inp", 0), ("slow.inp", 1)):
         done = shell_step(2, folder, EXPECTED="trusted.h5", RESULT=result, OPTIONS="--rtol 1e-6")
         assert done.returncode == status, done.stderr
+
+
+CRASH = "echo 'Traceback: a crash' >&2; exit 1"
+
+
+@pytest.mark.posix
+@pytest.mark.parametrize(
+    ("program", "status"),
+    [
+        (f"case $* in *sarif*) {CRASH};; esac", 1),  # in the second call alone
+        (CRASH, 1),
+        ("case $* in *sarif*) echo '{';; esac", 1),  # cut off with status 0
+        ("case $* in *sarif*) echo '{}';; esac", 0),
+        ("echo '{}'; exit 2", 2),
+    ],
+)
+def test_a_crash_while_the_action_writes_sarif_is_shown_and_leaves_no_file(
+    tmp_path: Path, program: str, status: int
+) -> None:
+    inputs = {"DECKS": "d.inp", "STRICT": "false", "SARIF": "f.sarif"}
+    done = shell_step(1, tmp_path, program=program, **inputs)
+    assert done.returncode == status
+    whole = "'{}'" in program
+    assert (tmp_path / "f.sarif").exists() == whole
+    assert ("::error::" in done.stdout) != whole
+    assert ("Traceback" in done.stderr) == ("Traceback" in program)
 
 
 def test_hooks_and_action_call_commands_with_options_that_exist() -> None:
