@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import contextlib
+import ctypes
+import mmap
 import os
 import subprocess
 import sys
 import threading
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
@@ -256,6 +259,52 @@ def test_free_memory_is_the_least_of_machine_and_control_groups(
     (job.parent / "memory.max").write_text("3000000\n")
     (job.parent / "memory.current").write_text("1000000\n")
     assert available() == 2_000_000
+
+
+def test_the_system_reports_its_free_memory() -> None:
+    free = available()
+    assert free is not None
+    assert 10 * MEGABYTE < free < 2**46
+
+
+class System:
+    """The functions of Windows and macOS that tell the memory, as their headers declare them."""
+
+    def __init__(self, fails: bool) -> None:
+        self.fails = fails
+        self.mach_host_self = lambda: 7
+
+    def GlobalMemoryStatusEx(self, status: Any) -> int:
+        names = "TotalPhys AvailPhys TotalPageFile AvailPageFile TotalVirtual AvailVirtual Extended"
+        fields = [(name, ctypes.c_uint64) for name in names.split()]
+        given: Any = type(
+            "MEMORYSTATUSEX",
+            (ctypes.Structure,),
+            {"_fields_": [("Length", ctypes.c_uint32), ("Load", ctypes.c_uint32), *fields]},
+        ).from_buffer(status._obj)
+        assert given.Length == ctypes.sizeof(given)
+        given.TotalPhys, given.AvailPhys, given.AvailPageFile = 16 * 10**9, 6 * 10**9, 5 * 10**9
+        return int(not self.fails)
+
+    def host_statistics64(self, host: int, flavor: int, pages: Any, size: Any) -> int:
+        assert (host, flavor) == (7, 4)
+        assert size._obj.value == len(pages) >= 38
+        pages[:4] = 2_000_000, 900_000, 500_000, 300_000  # free, active, inactive, wired
+        return int(self.fails)
+
+
+@pytest.mark.parametrize(
+    ("platform", "free"), [("win32", 5 * 10**9), ("darwin", 2_500_000 * mmap.PAGESIZE)]
+)
+def test_free_memory_of_windows_and_macos_is_read_from_their_structures(
+    monkeypatch: pytest.MonkeyPatch, platform: str, free: int
+) -> None:
+    monkeypatch.setattr(sys, "platform", platform)
+    monkeypatch.setattr(fecm._memory, "_of_groups", list)
+    monkeypatch.setattr(ctypes, "CDLL", lambda name: System(fails=False))
+    assert available() == free
+    monkeypatch.setattr(ctypes, "CDLL", lambda name: System(fails=True))
+    assert available() is None
 
 
 def test_rows_of_a_file_are_read_without_the_others(
