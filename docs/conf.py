@@ -58,6 +58,8 @@ sphinx_gallery_conf = {
 
 html_theme = "pydata_sphinx_theme"
 html_title = "fecm"
+# Of all versions of a page, search engines show the one at this address.
+html_baseurl = os.environ.get("READTHEDOCS_CANONICAL_URL", "")
 html_theme_options = {
     "navigation_with_keys": False,
     "show_toc_level": 2,

@@ -2,7 +2,8 @@
 
 A file is written under a temporary name, synced, and renamed when it is complete.  This partial
 file is locked, so that two processes never write the same output at the same time; one without a
-lock was left by a process that has ended, and is removed.
+lock was left by a process that has ended, and is removed.  On Windows, which has no such locks, an
+open file can't be removed, which does the same.
 """
 
 from __future__ import annotations
@@ -22,8 +23,13 @@ from fecm._errors import FecmError
 NO_FOLLOW = getattr(os, "O_NOFOLLOW", 0)
 NO_WAIT = getattr(os, "O_NONBLOCK", 0)
 
-# Errors of os.link on file systems without hard links.
-NO_LINKS = {errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK}
+# Windows neither removes nor renames an open file.
+OPEN_FILES_STAY = os.name == "nt"
+
+# Errors of os.link on file systems without hard links; the last one is that of Windows.
+NO_LINKS = {
+    errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK, errno.EINVAL,
+}  # fmt: skip
 ATTEMPTS = 10  # to create a partial file while others remove it
 
 
@@ -119,16 +125,19 @@ def beside(path: Path, *, overwrite: bool = True, follow: bool = True) -> Iterat
         mode = _mode(target)
         if follow:
             _refuse_special(path, mode)
-        handle = _create(path, partial, 0o666 if mode is None else 0o600)
+        file = io.FileIO(_create(path, partial, 0o666 if mode is None else 0o600), "r+")
         try:
             yield partial
-            _finish(handle, partial, target, overwrite)
+            _finish(file, partial, target, overwrite)
         finally:
-            if _is(handle, partial):
-                with contextlib.suppress(PermissionError):  # Windows removes no open file
+            left = file.closed or _is(file.fileno(), partial)
+            if OPEN_FILES_STAY:
+                file.close()
+            if left:
+                with contextlib.suppress(PermissionError):  # a writer that failed has it open
                     partial.unlink(missing_ok=True)
             with contextlib.suppress(OSError):
-                os.close(handle)
+                file.close()
 
 
 @contextlib.contextmanager
@@ -170,6 +179,12 @@ def _create(path: Path, partial: Path, mode: int) -> int:
 
 def _discard(partial: Path) -> bool:
     """Remove a partial file unless it is being written; return whether it is removed."""
+    if OPEN_FILES_STAY:
+        try:
+            partial.unlink(missing_ok=True)
+        except PermissionError:
+            return False
+        return True
     try:
         handle = os.open(partial, os.O_RDONLY | NO_FOLLOW | NO_WAIT)
     except FileNotFoundError:
@@ -231,16 +246,17 @@ def _is(handle: int, path: Path) -> bool:
         return False
 
 
-def _finish(handle: int, partial: Path, target: Path, overwrite: bool) -> None:
+def _finish(file: io.FileIO, partial: Path, target: Path, overwrite: bool) -> None:
     """Sync a partial file and give it its final name."""
-    if not _is(handle, partial):
+    if not _is(file.fileno(), partial):
         raise OutputError(f"{target}: its partial file {partial} was removed during writing")
-    sync(handle)
+    sync(file.fileno())
     if overwrite:
         with contextlib.suppress(FileNotFoundError):
-            _keep_permissions(handle, target.lstat())
-        if os.name == "nt":
-            os.close(handle)  # Windows renames no open file
+            _keep_permissions(file.fileno(), target.lstat())
+    if OPEN_FILES_STAY:
+        file.close()
+    if overwrite:
         partial.replace(target)
     else:
         try:

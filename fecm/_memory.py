@@ -68,7 +68,7 @@ def _of_machine() -> int | None:
 
 
 def _of_windows() -> int | None:
-    """The fields of MEMORYSTATUSEX, after its length: total and free memory, page file, …"""
+    """The least of free memory and free page file, fields of MEMORYSTATUSEX after its length."""
     import ctypes
 
     size = 64

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +14,16 @@ from hypothesis import settings
 # A busy machine fails no example.
 settings.register_profile("fecm", deadline=None)
 settings.load_profile("fecm")
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Skip what the system can't do."""
+    posix = hasattr(os, "fork")
+    can = {"posix": posix, "links": posix, "linux": posix and sys.platform == "linux"}
+    for item in items:
+        for name in (name for name, there in can.items() if not there):
+            if marker := item.get_closest_marker(name):
+                item.add_marker(pytest.mark.skip(reason=f"not {marker.name} here"))
 
 
 def pytest_collection_finish() -> None:

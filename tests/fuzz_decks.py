@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import random
-import resource
 import signal
 import time
 from collections import Counter
@@ -126,6 +125,8 @@ def main() -> int:
             print(f"seed {seed}: {type(error).__name__}: {error}", flush=True)
         finally:
             signal.setitimer(signal.ITIMER_PROF, 0.0)
+    import resource  # not on Windows, which can import this module
+
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(
         f"{options.count} decks from seed {options.seed} in {time.monotonic() - begin:.0f} s: "

@@ -16,7 +16,6 @@ import contextlib
 import json
 import os
 import random
-import resource
 import shutil
 import signal
 import subprocess
@@ -224,6 +223,8 @@ def judge(command: str, status: int, out: str, err: str) -> str:
 
 def examine(sound: Path, folder: Path, seed: int, commands: Sequence[str], tally: Tally) -> None:
     """Damage the file in the way of a seed, and put it through the commands."""
+    import resource  # not on Windows, which can import this module
+
     bad, out, err, made = (folder / name for name in ("bad.h5", "out", "err", "made"))
     kind = mutate(sound, bad, random.Random(seed))
     for command in commands:

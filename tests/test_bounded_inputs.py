@@ -20,7 +20,10 @@ SECONDS = 5
 
 @pytest.fixture(autouse=True)
 def alarm() -> Iterator[None]:
-    """End a command that waits for a file."""
+    """End a command that waits for a file, where the system has alarms."""
+    if not hasattr(signal, "alarm"):
+        yield
+        return
 
     def ring(number: int, frame: FrameType | None) -> None:
         raise AssertionError(f"longer than {SECONDS} s")
@@ -45,7 +48,7 @@ COMMANDS = {
 }
 
 
-@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="there are no FIFOs")
+@pytest.mark.links
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_pipe_without_a_writer_is_no_file_to_read(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -57,7 +60,7 @@ def test_a_pipe_without_a_writer_is_no_file_to_read(
     assert "pipe.msh is not a regular file" in done.stderr
 
 
-@pytest.mark.skipif(not Path("/dev/zero").exists(), reason="there are no devices")
+@pytest.mark.links
 @pytest.mark.parametrize("name", COMMANDS)
 def test_a_device_is_no_file_to_read(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

@@ -282,6 +282,7 @@ def test_a_checkpoint_that_was_made_up_is_refused_in_one_line(
     assert not Path("d.h5").exists()
 
 
+@pytest.mark.links
 @pytest.mark.parametrize(
     "name", ["run.h5.spool", "run.h5.checkpoint", ".run.h5.partial.checkpoint"]
 )
@@ -296,6 +297,7 @@ def test_a_planted_link_leads_no_checkpoint_elsewhere(tmp_path: Path, name: str)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "victim"]
 
 
+@pytest.mark.links
 def test_a_spool_that_became_a_link_is_not_followed(tmp_path: Path) -> None:
     with pytest.raises(StoppedError):
         run(deck(), tmp_path / "run.h5", 5)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import re
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -182,6 +181,7 @@ def test_tapes_go_to_the_folder_that_is_asked_for(deck: Path) -> None:
     assert len((deck.parent / "new/tapes/tape3").read_text().splitlines()) == 2 * 5
 
 
+@pytest.mark.posix
 def test_a_result_that_cannot_be_written_ends_in_one_line_and_leaves_what_was_there(
     deck: Path,
 ) -> None:
@@ -189,6 +189,8 @@ def test_a_result_that_cannot_be_written_ends_in_one_line_and_leaves_what_was_th
     target.write_text("precious")
 
     def limit() -> None:
+        import resource
+
         # As a full disk does: every byte beyond these is refused.
         resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, 20_000))
 
@@ -241,6 +243,7 @@ def test_a_reader_that_leaves_is_no_answer(arguments: tuple[str, ...], runs: Pat
     assert (done.returncode, done.stderr) == (2, "")
 
 
+@pytest.mark.linux
 def test_a_full_output_ends_in_one_line(tmp_path: Path) -> None:
     with Path("/dev/full").open("w") as full:
         done = subprocess.run(

@@ -227,8 +227,8 @@ TAPES = {
 
 @pytest.mark.parametrize(
     "name",
-    [*TAPES, "truncated", "binary", "empty", "foreign", "later", "folder", "both", "twice", "pipe",
-     "missing"],
+    [*TAPES, "truncated", "binary", "empty", "foreign", "later", "folder", "both", "twice",
+     pytest.param("pipe", marks=pytest.mark.links), "missing"],
 )  # fmt: skip
 def test_what_cant_be_compared_exits_2_with_one_line(runs: Path, tmp_path: Path, name: str) -> None:
     wrong = spoiled(name, tmp_path, runs / "report.h5")

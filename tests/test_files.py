@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import io
 import os
 import shutil
 import stat
@@ -17,6 +18,7 @@ from fecm._files import OutputError, beside, check_outputs, partial_of
 from fecm.simulation.checkpoint import checkpoint_of
 from tests.calls import assert_unusable, call
 from tests.decks import small
+from tests.without_posix import of_closed_files
 
 UNALIGNED = small().replace("    1    1       0.0       0.0\n", "1,1,0.0,0.0\n")
 
@@ -30,11 +32,17 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+def unlinked(*_: object, **__: object) -> None:
+    """Refuse a hard link."""
+    raise PermissionError(errno.EPERM, "this file system has no hard links")
+
+
 def names(folder: Path) -> list[str]:
     """Names in a folder."""
     return sorted(path.name for path in folder.iterdir())
 
 
+@pytest.mark.links
 @pytest.mark.parametrize(
     "arguments",
     [
@@ -66,6 +74,7 @@ def test_outputs_are_neither_each_other_nor_inputs(
     assert Path("d.inp").read_text() == small()
 
 
+@pytest.mark.links
 @pytest.mark.parametrize("kind", ["fifo", "device", "folder"])
 @pytest.mark.parametrize(
     "arguments",
@@ -103,6 +112,7 @@ def test_what_is_no_ordinary_file_is_never_replaced(
         pass
 
 
+@pytest.mark.links
 def test_of_a_link_the_target_is_replaced_and_a_dangling_one_is_refused(folder: Path) -> None:
     Path("deck.inp").write_text(UNALIGNED)
     Path("link.inp").symlink_to("deck.inp")
@@ -121,6 +131,7 @@ def test_of_a_link_the_target_is_replaced_and_a_dangling_one_is_refused(folder: 
     assert_unusable(call("fmt", "d.inp", "-o", "loop.h5", "--overwrite"))
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("mode", [0o600, 0o640, 0o444])
 def test_a_replaced_file_keeps_its_permissions_and_is_private_until_then(
     folder: Path, mode: int
@@ -142,6 +153,7 @@ def test_a_replaced_file_keeps_its_permissions_and_is_private_until_then(
     assert stat.S_IMODE(Path("new").stat().st_mode) == 0o666 & ~mask
 
 
+@pytest.mark.posix
 def test_a_file_is_synced_before_it_has_its_name_and_its_folder_after(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -161,6 +173,27 @@ def test_a_file_is_synced_before_it_has_its_name_and_its_folder_after(
     assert seen == 2 * [("file", False), ("folder", True)]
 
 
+@pytest.mark.linux
+@pytest.mark.parametrize("links", [True, False])
+def test_files_are_closed_before_they_are_renamed_or_removed_where_that_is_needed(
+    folder: Path, monkeypatch: pytest.MonkeyPatch, links: bool
+) -> None:
+    monkeypatch.setattr(_files, "OPEN_FILES_STAY", True)
+    for name in ("unlink", "replace"):
+        monkeypatch.setattr(os, name, of_closed_files(getattr(os, name)))
+    if not links:
+        monkeypatch.setattr(os, "link", unlinked)
+    assert call("run", "d.inp").exit_code == 0
+    assert call("run", "d.inp", "--overwrite").exit_code == 0
+    assert names(folder) == ["d.h5", "d.inp", "two.inp"]
+    with beside(Path("x.h5")):
+        refused = call("run", "d.inp", "-o", "x.h5")
+    assert "x.h5 is being written by another process" in refused.stderr
+    with pytest.raises(ZeroDivisionError), beside(Path("y.h5")):
+        _ = 1 / 0
+    assert names(folder) == ["d.h5", "d.inp", "two.inp", "x.h5"]
+
+
 def test_two_processes_never_write_the_same_output_at_a_time(folder: Path) -> None:
     with beside(Path("x.h5")) as partial:
         partial.write_text("first")
@@ -176,11 +209,8 @@ def test_two_processes_never_write_the_same_output_at_a_time(folder: Path) -> No
 def test_a_file_made_meanwhile_is_not_replaced_unasked(
     folder: Path, monkeypatch: pytest.MonkeyPatch, links: bool
 ) -> None:
-    def refused(*_: object, **__: object) -> None:
-        raise PermissionError(errno.EPERM, "this file system has no hard links")
-
     if not links:
-        monkeypatch.setattr(os, "link", refused)
+        monkeypatch.setattr(os, "link", unlinked)
     with contextlib.ExitStack() as stack:
         stack.enter_context(beside(Path("x.h5"), overwrite=False)).write_text("mine")
         Path("x.h5").write_text("theirs")
@@ -199,10 +229,10 @@ def test_commands_without_overwrite_rename_exclusively(
     shutil.copy(runs / "small.h5", "d.h5")
     finish = _files._finish
 
-    def late(handle: int, partial: Path, target: Path, overwrite: bool) -> None:
+    def late(file: io.FileIO, partial: Path, target: Path, overwrite: bool) -> None:
         if not target.name.endswith((".checkpoint", ".json", ".npz")):
             target.write_text("theirs")
-        finish(handle, partial, target, overwrite)
+        finish(file, partial, target, overwrite)
 
     monkeypatch.setattr(_files, "_finish", late)
     for arguments, name in (
@@ -219,6 +249,7 @@ def test_commands_without_overwrite_rename_exclusively(
         assert "meanwhile and is not replaced" in done.stderr
 
 
+@pytest.mark.links
 def test_what_a_killed_process_has_left_is_removed_and_no_link_is_followed(folder: Path) -> None:
     victim = Path("victim")
     victim.write_text("precious")
@@ -242,6 +273,7 @@ def test_what_a_killed_process_has_left_is_removed_and_no_link_is_followed(folde
         assert own.exists()
 
 
+@pytest.mark.posix
 def test_a_partial_file_that_somebody_removes_is_an_error(folder: Path) -> None:
     with contextlib.ExitStack() as stack:
         partial = stack.enter_context(beside(Path("x.h5")))

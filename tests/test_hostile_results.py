@@ -87,6 +87,7 @@ def ended(folder: Path, what: str, patience: str = "0.4") -> tuple[int, str, str
     return program.returncode, out, err
 
 
+@pytest.mark.posix
 def test_death_by_a_signal_is_one_line_and_leaves_no_partial_file(tmp_path: Path) -> None:
     status, out, err = ended(tmp_path, "crash")
     assert (status, out) == (2, "")
@@ -97,6 +98,7 @@ def test_death_by_a_signal_is_one_line_and_leaves_no_partial_file(tmp_path: Path
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.posix
 def test_a_call_that_never_comes_back_is_one_line(tmp_path: Path) -> None:
     status, out, err = ended(tmp_path, "hang")
     assert (status, out) == (2, "")
@@ -105,6 +107,7 @@ def test_a_call_that_never_comes_back_is_one_line(tmp_path: Path) -> None:
     assert told.count("\n") == 1
 
 
+@pytest.mark.posix
 def test_a_call_that_waits_for_ever_is_one_line(tmp_path: Path) -> None:
     status, out, err = ended(tmp_path, "wait")
     assert (status, out) == (2, "")
@@ -115,6 +118,7 @@ def test_a_call_that_waits_for_ever_is_one_line(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.posix
 def test_waiting_for_a_reader_of_the_output_has_no_limit(tmp_path: Path) -> None:
     program = start(tmp_path, "write", "1")
     with pytest.raises(subprocess.TimeoutExpired):
@@ -123,7 +127,7 @@ def test_waiting_for_a_reader_of_the_output_has_no_limit(tmp_path: Path) -> None
     assert (program.returncode, out.count("line"), err) == (0, 20_000, "")
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="the system does not kill it")
+@pytest.mark.linux
 def test_a_child_ends_with_its_parent(tmp_path: Path) -> None:
     program = start(tmp_path, "wait")
     assert program.stderr is not None
@@ -132,6 +136,7 @@ def test_a_child_ends_with_its_parent(tmp_path: Path) -> None:
     program.communicate(timeout=10)  # the child holds the other ends of both pipes
 
 
+@pytest.mark.linux
 def test_more_memory_than_is_free_is_one_line(tmp_path: Path) -> None:
     status, out, err = ended(tmp_path, "swallow", "20")
     assert (status, out) == (2, "")
@@ -139,14 +144,17 @@ def test_more_memory_than_is_free_is_one_line(tmp_path: Path) -> None:
     assert err.count("\n") == 1
 
 
+@pytest.mark.posix
 def test_honest_work_may_take_longer_than_one_call(tmp_path: Path) -> None:
     assert ended(tmp_path, "work", "1") == (0, "done\n", "")
 
 
+@pytest.mark.posix
 def test_the_exit_status_of_the_child_is_the_programs(tmp_path: Path) -> None:
     assert ended(tmp_path, "no", "20") == (1, "", "")
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize(
     "number", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGTERM]
 )
@@ -168,6 +176,7 @@ def test_limits_grow_with_the_files() -> None:
     assert limits_for(10 * GB, 8 * GB).memory == 6 * GB
 
 
+@pytest.mark.posix
 def test_patience_that_is_no_number_is_one_line(tmp_path: Path) -> None:
     program = start(tmp_path, "work", patience="-3")
     out, err = program.communicate(timeout=60)
@@ -411,6 +420,7 @@ def test_a_sweep_whose_cases_are_in_another_file_is_refused_by_name(tmp_path: Pa
         fecm.load_sweep(path)
 
 
+@pytest.mark.links
 def test_a_pipe_in_a_folder_of_tapes_is_refused(result: Path) -> None:
     os.mkfifo(result.with_name("tape3"))
     done = call("diff", result, result.parent)

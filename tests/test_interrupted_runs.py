@@ -5,7 +5,6 @@ from __future__ import annotations
 import contextlib
 import os
 import re
-import resource
 import shutil
 import signal
 import subprocess
@@ -52,6 +51,7 @@ def begun(folder: Path, *arguments: str) -> subprocess.Popen[str]:
     return process
 
 
+@pytest.mark.posix
 def test_a_killed_run_resumes_to_the_same_bytes(whole: Path) -> None:
     with begun(whole, "run", "deck.inp") as process:
         process.kill()
@@ -61,12 +61,14 @@ def test_a_killed_run_resumes_to_the_same_bytes(whole: Path) -> None:
     assert verdict(whole, "i.h5", whole / "whole.h5") == "same"
 
 
+@pytest.mark.posix
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(4))
 def test_a_run_killed_at_any_moment_resumes_to_the_same_bytes(whole: Path, seed: int) -> None:
     assert trial(whole, whole / "whole.h5", 1.2, seed).startswith("same")
 
 
+@pytest.mark.posix
 @pytest.mark.long
 def test_killed_sweeps_with_damaged_parts_end_in_the_same_bytes(tmp_path: Path) -> None:
     (tmp_path / "sweep.inp").write_text(SWEPT)
@@ -77,6 +79,7 @@ def test_killed_sweeps_with_damaged_parts_end_in_the_same_bytes(tmp_path: Path) 
     assert counts["same"] == 4
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize(
     "number", [pytest.param(signal.SIGINT, marks=pytest.mark.long), signal.SIGTERM]
 )
@@ -103,6 +106,7 @@ def test_an_interrupted_command_says_how_to_go_on_and_does(
     (whole / "i.txt").unlink()
 
 
+@pytest.mark.posix
 def test_a_second_signal_stops_at_once(tmp_path: Path) -> None:
     program = "LMAS\nDT        .1E-6\nLOOP      99999\nTIME\nRODP       9999\nNEXT\n"
     (tmp_path / "d.inp").write_text(small(program))
@@ -177,6 +181,8 @@ def test_what_stands_beyond_the_interrupted_problem_is_not_taken_for_done(tmp_pa
 
 def small_files(limit: int) -> None:
     """Let no file grow beyond a size, as a full disk does."""
+    import resource
+
     resource.setrlimit(resource.RLIMIT_FSIZE, (limit, limit))
 
 
@@ -184,6 +190,7 @@ def small_files(limit: int) -> None:
 NUMPY = ("--solver", "numpy")
 
 
+@pytest.mark.posix
 def test_a_disk_that_fills_leaves_the_last_checkpoint_usable(whole: Path) -> None:
     shutil.copy(LONG, whole / "short.inp")
     (whole / "f.h5").write_text("precious")
@@ -223,6 +230,7 @@ def mounted(folder: Path, size: str) -> Iterator[None]:
         subprocess.run(["umount", "-l", str(folder)], check=True)
 
 
+@pytest.mark.posix
 def test_a_read_only_folder_is_told_and_left_alone(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(small())
     folder = tmp_path / "out"
@@ -240,6 +248,7 @@ def test_a_read_only_folder_is_told_and_left_alone(tmp_path: Path) -> None:
     assert done.stdout == ""
 
 
+@pytest.mark.posix
 def test_a_small_disk_that_fills_is_told_and_what_was_there_stays(tmp_path: Path) -> None:
     (tmp_path / "deck.inp").write_text(LONGER)
     with mounted(tmp_path / "out", "20m"):  # enough to begin with, not for checkpoints as well
@@ -254,6 +263,7 @@ def test_a_small_disk_that_fills_is_told_and_what_was_there_stays(tmp_path: Path
         assert left <= {"d.h5", "d.h5.checkpoint", "d.h5.spool"}
 
 
+@pytest.mark.posix
 def test_a_folder_that_goes_away_during_the_run_ends_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -273,6 +283,7 @@ def test_a_folder_that_goes_away_during_the_run_ends_in_one_line(
     assert [path.name for path in tmp_path.iterdir()] == ["d.inp"]
 
 
+@pytest.mark.posix
 def test_a_result_that_a_reader_has_open_is_replaced_without_disturbing_it(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(small())
     assert call("run", "d.inp", cwd=tmp_path).exit_code == 0

@@ -193,7 +193,7 @@ FECM = f'exec "{sys.executable}" -m fecm "$@"'
 def shell_step(
     number: int, folder: Path, *, program: str = FECM, **inputs: str
 ) -> subprocess.CompletedProcess[str]:
-    """Run a shell step of the action with fecm, or another program, on the path, as a runner does."""
+    """Run a shell step of the action as a runner does, with `program` as ``fecm`` on the path."""
     steps = [
         s for s in yaml.safe_load((ROOT / "action.yml").read_text())["runs"]["steps"] if "run" in s
     ]

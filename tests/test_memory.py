@@ -96,7 +96,7 @@ def plate(folder: Path, elements: int, macros: str, *options: str) -> Path:
     return path
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="Linux tells the peak")
+@pytest.mark.linux
 def test_the_estimate_bounds_what_is_measured(tmp_path: Path) -> None:
     plates: list[tuple[str, int, tuple[str, ...]]] = [
         (IMPACT, 40, ()), (IMPACT, 20, ("--grading", "3", "--at", "2.1,1.3")), (STATIC, 28, ()),
@@ -153,7 +153,7 @@ print(peak() - base)
 """
 
 
-@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="Linux tells the peak")
+@pytest.mark.linux
 @pytest.mark.parametrize(
     ("steps", "cases", "history"),
     [pytest.param(3000, 700, False, marks=pytest.mark.long), (1500, 1100, True)],
@@ -231,6 +231,7 @@ def _write_on(pipe: int) -> None:
     os.close(pipe)
 
 
+@pytest.mark.posix
 def test_a_deck_that_never_ends_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fecm.deck.source_text, "available", lambda: 12 * MEGABYTE)
     endless, begin = os.pipe()
@@ -243,6 +244,7 @@ def test_a_deck_that_never_ends_is_refused(monkeypatch: pytest.MonkeyPatch) -> N
     assert "a deck of more than 1 MB is not read" in done.stderr
 
 
+@pytest.mark.linux
 def test_free_memory_is_the_least_of_machine_and_control_groups(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -267,6 +269,20 @@ def test_the_system_reports_its_free_memory() -> None:
     assert 10 * MEGABYTE < free < 2**46
 
 
+class MemoryStatus(ctypes.Structure):
+    """MEMORYSTATUSEX of sysinfoapi.h."""
+
+    _fields_ = [
+        ("length", ctypes.c_uint32),
+        ("load", ctypes.c_uint32),
+        ("total", ctypes.c_uint64),
+        ("free", ctypes.c_uint64),
+        ("page_file", ctypes.c_uint64),
+        ("free_page_file", ctypes.c_uint64),
+        ("virtual", ctypes.c_uint64 * 3),
+    ]
+
+
 class System:
     """The functions of Windows and macOS that tell the memory, as their headers declare them."""
 
@@ -275,18 +291,14 @@ class System:
         self.mach_host_self = lambda: 7
 
     def GlobalMemoryStatusEx(self, status: Any) -> int:
-        names = "TotalPhys AvailPhys TotalPageFile AvailPageFile TotalVirtual AvailVirtual Extended"
-        fields = [(name, ctypes.c_uint64) for name in names.split()]
-        given: Any = type(
-            "MEMORYSTATUSEX",
-            (ctypes.Structure,),
-            {"_fields_": [("Length", ctypes.c_uint32), ("Load", ctypes.c_uint32), *fields]},
-        ).from_buffer(status._obj)
-        assert given.Length == ctypes.sizeof(given)
-        given.TotalPhys, given.AvailPhys, given.AvailPageFile = 16 * 10**9, 6 * 10**9, 5 * 10**9
+        """Windows."""
+        given = MemoryStatus.from_buffer(status._obj)
+        assert given.length == ctypes.sizeof(given) == ctypes.sizeof(status._obj)
+        given.total, given.free, given.free_page_file = 16 * 10**9, 6 * 10**9, 5 * 10**9
         return int(not self.fails)
 
     def host_statistics64(self, host: int, flavor: int, pages: Any, size: Any) -> int:
+        """MacOS."""
         assert (host, flavor) == (7, 4)
         assert size._obj.value == len(pages) >= 38
         pages[:4] = 2_000_000, 900_000, 500_000, 300_000  # free, active, inactive, wired

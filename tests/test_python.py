@@ -114,7 +114,7 @@ for arguments, names in %r.items():
 """
 
 
-@pytest.mark.skipif(not hasattr(os, "fork"), reason="forks")
+@pytest.mark.posix
 def test_no_command_imports_what_it_does_not_use(tmp_path: Path) -> None:
     (tmp_path / "small.inp").write_text(small())
     done = subprocess.run(

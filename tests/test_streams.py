@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import shutil
 import signal
 import subprocess
@@ -55,6 +54,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.linux
 @pytest.mark.parametrize(
     ("streams", "status"),
     [long(">&-", 2), long("2>&-", 0), long(">&- 2>&-", 2), ("<&- >&- 2>&-", 2), (">/dev/full", 2),
@@ -73,6 +73,7 @@ def test_a_run_is_done_whatever_becomes_of_its_streams(
         assert done.stderr.splitlines()[-1].startswith("fecm: error: standard output: ")
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize(
     ("command", "streams", "status"),
     [long("info d.h5", ">&-", 2), long("info d.h5", "2>&-", 0), long("check d.inp", ">&-", 2),
@@ -88,6 +89,7 @@ def test_other_commands_end_with_2_when_they_can_not_print(
         assert len(list((folder / "t").iterdir())) == 3
 
 
+@pytest.mark.linux
 @pytest.mark.parametrize(
     ("command", "streams"),
     [long("info none.h5", "2>&-"), ("info none.h5", "2>&1 | true"), ("run none.inp", "2>/dev/full"),
@@ -99,6 +101,7 @@ def test_a_message_that_nobody_reads_changes_no_exit_status(
     assert shell(f"$F {command} {streams}; exit ${{PIPESTATUS[0]}}", folder).returncode == 2
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("encoding", [long("latin-1"), "ascii"])
 def test_characters_that_a_stream_lacks_are_escaped(folder: Path, encoding: str) -> None:
     text = small().replace("FECM small plate", "FECM plate α")
@@ -109,6 +112,7 @@ def test_characters_that_a_stream_lacks_are_escaped(folder: Path, encoding: str)
     assert done.stdout.splitlines()[0] in ("plate \\u03b1", *["plate α"] * (encoding == "ascii"))
 
 
+@pytest.mark.posix
 def test_control_characters_of_a_title_and_a_name_reach_no_terminal(
     folder: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -135,6 +139,7 @@ def test_control_characters_of_a_title_and_a_name_reach_no_terminal(
         )
 
 
+@pytest.mark.linux
 def test_names_that_are_not_utf_8_work_in_every_command(folder: Path) -> None:
     deck, first, second = "\udcff.inp", "\udcff1.h5", "\udcff2.h5"
     (folder / "d.inp").rename(folder / deck)
@@ -155,6 +160,7 @@ def test_names_that_are_not_utf_8_work_in_every_command(folder: Path) -> None:
     assert "\\udcff1.h5" in done.stdout
 
 
+@pytest.mark.linux
 def test_two_results_whose_names_are_not_utf_8_are_drawn(
     folder: Path, runs: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -196,14 +202,16 @@ main()
 """
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize(
-    ("macros", "number", "step"),
-    [(IMPACT, signal.SIGTERM, 49), long(IMPACT, signal.SIGINT, 49),
-     long(STATIC, signal.SIGHUP, 0), (EMPTY, signal.SIGINT, 0)],
+    ("macros", "name", "step"),
+    [(IMPACT, "SIGTERM", 49), long(IMPACT, "SIGINT", 49), long(STATIC, "SIGHUP", 0),
+     (EMPTY, "SIGINT", 0)],
 )  # fmt: skip
 def test_the_first_signal_ends_a_loop_at_its_next_macro(
-    folder: Path, macros: str, number: signal.Signals, step: int
+    folder: Path, macros: str, name: str, step: int
 ) -> None:
+    number = signal.Signals[name]
     (folder / "d.inp").write_text(small(macros).replace(LAST, HELD))
     done = python(SIGNALLED, str(int(number)), "run", "d.inp", "--solver", "numpy", cwd=folder)
     assert done.returncode == 128 + number
@@ -213,6 +221,7 @@ def test_the_first_signal_ends_a_loop_at_its_next_macro(
     assert sorted(p.name for p in folder.iterdir()) == ["d.h5.checkpoint", "d.h5.spool", "d.inp"]
 
 
+@pytest.mark.posix
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_while_the_program_starts_gives_its_exit_status(number: signal.Signals) -> None:
     done = python(
@@ -223,11 +232,12 @@ def test_a_signal_while_the_program_starts_gives_its_exit_status(number: signal.
     assert (done.returncode, done.stderr) == (128 + number, "")
 
 
-@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
-def test_a_signal_while_the_program_ends_changes_no_exit_status(number: signal.Signals) -> None:
+@pytest.mark.posix
+@pytest.mark.parametrize("name", ["SIGINT", "SIGTERM", "SIGHUP"])
+def test_a_signal_while_the_program_ends_changes_no_exit_status(name: str) -> None:
     done = python(
-        "import atexit, os, sys, fecm.__main__\n"
-        f"atexit.register(os.kill, os.getpid(), {int(number)})\n"
+        "import atexit, os, signal, sys, fecm.__main__\n"
+        f"atexit.register(os.kill, os.getpid(), signal.{name})\n"
         "sys.argv = ['fecm', '--version']\n"
         "fecm.__main__.main()"
     )
@@ -235,6 +245,7 @@ def test_a_signal_while_the_program_ends_changes_no_exit_status(number: signal.S
     assert done.stdout.startswith("fecm, version ")
 
 
+@pytest.mark.posix
 def test_nohup_keeps_a_run_from_ending_at_a_hangup() -> None:
     code = (
         "import os, signal, sys\n"
@@ -247,9 +258,12 @@ def test_nohup_keeps_a_run_from_ending_at_a_hangup() -> None:
     assert python(code).stdout == "False\n"
 
 
+@pytest.mark.linux
 @pytest.mark.parametrize("megabytes", [60, 200, 250])
 def test_too_little_address_space_ends_in_one_line(folder: Path, megabytes: int) -> None:
     def limit() -> None:
+        import resource
+
         resource.setrlimit(resource.RLIMIT_AS, (megabytes * 10**6, megabytes * 10**6))
 
     done = subprocess.run(

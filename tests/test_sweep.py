@@ -329,7 +329,7 @@ def children() -> list[int]:
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc")
+@pytest.mark.linux
 def test_a_worker_that_dies_costs_time_only() -> None:
     problem = problem_of(model(small(STEPS)))
     made = plan(problem, grid([("layup", list(LAYUPS))]), history=True)
@@ -474,6 +474,7 @@ main()
 """
 
 
+@pytest.mark.posix
 def test_a_sweep_that_is_interrupted_from_outside_ends_in_the_same_file(tmp_path: Path) -> None:
     (tmp_path / "plate.inp").write_text(small())
     varied = ("--vary", "k=1e6,2e6", "--vary", "layup=" + ",".join(LAYUPS[:4]))

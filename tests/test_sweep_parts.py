@@ -137,7 +137,7 @@ def begun(folder: Path) -> subprocess.Popen[str]:
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc")
+@pytest.mark.linux
 def test_the_workers_of_a_killed_sweep_end_too(tmp_path: Path) -> None:
     process = begun(tmp_path)
     workers = workers_of(process.pid)
@@ -155,7 +155,7 @@ def test_the_workers_of_a_killed_sweep_end_too(tmp_path: Path) -> None:
 
 
 @pytest.mark.long
-@pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="needs /proc")
+@pytest.mark.linux
 def test_a_sweep_whose_workers_are_all_killed_keeps_its_parts_for_the_next(tmp_path: Path) -> None:
     process = begun(tmp_path)
     while process.poll() is None:
