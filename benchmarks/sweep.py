@@ -77,7 +77,7 @@ def full(case: Case) -> tuple[fecm.Result, float]:
 
 def compare(sweep: fecm.SweepResult) -> tuple[float, list[float]]:
     """Largest difference of every 50th case over its peak force, and seconds of the full runs."""
-    if sweep.force is None or sweep.force.shape != (CASES, STEPS) or not sweep.fine.all():
+    if sweep.force is None or sweep.force.shape != (CASES, STEPS) or not sweep.completed.all():
         raise ValueError("the sweep is not whole")
     worst, seconds = 0.0, []
     for number in range(0, CASES, EVERY):

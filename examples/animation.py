@@ -18,8 +18,8 @@ deck = fecm.impact(
     units="in-lbf-s",
 )
 result = fecm.run_one(deck)
-result.plot("animation", "plate.gif")
+result.plot("animation", "plate.gif", overwrite=True)
 
 # %%
 # One instant, the one with the largest range of deflection unless ``times`` says otherwise:
-result.plot("surface", "plate.png")
+result.plot("surface", "plate.png", overwrite=True)

@@ -18,4 +18,4 @@ print(found)
 peak = found["peak_force"]
 worst = peak.argmax()
 print(f"{peak[worst]:.1f} lbf at {found['velocity'][worst]:g} in/s, k {found['k'][worst]:g}")
-found.plot("peak_force", path="map.png")
+found.plot("map", "map.png", quantity="peak_force", overwrite=True)

@@ -21,5 +21,5 @@ deck = fecm.impact(
 )
 result = fecm.run_one(deck)
 print(f"{result.metrics['peak_force']:.0f} N, w {result.metrics['max_deflection']:.4f} mm")
-result.plot("contour", times=(1.2e-4,), path="hole.png")
-result.plot("mesh", path="mesh.png")
+result.plot("contour", times=(1.2e-4,), path="hole.png", overwrite=True)
+result.plot("mesh", path="mesh.png", overwrite=True)

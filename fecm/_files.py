@@ -31,26 +31,39 @@ NO_LINKS = {
     errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK, errno.EINVAL,
 }  # fmt: skip
 ATTEMPTS = 10  # to create a partial file while others remove it
+# What lets an existing file be replaced: an option of a command, or an argument in Python.
+OPTION = "--overwrite"
+ARGUMENT = "overwrite=True"
 
 
 class OutputError(FecmError, OSError):
     """An output can't be written; the message says why."""
 
 
+class OutputExistsError(OutputError, FileExistsError):
+    """An output exists and may not be replaced."""
+
+
 def check_outputs(
-    paths: Sequence[Path], overwrite: bool, inputs: Iterable[Path] = (), own: Iterable[Path] = ()
+    paths: Sequence[Path],
+    overwrite: bool,
+    inputs: Iterable[Path] = (),
+    own: Iterable[Path] = (),
+    *,
+    allowed_by: str = OPTION,
 ) -> None:
     """Refuse outputs that conflict, exist, or can't be written, before the computation.
 
     `inputs` are files that the command reads, which are never replaced; `own` other files that it
-    writes, such as checkpoints, whose names no output may have.
+    writes, such as checkpoints, whose names no output may have.  `allowed_by` is what the messages
+    tell the caller to use to replace a file.
     """
     read = {key for path in inputs for key in _keys(path)}
     taken = {key for path in own for key in _keys(path)}
     for path in paths:
         keys = _keys(path)
         if read & keys:
-            raise OutputError(f"{path} is an input of this command; give the output another name")
+            raise OutputError(f"{path} is an input, which is not replaced; give another name")
         if taken & keys:
             raise OutputError(f"{path} is the name of two outputs; give them different names")
         taken |= keys
@@ -61,10 +74,10 @@ def check_outputs(
         if not target.parent.is_dir():
             raise OutputError(f"{path}: there is no folder {target.parent}")
         if mode is not None and not overwrite:
-            raise OutputError(f"{path} exists already; --overwrite replaces it")
+            raise OutputExistsError(f"{path} exists already; {allowed_by} replaces it")
         if path.is_symlink() and not overwrite:
-            message = f"{path} is a link to {target}, which does not exist; --overwrite creates it"
-            raise OutputError(message)
+            lack = f"{path} is a link to {target}, which does not exist"
+            raise OutputExistsError(f"{lack}; {allowed_by} creates it")
         if not _discard(partial_of(target)):
             raise OutputError(f"{path} is being written by another process")
 
@@ -263,7 +276,7 @@ def _finish(file: io.FileIO, partial: Path, target: Path, overwrite: bool) -> No
             _rename_exclusively(partial, target)
         except FileExistsError:
             message = f"{target} was created by another program meanwhile and is not replaced"
-            raise OutputError(message) from None
+            raise OutputExistsError(message) from None
     with contextlib.suppress(OSError):  # not every system opens or syncs folders
         folder = os.open(target.parent, os.O_RDONLY)
         try:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import BinaryIO, Literal
 
 from fecm._errors import warn
+from fecm._files import ARGUMENT, check_outputs
 from fecm._frozen import frozen
 from fecm._progress import once_a_minute
 from fecm.deck.findings import DeckError, Finding, Severity
@@ -220,6 +222,8 @@ def run_one(
     law: Law | str | None = None,
     projectile: DeckProjectile | LinearProjectile | None = None,
     criteria: Iterable[FailureCriterion | str] = (),
+    *,
+    overwrite: bool = False,
 ) -> Result:
     """Run a deck with exactly one problem; parameters and errors are those of :func:`run`.
 
@@ -244,7 +248,7 @@ def run_one(
         projectile=own_projectile(projectile),
         criteria=own_criteria(criteria),
     )
-    return _run(deck, mode, force, choices, output, progress, one=True)[0]
+    return _run(deck, mode, force, choices, output, progress, one=True, overwrite=overwrite)[0]
 
 
 def run(
@@ -262,6 +266,8 @@ def run(
     law: Law | str | None = None,
     projectile: DeckProjectile | LinearProjectile | None = None,
     criteria: Iterable[FailureCriterion | str] = (),
+    *,
+    overwrite: bool = False,
 ) -> Result | list[Result]:
     """Run every problem of a deck.
 
@@ -276,8 +282,7 @@ def run(
     slips : iterable of str
         Slips to add to report mode.
     output : str or Path, optional
-        Result file, which is overwritten; a second problem goes to ``-2.h5``, and so on.  Nothing
-        is written by default.
+        Result file; a second problem goes to ``-2.h5``, and so on.  Nothing is written by default.
     force : bool
         Run even if the time step is above the critical one, or with a checkerboard motion (E321).
     solver : str
@@ -305,6 +310,8 @@ def run(
     criteria : iterable of FailureCriterion or str
         Failure criteria that FAIL evaluates beside its own: functions, or names of entry points of
         the group ``fecm.criteria``.  The result has a group ``failure/NAME`` of each.
+    overwrite : bool
+        Replace existing result files.
 
     Returns
     -------
@@ -330,6 +337,8 @@ def run(
         If the matrices of `projectile` are not those of one free elastic body.
     NotEnoughMemoryError
         If the run needs more memory than is free; a MemoryError.
+    FileExistsError
+        If a result file exists and may not be replaced; nothing is then run.
     OSError
         If a file can't be read or written.
 
@@ -349,7 +358,7 @@ def run(
         projectile=own_projectile(projectile),
         criteria=own_criteria(criteria),
     )
-    results = _run(deck, mode, force, choices, output, progress, one=False)
+    results = _run(deck, mode, force, choices, output, progress, one=False, overwrite=overwrite)
     return results[0] if len(results) == 1 else results
 
 
@@ -390,6 +399,7 @@ def _run(
     progress: Progress | None,
     *,
     one: bool,
+    overwrite: bool,
 ) -> list[Result]:
     """Run the problems of a deck; warn of what is doubtful."""
     prepared = load_deck(deck, mode)
@@ -399,15 +409,17 @@ def _run(
         _check_one(prepared.problems)
     for problem in prepared.problems:
         check_options(problem, choices)
+    numbers = range(1, 1 + len(prepared.problems))
+    paths = [] if output is None else [numbered(Path(output), number) for number in numbers]
+    check_outputs(paths, overwrite, [Path(prepared.source)], allowed_by=ARGUMENT)
     found = tuple(finding for finding in prepared.findings if finding.severity != "error")
     _warn_of(prepared)
     results: list[Result] = []
-    for number, problem in enumerate(prepared.problems, start=1):
-        check_memory(problem, solver=choices.solver, in_memory=output is None)
-        path = None if output is None else numbered(Path(output), number)
+    for problem, path in zip_longest(prepared.problems, paths):
+        check_memory(problem, solver=choices.solver, in_memory=path is None)
         title = problem.deck.title or prepared.source
         LOGGER.info("%s: %d steps", title, problem.work.steps)
-        result = _run_one(problem, choices, path, progress)
+        result = _run_one(problem, choices, path, progress, overwrite=overwrite)
         LOGGER.info("%s: done", title)
         result.findings = found
         for note in result.notes:
@@ -417,7 +429,12 @@ def _run(
 
 
 def _run_one(
-    problem: Problem, choices: RunOptions, path: Path | None, progress: Progress | None
+    problem: Problem,
+    choices: RunOptions,
+    path: Path | None,
+    progress: Progress | None,
+    *,
+    overwrite: bool,
 ) -> Result:
     """Run one problem, into a file if there is a path."""
     due = once_a_minute()
@@ -435,7 +452,7 @@ def _run_one(
         return Result(memory.arrays, memory.texts, memory.groups)
     from fecm.results.hdf5_writer import writing  # 25 ms with h5py
 
-    with writing(path) as sink:
+    with writing(path, overwrite=overwrite) as sink:
         report(simulate(problem, sink, choices, [report]))
     return load(path)
 

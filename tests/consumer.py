@@ -44,6 +44,12 @@ measured: fecm.SweepResult = fecm.sweep(
 fecm.assert_same(sweep, "sweep.h5")
 sweep.export("forces.csv", "history")
 tabled: fecm.SweepResult = fecm.sweep(deck, cases=sweep.to_dataframe())
+stored: fecm.SweepResult = fecm.load_sweep("sweep.h5")
+changed: tuple[fecm.Deck, ...] = (result.deck.with_(velocity=3.0), stored.deck)
+replaced: fecm.Result = fecm.run_one(deck, output=Path("plate.h5"), overwrite=True)
+names: list[str] = [*result.keys(), *result.history, *sweep.keys(), result.unit("force")]
+columns: dict[str, NDArray[np.float64]] = dict(result.history)
+ended: NDArray[np.bool_] = sweep.completed & ~sweep.still_in_contact & sweep.contact_over
 peaks: xarray.DataArray = sweep.to_xarray().peak_force
 drawn: fecm.SweepResult = fecm.sweep(
     deck,
@@ -77,7 +83,7 @@ if drawn.random is not None:
     mean: float = float(drawn.random.statistics["peak_force"].mean)
     first: NDArray[np.float64] = drawn.random.sensitivity["peak_force"].first_interval
     chance: NDArray[np.float64] = drawn.random.exceedance.probability
-    scattered: Axes = drawn.plot("peak_force", kind="scatter")
+    scattered: Axes = drawn.plot("scatter", quantity="peak_force")
 plate: fecm.Plate = fecm.Plate.from_mesh("plate.msh", {"rim": "clamped"})
 ply: fecm.Ply = fecm.Ply(1.6e-9, 0.3, 140e3, 9e3, 5e3, 5e3, 3e3)
 laminates: list[fecm.Laminate] = [fecm.Laminate(x, ply, 0.2) for x in ("[0/90]s", [0, 45.0])]

@@ -205,7 +205,7 @@ def _without_memory() -> Any:
 def test_a_law_that_fails_in_one_case_fails_that_case_alone(deck: fecm.Deck) -> None:
     law = Faulty(lambda a: np.nan, 9e-4)
     found = fecm.sweep(deck, {"velocity": [20.0, 115.0]}, law=law)
-    assert found.fine.tolist() == [True, False]
+    assert found.completed.tolist() == [True, False]
     assert "contact law Faulty: the force is nan at the indentation 0.0009" in found["status"][1]
     assert np.isnan(found["peak_force"][1])
 

@@ -68,7 +68,7 @@ def test_outputs_are_neither_each_other_nor_inputs(
     before = names(folder)
     done = call(*arguments, "--overwrite")
     assert done.exit_code == 2
-    assert "an input of this command" in done.stderr or "the name of two outputs" in done.stderr
+    assert "is an input" in done.stderr or "the name of two outputs" in done.stderr
     assert done.stdout == ""
     assert names(folder) == before
     assert Path("d.inp").read_text() == small()

@@ -83,6 +83,15 @@ def test_the_fitted_deck_has_no_cards_of_the_deck_that_was_read() -> None:
     assert f"{found.values['k']:.5g}" == f"{found.deck.require(Indentation).k:.5g}"
 
 
+def test_fitted_values_have_the_units_of_the_deck() -> None:
+    found = fecm.identify(started(), TIME, measured(), ["k", "mass", "delay", "offset"])
+    assert found.units == {"length": "mm", "force": "N", "time": "s"}
+    units = {name: found.unit(name) for name in found.values}
+    assert units == {"k": "N/mm^1.5", "mass": "N*s^2/mm", "delay": "s", "offset": "N"}
+    with pytest.raises(KeyError, match="velocity was not fitted"):
+        found.unit("velocity")
+
+
 def test_velocity_and_energy_are_not_fitted_together() -> None:
     with pytest.raises(CasesError, match="velocity and energy exclude each other"):
         fecm.identify(started(), TIME, measured(), ["velocity", "energy"])

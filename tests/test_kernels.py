@@ -268,8 +268,9 @@ def test_a_library_of_other_sources_is_not_used(monkeypatch: pytest.MonkeyPatch)
 @compiled
 def test_the_result_names_its_solver(tmp_path: Path) -> None:
     for solver in ("kernels", "numpy", "csr"):
-        fecm.run_one(small(), output=tmp_path / "x.h5", solver=solver)
-        with h5py.File(tmp_path / "x.h5") as file:
+        path = tmp_path / f"{solver}.h5"
+        fecm.run_one(small(), output=path, solver=solver)
+        with h5py.File(path) as file:
             assert file.attrs["solver"] == solver
 
 

@@ -99,9 +99,10 @@ def test_a_contact_that_lasts_to_the_end_has_no_rebound(tmp_path: Path) -> None:
 def test_a_sweep_has_columns_of_the_threshold_with_dela_only(tmp_path: Path) -> None:
     with_it = deck(f"{RIGID}DELA\n.001,\n")
     for text, names in ((deck(), ()), (with_it, tuple(THRESHOLD))):
-        swept = fecm.sweep(text, {"k": [2e6, -1.0]}, output=tmp_path / "s.h5")
+        path = tmp_path / f"{len(names)}.h5"
+        swept = fecm.sweep(text, {"k": [2e6, -1.0]}, output=path)
         assert tuple(swept.summary) == (*SUMMARY, *names, RATIO, *VERDICTS)
-        loaded = fecm.load_sweep(tmp_path / "s.h5")
+        loaded = fecm.load_sweep(path)
         for name in names:
             assert np.isfinite(loaded[name][0])
             assert np.isnan(loaded[name][1])

@@ -148,11 +148,11 @@ def test_refined_and_random_cases_are_full_runs_too(runs: list[float]) -> None:
     short = DECK.replace("LOOP        600", "LOOP         60")
     refined = fecm.sweep(short, refine=[1, 2])
     assert len(runs) == 2
-    assert refined.fine.all()
+    assert refined.completed.all()
     drawn = fecm.sweep(short, random={"velocity": "uniform:300,600"}, samples=16)
     assert len(runs) == 18
     assert drawn.random is not None
-    assert drawn.fine.all()
+    assert drawn.completed.all()
 
 
 # Estimates ----------------------------------------------------------------------------------------

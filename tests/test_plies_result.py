@@ -77,8 +77,8 @@ def test_what_is_not_stored_is_answered_with_the_remedy_or_the_range(result: Res
     without = fecm.run_one(small())
     with pytest.raises(NotStoredError, match="add PLYS to the deck's program"):
         without.plies()
-    other = Result({path: result[path] for path in result}, {"deck": small()}, {})
-    other.deck = small().replace("    2  90.     0.053\n", "")
+    single = small().replace("    2  90.     0.053\n", "")
+    other = Result({path: result[path] for path in result}, {"deck": single}, {})
     with pytest.raises(ResultFileError, match="2 plies"):
         other.plies()
 
@@ -146,7 +146,7 @@ def test_cells_without_nine_nodes_have_no_interlaminar_stress(
 def test_a_damaged_result_is_refused_in_words(result: Result, tmp_path: Path) -> None:
     arrays = {path: result[path] for path in result}
     arrays["plies/element"] = np.array([2, 9])
-    damaged = Result(arrays, {"deck": result.deck}, {})
+    damaged = Result(arrays, {"deck": result.deck_text}, {})
     with pytest.raises(ExportError, match="outside 1 to 4"):
         write_vtkhdf(damaged, tmp_path / "plate.vtkhdf")
     with pytest.raises(ResultFileError, match="outside 1 to 4"):

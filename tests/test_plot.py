@@ -108,7 +108,7 @@ def test_line_follows_the_nodes_through_the_impact_point(result: Result) -> None
 def test_on_a_distorted_mesh_the_line_is_interpolated_in_its_elements(result: Result) -> None:
     coordinates, elements = distorted_square(4, 4)
     node = int(np.hypot(*(coordinates - 0.5).T).argmin()) + 1
-    deck = result.deck.replace("   13    3", f"{node:5d}    3")
+    deck = result.deck_text.replace("   13    3", f"{node:5d}    3")
     w = 3.0 * coordinates[:, 0] + 2.0 * coordinates[:, 1] - 1.0
     arrays: dict[str, Array] = {
         "mesh/coordinates": coordinates,
@@ -180,7 +180,7 @@ def test_strain_by_default_is_the_largest_outside_the_load(result: Result) -> No
         largest = np.maximum(np.abs(middle + radius), np.abs(middle - radius)).max(axis=0)
         assert largest[~outside].max() > largest[outside].max()
         groups = {name: one.attributes_of(name) for name in ("patch", "tape8")}
-        one = Result(arrays, {"deck": one.deck}, groups)
+        one = Result(arrays, {"deck": one.deck_text}, groups)
         equal = points[outside & (largest > (1.0 - 1e-9) * largest[outside].max())]
         (line,) = plot(one, "strain", gages=(0.0,)).axes[0].get_lines()
         assert line.get_label() in [f"εx at {x:.4g}, {y:.4g}" for x, y in equal]
@@ -349,7 +349,7 @@ def test_force_draws_the_delamination_threshold_if_there_is_one(result: Result) 
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -1.0, "high", None])
 def test_a_threshold_without_sense_is_refused(result: Result, value: Any) -> None:
     arrays = {path: result[path] for path in result}
-    made = Result(arrays, {"deck": result.deck}, {"threshold": {"force": value}})
+    made = Result(arrays, {"deck": result.deck_text}, {"threshold": {"force": value}})
     with pytest.raises(PlotError, match="odd has a delamination threshold that can't be drawn"):
         draw("force", {"odd": made})
 

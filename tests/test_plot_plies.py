@@ -66,7 +66,7 @@ def test_thickness_shows_six_components_with_jumps_at_the_faces_of_plies(plies: 
 
 @pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
 def test_a_thin_line_has_the_residual_stresses_of_the_cure(plies: Result) -> None:
-    text = plies.deck.replace("UNIT", "CURE\n-100.,\n,1.E-6,2.E-5\n\nUNIT")
+    text = plies.deck_text.replace("UNIT", "CURE\n-100.,\n,1.E-6,2.E-5\n\nUNIT")
     cured = run(text)
     figure: Any = plot(cured, "thickness")
     assert figure.get_suptitle().endswith("\nthin: residual stress (CURE)")
@@ -90,7 +90,7 @@ def test_thickness_without_a_place_is_that_of_the_largest_stress_outside_the_loa
     axes: Any = plot(plies, "thickness").axes[0]
     assert np.abs(axes.get_lines()[-1].get_xdata()).max() == largest
     arrays = {path: plies[path] for path in plies} | {"plies/under_load": np.ones_like(under)}
-    everywhere = Result(arrays, {"deck": plies.deck}, {"patch": plies.patch.attributes})
+    everywhere = Result(arrays, {"deck": plies.deck_text}, {"patch": plies.patch.attributes})
     with pytest.warns(FecmWarning, match="of the load, where plate theory does not hold"):
         axes = plot(everywhere, "thickness").axes[0]
     assert np.abs(axes.get_lines()[-1].get_xdata()).max() == stress.max()
@@ -114,7 +114,7 @@ def test_thickness_of_elements_without_nine_nodes_shows_in_plane_stresses(plies:
     arrays = {path: plies[path] for path in plies}
     for name in ("tau_xz", "tau_yz", "residual"):
         arrays[f"plies/{name}"] = np.full_like(arrays[f"plies/{name}"], np.nan)
-    made = Result(arrays, {"deck": plies.deck}, {"patch": plies.patch.attributes})
+    made = Result(arrays, {"deck": plies.deck_text}, {"patch": plies.patch.attributes})
     with pytest.warns(FecmWarning, match="does not have nine nodes"):
         figure = plot(made, "thickness")
     assert sum(axes.axison for axes in figure.axes) == 3
@@ -141,7 +141,7 @@ def scaled(result: Result, factor: float) -> Result:
             arrays[path] = factor * arrays[path]
     groups = {"": result.attributes, **{name: getattr(result, name).attributes for name in
               ("failure", "patch")}}  # fmt: skip
-    return Result(arrays, {"deck": result.deck}, groups)
+    return Result(arrays, {"deck": result.deck_text}, groups)
 
 
 def area(polygon: Array) -> float:
@@ -245,7 +245,7 @@ def test_exposures_that_can_not_be_shown_are_refused(failing: Result) -> None:
     arrays["failure/under_load"] = np.ones_like(arrays["failure/under_load"])
     groups = {"failure": failing.failure.attributes, "patch": failing.patch.attributes}
     with pytest.raises(PlotError, match="load is over all elements of covered: no exposure"):
-        draw("failure", {"covered": Result(arrays, {"deck": failing.deck}, groups)})
+        draw("failure", {"covered": Result(arrays, {"deck": failing.deck_text}, groups)})
 
 
 @pytest.mark.filterwarnings("ignore::fecm.FecmWarning")

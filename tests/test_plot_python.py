@@ -12,7 +12,7 @@ import pytest
 import fecm
 from fecm.plot.kinds import KINDS, PlotError, Shows
 from fecm.plot.pictures import draw
-from fecm.results.pictures import RunKind
+from fecm.results.pictures import RunKind, SweepKind
 from tests.calls import call
 from tests.decks import APPENDIX, DATA_CARDS, PROGRAM, small
 
@@ -135,15 +135,25 @@ def test_a_file_is_that_of_the_command_line_whatever_the_users_style(
 
 
 def test_the_kinds_for_type_checkers_are_those_of_results() -> None:
-    assert list(get_args(RunKind)) == [
-        name for name, kind in KINDS.items() if kind.shows is not Shows.SWEEP
-    ]
+    of_sweeps = {name: kind.shows is Shows.SWEEP for name, kind in KINDS.items()}
+    assert list(get_args(RunKind)) == [name for name, sweep in of_sweeps.items() if not sweep]
+    assert list(get_args(SweepKind)) == [name for name, sweep in of_sweeps.items() if sweep]
 
 
 def test_a_warning_of_a_picture_is_one_of_the_users_line(sweep: fecm.SweepResult) -> None:
     with pytest.warns(fecm.FecmWarning, match="level 1e.09 is outside") as caught:
         sweep.plot(level=[1e9])
     assert {warning.filename for warning in caught} == {__file__}
+
+
+def test_a_quantity_in_place_of_the_kind_is_answered_with_its_keyword(
+    sweep: fecm.SweepResult,
+) -> None:
+    name: Any = "max_indentation"
+    with pytest.raises(ValueError, match="give quantity='max_indentation'"):
+        sweep.plot(name)
+    axes = sweep.plot(quantity=name, over="velocity", where={"k": 1e6})
+    assert axes.get_ylabel().startswith("Largest indentation")
 
 
 def test_transducers_of_rigid_masses_are_not_drawn_again() -> None:

@@ -6,11 +6,15 @@ import ast
 import inspect
 import logging
 import os
+import pickle
 import re
 import subprocess
 import sys
+from collections.abc import Callable
+from functools import partial
 from importlib import import_module
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,7 +22,13 @@ import pytest
 import fecm
 from fecm.mechanics.contact_law import ContactPoint
 from tests.calls import call
-from tests.decks import APPENDIX, LONG, ROOT, small
+from tests.decks import APPENDIX, DATA_CARDS, DISC, LONG, PLY_PROGRAM, PROGRAM, ROOT, small
+
+# The small plate with ply stresses and exposures.
+STRENGTHS = "ALLO\n   200000.   200000.     7000.    28000.    13000.\n\n"
+DECK = small(
+    PLY_PROGRAM.replace("PLYS", "FAIL          1\nPLYS"), data=DISC + STRENGTHS + DATA_CARDS
+)
 
 
 def test_the_namespace_lists_the_public_names_and_nothing_else() -> None:
@@ -172,6 +182,150 @@ def test_a_saved_result_is_the_file_that_the_run_would_have_written(tmp_path: Pa
     assert call("diff", str(written), str(saved)).exit_code == 0
     with pytest.raises(OSError, match="exists already"):
         result.save(saved)
+
+
+def test_the_deck_of_a_result_is_one_that_can_be_changed_and_run(tmp_path: Path) -> None:
+    deck = fecm.read_one(small())
+    result = fecm.run_one(deck, output=tmp_path / "r.h5")
+    speeds = {"velocity": [60.0, 115.0]}
+    swept = fecm.sweep(deck, speeds, history=True, output=tmp_path / "s.h5")
+    assert swept.force is not None
+    loaded: list[fecm.Result | fecm.SweepResult] = [
+        fecm.load(tmp_path / "r.h5"),
+        fecm.load_sweep(str(tmp_path / "s.h5")),
+    ]
+    for one in (result, swept, *loaded):
+        assert one.deck == deck
+        slower = fecm.run_one(one.deck.with_(velocity=60.0)).force
+        np.testing.assert_allclose(slower, swept.force[0], rtol=1e-9)
+
+
+def test_a_deck_of_a_listing_result_is_read_as_the_original_program_reads_it(runs: Path) -> None:
+    found = fecm.load(runs / "listing.h5")
+    assert fecm.run_one(found.deck, mode="listing").force.tolist() == found.force.tolist()
+
+
+def test_a_result_without_a_readable_deck_says_so(runs: Path) -> None:
+    found = fecm.load(runs / "small.h5")
+    for text in ("", "nonsense\n"):
+        other = fecm.Result({path: found[path] for path in found}, {"deck": text}, {})
+        assert other.deck_text == text
+        with pytest.raises(fecm.FecmError, match="no deck that can be read"):
+            _ = other.deck
+
+
+def test_results_groups_and_sweeps_are_read_by_name_as_mappings_are(runs: Path) -> None:
+    swept = fecm.sweep(with_units(small()), {"velocity": [50.0, 60.0]}, history=True)
+    result = fecm.run_one(with_units(DECK))
+    loaded = fecm.load(runs / "small.h5")
+    sources: list[Any] = [result, loaded, swept, result.history, result.failure, result.plies]
+    for one in sources:
+        names = list(one)
+        assert one.keys() == names
+        assert len(names) == len(set(names)) > 2
+        assert "forse" not in one
+        whole = dict(one)
+        for name in names:
+            assert name in one
+            np.testing.assert_array_equal(whole[name], one[name])
+        for asked in (one.__getitem__, one.unit):
+            with pytest.raises(KeyError, match="forse"):
+                asked("forse")
+    assert list(swept) == list(swept.to_dataframe())
+    assert len(swept) == 2
+    assert result["force"] is result["history/force"]
+    assert result.history["force"] is result.force
+    assert result.failure.puck["exposure"] is result["failure/puck/exposure"]
+    assert "w" in result.tape3
+    assert "w" not in result
+
+
+def test_results_groups_and_sweeps_survive_pickle(runs: Path) -> None:
+    result = fecm.run_one(small())
+    swept = fecm.sweep(small(), {"velocity": [50.0, 60.0]})
+    whole: list[Any] = [result, result.tape3, result.laminate, fecm.load(runs / "small.h5"), swept]
+    for one in whole:
+        again = pickle.loads(pickle.dumps(one))
+        assert type(again) is type(one)
+        assert list(again) == list(one)
+        for name in one:
+            np.testing.assert_array_equal(again[name], one[name])
+
+
+def test_units_are_asked_for_by_the_names_of_datasets_and_columns() -> None:
+    deck = fecm.read_one(with_units(DECK))
+    result = fecm.run_one(deck)
+    swept = fecm.sweep(deck, {"velocity": [50.0, 60.0]}, history=True)
+    assert result.units == result.tape3.units == swept.units
+    assert swept.units == {"length": "in", "force": "lbf", "time": "s"}
+    for name, unit in (("force", "lbf"), ("velocity", "in/s"), ("peak_force", "lbf")):
+        assert result.unit(name) == swept.unit(name) == unit
+    assert swept.unit("dt") == result.unit("time") == result.tape3.unit("time") == "s"
+    assert swept.unit("status") == result.unit("step") == ""
+    assert result.unit("tape8/kappa_x") == result.tape8.unit("kappa_x") == "1/in"
+    assert result.unit("plies/sigma_1") == result.plies.unit("sigma_1") == "lbf/in^2"
+    assert result.unit("failure/puck/time") == result.failure.puck.unit("time") == "s"
+    for one in (result, swept):
+        with pytest.raises(KeyError, match="no length in this"):
+            one.unit("length")
+    assert fecm.run_one(small()).unit("force") == ""
+
+
+def test_a_saved_sweep_is_the_file_that_the_sweep_would_have_written(tmp_path: Path) -> None:
+    written, saved = tmp_path / "written.h5", tmp_path / "saved.h5"
+    found = fecm.sweep(small(), {"velocity": [50.0, 60.0]}, history=True, output=written)
+    found.save(saved)
+    assert saved.read_bytes() == written.read_bytes()
+    with pytest.raises(FileExistsError, match="exists already; overwrite=True replaces it"):
+        fecm.load_sweep(saved).save(saved)
+
+
+def test_python_replaces_a_file_only_with_overwrite(tmp_path: Path) -> None:
+    deck = tmp_path / "small.inp"
+    deck.write_text(small())
+    program = PROGRAM.replace("LOOP         10", "LOOP        400")
+    result, swept = fecm.run_one(deck), fecm.sweep(small(program), {"velocity": [50.0, 60.0]})
+    writers: list[Callable[..., object]] = [
+        partial(fecm.run, deck, output=tmp_path / "run.h5"),
+        partial(fecm.run_one, deck, output=tmp_path / "one.h5"),
+        partial(fecm.sweep, deck, {"velocity": [50.0]}, output=tmp_path / "sweep.h5"),
+        partial(result.save, tmp_path / "saved.h5"),
+        partial(result.plot, "force", tmp_path / "force.svg"),
+        partial(swept.plot, path=tmp_path / "map.svg"),
+    ]
+    for write in writers:
+        before = set(tmp_path.iterdir())
+        write()
+        (path,) = set(tmp_path.iterdir()) - before
+        path.write_text("mine")
+        with pytest.raises(FileExistsError, match="exists already; overwrite=True replaces it"):
+            write()
+        assert path.read_text() == "mine"
+        write(overwrite=True)
+        assert path.stat().st_size > 1000
+
+
+def test_an_existing_output_is_refused_before_anything_is_run(tmp_path: Path) -> None:
+    (tmp_path / "out-2.h5").write_text("mine")
+    ran: list[int] = []
+    with pytest.raises(FileExistsError, match=r"out-2\.h5 exists already"):
+        fecm.run(
+            small(stop=False) + small(),
+            output=tmp_path / "out.h5",
+            progress=lambda step, steps: ran.append(step),
+        )
+    assert not ran
+    assert [path.name for path in tmp_path.iterdir()] == ["out-2.h5"]
+
+
+def test_a_result_never_replaces_the_deck_it_is_made_of(tmp_path: Path) -> None:
+    deck = tmp_path / "small.inp"
+    deck.write_text(small())
+    with pytest.raises(fecm.FecmError, match="is an input"):
+        fecm.run(deck, output=deck, overwrite=True)
+    with pytest.raises(fecm.FecmError, match="is an input"):
+        fecm.sweep(deck, {"velocity": [50.0]}, output=deck, overwrite=True)
+    assert deck.read_text() == small()
 
 
 def with_units(text: str) -> str:

@@ -252,7 +252,7 @@ def test_a_case_that_fails_is_a_row_with_its_reason() -> None:
             {"thickness": 0.1, "k": 1e6},
         ],
     )
-    assert found.fine.tolist() == [False, False, True]
+    assert found.completed.tolist() == [False, False, True]
     assert "contact coefficient" in found["status"][0]
     assert "thick" in found["status"][1]
     assert np.isnan(found["peak_force"][:2]).all()
@@ -319,7 +319,7 @@ def serial(program: str = STEPS) -> SweepResult:
 def test_two_workers_give_what_one_process_does() -> None:
     shared = fecm.sweep(model(small(STEPS)), {"layup": LAYUPS}, history=True, workers=2)
     assert_same(shared, serial())
-    assert shared.fine.all()
+    assert shared.completed.all()
 
 
 def children() -> list[int]:
@@ -526,7 +526,7 @@ def test_a_result_keeps_cases_numbers_and_forces(tmp_path: Path) -> None:
     stored = fecm.load_sweep(path)
     assert stored.cases["velocity"].tolist() == [50.0, 50.0, 100.0, 100.0]
     assert stored.cases["layup"].tolist() == ["[0/90]", "[x]", "[0/90]", "[x]"]
-    assert stored.fine.tolist() == [True, False, True, False]
+    assert stored.completed.tolist() == [True, False, True, False]
     assert stored.unit("peak_force") == "lbf"
     assert stored.force is not None
     assert stored.force.shape == (4, 400)

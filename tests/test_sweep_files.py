@@ -14,7 +14,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.sweeps.result import SweepResult, summary
+from fecm.sweeps.result import SweepResult
+from fecm.sweeps.summary import summary
 from tests.calls import assert_unusable, call
 from tests.decks import PROGRAM
 from tests.decks import small as small_of
@@ -184,8 +185,8 @@ def test_forces_of_the_cases_that_were_run_are_exported_a_row_a_step(swept: Path
     rows = list(csv.DictReader(io.StringIO(done.stdout)))
     found = fecm.load_sweep(swept)
     assert found.force is not None
-    assert len(rows) == int(found.steps[found.fine].sum()) == 3 * found.force.shape[1]
-    assert sorted({int(row["case"]) for row in rows}) == np.flatnonzero(found.fine).tolist()
+    assert len(rows) == int(found.steps[found.completed].sum()) == 3 * found.force.shape[1]
+    assert sorted({int(row["case"]) for row in rows}) == np.flatnonzero(found.completed).tolist()
     assert max(float(row["force"]) for row in rows) == np.nanmax(found["peak_force"])
     last = rows[-1]
     assert float(last["time"]) == pytest.approx(int(last["step"]) * found.dt[4], rel=1e-12)

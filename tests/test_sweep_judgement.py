@@ -73,7 +73,7 @@ def test_cases_together_keep_the_energy_as_well_as_their_runs_do(
     monkeypatch.setattr(batch, "impacts", watched)
     deck = fecm.read_one(small(STEPS))
     stiffnesses = [2e6, 1e8, 1e9]
-    assert fecm.sweep(deck, {"k": stiffnesses}).fine.all()
+    assert fecm.sweep(deck, {"k": stiffnesses}).completed.all()
     for k, error in zip(stiffnesses, seen, strict=True):
         exact = balance(apply_case(deck, {"k": k}))
         assert 0.2 * exact < error < 5.0 * exact + 1e-5
@@ -100,7 +100,7 @@ def test_a_case_cut_off_in_contact_keeps_its_peaks_alone() -> None:
     whole = fecm.sweep(small(STEPS), {"velocity": [50.0, 150.0]})
     assert cut["status"].tolist() == [Status.STILL, "ok"]
     assert whole["status"].tolist() == ["ok", "ok"]
-    assert cut.fine.all()
+    assert cut.completed.all()
     for name in SUMMARY:
         if name in ("peak_force", "time_of_peak", "max_indentation"):
             assert cut[name][0] == whole[name][0]

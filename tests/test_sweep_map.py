@@ -16,7 +16,7 @@ from fecm._errors import FecmWarning
 from fecm.plot.kinds import PlotError
 from fecm.plot.pictures import draw
 from fecm.sweeps.result import SweepResult
-from fecm.sweeps.result_file import save
+from fecm.sweeps.result_writer import save
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small
 from tests.pictures import OF_RUNS
@@ -311,13 +311,13 @@ def test_one_value_of_three_is_not_drawn_without_the_others() -> None:
 )
 def test_cases_still_in_contact_are_crossed_and_counted(vary: dict[str, list[float]]) -> None:
     sweep = fecm.sweep(LONG_ENOUGH_FOR_TWO, vary)
-    count = int(sweep.still.sum())
+    count = int(sweep.still_in_contact.sum())
     assert 0 < count < len(sweep)
     with pytest.warns(FecmWarning, match=f"{count} of {len(sweep)} cases of .* still in contact"):
         figure = plot(sweep)
     cross = figure.axes[0].get_lines()[-1]
     assert cross.get_marker() == "x"
-    assert data_of(cross)[0].tolist() == sweep["velocity"][sweep.still].tolist()
+    assert data_of(cross)[0].tolist() == sweep["velocity"][sweep.still_in_contact].tolist()
     told = f"still in contact at the end: {count} of {len(sweep)} cases"
     assert figure.axes[0].get_xlabel().endswith(f"\n\N{MULTIPLICATION SIGN} {told}")
     with pytest.warns(FecmWarning, match="they have no value in the picture"):

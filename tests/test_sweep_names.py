@@ -19,7 +19,7 @@ from fecm.sweeps import batch
 from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.cases import read_cases
 from fecm.sweeps.grid import parse_vary
-from fecm.sweeps.result import summary
+from fecm.sweeps.summary import summary
 from fecm.sweeps.values import VARIABLES, Changes
 from fecm.sweeps.vary import apply_case
 from tests.calls import call
@@ -80,7 +80,7 @@ def test_a_case_is_the_deck_that_new_writes_with_its_values(number: int, patch: 
     case, options = CASES[number]
     found = fecm.sweep(new(patch=patch), cases=[case], history=True)
     expected = fecm.run_one(new(**options, patch=patch))
-    assert found.fine.all()
+    assert found.completed.all()
     assert found.force is not None
     assert found.dt[0] == expected.time[0]
     # The duration of a deck is a number of its own steps.
@@ -180,7 +180,7 @@ def test_places_that_can_not_be_hit_are_cases_with_a_reason() -> None:
     places = [(50, 50), (49, 52), (0, 50), (130, 50)]
     found = fecm.sweep(new(patch="none"), {"at": places, "velocity": [2000.0, 3000.0]})
     assert found["at"].tolist()[::2] == ["(50,50)", "(49,52)", "(0,50)", "(130,50)"]
-    assert found.fine.tolist() == [True] * 4 + [False] * 4
+    assert found.completed.tolist() == [True] * 4 + [False] * 4
     assert found["status"][4].startswith("Dof 3 of the impact node 11 is restrained")
     assert found["status"][6] == "at (130,50) is outside the plate"
     np.testing.assert_array_equal(found["hit_x"], [50.0] * 4 + [np.nan] * 4)
@@ -190,7 +190,7 @@ def test_places_that_can_not_be_hit_are_cases_with_a_reason() -> None:
     assert line == "moved             2: to the nearest node, up to 2.236 mm away"
     patched = fecm.sweep(new(), {"at": places})
     assert patched["hit_x"][:2].tolist() == [50.0, 49.0]
-    assert not patched.fine[2:].any()
+    assert not patched.completed[2:].any()
 
 
 # Time step and duration --------------------------------------------------------------------------
@@ -200,7 +200,7 @@ def test_dt_auto_is_dt_0_of_the_deck_of_the_case() -> None:
     deck = new(dt="2e-7")
     found = fecm.sweep(deck, {"dt": ["auto", 2e-7], "thickness": [2.0, 8.0]})
     assert found["dt"].tolist() == [0.0, 0.0, 2e-7, 2e-7]
-    assert found.fine.all()
+    assert found.completed.all()
     for case, thickness in enumerate((2.0, 8.0)):
         expected = fecm.run_one(deck.with_(thickness=thickness, dt=0))
         assert found.dt[case] == expected.time[0] > 2e-7
@@ -212,10 +212,10 @@ def test_dt_auto_is_dt_0_of_the_deck_of_the_case() -> None:
 def test_an_unstable_case_names_the_critical_step_and_the_remedy() -> None:
     deck = new(dt="5e-7")
     found = fecm.sweep(deck, {"size": ["100x100", "15x15"]})
-    assert found.fine.tolist() == [True, False]
+    assert found.completed.tolist() == [True, False]
     assert "critical time step" in found["status"][1]
     assert found["status"][1].endswith("Vary dt=auto, or take DT 0.")
-    assert fecm.sweep(deck, {"size": ["15x15"], "dt": ["auto"]}).fine.all()
+    assert fecm.sweep(deck, {"size": ["15x15"], "dt": ["auto"]}).completed.all()
 
 
 def test_a_duration_is_reached_with_any_time_step_and_rounded_up_to_a_step() -> None:
@@ -394,8 +394,8 @@ def test_the_help_of_the_command_lists_every_name() -> None:
 
 @pytest.mark.parametrize("name", VARIABLES)
 def test_a_value_is_stored_in_the_unit_of_its_dimension(name: str) -> None:
-    units = {"length": "mm", "force": "N", "time": "s"}
-    found = fecm.SweepResult({}, {}, np.zeros(0), np.zeros(0), units=units)
+    units, none = {"length": "mm", "force": "N", "time": "s"}, np.zeros(0)
+    found = fecm.SweepResult({name: none}, {}, none, none, units=units)
     expected = VARIABLES[name].dimension
     for dimension, unit in units.items():
         expected = expected.replace(dimension, unit)

@@ -61,7 +61,7 @@ def test_cases_lost_with_their_workers_are_not_stored_as_finished(
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
     problem = problem_of(made.settings.deck)
     found = carry_out(problem, made, parts=parts)
-    assert found.fine.tolist() == [False, True]
+    assert found.completed.tolist() == [False, True]
     assert [parts.get(task) is None for task in tasks(problem, made)] == [True, False]
 
 

@@ -120,7 +120,7 @@ def test_threads_and_processes_give_what_one_process_does() -> None:
     for executor in (ThreadPoolExecutor(3), ProcessPoolExecutor(1, spawn)):
         with executor:
             found = fecm.sweep(small(), GRID, history=True, executor=executor)
-        assert found.fine.sum() == 6
+        assert found.completed.sum() == 6
         np.testing.assert_array_equal(found.force, serial.force)
         for name, values in serial.summary.items():
             np.testing.assert_array_equal(found[name], values)
@@ -140,7 +140,7 @@ def test_the_callers_dask_client_stays_open_and_the_default() -> None:
                 assert client.status == "running"
                 assert distributed.default_client() is client
             assert client.submit(sum, [2, 3]).result() == 5
-        assert fecm.sweep(small(), GRID, scheduler=cluster).fine.sum() == 6
+        assert fecm.sweep(small(), GRID, scheduler=cluster).completed.sum() == 6
 
 
 @pytest.mark.parametrize(
@@ -185,18 +185,18 @@ def test_built_decks_give_the_results_of_runs_and_keep_names_and_measured_column
         progress=lambda *counts: seen.append(counts),
     )
     assert seen == [(done, 8) for done in range(1, 9)]
-    assert found.fine.tolist() == 2 * [True, True, False, False]
+    assert found.completed.tolist() == 2 * [True, True, False, False]
     assert found["status"].tolist()[2:4] == [
         "build: KeyError: 'no such plate'",
         "build: the units of the deck are not those of the other cases",
     ]
     assert found.force is not None
-    for case in np.flatnonzero(found.fine):
+    for case in np.flatnonzero(found.completed):
         one = fecm.run_one(plate({name: found[name][case].item() for name in OWN}))
         np.testing.assert_array_equal(found.force[case][: len(one.force)], one.force)
         assert found["w"][case] == one.plate_w.max()
         assert found["instants"][case] == len(one.tape3.time)
-    assert np.isnan(found["w"][~found.fine]).all()
+    assert np.isnan(found["w"][~found.completed]).all()
     loaded = fecm.load_sweep(path)
     for name in ("speed", "kind", "w", "status"):
         np.testing.assert_array_equal(loaded[name], found[name])
@@ -214,7 +214,10 @@ def test_measured_columns_are_drawn_and_tabulated() -> None:
     pytest.importorskip("matplotlib")
     found = fecm.sweep(small(), {"velocity": [50.0, 100.0]}, measure=readings)
     assert found.to_dataframe()["w"].tolist() == found["w"].tolist()
-    drawn = [np.asarray(line.get_ydata(), dtype=float).tolist() for line in found.plot("w").lines]
+    drawn = [
+        np.asarray(line.get_ydata(), dtype=float).tolist()
+        for line in found.plot(quantity="w").lines
+    ]
     assert found["w"].tolist() in drawn
 
 

@@ -18,10 +18,11 @@ from fecm.cli.common import echo_json
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
 from fecm.cli.options import FILE_PATH, FORMAT_OPTION, Format
+from fecm.deck.units import declared_units
 from fecm.results.description import describe_groups
 from fecm.results.hdf5_reader import Contents, read
 from fecm.results.result import result_of
-from fecm.results.schema import Form, declared_units
+from fecm.results.schema import Form
 from fecm.results.summary import about_run
 
 # Attributes of the file that are keys of the JSON output, of runs and of sweeps.
@@ -92,12 +93,12 @@ def _about(contents: Contents) -> dict[str, Any]:
     if is_sweep:
         # 48 ms, which the result of a run does not need.
         from fecm.sweeps.random_tables import tables
-        from fecm.sweeps.result import summary
         from fecm.sweeps.result_file import sweep_of
+        from fecm.sweeps.summary import summary
 
         sweep = sweep_of(contents, history=False)
         random = [] if sweep.random is None else tables(sweep.random, sweep.unit)
-        failed = len(sweep) - int(sweep.fine.sum())
+        failed = len(sweep) - int(sweep.completed.sum())
         extent = {"cases": len(sweep), "failed": failed, "summary": [*summary(sweep), *random]}
     else:
         extent = about_run(result_of(contents))

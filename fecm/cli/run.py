@@ -54,7 +54,6 @@ from fecm.results import hdf5_writer
 from fecm.results.exposures import largest_exposures
 from fecm.results.hdf5_reader import read
 from fecm.results.result import Result, result_of
-from fecm.results.schema import declared_units
 from fecm.results.summary import about_run
 from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
 from fecm.simulation.printout import Printer
@@ -323,7 +322,7 @@ def _run_one(job: Job, choices: RunOptions, options: Options) -> Result:
     note(*simulation.state.notes, *result.notes)
     if options.form is Format.JSON:
         named = {"title": problem.deck.title, "result": str(path), "printed": job.printed}
-        echo_json({**named, "units": declared_units(result.attributes), **about})
+        echo_json({**named, "units": result.units, **about})
         return result
     echo(problem.deck.title or "(no title)")
     for line in (*about["summary"], *larger_steps(problem)):

@@ -62,9 +62,10 @@ from fecm.sweeps.random import (
 )
 from fecm.sweeps.random_tables import tables
 from fecm.sweeps.refine import refined_cases
-from fecm.sweeps.result import SweepResult, remarks, summary, verdict
-from fecm.sweeps.result_file import save
+from fecm.sweeps.result import SweepResult
+from fecm.sweeps.result_writer import save
 from fecm.sweeps.schedule import LOST, SchedulerError, address_in
+from fecm.sweeps.summary import remarks, summary, verdict
 from fecm.sweeps.values import NAMES
 
 NAMED = [f"{name}=" for name in NAMES]  # for the shell's completion
@@ -361,7 +362,7 @@ def sweep(options: Options) -> None:
     note(*remarks(result))
     echo(verdict(result))
     is_open = result.random is not None and result.random.exceedance.open.any()
-    if (is_open or not result.fine.all()) and not options.allow_failed:
+    if (is_open or not result.completed.all()) and not options.allow_failed:
         raise SystemExit(FAILED)
 
 

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Mapping
+from typing import Any
 
 from fecm.deck.model import Deck, Units
 
@@ -47,6 +49,12 @@ def unit_names(deck: Deck) -> dict[str, str]:
     """Names of the units of length, force and time; empty where the deck gives none."""
     units = deck.last(Units)
     return {} if units is None else {name: getattr(units, name) for name in Units.NAMES}
+
+
+def declared_units(attributes: Mapping[str, Any]) -> dict[str, str]:
+    """Names of the units of length, force and time in the attributes of a result; empty without."""
+    names = {name: str(attributes.get(f"unit_{name}", "")) for name in Units.NAMES}
+    return names if all(names.values()) else {}
 
 
 def unit_of(dimension: str, names: dict[str, str]) -> str:

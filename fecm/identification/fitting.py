@@ -26,7 +26,7 @@ from fecm.sweeps.vary import strike
 
 DELAY = "delay"  # measured time at which the approach of the projectile ends in a contact
 OFFSET = "offset"  # measured force without a contact
-OF_RECORD = (DELAY, OFFSET)  # values of the measurement, not of the deck
+OF_RECORD = {DELAY: "time", OFFSET: "force"}  # dimensions of values that no deck has
 STEP = 1e-3  # half of the step of central differences, in the scaled parameters
 POINTS = 10  # fewest measured points
 LOST = 0.2  # largest share of the points of the contact that may be outside the run of the deck

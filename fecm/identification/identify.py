@@ -14,7 +14,7 @@ import numpy as np
 from fecm._errors import warn
 from fecm._typing import Floats
 from fecm.deck.model import Deck, Impact, Indentation, Nonlinear, Projectile
-from fecm.deck.units import unit_names
+from fecm.deck.units import unit_names, unit_of
 from fecm.identification.alignment import IdentifyError, check_measured, lags
 from fecm.identification.fitting import (
     DELAY,
@@ -47,6 +47,7 @@ from fecm.mechanics.own_law import name_of, own_law
 from fecm.mechanics.projectile import RigidMass
 from fecm.problem.parts import build_projectile
 from fecm.results.comparison import Measurement, measurement_of
+from fecm.results.errors import NotStoredError
 from fecm.results.validity import MEANING, Reason, reasons_of
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Filter, filter_of
@@ -55,6 +56,7 @@ from fecm.sweeps.batch import runs_of
 from fecm.sweeps.find import Runs
 from fecm.sweeps.plan import check_law, shares_plate
 from fecm.sweeps.strike import strike_of
+from fecm.sweeps.values import dimension_of
 
 CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
     **dict.fromkeys(("velocity", "energy"), Impact),
@@ -130,6 +132,23 @@ class Identification:
     def share(self) -> float:
         """`rms` over the measured peak force."""
         return self.rms / float(self.force.max())
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Names of the units of length, force and time; empty if the deck names none."""
+        return unit_names(self.deck)
+
+    def unit(self, name: str) -> str:
+        """Unit of a fitted value; empty for a pure number, or if the deck names no units.
+
+        Raises
+        ------
+        NotStoredError
+            If no such value was fitted; a KeyError.
+        """
+        if name not in self.values:
+            raise NotStoredError(f"{name} was not fitted; there are {', '.join(self.values)}")
+        return unit_of(OF_RECORD.get(name) or dimension_of(name), self.units)
 
     def cards(self) -> str:
         """Cards of the deck with fitted values."""

@@ -12,7 +12,7 @@ from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.deck.model import Deck, Material
 from fecm.deck.units import unit_of
-from fecm.identification.fitting import DELAY, OFFSET, Model, Solution, listed
+from fecm.identification.fitting import DELAY, OF_RECORD, OFFSET, Model, Solution, listed
 from fecm.sweeps.vary import apply_case
 
 COLOURED = 0.5  # a finding reports a larger correlation of neighbouring residuals
@@ -145,9 +145,8 @@ def _linear(model: Model, found: Solution, names: Sequence[str]) -> Trial:
 
 
 def _told(trial: Trial, before: Floats, units: dict[str, str]) -> str:
-    dimensions = {DELAY: "time", OFFSET: "force"}
     values = [
-        f"{name} {value:.3g} {unit_of(dimensions[name], units)}".rstrip()
+        f"{name} {value:.3g} {unit_of(OF_RECORD[name], units)}".rstrip()
         for name, value in trial.added.items()
     ]
     rms = [float(np.sqrt(np.mean(e**2))) for e in (before, trial.residual)]

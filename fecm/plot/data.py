@@ -20,7 +20,6 @@ from fecm.results.errors import NotStoredError, ResultFileError
 from fecm.results.missing import remedy
 from fecm.results.plies import points_of, rows_at
 from fecm.results.result import Result
-from fecm.results.stored import model_of
 
 LARGEST = 1e100  # larger numbers are refused: axes fail long before numbers overflow
 MANY = 2000  # meshes with more elements are drawn with fewer points per element
@@ -66,7 +65,7 @@ def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
 def deck_of(result: Result, name: str) -> Deck:
     """Model of a result's deck."""
     try:
-        return model_of(result)
+        return result.deck
     except ResultFileError:
         raise PlotError(f"{name} holds no deck that can be read") from None
 

@@ -14,7 +14,6 @@ from fecm.plot import data, style
 from fecm.plot.kinds import Against, Picture, PlotError, Width
 from fecm.results.comparison import Source, compare, measurement_of
 from fecm.results.result import Result
-from fecm.results.schema import declared_units
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -99,7 +98,7 @@ def force(
     measured = None
     if overlay is not None:
         first = next(iter(results.values()))
-        units = declared_units(first.attributes)
+        units = first.units
         measured = measurement_of(overlay, units).corrected(delay, offset)
         sizes.append(measured.force)
     pound = style.scale_of(results, "force", sizes)

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from fecm._errors import FecmError, did_you_mean
-from fecm._files import beside
+from fecm._files import ARGUMENT, beside, check_outputs
 from fecm.plot.kinds import (
     KINDS,
     MISSING,
@@ -153,6 +153,8 @@ def plot(
     results: Mapping[str, Result | SweepResult],
     path: str | Path | None = None,
     ax: Axes | None = None,
+    *,
+    overwrite: bool = False,
     **options: Unpack[Options],
 ) -> Axes:
     """Draw one or more results: in a file, on given axes, or on a new figure of pyplot.
@@ -167,9 +169,11 @@ def plot(
     results : mapping
         Results, or one sweep, by the names in the legend.
     path : str or Path, optional
-        File to write; an existing one is replaced.  The suffix selects the format.
+        File to write.  The suffix selects the format.
     ax : matplotlib.axes.Axes, optional
         Axes to draw on.
+    overwrite : bool
+        Replace an existing file.
     **options
         Options of the kind.
 
@@ -183,17 +187,22 @@ def plot(
     PlotError
         If results lack the data, options are invalid, both `path` and `ax` are given, or `ax` is
         and the picture has several axes.
+    FileExistsError
+        If the file exists and may not be replaced.
 
     Examples
     --------
     >>> plot("loop", {"lumped": one, "consistent": other}, "rods.pdf")  # doctest: +SKIP
     """
+    if kind not in list(Kind) and any(kind in result for result in results.values()):
+        raise PlotError(f"{kind} is no kind of picture but a quantity: give quantity={kind!r}")
     if path is not None:
         if ax is not None:
             raise PlotError("give path or ax, not both: ax.figure.savefig writes your own figure")
         check_suffix(kind, Path(path))
+        check_outputs([Path(path)], overwrite, allowed_by=ARGUMENT)
         picture = draw(kind, results, **options)
-        save(picture, Path(path))
+        save(picture, Path(path), overwrite=overwrite)
         return picture.figure.axes[0]
     function_of(kind)  # without matplotlib, this says what to install
     from matplotlib import pyplot

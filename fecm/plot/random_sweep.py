@@ -100,7 +100,7 @@ def exceedance(
     for (place, rows), shown, colour in zip(drawn.rows.items(), every, colours(), strict=False):
         values = np.sort(shown.values[np.isfinite(shown.values)])
         count = len(values)
-        ended = drawn.sweep.fine[rows] & ~drawn.sweep.over[rows]
+        ended = drawn.sweep.completed[rows] & ~drawn.sweep.contact_over[rows]
         open_ends = int((np.isnan(shown.values) & ended).sum())
         label = drawn.random.label(place)
         above = (count - np.arange(count) - 0.5) / count

@@ -187,7 +187,7 @@ def open_ends(results: Mapping[str, Result]) -> str:
 
 def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Array]) -> Scale:
     """Scale for arrays of one dimension, in the results' unit if all name it; units must agree."""
-    units = {name: result.unit(dimension) for name, result in results.items()}
+    units = {name: unit_of(dimension, result.units) for name, result in results.items()}
     named = {unit: name for name, unit in units.items() if unit}
     if len(named) > 1:
         units_in = " and ".join(f"{unit} in {name}" for unit, name in named.items())

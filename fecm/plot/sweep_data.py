@@ -16,7 +16,8 @@ from fecm.plot.kinds import PlotError
 from fecm.results.metrics import COLUMNS, VERDICTS
 from fecm.results.metrics import INTEGERS as COUNTS
 from fecm.results.validity import MEANING, Reason, counted
-from fecm.sweeps.result import SweepResult, reasons
+from fecm.sweeps.result import SweepResult
+from fecm.sweeps.summary import reasons
 from fecm.sweeps.values import NAMES, VARIABLES, Kind
 
 if TYPE_CHECKING:
@@ -143,7 +144,7 @@ def quantity_of(sweep: SweepResult, name: str, rows: Indices, quantity: str) -> 
     if quantity not in known:
         others = did_you_mean(quantity, known) or f"; the sweep has {listed(known)}"
         raise PlotError(f"unknown quantity {quantity}{others}")
-    fine = sweep.fine[rows]
+    fine = sweep.completed[rows]
     values = np.where(fine, sweep[quantity][rows].astype(float), np.nan)
     _warn_of_gaps(sweep, name, rows, quantity, np.isnan(values))
     return variable_of(sweep, quantity, values)
@@ -153,7 +154,7 @@ def _warn_of_gaps(
     sweep: SweepResult, name: str, rows: Indices, quantity: str, lacking: Bools
 ) -> None:
     """Warn of cases that lack a quantity, by reason; refuse a picture if all do."""
-    fine = sweep.fine[rows]
+    fine = sweep.completed[rows]
     open_ends = ended(sweep, rows)
     still = next(iter(open_ends.values()), np.zeros_like(fine))
     of_all = f"of {len(rows)} cases of {name}"
@@ -187,8 +188,8 @@ def beyond(sweep: SweepResult, rows: Indices) -> dict[str, Bools]:
 
 def ended(sweep: SweepResult, rows: Indices) -> dict[str, Bools]:
     """Cases whose contact is not over, by what they are; empty if there are none."""
-    mask = sweep.fine[rows] & ~sweep.over[rows]
-    what = STILL if np.array_equal(mask, sweep.still[rows]) else ENDED
+    mask = sweep.completed[rows] & ~sweep.contact_over[rows]
+    what = STILL if np.array_equal(mask, sweep.still_in_contact[rows]) else ENDED
     return {what: mask} if mask.any() else {}
 
 

@@ -81,7 +81,7 @@ def thickness(
         place.name(ax.yaxis, "$z$")
     clock = style.scale_of(results, "time", [plies.time])
     x, y = plies.x[0, point], plies.y[0, point]
-    where = f"{x:.4g}, {y:.4g} {style.literal(result.unit('length'))}".rstrip()
+    where = f"{x:.4g}, {y:.4g} {style.literal(result.units.get('length', ''))}".rstrip()
     time = clock.show(float(plies.time[0]))
     title = f"element {plies.element[0]} at {where}, time {time}"
     if drawn[0].residual is not None:

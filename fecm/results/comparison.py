@@ -16,7 +16,6 @@ from fecm._measured_tables import read_table, same_name
 from fecm._text import printable
 from fecm._typing import Floats
 from fecm.deck.units import KNOWN
-from fecm.results.schema import declared_units
 from fecm.results.stored import Stored
 
 # A CSV file, or times and forces.
@@ -159,5 +158,5 @@ def compare(stored: Stored, measured: Measurement) -> Comparison:
         measured_impulse=float(weights @ force),
         rms=float(np.sqrt(np.mean((own - force) ** 2))),
         correlation=float(np.corrcoef(own, force)[0, 1]) if varies else math.nan,
-        units=declared_units(stored.attributes),
+        units=stored.units,
     )

@@ -45,14 +45,14 @@ def datatree(stored: Stored) -> xarray.DataTree:
     for path in stored:
         values = stored[path]
         dataset = dataset_of(path, values.ndim) or Dataset(path, values.shape, "")
-        texts = {"long_name": dataset.description, "units": stored.unit(dataset.dimension)}
+        texts = {"long_name": dataset.description, "units": stored.unit(path)}
         attributes = {name: text for name, text in texts.items() if text}
         groups.setdefault(dataset.group, {})[dataset.name] = (
             _axis_names(dataset),
             values,
             attributes,
         )
-    units = {"units": unit} if (unit := stored.unit("length")) else {}
+    units = {"units": unit} if (unit := stored.unit("mesh/coordinates")) else {}
     places = {
         axis: ("node", values, units)
         for axis, values in zip(AXES, stored["mesh/coordinates"].T, strict=False)

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from enum import StrEnum
 from pathlib import Path
 
-from fecm._files import check_outputs, writing
+from fecm._files import ARGUMENT, check_outputs, writing
 from fecm.results import csv
 from fecm.results.errors import ExportError
 from fecm.results.stored import Stored
@@ -45,7 +45,7 @@ def export(
 
     `note` receives a sentence about fields that are exported incompletely.
     """
-    check_outputs([path], overwrite)
+    check_outputs([path], overwrite, allowed_by=ARGUMENT)
     if form is ExportFormat.VTKHDF:
         if dataset:
             raise ExportError("a dataset is chosen for csv; vtkhdf holds all fields")

@@ -12,9 +12,9 @@ from typing import Any
 import h5py
 import numpy as np
 
-from fecm._files import beside, check_outputs
+from fecm._files import ARGUMENT, beside, check_outputs
 from fecm._typing import Array
-from fecm.deck.units import unit_of
+from fecm.deck.units import declared_units, unit_of
 from fecm.results import schema
 from fecm.results.criteria import criteria_of
 from fecm.results.errors import ResultWriteError
@@ -66,7 +66,7 @@ class FileSink:
         self._note(Operation.ATTRIBUTES, group=group, values=dict(values))
         target = self._group(group)
         if not group:
-            self._units = schema.declared_units(values)
+            self._units = declared_units(values)
         for name, value in values.items():
             if isinstance(value, list | tuple) and all(isinstance(one, str) for one in value):
                 target.attrs.create(name, value, (len(value),), TEXT)
@@ -180,11 +180,11 @@ def writing(path: Path, *, overwrite: bool = True) -> Iterator[FileSink]:
 
 def save(stored: Stored, path: Path, *, overwrite: bool) -> None:
     """Write a result as a file; see :meth:`fecm.Result.save`."""
-    check_outputs([path], overwrite)
+    check_outputs([path], overwrite, allowed_by=ARGUMENT)
     with writing(path, overwrite=overwrite) as sink:
         sink.axis_names["criteria"] = criteria_of(stored.attributes_of("failure"))
         sink.attributes("", stored.attributes)
-        sink.text("deck", stored.deck, "the cards of the problem")
+        sink.text("deck", stored.deck_text, "the cards of the problem")
         for name in stored:
             values = stored[name]
             own = schema.Dataset(name, values.shape, "", dtype=values.dtype.name)

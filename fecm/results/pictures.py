@@ -23,13 +23,21 @@ RunKind = Literal[
     "mesh",
     "animation",
 ]
+# Kinds of pictures of a sweep; those but map are of random sweeps.
+SweepKind = Literal["map", "exceedance", "sensitivity", "scatter"]
 
 
 def plot(
-    kind: str, results: Mapping[str, Any], path: str | Path | None, ax: Axes | None, **options: Any
+    kind: str,
+    results: Mapping[str, Any],
+    path: str | Path | None,
+    ax: Axes | None,
+    *,
+    overwrite: bool,
+    **options: Any,
 ) -> Axes:
     """Draw results by their names in the legend; see :func:`fecm.plot.pictures.plot`."""
     # The one import that climbs: whoever draws nothing can do without the room of pictures.
     from fecm.plot import pictures
 
-    return pictures.plot(kind, results, path, ax, **options)
+    return pictures.plot(kind, results, path, ax, overwrite=overwrite, **options)

@@ -17,7 +17,7 @@ from fecm.mechanics.mesh import element_blocks
 from fecm.results.errors import NotStoredError, ResultFileError
 from fecm.results.missing import remedy
 from fecm.results.schema import PlyRows
-from fecm.results.stored import Stored, model_of
+from fecm.results.stored import Stored
 
 IN_PLANE = ("sigma_1", "sigma_2", "tau_12")
 INTERLAMINAR = ("tau_xz", "tau_yz")
@@ -60,7 +60,7 @@ class PlyGroup(PlyRows):
     """The datasets of ``plies``; called, the stresses and strains of some plies."""
 
     def __init__(self, stored: Stored) -> None:
-        super().__init__("plies", stored._arrays, stored._groups)
+        super().__init__("plies", stored)
         self._stored = stored
 
     def __call__(
@@ -104,7 +104,7 @@ class PlyGroup(PlyRows):
             name: stored[f"plies/{name}"][np.ix_(rows, members)]
             for name in (*IN_PLANE, *INTERLAMINAR, "residual")
         }
-        deck = model_of(stored)
+        deck = stored.deck
         material = deck.last(Material)
         count = z.shape[-2]
         if material is None or not _fits(deck, z):
@@ -173,7 +173,7 @@ def cure_stress_of(stored: Stored, element: int) -> Floats | None:
     values = stored[CURE_STRESS]
     if values.ndim == 3:
         return values
-    (position,) = _positions(stored, model_of(stored), np.array([element]))
+    (position,) = _positions(stored, stored.deck, np.array([element]))
     return np.asarray(values[position])
 
 

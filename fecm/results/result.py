@@ -16,7 +16,6 @@ from fecm.results.end import End
 from fecm.results.errors import NotStoredError, ResultFileError
 from fecm.results.first_failure import FirstFailure, first_failures
 from fecm.results.group import Group
-from fecm.results.metrics import METRICS
 from fecm.results.missing import not_stored
 from fecm.results.pictures import RunKind, plot
 from fecm.results.plies import PlyGroup
@@ -54,8 +53,8 @@ class Result(Stored, schema.Contact):
     ----------
     attributes : dict
         Attributes of the result.
-    deck : str
-        The cards of the problem.
+    deck_text : str
+        The cards of the problem, as in the file; :attr:`deck` has them read.
     findings : tuple of Finding
         Warnings and notes about the deck, of a run in this process; empty for a loaded result.
     """
@@ -142,27 +141,56 @@ class Result(Stored, schema.Contact):
         return conversions.datatree(self)
 
     def to_pyvista(self, time: float | None = None) -> pyvista.UnstructuredGrid:
-        """The plate with its displacements, w and rotations as point data; needs PyVista.
+        """The plate and its fields at a time, as point and cell data; needs PyVista.
+
+        The fields are those of ``fecm export --to vtkhdf`` (docs/results.md): displacements,
+        strains, ply stresses, and the largest exposures of the run.  Strains and ply stresses that
+        were not stored at the step of the displacements are absent.  The field data are ``time``
+        and, if there are reasons to doubt the result or its fields, ``notes``.
 
         Parameters
         ----------
         time : float, optional
-            The nearest stored row is taken; by default the last.
+            The nearest row of displacements is taken; by default the last.
 
         Raises
         ------
         NotStoredError
             If the result has no displacements, or none at this time.
+        ExportError
+            If elements that do not exist have ply stresses.
+        ImportError
+            If PyVista is not installed.
+
+        Examples
+        --------
+        >>> grid = result.to_pyvista(1e-4)  # doctest: +SKIP
+        >>> grid.warp_by_vector("displacement", factor=20.0).plot(scalars="sigma_2")
+        ... # doctest: +SKIP
         """
         return conversions.grid(self, time)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the result as a file, such as one of a run in memory.
 
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+        overwrite : bool
+            Replace an existing file.
+
         Raises
         ------
+        FileExistsError
+            If the file exists and may not be replaced.
         OSError
-            If the file exists and may not be replaced, or can't be written.
+            If it can't be written.
+
+        Examples
+        --------
+        >>> import fecm
+        >>> fecm.run_one("decks/appendix.inp").save("appendix.h5", overwrite=True)
         """
         from fecm.results.hdf5_writer import save  # h5py takes 30 ms
 
@@ -216,6 +244,7 @@ class Result(Stored, schema.Contact):
         path: str | Path | None = None,
         *,
         ax: Axes | None = None,
+        overwrite: bool = False,
         **options: Any,
     ) -> Axes:
         """Draw a picture on a new figure of pyplot, on given axes, or in a file.
@@ -229,10 +258,11 @@ class Result(Stored, schema.Contact):
             ``"force"``, ``"loop"``, ``"energy"``, ``"strain"``, ``"thickness"``, ``"failure"``,
             ``"line"``, ``"contour"``, ``"surface"``, ``"mesh"`` or ``"animation"``.
         path : str or Path, optional
-            File to write instead, as ``fecm plot`` does; an existing one is replaced.  The suffix
-            selects the format.
+            File to write instead, as ``fecm plot`` does.  The suffix selects the format.
         ax : matplotlib.axes.Axes, optional
             Axes to draw on.
+        overwrite : bool
+            Replace an existing file.
         **options
             Options of the kind, such as ``times`` or ``overlay``; see docs/pictures.md.
 
@@ -246,6 +276,8 @@ class Result(Stored, schema.Contact):
         PlotError
             If the result lacks the data, the options are invalid, or `ax` is given and the picture
             has several axes.
+        FileExistsError
+            If the file exists and may not be replaced.
         ImportError
             If matplotlib is not installed.
 
@@ -254,7 +286,8 @@ class Result(Stored, schema.Contact):
         >>> ax = result.plot("force", width="full")  # doctest: +SKIP
         >>> ax.plot(time, force, ".")  # doctest: +SKIP
         """
-        return plot(kind, {self.title or "the result": self}, path, ax, **options)
+        named = {self.title or "the result": self}
+        return plot(kind, named, path, ax, overwrite=overwrite, **options)
 
     def compare(
         self,
@@ -291,7 +324,7 @@ class Result(Stored, schema.Contact):
         """
         from fecm.results.comparison import compare, measurement_of  # 4 ms at start
 
-        given = measurement_of(measured, schema.declared_units(self.attributes))
+        given = measurement_of(measured, self.units)
         return compare(self, given.corrected(delay, offset))
 
     if not TYPE_CHECKING:  # so that a misspelt name is a type error
@@ -302,7 +335,7 @@ class Result(Stored, schema.Contact):
             if f"history/{name}" in self._arrays:
                 return self._arrays[f"history/{name}"]
             if any(path.startswith(f"{name}/") for path in self._arrays):
-                return schema.GROUP_TYPES.get(name, Group)(name, self._arrays, self._groups)
+                return schema.GROUP_TYPES.get(name, Group)(name, self)
             raise NotStoredError(not_stored(name, self._arrays))
 
     def __dir__(self) -> list[str]:
@@ -322,7 +355,7 @@ class Result(Stored, schema.Contact):
     def _repr_html_(self) -> str:
         """Table of the metrics, for notebooks; without an impact of the datasets."""
         rows = [
-            (name.replace("_", " "), f"{value:.6g} {self.unit(METRICS[name][1])}".rstrip())
+            (name.replace("_", " "), f"{value:.6g} {self.unit(name)}".rstrip())
             for name, value in self.metrics.items()
         ] or [(path, str(self[path].shape)) for path in self]
         return html_table(repr(self)[1:-1], [*rows, *(("note", note) for note in self.notes)])

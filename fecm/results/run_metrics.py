@@ -19,7 +19,7 @@ from fecm.results.metrics import (
     Projectiles,
     summarise,
 )
-from fecm.results.stored import Stored, model_of
+from fecm.results.stored import Stored
 
 
 def end_of(stored: Stored) -> End | None:
@@ -67,7 +67,7 @@ def _summarised(stored: Stored) -> Metrics | None:
 def _impact_velocity(stored: Stored) -> float:
     """Impact velocity of the deck; NaN if the deck can't be read or has none."""
     with contextlib.suppress(ResultFileError):
-        if (card := model_of(stored).last(Impact)) is not None and card.velocity:
+        if (card := stored.deck.last(Impact)) is not None and card.velocity:
             return card.velocity
     return math.nan
 

@@ -6,10 +6,10 @@ of ply stresses ``members`` (elements), ``npp`` (points per element), ``layers``
 The annotations of a group serve type checkers, editors and :data:`DATASETS`.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import replace
 from enum import StrEnum
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -456,9 +456,3 @@ AXIS_NAMES: dict[str | int, tuple[str, ...]] = {
     "statistics": ("draws", "mean", "standard_deviation", "1 %", "5 %", "50 %", "95 %", "99 %"),
     "bounds": ("lower", "upper"),
 }
-
-
-def declared_units(attributes: Mapping[str, Any]) -> dict[str, str]:
-    """Names of the units of length, force and time; empty if the deck names none."""
-    names = {n: str(attributes.get(f"unit_{n}", "")) for n in ("length", "force", "time")}
-    return names if all(names.values()) else {}

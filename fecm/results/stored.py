@@ -14,12 +14,12 @@ import numpy as np
 from fecm._typing import Array
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader
-from fecm.deck.units import unit_of
+from fecm.deck.units import declared_units, unit_of
 from fecm.results.errors import NotStoredError, ResultFileError
 from fecm.results.group import Attributes
-from fecm.results.metrics import VALIDITY
+from fecm.results.metrics import METRICS, VALIDITY
 from fecm.results.missing import not_stored
-from fecm.results.schema import KINEMATICS, Kinematics, declared_units
+from fecm.results.schema import KINEMATICS, Kinematics, dataset_of
 
 
 class Stored:
@@ -36,7 +36,28 @@ class Stored:
         self._groups = groups
         self._model = model
         self.attributes: dict[str, Any] = dict(groups.get("", {}))
-        self.deck: str = texts.get("deck", "")
+        self.deck_text = texts.get("deck", "")
+
+    @property
+    def deck(self) -> Deck:
+        """The deck that was run.
+
+        Raises
+        ------
+        ResultFileError
+            If the result holds no deck that can be read.
+
+        Examples
+        --------
+        >>> import fecm
+        >>> result = fecm.run_one("decks/impact-115.inp")
+        >>> slower = fecm.run_one(result.deck.with_(velocity=60.0))
+        >>> print(f"{slower.force.max():.2f} lb")
+        43.79 lb
+        """
+        if self._model is not None:
+            return self._model
+        return deck_in(self.deck_text, blanks_are_zeros=self.mode == "listing")
 
     @property
     def title(self) -> str:
@@ -95,9 +116,36 @@ class Stored:
         """
         return self._groups.get("threshold", {})
 
-    def unit(self, dimension: str) -> str:
-        """Unit of a dimension such as ``"force/length"``; empty if the deck names none."""
-        return unit_of(dimension, declared_units(self.attributes))
+    @property
+    def units(self) -> dict[str, str]:
+        """Names of the units of length, force and time; empty if the deck names none."""
+        return declared_units(self.attributes)
+
+    def unit(self, name: str) -> str:
+        """Unit of a dataset or a metric; empty for a pure number, or if the deck names no units.
+
+        Parameters
+        ----------
+        name : str
+            Name of a dataset, such as ``"tape3/w"`` or ``"force"``, or of :attr:`Result.metrics`,
+            such as ``"peak_force"``.
+
+        Raises
+        ------
+        NotStoredError
+            If there is neither; a KeyError.
+
+        Examples
+        --------
+        >>> import fecm
+        >>> result = fecm.run_one(fecm.examples.path("impact-115"))
+        >>> result.unit("velocity"), result.unit("energy_absorbed")
+        ('in/s', 'lbf*in')
+        """
+        if name in METRICS:
+            return unit_of(METRICS[name].dimension, self.units)
+        known = dataset_of(self._stored(name), rank=0)
+        return "" if known is None else unit_of(known.dimension, self.units)
 
     def attributes_of(self, group: str) -> dict[str, Any]:
         """Attributes of a group; empty without the group."""
@@ -110,30 +158,43 @@ class Stored:
             return np.asarray(self._arrays[path.strip("/")][start:stop])
         return np.asarray(read(path, start, stop))
 
-    def __getitem__(self, path: str) -> Array:
-        name = path.strip("/")
-        if name not in self._arrays:
-            raise NotStoredError(not_stored(name, self._arrays))
-        return np.asarray(self._arrays[name])
+    def _path(self, name: str) -> str:
+        """Path of a dataset, or of a column of the history by its name alone."""
+        path = name.strip("/")
+        column = f"history/{path}"
+        return column if path not in self._arrays and column in self._arrays else path
 
-    def __contains__(self, path: str) -> bool:
-        return path.strip("/") in self._arrays
+    def _stored(self, name: str) -> str:
+        """Path of a dataset that is there.  Raises NotStoredError if it is not."""
+        path = self._path(name)
+        if path not in self._arrays:
+            raise NotStoredError(not_stored(path, self._arrays))
+        return path
+
+    def __getitem__(self, name: str) -> Array:
+        """A dataset by its path; a column of the history also by its name alone."""
+        return np.asarray(self._arrays[self._stored(name)])
+
+    def __contains__(self, name: str) -> bool:
+        return self._path(name) in self._arrays
 
     def __iter__(self) -> Iterator[str]:
         """Iterate over the paths of all datasets."""
         return iter(self._arrays)
 
-
-def model_of(stored: Stored) -> Deck:
-    """Model of a result's deck.  Raises ResultFileError if the result holds no readable deck."""
-    deck = stored._model or _parsed(stored.deck, stored.mode == "listing")
-    if deck is None:
-        raise ResultFileError("the result holds no deck that can be read")
-    return deck
+    def keys(self) -> list[str]:
+        """Paths of all datasets."""
+        return list(self)
 
 
 @functools.lru_cache(maxsize=8)
-def _parsed(text: str, blanks_are_zeros: bool) -> Deck | None:
-    """Parse a deck's text once, however often it is needed."""
+def deck_in(text: str, *, blanks_are_zeros: bool = False) -> Deck:
+    """The deck in the text of a result, parsed once, however often it is needed.
+
+    Raises ResultFileError if it can't be read.
+    """
     problems = Reader(text, blanks_are_zeros=blanks_are_zeros).problems()
-    return next((problem.deck for problem in problems if problem.deck is not None), None)
+    deck = next((problem.deck for problem in problems if problem.deck is not None), None)
+    if deck is None:
+        raise ResultFileError("the result holds no deck that can be read")
+    return deck

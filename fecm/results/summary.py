@@ -10,6 +10,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.deck.units import quantity as shown_quantity
+from fecm.deck.units import unit_of
 from fecm.results.criteria import spelt, where
 from fecm.results.end import End
 from fecm.results.exposures import LargestExposure, evaluations_in_contact, largest_exposures
@@ -65,7 +66,9 @@ def summary(result: Stored) -> list[str]:
         found = result["modes/angular_frequency"]
         texts = ", ".join(f"{omega:.6g}" for omega in found[:LISTED])
         more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
-        lines.append(_line("frequencies", f"{texts}{more} {result.unit('1/time')}".rstrip()))
+        lines.append(
+            _line("frequencies", f"{texts}{more} {result.unit('modes/angular_frequency')}".rstrip())
+        )
     return lines or ["nothing was stored"]
 
 
@@ -195,7 +198,7 @@ def _rounded(result: Stored, value: float, dimension: str) -> str:
 
 
 def _quantity(result: Stored, value: float, dimension: str) -> str:
-    return shown_quantity(value, result.unit(dimension))
+    return shown_quantity(value, unit_of(dimension, result.units))
 
 
 def _impact(result: Stored) -> list[str]:

@@ -133,13 +133,13 @@ def _bent(simulation: Simulation, result: Result, peak: Peak) -> str:
 
 def _size(result: Result, value: float, thickness: float) -> str:
     """A length, and its ratio to the thickness."""
-    length = f"{value:.4g} {result.unit('length')}".rstrip()
+    length = f"{value:.4g} {result.units.get('length', '')}".rstrip()
     return f"{length} = {value / thickness:.3g} h"
 
 
 def _reached(result: Result, what: str, value: str, peak: Peak) -> str:
     """Begin of a note: what a quantity reaches, and where and when."""
-    time = f"time {peak.time:.6g} {result.unit('time')}".rstrip()
+    time = f"time {peak.time:.6g} {result.units.get('time', '')}".rstrip()
     if not math.isnan(peak.x):
         time = f"({peak.x:.6g}, {peak.y:.6g}), {time}"
     return f"the {what} reaches {value} at {time}: beyond"

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from fecm.deck.units import quantity
+from fecm.deck.units import quantity, unit_of
 from fecm.mechanics.points import shortest_side
 from fecm.mechanics.stretching import principal_values
 from fecm.results.result import Result
@@ -49,8 +49,8 @@ def _time_step(simulation: Simulation, result: Result) -> Iterator[str]:
     # A time step that is as near to that of the linear plate was chosen so.
     limit = allowed * (NEAR**2 if linear < NEAR**2 * allowed else 1.0)
     if linear + growth > limit:
-        force = quantity(largest.value, result.unit("force/length"))
-        at = quantity(largest.time, result.unit("time"))
+        force = quantity(largest.value, unit_of("force/length", result.units))
+        at = quantity(largest.time, unit_of("time", result.units))
         share = math.sqrt((linear + growth) / allowed)
         yield (
             f"the membrane force reaches {force} at time {at}: it may raise the plate's largest "
@@ -73,8 +73,9 @@ def _delamination(simulation: Simulation, result: Result) -> Iterator[str]:
     )
     bending = 6.0 * moment / simulation.problem.laminate.thickness
     if bending > 0.0 and force > STRETCHED * bending:
+        time = quantity(at, unit_of("time", result.units))
+        pull = quantity(force, unit_of("force/length", result.units))
         yield (
-            f"at time {quantity(at, result.unit('time'))} the membrane force under the load is "
-            f"{quantity(force, result.unit('force/length'))}, {force / bending:.0%} of 6 M/h: the "
-            "threshold of DELA is that of a plate in bending"
+            f"at time {time} the membrane force under the load is {pull}, {force / bending:.0%} of "
+            "6 M/h: the threshold of DELA is that of a plate in bending"
         )

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecm._errors import warn
+from fecm._files import ARGUMENT, check_outputs
 from fecm._progress import once_a_minute
 from fecm.api import LOGGER, LoadedDeck, Progress, load_deck
 from fecm.deck.findings import DeckError
@@ -55,7 +56,7 @@ from fecm.sweeps.random import (
 from fecm.sweeps.reduced_check import compared, trials
 from fecm.sweeps.refine import refined_cases
 from fecm.sweeps.result import SweepResult, result_of
-from fecm.sweeps.result_file import save
+from fecm.sweeps.result_writer import save
 
 
 def problem_of(deck: str | Path | Deck) -> Problem:
@@ -223,6 +224,7 @@ def sweep(
     scheduler: object = None,
     executor: Executor | None = None,
     output: str | Path | None = None,
+    overwrite: bool = False,
     progress: Progress | None = None,
     law: Law | str | None = None,
 ) -> SweepResult:
@@ -292,7 +294,9 @@ def sweep(
     executor : concurrent.futures.Executor, optional
         Pool of threads or processes, or another executor.  It is not shut down.
     output : str or Path, optional
-        Output file, which is overwritten.
+        Output file.
+    overwrite : bool
+        Replace an existing output file.
     progress : callable, optional
         Called with the number of finished cases and that of all cases.
     law : Law or str, optional
@@ -320,6 +324,8 @@ def sweep(
         If `law` lacks a method; where it fails in a case, that is the status of the case.
     ExtensionError
         If no installed package has an entry point of the name `law`.
+    FileExistsError
+        If the output file exists and may not be replaced; nothing is then run.
     OSError
         If a file cannot be read or written.
 
@@ -370,6 +376,8 @@ def sweep(
     if workers > 1 or isinstance(executor, ProcessPoolExecutor):
         _check_sendable(workers > 1, build=build, measure=own, law=own_contact)
     prepared = _prepared(deck, build, made)
+    if output is not None:
+        check_outputs([Path(output)], overwrite, [Path(prepared.source)], allowed_by=ARGUMENT)
     (problem,) = prepared.problems
     if refine is not None:
         made, measures = refined_cases(problem, refine), (Measure.DEFLECTION,)
@@ -401,7 +409,7 @@ def sweep(
         done=_Watch(len(made), progress, same_names=own is not None),
     )
     if output is not None:
-        save(result, Path(output))
+        save(result, Path(output), overwrite=overwrite)
     for text in result.notes:
         warn(text)
     return result

@@ -12,14 +12,14 @@ import numpy as np
 
 from fecm.results.errors import ExportError
 from fecm.results.metrics import VERDICTS
-from fecm.sweeps.result import SweepResult
+from fecm.sweeps.stored import StoredSweep
 
 FORMULA = re.compile(r"[=+@\x00-\x1f-]")  # how a formula begins
 CASES = "cases"
 HISTORY = "history"
 
 
-def csv_lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:
+def csv_lines(sweep: StoredSweep, name: str = CASES) -> Iterator[str]:
     """Return the lines of a CSV table, with line ends.
 
     ``"cases"`` has the values and results of every case, ``"history"`` the contact force after
@@ -39,7 +39,7 @@ def csv_lines(sweep: SweepResult, name: str = CASES) -> Iterator[str]:
     )
 
 
-def _case_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:
+def _case_rows(sweep: StoredSweep) -> Iterator[Iterable[Any]]:
     columns = {**sweep.cases, **sweep.summary}
     texts = {name: columns.pop(name) for name in VERDICTS if name in columns}
     columns |= {"dt": sweep.dt, "steps": sweep.steps, **texts}
@@ -47,10 +47,10 @@ def _case_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:
     yield from zip(range(len(sweep)), *(v.tolist() for v in columns.values()), strict=True)
 
 
-def _step_rows(sweep: SweepResult) -> Iterator[Iterable[Any]]:
+def _step_rows(sweep: StoredSweep) -> Iterator[Iterable[Any]]:
     assert sweep.force is not None
     yield ("case", "step", "time", "force")
-    for case in np.flatnonzero(sweep.fine).tolist():
+    for case in np.flatnonzero(sweep.completed).tolist():
         count = int(sweep.steps[case])
         times = np.add.accumulate(np.full(count, sweep.dt[case])).tolist()
         forces = sweep.force[case, :count].tolist()

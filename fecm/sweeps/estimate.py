@@ -238,7 +238,9 @@ def _run_itself(problem: Problem, mass: float) -> tuple[ModelEstimate, list[str]
     peak, duration = (float(own[name][0]) for name in ("peak_force", "contact_time"))
     if math.isnan(duration):
         doubts.append("the run ends before its contact does: what is open needs a longer duration")
-    doubts += [f"{name}: {one['status'][0]}" for name, one in swept.items() if not one.fine.all()]
+    doubts += [
+        f"{name}: {one['status'][0]}" for name, one in swept.items() if not one.completed.all()
+    ]
     h, judge = problem.judge.thickness, problem.judge
     bent = [text for name, one in swept.items() for text in _bent(name, one[RATIO][0] * h, judge)]
     energy = 0.5 * mass * velocity**2

@@ -1,175 +1,36 @@
-"""Result of a sweep: values and results of every case, and what its cases are worth."""
+"""Result of a sweep: values and results of every case, and what can be made of them."""
 
 from __future__ import annotations
 
 import math
-from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._errors import did_you_mean
-from fecm._files import check_outputs, writing
+from fecm._files import ARGUMENT, check_outputs, writing
 from fecm._tables import html_table
-from fecm._typing import Bools
-from fecm.deck.model import Delamination, Preload
-from fecm.deck.reader import Reader
-from fecm.deck.units import quantity, unit_names, unit_of
+from fecm.deck.model import Delamination
+from fecm.deck.units import unit_names
 from fecm.mechanics.own_law import name_of
-from fecm.results.errors import NotStoredError
-from fecm.results.linear_plate import TOO_SOFT, UNSAFE, InPlane, softness
-from fecm.results.metrics import COLUMNS, FOUND, RATIO, SUMMARY, THRESHOLD, VALIDITY, VERDICTS
-from fecm.results.pictures import plot
-from fecm.results.validity import BENT, MEANING, counted
-from fecm.sweeps.case import pair
-from fecm.sweeps.convergence import Convergence, convergence
-from fecm.sweeps.outcome import About, Column, Outcome, Status, was_run
+from fecm.results.metrics import COLUMNS, FOUND, RATIO, SUMMARY, THRESHOLD, VERDICTS
+from fecm.results.pictures import SweepKind, plot
+from fecm.sweeps.outcome import About, Column, Outcome
 from fecm.sweeps.plan import Plan
-from fecm.sweeps.random_result import RandomResult, evaluate, open_ends
+from fecm.sweeps.random_result import evaluate
 from fecm.sweeps.reduced_check import ReducedModel
-from fecm.sweeps.values import REFINE, dimension_of
+from fecm.sweeps.stored import StoredSweep
+from fecm.sweeps.summary import LABEL_WIDTH, counts, reasons, remarks, summary, verdict
 
 if TYPE_CHECKING:
     import pandas
     import xarray
     from matplotlib.axes import Axes
 
-LABEL_WIDTH = 18  # of the lines of the summary
-DIGITS = 6  # of the values of a case, unless others are closer
-MOST_REASONS = 5  # of failure, that the summary lists
-WEIGHED = ("mass", "rod_mass", "energy")  # values that the summary shows in g and J
-SAME_PLACE = 1e-9  # distance from the place given, relative to its coordinates, that is rounding
 
-
-def summary(result: SweepResult) -> list[str]:
-    """Return summary lines: number of cases, smallest and largest peak or velocity, failures."""
-    fine = result.fine
-    failed = Counter(result["status"][~fine].tolist())
-    lines = [f"cases             {len(result)}"]
-    if result.law:
-        lines.append(f"contact law       {result.law}, instead of EXPE")
-    lines += [*_extremes(result), *_moved(result)]
-    for reason, times in failed.most_common(MOST_REASONS):
-        lines.append(f"failed            {times}: {reason}")
-    if (others := len(failed) - MOST_REASONS) > 0:
-        lines.append(f"failed            for {others} other reason{'s' * (others > 1)}")
-    if result.random is not None and failed:
-        lines.append(f"failed share      {(~fine).mean():.3%} of the draws")
-    return [*lines, *(() if result.reduced is None else result.reduced.lines())]
-
-
-def _extremes(result: SweepResult) -> Iterator[str]:
-    """The cases with the smallest and the largest peak, or velocity found."""
-    what, names, digits = "peak", ["peak_force"], 6
-    if "found_velocity" in result.summary:
-        what, names, digits = "found", ["found_velocity", "found_energy"], 8
-    shown = np.where(result.fine, result[names[0]], np.nan)
-    if not np.isfinite(shown).any():
-        return
-    for size, case in (("smallest", np.nanargmin(shown)), ("largest", np.nanargmax(shown))):
-        texts = [quantity(result[name][case], result.unit(name), digits) for name in names]
-        values = ", ".join(f"{name} {_shown(result, name, int(case))}" for name in result.cases)
-        given = f" ({values})" if values else ""
-        yield f"{size} {what:{LABEL_WIDTH - 2 - len(size)}} {', '.join(texts)}{given}"
-
-
-def _moved(result: SweepResult) -> Iterator[str]:
-    """How far the places that were hit are from those given."""
-    if "at" not in result.cases or "hit_x" not in result.summary:
-        return
-    asked = np.array([pair("at", text) for text in result.cases["at"].tolist()]).T
-    moved = np.hypot(*(asked - (result["hit_x"], result["hit_y"])))
-    if count := np.count_nonzero(moved > SAME_PLACE * np.abs(asked).max()):
-        distance = f"{np.nanmax(moved):.4g} {result.unit('hit_x')}".rstrip()
-        yield f"moved             {count}: to the nearest node, up to {distance} away"
-
-
-def _shown(result: SweepResult, name: str, case: int) -> str:
-    """Value of a case with six digits, or as many as tell it from those that are not random."""
-    values = result.cases[name]
-    if values.dtype.kind != "f":
-        return str(values[case])
-    digits = DIGITS
-    if result.random is None:
-        size = max(abs(float(values[case])), 1e-300)
-        others = np.abs(values[values != values[case]] - values[case])
-        gap = float(np.min(others / size, initial=1.0))
-        digits = min(max(DIGITS, 1 - math.floor(math.log10(gap))), 17)
-    return quantity(values[case], result.unit(name) if name in WEIGHED else "", digits)
-
-
-def verdict(result: SweepResult) -> str:
-    """Count the cases, the failures, and the cases with doubtful results."""
-    found = ", ".join(f"{count} {what}" for count, what in _counts(result))
-    return f"{len(result)} case{'' if len(result) == 1 else 's'}: {found or 'all ok'}"
-
-
-def reasons(status: Column) -> str:
-    """The most common reason of failure, and the number of others."""
-    (first, _), *others = Counter(status.tolist()).most_common()
-    more = f", and {len(others)} other reason{'s' * (len(others) > 1)}" if others else ""
-    return f"{first}{more}"
-
-
-def _counts(result: SweepResult) -> list[tuple[int, str]]:
-    """Numbers of cases with doubtful results and of failures, which are last."""
-    fine, steps = result.fine, result.unconverged_steps
-    unconverged = np.zeros_like(fine) if steps is None else fine & (steps > 0)
-    cases = {
-        "still in contact at the end": result.still,
-        **_doubts(result),
-        "with a contact iteration that did not converge": unconverged,
-        "failed": ~fine,
-    }
-    return [(int(some.sum()), what) for what, some in cases.items() if some.any()]
-
-
-def _doubts(result: SweepResult) -> dict[str, Bools]:
-    """Cases beyond the range of the model, by what they are."""
-    found = {}
-    for reason, some in counted(result.validity):
-        what = MEANING[reason]
-        if reason in BENT.values():
-            ratio = result.summary.get(RATIO, np.full(len(some), np.nan))[some]
-            if np.isfinite(ratio).any():
-                what = f"{what[:-1]}, up to {np.nanmax(ratio):.3g} h)"
-        found[what] = some
-    return found
-
-
-def remarks(result: SweepResult) -> Iterator[str]:
-    """What open values and cases beyond the linear plate mean, and what helps."""
-    is_open = result.fine & ~result.over
-    if is_open.any():
-        duration = 2.0 * float((result.dt * result.steps)[is_open].max())
-        yield (
-            f"{is_open.sum()} of {len(result)} cases end before their contact does: what comes "
-            f"after is open; a longer run decides it, as with --vary duration={duration:.3g}"
-        )
-    bent = [reason for reason, _ in counted(result.validity) if reason in BENT.values()]
-    if bent:
-        held = any(reason != BENT[InPlane.FREE] for reason in bent)
-        ratio = result.summary.get(RATIO, np.full(1, np.nan))
-        size = ""
-        if np.isfinite(ratio).any():
-            largest = float(np.nanmax(ratio))
-            in_plane = InPlane.UNKNOWN if held else InPlane.FREE
-            error = softness(largest, in_plane, preloaded=_is_preloaded(result.deck))
-            size = f" (at w = {largest:.3g} h {error})"
-        yield f"beyond its range {TOO_SOFT}{size}; {UNSAFE}"
-
-
-def _is_preloaded(deck: str) -> bool:
-    """Whether the text of a deck has a PREL segment."""
-    return any(problem.deck and problem.deck.has(Preload) for problem in Reader(deck).problems())
-
-
-@dataclass(repr=False)
-class SweepResult:
+class SweepResult(StoredSweep):
     """Result of a sweep.
 
     Attributes
@@ -183,10 +44,10 @@ class SweepResult:
         Time step and number of steps of every case.
     force : ndarray (n, steps) or None
         Contact force after every step, NaN after the last step; None unless requested.
-    unconverged_steps : ndarray (n,) or None
+    unsettled_steps : ndarray (n,) or None
         Steps whose contact iteration did not converge; None if the file does not contain them.
-    deck : str
-        Text of the deck.
+    deck_text : str
+        The cards of the deck that was varied, as in the file; :attr:`deck` has them read.
     title : str
         Title of the deck.
     units : dict
@@ -199,22 +60,6 @@ class SweepResult:
         Name of the contact law that took the place of EXPE; empty if none did.
     """
 
-    cases: dict[str, Column]
-    summary: dict[str, Column]
-    dt: Column
-    steps: Column
-    force: Column | None = None
-    unconverged_steps: Column | None = None
-    deck: str = ""
-    title: str = ""
-    units: dict[str, str] = field(default_factory=dict)
-    random: RandomResult | None = None
-    reduced: ReducedModel | None = None
-    law: str = ""
-
-    def __len__(self) -> int:
-        return len(self.dt)
-
     def __repr__(self) -> str:
         return f"<fecm sweep {self.title!r} over {', '.join(self.cases)}: {verdict(self)}>"
 
@@ -223,60 +68,43 @@ class SweepResult:
         lines = ((line[:LABEL_WIDTH].strip(), line[LABEL_WIDTH:]) for line in summary(self))
         return html_table(repr(self)[1:-1], lines)
 
-    def __getitem__(self, name: str) -> Column:
-        """Values or results of every case, by name."""
-        if name in self.cases:
-            return self.cases[name]
-        if name not in self.summary:
-            names = [*self.cases, *self.summary]
-            others = did_you_mean(name, names) or f"; there are {', '.join(names)}"
-            raise NotStoredError(f"there is no {name} in this sweep{others}")
-        return self.summary[name]
-
-    @property
-    def fine(self) -> Bools:
-        """Cases that were run."""
-        return was_run(self.summary["status"])
-
-    @property
-    def still(self) -> Bools:
-        """Cases that were run and ended in contact."""
-        return np.asarray(self.summary["status"] == Status.STILL)
-
-    @property
-    def validity(self) -> Column:
-        """``"ok"``, reasons to doubt a case, or ``"failed"``; of earlier files empty texts."""
-        return self.summary.get(VALIDITY, np.full(len(self), ""))
-
-    @property
-    def over(self) -> Bools:
-        """Cases that were run until their contact was over."""
-        return self.fine & ~open_ends(self.summary)
-
-    @property
-    def convergence(self) -> dict[str, Convergence]:
-        """Order, limit and band of every quantity of a refinement study; empty for others."""
-        if REFINE not in self.cases:
-            return {}
-        # The text of a file, which is no path even if it is one line.
-        decks = (problem.deck for problem in Reader(self.deck).problems())
-        nodes = next((deck.control.nen for deck in decks if deck is not None), 0)
-        return convergence(self.cases, self.summary, nodes)
-
     @property
     def notes(self) -> tuple[str, ...]:
         """Numbers of cases that failed or whose results are doubtful."""
-        texts = [f"{count} of {len(self)} cases {what}" for count, what in _counts(self)]
-        if not self.fine.all():
-            texts[-1] += f": {reasons(self['status'][~self.fine])}"
+        texts = [f"{count} of {len(self)} cases {what}" for count, what in counts(self)]
+        if not self.completed.all():
+            texts[-1] += f": {reasons(self['status'][~self.completed])}"
         return (*texts, *remarks(self), *(() if self.random is None else self.random.notes))
 
-    def unit(self, name: str) -> str:
-        """Return the unit of a value or result; empty if the deck states none."""
-        if name == "force":
-            return unit_of("force", self.units)
-        dimension = COLUMNS[name][1] if name in COLUMNS else dimension_of(name)
-        return unit_of(dimension, self.units)
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write the result as a file, which :func:`fecm.load_sweep` and the command line read.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write.
+        overwrite : bool
+            Replace an existing file.
+
+        Raises
+        ------
+        FileExistsError
+            If the file exists and may not be replaced.
+        OSError
+            If it can't be written.
+
+        Examples
+        --------
+        >>> import fecm
+        >>> found = fecm.sweep("decks/impact-115.inp", {"velocity": [50.0, 115.0]})
+        >>> found.save("velocities.h5", overwrite=True)
+        >>> fecm.load_sweep("velocities.h5").keys() == found.keys()
+        True
+        """
+        from fecm.sweeps.result_writer import save  # h5py takes 60 ms to import
+
+        check_outputs([Path(path)], overwrite, allowed_by=ARGUMENT)
+        save(self, Path(path), overwrite=overwrite)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return values and results as a table with one row per case (requires pandas)."""
@@ -314,11 +142,11 @@ class SweepResult:
         axes, shape = [*coordinates, "step"], [len(values) for values in coordinates.values()]
 
         def about(name: str) -> dict[str, str]:
-            texts = {"long_name": COLUMNS.get(name, ("",))[0], "units": self.unit(name)}
+            texts = {"long_name": COLUMNS.get(name, ("",))[0], "units": self._unit(name)}
             return {key: text for key, text in texts.items() if text}
 
         columns = {**self.cases, **self.summary, "dt": self.dt, "steps": self.steps}
-        added = {"unsettled_steps": self.unconverged_steps, "force": self.force}
+        added = {"unsettled_steps": self.unsettled_steps, "force": self.force}
         columns |= {name: values for name, values in added.items() if values is not None}
         variables = {}
         for name, values in columns.items():
@@ -334,26 +162,6 @@ class SweepResult:
         if self.force is not None:
             found = found.assign_coords(step=np.arange(1, self.force.shape[1] + 1))
         return found.set_coords(list(self.cases))
-
-    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write the sweep as a file, such as one in memory; ``fecm.load_sweep`` reads it.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to write.
-        overwrite : bool
-            Whether an existing file is replaced.
-
-        Raises
-        ------
-        OSError
-            If the file exists and may not be replaced, or can't be written.
-        """
-        from fecm.sweeps.result_file import save  # which imports this module
-
-        check_outputs([Path(path)], overwrite)
-        save(self, Path(path), overwrite=overwrite)
 
     def export(
         self,
@@ -387,37 +195,40 @@ class SweepResult:
         >>> found = fecm.sweep(deck, {"velocity": [100.0, 115.0, 130.0]})
         >>> found.export("velocities.csv")
         """
-        from fecm.sweeps.csv import csv_lines  # which imports this module
+        from fecm.sweeps.csv import csv_lines  # 2 ms at start
 
         lines = csv_lines(self, table)
-        check_outputs([Path(path)], overwrite)
+        check_outputs([Path(path)], overwrite, allowed_by=ARGUMENT)
         with writing(Path(path), overwrite=overwrite) as file:
             file.writelines(lines)
 
     def plot(
         self,
-        quantity: str = "",
-        over: str | Sequence[str] = (),
+        kind: SweepKind = "map",
         path: str | Path | None = None,
         *,
-        kind: Literal["map", "exceedance", "sensitivity", "scatter"] = "map",
+        quantity: str = "",
+        over: str | Sequence[str] = (),
         ax: Axes | None = None,
+        overwrite: bool = False,
         **options: Any,
     ) -> Axes:
-        """Draw a map on a new figure of pyplot, on given axes, or in a file; or another kind.
+        """Draw a picture on a new figure of pyplot, on given axes, or in a file.
 
         Parameters
         ----------
+        kind : {"map", "exceedance", "sensitivity", "scatter"}
+            Kind of picture; those but map are of random sweeps.
+        path : str or Path, optional
+            File to write instead, as ``fecm plot`` does.  The suffix selects the format.
         quantity : str
             Name in the summary; the peak force, or the velocity found, if empty.
         over : str or sequence of str
             One or two names of varied values; all varied values if empty.
-        path : str or Path, optional
-            File to write or replace instead, as ``fecm plot`` does, in the format of its suffix.
-        kind : {"map", "exceedance", "sensitivity", "scatter"}
-            Kind of picture; those but map are of random sweeps.
         ax : matplotlib.axes.Axes, optional
             Axes to draw on.
+        overwrite : bool
+            Replace an existing file.
         **options
             Other options of the kind, such as ``where``, ``level``, ``width``.
 
@@ -430,14 +241,20 @@ class SweepResult:
         ------
         PlotError
             If the sweep does not contain the data.
+        FileExistsError
+            If the file exists and may not be replaced.
         ImportError
             If matplotlib is not installed.
+
+        Examples
+        --------
+        >>> found.plot(quantity="max_indentation", over="velocity")  # doctest: +SKIP
         """
         names = (over,) if isinstance(over, str) else tuple(over)
         named = {self.title or "the sweep": self}
         if names or kind == "map":
             options["over"] = names
-        return plot(kind, named, path, ax, quantity=quantity, **options)
+        return plot(kind, named, path, ax, overwrite=overwrite, quantity=quantity, **options)
 
 
 def _grid(cases: Mapping[str, Column], count: int) -> tuple[dict[str, Column], NDArray[np.intp]]:
@@ -470,8 +287,8 @@ def result_of(plan: Plan, outcome: Outcome, reduced: ReducedModel | None = None)
         dt=columns[About.DT],
         steps=columns[About.STEPS],
         force=outcome.force,
-        unconverged_steps=columns[About.UNSETTLED],
-        deck=deck.text or deck.to_text(),
+        unsettled_steps=columns[About.UNSETTLED],
+        deck_text=deck.text or deck.to_text(),
         title=deck.title,
         units=unit_names(deck),
         random=random,

@@ -14,7 +14,7 @@ from fecm._measured_tables import read_table, same_name
 from fecm._typing import Floats
 from fecm.deck.source_text import HDF5
 from fecm.results.result import Result, load
-from fecm.results.schema import DATASETS, declared_units
+from fecm.results.schema import DATASETS
 from fecm.studies import StudyError
 
 TRANSDUCER = "transducer"
@@ -62,7 +62,7 @@ def _of_result(path: Path, result: Result, column: str | None) -> TimeHistory:
         return np.concatenate([rest, result[f"history/{column}"]])
 
     beside = {"contact force": begun("force")} if name == TRANSDUCER else {}
-    units = declared_units(result.attributes)
+    units = result.units
     return TimeHistory(name, begun("time"), begun(name), dimension, len(rest), beside, units)
 
 

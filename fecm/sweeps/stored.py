@@ -1,0 +1,134 @@
+"""What a sweep has stored: values and results of every case by name, and the deck.
+
+:class:`~fecm.sweeps.result.SweepResult` adds to it what can be made of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from fecm._errors import did_you_mean
+from fecm._typing import Bools
+from fecm.deck.model import Deck
+from fecm.deck.units import unit_of
+from fecm.results.errors import NotStoredError, ResultFileError
+from fecm.results.metrics import COLUMNS, VALIDITY
+from fecm.results.stored import deck_in
+from fecm.sweeps.convergence import Convergence, convergence
+from fecm.sweeps.outcome import Column, Status, was_run
+from fecm.sweeps.random_result import RandomResult, open_ends
+from fecm.sweeps.reduced_check import ReducedModel
+from fecm.sweeps.values import REFINE, dimension_of
+
+OWN_DIMENSIONS = {"force": "force", "dt": "time"}  # of arrays that are not in the tables
+
+
+@dataclass(repr=False)
+class StoredSweep:
+    """Values, results and deck of a sweep; see :class:`fecm.SweepResult`."""
+
+    cases: dict[str, Column]
+    summary: dict[str, Column]
+    dt: Column
+    steps: Column
+    force: Column | None = None
+    unsettled_steps: Column | None = None
+    deck_text: str = ""
+    title: str = ""
+    units: dict[str, str] = field(default_factory=dict)
+    random: RandomResult | None = None
+    reduced: ReducedModel | None = None
+    law: str = ""
+
+    def __len__(self) -> int:
+        return len(self.dt)
+
+    def __getitem__(self, name: str) -> Column:
+        """Values or results of every case, by name."""
+        for columns in (self.cases, self.summary):
+            if name in columns:
+                return columns[name]
+        raise self._lacks(name)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.cases or name in self.summary
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names of values and results."""
+        return iter(self.cases | self.summary)
+
+    def keys(self) -> list[str]:
+        """Names of values and results."""
+        return list(self)
+
+    def _lacks(self, name: str) -> NotStoredError:
+        """The error about an unknown name."""
+        others = did_you_mean(name, self) or f"; there are {', '.join(self)}"
+        return NotStoredError(f"there is no {name} in this sweep{others}")
+
+    @property
+    def deck(self) -> Deck:
+        """The deck that was varied; of decks of your own that of the first case that has one.
+
+        Raises
+        ------
+        ResultFileError
+            If the result holds no deck that can be read.
+        """
+        return deck_in(self.deck_text)
+
+    @property
+    def completed(self) -> Bools:
+        """Cases that were run to the end; the others failed, for the reason in ``status``."""
+        return was_run(self.summary["status"])
+
+    @property
+    def still_in_contact(self) -> Bools:
+        """Completed cases that end in contact."""
+        return np.asarray(self.summary["status"] == Status.STILL)
+
+    @property
+    def validity(self) -> Column:
+        """``"ok"``, reasons to doubt a case, or ``"failed"``; of earlier files empty texts."""
+        return self.summary.get(VALIDITY, np.full(len(self), ""))
+
+    @property
+    def contact_over(self) -> Bools:
+        """Completed cases whose contact is over at the end, so that no value is open."""
+        return self.completed & ~open_ends(self.summary)
+
+    @property
+    def convergence(self) -> dict[str, Convergence]:
+        """Order, limit and band of every quantity of a refinement study; empty for others."""
+        if REFINE not in self.cases:
+            return {}
+        try:
+            nodes = self.deck.control.nen
+        except ResultFileError:  # of a damaged file
+            nodes = 0
+        return convergence(self.cases, self.summary, nodes)
+
+    def unit(self, name: str) -> str:
+        """Unit of a column; empty for texts and pure numbers, or if the deck names no units.
+
+        Parameters
+        ----------
+        name : str
+            One of :meth:`keys`, ``"force"`` or ``"dt"``.
+
+        Raises
+        ------
+        NotStoredError
+            If there is no such column; a KeyError.
+        """
+        if name not in self and name not in OWN_DIMENSIONS:
+            raise self._lacks(name)
+        return self._unit(name)
+
+    def _unit(self, name: str) -> str:
+        """Unit of any name; empty if it is unknown."""
+        dimension = COLUMNS[name].dimension if name in COLUMNS else dimension_of(name)
+        return unit_of(OWN_DIMENSIONS.get(name, dimension), self.units)

@@ -1,0 +1,152 @@
+"""Summary of a sweep: its cases in a few lines, and what they are worth."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+
+from fecm._typing import Bools
+from fecm.deck.model import Preload
+from fecm.deck.units import quantity
+from fecm.results.errors import ResultFileError
+from fecm.results.linear_plate import TOO_SOFT, UNSAFE, InPlane, softness
+from fecm.results.metrics import RATIO
+from fecm.results.validity import BENT, MEANING, counted
+from fecm.sweeps.case import pair
+from fecm.sweeps.outcome import Column
+from fecm.sweeps.stored import StoredSweep
+
+LABEL_WIDTH = 18  # of the lines of the summary
+DIGITS = 6  # of the values of a case, unless others are closer
+MOST_REASONS = 5  # of failure, that the summary lists
+WEIGHED = ("mass", "rod_mass", "energy")  # values that the summary shows in g and J
+SAME_PLACE = 1e-9  # distance from the place given, relative to its coordinates, that is rounding
+
+
+def summary(result: StoredSweep) -> list[str]:
+    """Return summary lines: number of cases, smallest and largest peak or velocity, failures."""
+    fine = result.completed
+    failed = Counter(result["status"][~fine].tolist())
+    lines = [f"cases             {len(result)}"]
+    if result.law:
+        lines.append(f"contact law       {result.law}, instead of EXPE")
+    lines += [*_extremes(result), *_moved(result)]
+    for reason, times in failed.most_common(MOST_REASONS):
+        lines.append(f"failed            {times}: {reason}")
+    if (others := len(failed) - MOST_REASONS) > 0:
+        lines.append(f"failed            for {others} other reason{'s' * (others > 1)}")
+    if result.random is not None and failed:
+        lines.append(f"failed share      {(~fine).mean():.3%} of the draws")
+    return [*lines, *(() if result.reduced is None else result.reduced.lines())]
+
+
+def _extremes(result: StoredSweep) -> Iterator[str]:
+    """The cases with the smallest and the largest peak, or velocity found."""
+    what, names, digits = "peak", ["peak_force"], 6
+    if "found_velocity" in result.summary:
+        what, names, digits = "found", ["found_velocity", "found_energy"], 8
+    shown = np.where(result.completed, result[names[0]], np.nan)
+    if not np.isfinite(shown).any():
+        return
+    for size, case in (("smallest", np.nanargmin(shown)), ("largest", np.nanargmax(shown))):
+        texts = [quantity(result[name][case], result.unit(name), digits) for name in names]
+        values = ", ".join(f"{name} {_shown(result, name, int(case))}" for name in result.cases)
+        given = f" ({values})" if values else ""
+        yield f"{size} {what:{LABEL_WIDTH - 2 - len(size)}} {', '.join(texts)}{given}"
+
+
+def _moved(result: StoredSweep) -> Iterator[str]:
+    """How far the places that were hit are from those given."""
+    if "at" not in result.cases or "hit_x" not in result.summary:
+        return
+    asked = np.array([pair("at", text) for text in result.cases["at"].tolist()]).T
+    moved = np.hypot(*(asked - (result["hit_x"], result["hit_y"])))
+    if count := np.count_nonzero(moved > SAME_PLACE * np.abs(asked).max()):
+        distance = f"{np.nanmax(moved):.4g} {result.unit('hit_x')}".rstrip()
+        yield f"moved             {count}: to the nearest node, up to {distance} away"
+
+
+def _shown(result: StoredSweep, name: str, case: int) -> str:
+    """Value of a case with six digits, or as many as tell it from those that are not random."""
+    values = result.cases[name]
+    if values.dtype.kind != "f":
+        return str(values[case])
+    digits = DIGITS
+    if result.random is None:
+        size = max(abs(float(values[case])), 1e-300)
+        others = np.abs(values[values != values[case]] - values[case])
+        gap = float(np.min(others / size, initial=1.0))
+        digits = min(max(DIGITS, 1 - math.floor(math.log10(gap))), 17)
+    return quantity(values[case], result.unit(name) if name in WEIGHED else "", digits)
+
+
+def verdict(result: StoredSweep) -> str:
+    """Count the cases, the failures, and the cases with doubtful results."""
+    found = ", ".join(f"{count} {what}" for count, what in counts(result))
+    return f"{len(result)} case{'' if len(result) == 1 else 's'}: {found or 'all ok'}"
+
+
+def reasons(status: Column) -> str:
+    """The most common reason of failure, and the number of others."""
+    (first, _), *others = Counter(status.tolist()).most_common()
+    more = f", and {len(others)} other reason{'s' * (len(others) > 1)}" if others else ""
+    return f"{first}{more}"
+
+
+def counts(result: StoredSweep) -> list[tuple[int, str]]:
+    """Numbers of cases with doubtful results and of failures, which are last."""
+    fine, steps = result.completed, result.unsettled_steps
+    unconverged = np.zeros_like(fine) if steps is None else fine & (steps > 0)
+    cases = {
+        "still in contact at the end": result.still_in_contact,
+        **_doubts(result),
+        "with a contact iteration that did not converge": unconverged,
+        "failed": ~fine,
+    }
+    return [(int(some.sum()), what) for what, some in cases.items() if some.any()]
+
+
+def _doubts(result: StoredSweep) -> dict[str, Bools]:
+    """Cases beyond the range of the model, by what they are."""
+    found = {}
+    for reason, some in counted(result.validity):
+        what = MEANING[reason]
+        if reason in BENT.values():
+            ratio = result.summary.get(RATIO, np.full(len(some), np.nan))[some]
+            if np.isfinite(ratio).any():
+                what = f"{what[:-1]}, up to {np.nanmax(ratio):.3g} h)"
+        found[what] = some
+    return found
+
+
+def remarks(result: StoredSweep) -> Iterator[str]:
+    """What open values and cases beyond the linear plate mean, and what helps."""
+    is_open = result.completed & ~result.contact_over
+    if is_open.any():
+        duration = 2.0 * float((result.dt * result.steps)[is_open].max())
+        yield (
+            f"{is_open.sum()} of {len(result)} cases end before their contact does: what comes "
+            f"after is open; a longer run decides it, as with --vary duration={duration:.3g}"
+        )
+    bent = [reason for reason, _ in counted(result.validity) if reason in BENT.values()]
+    if bent:
+        held = any(reason != BENT[InPlane.FREE] for reason in bent)
+        ratio = result.summary.get(RATIO, np.full(1, np.nan))
+        size = ""
+        if np.isfinite(ratio).any():
+            largest = float(np.nanmax(ratio))
+            in_plane = InPlane.UNKNOWN if held else InPlane.FREE
+            error = softness(largest, in_plane, preloaded=_is_preloaded(result))
+            size = f" (at w = {largest:.3g} h {error})"
+        yield f"beyond its range {TOO_SOFT}{size}; {UNSAFE}"
+
+
+def _is_preloaded(result: StoredSweep) -> bool:
+    """Whether the deck has a PREL segment."""
+    try:
+        return result.deck.has(Preload)
+    except ResultFileError:  # of a damaged file
+        return False
