@@ -40,6 +40,10 @@ class OutputError(FecmError, OSError):
     """An output can't be written; the message says why."""
 
 
+class NoFolderError(OutputError, FileNotFoundError):
+    """The folder of an output does not exist."""
+
+
 class OutputExistsError(OutputError, FileExistsError):
     """An output exists and may not be replaced."""
 
@@ -72,7 +76,7 @@ def check_outputs(
         _refuse_special(path, mode)
         target = final(path)
         if not target.parent.is_dir():
-            raise OutputError(f"{path}: there is no folder {target.parent}")
+            raise NoFolderError(f"{path}: there is no folder {target.parent}")
         if mode is not None and not overwrite:
             raise OutputExistsError(f"{path} exists already; {allowed_by} replaces it")
         if path.is_symlink() and not overwrite:

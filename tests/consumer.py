@@ -44,8 +44,8 @@ measured: fecm.SweepResult = fecm.sweep(
 fecm.assert_same(sweep, "sweep.h5")
 sweep.export("forces.csv", "history")
 tabled: fecm.SweepResult = fecm.sweep(deck, cases=sweep.to_dataframe())
-stored: fecm.SweepResult = fecm.load_sweep("sweep.h5")
-changed: tuple[fecm.Deck, ...] = (result.deck.with_(velocity=3.0), stored.deck)
+reopened: fecm.SweepResult = fecm.load_sweep("sweep.h5")
+changed: tuple[fecm.Deck, ...] = (result.deck.with_(velocity=3.0), reopened.deck)
 replaced: fecm.Result = fecm.run_one(deck, output=Path("plate.h5"), overwrite=True)
 names: list[str] = [*result.keys(), *result.history, *sweep.keys(), result.unit("force")]
 columns: dict[str, NDArray[np.float64]] = dict(result.history)

@@ -318,7 +318,7 @@ def test_a_projectile_of_a_deck_is_replaced_in_its_card() -> None:
 def test_an_output_in_no_folder_is_named_once(tmp_path: Path) -> None:
     with pytest.raises(FileNotFoundError) as refused:
         fecm.run_one(DECK, output=tmp_path / "none" / "x.h5")
-    assert str(refused.value).endswith(f"'{tmp_path / 'none' / 'x.h5'}'")
+    assert str(refused.value).count(str(tmp_path / "none" / "x.h5")) == 1
 
 
 def test_the_examples_offer_their_two_functions() -> None:

@@ -11,12 +11,14 @@ import pytest
 import fecm
 from fecm.results.csv import lines
 from fecm.results.errors import ExportError, NotStoredError, ResultFileError
+from fecm.results.exposures import largest_exposures
 from fecm.results.result import Result
 from fecm.results.vtkhdf import write_vtkhdf
 from tests.builders import REPORT_PLY, turned_stiffness
 from tests.calls import call
 from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, small
 
+STRENGTHS = "ALLO\n   200000.   200000.     7000.    28000.    13000.\n\n"
 DECK = small(PLY_PROGRAM, data=DISC + DATA_CARDS)
 
 
@@ -31,6 +33,13 @@ def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def result(file: Path) -> Result:
     return fecm.load(file)
+
+
+@pytest.fixture(scope="module")
+def failing() -> Result:
+    """The same plate with exposures."""
+    program = PLY_PROGRAM.replace("PLYS", "FAIL          1\nPLYS")
+    return fecm.run_one(small(program, data=DISC + STRENGTHS + DATA_CARDS))
 
 
 def test_strains_of_plies_times_the_stiffness_of_the_ply_are_their_stresses(result: Result) -> None:
@@ -119,7 +128,10 @@ def test_cells_have_the_stress_of_largest_magnitude_and_its_ply(
     assert not notes
     members = result["plies/element"] - 1
     with h5py.File(tmp_path / "plate.vtkhdf") as file:
-        data = {name: field[()].reshape(2, 4) for name, field in file["VTKHDF/CellData"].items()}
+        cells = file["VTKHDF/CellData"]
+        under_load = cells["under_load"][()]
+        data = {name: cells[name][()].reshape(2, 4) for name in cells if name != "under_load"}
+    np.testing.assert_array_equal(under_load[members], result["plies/under_load"])
     for name, axes in (("sigma_2", (1, 3)), ("tau_xz", (2,))):
         stored = result[f"plies/{name}"]
         by_ply = np.abs(stored).max(axis=tuple(axis + 1 for axis in axes))
@@ -130,6 +142,61 @@ def test_cells_have_the_stress_of_largest_magnitude_and_its_ply(
         assert np.isnan(data[f"{name}_ply"][:, others]).all()
     # With its sign: sigma_2 is as large at both faces of the plate, but not in every element.
     assert np.isin(data["sigma_2"][:, members], result["plies/sigma_2"]).all()
+
+
+def test_cells_have_the_largest_exposure_outside_the_load_and_its_ply(
+    failing: Result, tmp_path: Path
+) -> None:
+    notes: list[str] = []
+    write_vtkhdf(failing, tmp_path / "plate.vtkhdf", notes.append)
+    assert failing.still_in_contact
+    assert notes == ["the run ends in contact: exposures are lower bounds"]
+    with h5py.File(tmp_path / "plate.vtkhdf") as file:
+        data = {name: field[()] for name, field in file["VTKHDF/CellData"].items()}
+        for name in data:
+            if name.startswith("exposure"):  # of the entire run: once, at every time step
+                assert file[f"VTKHDF/Steps/CellDataOffsets/{name}"][()].tolist() == [0, 0]
+    largest = {one.criterion: one for one in largest_exposures(failing)}
+    assert set(largest) == {"max_stress", "tsai_wu", "hashin", "puck", "interlaminar"}
+    for criterion, one in largest.items():
+        cell = int(np.nanargmax(data[f"exposure_{criterion}"]))
+        assert data[f"exposure_{criterion}"][cell] == one.exposure
+        assert data[f"exposure_{criterion}_ply"][cell] == one.ply
+    under = failing["failure/under_load"] != 0
+    assert under.any()
+    assert not under.all()
+    np.testing.assert_array_equal(data["under_load"], under.any(axis=1))
+    outside = np.where(under[:, :, None, None], -1.0, failing["failure/hashin/exposure"])
+    np.testing.assert_array_equal(data["exposure_hashin"], outside.max(axis=(1, 2, 3)))
+    assert np.isnan(data["exposure_interlaminar"][under.any(axis=1)]).all()
+
+
+def test_a_cell_whose_points_are_all_under_the_load_has_no_exposure(
+    failing: Result, tmp_path: Path
+) -> None:
+    arrays = {path: failing[path].copy() for path in failing}
+    arrays["failure/under_load"][2] = 1
+    write_vtkhdf(Result(arrays, {}, {}), tmp_path / "plate.vtkhdf")
+    with h5py.File(tmp_path / "plate.vtkhdf") as file:
+        assert np.isnan(file["VTKHDF/CellData/exposure_puck"][()]).tolist() == [0, 0, 1, 0]
+
+
+def test_the_grid_of_pyvista_has_the_fields_of_vtkhdf(failing: Result, tmp_path: Path) -> None:
+    pytest.importorskip("pyvista")
+    write_vtkhdf(failing, tmp_path / "plate.vtkhdf")
+    with h5py.File(tmp_path / "plate.vtkhdf") as file:
+        root = file["VTKHDF"]
+        for row, time in enumerate(failing.tape3.time.tolist()):
+            grid = failing.to_pyvista(time)
+            for at, data in (("Point", grid.point_data), ("Cell", grid.cell_data)):
+                assert set(data) == set(root[f"{at}Data"])
+                for name in root[f"{at}Data"]:
+                    start = root[f"Steps/{at}DataOffsets/{name}"][row]
+                    wanted = root[f"{at}Data/{name}"][start : start + len(data[name])]
+                    np.testing.assert_array_equal(data[name], wanted)
+            notes = grid.field_data["notes"].tolist()
+            assert notes[:-1] == list(failing.notes)
+            assert "exposures are lower bounds" in notes[-1]
 
 
 def test_cells_without_nine_nodes_have_no_interlaminar_stress(

@@ -50,7 +50,7 @@ def largest_exposures(stored: Stored) -> list[LargestExposure]:
     found = []
     for criterion in criteria_of(stored.attributes_of("failure")):
         exposure = stored[f"failure/{criterion}/exposure"]
-        outside = np.where(_near(stored, criterion), -1.0, exposure)
+        outside = np.where(near_load(stored, criterion), -1.0, exposure)
         if not outside.size or not (outside >= 0.0).any():
             continue
         place = np.unravel_index(int(np.nanargmax(outside)), outside.shape)
@@ -83,7 +83,7 @@ def _number(value: object) -> float | None:
     return float(value) if isinstance(value, int | float) else None
 
 
-def _near(stored: Stored, criterion: str) -> Array:
+def near_load(stored: Stored, criterion: str) -> Array:
     """Mask of the exposures of a criterion under the load, of a shape that fits theirs."""
     under = stored["failure/under_load"] != 0
     if criterion == INTERLAMINAR:  # whose exposures belong to the element

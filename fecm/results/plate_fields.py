@@ -1,0 +1,191 @@
+"""Fields over the plate at stored time steps: what ParaView and PyVista show of a result."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from enum import StrEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._frozen import frozen
+from fecm._typing import Array
+from fecm.mechanics.strains import STRAINS
+from fecm.results.criteria import INTERLAMINAR, criteria_of
+from fecm.results.errors import ExportError
+from fecm.results.exposures import near_load
+from fecm.results.plies import IN_PLANE
+from fecm.results.plies import INTERLAMINAR as BETWEEN_PLIES
+from fecm.results.stored import Stored
+from fecm.results.vtk_cells import Ints
+
+Note = Callable[[str], None]
+# Numbers of points that are the first nodes of an element (K = -2: corners, K = -3: nine).
+NODAL_POINTS = (4, 9)
+
+
+class At(StrEnum):
+    """What a field belongs to, as VTKHDF names it."""
+
+    POINTS = "Point"
+    CELLS = "Cell"
+
+
+@frozen
+class Fields:
+    """Fields that are computed together."""
+
+    at: At
+    shapes: Mapping[str, tuple[int, ...]]  # of a time step, by name
+    # The fields of the time step with this number, in the order of `shapes`.
+    of_step: Callable[[int], Iterable[Array]]
+    constant: bool = False  # whether they are the same at all time steps
+
+
+def fields(stored: Stored, rows: Ints, note: Note = lambda text: None) -> Iterator[Fields]:
+    """Fields at the time steps of some rows of tape3.
+
+    `note` receives a sentence about fields that were not stored at all of these steps.  Raises
+    ExportError if elements that do not exist have ply stresses.
+    """
+    steps = stored["tape3/step"][rows]
+    yield _displacements(stored["tape3/displacement"], rows)
+    yield from _strains(stored, steps, note)
+    yield from _ply_stresses(stored, steps, note)
+    yield from _exposures(stored, note)
+    if "mesh/laminate" in stored:
+        yield _constant({"laminate": stored["mesh/laminate"]})
+
+
+def _constant(values: Mapping[str, Array]) -> Fields:
+    """Values of the cells that do not depend on time."""
+    shapes = {name: one.shape for name, one in values.items()}
+    return Fields(At.CELLS, shapes, lambda number: list(values.values()), constant=True)
+
+
+def _displacements(stored: Array, rows: Ints) -> Fields:
+    """At the points: displacement (u, v, w), w alone, rotations (theta_x, theta_y)."""
+    _, numnp, ndf = stored.shape
+    shapes = {"displacement": (numnp, 3), "w": (numnp,), "rotation": (numnp, ndf - 3)}
+    if ndf == 3:
+        del shapes["rotation"]
+
+    def of_step(number: int) -> list[Array]:
+        one = stored[rows[number]]
+        return [one[:, :3], one[:, 2], one[:, 3:]][: len(shapes)]
+
+    return Fields(At.POINTS, shapes, of_step)
+
+
+def _strains(stored: Stored, steps: Ints, note: Note) -> Iterator[Fields]:
+    """Curvatures and transverse shear strains: at the points if stored there, else cell means."""
+    if "tape8/step" not in stored:
+        note("the result has no strains (tape8), which the macro RODP stores")
+        return
+    at, shared = _rows_of(stored, "tape8", steps, "strains", note)
+    if not shared.any():
+        return
+    elements = stored["mesh/elements"]
+    numnp = len(stored["mesh/coordinates"])
+    values = [stored[f"tape8/{name}"] for name in STRAINS]
+    npt = values[0].shape[2]
+    all_nodes = npt in NODAL_POINTS and not (elements[:, npt:] > 0).any()
+    at_nodes = all_nodes and stored.attributes_of("tape8").get("location") == "nodes"
+    there = elements[:, :npt] > 0
+    points = elements[:, :npt][there] - 1
+    shares = np.bincount(points, minlength=numnp)  # elements at each node
+    length = numnp if at_nodes else len(elements)
+
+    def mean(row: Array) -> Array:
+        if not at_nodes:
+            return np.asarray(row.mean(axis=1))
+        own = row[:, : there.shape[1]][there]
+        return np.bincount(points, weights=own, minlength=numnp) / shares
+
+    def of_step(number: int) -> list[Array]:
+        if not shared[number]:
+            return [np.full(length, np.nan) for _ in STRAINS]
+        return [mean(one[at[number]]) for one in values]
+
+    where = At.POINTS if at_nodes else At.CELLS
+    yield Fields(where, dict.fromkeys(STRAINS, (length,)), of_step)
+
+
+def _rows_of(
+    stored: Stored, group: str, steps: Ints, what: str, note: Note
+) -> tuple[Ints, NDArray[np.bool_]]:
+    """Rows of a group at the time steps, and which of these have one."""
+    own = stored[f"{group}/step"]
+    at = np.minimum(np.searchsorted(own, steps), len(own) - 1)
+    shared = own[at] == steps
+    if not shared.any():
+        note(f"{what} ({group}) and displacements (tape3) share no step; {what} are omitted")
+    elif not shared.all():
+        were = f"were stored at {shared.sum()} of {len(steps)} time steps"
+        note(f"{what} ({group}) {were}; at the others they are NaN")
+    return at, shared
+
+
+def _ply_stresses(stored: Stored, steps: Ints, note: Note) -> Iterator[Fields]:
+    """In the cells: of each component the value of largest magnitude, and the ply that has it."""
+    if "plies/step" not in stored:
+        return
+    at, shared = _rows_of(stored, "plies", steps, "ply stresses", note)
+    if not shared.any():
+        return
+    cells = stored["plies/element"] - 1
+    length = len(stored["mesh/elements"])
+    if not 0 <= cells.min() <= cells.max() < length:
+        raise ExportError(f"elements outside 1 to {length} have ply stresses")
+
+    def component(name: str) -> Fields:
+        values = stored[f"plies/{name}"]
+
+        def of_step(number: int) -> Array:
+            found = np.full((2, length), np.nan)
+            if shared[number]:
+                found[:, cells] = _largest(values[at[number]])
+            return found
+
+        return Fields(At.CELLS, dict.fromkeys((name, f"{name}_ply"), (length,)), of_step)
+
+    yield from map(component, (*IN_PLANE, *BETWEEN_PLIES))
+    if "failure/under_load" not in stored:
+        under = np.full(length, np.nan)
+        under[cells] = stored["plies/under_load"] != 0
+        yield _constant({"under_load": under})
+
+
+def _exposures(stored: Stored, note: Note) -> Iterator[Fields]:
+    """In the cells: the largest exposure of each criterion over the run, and its ply.
+
+    Points under the load are left out; a cell without others is NaN.
+    """
+    if "failure/under_load" not in stored:
+        return
+    if stored.still_in_contact:
+        note("the run ends in contact: exposures are lower bounds")
+    for criterion in criteria_of(stored.attributes_of("failure")):
+        values = stored[f"failure/{criterion}/exposure"]
+        left_out = near_load(stored, criterion) | (values < 0.0)  # plies without strengths
+        known = np.where(left_out, np.nan, values)
+        if not np.isfinite(known).any():
+            continue
+        name = f"exposure_{criterion}"
+        exposure, ply = _largest(known[..., None] if criterion == INTERLAMINAR else known)
+        yield _constant({name: exposure, f"{name}_ply": ply})
+    under = (stored["failure/under_load"] != 0).any(axis=1)
+    yield _constant({"under_load": under.astype(float)})
+
+
+def _largest(row: Array) -> Array:
+    """Value of largest magnitude in (..., plies, levels) of every element, and its ply, (2, n).
+
+    NaN, of plies that only other laminates have, is left out unless an element has nothing else.
+    """
+    values = np.moveaxis(row, -2, 1)
+    flat = values.reshape(len(values), -1)
+    place = np.where(np.isnan(flat), -1.0, np.abs(flat)).argmax(axis=1)
+    found = flat[np.arange(len(flat)), place]
+    ply = place // (flat.shape[1] // values.shape[1]) + 1.0
+    return np.stack([found, np.where(np.isnan(found), np.nan, ply)])
