@@ -16,7 +16,7 @@ CGROUPS = Path("/sys/fs/cgroup")
 UNNOTICED = 100_000_000  # bytes that are allocated without a check
 
 
-class NotEnoughMemoryError(FecmError, MemoryError):
+class NotEnoughMemoryError(MemoryError, FecmError):
     """More memory is needed than is free; the message contains both numbers."""
 
 

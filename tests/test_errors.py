@@ -29,7 +29,7 @@ ARGUMENTS: dict[type[BaseException], tuple[object, ...]] = {
 def error_classes() -> Iterator[type[BaseException]]:
     """Every class of an error or a warning that a module of the package defines."""
     for module in pkgutil.walk_packages(fecm.__path__, "fecm."):
-        if module.name == "fecm.__main__" or module.name.endswith("._compiled"):
+        if module.name == "fecm.__main__" or module.name.endswith(".libfecm"):
             continue
         for value in vars(importlib.import_module(module.name)).values():
             is_error = inspect.isclass(value) and issubclass(value, BaseException)
@@ -55,6 +55,11 @@ def test_every_error_is_the_same_after_pickling(kind: type[BaseException], proto
         assert type(again) is kind
         assert (str(again), again.args) == (str(error), error.args)
         assert vars(again) == vars(error)
+
+
+@pytest.mark.parametrize("kind", CLASSES, ids=lambda kind: kind.__qualname__)
+def test_every_error_is_made_by_its_own_new_as_dask_does(kind: type[BaseException]) -> None:
+    assert type(kind.__new__(kind, "what is wrong")) is kind
 
 
 def test_a_bad_deck_leaves_the_other_tasks_of_a_process_pool_alone() -> None:
