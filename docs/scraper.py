@@ -10,8 +10,10 @@ from sphinx_gallery.scrapers import figure_rst
 # In the gallery; others follow.
 ORDER = (
     "deck_without_text", "overlay_of_a_measurement", "parametric_study", "animation",
-    "plate_with_a_hole", "ply_strains", "stretching_plate", "sandwich_core", "mesh_convergence",
-    "own_projectile", "own_contact_law", "layup_optimisation", "axisymmetric_projectile",
+    "plate_with_a_hole", "ply_stresses", "stretching_plate", "sandwich_core", "mesh_convergence",
+    "table_of_cases", "layup_optimisation", "sobol_indices", "posterior", "process_pool",
+    "dask_cluster", "trusted_result", "own_projectile", "own_contact_law",
+    "axisymmetric_projectile",
 )  # fmt: skip
 
 

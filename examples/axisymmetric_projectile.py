@@ -5,7 +5,7 @@ On page 100 the report compares its projectile of 20 rod elements with one of 11
 elements, and finds no significant difference in the middle. Here the contact force of
 ``impact-115`` acts on the tip of 28 × 4 axisymmetric elements, and the force that their front half
 passes on is compared with the transducer of the rod. Needs scikit-fem:
-``pip install 'fecm[docs]'``.
+``pip install 'fecm[examples]'``.
 """
 
 import warnings

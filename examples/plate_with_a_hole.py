@@ -2,7 +2,7 @@
 ===================
 
 Impact beside a hole, on a mesh of Gmsh that comes with the package. Needs meshio:
-``pip install 'fecm[mesh,plot]'``.
+``pip install 'fecm[examples]'``.
 """
 
 import fecm

@@ -1,0 +1,55 @@
+"""A posterior by emcee
+====================
+
+What a measured force tells about the contact coefficient and the velocity: samples of their joint
+distribution by emcee. The plate is run once, for a grid of forces between which each sample is
+interpolated. Needs emcee: ``pip install 'fecm[examples]'``.
+"""
+
+import re
+import warnings
+
+import emcee
+import matplotlib.pyplot as plt
+import numpy as np
+from scipy.interpolate import RegularGridInterpolator
+from scipy.signal import lfilter
+
+import fecm
+
+table = fecm.examples.path("measured-force.csv")  # of a point force, with a scatter of 0.8 lbf
+time, measured = np.loadtxt(table, delimiter=",", skiprows=4, unpack=True)
+deck = fecm.examples.path("impact-115.inp").read_text()
+deck = re.sub("PATC\n|DISC\n|SHEA MITC\n", "", deck)
+grid = {"velocity": np.linspace(113, 117, 9), "k": np.linspace(1.7e6, 2.1e6, 9)}
+with warnings.catch_warnings(action="ignore"):  # a point force depends on the mesh
+    found = fecm.sweep(deck, grid, history=True)
+
+# %%
+# The transducer is a first-order filter with a rise time of 5 µs.
+dt = found.dt[0]
+decay = np.exp(-dt * np.log(9) / 5e-6)
+force = lfilter([1 - decay, 1 - decay], [2, -2 * decay], found.force)
+force = force[:, np.rint(time / dt).astype(int) - 1].reshape(9, 9, -1)
+model = RegularGridInterpolator(tuple(grid.values()), force, bounds_error=False)
+
+
+def log_probability(values):
+    """Of Gaussian errors, and of values that are equally probable within the grid."""
+    squares = np.sum(((model(values) - measured) / 0.8) ** 2, axis=1)
+    return np.where(np.isnan(squares), -np.inf, -squares / 2)
+
+
+sampler = emcee.EnsembleSampler(16, 2, log_probability, vectorize=True)
+sampler.random_state = np.random.RandomState(0).get_state()
+start = np.random.default_rng(0).uniform([114, 1.8e6], [116, 2.0e6], (16, 2))
+sampler.run_mcmc(start, 2000)
+velocity, k = sampler.get_chain(discard=200, flat=True).T
+print(f"velocity {velocity.mean():.2f} ± {velocity.std():.2f} in/s; the true one is 115")
+print(f"k {k.mean():.3e} ± {k.std():.1e} lbf/in^1.5; the true one is 1.912e+06")
+
+figure, ax = plt.subplots(figsize=(5, 3.5), layout="constrained")
+ax.hexbin(velocity, k, gridsize=40, cmap="Blues")
+ax.plot(115, 1.912e6, "r+")
+ax.set(xlabel="Velocity (in/s)", ylabel="k (lbf/in$^{1.5}$)")
+figure.savefig("posterior.png")
