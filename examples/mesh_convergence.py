@@ -29,6 +29,6 @@ peak = found["peak_force"]
 for elements, force in zip(found["elements"], peak, strict=True):
     print(f"{elements:3.0f} elements a side: {force:.2f} N ({force / peak[-1] - 1:+.2%})")
 
-ax = found.plot("peak_force")
+ax = found.plot(quantity="peak_force")
 ax.set(xlabel="Elements a side", ylim=(179, 180))
 ax.figure.savefig("convergence.png")
