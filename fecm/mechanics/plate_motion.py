@@ -60,7 +60,8 @@ class DivergenceError(FecmError, ArithmeticError):
     exit_code = 1
 
     def __init__(self, step: int, reason: str) -> None:
-        self.step, self.reason = step, reason
+        self.step: int = step
+        self.reason: str = reason
         super().__init__(f"step {step}: {reason}")
 
     def __reduce__(self) -> tuple[object, ...]:

@@ -36,7 +36,7 @@ class Stored:
         self._groups = groups
         self._model = model
         self.attributes: dict[str, Any] = dict(groups.get("", {}))
-        self.deck_text = texts.get("deck", "")
+        self.deck_text: str = texts.get("deck", "")
 
     @property
     def deck(self) -> Deck:

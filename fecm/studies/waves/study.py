@@ -39,7 +39,9 @@ class Waves:
     """
 
     def __init__(self, medium: Medium, units: dict[str, str], notes: tuple[str, ...] = ()) -> None:
-        self.medium, self.units, self.notes = medium, units, notes
+        self.medium: Medium = medium
+        self.units: dict[str, str] = units
+        self.notes: tuple[str, ...] = notes
 
     @property
     def thickness(self) -> float:
