@@ -13,8 +13,8 @@ import fecm
 good = fecm.read_one(fecm.examples.path("impact-115.inp"))
 decks = {
     "as in the report": good.to_text(),
+    "mistyped": good.to_text().replace("    1  0.0    0.0053", "    1  0.0    0.OO53"),
     "faster": good.with_(velocity=150).to_text(),
-    "no plies": good.to_text().replace("    1  0.0    0.0053", "    1  0.0    0.OO53"),
 }
 
 if __name__ == "__main__":  # worker processes import this script

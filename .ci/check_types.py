@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """Whether a type checker knows the type of every public name, and of all that it leads to.
 
 basedpyright judges an installed package alone, and does not see an editable installation: the
@@ -19,21 +18,19 @@ from pathlib import Path
 
 import fecm
 
-CHECK = ("basedpyright", "--verifytypes", "fecm", "--ignoreexternal", "--outputjson")
-
 
 def verified(folder: Path) -> dict[str, bool]:
     """Whether the type of each symbol is known, by name."""
-    venv.create(folder)
+    venv.create(folder, symlinks=os.name != "nt")
     site = Path(sysconfig.get_path("purelib", vars={"base": str(folder)}))
     shutil.copytree(Path(fecm.__file__).parent, site / "fecm")
     libraries = [path for path in sys.path if "site-packages" in path]
     (site / "libraries.pth").write_text("\n".join(libraries))
-    here = Path(sys.executable).parent
-    path = os.pathsep.join([str(folder / here.name), str(here), os.environ["PATH"]])
-    # It fails because of names that are not public.
+    programs = Path(sys.executable).parent
+    # The python that basedpyright asks for the libraries.  It fails because of internal names.
+    path = os.pathsep.join([str(folder / programs.name), os.environ["PATH"]])
     done = subprocess.run(
-        [shutil.which(CHECK[0], path=path) or CHECK[0], *CHECK[1:]],
+        [programs / "basedpyright", "--verifytypes", "fecm", "--ignoreexternal", "--outputjson"],
         cwd=folder,
         env={**os.environ, "PATH": path},
         capture_output=True,
