@@ -46,6 +46,7 @@ COMMANDS = {
     "materials": LazyCommand("fecm.cli.new", "List the named plies of `fecm new`, or of a file."),
     "new": LazyCommand("fecm.cli.new", "Write a deck from plate, layup, supports and impact."),
     "plot": LazyCommand("fecm.cli.plot", "Draw the report's figures, or the map of a sweep.", True),
+    "report": LazyCommand("fecm.cli.report", "Write an HTML page about results.", True),
     "rod": LazyCommand("fecm.cli.rod", "The projectile's rod alone: pulses and calibration."),
     "run": LazyCommand("fecm.cli.run", "Run every problem in DECK and write its result."),
     "sweep": LazyCommand("fecm.cli.sweep", "Run DECK many times with varied parameters."),

@@ -28,6 +28,7 @@ from fecm.deck.model import Deck
 from fecm.deck.units import unit_names, unit_of
 from fecm.identification.identify import CARDS, FREE, Identification, fit
 from fecm.mechanics.own_law import own_law
+from fecm.report.page import check_page
 from fecm.results.comparison import Measurement, measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
 
@@ -42,6 +43,7 @@ class Options:
     sensor: Filter | None
     output: Path | None
     picture: Path | None
+    page: Path | None
     overwrite: bool
     form: Format
     law: str | None  # name of a contact law of an installed package
@@ -82,6 +84,13 @@ class Options:
     metavar="FILE",
     help="Also draw measured and fitted force and the residual: .png, .svg or .pdf.",
 )
+@option(
+    "--report",
+    "page",
+    type=FILE_PATH,
+    metavar="FILE.html",
+    help="Also write an HTML page about the fit.",
+)
 @option("--overwrite", is_flag=True, help="Replace existing files.")
 @FORMAT_OPTION
 @collected(Options)
@@ -97,6 +106,8 @@ def identify(options: Options) -> None:
     targets = OutputPaths(
         output or DASH, options.picture, overwrite, options.deck, options.measured
     )
+    if options.page is not None:
+        check_page(options.page, overwrite, [options.deck, options.measured])
     problem = load_single(options.deck, "identify")
     units = unit_names(problem.deck)
     measured = measurement_of(options.measured, units)
@@ -105,6 +116,12 @@ def identify(options: Options) -> None:
     if output is not None:
         write_lines([found.deck.to_text()], output, overwrite=overwrite)
         note(f"wrote {output}")
+    if options.page is not None:
+        # 0.5 s with matplotlib, which other fits do not need.
+        from fecm.report.report import write_report
+
+        write_report({measured.name: found}, options.page, overwrite=overwrite)
+        note(f"wrote {options.page}")
     note(*found.notes)
     if options.form is Format.JSON:
         echo_json(_document(found))

@@ -192,7 +192,7 @@ def plot(
     be drawn.
     """
     options = asked.given()
-    named = _named(results)
+    named = named_results(results)
     first = next(iter(named.values()))
     usual = "force" if isinstance(first, Result) else "exceedance" if first.random else "map"
     chosen = list(dict.fromkeys(kinds)) or [usual]
@@ -228,7 +228,7 @@ def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path
     return {kind: folder / f"{first.stem}-{kind}{KINDS[kind].suffixes[0]}" for kind in kinds}
 
 
-def _named(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
+def named_results(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
     """Results by the shortest distinct names."""
     names = [printable(path.stem) for path in paths]
     if len(set(names)) < len(names):

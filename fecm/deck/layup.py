@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Sequence
+from itertools import groupby
 from typing import NamedTuple
 
 from fecm._errors import FecmError
@@ -121,3 +123,23 @@ def _times(digits: str, plies: int, text: str, position: int) -> int:
         possible = f"1 to {MOST_PLIES} plies are possible"
         raise LayupError(f"the layup `{_quoted(text)}` repeats {where}; {possible}")
     return int(digits)
+
+
+def layup_text(angles: Sequence[float]) -> str:
+    """Shortest usual notation of a laminate's angles, which :func:`parse_layup` reads back.
+
+    Examples
+    --------
+    >>> layup_text([45, 0, -45, 90, 45, 0, -45, 90, 90, -45, 0, 45, 90, -45, 0, 45])
+    '[45/0/-45/90]2s'
+    """
+    plies = list(angles)
+    half = len(plies) // 2
+    mirrored = len(plies) > 1 and plies == plies[::-1] and len(plies) % 2 == 0
+    repeated = plies[:half] if mirrored else plies
+    count = len(repeated)
+    period = next(n for n in range(1, count + 1) if repeated == repeated[:n] * (count // n))
+    times = count // period
+    runs = [(angle, len(list(same))) for angle, same in groupby(repeated[:period])]
+    inside = "/".join(f"{angle:g}" + (f"_{n}" if n > 1 else "") for angle, n in runs)
+    return f"[{inside}]{times if times > 1 else ''}{'s' if mirrored else ''}"

@@ -48,6 +48,7 @@ from fecm.mechanics.projectile import RigidMass
 from fecm.problem.parts import build_projectile
 from fecm.results.comparison import Measurement, measurement_of
 from fecm.results.errors import NotStoredError
+from fecm.results.pictures import report
 from fecm.results.validity import MEANING, Reason, reasons_of
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Filter, filter_of
@@ -149,6 +150,33 @@ class Identification:
         if name not in self.values:
             raise NotStoredError(f"{name} was not fitted; there are {', '.join(self.values)}")
         return unit_of(OF_RECORD.get(name) or dimension_of(name), self.units)
+
+    def report(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write an HTML page to hand on, as ``fecm identify --report`` does.
+
+        The page is one file: verdict, fitted values, their errors, pictures, deck.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write, ``.html``.
+        overwrite : bool
+            Replace an existing file.
+
+        Raises
+        ------
+        ReportError
+            If the name has another suffix.
+        FileExistsError
+            If the file exists and may not be replaced.
+        ImportError
+            If Jinja2 or matplotlib is not installed.
+
+        Examples
+        --------
+        >>> found.report("impact.html")  # doctest: +SKIP
+        """
+        report({"the measurement": self}, path, overwrite=overwrite)
 
     def cards(self) -> str:
         """Cards of the deck with fitted values."""

@@ -89,6 +89,18 @@ def first_failures(stored: Stored, level: float = 1.0) -> list[FirstFailure]:
     return sorted(found, key=lambda one: one.time)
 
 
+def threshold_energy(stored: Stored) -> float:
+    """Work of the contact force when it first reaches the delamination threshold (force*length).
+
+    NaN if it does not.
+    """
+    time = float(stored.threshold.get("time", math.nan)) if stored.threshold else math.nan
+    if not math.isfinite(time):
+        return math.nan
+    history = _history(stored)
+    return float(np.interp(time, history.time, history.work))
+
+
 class _History(NamedTuple):
     """Contact force and its work on the plate at every step, from rest; NaN without impact."""
 

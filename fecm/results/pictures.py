@@ -1,10 +1,12 @@
-"""The way from a result, of a run or of a sweep, to its pictures."""
+"""The ways from a result, of a run or of a sweep, to its pictures and its report."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
+
+from fecm._files import ARGUMENT
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,3 +43,11 @@ def plot(
     from fecm.plot import pictures
 
     return pictures.plot(kind, results, path, ax, overwrite=overwrite, **options)
+
+
+def report(results: Mapping[str, Any], path: str | Path, *, overwrite: bool) -> None:
+    """Write the page about results by their names; see :func:`fecm.report.report.write_report`."""
+    # As above: whoever hands nothing on can do without the room of reports.
+    from fecm.report.report import write_report
+
+    write_report(results, Path(path), overwrite=overwrite, allowed_by=ARGUMENT)

@@ -17,7 +17,7 @@ from fecm.results.errors import NotStoredError, ResultFileError
 from fecm.results.first_failure import FirstFailure, first_failures
 from fecm.results.group import Group
 from fecm.results.missing import not_stored
-from fecm.results.pictures import RunKind, plot
+from fecm.results.pictures import RunKind, plot, report
 from fecm.results.plies import PlyGroup
 from fecm.results.run_metrics import end_of, metrics_of
 from fecm.results.stored import Stored
@@ -288,6 +288,33 @@ class Result(Stored, schema.Contact):
         """
         named = {self.title or "the result": self}
         return plot(kind, named, path, ax, overwrite=overwrite, **options)
+
+    def report(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write an HTML page to hand on, as ``fecm report`` does.
+
+        The page is one file: verdict, validity, numbers, pictures, model, checksums and deck.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write, ``.html``.
+        overwrite : bool
+            Replace an existing file.
+
+        Raises
+        ------
+        ReportError
+            If the name has another suffix.
+        FileExistsError
+            If the file exists and may not be replaced.
+        ImportError
+            If Jinja2 or matplotlib is not installed.
+
+        Examples
+        --------
+        >>> result.report("impact.html")  # doctest: +SKIP
+        """
+        report({self.title or "the result": self}, path, overwrite=overwrite)
 
     def compare(
         self,

@@ -16,7 +16,7 @@ from fecm.deck.model import Delamination
 from fecm.deck.units import unit_names
 from fecm.mechanics.own_law import name_of
 from fecm.results.metrics import COLUMNS, FOUND, RATIO, SUMMARY, THRESHOLD, VERDICTS
-from fecm.results.pictures import SweepKind, plot
+from fecm.results.pictures import SweepKind, plot, report
 from fecm.sweeps.outcome import About, Column, Outcome
 from fecm.sweeps.plan import Plan
 from fecm.sweeps.random_result import evaluate
@@ -255,6 +255,33 @@ class SweepResult(StoredSweep):
         if names or kind == "map":
             options["over"] = names
         return plot(kind, named, path, ax, overwrite=overwrite, quantity=quantity, **options)
+
+    def report(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write an HTML page to hand on, as ``fecm report`` does.
+
+        The page is one file: verdict, varied values, numbers, pictures, deck.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write, ``.html``.
+        overwrite : bool
+            Replace an existing file.
+
+        Raises
+        ------
+        ReportError
+            If the name has another suffix.
+        FileExistsError
+            If the file exists and may not be replaced.
+        ImportError
+            If Jinja2 or matplotlib is not installed.
+
+        Examples
+        --------
+        >>> found.report("impact.html")  # doctest: +SKIP
+        """
+        report({self.title or "the sweep": self}, path, overwrite=overwrite)
 
 
 def _grid(cases: Mapping[str, Column], count: int) -> tuple[dict[str, Column], NDArray[np.intp]]:

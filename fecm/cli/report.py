@@ -1,0 +1,50 @@
+"""``fecm report``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+from click import option
+
+from fecm.cli.common import RefusedError, echo
+from fecm.cli.help import typical
+from fecm.cli.isolation import reads
+from fecm.cli.options import FILE_PATH
+from fecm.cli.plot import named_results
+from fecm.report.page import check_page
+
+
+@click.command(
+    epilog=typical(
+        "fecm report impact-115.h5",
+        "fecm report thin.h5 thick.h5 -o comparison.html",
+    ),
+)
+@click.argument("results", type=FILE_PATH, nargs=-1, required=True, metavar="RESULT...")
+@option(
+    "-o",
+    "--output",
+    type=FILE_PATH,
+    metavar="FILE.html",
+    help="Page to write.  [default: RESULT.html in this folder]",
+)
+@option("--open", "opens", is_flag=True, help="Open the page in the browser.")
+@option("--overwrite", is_flag=True, help="Replace an existing page.")
+@reads("results")
+def report(results: tuple[Path, ...], output: Path | None, opens: bool, overwrite: bool) -> None:
+    """Write one HTML page about RESULT: of a run, of a sweep, or of several runs side by side.
+
+    The page is self-contained: verdict, range of the model, numbers, pictures, model, checksums
+    and the deck.  It needs no network and no scripts, and prints on A4.
+    """
+    path = output or Path(f"{results[0].stem}.html")
+    check_page(path, overwrite, results)
+    from fecm.report.report import digest, write_report
+
+    named = named_results(results)
+    digests = dict(zip(named, map(digest, results), strict=True))
+    write_report(named, path, digests, overwrite=overwrite)
+    echo(path)
+    if opens and click.launch(str(path)):
+        raise RefusedError(f"{path} is written, but no browser could be started")

@@ -1,0 +1,1 @@
+"""One HTML page about results, to hand on."""

@@ -1,0 +1,115 @@
+"""Page about parameters that were fitted to a measured force."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+
+from fecm.deck.units import unit_names, unit_of
+from fecm.identification.identify import CARDS, Identification
+from fecm.plot.histories import fit_picture
+from fecm.report.content import (
+    Block,
+    Cell,
+    Judgement,
+    Judgements,
+    Level,
+    Listing,
+    Number,
+    Page,
+    Picture,
+    notes,
+    number,
+    sections,
+    share,
+    table,
+)
+from fecm.report.figures import inside
+from fecm.sweeps.values import dimension_of
+
+
+def identification_page(name: str, found: Identification) -> Page:
+    """Page about a fit; `name` is that of the measurement."""
+    values = ", ".join(_said(found, key) for key in found.values)
+    verdict = [f"Fitted to {name}: {values}."]
+    level = Level.WITHIN
+    if not found.accepted:
+        level = Level.OUTSIDE
+        verdict.append("The fit is not accepted: see Trust.")
+    elif found.notes:
+        level = Level.DOUBTFUL
+        verdict.append("The fit has converged, with doubts: see Trust.")
+    else:
+        verdict.append("The fit has converged and describes the measurement.")
+    body = sections(
+        [
+            ("Trust", [Judgements(tuple(_judgements(found))), *notes(found.notes, "Notes")]),
+            ("Results", _results(found)),
+            ("Pictures", [_picture(found)]),
+            ("Provenance", _provenance(found)),
+        ]
+    )
+    return Page(found.deck.title or f"Identification from {name}", tuple(verdict), level, body)
+
+
+def _unit(found: Identification, name: str) -> str:
+    """Unit of a parameter."""
+    return unit_of(dimension_of(name), unit_names(found.deck))
+
+
+def _said(found: Identification, name: str) -> str:
+    """A parameter with its standard error."""
+    value, error = found.values[name], found.errors[name]
+    return f"{name} = {value:.5g} ± {error:.2g} {_unit(found, name)}".rstrip()
+
+
+def _judgements(found: Identification) -> Iterator[Judgement]:
+    """Convergence and residual."""
+    for name, fine in (("converged", found.converged), ("accepted", found.accepted)):
+        yield Judgement(Level.WITHIN if fine else Level.OUTSIDE, name, "yes" if fine else "no")
+    force = unit_of("force", unit_names(found.deck))
+    yield Judgement(Level.UNJUDGED, "residual, rms", number(found.rms, force), "noise and model")
+    yield Judgement(Level.UNJUDGED, "residual of the peak", share(found.share))
+    count = len(found.time)
+    words = f"{found.dof} degrees of freedom"
+    yield Judgement(Level.UNJUDGED, "points", Number(count, str(count)), words)
+
+
+def _results(found: Identification) -> Iterator[Block]:
+    """Values with errors, their correlations, and what errors of the plate do to them."""
+    rows: list[tuple[Cell, ...]] = []
+    for name, value in found.values.items():
+        unit = _unit(found, name)
+        cells = (value, found.errors[name], found.start[name])
+        rows.append((name, *(number(cell, unit) for cell in cells)))
+    yield from table(rows, ("parameter", "value", "standard error", "start"), "Fitted values")
+    if len(found.values) > 1:
+        rows = [
+            (name, *(number(float(value), digits=3) for value in row))
+            for name, row in zip(found.values, found.correlation, strict=True)
+        ]
+        yield from table(rows, ("", *found.values), "Correlations")
+    rows = []
+    for name, value in found.values.items():
+        relative = name in CARDS and value
+        changes = [changes[name] for changes in found.plate_errors.values()]
+        rows.append((name, *(share(c / value) if relative else number(c) for c in changes)))
+    if found.plate_errors:
+        caption = "Change of the values with 1 % more of a property of the plate in the deck"
+        yield from table(rows, ("parameter", *found.plate_errors), caption)
+
+
+def _picture(found: Identification) -> Block:
+    """Measured and fitted force, and the residual."""
+    picture = fit_picture(found, unit_names(found.deck))
+    caption = "Measured and fitted contact force, and the residual."
+    return Picture(inside(picture.figure), caption, caption)
+
+
+def _provenance(found: Identification) -> Iterator[Block]:
+    """Cards with the fitted values, and the deck."""
+    text = found.deck.to_text()
+    checksum = hashlib.sha256(text.encode()).hexdigest()
+    yield from table([("fitted deck, SHA-256", checksum)], caption="Checksum")
+    yield Listing("The fitted cards", found.cards())
+    yield Listing("The fitted deck", text)

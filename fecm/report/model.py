@@ -1,0 +1,165 @@
+"""Section about the model of a run: plate, laminate, plies, projectile, contact, program."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from fecm.deck import model
+from fecm.deck.layup import layup_text
+from fecm.deck.macros import flat
+from fecm.deck.units import (
+    DENSITY,
+    MASS,
+    MODULUS,
+    TOUGHNESS,
+    mass_in_si,
+    quantity,
+    unit_names,
+    unit_of,
+)
+from fecm.mechanics.projectile import RigidMass
+from fecm.problem.parts import build_projectile
+from fecm.problem.problem import Problem
+from fecm.report.content import Block, Cell, Number, Picture, number, table
+from fecm.report.figures import inside
+from fecm.report.stack import stack
+from fecm.results.result import Result
+
+PLY = (
+    ("density", DENSITY),
+    ("e1", MODULUS),
+    ("e2", MODULUS),
+    ("g12", MODULUS),
+    ("g13", MODULUS),
+    ("g23", MODULUS),
+    ("nu12", ""),
+)
+STRENGTHS = ("xt", "xc", "yt", "yc", "s12", "s13", "s23")
+LAW = {"k": "force/length^1.5", "alpha_p": "length", "alpha_cr": "length"}
+
+
+def of_problem(result: Result, problem: Problem) -> Iterator[Block]:
+    """Tables and pictures of a problem."""
+    deck = problem.deck
+    yield from table(_plate(result, problem), caption="Plate")
+    for number_of, layers in deck.layers.items():
+        layup = layup_text([layer.angle for layer in layers])
+        name = f"Laminate {number_of}: {layup}" if len(deck.layers) > 1 else f"Laminate {layup}"
+        words = f"{name}, {len(layers)} plies, the struck face on top."
+        names = {material: f"material {material}" for material in deck.plies}
+        yield Picture(inside(stack(layers, names)), words, words)
+    yield from _materials(deck)
+    yield from table(_impact(deck), caption="Projectile and contact")
+    yield from table(_program(problem), caption="Program")
+
+
+def extent(problem: Problem) -> str:
+    """Extent of the plate."""
+    unit = unit_of("length", unit_names(problem.deck))
+    low, high = (f(problem.mesh.coordinates[:, :2], axis=0) for f in (np.min, np.max))
+    a, b = (f"{side:.5g}" for side in high - low)
+    return f"{a} × {b} {unit}".rstrip()
+
+
+def _plate(result: Result, problem: Problem) -> Iterator[tuple[Cell, ...]]:
+    """Plate, mesh, supports and what loads it."""
+    from fecm.plot.mesh import supports
+
+    deck, plate = problem.deck, problem.plate
+    in_units = partial(_in_units, deck)
+    yield "extent", extent(problem)
+    yield "thickness", in_units(problem.laminate.thickness, "length")
+    control = deck.control
+    yield "mesh", f"{control.numel} elements of up to {control.nen} nodes, {control.numnp} nodes"
+    if "mesh/equations" in result:
+        held = {str(name): int(nodes.sum()) for name, nodes in supports(result).items()}
+        texts = [f"{count} nodes {name}" for name, count in held.items() if count]
+        yield "supports", ", ".join(texts) or "none: the plate is free"
+    yield "kinematics", "von Kármán: stretches as it bends" if plate.nonlinear else "linear"
+    mass = plate.total_mass()
+    yield "mass", Number(mass, _mass(deck, mass))
+    for name, force in zip(("N0x", "N0y", "N0xy"), plate.preload, strict=True):
+        if force:
+            yield f"preload {name}", in_units(force, "force/length")
+    if (cure := deck.last(model.Cure)) is not None:
+        yield "cure", f"temperature difference {cure.delta_t:g}"
+    for name in "ABD":
+        matrix = getattr(problem.laminate, name)
+        dimension = {"A": "force/length", "B": "force", "D": "force*length"}[name]
+        rows = "; ".join(" ".join(f"{value:.4g}" for value in row) for row in _rounded(matrix))
+        yield f"{name} ({unit_of(dimension, unit_names(deck)) or 'deck units'})", rows
+
+
+def _rounded(matrix: np.ndarray) -> np.ndarray:
+    """A matrix with its rounding errors as zeros."""
+    return np.where(np.abs(matrix) < 1e-9 * max(1.0, np.abs(matrix).max()), 0.0, matrix)
+
+
+def _materials(deck: model.Deck) -> Iterator[Block]:
+    """Constants and strengths of the plies of every material."""
+    plies = dict(sorted(deck.plies.items()))
+    header = ["constant", *(f"material {number}" for number in plies)]
+    if len(plies) == 1:
+        header = ["constant", "ply"]
+    rows = [
+        (name, *(_in_units(deck, getattr(ply, name), dimension) for ply in plies.values()))
+        for name, dimension in PLY
+    ]
+    yield from table(rows, header, "Ply constants")
+    if (strengths := deck.last(model.Allowables)) is None:
+        return
+    given = {one.material: one for one in (strengths, *strengths.others)}
+    header = ["strength", *(f"material {number}" for number in given)]
+    if len(given) == 1:
+        header = ["strength", "ply"]
+    rows = [
+        (name, *(_in_units(deck, getattr(one, name), MODULUS) for one in given.values()))
+        for name in STRENGTHS
+    ]
+    yield from table(rows, header, "Ply strengths")
+
+
+def _impact(deck: model.Deck) -> Iterator[tuple[Cell, ...]]:
+    """Projectile, its velocity and energy, contact law, patch and toughness."""
+    impact, law = deck.last(model.Impact), deck.last(model.Indentation)
+    in_units = partial(_in_units, deck)
+    if impact is None or law is None:
+        return
+    projectile = build_projectile(deck)
+    mass = projectile.total_mass
+    rigid = isinstance(projectile, RigidMass)
+    yield "projectile", "rigid mass" if rigid else "elastic rod"
+    yield "mass", Number(mass, _mass(deck, mass))
+    yield "velocity", in_units(impact.velocity, "length/time")
+    yield "energy", in_units(0.5 * mass * impact.velocity**2, "force*length")
+    yield "contact law", "equation 3-7 (ACR)" if law.word else "equation 3-8"
+    for name, value in zip(law.names(), law.values(), strict=True):
+        if name != "(none)":
+            yield f"law: {name}", in_units(value, LAW.get(name, ""))
+    if (patch := deck.last(model.Patch)) is not None:
+        yield "patch", {"DISC": "uniform pressure", "HERT": "Hertz's pressure"}[patch.shape]
+    if (toughness := deck.last(model.Delamination)) is not None:
+        yield "mode II toughness", in_units(toughness.toughness, TOUGHNESS)
+
+
+def _program(problem: Problem) -> Iterator[tuple[Cell, ...]]:
+    """Time steps and the words of the macro program."""
+    steps = [m.value for m in flat(problem.program) if m.word == "DT"]
+    yield "impact steps", Number(problem.work.steps, str(problem.work.steps))
+    if steps:
+        yield "time step", _in_units(problem.deck, max(steps), "time")
+    yield "macros", " ".join(dict.fromkeys(m.word for m in flat(problem.program)))
+
+
+def _in_units(deck: model.Deck, value: float, dimension: str) -> Cell:
+    """A value in the units of the deck."""
+    return number(float(value), unit_of(dimension, unit_names(deck)))
+
+
+def _mass(deck: model.Deck, mass: float) -> str:
+    """A mass in g or kg where the units are known."""
+    names = unit_names(deck)
+    return mass_in_si(mass, names) or quantity(mass, unit_of(MASS, names), 5)

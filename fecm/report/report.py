@@ -1,0 +1,55 @@
+"""Reports: the page of a run, of several runs, of a sweep, of a fit."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from pathlib import Path
+
+from fecm._files import OPTION
+from fecm.identification.identify import Identification
+from fecm.report.content import Page
+from fecm.report.identification import identification_page
+from fecm.report.page import ReportError, check_page, write
+from fecm.report.run import run_page
+from fecm.report.sweep import sweep_page
+from fecm.results.result import Result
+from fecm.sweeps.result import SweepResult
+
+Reported = Result | SweepResult | Identification
+
+
+def digest(path: Path) -> str:
+    """SHA-256 of a file."""
+    with path.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def page_of(results: Mapping[str, Reported], digests: Mapping[str, str] | None = None) -> Page:
+    """Page about the results of one or more runs, of one sweep, or of one fit, by their names.
+
+    Raises ReportError if a sweep or a fit is not alone.
+    """
+    runs = {name: one for name, one in results.items() if isinstance(one, Result)}
+    if len(runs) == len(results):
+        return run_page(runs, digests or {})
+    if len(results) > 1:
+        raise ReportError("a sweep has a page of its own; give one sweep, or results of runs")
+    ((name, found),) = results.items()
+    if isinstance(found, SweepResult):
+        return sweep_page(name, found, digests or {})
+    assert isinstance(found, Identification)
+    return identification_page(name, found)
+
+
+def write_report(
+    results: Mapping[str, Reported],
+    path: Path,
+    digests: Mapping[str, str] | None = None,
+    *,
+    overwrite: bool,
+    allowed_by: str = OPTION,
+) -> None:
+    """Write the page about results; see :func:`page_of` and :func:`fecm.report.page.write`."""
+    check_page(path, overwrite, allowed_by=allowed_by)
+    write(page_of(results, digests), path, overwrite=overwrite)

@@ -1,0 +1,295 @@
+"""Page about the results of runs: one in full, or several side by side."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from functools import partial
+
+import numpy as np
+
+from fecm.deck import model
+from fecm.deck.layup import layup_text
+from fecm.deck.units import MASS, mass_in_si, quantity, unit_names, unit_of
+from fecm.problem.parts import build_projectile
+from fecm.problem.problem import Problem
+from fecm.report import figures
+from fecm.report.content import (
+    UNKNOWN,
+    Block,
+    Cell,
+    Judgement,
+    Judgements,
+    Level,
+    Listing,
+    Number,
+    Page,
+    Section,
+    notes,
+    number,
+    sections,
+    shown,
+    table,
+    worst,
+)
+from fecm.report.model import extent, of_problem
+from fecm.report.trust import judgements, problem_of
+from fecm.results.criteria import spelt, where
+from fecm.results.exposures import largest_exposures
+from fecm.results.first_failure import first_failures, threshold_energy
+from fecm.results.metrics import INTEGERS, METRICS
+from fecm.results.result import Result
+from fecm.results.summary import UNDECIDED
+
+WORDS = {
+    Level.WITHIN: "All quantities are within the range of the model.",
+    Level.DOUBTFUL: "Some quantities are doubtful: see Trust.",
+    Level.OUTSIDE: "Some quantities are outside the range of the model: see Trust.",
+}
+
+
+def run_page(results: Mapping[str, Result], digests: Mapping[str, str]) -> Page:
+    """Page about the results of one or more runs.
+
+    Parameters
+    ----------
+    results : mapping of str to Result
+        Results by name.
+    digests : mapping of str to str
+        SHA-256 of the files of results, by name; those in memory have none.
+    """
+    problems = {name: problem_of(result) for name, result in results.items()}
+    judged = {name: list(judgements(result, problems[name])) for name, result in results.items()}
+    level = worst(one for some in judged.values() for one in some)
+    if len(results) == 1:
+        ((name, result),) = results.items()
+        title = result.title or name
+        verdict = [_sentence(result, problems[name]), WORDS[level]]
+        body = _single(name, result, problems[name], judged[name])
+    else:
+        title = f"{len(results)} impacts: {', '.join(results)}"
+        said = (f"{name}: {_sentence(one, problems[name])}" for name, one in results.items())
+        verdict = [*said, WORDS[level]]
+        body = _several(results, problems, judged)
+    provenance = _provenance(results, digests)
+    return Page(title, tuple(verdict), level, (*body, *sections([("Provenance", provenance)])))
+
+
+def _single(
+    name: str, result: Result, problem: Problem | None, judged: list[Judgement]
+) -> tuple[Section, ...]:
+    """Sections about one result."""
+    named = {name: result}
+    trust: list[Block] = [Judgements(tuple(judged))] if judged else []
+    return sections(
+        [
+            ("Trust", [*trust, *_notes(result)]),
+            ("Results", [*_metrics(named), *_threshold(result), *_criteria(result)]),
+            ("Pictures", [*figures.of_runs(named), *figures.of_run(name, result)]),
+            ("Model", [] if problem is None else of_problem(result, problem)),
+        ]
+    )
+
+
+def _several(
+    results: Mapping[str, Result],
+    problems: Mapping[str, Problem | None],
+    judged: Mapping[str, list[Judgement]],
+) -> tuple[Section, ...]:
+    """Sections about several results, a column each."""
+    trust: list[Block] = []
+    for name, result in results.items():
+        doubts = tuple(one for one in judged[name] if one.level is not Level.WITHIN)
+        trust += [Judgements(doubts, caption=name)] if doubts else []
+        trust += notes(result.notes, f"Notes of {name}")
+    models = {name: _model_row(problems[name]) for name in results}
+    names = list(dict.fromkeys(key for row in models.values() for key in row))
+    rows = [(key, *(row.get(key, UNKNOWN) for row in models.values())) for key in names]
+    return sections(
+        [
+            ("Trust", trust),
+            ("Results", _metrics(results)),
+            ("Pictures", _common_pictures(results)),
+            ("Model", table(rows, ("quantity", *results))),
+        ]
+    )
+
+
+def _common_pictures(results: Mapping[str, Result]) -> list[Block]:
+    """Histories of all results in the same pictures, which need the same units."""
+    if len({tuple(one.units.items()) for one in results.values()}) > 1:
+        return notes(["The results have different units: they have no pictures in common."])
+    return list(figures.of_runs(results))
+
+
+def _model_row(problem: Problem | None) -> dict[str, Cell]:
+    """What distinguishes the models of several results."""
+    if problem is None:
+        return {}
+    deck, units = problem.deck, unit_names(problem.deck)
+    layers = deck.require(model.Material).layers
+    row: dict[str, Cell] = {
+        "plate": extent(problem),
+        "thickness": number(problem.laminate.thickness, unit_of("length", units)),
+        "layup": layup_text([layer.angle for layer in layers]),
+        "kinematics": "von Kármán" if problem.plate.nonlinear else "linear",
+        "elements": Number(deck.control.numel, str(deck.control.numel)),
+    }
+    if (impact := deck.last(model.Impact)) is not None:
+        mass = build_projectile(deck).total_mass
+        row["projectile mass"] = Number(mass, mass_in_si(mass, units) or f"{mass:.5g}")
+        row["velocity"] = number(impact.velocity, unit_of("length/time", units))
+        energy = 0.5 * mass * impact.velocity**2
+        row["energy"] = number(energy, unit_of("force*length", units))
+    return row
+
+
+def _sentence(result: Result, problem: Problem | None) -> str:
+    """What was hit by what, and what came of it, in one sentence."""
+    said = partial(_said, result)
+    if "history/force" not in result or not len(result["history/force"]):
+        return "No impact was computed."
+    force, time = result["history/force"], result["history/time"]
+    peak = int(force.argmax())
+    parts = []
+    if force[peak] > 0.0:
+        at_least = "at least " if result.end in UNDECIDED else ""
+        parts.append(
+            f"peak force {at_least}{said(force[peak], 'force')} at {said(time[peak], 'time')}"
+        )
+    else:
+        parts.append("there was no contact")
+    if result.threshold:
+        limit = float(result.threshold["force"])
+        if math.isfinite(float(result.threshold["time"])):
+            energy = said(threshold_energy(result), "force*length")
+            parts.append(f"passes the delamination threshold of {said(limit, 'force')} at {energy}")
+        else:
+            ends = " by the end of the run" if result.end in UNDECIDED else ""
+            parts.append(f"stays below the delamination threshold of {said(limit, 'force')}{ends}")
+    if first := first_failures(result)[:1]:
+        one = first[0]
+        text = f"first failure: {one.mode} ({spelt(one.criterion)}), {one.where}"
+        if not math.isnan(one.force):
+            text = f"{text}, at {said(one.force, 'force')} and {said(one.energy, 'force*length')}"
+        parts.append(text)
+    elif largest_exposures(result):
+        parts.append("no ply reaches an exposure of 1")
+    if problem is None:
+        return f"{'; '.join(parts).capitalize()}."
+    return f"{_scene(problem)}: {'; '.join(parts)}."
+
+
+def _scene(problem: Problem) -> str:
+    """What hits what, and how hard."""
+    deck, units = problem.deck, unit_names(problem.deck)
+    impact = deck.require(model.Impact)
+    mass = build_projectile(deck).total_mass
+    weight = mass_in_si(mass, units) or quantity(mass, unit_of(MASS, units), 4)
+    speed = f"{impact.velocity:.4g} {unit_of('length/time', units)}".rstrip()
+    energy = quantity(0.5 * mass * impact.velocity**2, unit_of("force*length", units), 4)
+    layup = layup_text([layer.angle for layer in deck.require(model.Material).layers])
+    thickness = f"{problem.laminate.thickness:.4g} {unit_of('length', units)}".rstrip()
+    return (
+        f"A mass of {weight} at {speed} ({energy}) on a plate of {extent(problem)}, "
+        f"{thickness} of {layup}"
+    )
+
+
+def _notes(result: Result) -> list[Block]:
+    """Notes of the run."""
+    return notes(result.notes, "Notes of the run")
+
+
+def _metrics(results: Mapping[str, Result]) -> list[Block]:
+    """Impact metrics with a column for each result."""
+    metrics = {name: result.metrics for name, result in results.items()}
+    rows: list[tuple[Cell, ...]] = []
+    for key, (description, dimension) in METRICS.items():
+        if not any(key in own for own in metrics.values()):
+            continue
+        cells: list[Cell] = []
+        for name, result in results.items():
+            value = float(metrics[name].get(key, math.nan))
+            whole = key in INTEGERS and math.isfinite(value)
+            unit = unit_of(dimension, result.units)
+            cells.append(Number(value, f"{value:.0f}") if whole else number(value, unit))
+        rows.append((key.replace("_", " "), *cells, description))
+    return table(rows, ("metric", *(results if len(results) > 1 else ("value",)), "meaning"))
+
+
+def _threshold(result: Result) -> list[Block]:
+    """Threshold of delamination with its band."""
+    known = result.threshold
+    if not known:
+        return []
+    unit = unit_of("force", result.units)
+    rows: list[tuple[Cell, ...]] = [
+        ("threshold force", number(float(known["force"]), unit)),
+        ("number of delaminations", str(known.get("number", UNKNOWN))),
+    ]
+    if np.shape(known.get("band", 0)) == (2,):
+        low, high = (number(float(force), unit) for force in known["band"])
+        rows += [
+            ("one delamination in each interface of unlike plies", low),
+            ("a single delamination", high),
+        ]
+    reached = float(known["time"])
+    if math.isfinite(reached):
+        rows.append(("reached at time", number(reached, unit_of("time", result.units))))
+        rows.append(
+            ("energy then", number(threshold_energy(result), unit_of("force*length", result.units)))
+        )
+    return table(rows, caption="Delamination threshold")
+
+
+def _criteria(result: Result) -> list[Block]:
+    """Largest exposure and first failure of every criterion."""
+    length, time, force = (unit_of(name, result.units) for name in ("length", "time", "force"))
+    first = {one.criterion: one for one in first_failures(result)}
+    rows: list[tuple[Cell, ...]] = []
+    for one in largest_exposures(result):
+        reached = first.get(one.criterion)
+        rows.append(
+            (
+                spelt(one.criterion),
+                number(one.exposure),
+                one.mode,
+                where(one.criterion, one.ply),
+                number(one.x, length),
+                number(one.y, length),
+                number(one.time, time),
+                UNKNOWN if reached is None else number(reached.time, time),
+                UNKNOWN if reached is None else number(reached.force, force, 4),
+            )
+        )
+    header = ("criterion", "exposure", "mode", "where", "x", "y", "time")
+    return table(rows, (*header, "1 at time", "1 at force"), "Largest exposures")
+
+
+def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> Iterator[Block]:
+    """Version, solver and checksums, and the decks."""
+    import hashlib
+
+    texts = {name: result.deck_text for name, result in results.items()}
+    rows: dict[str, list[Cell]] = {
+        "fecm": [str(r.attributes.get("fecm_version", UNKNOWN)) for r in results.values()],
+        "solver": [str(r.attributes.get("solver", UNKNOWN)) for r in results.values()],
+        "mode": [r.mode for r in results.values()],
+        "slips": [", ".join(r.slips) or "none" for r in results.values()],
+        "deck, SHA-256": [hashlib.sha256(t.encode()).hexdigest() for t in texts.values()],
+    }
+    if digests:
+        rows["result, SHA-256"] = [digests.get(name, "in memory") for name in results]
+    yield from table(
+        ((key, *cells) for key, cells in rows.items()),
+        ("", *results) if len(results) > 1 else (),
+        "" if len(results) > 1 else "Versions and checksums",
+    )
+    for name, text in texts.items():
+        yield Listing("The deck" if len(texts) == 1 else f"The deck of {name}", text)
+
+
+def _said(result: Result, value: float, dimension: str) -> str:
+    """A quantity in four digits."""
+    return shown(float(value), unit_of(dimension, result.units), 4)

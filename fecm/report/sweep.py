@@ -1,0 +1,254 @@
+"""Page about the result of a sweep: a grid, a list of cases, a search, or a random sweep."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from fecm.plot.kinds import Kind
+from fecm.report import figures
+from fecm.report.content import (
+    UNKNOWN,
+    Block,
+    Cell,
+    Judgement,
+    Judgements,
+    Level,
+    Listing,
+    Number,
+    Page,
+    notes,
+    number,
+    sections,
+    share,
+    shown,
+    table,
+    worst,
+)
+from fecm.results.metrics import VERDICTS, described
+from fecm.results.validity import MEANING, counted
+from fecm.sweeps.random_result import RandomResult
+from fecm.sweeps.random_tables import MAIN, chance
+from fecm.sweeps.result import SweepResult
+from fecm.sweeps.statistics import QUANTILES
+from fecm.sweeps.summary import verdict
+
+FOUND = "found_velocity"
+PEAK = "peak_force"
+MOST_NAMED = 4  # values that name a case
+MOST_VALUES = 8  # different values of a name that are listed one by one
+MOST_COMBINATIONS = 12  # of varied values, whose statistics are listed
+
+
+def sweep_page(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> Page:
+    """Page about the result of a sweep; `digests` is the SHA-256 of its file, by its name."""
+    judged = list(_judgements(sweep))
+    level = worst(judged)
+    random = sweep.random
+    body = sections(
+        [
+            ("Trust", [Judgements(tuple(judged)), *notes(sweep.notes, "Notes of the sweep")]),
+            ("Varied values", _varied(sweep)),
+            ("Results", [*_extremes(sweep), *([] if random is None else _random(sweep, random))]),
+            ("Pictures", _pictures(name, sweep)),
+            ("Provenance", _provenance(name, sweep, digests)),
+        ]
+    )
+    return Page(sweep.title or name, tuple(_sentences(sweep)), level, body)
+
+
+def _sentences(sweep: SweepResult) -> Iterator[str]:
+    """What was varied, and what came of it."""
+    what = FOUND if FOUND in sweep.summary else PEAK
+    names = ", ".join(sweep.cases) or "nothing"
+    yield f"A sweep over {names}; {verdict(sweep)}."
+    if (random := sweep.random) is not None and not random.combinations:
+        found = random.exceedance
+        for row, (quantity, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
+            p, low, high, count, is_open = (float(values[row]) for values in found[2:])
+            lacking = random.design.draws - int(count)
+            said = "its threshold" if np.isnan(limit) else f"{limit:.6g} {sweep.unit(quantity)}"
+            chances = chance(p, low, high, int(is_open), lacking)
+            yield f"The probability that {quantity} exceeds {said.rstrip()} is {chances}."
+    values = _fine(sweep, what)
+    if np.isfinite(values).any():
+        unit = sweep.unit(what)
+        ends = [shown(float(end), unit) for end in (np.nanmin(values), np.nanmax(values))]
+        yield f"{what.replace('_', ' ').capitalize()}: {' to '.join(ends)}."
+
+
+def _fine(sweep: SweepResult, name: str) -> np.ndarray:
+    """A quantity of the cases that were run, NaN for the others."""
+    return np.where(sweep.completed, sweep[name], np.nan)
+
+
+def _judgements(sweep: SweepResult) -> Iterator[Judgement]:
+    """Counts of cases by their status and validity."""
+    count = len(sweep)
+    failed = int((~sweep.completed).sum())
+    valid = int((sweep.validity == "ok").sum())
+    level = Level.WITHIN if valid == count else Level.DOUBTFUL
+    yield Judgement(level, "valid cases", Number(valid, f"{valid} of {count}"))
+    if failed:
+        reasons = Counter(sweep["status"][~sweep.completed].tolist()).most_common(3)
+        words = "; ".join(f"{times}: {reason}" for reason, times in reasons)
+        yield Judgement(Level.OUTSIDE, "failed", Number(failed, f"{failed} of {count}"), words)
+    for reason, some in counted(sweep.validity):
+        cases = int(some.sum())
+        yield Judgement(
+            Level.OUTSIDE, str(reason), Number(cases, f"{cases} of {count}"), MEANING[reason]
+        )
+    if still := int(sweep.still_in_contact.sum()):
+        words = "what comes after the end is open"
+        size = Number(still, f"{still} of {count}")
+        yield Judgement(Level.DOUBTFUL, "still in contact at the end", size, words)
+
+
+def _varied(sweep: SweepResult) -> list[Block]:
+    """Names, numbers and ranges of the values of the cases."""
+    laws = {} if sweep.random is None else sweep.random.design.laws
+    rows: list[tuple[Cell, ...]] = []
+    for name, values in sweep.cases.items():
+        different = list(dict.fromkeys(values.tolist()))
+        unit = sweep.unit(name)
+        if name in laws:
+            said: Cell = str(laws[name])
+        elif len(different) <= MOST_VALUES or values.dtype.kind != "f":
+            texts = [f"{one:.6g}" if isinstance(one, float) else str(one) for one in different]
+            said = ", ".join(texts[:MOST_VALUES]) + (", …" if len(texts) > MOST_VALUES else "")
+        else:
+            said = f"{values.min():.6g} to {values.max():.6g}"
+        rows.append((name, Number(len(different), str(len(different))), said, unit or UNKNOWN))
+    return table(rows, ("name", "different values", "values", "unit"))
+
+
+def _extremes(sweep: SweepResult) -> list[Block]:
+    """The cases with the smallest and the largest value of every quantity."""
+    rows: list[tuple[Cell, ...]] = []
+    for name, column in sweep.summary.items():
+        if name in VERDICTS or column.dtype.kind != "f" or column.ndim > 1:
+            continue
+        values = _fine(sweep, name)
+        if not np.isfinite(values).any():
+            continue
+        low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
+        unit = sweep.unit(name)
+        cells = [_case(sweep, low), number(float(values[low]), unit)]
+        if values[high] > values[low]:
+            cells += [_case(sweep, high), number(float(values[high]), unit)]
+        else:
+            cells += ["all cases", number(float(values[high]), unit)]
+            cells[0] = "all cases"
+        rows.append((name.replace("_", " "), cells[1], cells[0], cells[3], cells[2]))
+    header = ("quantity", "smallest", "case", "largest", "case")
+    return table(rows, header, "Smallest and largest values of the cases that were run")
+
+
+def _case(sweep: SweepResult, case: int) -> str:
+    """Number and values of a case."""
+    if len(sweep.cases) > MOST_NAMED:
+        return f"{case}"
+    values = {name: column[case].item() for name, column in sweep.cases.items()}
+    texts = [f"{n} {v:.5g}" if isinstance(v, float) else f"{n} {v}" for n, v in values.items()]
+    return f"{case}: {', '.join(texts)}"
+
+
+def _random(sweep: SweepResult, random: RandomResult) -> Iterator[Block]:
+    """Design, statistics, probabilities and sensitivity indices of a random sweep."""
+    design = random.design
+    yield from table(
+        [
+            ("design", str(design.kind)),
+            ("samples", Number(design.samples, str(design.samples))),
+            ("seed", Number(design.seed, str(design.seed))),
+        ],
+        caption="Random sweep",
+    )
+    count = len(next(iter(random.combinations.values()), [0]))
+    for combination in range(min(count, MOST_COMBINATIONS)):
+        place = (combination,) if random.combinations else ()
+        label = f" with {random.label(combination)}" if random.combinations else ""
+        yield from _statistics(sweep, random, place, f"Statistics{label}")
+        yield from _exceedance(sweep, random, place, f"Probabilities{label}")
+        yield from _indices(sweep, random, place, label)
+    if count > MOST_COMBINATIONS:
+        yield from notes([f"{count - MOST_COMBINATIONS} more combinations are in the file"])
+
+
+def _statistics(
+    sweep: SweepResult, random: RandomResult, place: tuple[int, ...], caption: str
+) -> list[Block]:
+    """Mean, standard deviation and quantiles of the most important quantities."""
+    rows: list[tuple[Cell, ...]] = []
+    for name in (name for name in MAIN if name in random.statistics):
+        own, unit = random.statistics[name], sweep.unit(name)
+        values = [own.mean[place], own.standard_deviation[place], *own.quantiles[place]]
+        draws = int(own.draws[place])
+        cells = [number(float(value), unit) for value in values]
+        rows.append((name.replace("_", " "), *cells, Number(draws, str(draws))))
+    quantiles = [f"{100 * q:g} %" for q in QUANTILES]
+    return table(rows, ("quantity", "mean", "std. dev.", *quantiles, "draws"), caption)
+
+
+def _exceedance(
+    sweep: SweepResult, random: RandomResult, place: tuple[int, ...], caption: str
+) -> list[Block]:
+    """Probabilities that quantities exceed limits, with their intervals."""
+    found = random.exceedance
+    rows: list[tuple[Cell, ...]] = []
+    for row, (name, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
+        p, low, high, draws, is_open = (float(values[(*place, row)]) for values in found[2:])
+        level = "its threshold" if np.isnan(limit) else number(float(limit), sweep.unit(str(name)))
+        counts = [Number(value, f"{value:.0f}") for value in (draws, is_open)]
+        chances = [share(value, 4) for value in (p, low, high)]
+        rows.append((str(name).replace("_", " "), level, *chances, *counts))
+    header = ("quantity", "exceeds", "probability", "from", "to (95 %)", "draws", "open")
+    return table(rows, header, caption)
+
+
+def _indices(
+    sweep: SweepResult, random: RandomResult, place: tuple[int, ...], label: str
+) -> Iterator[Block]:
+    """Sobol' indices of the most important quantity."""
+    name = next((name for name in MAIN if name in random.sensitivity), None)
+    if name is None:
+        return
+    columns = [np.asarray(values[place]).tolist() for values in random.sensitivity[name]]
+    rows: list[tuple[Cell, ...]] = []
+    for law, first, total, *intervals in zip(random.design.laws, *columns, strict=True):
+        cells: list[Cell] = []
+        for value, (low, high) in zip((first, total), intervals, strict=True):
+            cells += [number(value, digits=4), f"{low:.4g} to {high:.4g}"]
+        rows.append((law, *cells))
+    header = ("value", "first-order index", "95 %", "total index", "95 %")
+    yield from table(rows, header, f"Sensitivity of {name.replace('_', ' ')}{label}")
+
+
+def _pictures(name: str, sweep: SweepResult) -> Iterator[Block]:
+    """The map of a sweep; of a random one probabilities, indices and scatter."""
+    named = {name: sweep}
+    what = described(FOUND if FOUND in sweep.summary else PEAK).capitalize()
+    if sweep.random is not None:
+        yield from figures.drawn(Kind.EXCEEDANCE, named, f"{what}: probability of exceedance.")
+        yield from figures.drawn(Kind.SENSITIVITY, named, f"{what}: sensitivity indices.")
+        yield from figures.drawn(Kind.SCATTER, named, f"{what} over the random values.")
+        return
+    yield from figures.drawn(Kind.MAP, named, f"{what} over the varied values.")
+
+
+def _provenance(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> Iterator[Block]:
+    """Checksums, time steps, and the deck."""
+    text = sweep.deck_text
+    steps = sorted({f"{dt:.5g}" for dt in sweep.dt.tolist()})
+    rows: list[tuple[Cell, ...]] = [
+        ("cases", Number(len(sweep), str(len(sweep)))),
+        ("time steps", ", ".join(steps[:4]) + (", …" if len(steps) > 4 else "")),
+        ("deck, SHA-256", hashlib.sha256(text.encode()).hexdigest()),
+    ]
+    if name in digests:
+        rows.append(("result, SHA-256", digests[name]))
+    yield from table(rows, caption="Checksums")
+    yield Listing("The deck", text)

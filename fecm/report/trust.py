@@ -1,0 +1,207 @@
+"""How far a result may be trusted: every quantity that bounds the model, and its size."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from fecm.api import load_deck
+from fecm.deck.macros import flat
+from fecm.problem.problem import Problem
+from fecm.problem.resolution import ENOUGH_PER_WAVE, said_error
+from fecm.problem.slips import LISTING
+from fecm.problem.summary import summarise
+from fecm.report.content import UNKNOWN, Cell, Judgement, Level, Number, number, share
+from fecm.results.criteria import spelt
+from fecm.results.end import End
+from fecm.results.exposures import FEWEST, evaluations_in_contact, largest_exposures
+from fecm.results.metrics import MOBILITY
+from fecm.results.result import Result
+from fecm.results.validity import BENT, CROSSED, INDENTATION, SLOPE, STRAIN, Reason, reasons_of
+
+# Errors of the energy balance, relative to the energy put in, up to which it is fine.
+BALANCED = 1e-3
+# Change of the static deflection by the shear stiffness from equilibrium that is worth a doubt.
+NOTABLE_SHEAR = 0.02
+ENDS = {
+    End.OVER: (Level.WITHIN, "contact over", ""),
+    End.PASSED: (
+        Level.DOUBTFUL,
+        "in contact, peak passed",
+        "what comes after the end is open: permanent indentation, rebound, energies",
+    ),
+    End.RISING: (
+        Level.OUTSIDE,
+        "in contact, peak not reached",
+        "the largest force is a lower bound of the peak; take more steps",
+    ),
+    End.BETWEEN: (
+        Level.OUTSIDE,
+        "between two contacts",
+        "the projectile still approaches: the largest force is a lower bound; take more steps",
+    ),
+}
+
+
+def problem_of(result: Result) -> Problem | None:
+    """The problem of a result's deck; None if the deck can't be read."""
+    loaded = load_deck(result.deck_text, result.mode)
+    if loaded.errors(force=True) or len(loaded.problems) != 1:
+        return None
+    return loaded.problems[0]
+
+
+def judgements(result: Result, problem: Problem | None) -> Iterator[Judgement]:
+    """Judge a result by what its file holds, and by its deck."""
+    reasons = reasons_of(result.validity)
+    if result.end is not None:
+        level, said, words = ENDS[result.end]
+        yield Judgement(level, "end of the run", said, words)
+    if problem is not None:
+        yield from _reached(result, problem, reasons)
+    yield from _failure(result)
+    yield from _threshold(result)
+    if problem is not None:
+        yield from _mesh(problem)
+    yield from _numerical(result)
+    yield from _mode(result)
+
+
+def _reached(result: Result, problem: Problem, reasons: list[str]) -> Iterator[Judgement]:
+    """Deflection, strain and indentation against the limits of the model."""
+    if "history/plate_w" not in result:
+        return
+    limits = problem.judge
+    w = float(result["history/plate_w"].max(initial=0.0)) / limits.thickness
+    bent = BENT[limits.in_plane] in reasons
+    if result.attributes_of("history").get(MOBILITY):
+        if bent:
+            words = "less the rigid motion of the plate; see the notes"
+            yield Judgement(Level.OUTSIDE, "deflection", f"beyond {limits.limit} h", words)
+    else:
+        size = Number(w, f"{w:.3g} h")
+        if problem.plate.nonlinear:
+            words = "the plate is nonlinear (von Kármán); its slope is the limit"
+            yield Judgement(Level.WITHIN, "deflection under the load", size, words)
+        else:
+            words = f"a linear plate holds up to {limits.limit} h with these supports"
+            if bent:
+                words = f"{words}; {limits.softness(max(w, limits.limit))}"
+            level = Level.OUTSIDE if bent else Level.WITHIN
+            yield Judgement(level, "deflection under the load", size, words)
+    for reason, name, what, limit in (
+        (Reason.STEEP, "slope", "the theory holds", f"up to {SLOPE}"),
+        (Reason.STRAINED, "strain", "linear plies hold", f"up to {100.0 * STRAIN:g} %"),
+    ):
+        if reason == Reason.STEEP and not problem.plate.nonlinear:
+            continue
+        beyond = reason in reasons
+        level = Level.OUTSIDE if beyond else Level.WITHIN
+        place = "beyond the limit" if beyond else "below the limit"
+        yield Judgement(level, name, place, f"{what} {limit}")
+    depth = float(result["history/indentation"].max(initial=0.0)) / limits.thickness
+    level = Level.OUTSIDE if Reason.SOFT in reasons else Level.WITHIN
+    words = f"the contact law of a half-space holds up to {INDENTATION:g} h"
+    yield Judgement(level, "indentation", Number(depth, f"{depth:.3g} h"), words)
+
+
+def _failure(result: Result) -> Iterator[Judgement]:
+    """Exposures of the plies, and how often they were evaluated."""
+    largest = largest_exposures(result)
+    if not largest:
+        yield Judgement(Level.UNJUDGED, "failure of plies", UNKNOWN, "the deck has no FAIL")
+        return
+    top = max(largest, key=lambda one: one.exposure)
+    broken = top.exposure > 1.0
+    words = f"{spelt(top.criterion)}; " + (
+        "the run is elastic beyond the first failure" if broken else "1 is failure"
+    )
+    level = Level.DOUBTFUL if broken else Level.WITHIN
+    yield Judgement(level, "largest exposure", number(top.exposure, digits=4), words)
+    count = evaluations_in_contact(result)
+    if count is not None and "history/force" in result:
+        few = count < FEWEST
+        yield Judgement(
+            Level.DOUBTFUL if few else Level.WITHIN,
+            "evaluations of FAIL during contact",
+            Number(count, str(count)),
+            f"below {FEWEST} the largest exposure may be missed" if few else "",
+        )
+
+
+def _threshold(result: Result) -> Iterator[Judgement]:
+    """Peak force against the threshold of delamination."""
+    if "history/force" not in result:
+        return
+    if not result.threshold:
+        yield Judgement(Level.UNJUDGED, "delamination", UNKNOWN, "the deck has no DELA")
+        return
+    ratio = float(result["history/force"].max(initial=0.0)) / float(result.threshold["force"])
+    crossed = ratio > CROSSED
+    words = "the run is elastic beyond delamination" if crossed else ""
+    level = Level.DOUBTFUL if crossed else Level.WITHIN
+    yield Judgement(level, "largest force over the threshold", number(ratio, digits=3), words)
+
+
+def _mesh(problem: Problem) -> Iterator[Judgement]:
+    """Mesh, time step, contact patch and shear stiffness."""
+    summary = summarise(problem)
+    if (count := summary.elements_per_wave) is not None:
+        coarse = count < ENOUGH_PER_WAVE
+        words = f"{ENOUGH_PER_WAVE} are enough for a peak"
+        if summary.mesh_error is not None:
+            words = f"{words}; {said_error(summary.mesh_error)}"
+        level = Level.DOUBTFUL if coarse else Level.WITHIN
+        yield Judgement(level, "elements per bending wave", number(count, digits=3), words)
+    steps = [m.value for m in flat(problem.program) if m.word == "DT" and m.value > 0.0]
+    if steps and math.isfinite(critical := summary.critical_time_step):
+        ratio = max(steps) / critical
+        level = Level.WITHIN if ratio < 1.0 else Level.OUTSIDE
+        yield Judgement(level, "time step", share(ratio), "of the critical one")
+    if problem.contact is not None:
+        yield _load(problem)
+    if summary.equilibrium_change is not None:
+        change = summary.equilibrium_change
+        level = Level.DOUBTFUL if abs(change) > NOTABLE_SHEAR else Level.WITHIN
+        words = (
+            "change of the static deflection by the shear stiffness from equilibrium (SHEA EQUI), "
+            "which the deck leaves out"
+        )
+        yield Judgement(level, "transverse shear factor 1", share(change), words)
+
+
+def _load(problem: Problem) -> Judgement:
+    """The contact force as a patch, or at a point."""
+    name, patch = "contact force", problem.patch
+    if patch is None:
+        words = "the peak depends on the element under a point force; PATC gives it a size"
+        return Judgement(Level.DOUBTFUL, name, "at a point", words)
+    ratio = patch.radius / problem.laminate.thickness
+    return Judgement(Level.WITHIN, name, Number(ratio, f"on a radius of {ratio:.3g} h"))
+
+
+def _numerical(result: Result) -> Iterator[Judgement]:
+    """Energy balance and contact iteration."""
+    initial = result.attributes_of("energy").get("initial")
+    if "energy/balance_error" in result and isinstance(initial, float) and initial > 0.0:
+        worst = float(np.abs(result["energy/balance_error"]).max(initial=0.0)) / initial
+        level = Level.WITHIN if worst < BALANCED else Level.DOUBTFUL
+        size: Cell = Number(worst, f"{worst:.2g}")
+        words = "largest error, of the energy put in"
+        yield Judgement(level, "energy balance", size, words)
+    count = result.attributes_of("history").get("unsettled_steps")
+    if count:
+        words = "the contact iteration did not converge; a smaller DT helps"
+        yield Judgement(Level.DOUBTFUL, "steps", Number(float(count), str(count)), words)
+
+
+def _mode(result: Result) -> Iterator[Judgement]:
+    """Slips of the printed program that are active."""
+    if result.mode == LISTING:
+        words = "the printed program of 1982 with its slips, not the text of the report"
+        yield Judgement(Level.DOUBTFUL, "mode", "listing", words)
+    elif result.slips:
+        words = "active slips of the printed program of 1982"
+        yield Judgement(Level.DOUBTFUL, "slips", ", ".join(result.slips), words)

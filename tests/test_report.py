@@ -1,0 +1,297 @@
+"""Reports: one HTML page about results."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import fecm
+from fecm.deck.layup import layup_text, parse_layup
+from fecm.report.page import render
+from fecm.report.report import page_of
+from fecm.results.first_failure import first_failures
+from fecm.results.metrics import METRICS
+from fecm.results.result import Result
+from tests.calls import assert_unusable, call
+from tests.decks import LONG, small
+from tests.pages import Page, agrees, read_page
+from tests.test_first_failure import failing
+
+# A light projectile, whose contact ends within the run and passes the threshold.
+LIGHT = "PROJ\n    0    0     4.E-6\nDELA\n       .02\nEXPE"
+
+
+def page(**results: fecm.Result | fecm.SweepResult) -> Page:
+    return read_page(render(page_of(results)))
+
+
+@pytest.fixture
+def _undrawn(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Pages without pictures, which take most of the time."""
+    monkeypatch.setattr("fecm.report.figures.drawn", lambda *_, **__: iter(()))
+
+
+@pytest.fixture(scope="module")
+def failed() -> Result:
+    """A run whose plies fail and whose force passes the threshold."""
+    return fecm.run_one(failing(steps=160).replace("EXPE", LIGHT, 1))
+
+
+@pytest.fixture(scope="module")
+def html(failed: Result) -> str:
+    return render(page_of({"failed": failed}))
+
+
+@pytest.fixture(scope="module")
+def shown(html: str) -> Page:
+    return read_page(html)
+
+
+def test_every_number_of_a_page_is_the_one_beside_its_text(shown: Page) -> None:
+    cells = list(shown.numbers())
+    assert len(cells) > 60
+    assert [cell for cell in cells if not agrees(cell)] == []
+
+
+def test_the_metrics_of_a_page_are_those_of_the_result(failed: Result, shown: Page) -> None:
+    known = {name: value for name, value in failed.metrics.items() if np.isfinite(value)}
+    assert len(known) > 5
+    for name, value in known.items():
+        assert shown.row(name.replace("_", " "))[0].value == value
+    open_ones = [name for name in METRICS if name in failed.metrics and name not in known]
+    assert all(shown.row(name.replace("_", " "))[0].text == "–" for name in open_ones)
+
+
+def test_a_reader_of_the_page_alone_learns_what_happened(failed: Result, shown: Page) -> None:
+    first = first_failures(failed)[0]
+    text = shown.text
+    for said in (
+        f"peak force {failed.force.max():.4g}",
+        "passes the delamination threshold of",
+        f"first failure: {first.mode} ({first.criterion.replace('_', ' ')}), ply {first.ply}",
+        "doubtful",
+        "elements per bending wave",
+        "the deck",
+        fecm.__version__,
+        hashlib.sha256(failed.deck_text.encode()).hexdigest(),
+    ):
+        assert said.lower() in text.lower(), said
+    assert all(note in text for note in failed.notes)
+
+
+def test_exposures_of_a_page_are_those_of_the_result(failed: Result, shown: Page) -> None:
+    for name in ("hashin", "interlaminar"):
+        largest = failed["exposures/exposure"][-1]
+        criteria = ("max_stress", "tsai_wu", "hashin", "puck", "interlaminar")
+        assert shown.row(name)[0].value == pytest.approx(largest[criteria.index(name)], rel=1e-12)
+
+
+def test_what_a_run_lacks_has_no_heading() -> None:
+    found = page(small=fecm.run_one(small()))
+    assert found.headings[1:] == [
+        "Trust",
+        "Notes of the run",
+        "Results",
+        "Pictures",
+        "Model",
+        "Provenance",
+    ]
+    assert not {"Delamination threshold", "Largest exposures", "Ply strengths"} & set(
+        found.captions
+    )
+    assert "not judged" in found.text
+
+
+@pytest.mark.usefixtures("_undrawn")
+def test_a_run_without_impact_has_a_page() -> None:
+    forces = "FORC\n   13    0       0.0       0.0       1.0\n\nROD"
+    held = "   24    0    1    1    0    0    0\n   25    0    1    1    1    1    1\n"
+    deck = small("DT         1.0\nTANG\nTIME\nFORM\nSOLV\nDISP\n").replace("ROD", forces, 1)
+    deck = deck.replace("   25    0    1    1    0    0    0\n", held, 1)
+    found = page(small=fecm.run_one(deck))
+    assert "No impact was computed." in found.text
+    assert "Results" not in found.headings
+
+
+@pytest.mark.usefixtures("_undrawn")
+def test_foreign_texts_are_shown_as_text() -> None:
+    title = "<script>alert('1')</script> & \x07\x1b[31m" + 270 * "x"
+    result = fecm.run_one(small())
+    result.attributes["title"] = title
+    html = render(page_of({"<b>": result}))
+    assert "<script" not in html
+    assert "<b>" not in html
+    assert "\x07" not in html
+    assert "<script>alert('1')</script> & \\x07\\x1b[31m" in read_page(html).headings[0]
+
+
+def test_a_page_fetches_nothing_and_runs_nothing(html: str, shown: Page) -> None:
+    assert shown.addresses
+    assert all(address.startswith(("data:image/", "#")) for address in shown.addresses)
+    assert "url(" not in html
+    assert not {"script", "link", "iframe", "object"} & set(shown.names)
+    assert "default-src 'none'" in html
+
+
+def test_pictures_have_words_and_headings_their_order(shown: Page) -> None:
+    assert len(shown.pictures) >= 6
+    assert all(len(picture["alt"]) > 15 for picture in shown.pictures)
+    assert len(set(shown.ids)) == len(shown.ids)
+    assert shown.names.count("h1") == shown.names.count("main") == 1
+
+
+def test_equal_results_give_equal_bytes(failed: Result, html: str) -> None:
+    again = fecm.run_one(failing(steps=160).replace("EXPE", LIGHT, 1))
+    assert render(page_of({"failed": again})) == html
+
+
+def test_several_runs_stand_side_by_side(failed: Result) -> None:
+    other = fecm.run_one(small())
+    found = page(one=failed, other=other)
+    assert [cell.value for cell in found.row("velocity")] == [115.0, 115.0]
+    assert [cell.text for cell in found.row("elements")] == ["4", "4"]
+    peaks = [cell.text for cell in found.row("peak force")][:2]
+    assert peaks == [f"{failed.force.max():.5g}", "–"]  # the other ends in contact
+    assert found.row("kinematics")[1].text == "linear"
+    assert found.pictures
+
+
+def test_results_in_different_units_have_no_common_pictures(failed: Result) -> None:
+    other = fecm.run_one(small().replace("ROD", "UNIT\nin lbf s\nROD", 1))
+    found = page(one=failed, other=other)
+    assert not found.pictures
+    assert "different units" in found.text
+
+
+@pytest.fixture(scope="module")
+def sweep() -> fecm.SweepResult:
+    return fecm.sweep(LONG, {"velocity": [50.0, 80.0, 400.0], "k": [1e6, 2e6]})
+
+
+@pytest.mark.usefixtures("_undrawn")
+def test_the_page_of_a_sweep_has_its_extremes(sweep: fecm.SweepResult) -> None:
+    found = page(sweep=sweep)
+    row = found.row("max indentation")
+    values = sweep["max_indentation"]
+    assert [row[0].value, row[2].value] == [values.min(), values.max()]
+    assert row[3].text == f"{values.argmax()}: velocity 400, k 1e+06"
+    assert found.row("velocity")[1].text == "50, 80, 400"
+    assert "6 cases" in found.text
+    assert all(agrees(cell) for cell in found.numbers())
+    beyond = "indentation > h/4"
+    assert found.row("valid cases")[0].value == (sweep.validity == "ok").sum()
+    assert beyond not in found.text
+
+
+def test_the_page_of_a_random_sweep_has_its_probabilities() -> None:
+    found = fecm.sweep(
+        LONG,
+        random={"velocity": "normal:115,5", "k": "lognormal:1.9e6,0.1"},
+        samples=16,
+        exceed={"peak_force": 85.0},
+    )
+    shown = page(random=found)
+    assert found.random is not None
+    own = found.random.exceedance
+    row = shown.row("peak force")
+    chances = [row_.value for row_ in [r for r in shown.rows if len(r) == 7][-1][2:5]]
+    assert chances == [own.probability[0], own.lower[0], own.upper[0]]
+    assert row
+    assert shown.row("samples")[0].text == "16"
+    assert shown.row("velocity")[1].text == "normal:115,5"
+    assert len(shown.pictures) >= 2
+
+
+def test_a_fit_has_a_page(tmp_path: Path) -> None:
+    example = {name: fecm.examples.path(name) for name in ("impact-115.inp", "measured-force.csv")}
+    output = tmp_path / "fit.html"
+    done = call(
+        "identify", *example.values(), "--free", "k,velocity", "--filter", "first-order:5e-6",
+        "--report", output, cwd=tmp_path,
+    )  # fmt: skip
+    assert done.exit_code == 0, done.stderr
+    found = read_page(output.read_text("utf-8"))
+    k = found.row("k")
+    said = re.search(r"^k +(\S+) ± (\S+),", done.stdout, re.MULTILINE)
+    assert said is not None
+    assert [float(f"{k[0].value:.5g}"), float(f"{k[1].value:.2g}")] == [
+        float(text) for text in said.groups()
+    ]
+    assert "1 % more" in " ".join(found.captions)
+    assert all(agrees(cell) for cell in found.numbers())
+
+
+@pytest.mark.usefixtures("_undrawn")
+def test_the_command_writes_the_page_with_the_checksum_of_the_file(
+    runs: Path, tmp_path: Path
+) -> None:
+    done = call("report", runs / "report.h5", cwd=tmp_path)
+    assert (done.exit_code, done.stdout) == (0, "report.html\n"), done.stderr
+    text = (tmp_path / "report.html").read_text("utf-8")
+    assert hashlib.sha256((runs / "report.h5").read_bytes()).hexdigest() in text
+    assert_unusable(again := call("report", runs / "report.h5", cwd=tmp_path))
+    assert "--overwrite" in again.stderr
+    assert call("report", runs / "report.h5", "--overwrite", cwd=tmp_path).exit_code == 0
+    assert (tmp_path / "report.html").read_text("utf-8") == text
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["report.h5", "-o", "page.pdf"], "is written as .html"),
+        (["no.h5"], "no.h5: No such file"),
+        (["deck.inp"], "deck.inp"),
+        (["report.h5", "report.h5"], "given twice"),
+        (["report.h5", "-o", "no/page.html"], "there is no folder"),
+    ],
+)
+def test_wrong_calls_are_refused_and_nothing_is_written(
+    runs: Path, tmp_path: Path, arguments: list[str], said: str
+) -> None:
+    (tmp_path / "deck.inp").write_text(small())
+    (tmp_path / "report.h5").write_bytes((runs / "report.h5").read_bytes())
+    assert_unusable(done := call("report", *arguments, cwd=tmp_path))
+    assert said in done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["deck.inp", "report.h5"]
+
+
+def test_without_jinja2_one_line_says_what_to_install(
+    runs: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(sys.modules, "jinja2", None)
+    assert_unusable(done := call("report", runs / "report.h5", cwd=tmp_path))
+    assert "pip install 'fecm[report]'" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("angles", "said"),
+    [
+        ([0, 45, 90, -45] * 2 + [-45, 90, 45, 0] * 2, "[0/45/90/-45]2s"),
+        ([0, 90], "[0/90]"),
+        ([0, 0, 90, 0, 0, 90], "[0_2/90]2"),
+        ([30], "[30]"),
+        ([22.5, -22.5, 22.5], "[22.5/-22.5/22.5]"),
+    ],
+)
+def test_layups_are_said_in_the_usual_notation(angles: list[float], said: str) -> None:
+    assert layup_text(angles) == said
+
+
+@given(
+    st.lists(st.sampled_from([0.0, 45.0, -45.0, 90.0, 22.5]), min_size=1, max_size=8),
+    st.integers(1, 3),
+    st.booleans(),
+)
+def test_the_notation_of_a_layup_is_read_back(
+    plies: list[float], times: int, mirrored: bool
+) -> None:
+    angles = plies * times
+    angles = angles + angles[::-1] if mirrored else angles
+    assert parse_layup(layup_text(angles)) == angles
