@@ -1,0 +1,19 @@
+"""Which ply fails first, and where?
+=================================
+
+Exposures of every ply in a drop-weight test, at the energy at which the plate delaminates. The map
+looks down on the plate: outlined cells are beyond failure, hatched ones are too near to the load
+for plate theory.
+"""
+
+import warnings
+
+import fecm
+
+warnings.simplefilter("ignore", fecm.FecmWarning)  # plies fail, and the run continues elastically
+deck = fecm.read_one(fecm.examples.path("drop-weight.inp")).with_(energy="4.5J")
+result = fecm.run_one(deck)
+for one in result.first_failures:
+    print(f"{one.criterion:12} {one.mode}, ply {one.ply}: {one.force:.0f} N, {one.energy:.0f} mJ")
+
+result.plot("failure", "failure.png", width="full", overwrite=True)
