@@ -42,6 +42,8 @@ autodoc_member_order = "bysource"
 autodoc_typehints = "none"
 
 sys.path.insert(0, str(Path(__file__).parent))
+import scraper  # noqa: E402
+
 sphinx_gallery_conf = {
     "examples_dirs": "../examples",
     "gallery_dirs": "gallery",
@@ -51,6 +53,7 @@ sphinx_gallery_conf = {
     "capture_repr": (),
     "download_all_examples": False,
     "show_signature": False,
+    "default_thumb_file": str(Path(__file__).parent / "_static" / "logo.svg"),
     "min_reported_time": 60,
     "write_computation_times": False,
     "abort_on_example_error": True,
@@ -58,11 +61,13 @@ sphinx_gallery_conf = {
 
 html_theme = "pydata_sphinx_theme"
 html_title = "fecm"
+html_logo = html_favicon = "_static/logo.svg"  # drawn by logo.py
 # Of all versions of a page, search engines show the one at this address.
 html_baseurl = os.environ.get("READTHEDOCS_CANONICAL_URL", "")
 html_theme_options = {
     "navigation_with_keys": False,
     "show_toc_level": 2,
+    "logo": {"text": "fecm"},
     "navbar_align": "left",
     "header_links_before_dropdown": 7,
     "github_url": "https://github.com/fecm/fecm",
@@ -84,6 +89,26 @@ def _mathml(self: Any, node: Any) -> None:
     raise nodes.SkipNode
 
 
+def _captions(app: Any, doctree: Any) -> None:
+    """Show the text of a picture that stands alone in its paragraph below it."""
+    from docutils import nodes
+
+    if app.env.docname == "index":  # where the text beside it says so
+        return
+    for paragraph in list(doctree.findall(nodes.paragraph)):
+        pictures = [part for part in paragraph if isinstance(part, nodes.image)]
+        others = [part for part in paragraph if part not in pictures]
+        if not pictures or any(part.astext().strip() for part in others):
+            continue
+        figures = [
+            nodes.figure("", picture.deepcopy(), nodes.caption("", picture["alt"]))
+            for picture in pictures
+        ]
+        for figure in figures:
+            doctree.note_implicit_target(figure)  # its name, which Sphinx asks for
+        paragraph.replace_self(figures)
+
+
 def _literally(app: Any, context: Any, lines: list[str]) -> None:
     """Keep bars, stars and addresses in help texts from being markup."""
     lines[:] = [re.sub(r"[|*]|(?<=:)//", r"\\\g<0>", line) for line in lines]
@@ -93,4 +118,6 @@ def setup(app: Any) -> None:
     """Register the renderer of equations, and correct help texts."""
     for part in ("description", "options"):
         app.connect(f"sphinx-click-process-{part}", _literally)
+    app.connect("doctree-read", _captions)
+    app.connect("builder-inited", scraper.draw_thumbnails, priority=900)  # after the gallery
     app.add_html_math_renderer("mathml", (_mathml, None), (_mathml, None))

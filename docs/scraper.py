@@ -5,16 +5,20 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import thumbnails
 from sphinx_gallery.scrapers import figure_rst
 
 # In the gallery; others follow.
 ORDER = (
-    "deck_without_text", "overlay_of_a_measurement", "parametric_study", "animation",
-    "plate_with_a_hole", "ply_stresses", "stretching_plate", "sandwich_core", "mesh_convergence",
-    "table_of_cases", "layup_optimisation", "sobol_indices", "posterior", "process_pool",
-    "dask_cluster", "trusted_result", "own_projectile", "own_contact_law",
+    "drop_weight_test", "first_failure", "energy_of_delamination", "probability_of_delamination",
+    "contact_from_a_measurement", "overlay_of_a_measurement", "posterior", "deck_without_text",
+    "parametric_study", "table_of_cases", "animation", "plate_with_a_hole", "ply_stresses",
+    "stretching_plate", "sandwich_core", "mesh_convergence", "layup_optimisation", "sobol_indices",
+    "process_pool", "dask_cluster", "trusted_result", "own_projectile", "own_contact_law",
     "axisymmetric_projectile",
 )  # fmt: skip
+# Variables of the scripts that were run, for their thumbnails.
+_VARIABLES: dict[str, dict[str, Any]] = {}
 
 
 def order(name: str) -> int:
@@ -25,6 +29,7 @@ def order(name: str) -> int:
 
 def written_pictures(block: Any, variables: dict[str, Any], conf: dict[str, Any]) -> str:
     """Move the pictures that a script has written into the gallery, and show them."""
+    _VARIABLES[Path(variables["src_file"]).stem] = dict(variables["example_globals"])
     shown = []
     for written in sorted((*Path().glob("*.gif"), *Path().glob("*.png"))):
         target = Path(next(variables["image_path_iterator"])).with_suffix(written.suffix)
@@ -32,3 +37,11 @@ def written_pictures(block: Any, variables: dict[str, Any], conf: dict[str, Any]
         written.unlink()
         shown.append(target)
     return figure_rst(shown, conf["src_dir"]) if shown else ""
+
+
+def draw_thumbnails(app: Any) -> None:
+    """Draw thumbnails over those that are pictures made small."""
+    folder = Path(app.srcdir) / "gallery" / "images" / "thumb"
+    for script, names in _VARIABLES.items():
+        for path in folder.glob(f"sphx_glr_{script}_thumb.*"):
+            thumbnails.drawn(script, names, path)
