@@ -1,0 +1,167 @@
+"""What the pages of the site say about the program holds: notes, units, logo, gallery."""
+
+from __future__ import annotations
+
+import ast
+import re
+import runpy
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import fecm
+from fecm.deck.unit_systems import convert
+from fecm.deck.units import COEFFICIENT, DENSITY, MASS, MODULUS, TOUGHNESS, VELOCITY
+from tests.decks import ROOT
+
+DOCS = ROOT / "docs"
+PACKAGE = ROOT / "fecm"
+# Where the notes of runs and sweeps are written, with the names that hold them; none are all.
+NOTES = {
+    "simulation/judge.py": (),
+    "simulation/macros.py": ("PINNED",),
+    "simulation/membrane.py": (),
+    "results/end.py": ("OPEN_ENDS", "OPEN_LATER"),
+    "results/linear_plate.py": ("TOO_SOFT", "PRELOADED", "REMEDY", "UNSAFE", "softness"),
+    "results/validity.py": ("MEANING",),
+    "sweeps/distributions.py": ("doubt", "_of_logarithm"),
+    "sweeps/doubts.py": (),
+    "sweeps/expected.py": ("expected",),
+    "sweeps/random.py": ("REMEDY", "doubt", "cost"),
+    "sweeps/random_result.py": ("_notes",),
+    "sweeps/summary.py": ("counts", "remarks"),
+}
+# Where notes are handed to the user as they are written.
+HANDED_OVER = ("simulation/*.py", "sweeps/*.py", "cli/run.py", "cli/sweep.py")
+FEWEST_WORDS = 3  # of a text that tells a note from others
+# Quantities of the page on units, by the first words of their rows.
+DIMENSIONS = {
+    "length": "length",
+    "ply thickness": "length",
+    "density": DENSITY,
+    "modulus": MODULUS,
+    "strength": MODULUS,
+    "toughness": TOUGHNESS,
+    "mass": MASS,
+    "velocity": VELOCITY,
+    "energy": "force*length",
+    "contact coefficient": COEFFICIENT,
+    "force": "force",
+    "duration": "time",
+}
+
+
+def table(page: str, first: str) -> list[list[str]]:
+    """The rows of the table of a page whose head begins with a word."""
+    lines = (DOCS / page).read_text(encoding="utf-8").splitlines()
+    begin = next(n for n, line in enumerate(lines) if line.startswith(f"| {first}"))
+    rows = []
+    for line in lines[begin:]:
+        if not line.startswith("|"):
+            break
+        rows.append([cell.strip() for cell in line.strip("|").split("|")])
+    return [rows[0], *rows[2:]]
+
+
+def texts(node: ast.AST) -> Iterator[str]:
+    """The texts in a piece of code, without those of docstrings and errors."""
+    if isinstance(node, ast.Raise) or (
+        isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+    ):
+        return
+    if isinstance(node, ast.Constant) and isinstance(node.value, str):
+        yield node.value
+    for part in ast.iter_child_nodes(node):
+        yield from texts(part)
+
+
+def named(tree: ast.Module, names: tuple[str, ...]) -> Iterator[ast.AST]:
+    """Functions and constants of a module; the module itself without names."""
+    if not names:
+        yield tree
+    for node in ast.walk(tree):
+        held = [node.name] if isinstance(node, ast.FunctionDef) else []
+        if isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            held = [target.id for target in targets if isinstance(target, ast.Name)]
+        if set(held) & set(names):
+            yield node
+
+
+def handed_over(tree: ast.Module) -> Iterator[ast.AST]:
+    """Arguments of the calls that print a note, warn, or add to the notes of a run."""
+    for node in ast.walk(tree):
+        if not isinstance(node, ast.Call):
+            continue
+        function = ast.unparse(node.func)
+        if function in ("note", "warn") or function.endswith("notes.append"):
+            yield from node.args
+
+
+def notes_of(path: Path, names: tuple[str, ...] | None) -> set[str]:
+    """Texts of the notes in a module, as far as they are without numbers."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    nodes = handed_over(tree) if names is None else named(tree, names)
+    found = {" ".join(text.split()) for node in nodes for text in texts(node)}
+    return {text for text in found if len(text.split()) >= FEWEST_WORDS}
+
+
+def sources() -> Iterator[tuple[Path, tuple[str, ...] | None]]:
+    """Modules with notes, and the names that hold them; None: those that are handed over."""
+    for name, names in NOTES.items():
+        yield PACKAGE / name, names
+    for pattern in HANDED_OVER:
+        for path in PACKAGE.glob(pattern):
+            yield path, None
+
+
+def test_my_run_says_has_every_note_of_a_run_and_of_a_sweep() -> None:
+    page = (DOCS / "my-run-says.md").read_text(encoding="utf-8")
+    page = " ".join(re.sub(r"^> ", "", page, flags=re.M).split())
+    notes = set().union(*(notes_of(path, names) for path, names in sources()))
+    assert len(notes) > 50
+    assert {text for text in notes if text not in page} == set()
+
+
+@pytest.mark.parametrize("call", ["note", "warn", "run.state.notes.append"])
+def test_a_note_that_a_module_begins_to_hand_over_is_found(call: str, tmp_path: Path) -> None:
+    module = tmp_path / "new.py"
+    module.write_text(
+        f'def f(run):\n    """One, two, three."""\n    {call}(f"{{3}} new doubts here")\n'
+    )
+    assert notes_of(module, None) == {"new doubts here"}
+
+
+def test_the_quantities_on_the_page_of_units_are_the_same_in_every_system() -> None:
+    (_, *systems), *rows = table("units.md", "quantity")
+    systems = [system.strip("`") for system in systems]
+    assert len(rows) == len(DIMENSIONS)
+    for name, *cells in rows:
+        dimension = next(DIMENSIONS[begin] for begin in DIMENSIONS if name.startswith(begin))
+        values = [float(cell.split()[0]) for cell in cells]
+        for system, value in zip(systems, values, strict=True):
+            expected = convert(values[0], dimension, systems[0], system)
+            assert value == pytest.approx(expected, rel=1e-3), (name, system)
+
+
+@pytest.mark.parametrize("row", table("units.md", "slip in a deck")[1:], ids=lambda row: row[0])
+def test_a_slip_on_the_page_of_units_is_found(row: list[str]) -> None:
+    _, right, wrong, codes = row
+    lines = fecm.examples.path("drop-weight.inp").read_text(encoding="utf-8").splitlines()
+    slipped = next(n for n, line in enumerate(lines) if has(line, right))
+    lines[slipped] = lines[slipped].replace(right, wrong)
+    if lines[slipped] != wrong:  # with commas, a longer value needs no column
+        lines[slipped] = ",".join(re.split(r" +|,", lines[slipped].strip()))
+    found = {finding.code for finding in fecm.check("\n".join(lines) + "\n").findings}
+    assert set(codes.split(", ")) <= found
+
+
+def has(line: str, value: str) -> bool:
+    """Whether a card is, or has, a value."""
+    return line == value or value in re.split(r"[ ,]+", line)
+
+
+def test_the_logo_is_what_its_script_draws() -> None:
+    drawn = runpy.run_path(str(DOCS / "logo.py"))["picture"]()
+    assert (DOCS / "_static" / "logo.svg").read_text(encoding="utf-8") == drawn
