@@ -95,17 +95,10 @@ def test_exposures_of_a_page_are_those_of_the_result(failed: Result, shown: Page
 
 def test_what_a_run_lacks_has_no_heading() -> None:
     found = page(small=fecm.run_one(small()))
-    assert found.headings[1:] == [
-        "Trust",
-        "Notes of the run",
-        "Results",
-        "Pictures",
-        "Model",
-        "Provenance",
-    ]
-    assert not {"Delamination threshold", "Largest exposures", "Ply strengths"} & set(
-        found.captions
-    )
+    of_trust = ["Trust", "Notes of the run", "Warnings about the deck"]
+    assert found.headings[1:] == [*of_trust, "Results", "Pictures", "Model", "Provenance"]
+    absent = {"Delamination threshold", "Largest exposures", "Ply strengths"}
+    assert not absent & set(found.captions)
     assert "not judged" in found.text
 
 
@@ -116,8 +109,50 @@ def test_a_run_without_impact_has_a_page() -> None:
     deck = small("DT         1.0\nTANG\nTIME\nFORM\nSOLV\nDISP\n").replace("ROD", forces, 1)
     deck = deck.replace("   25    0    1    1    0    0    0\n", held, 1)
     found = page(small=fecm.run_one(deck))
-    assert "No impact was computed." in found.text
-    assert "Results" not in found.headings
+    assert "No impact: see Results." in found.text
+    assert "Summary" in found.captions
+    assert "at node" in found.row("largest w")[0].text
+
+
+def test_an_open_peak_is_a_lower_bound() -> None:
+    result = fecm.run_one(small())
+    found = page(small=result)
+    assert found.row("largest force by the end")[0].value == result.force.max()
+    assert found.row("end of the run")[1].text == "outside the model"
+    assert found.row("peak force")[0].text == "–"
+
+
+def test_the_constants_of_the_law_have_units_and_the_deck_its_warnings() -> None:
+    found = page(small=fecm.run_one(small().replace("ROD", "UNIT\nin lbf s\nROD", 1)))
+    assert found.row("contact coefficient k")[0].text == "1.912e+06 lbf/in^1.5"
+    assert found.row("critical indentation alpha_p")[0].text == "0.0006564 in"
+    assert "Warnings about the deck" in found.headings
+    assert "[W415]" in found.text
+
+
+@pytest.mark.usefixtures("_undrawn")
+def test_a_result_without_a_readable_deck_has_a_page() -> None:
+    result = fecm.run_one(small())
+    bare = Result({name: result[name] for name in result}, {"deck": str(LONG)}, {})
+    found = page(bare=bare)
+    assert "Model" not in found.headings  # the text is no path that is followed
+    assert "at least" in found.text or "Peak force" in found.text
+
+
+@pytest.mark.usefixtures("_undrawn")
+def test_a_long_deck_is_cut_with_a_word(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("fecm.report.content.MOST_TEXT", 300)
+    result = fecm.run_one(small())
+    html = render(page_of({"small": result}))
+    kept, left = re.findall(r"<pre[^>]*>(.*)\n\.\.\. (\d+) more lines", html, re.DOTALL)[0]
+    assert result.deck_text.startswith(kept)
+    assert kept.count("\n") + 1 + int(left) == result.deck_text.count("\n")
+
+
+@pytest.mark.usefixtures("_undrawn")
+def test_a_refinement_shows_its_limit_and_band() -> None:
+    study = fecm.sweep(small().replace("10\nTIME", "60\nTIME"), refine=[1, 2])
+    assert page(study=study).captions.count("Convergence with the mesh and the time step") == 1
 
 
 @pytest.mark.usefixtures("_undrawn")

@@ -15,6 +15,7 @@ from fecm.deck.units import quantity, thousands, with_prefix
 
 UNKNOWN = "–"  # of a value that is not known
 DIGITS = 5  # of numbers on a page
+MOST_TEXT = 200_000  # characters of a listing
 SCALED = ("N", "kN", "s", "ms", "us", "µs")  # units that take a prefix
 
 
@@ -150,6 +151,15 @@ def notes(texts: Iterable[str], title: str = "") -> list[Block]:
     """A list of sentences as a list of blocks, which is empty without sentences."""
     found = tuple(dict.fromkeys(texts))
     return [Notes(found, title)] if found else []
+
+
+def listing(title: str, text: str) -> Listing:
+    """A listing, cut where it would make the page large; its checksum is that of the whole text."""
+    if len(text) <= MOST_TEXT:
+        return Listing(title, text)
+    kept = text[:MOST_TEXT].rpartition("\n")[0]
+    left = text.count("\n") - kept.count("\n") - 1
+    return Listing(title, f"{kept}\n... {left} more lines, which the result has")
 
 
 def sections(given: Iterable[tuple[str, Iterable[Block]]]) -> tuple[Section, ...]:

@@ -14,10 +14,10 @@ from fecm.report.content import (
     Judgement,
     Judgements,
     Level,
-    Listing,
     Number,
     Page,
     Picture,
+    listing,
     notes,
     number,
     sections,
@@ -111,5 +111,5 @@ def _provenance(found: Identification) -> Iterator[Block]:
     text = found.deck.to_text()
     checksum = hashlib.sha256(text.encode()).hexdigest()
     yield from table([("fitted deck, SHA-256", checksum)], caption="Checksum")
-    yield Listing("The fitted cards", found.cards())
-    yield Listing("The fitted deck", text)
+    yield listing("The fitted cards", found.cards())
+    yield listing("The fitted deck", text)

@@ -11,6 +11,7 @@ from fecm.deck import model
 from fecm.deck.layup import layup_text
 from fecm.deck.macros import flat
 from fecm.deck.units import (
+    COEFFICIENT,
     DENSITY,
     MASS,
     MODULUS,
@@ -38,7 +39,7 @@ PLY = (
     ("nu12", ""),
 )
 STRENGTHS = ("xt", "xc", "yt", "yc", "s12", "s13", "s23")
-LAW = {"k": "force/length^1.5", "alpha_p": "length", "alpha_cr": "length"}
+LAW = (COEFFICIENT, "length", "", "")  # dimensions of the constants of EXPE
 
 
 def of_problem(result: Result, problem: Problem) -> Iterator[Block]:
@@ -136,9 +137,9 @@ def _impact(deck: model.Deck) -> Iterator[tuple[Cell, ...]]:
     yield "velocity", in_units(impact.velocity, "length/time")
     yield "energy", in_units(0.5 * mass * impact.velocity**2, "force*length")
     yield "contact law", "equation 3-7 (ACR)" if law.word else "equation 3-8"
-    for name, value in zip(law.names(), law.values(), strict=True):
-        if name != "(none)":
-            yield f"law: {name}", in_units(value, LAW.get(name, ""))
+    for name, value, dimension in zip(law.names(), law.values(), LAW, strict=True):
+        if value or dimension == COEFFICIENT:
+            yield name, in_units(value, dimension)
     if (patch := deck.last(model.Patch)) is not None:
         yield "patch", {"DISC": "uniform pressure", "HERT": "Hertz's pressure"}[patch.shape]
     if (toughness := deck.last(model.Delamination)) is not None:

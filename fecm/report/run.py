@@ -21,10 +21,10 @@ from fecm.report.content import (
     Judgement,
     Judgements,
     Level,
-    Listing,
     Number,
     Page,
     Section,
+    listing,
     notes,
     number,
     sections,
@@ -39,7 +39,7 @@ from fecm.results.exposures import largest_exposures
 from fecm.results.first_failure import first_failures, threshold_energy
 from fecm.results.metrics import INTEGERS, METRICS
 from fecm.results.result import Result
-from fecm.results.summary import UNDECIDED
+from fecm.results.summary import LABEL_WIDTH, UNDECIDED, summary
 
 WORDS = {
     Level.WITHIN: "All quantities are within the range of the model.",
@@ -58,14 +58,17 @@ def run_page(results: Mapping[str, Result], digests: Mapping[str, str]) -> Page:
     digests : mapping of str to str
         SHA-256 of the files of results, by name; those in memory have none.
     """
-    problems = {name: problem_of(result) for name, result in results.items()}
+    loaded = {name: problem_of(result) for name, result in results.items()}
+    problems = {name: problem for name, (problem, _) in loaded.items()}
     judged = {name: list(judgements(result, problems[name])) for name, result in results.items()}
     level = worst(one for some in judged.values() for one in some)
+    if level is Level.WITHIN and any(result.notes for result in results.values()):
+        level = Level.DOUBTFUL
     if len(results) == 1:
         ((name, result),) = results.items()
         title = result.title or name
         verdict = [_sentence(result, problems[name]), WORDS[level]]
-        body = _single(name, result, problems[name], judged[name])
+        body = _single(name, result, *loaded[name], judged[name])
     else:
         title = f"{len(results)} impacts: {', '.join(results)}"
         said = (f"{name}: {_sentence(one, problems[name])}" for name, one in results.items())
@@ -76,15 +79,21 @@ def run_page(results: Mapping[str, Result], digests: Mapping[str, str]) -> Page:
 
 
 def _single(
-    name: str, result: Result, problem: Problem | None, judged: list[Judgement]
+    name: str,
+    result: Result,
+    problem: Problem | None,
+    warnings: list[str],
+    judged: list[Judgement],
 ) -> tuple[Section, ...]:
     """Sections about one result."""
     named = {name: result}
     trust: list[Block] = [Judgements(tuple(judged))] if judged else []
+    trust += notes(result.notes, "Notes of the run")
+    trust += notes(warnings, "Warnings about the deck")
     return sections(
         [
-            ("Trust", [*trust, *_notes(result)]),
-            ("Results", [*_metrics(named), *_threshold(result), *_criteria(result)]),
+            ("Trust", trust),
+            ("Results", [*_results(named), *_threshold(result), *_criteria(result)]),
             ("Pictures", [*figures.of_runs(named), *figures.of_run(name, result)]),
             ("Model", [] if problem is None else of_problem(result, problem)),
         ]
@@ -108,7 +117,7 @@ def _several(
     return sections(
         [
             ("Trust", trust),
-            ("Results", _metrics(results)),
+            ("Results", _results(results)),
             ("Pictures", _common_pictures(results)),
             ("Model", table(rows, ("quantity", *results))),
         ]
@@ -148,7 +157,7 @@ def _sentence(result: Result, problem: Problem | None) -> str:
     """What was hit by what, and what came of it, in one sentence."""
     said = partial(_said, result)
     if "history/force" not in result or not len(result["history/force"]):
-        return "No impact was computed."
+        return "No impact: see Results."
     force, time = result["history/force"], result["history/time"]
     peak = int(force.argmax())
     parts = []
@@ -176,7 +185,8 @@ def _sentence(result: Result, problem: Problem | None) -> str:
     elif largest_exposures(result):
         parts.append("no ply reaches an exposure of 1")
     if problem is None:
-        return f"{'; '.join(parts).capitalize()}."
+        text = "; ".join(parts)
+        return f"{text[0].upper()}{text[1:]}."
     return f"{_scene(problem)}: {'; '.join(parts)}."
 
 
@@ -196,15 +206,25 @@ def _scene(problem: Problem) -> str:
     )
 
 
-def _notes(result: Result) -> list[Block]:
-    """Notes of the run."""
-    return notes(result.notes, "Notes of the run")
+def _results(results: Mapping[str, Result]) -> list[Block]:
+    """Metrics of impacts, or what the summary says of a result without impact."""
+    if any(result.metrics for result in results.values()):
+        return _metrics(results)
+    rows = [
+        (line[:LABEL_WIDTH].strip(), line[LABEL_WIDTH:])
+        for result in results.values()
+        for line in summary(result)
+    ]
+    return table(rows, caption="Summary")
 
 
 def _metrics(results: Mapping[str, Result]) -> list[Block]:
     """Impact metrics with a column for each result."""
     metrics = {name: result.metrics for name, result in results.items()}
     rows: list[tuple[Cell, ...]] = []
+    if any(result.end in UNDECIDED for result in results.values()):
+        bounds = [_lower_bound(result) for result in results.values()]
+        rows.append(("largest force by the end", *bounds, "lower bound of the peak force"))
     for key, (description, dimension) in METRICS.items():
         if not any(key in own for own in metrics.values()):
             continue
@@ -216,6 +236,13 @@ def _metrics(results: Mapping[str, Result]) -> list[Block]:
             cells.append(Number(value, f"{value:.0f}") if whole else number(value, unit))
         rows.append((key.replace("_", " "), *cells, description))
     return table(rows, ("metric", *(results if len(results) > 1 else ("value",)), "meaning"))
+
+
+def _lower_bound(result: Result) -> Cell:
+    """Largest force of a run whose peak is open."""
+    if result.end not in UNDECIDED:
+        return UNKNOWN
+    return number(float(result["history/force"].max()), unit_of("force", result.units))
 
 
 def _threshold(result: Result) -> list[Block]:
@@ -287,7 +314,7 @@ def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> It
         "" if len(results) > 1 else "Versions and checksums",
     )
     for name, text in texts.items():
-        yield Listing("The deck" if len(texts) == 1 else f"The deck of {name}", text)
+        yield listing("The deck" if len(texts) == 1 else f"The deck of {name}", text)
 
 
 def _said(result: Result, value: float, dimension: str) -> str:

@@ -17,9 +17,9 @@ from fecm.report.content import (
     Judgement,
     Judgements,
     Level,
-    Listing,
     Number,
     Page,
+    listing,
     notes,
     number,
     sections,
@@ -28,8 +28,8 @@ from fecm.report.content import (
     table,
     worst,
 )
-from fecm.results.metrics import VERDICTS, described
-from fecm.results.validity import MEANING, counted
+from fecm.results.metrics import RATIO, VERDICTS, described
+from fecm.results.validity import MEANING, Reason, counted
 from fecm.sweeps.random_result import RandomResult
 from fecm.sweeps.random_tables import MAIN, chance
 from fecm.sweeps.result import SweepResult
@@ -38,6 +38,8 @@ from fecm.sweeps.summary import verdict
 
 FOUND = "found_velocity"
 PEAK = "peak_force"
+# Reasons for which results are those of an elastic plate; others are outside the model.
+ELASTIC = (Reason.BROKEN, Reason.DELAMINATED, Reason.OTHER)
 MOST_NAMED = 4  # values that name a case
 MOST_VALUES = 8  # different values of a name that are listed one by one
 MOST_COMBINATIONS = 12  # of varied values, whose statistics are listed
@@ -47,12 +49,12 @@ def sweep_page(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> Pag
     """Page about the result of a sweep; `digests` is the SHA-256 of its file, by its name."""
     judged = list(_judgements(sweep))
     level = worst(judged)
-    random = sweep.random
+    drawn = [] if sweep.random is None else _random(sweep, sweep.random)
     body = sections(
         [
             ("Trust", [Judgements(tuple(judged)), *notes(sweep.notes, "Notes of the sweep")]),
             ("Varied values", _varied(sweep)),
-            ("Results", [*_extremes(sweep), *([] if random is None else _random(sweep, random))]),
+            ("Results", [*_extremes(sweep), *_convergence(sweep), *_reduced(sweep), *drawn]),
             ("Pictures", _pictures(name, sweep)),
             ("Provenance", _provenance(name, sweep, digests)),
         ]
@@ -98,9 +100,8 @@ def _judgements(sweep: SweepResult) -> Iterator[Judgement]:
         yield Judgement(Level.OUTSIDE, "failed", Number(failed, f"{failed} of {count}"), words)
     for reason, some in counted(sweep.validity):
         cases = int(some.sum())
-        yield Judgement(
-            Level.OUTSIDE, str(reason), Number(cases, f"{cases} of {count}"), MEANING[reason]
-        )
+        level = Level.DOUBTFUL if reason in ELASTIC else Level.OUTSIDE
+        yield Judgement(level, str(reason), Number(cases, f"{cases} of {count}"), MEANING[reason])
     if still := int(sweep.still_in_contact.sum()):
         words = "what comes after the end is open"
         size = Number(still, f"{still} of {count}")
@@ -145,6 +146,31 @@ def _extremes(sweep: SweepResult) -> list[Block]:
         rows.append((name.replace("_", " "), cells[1], cells[0], cells[3], cells[2]))
     header = ("quantity", "smallest", "case", "largest", "case")
     return table(rows, header, "Smallest and largest values of the cases that were run")
+
+
+def _convergence(sweep: SweepResult) -> list[Block]:
+    """Order, limit and error band of the quantities of a refinement study."""
+    rows: list[tuple[Cell, ...]] = []
+    for name, one in sweep.convergence.items():
+        unit, finest = sweep.unit(name), float(sweep[name][-1])
+        sizes = (number(finest, unit), number(one.limit, unit), number(one.band, unit))
+        rows.append((name.replace("_", " "), *sizes, number(one.order, digits=3), one.remark))
+    header = ("quantity", "finest mesh", "limit", "band, ±", "observed order", "remark")
+    return table(rows, header, "Convergence with the mesh and the time step")
+
+
+def _reduced(sweep: SweepResult) -> list[Block]:
+    """Full runs beside the reduced model."""
+    found = sweep.reduced
+    if found is None:
+        return []
+    differences = [found.difference("peak_force"), found.difference(RATIO)]
+    rows = [
+        (str(case), *(share(float(value)) for value in pair))
+        for case, *pair in zip(found.columns["case"], *differences, strict=True)
+    ]
+    caption = f"Reduced model with {found.modes} modes: differences from full runs"
+    return table(rows, ("case", "peak force", "deflection"), caption)
 
 
 def _case(sweep: SweepResult, case: int) -> str:
@@ -251,4 +277,4 @@ def _provenance(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> It
     if name in digests:
         rows.append(("result, SHA-256", digests[name]))
     yield from table(rows, caption="Checksums")
-    yield Listing("The deck", text)
+    yield listing("The deck", text)

@@ -16,6 +16,7 @@ from fecm.problem.summary import summarise
 from fecm.report.content import UNKNOWN, Cell, Judgement, Level, Number, number, share
 from fecm.results.criteria import spelt
 from fecm.results.end import End
+from fecm.results.errors import ResultFileError
 from fecm.results.exposures import FEWEST, evaluations_in_contact, largest_exposures
 from fecm.results.metrics import MOBILITY
 from fecm.results.result import Result
@@ -45,12 +46,16 @@ ENDS = {
 }
 
 
-def problem_of(result: Result) -> Problem | None:
-    """The problem of a result's deck; None if the deck can't be read."""
-    loaded = load_deck(result.deck_text, result.mode)
+def problem_of(result: Result) -> tuple[Problem | None, list[str]]:
+    """The problem of a result's deck, None if it can't be read, and the warnings about it."""
+    try:
+        loaded = load_deck(result.deck, result.mode)  # the text of a file could be another's path
+    except (ResultFileError, ValueError):
+        return None, []
     if loaded.errors(force=True) or len(loaded.problems) != 1:
-        return None
-    return loaded.problems[0]
+        return None, []
+    warnings = [one for one in loaded.findings if one.severity == "warning"]
+    return loaded.problems[0], [f"{one.message} [{one.code}]" for one in warnings]
 
 
 def judgements(result: Result, problem: Problem | None) -> Iterator[Judgement]:

@@ -20,6 +20,7 @@ from fecm.results.stored import Stored
 from fecm.results.validity import CROSSED
 
 NEAR = 0.05  # of the time of the peak, up to which a row is that of the peak
+LABEL_WIDTH = 18  # of the lines
 LISTED = 6  # most contacts and frequencies listed individually
 # Parts by the caller of the run: attribute, name, and the segment of the deck that they replace.
 OWN_PARTS = (("law", "contact law", "EXPE"), ("projectile", "projectile", "PROJ"))
@@ -32,7 +33,7 @@ UNDECIDED = {
 
 def _line(name: str, text: str) -> str:
     """A line of the summary."""
-    return f"{name:18}{text}"
+    return f"{name:{LABEL_WIDTH}}{text}"
 
 
 def summary(result: Stored) -> list[str]:
