@@ -285,6 +285,55 @@ def test_an_unknown_name_is_answered_with_near_ones(result: Result, name: str, h
     assert hint in str(refused.value)
 
 
+@pytest.mark.parametrize(
+    ("name", "header"),
+    [
+        (
+            "history",
+            "step,time (s),force (N),indentation (mm),transducer (N),displacement (mm),"
+            "velocity (mm/s),acceleration (mm/s^2),plate_w (mm)",
+        ),
+        ("tape3", "step,time (s),node,u (mm),v (mm),w (mm),theta_x,theta_y"),
+        ("tape8/kappa_x", "step,time (s),element,point,kappa_x (1/mm)"),
+        ("laminate/D", "row,xx (mJ),yy (mJ),xy (mJ)"),
+        ("mesh/coordinates", "node,x (mm),y (mm)"),
+    ],
+)
+def test_headers_have_the_units_that_the_deck_names(name: str, header: str) -> None:
+    assert next(lines(run(small(data=DATA_CARDS + "UNIT\nmm N s\n")), name)) == header + "\n"
+
+
+def test_an_exported_force_is_a_measurement_in_the_units_of_the_deck(tmp_path: Path) -> None:
+    result = run(small(data=DATA_CARDS + "UNIT\nmm N s\n"))
+    result.export(tmp_path / "history.csv")
+    compared = result.compare(tmp_path / "history.csv")
+    assert (compared.rms, compared.correlation) == (0.0, pytest.approx(1.0))
+    other = run(small(data=DATA_CARDS + "UNIT\nin lbf s\n"))
+    with pytest.raises(fecm.FecmError, match="force is in N, and the deck in lbf"):
+        other.compare(tmp_path / "history.csv")
+
+
+def test_a_unit_with_a_comma_stays_in_its_column(result: Result) -> None:
+    arrays = {path: result[path] for path in result}
+    units = {"unit_length": "m,m", "unit_force": "N", "unit_time": 's"'}
+    header, first = list(lines(Result(arrays, {}, {"": units}), "energy"))[:2]
+    names, numbers = csv.reader([header, first])
+    assert names[:2] == ["step", 'time (s")']
+    assert names[2] == "plate_kinetic (N*m,m)"
+    assert len(names) == len(numbers)
+
+
+def test_exposures_of_a_run_that_ends_in_contact_are_noted_as_lower_bounds(file: Path) -> None:
+    strengths = "ALLO\n1500.,1500.,50.,200.,100.,50.\n\n" + DATA_CARDS
+    failing = run(small(PROGRAM.replace("NEXT", "FAIL          1\nNEXT"), data=strengths))
+    assert failing.still_in_contact
+    failing.save(file, overwrite=True)
+    told = "fecm: note: the run ends in contact: exposures are lower bounds\n"
+    for dataset, note in (("exposures", told), ("failure/puck/exposure", told), ("tape3", "")):
+        done = call("export", file, "--to", "csv", "--dataset", dataset, "-o", "-")
+        assert (done.exit_code, done.stderr) == (0, note)
+
+
 def test_a_group_that_was_never_stored_names_its_macro() -> None:
     idle = PROGRAM.replace("RODP          5\n", "")
     result = run(small(idle, data=DATA_CARDS[DATA_CARDS.index("MATE") :]))

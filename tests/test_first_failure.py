@@ -164,6 +164,13 @@ def test_summary_and_json_have_the_first_failure(tmp_path: Path, every_step: Res
         assert failure["evaluations_in_contact"] == evaluations_in_contact(every_step)
         assert failure["first"][0] == vars(first)
         assert failure["largest"]["puck"] == every_step["exposures/exposure"][-1, 3]
+        assert failure["history"]["time"] == every_step["exposures/time"].tolist()
+        puck = failure["history"]["exposure"]["puck"]
+        assert puck == every_step["exposures/exposure"][:, 3].tolist()
+        # It first reaches 1 between the evaluations that the first failure names.
+        (own,) = (one for one in failure["first"] if one["criterion"] == "puck")
+        reached = next(row for row, value in enumerate(puck) if value >= 1.0)
+        assert failure["history"]["time"][reached] == own["latest"]
 
 
 def test_exposures_below_1_have_no_first_failure(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
+from fecm.cli.identify import _page
 from fecm.deck.model import Indentation
 from fecm.identification.alignment import IdentifyError
 from fecm.plot.histories import fit_picture
@@ -88,6 +89,10 @@ def test_fitted_values_have_the_units_of_the_deck() -> None:
     assert found.units == {"length": "mm", "force": "N", "time": "s"}
     units = {name: found.unit(name) for name in found.values}
     assert units == {"k": "N/mm^1.5", "mass": "N*s^2/mm", "delay": "s", "offset": "N"}
+    (line,) = (line for line in _page(found, "N") if line.startswith("mass "))
+    _, value, _, _, unit, _, start = line.split()
+    assert float(value) == pytest.approx(1e6 * found.values["mass"], rel=1e-4)  # g in a tonne
+    assert (unit, start) == ("g,", "23")
     with pytest.raises(KeyError, match="velocity was not fitted"):
         found.unit("velocity")
 

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.mechanics.failure import CRITERIA
 from fecm.results.csv import lines
 from fecm.results.errors import ExportError, NotStoredError, ResultFileError
 from fecm.results.exposures import largest_exposures
@@ -16,7 +17,7 @@ from fecm.results.result import Result
 from fecm.results.vtkhdf import write_vtkhdf
 from tests.builders import REPORT_PLY, turned_stiffness
 from tests.calls import call
-from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, small
+from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, PROGRAM, small
 
 STRENGTHS = "ALLO\n   200000.   200000.     7000.    28000.    13000.\n\n"
 DECK = small(PLY_PROGRAM, data=DISC + DATA_CARDS)
@@ -142,6 +143,21 @@ def test_cells_have_the_stress_of_largest_magnitude_and_its_ply(
         assert np.isnan(data[f"{name}_ply"][:, others]).all()
     # With its sign: sigma_2 is as large at both faces of the plate, but not in every element.
     assert np.isin(data["sigma_2"][:, members], result["plies/sigma_2"]).all()
+
+
+@pytest.mark.parametrize("every", [1, 3, 10])
+def test_every_time_step_has_the_largest_exposures_so_far(tmp_path: Path, every: int) -> None:
+    program = PROGRAM.replace("NEXT", f"FAIL{every:11}\nNEXT")
+    result = fecm.run_one(small(program, data=STRENGTHS + DATA_CARDS))
+    write_vtkhdf(result, tmp_path / "plate.vtkhdf")
+    evaluations = result["exposures/step"]
+    with h5py.File(tmp_path / "plate.vtkhdf") as file:
+        assert "largest_interlaminar" not in file["VTKHDF/FieldData"]  # no strength is given
+        for number, criterion in enumerate(CRITERIA):
+            stored = file[f"VTKHDF/FieldData/largest_{criterion}"][()]
+            for step, value in zip(result["tape3/step"], stored, strict=True):
+                known = result["exposures/exposure"][evaluations <= step, number]
+                assert value == (known[-1] if len(known) else 0.0)
 
 
 def test_cells_have_the_largest_exposure_outside_the_load_and_its_ply(

@@ -172,6 +172,20 @@ def test_the_map_of_exposures_has_a_cell_around_every_point(points: int) -> None
         assert (cell.max(axis=0) >= place - 1e-12).all()
 
 
+@pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
+def test_map_and_bars_stand_beside_each_other_below_a_lower_legend(failing: Result) -> None:
+    figure: Any = plot(failing, "failure")
+    figure.canvas.draw()
+    plate, bars, _ = figure.axes
+    left, right = plate.get_position(), bars.get_position()
+    assert left.x1 < right.x0
+    assert left.y0 < right.y1
+    assert right.y0 < left.y1
+    (legend,) = figure.legends
+    assert legend.get_window_extent().height < plate.get_window_extent().height
+    assert figure.get_figwidth() > figure.get_figheight()
+
+
 def test_an_open_contact_is_told_above_the_exposures(failing: Result) -> None:
     assert failing.still_in_contact
     with pytest.warns(FecmWarning, match="are left out"):

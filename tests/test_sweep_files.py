@@ -17,7 +17,7 @@ import fecm
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.summary import summary
 from tests.calls import assert_unusable, call
-from tests.decks import PROGRAM
+from tests.decks import DATA_CARDS, PROGRAM
 from tests.decks import small as small_of
 
 STEPS = PROGRAM.replace("LOOP         10", "LOOP        400")
@@ -178,6 +178,19 @@ def test_cases_are_exported_a_row_each_with_their_texts(swept: Path, tmp_path: P
     assert [row["status"] for row in rows] == found["status"].tolist()
     np.testing.assert_array_equal([float(row["impulse"]) for row in rows], found["impulse"])
     assert call("export", swept, "--to", "csv", "-o", "-").stdout == target.read_text()
+
+
+def test_columns_of_cases_have_the_units_that_the_deck_names(tmp_path: Path) -> None:
+    deck = small_of(data=DATA_CARDS + "UNIT\nmm N s\n")
+    sweep = fecm.sweep(deck, {"rod_mass": [1e-3], "velocity": [50.0]}, history=True)
+    sweep.export(tmp_path / "cases.csv")
+    sweep.export(tmp_path / "history.csv", "history")
+    names = (tmp_path / "cases.csv").read_text().splitlines()[0].split(",")
+    assert names[:5] == ["case", "rod_mass (t)", "velocity (mm/s)", "peak_force (N)",
+                         "time_of_peak (s)"]  # fmt: skip
+    assert names[-4:] == ["dt (s)", "steps", "status", "validity"]
+    assert "energy_absorbed (mJ)" in names
+    assert (tmp_path / "history.csv").read_text().startswith("case,step,time (s),force (N)\n")
 
 
 def test_forces_of_the_cases_that_were_run_are_exported_a_row_a_step(swept: Path) -> None:

@@ -105,7 +105,7 @@ def export(
         if is_sweep:
             _write_sweep(contents, target, name, path, overwrite=overwrite)
         elif path == DASH:
-            write_lines(csv.lines(result_of(contents), name), path, overwrite=overwrite)
+            write_lines(csv.lines(result_of(contents), name, note), path, overwrite=overwrite)
         else:
             form = ExportFormat(target)
             asked = name if form is ExportFormat.CSV else ""

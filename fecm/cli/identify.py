@@ -25,7 +25,7 @@ from fecm.cli.options import (
 from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
 from fecm.deck.model import Deck
-from fecm.deck.units import unit_names, unit_of
+from fecm.deck.units import readable, unit_names, unit_of
 from fecm.identification.identify import CARDS, FREE, Identification, fit
 from fecm.mechanics.own_law import own_law
 from fecm.report.page import check_page
@@ -177,8 +177,12 @@ def _page(found: Identification, force: str) -> list[str]:
     if found.law:
         lines.append(f"law          {found.law}, instead of EXPE")
     for name, value in found.values.items():
-        error, start = found.errors[name], found.start[name]
-        lines.append(f"{name:<11}  {value:.5g} ± {error:.2g}, from {start:.5g}")
+        power, unit = readable(value, found.unit(name), digits=5)
+        best, error, start = (
+            number / 10.0**power for number in (value, found.errors[name], found.start[name])
+        )
+        spread = f"{best:.5g} ± {error:.2g} {unit}".rstrip()
+        lines.append(f"{name:<11}  {spread}, from {start:.5g}")
     if len(found.values) > 1:
         lines.append("correlation  " + "".join(f"{name:>12}" for name in found.values))
         for name, row in zip(found.values, found.correlation, strict=True):

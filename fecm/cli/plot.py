@@ -150,7 +150,9 @@ class PictureOptions:
 )
 @option("--along", type=click.Choice(["x", "y"]), help="Direction of line.  [default: x]")
 @option(
-    "--width", type=click.Choice(["column", "full"]), help="3.5 in, or 7.2 in.  [default: column]"
+    "--width",
+    type=click.Choice(["column", "full"]),
+    help="3.5 in, or 7.2 in.  [default: column; of failure full]",
 )
 @option(
     "--quantity",

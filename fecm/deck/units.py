@@ -11,6 +11,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
+from fecm._text import printable
 from fecm.deck.model import Deck, Units
 
 # Units that are known by name, in m, N and s.
@@ -64,6 +65,16 @@ def unit_of(dimension: str, names: dict[str, str]) -> str:
     return re.sub(r"length|force|time", lambda match: names[match[0]], dimension)
 
 
+def column_name(name: str, unit: str) -> str:
+    """Heading of a column: ``force (N)``, or the name alone where it has no unit."""
+    return f"{name} ({printable(short_name(unit))})" if unit else name
+
+
+def short_name(unit: str) -> str:
+    """Name of a unit without products: t of N*s^2/mm, mJ of N*mm; others as they are."""
+    return (with_prefix(unit, 0) if "*" in unit else "") or unit
+
+
 def in_si(dimension: str, names: dict[str, str]) -> float | None:
     """One unit of a physical dimension, such as ``force*time^2/length^4``, in m, N and s.
 
@@ -110,12 +121,18 @@ def with_prefix(unit: str, power: int) -> str:
 
 def quantity(value: float, unit: str, digits: int = 6) -> str:
     """A value with its unit: 20 g instead of 2e-05 N*s^2/mm, 1.5 J instead of 1500 N*mm."""
+    power, name = readable(value, unit, digits)
+    return f"{value / 10.0**power:.{digits}g} {name}".rstrip()
+
+
+def readable(value: float, unit: str, digits: int = 6) -> tuple[int, str]:
+    """Power of ten, and its name, in which a mass or an energy has a few digits; else 0, `unit`."""
     base, _ = PREFIXED.get(unit, ("", 0))
     if base in ("g", "J") and 0.0 < abs(value) < math.inf:
         power = thousands(float(f"{abs(value):.{digits}g}"))
         if name := with_prefix(unit, power):
-            return f"{value / 10.0**power:.{digits}g} {name}"
-    return f"{value:.{digits}g} {unit}".rstrip()
+            return power, name
+    return 0, unit
 
 
 def mass_in_si(mass: float, names: dict[str, str]) -> str:

@@ -65,9 +65,7 @@ class Exposures:
     worst: LargestExposure  # the largest of them
 
 
-def failure(
-    results: Mapping[str, Result], *, quantity: str = "", width: Width = "column"
-) -> Picture:
+def failure(results: Mapping[str, Result], *, quantity: str = "", width: Width = "full") -> Picture:
     """Largest exposures over time: of the worst ply on the plate, and of every ply in bars.
 
     Points under the load are hatched; the bars leave them out.  Values between two plies belong to

@@ -1,19 +1,25 @@
 """CSV: datasets of a result as tables in long form, for spreadsheets and data frames.
 
-Key columns come first (step and time, then node, element or point, from 1), then values.  Numbers
-are written by Python's repr and can be read back exactly.
+Key columns come first (step and time, then node, element or point, from 1), then values.  Units
+follow the names in the header, as tables of measured data have them.  Numbers are written by
+Python's repr and can be read back exactly.
 """
 
 from __future__ import annotations
 
+import csv
+import io
 import itertools
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
 from fecm._typing import Array
+from fecm.deck.units import column_name
 from fecm.results import schema
 from fecm.results.errors import ExportError
+from fecm.results.exposures import LOWER_BOUNDS
 from fecm.results.groups import STORED_BY
 from fecm.results.missing import remedy, suggestion
 from fecm.results.plies import IN_PLANE, INTERLAMINAR
@@ -41,18 +47,25 @@ KEYS = {
 LABELS = {"gages": "gages/number", "members": "plies/element", "patch_nodes": "patch/node"}
 # Datasets of the table of ply stresses.
 PLIES = tuple(f"plies/{name}" for name in (*IN_PLANE, *INTERLAMINAR))
+FAILURE = ("failure", "exposures")  # groups of FAIL
+# A unit and the components of a dataset that have it.
+OF_COMPONENTS = re.compile(r"(\S+) \(([^)]*)\)")
 HISTORY = "history"  # the group that is exported by default
 BLOCK = 100_000  # lines per block
 
 
-def lines(result: Stored, name: str = HISTORY) -> Iterator[str]:
+def lines(
+    result: Stored, name: str = HISTORY, note: Callable[[str], None] = lambda text: None
+) -> Iterator[str]:
     """Lines of one dataset such as ``tape3/w``, or of all datasets of a group such as ``history``.
 
-    The first is the header.  Raises ExportError if there is no such dataset or group, or the
-    group's datasets differ in shape.
+    The first is the header.  `note` receives a sentence about values that are not final.  Raises
+    ExportError if there is no such dataset or group, or the group's datasets differ in shape.
     """
     plain = name.strip("/")
     members = _members(result, plain)
+    if plain.partition("/")[0] in FAILURE and result.still_in_contact:
+        note(LOWER_BOUNDS)
     group = members[0].rpartition("/")[0]
     beside = [f"{group}/{column}" for column in CLOCK]
     clock = [path for path in beside if path in result and _in_rows(path)]
@@ -65,7 +78,9 @@ def lines(result: Stored, name: str = HISTORY) -> Iterator[str]:
         values = ["tape3/displacement"]  # w is one of its columns
     instants = [result[path] for path in clock]
     if not values:  # only step or time
-        return _lines(_names(clock), zip(*(times.tolist() for times in instants), strict=True))
+        return _lines(
+            _headings(result, clock), zip(*(times.tolist() for times in instants), strict=True)
+        )
     values = [path for path in values if path not in LABELS.values()] or values
     arrays = [result[path] for path in values]
     if plain == "plies" and len(values) > len(PLIES):
@@ -81,21 +96,23 @@ def lines(result: Stored, name: str = HISTORY) -> Iterator[str]:
     dataset = schema.dataset_of(values[0], len(shape))
     known = shape if dataset is None else dataset.shape
     axes = list(zip(known, shape, strict=True))[bool(clock) :]
-    columns = _names(values)
+    columns = _headings(result, values)
     if len(values) == 1 and axes and len(names := NAMED.get(axes[-1][0], ())) >= axes[-1][1]:
-        columns = names[: axes.pop()[1]]
+        columns = _components(names[: axes.pop()[1]], result.unit(values[0]))
     keys = tuple(KEYS.get(str(size), "row") for size, _ in axes)
     numbers: list[Sequence[int]] = []  # along each axis: those that are stored, else from 1
     for size, length in axes:
         path = LABELS.get(str(size), "")
         numbers.append(result[path].tolist() if path in result else range(1, length + 1))
-    return _lines((*_names(clock), *keys, *columns), _rows(arrays, instants, numbers))
+    return _lines((*_headings(result, clock), *keys, *columns), _rows(arrays, instants, numbers))
 
 
 def _lines(header: Sequence[str], rows: Iterator[tuple[float, ...]]) -> Iterator[str]:
     """Lines of a header and of rows of numbers."""
+    first = io.StringIO()
+    csv.writer(first, lineterminator="\n").writerow(header)
     texts = (",".join(map(repr, row)) + "\n" for row in rows)
-    return itertools.chain([",".join(header) + "\n"], texts)
+    return itertools.chain([first.getvalue()], texts)
 
 
 def _members(result: Stored, name: str) -> list[str]:
@@ -111,9 +128,19 @@ def _members(result: Stored, name: str) -> list[str]:
     raise ExportError(f"the result has no dataset {name}{suggestion(name, result)}")
 
 
-def _names(paths: Sequence[str]) -> tuple[str, ...]:
-    """Names of datasets within their groups."""
-    return tuple(path.rpartition("/")[2] for path in paths)
+def _headings(result: Stored, paths: Sequence[str]) -> tuple[str, ...]:
+    """Names of datasets within their groups, with units."""
+    return tuple(column_name(path.rpartition("/")[2], result.unit(path)) for path in paths)
+
+
+def _components(names: Sequence[str], unit: str) -> tuple[str, ...]:
+    """Names of the components of a dataset, with units.
+
+    `unit` is that of all, or says which has which: ``mm (u, v, w), 1 (theta_x, theta_y)``.
+    """
+    shared = OF_COMPONENTS.findall(unit)
+    own = {name: one for one, members in shared for name in members.split(", ") if one != "1"}
+    return tuple(column_name(name, own.get(name, "") if shared else unit) for name in names)
 
 
 def _in_rows(path: str) -> bool:

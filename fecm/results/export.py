@@ -43,7 +43,7 @@ def export(
 ) -> None:
     """Write a result, of csv one dataset or group; see :meth:`fecm.Result.export`.
 
-    `note` receives a sentence about fields that are exported incompletely.
+    `note` receives a sentence about what is exported incompletely, or is not final.
     """
     check_outputs([path], overwrite, allowed_by=ARGUMENT)
     if form is ExportFormat.VTKHDF:
@@ -51,6 +51,6 @@ def export(
             raise ExportError("a dataset is chosen for csv; vtkhdf holds all fields")
         write_vtkhdf(result, path, note, overwrite=overwrite)
         return
-    lines = csv.lines(result, dataset or csv.HISTORY)
+    lines = csv.lines(result, dataset or csv.HISTORY, note)
     with writing(path, overwrite=overwrite) as file:
         file.writelines(lines)

@@ -10,6 +10,7 @@ from fecm.results.criteria import INTERLAMINAR, criteria_of, plies_of
 from fecm.results.errors import ResultFileError
 from fecm.results.stored import Stored
 
+LOWER_BOUNDS = "the run ends in contact: exposures are lower bounds"
 FEWEST = 20  # evaluations of FAIL during contact below which maxima may be missed
 # Attributes of a criterion's group, with CURE.
 AT_REST = "at_rest"

@@ -126,16 +126,22 @@ def _history(stored: Stored) -> _History:
 def failure_metrics(stored: Stored) -> dict[str, Any]:
     """Evaluations, largest exposures and first failures as plain values; empty without FAIL.
 
-    With CURE also the exposures at rest and the load factors.
+    ``history`` has the largest exposures so far at every evaluation.  With CURE also the exposures
+    at rest and the load factors.
     """
     if "failure/x" not in stored:
         return {}
-    largest = []
-    if "exposures/exposure" in stored:
-        largest = stored["exposures/exposure"][-1].tolist()
+    times: list[float] = []
+    so_far: dict[str, list[float]] = {}
+    if "exposures/exposure" in stored and "exposures/time" in stored:
+        times = stored["exposures/time"].tolist()
+        columns = stored["exposures/exposure"].T.tolist()
+        criteria = criteria_of(stored.attributes_of("failure"))
+        so_far = dict(zip(criteria, columns, strict=False))
     return {
         "evaluations_in_contact": evaluations_in_contact(stored),
-        "largest": dict(zip(criteria_of(stored.attributes_of("failure")), largest, strict=False)),
+        "largest": {criterion: exposures[-1] for criterion, exposures in so_far.items()},
+        "history": {"time": times, "exposure": so_far},
         "first": [asdict(one) for one in first_failures(stored)],
         **_of_cure(stored),
     }

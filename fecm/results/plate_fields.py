@@ -13,7 +13,7 @@ from fecm._typing import Array
 from fecm.mechanics.strains import STRAINS
 from fecm.results.criteria import INTERLAMINAR, criteria_of
 from fecm.results.errors import ExportError
-from fecm.results.exposures import near_load
+from fecm.results.exposures import LOWER_BOUNDS, near_load
 from fecm.results.plies import IN_PLANE
 from fecm.results.plies import INTERLAMINAR as BETWEEN_PLIES
 from fecm.results.stored import Stored
@@ -164,7 +164,7 @@ def _exposures(stored: Stored, note: Note) -> Iterator[Fields]:
     if "failure/under_load" not in stored:
         return
     if stored.still_in_contact:
-        note("the run ends in contact: exposures are lower bounds")
+        note(LOWER_BOUNDS)
     for criterion in criteria_of(stored.attributes_of("failure")):
         values = stored[f"failure/{criterion}/exposure"]
         left_out = near_load(stored, criterion) | (values < 0.0)  # plies without strengths

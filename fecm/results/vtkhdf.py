@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 
 from fecm._typing import Array
+from fecm.results.criteria import criteria_of
 from fecm.results.errors import ExportError
 from fecm.results.hdf5_writer import new_hdf5
 from fecm.results.missing import remedy
@@ -45,6 +46,7 @@ def write_vtkhdf(
         root.attrs.create("Type", np.bytes_(b"UnstructuredGrid"))
         _write_mesh(root, result, result["tape3/time"][rows])
         _write_contact(root, result, steps)
+        _write_exposures(root, result, steps)
         for one in fields(result, rows, note):
             _write_fields(root, len(steps), one)
 
@@ -111,3 +113,16 @@ def _write_contact(root: h5py.Group, result: Stored, steps: Ints) -> None:
         values = np.concatenate((result[f"history/{name}"], [0.0]))
         at_step = np.where(steps > 0, values[np.minimum(at, len(values) - 1)], 0.0)
         _field(root, TIME, name, len(steps), (1,))[:] = at_step
+
+
+def _write_exposures(root: h5py.Group, result: Stored, steps: Ints) -> None:
+    """Field data: largest exposure so far of each criterion; zero before the first evaluation."""
+    if any(f"exposures/{name}" not in result for name in ("step", "exposure")):
+        return
+    evaluations = np.searchsorted(result["exposures/step"], steps, side="right")
+    criteria = criteria_of(result.attributes_of("failure"))
+    for criterion, exposures in zip(criteria, result["exposures/exposure"].T, strict=False):
+        if not np.isfinite(exposures).any():
+            continue  # its strengths are not known
+        so_far = np.concatenate(([0.0], exposures))[evaluations]
+        _field(root, TIME, f"largest_{criterion}", len(steps), (1,))[:] = so_far

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from fecm.deck.units import column_name, short_name
 from fecm.sweeps.copula import pairs_of
 from fecm.sweeps.limits import THRESHOLD
 from fecm.sweeps.random_result import RandomResult
@@ -26,7 +27,10 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
     """Lines of the most important quantities: statistics, indices and probabilities."""
     design, found = random.design, random.exceedance
     lines = [f"design            {design.kind}, {design.samples} samples, seed {design.seed}"]
-    lines += [f"random            {name} {law}" for name, law in design.laws.items()]
+    lines += [
+        f"random            {column_name(name, unit(name))} {law}"
+        for name, law in design.laws.items()
+    ]
     lines += [
         f"correlation       {a}, {b} {value:.6g}"
         for (a, b), value in pairs_of([*design.laws], design.correlation).items()
@@ -40,7 +44,7 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
         lines += ["", *([random.label(number)] if place else [])]
         own = [random.statistics[name] for name in chosen]
         rows = [[s.mean[place], s.standard_deviation[place], *s.quantiles[place]] for s in own]
-        columns = [chosen, [unit(name) for name in chosen]]
+        columns = [chosen, [short_name(unit(name)) for name in chosen]]
         columns += [[f"{value:.6g}" for value in row] for row in zip(*rows, strict=True)]
         lacking = [design.draws - int(s.draws[place]) for s in own]
         columns.append([str(count) for count in lacking] if any(lacking) else [""] * len(own))

@@ -23,7 +23,11 @@ from fecm.sweeps.random_result import RandomResult, open_ends
 from fecm.sweeps.reduced_check import ReducedModel
 from fecm.sweeps.values import REFINE, dimension_of
 
-OWN_DIMENSIONS = {"force": "force", "dt": "time"}  # of arrays that are not in the tables
+OWN_DIMENSIONS = {
+    "force": "force",
+    "dt": "time",
+    "steps": "",
+}  # of arrays that are not in the tables
 
 
 @dataclass(repr=False)
@@ -117,7 +121,7 @@ class StoredSweep:
         Parameters
         ----------
         name : str
-            One of :meth:`keys`, ``"force"`` or ``"dt"``.
+            One of :meth:`keys`, ``"force"``, ``"dt"`` or ``"steps"``.
 
         Raises
         ------
