@@ -162,6 +162,23 @@ def test_a_toughness_stands_in_for_one_that_a_ply_does_not_have() -> None:
     assert own == MATERIALS["IM7/8552"].value("GIIc", "mm-N-s")
 
 
+@pytest.mark.parametrize("mesh", ["6x4", "24x16"])
+def test_damage_stores_ply_stresses_on_both_sides_of_the_edge_of_the_load(mesh: str) -> None:
+    options = (*D7136, "--damage", "--mesh", mesh, "--duration", "5e-6", "--dt", "1e-7")
+    result = fecm.run_one(new(*options).stdout)
+    under = result["plies/under_load"] == 1
+    assert under.any()
+    assert np.count_nonzero(~under) >= np.count_nonzero(under)
+    assert len(result["plies/time"]) == 25  # 50 steps, every second
+    plain = new_deck(*options, "--plies", "0")
+    words = [macro.word for macro in plain.macros]
+    assert "FAIL" in words
+    assert "PLYS" not in words
+    asked = new_deck(*options, "--plies", "10,3")
+    (card,) = (macro for macro in asked.macros if macro.word == "PLYS")
+    assert (card.value, card.second) == (10.0, 3.0)
+
+
 # Supports in the plane ---------------------------------------------------------------------------
 
 COUPLED = (*PLATE, "--layup", "[0_4/90_4]", "--velocity", "3000")

@@ -68,7 +68,6 @@ class Request:
     nonlinear: bool = False
     preload: Sequence[float | str] | None = None
     gages: Iterable[GagePlace] = ()
-    damage: bool = False
     giic: float | None = None
     cure: float | str | None = None
     title: str = ""
@@ -175,7 +174,8 @@ def impact(
     plies : int or bool or tuple of int, optional
         Store stresses and strains ply by ply, which :attr:`Result.plies` gives: the steps between
         rows, True for about 20 rows, or the steps and how many elements nearest to the load.  They
-        are large; none by default.
+        are large: none by default, and with `damage` and strengths about 20 rows of the elements
+        around the load.
     failure : int or bool, optional
         Evaluate the failure criteria, which need a named ply with strengths: the steps between
         evaluations, or True for the rows of `every`.  By default where `damage` finds strengths.
@@ -203,7 +203,8 @@ def impact(
     gages : iterable of tuple
         Place x, y and z from the mid-plane (length) and direction (degrees) of strain gages.
     damage : bool
-        Add strengths and toughness of a named ply, as far as they are known.
+        Add strengths and toughness of a named ply, as far as they are known, and store what the
+        pictures of failure and of stresses through the thickness show.
     giic : float, optional
         Toughness G_IIc of the delamination threshold, force/length; a named ply's by default.
     cure : float or str, optional
@@ -248,13 +249,12 @@ def impact(
             plate,
             laminate,
             Strike(projectile, contact, velocity, energy, at),
-            Numerics(patch, shear, shear_factor, duration, dt, every, plies, failure),
+            Numerics(patch, shear, shear_factor, duration, dt, every, plies, failure, damage),
             units=units,
             in_plane=in_plane,
             nonlinear=nonlinear,
             preload=preload,
             gages=gages,
-            damage=damage,
             giic=giic,
             cure=cure,
             title=title,
@@ -298,7 +298,7 @@ def author(asked: Request) -> Authored:
             "elastic law; prefer a measured law"
         )
         doubts += doubts_of_core(plies, struck)
-    damage = damages(plies, asked.giic, notes) if asked.damage else toughness(asked.giic)
+    damage = damages(plies, asked.giic, notes) if asked.numerics.damage else toughness(asked.giic)
     if asked.numerics.failure and not any(isinstance(s, model.Allowables) for s in damage):
         damage = [strengths_of(plies), *damage]
     stretches = asked.nonlinear or plies.is_coupled

@@ -7,18 +7,21 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
 
+import numpy as np
+
 from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.authoring.contact import parse_patch
 from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck.model import Allowables, Deck, Impact, Indentation, Macro, Patch, Shear
-from fecm.deck.outputs import Rows, RowsOfPlies, with_outputs
+from fecm.deck.outputs import PLY_ROWS, Rows, RowsOfPlies, with_outputs
 from fecm.mechanics.points import HERTZ
 from fecm.mechanics.quick_models import contact_time
 from fecm.mechanics.solutions import static_stiffness
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate, build_projectile
+from fecm.problem.problem import Problem
 
 ROWS = 200  # default number of stored rows of strains and displacements
 # Simulated time over half a period of the projectile on the plate's static stiffness, and least
@@ -26,6 +29,11 @@ ROWS = 200  # default number of stored rows of strains and displacements
 # ends it up to 2 % later.
 HALF_PERIODS = 1.25
 CONTACT_TIMES = 1.1
+
+# Elements whose ply stresses are stored with `damage`: those nearer to the load than so many times
+# the distance within which plate theory does not hold, and at least so many.
+AROUND_LOAD = 3.0
+FEWEST_ELEMENTS = 24
 
 AUTO = "auto"  # the default patch: a disc, or what a standard has
 EQUI: Literal["equi"] = "equi"  # the shear stiffness from equilibrium
@@ -44,8 +52,9 @@ class Numerics:
     duration: float | str | None = None
     dt: float | None = None
     every: int | None = None  # steps between stored rows
-    plies: RowsOfPlies | None = None  # the same of ply stresses
+    plies: RowsOfPlies | None = None  # the same of ply stresses, with `damage` of some elements
     failure: Rows | None = None  # the same of failure exposures, by default as `every`
+    damage: bool = False  # whether the deck is to show damage
 
     def contact_patch(self, *, prescribed: bool) -> Patch | None:
         """Contact patch; `prescribed` says whether a standard has the default one."""
@@ -71,29 +80,47 @@ class Numerics:
             return self.dt
         return rounded_time_step(critical_time_step(build_plate(deck, generate(deck))))
 
-    def program(self, deck: Deck, dt: float, duration: float) -> tuple[Macro, ...]:
-        """Macro program of an impact."""
+    def program(
+        self, deck: Deck, dt: float, duration: float, elements: int | None = None
+    ) -> tuple[Macro, ...]:
+        """Macro program of an impact; unless asked otherwise with ply stresses of `elements`."""
         steps = max(1, math.ceil(duration / dt - 1e-9))
         rows = float(self.every if self.every is not None else max(1, steps // ROWS))
         words = {"LMAS": 0.0, "DT": dt, "LOOP": float(steps), "TIME": 0.0}
         words |= {"RODP": rows, "DISP": rows, "NEXT": 0.0}
         macros = [Macro(word, value=value) for word, value in words.items()]
         failure = deck.has(Allowables) if self.failure is None else self.failure
-        return with_outputs(macros, failure=failure, plies=self.plies)
+        plies = self.plies
+        if plies is None and elements is not None:
+            plies = (max(1, steps // PLY_ROWS), elements)
+        return with_outputs(macros, failure=failure, plies=plies)
 
     def with_program(self, deck: Deck, dt: float, duration: float | None) -> Deck:
-        """The deck with its program; without a duration, it is longer than the contact."""
-        if duration is None:
-            duration = contact_duration(replace(deck, macros=self.program(deck, dt, dt)))
-        return replace(deck, macros=self.program(deck, dt, duration))
+        """The deck with its program; without a duration, it is longer than the contact.
+
+        With `damage` and strengths the program also stores ply stresses around the load.
+        """
+        with_plies = self.damage and deck.has(Allowables)
+        elements = None
+        if duration is None or with_plies:
+            loaded = load_deck(replace(deck, macros=self.program(deck, dt, dt)))
+            if loaded.errors():  # the deck is refused later
+                return replace(deck, macros=self.program(deck, dt, duration or dt))
+            (problem,) = loaded.problems
+            duration = contact_duration(problem) if duration is None else duration
+            elements = elements_around_load(problem) if with_plies else None
+        return replace(deck, macros=self.program(deck, dt, duration, elements))
 
 
-def contact_duration(deck: Deck) -> float:
+def elements_around_load(problem: Problem) -> int:
+    """Number of elements about the load in which the plies are most stressed, and those beside."""
+    near = np.count_nonzero(problem.distances < AROUND_LOAD * problem.reach_of_load)
+    return min(max(near, FEWEST_ELEMENTS), problem.deck.control.numel)
+
+
+def contact_duration(problem: Problem) -> float:
     """Simulated time: longer than the contact of the projectile with the static plate."""
-    loaded = load_deck(deck)
-    if loaded.errors():
-        return 1.0  # the deck is refused later
-    (problem,) = loaded.problems
+    deck = problem.deck
     assert problem.contact is not None
     stiffness = static_stiffness(problem.moving_plate, problem.contact)
     mass, velocity = build_projectile(deck).total_mass, deck.require(Impact).velocity

@@ -307,8 +307,8 @@ class Options:
 @option(
     "--damage",
     is_flag=True,
-    help="Add strengths and toughness of a named ply: failure exposures (ALLO, FAIL) and the "
-    "delamination threshold (DELA).",
+    help="Add strengths and toughness of a named ply: failure exposures (ALLO, FAIL), ply "
+    "stresses around the load (PLYS) and the delamination threshold (DELA).",
 )
 @option(
     "--giic",
@@ -419,9 +419,9 @@ class Options:
 )
 @option(
     "--plies",
-    type=list_of("N[,M]", click.IntRange(min=1), [1, 2]),
+    type=list_of("N[,M]", click.IntRange(min=0), [1, 2]),
     help="Store ply stresses at every N-th step (PLYS), of all elements or the M nearest to the "
-    "load.",
+    "load; 0 stores none.  [default with --damage: about 20 rows of the elements around the load]",
 )
 @option(
     "--failure",
@@ -522,12 +522,12 @@ def _author(options: Options, given: Collection[str]) -> Authored:
                 options.every,
                 _rows_of_plies(options.plies),
                 options.failure,
+                options.damage,
             ),
             units=laminate.units,
             in_plane=options.in_plane,
             nonlinear=options.nonlinear,
             preload=options.preload,
-            damage=options.damage,
             giic=options.giic,
             cure=options.cure,
             title=options.title,
@@ -541,7 +541,7 @@ def _rows_of_plies(given: tuple[int, ...] | None) -> RowsOfPlies | None:
     if given is None:
         return None
     steps, *elements = given
-    return (steps, elements[0]) if elements else steps
+    return (steps, elements[0]) if elements else steps or False
 
 
 def _additions(deck: Deck) -> list[str]:

@@ -197,12 +197,17 @@ class Problem:
         centres = element_centres(self.mesh.elements, self.mesh.coordinates)
         return np.asarray(np.hypot(*(centres - self.load_place).T))
 
+    @property
+    def reach_of_load(self) -> float:
+        """Distance from the load within which plate theory does not hold: patch's radius + h/2."""
+        return self.laminate.thickness / 2.0 + (0.0 if self.patch is None else self.patch.radius)
+
     def under_load(self, x: Floats, y: Floats) -> Bools:
-        """Whether plate theory does not hold at points: within the patch's radius + h/2 of it."""
+        """Whether plate theory does not hold at points."""
         if self.load_place is None:
             return np.zeros(x.shape, dtype=bool)
-        reach = self.laminate.thickness / 2.0 + (0.0 if self.patch is None else self.patch.radius)
-        return np.asarray(np.hypot(x - self.load_place[0], y - self.load_place[1]) < reach)
+        distance = np.hypot(x - self.load_place[0], y - self.load_place[1])
+        return np.asarray(distance < self.reach_of_load)
 
     @cached_property
     def contact(self) -> Floats | None:
