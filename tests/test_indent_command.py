@@ -38,6 +38,18 @@ def test_a_curve_of_the_deck_fits_back_to_the_decks_card(tmp_path: Path) -> None
     assert done.stdout.splitlines()[-2:] == ["EXPE", " 1912000.0 0.0006564     0.094       2.0"]
 
 
+def test_a_curve_has_the_units_of_the_deck_in_which_it_is_read(tmp_path: Path) -> None:
+    named = LONG.read_text().replace("COOR", "UNIT\nin lbf s\nCOOR", 1)
+    (tmp_path / "named.inp").write_text(named)
+    path = ("--path", "1e-3,0,2e-3,8e-4,3e-3,0", "--points", 60)
+    made = call("indent", "curve", "named.inp", *path, "-o", "test.csv", cwd=tmp_path)
+    assert made.exit_code == 0
+    assert (tmp_path / "test.csv").read_text().startswith("indentation (in),force (lbf),branch\n")
+    done = call("indent", "fit", "test.csv", cwd=tmp_path)
+    assert "units           in, lbf" in done.stdout
+    assert done.stdout.splitlines()[-1] == " 1912000.0 0.0006564     0.094       2.0"
+
+
 def test_a_fit_for_programs_has_every_value_with_its_error(tmp_path: Path) -> None:
     a, f = make_test()
     file = written(tmp_path / "test.csv", a, noisy(f, 0))

@@ -195,6 +195,11 @@ def test_the_command_prints_what_the_rod_does() -> None:
     np.testing.assert_array_equal(found["acceleration_far_end"], expected.accelerations[:, 2])
     np.testing.assert_array_equal(found["ratio_at_0.5"], expected.forces[:, 0] / found["force"])
     assert call("rod", "pulse", *SHAPE, *PUSH).stdout.startswith("time,force,force_at_0.5,ratio")
+    named = call("rod", "pulse", *SHAPE, *PUSH, "--units", "in-lbf-s").stdout.splitlines()[0]
+    assert named == (
+        "time (s),force (lbf),force_at_0.5 (lbf),ratio_at_0.5,acceleration_struck_end (in/s^2),"
+        "acceleration_middle (in/s^2),acceleration_far_end (in/s^2)"
+    )
 
 
 def test_a_file_gets_the_numbers_and_the_user_a_summary(tmp_path: Path) -> None:

@@ -23,9 +23,11 @@ UNSYMMETRIC = ("--layup", "0/30/70", "--ply-thickness", ".1", "--material", "rep
 
 
 def rows(done: Done) -> list[dict[str, str]]:
-    """The table that a call has printed."""
+    """The table that a call has printed, by names without units."""
     assert done.exit_code == 0, done.stderr
-    return list(csv.DictReader(io.StringIO(done.stdout)))
+    head, *lines = csv.reader(io.StringIO(done.stdout))
+    names = [name.partition(" (")[0] for name in head]
+    return [dict(zip(names, line, strict=True)) for line in lines]
 
 
 # Tables -----------------------------------------------------------------------------------------
@@ -96,7 +98,31 @@ def test_a_layup_gives_what_the_same_laminate_in_a_deck_gives(command: tuple[str
 
 def test_constants_of_a_ply_stand_for_a_named_one() -> None:
     ply = "0.000148,0.3,17.5e6,1.15e6,.8e6,.8e6,.8e6"
-    assert call("waves", "speeds", *LAYUP, "--ply", ply) == call("waves", "speeds", *LAMINATE)
+    own, named = (call("waves", "speeds", *LAYUP, *x) for x in (("--ply", ply), LAMINATE[-2:]))
+    assert rows(own) == rows(named)
+
+
+@pytest.mark.parametrize(
+    ("command", "header"),
+    [
+        (
+            ("dispersion", "--angle", "0", "--wavelengths", "1:2:2"),
+            "angle_deg,wavelength_over_h,mode,phase_velocity (in/s),angular_frequency (1/s)",
+        ),
+        (
+            ("speeds", "--step", "90"),
+            "angle_deg,extension (in/s),in_plane_shear (in/s),bending (in/s),twisting (in/s),"
+            "transverse_shear (in/s)",
+        ),
+        (
+            ("fronts", "--step", "90", "--time", "1e-5"),
+            "mode,normal_deg,time (s),x (in),y (in),ray_deg",
+        ),
+    ],
+)
+def test_headers_have_the_units_of_a_named_ply(command: tuple[str, ...], header: str) -> None:
+    done = call("waves", *command, *LAMINATE, "--units", "in-lbf-s")
+    assert done.stdout.splitlines()[0] == header
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,6 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
 
-import numpy as np
-
 from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.authoring.contact import parse_patch
@@ -114,7 +112,7 @@ class Numerics:
 
 def elements_around_load(problem: Problem) -> int:
     """Number of elements about the load in which the plies are most stressed, and those beside."""
-    near = np.count_nonzero(problem.distances < AROUND_LOAD * problem.reach_of_load)
+    near = int((problem.distances < AROUND_LOAD * problem.reach_of_load).sum())
     return min(max(near, FEWEST_ELEMENTS), problem.deck.control.numel)
 
 

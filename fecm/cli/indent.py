@@ -222,10 +222,12 @@ def curve(options: CurveOptions) -> None:
     if not walk or not all(math.isfinite(point.force) for point, _ in walk):
         raise RefusedError("the forces along --path overflow")
     columns = np.array([point for point, _ in walk]).T
-    options.targets.draw("studies:path_picture", *columns, unit_names(problem))
+    units = unit_names(problem)
+    options.targets.draw("studies:path_picture", *columns, units)
     branches = ("loading", "unloading", "reloading")
     rows = ((point.indentation, point.force, branches[branch]) for point, branch in walk)
-    options.targets.write("indentation,force,branch", rows)
+    dimensions = {"indentation": "length", "force": "force", "branch": ""}
+    options.targets.write(dimensions, units, rows)
 
 
 def _rigidities(options: CurveOptions) -> None:
@@ -251,8 +253,14 @@ def _rigidities(options: CurveOptions) -> None:
     if not np.all(np.isfinite(by)):
         raise RefusedError("the rigidities along --path overflow")
     named = dict(zip(("equation 3-9", "equation 3-7"), by, strict=True))
-    targets.draw("studies:rigidity_picture", peaks, named, slope.q, unit_names(problem))
-    targets.write("alpha_m,s_3_9,s_3_7", np.column_stack([peaks, *by]).tolist())
+    names = unit_names(problem)
+    targets.draw("studies:rigidity_picture", peaks, named, slope.q, names)
+    dimensions = {
+        "alpha_m": "length",
+        "s_3_9": f"force/length^{slope.q:g}",
+        "s_3_7": f"force/length^{contact_law.ACR_POWER:g}",
+    }
+    targets.write(dimensions, names, np.column_stack([peaks, *by]).tolist())
 
 
 def _permanent(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import functools
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -12,8 +12,10 @@ from typing import Any
 import click
 
 from fecm._files import check_outputs, writing
+from fecm._tables import csv_line
 from fecm.cli.common import DASH, RefusedError, note
 from fecm.cli.options import FILE_PATH, Decorated, stacked
+from fecm.deck.units import column_name, unit_of
 from fecm.plot.kinds import SUFFIXES
 from fecm.plot.pictures import imported, require_matplotlib, save
 
@@ -73,10 +75,19 @@ class OutputPaths:
             save(imported(place)(*data), self.picture, overwrite=self._overwrite)
             note(f"drew {self.picture}")
 
-    def write(self, header: str, rows: Iterable[Iterable[object]]) -> None:
-        """Write the table as CSV."""
-        lines = (",".join(map(str, row)) + "\n" for row in chain([[header]], rows))
-        write_lines(lines, self.table, overwrite=self._overwrite)
+    def write(
+        self, columns: Mapping[str, str], units: dict[str, str], rows: Iterable[Iterable[object]]
+    ) -> None:
+        """Write the table as CSV, the units after the names in the header.
+
+        `columns` has the dimension of each column, empty for pure numbers and texts; `units` are
+        the names of the units of length, force and time, empty if they are not known.
+        """
+        header = csv_line(
+            column_name(name, unit_of(dimension, units)) for name, dimension in columns.items()
+        )
+        lines = (",".join(map(str, row)) + "\n" for row in rows)
+        write_lines(chain([header], lines), self.table, overwrite=self._overwrite)
         if self.table != DASH:
             note(f"wrote {self.table}")
 

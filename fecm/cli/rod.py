@@ -190,7 +190,8 @@ def pulse(options: PulseOptions) -> None:
     )
     targets = options.targets
     targets.draw("studies:pulse_picture", found, found.filtered, found.units)
-    targets.write(*pulse_test.table(found, found.filtered))
+    columns, rows = pulse_test.table(found, found.filtered)
+    targets.write(columns, found.units, rows)
     if targets.table != DASH:
         click.echo(found)
 
@@ -245,7 +246,8 @@ def filter_(history: Path, transducer: Filter, column: str | None, targets: Outp
     named = {**series.beside, series.name: series.values, "filtered": filtered}
     targets.draw("studies:filter_picture", series.time, named, series.units, series.dimension)
     columns = np.stack([series.time, series.values, filtered], axis=1)
-    targets.write(f"time,{series.name},filtered", columns[series.first :].tolist())
+    dimensions = {"time": "time", series.name: series.dimension, "filtered": series.dimension}
+    targets.write(dimensions, dict(series.units), columns[series.first :].tolist())
 
 
 @rod.command(

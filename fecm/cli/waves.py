@@ -28,6 +28,7 @@ from fecm.cli.options import (
     stacked,
 )
 from fecm.cli.outputs import OutputPaths, outputs
+from fecm.deck.units import VELOCITY
 from fecm.studies.waves.study import Waves, waves_of
 from fecm.studies.waves.study import waves as waves_in
 
@@ -207,7 +208,14 @@ def dispersion(
         for place, mode in enumerate(curve.modes)
     )
     targets.draw("waves:dispersion_picture", waves.medium, curves)
-    targets.write("angle_deg,wavelength_over_h,mode,phase_velocity,angular_frequency", rows)
+    dimensions = {
+        "angle_deg": "",
+        "wavelength_over_h": "",
+        "mode": "",
+        "phase_velocity": VELOCITY,
+        "angular_frequency": "1/time",
+    }
+    targets.write(dimensions, waves.units, rows)
 
 
 @waves.command(
@@ -226,7 +234,7 @@ def speeds(step: float, source: Source, targets: OutputPaths) -> None:
     rows = np.column_stack([fronts.normal, fronts.velocity]).tolist()
     targets.draw("waves:speeds_picture", waves.surfaces, waves.units)
     _note_names(waves)
-    targets.write(",".join(("angle_deg", *fronts.modes)), rows)
+    targets.write({"angle_deg": "", **dict.fromkeys(fronts.modes, VELOCITY)}, waves.units, rows)
 
 
 @waves.command(
@@ -286,7 +294,15 @@ def fronts(
             if own := [cusp for cusp in cusps if cusp.mode == mode]:
                 texts = (f"normal {c.normal:.4f} deg at {c.x:.6g}, {c.y:.6g}" for c in own)
                 note(f"{mode} has {len(own)} cusps at time {time:g}: {'; '.join(texts)}")
-    targets.write("mode,normal_deg,time,x,y,ray_deg", rows)
+    dimensions = {
+        "mode": "",
+        "normal_deg": "",
+        "time": "time",
+        "x": "length",
+        "y": "length",
+        "ray_deg": "",
+    }
+    targets.write(dimensions, waves.units, rows)
 
 
 def _bound(rows: float) -> None:

@@ -7,14 +7,13 @@ Python's repr and can be read back exactly.
 
 from __future__ import annotations
 
-import csv
-import io
 import itertools
 import re
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
+from fecm._tables import csv_line
 from fecm._typing import Array
 from fecm.deck.units import column_name
 from fecm.results import schema
@@ -109,10 +108,8 @@ def lines(
 
 def _lines(header: Sequence[str], rows: Iterator[tuple[float, ...]]) -> Iterator[str]:
     """Lines of a header and of rows of numbers."""
-    first = io.StringIO()
-    csv.writer(first, lineterminator="\n").writerow(header)
     texts = (",".join(map(repr, row)) + "\n" for row in rows)
-    return itertools.chain([first.getvalue()], texts)
+    return itertools.chain([csv_line(header)], texts)
 
 
 def _members(result: Stored, name: str) -> list[str]:

@@ -25,8 +25,9 @@ def csv_lines(sweep: StoredSweep, name: str = CASES) -> Iterator[str]:
 
     ``"cases"`` has the values and results of every case, ``"history"`` the contact force after
     every step of every case that was run.  Cases count from 0, steps from 1.  Units follow the
-    names in the header.  Numbers are written as Python's repr, which preserves every bit.  An apostrophe precedes texts that a spreadsheet
-    would read as formulas.  Raises ExportError if there is no such table.
+    names in the header.  Numbers are written as Python's repr, which preserves every bit.  An
+    apostrophe precedes texts that a spreadsheet would read as formulas.  Raises ExportError if
+    there is no such table.
     """
     if name not in (CASES, HISTORY):
         raise ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")

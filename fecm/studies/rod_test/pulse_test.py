@@ -227,14 +227,21 @@ def displacement_row(rod: Rod, x: float) -> Floats:
     return row
 
 
-def table(history: RodHistory, filtered: Floats | None = None) -> tuple[str, list[list[float]]]:
-    """Return header and rows of a CSV of the history, with the filtered forces at the stations."""
+def table(
+    history: RodHistory, filtered: Floats | None = None
+) -> tuple[dict[str, str], list[list[float]]]:
+    """Return dimensions by column, and rows, of a CSV of the history.
+
+    It has the filtered forces at the stations, if there are any.
+    """
     names = [f"{x:.12g}" for x in history.stations]
-    header = ["time", "force", *(f"force_at_{x}" for x in names)]
+    dimensions = {"time": "time", "force": "force"}
+    dimensions |= dict.fromkeys((f"force_at_{x}" for x in names), "force")
     columns = [history.time[:, None], history.applied[:, None], history.forces]
     if filtered is not None:
-        header += [f"filtered_at_{x}" for x in names]
+        dimensions |= dict.fromkeys((f"filtered_at_{x}" for x in names), "force")
         columns.append(filtered)
-    header += [f"ratio_at_{x}" for x in names] + [f"acceleration_{point}" for point in POINTS]
+    dimensions |= dict.fromkeys((f"ratio_at_{x}" for x in names), "")
+    dimensions |= dict.fromkeys((f"acceleration_{point}" for point in POINTS), "length/time^2")
     columns += [history.ratios, history.accelerations]
-    return ",".join(header), np.hstack(columns).tolist()
+    return dimensions, np.hstack(columns).tolist()
