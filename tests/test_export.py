@@ -295,7 +295,7 @@ def test_an_unknown_name_is_answered_with_near_ones(result: Result, name: str, h
         ),
         ("tape3", "step,time (s),node,u (mm),v (mm),w (mm),theta_x,theta_y"),
         ("tape8/kappa_x", "step,time (s),element,point,kappa_x (1/mm)"),
-        ("laminate/D", "row,xx (mJ),yy (mJ),xy (mJ)"),
+        ("laminate/D", "row,xx (N*mm),yy (N*mm),xy (N*mm)"),
         ("mesh/coordinates", "node,x (mm),y (mm)"),
     ],
 )

@@ -189,7 +189,7 @@ def test_columns_of_cases_have_the_units_that_the_deck_names(tmp_path: Path) -> 
     assert names[:5] == ["case", "rod_mass (t)", "velocity (mm/s)", "peak_force (N)",
                          "time_of_peak (s)"]  # fmt: skip
     assert names[-4:] == ["dt (s)", "steps", "status", "validity"]
-    assert "energy_absorbed (mJ)" in names
+    assert "energy_absorbed (N*mm)" in names
     assert (tmp_path / "history.csv").read_text().startswith("case,step,time (s),force (N)\n")
 
 

@@ -71,8 +71,8 @@ def column_name(name: str, unit: str) -> str:
 
 
 def short_name(unit: str) -> str:
-    """Name of a unit without products: t of N*s^2/mm, mJ of N*mm; others as they are."""
-    return (with_prefix(unit, 0) if "*" in unit else "") or unit
+    """Name of a unit: t of the mass N*s^2/mm; others as they are."""
+    return with_prefix(unit, 0) if PREFIXED.get(unit, ("",))[0] == "g" else unit
 
 
 def in_si(dimension: str, names: dict[str, str]) -> float | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 
-from fecm.deck.units import unit_names, unit_of
+from fecm.deck.units import readable, unit_names, unit_of
 from fecm.identification.identify import CARDS, Identification
 from fecm.plot.histories import fit_picture
 from fecm.report.content import (
@@ -59,8 +59,10 @@ def _unit(found: Identification, name: str) -> str:
 
 def _said(found: Identification, name: str) -> str:
     """A parameter with its standard error."""
-    value, error = found.values[name], found.errors[name]
-    return f"{name} = {value:.5g} ± {error:.2g} {_unit(found, name)}".rstrip()
+    value = found.values[name]
+    power, unit = readable(value, _unit(found, name), digits=5)
+    best, error = value / 10.0**power, found.errors[name] / 10.0**power
+    return f"{name} = {best:.5g} ± {error:.2g} {unit}".rstrip()
 
 
 def _judgements(found: Identification) -> Iterator[Judgement]:

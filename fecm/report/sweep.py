@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from fecm.deck.units import short_name
 from fecm.plot.kinds import Kind
 from fecm.report import figures
 from fecm.report.content import (
@@ -122,7 +123,8 @@ def _varied(sweep: SweepResult) -> list[Block]:
             said = ", ".join(texts[:MOST_VALUES]) + (", …" if len(texts) > MOST_VALUES else "")
         else:
             said = f"{values.min():.6g} to {values.max():.6g}"
-        rows.append((name, Number(len(different), str(len(different))), said, unit or UNKNOWN))
+        count = Number(len(different), str(len(different)))
+        rows.append((name, count, said, short_name(unit) or UNKNOWN))
     return table(rows, ("name", "different values", "values", "unit"))
 
 

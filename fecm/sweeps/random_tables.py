@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from fecm.deck.units import column_name, short_name
+from fecm.deck.units import column_name
 from fecm.sweeps.copula import pairs_of
 from fecm.sweeps.limits import THRESHOLD
 from fecm.sweeps.random_result import RandomResult
@@ -44,7 +44,7 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
         lines += ["", *([random.label(number)] if place else [])]
         own = [random.statistics[name] for name in chosen]
         rows = [[s.mean[place], s.standard_deviation[place], *s.quantiles[place]] for s in own]
-        columns = [chosen, [short_name(unit(name)) for name in chosen]]
+        columns = [chosen, [unit(name) for name in chosen]]
         columns += [[f"{value:.6g}" for value in row] for row in zip(*rows, strict=True)]
         lacking = [design.draws - int(s.draws[place]) for s in own]
         columns.append([str(count) for count in lacking] if any(lacking) else [""] * len(own))
