@@ -7,9 +7,12 @@ import re
 import sys
 from importlib.metadata import version as installed
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 from latex2mathml.converter import convert
+
+WIDTH = 64  # of notes above tables: what fits between both side bars
 
 project = "fecm"
 author = "the fecm developers"
@@ -109,6 +112,32 @@ def _captions(app: Any, doctree: Any) -> None:
         paragraph.replace_self(figures)
 
 
+def _is_row(line: str) -> bool:
+    """Whether a line of output is one of a table, of three columns at least."""
+    return len(re.split(" {2,}", line.strip())) > 2
+
+
+def _folded(line: str) -> str:
+    """Wrap a note."""
+    return "\n".join(wrap(line, WIDTH)) if line.startswith("fecm: ") else line
+
+
+def _wrap_output(app: Any, doctree: Any) -> None:
+    """Let browsers wrap output; beside tables, whose lines must stay whole, wrap the notes here."""
+    from docutils import nodes
+
+    for block in doctree.findall(nodes.literal_block):
+        if block.get("language") != "text":
+            continue
+        lines = block.astext().splitlines()
+        if not any(map(_is_row, lines)):
+            block["classes"].append("prose")
+            continue
+        block.rawsource = "\n".join(map(_folded, lines))
+        block.children = []
+        block += nodes.Text(block.rawsource)
+
+
 def _literally(app: Any, context: Any, lines: list[str]) -> None:
     """Keep bars, stars and addresses in help texts from being markup."""
     lines[:] = [re.sub(r"[|*]|(?<=:)//", r"\\\g<0>", line) for line in lines]
@@ -116,6 +145,7 @@ def _literally(app: Any, context: Any, lines: list[str]) -> None:
 
 def setup(app: Any) -> None:
     """Register the renderer of equations, and correct help texts."""
+    app.connect("doctree-read", _wrap_output)
     for part in ("description", "options"):
         app.connect(f"sphinx-click-process-{part}", _literally)
     app.connect("doctree-read", _captions)

@@ -25,7 +25,6 @@ from fecm.report.content import (
     table,
 )
 from fecm.report.figures import inside
-from fecm.sweeps.values import dimension_of
 
 
 def identification_page(name: str, found: Identification) -> Page:
@@ -52,15 +51,10 @@ def identification_page(name: str, found: Identification) -> Page:
     return Page(found.deck.title or f"Identification from {name}", tuple(verdict), level, body)
 
 
-def _unit(found: Identification, name: str) -> str:
-    """Unit of a parameter."""
-    return unit_of(dimension_of(name), unit_names(found.deck))
-
-
 def _said(found: Identification, name: str) -> str:
     """A parameter with its standard error."""
     value = found.values[name]
-    power, unit = readable(value, _unit(found, name), digits=5)
+    power, unit = readable(value, found.unit(name), digits=5)
     best, error = value / 10.0**power, found.errors[name] / 10.0**power
     return f"{name} = {best:.5g} ± {error:.2g} {unit}".rstrip()
 
@@ -81,7 +75,7 @@ def _results(found: Identification) -> Iterator[Block]:
     """Values with errors, their correlations, and what errors of the plate do to them."""
     rows: list[tuple[Cell, ...]] = []
     for name, value in found.values.items():
-        unit = _unit(found, name)
+        unit = found.unit(name)
         cells = (value, found.errors[name], found.start[name])
         rows.append((name, *(number(cell, unit) for cell in cells)))
     yield from table(rows, ("parameter", "value", "standard error", "start"), "Fitted values")
