@@ -1,0 +1,182 @@
+"""Reports in a real browser, on paper, and before a validator of HTML."""
+
+from __future__ import annotations
+
+import io
+import os
+import re
+import shutil
+import subprocess
+import unicodedata
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import fecm
+from fecm.report.page import render
+from fecm.report.report import page_of
+from tests.browser import Browser, find_browser
+from tests.calls import call
+from tests.decks import LONG, small
+from tests.pages import read_page
+from tests.test_first_failure import failing
+
+KINDS = ("run", "runs", "sweep", "random", "fit")
+LARGEST = 1_500_000  # bytes of a page
+AA = 4.5  # contrast of text, WCAG 2.2, success criterion 1.4.3
+A4 = (595.0, 842.0)  # points
+PAPER = (680, 1009)  # pixels of A4 within margins of 15 mm, of which 96 make an inch
+MARKS = re.compile("[●▲■○]")  # before verdicts, drawn by the style
+LONG_TITLE = "<b>" + 300 * "x"
+
+# Colours of every text and of what lies behind it.
+COLOURS = """
+[...new Set([...document.querySelectorAll("body *")]
+  .filter(one => [...one.childNodes].some(node => node.nodeType === 3 && node.data.trim()))
+  .map(one => {
+    let behind = one;
+    const clear = "rgba(0, 0, 0, 0)";
+    while (behind && getComputedStyle(behind).backgroundColor === clear)
+      behind = behind.parentElement;
+    const paper = behind ? getComputedStyle(behind).backgroundColor : "none";
+    return getComputedStyle(one).color + "/" + paper;
+  }))]
+"""
+
+pytestmark = pytest.mark.browser
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """A page of every kind, as files."""
+    folder = tmp_path_factory.mktemp("pages")
+    run = fecm.run_one(failing(steps=160).replace("EXPE", "DELA\n       .02\nEXPE", 1))
+    run.attributes["title"] = LONG_TITLE
+    random = fecm.sweep(
+        LONG,
+        random={"velocity": "normal:115,5", "k": "lognormal:1.9e6,0.1"},
+        samples=16,
+        exceed={"peak_force": 85.0},
+    )
+    results = {
+        "run": {"run": run},
+        "runs": {"one": run, "other": fecm.run_one(small())},
+        "sweep": {"map": fecm.sweep(LONG, {"velocity": [50.0, 80.0, 400.0], "k": [1e6, 2e6]})},
+        "random": {"random": random},
+    }
+    for kind, given in results.items():
+        html = render(page_of(given))  # type: ignore[arg-type]
+        (folder / f"{kind}.html").write_text(html, encoding="utf-8", newline="\n")
+    example = [fecm.examples.path(name) for name in ("impact-115.inp", "measured-force.csv")]
+    done = call(
+        "identify", *example, "--free", "k,velocity", "--report", folder / "fit.html", cwd=folder
+    )
+    assert done.exit_code == 0, done.stderr
+    return {kind: folder / f"{kind}.html" for kind in KINDS}
+
+
+@pytest.fixture(scope="module")
+def browser(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Browser]:
+    """A headless browser."""
+    program = find_browser()
+    if program is None:
+        pytest.skip("no Chromium or Chrome found")
+    with Browser(program, tmp_path_factory.mktemp("profile")) as found:
+        yield found
+
+
+def contrast(text: str, paper: str) -> float:
+    """Contrast of two colours, as WCAG defines it."""
+    first, second = sorted((_luminance(text), _luminance(paper)))
+    return (second + 0.05) / (first + 0.05)
+
+
+def _luminance(colour: str) -> float:
+    """Relative luminance of ``rgb(r, g, b)``."""
+    shares = [int(number) / 255 for number in re.findall(r"\d+", colour)]
+    assert len(shares) == 3, colour
+    linear = [s / 12.92 if s <= 0.04045 else ((s + 0.055) / 1.055) ** 2.4 for s in shares]
+    return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2]
+
+
+def packed(text: str) -> str:
+    """A text without spaces, and without the ligatures that fonts put in."""
+    return "".join(unicodedata.normalize("NFKC", text).split())
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("width", [390, 1400])
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_page_asks_for_nothing_complains_of_nothing_and_fits_the_window(
+    pages: dict[str, Path], browser: Browser, kind: str, width: int, scheme: str
+) -> None:
+    browser.open(pages[kind], width=width, scheme=scheme)
+    assert browser.requests() == [pages[kind].as_uri()]
+    assert browser.complaints() == []
+    assert browser.value("document.documentElement.scrollWidth") == width
+    assert browser.value("[...document.images].every(one => one.naturalWidth > 0)")
+    dark = _luminance(browser.value("getComputedStyle(document.body).backgroundColor")) < 0.2
+    assert dark == (scheme == "dark")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_text_has_the_contrast_of_wcag_aa(
+    pages: dict[str, Path], browser: Browser, kind: str, scheme: str
+) -> None:
+    browser.open(pages[kind], scheme=scheme)
+    pairs = [tuple(pair.split("/")) for pair in browser.value(COLOURS)]
+    assert len(pairs) >= 3
+    assert {pair: contrast(*pair) for pair in pairs if contrast(*pair) < AA} == {}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_page_is_the_same_without_scripts(
+    pages: dict[str, Path], browser: Browser, kind: str
+) -> None:
+    browser.open(pages[kind])
+    with_scripts = browser.do("Page.captureScreenshot", captureBeyondViewport=True)
+    browser.do("Emulation.setScriptExecutionDisabled", value=True)
+    try:
+        browser.open(pages[kind])
+        without = browser.do("Page.captureScreenshot", captureBeyondViewport=True)
+    finally:
+        browser.do("Emulation.setScriptExecutionDisabled", value=False)
+    assert without == with_scripts
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_on_paper_no_row_is_cut_and_no_picture(
+    pages: dict[str, Path], browser: Browser, kind: str
+) -> None:
+    pypdf = pytest.importorskip("pypdf", reason="pypdf reads the printed page")
+    browser.open(pages[kind], width=PAPER[0], media="print")
+    sizes = browser.value(
+        '[...document.querySelectorAll("figure")].map(one => '
+        "[one.getBoundingClientRect().right, one.getBoundingClientRect().height])"
+    )
+    assert all(right <= PAPER[0] + 1 and height <= PAPER[1] for right, height in sizes)
+    assert browser.value("document.documentElement.scrollWidth") == PAPER[0]
+    printed = pypdf.PdfReader(io.BytesIO(browser.pdf())).pages
+    assert len(printed) >= 2
+    for sheet in printed:
+        assert [float(side) for side in sheet.mediabox[2:]] == pytest.approx(A4, abs=1.0)
+    texts = [packed(MARKS.sub("", sheet.extract_text())) for sheet in printed]
+    rows = ["".join(cell.text for cell in row) for row in read_page(pages[kind].read_text()).rows]
+    assert len(rows) > 10
+    assert [row for row in rows if not any(packed(row) in text for text in texts)] == []
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_page_is_small_enough_for_a_letter(pages: dict[str, Path], kind: str) -> None:
+    assert pages[kind].stat().st_size < LARGEST
+
+
+def test_a_validator_of_html_finds_no_error(pages: dict[str, Path]) -> None:
+    jar, java = os.environ.get("VNU_JAR"), shutil.which("java")
+    if not (jar and java):
+        pytest.skip("no java, or VNU_JAR does not name the Nu HTML checker (npm install vnu-jar)")
+    command = [java, "-jar", jar, "--errors-only", "--stdout", *map(str, pages.values())]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
