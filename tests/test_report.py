@@ -74,6 +74,7 @@ def test_a_reader_of_the_page_alone_learns_what_happened(failed: Result, shown: 
     text = shown.text
     for said in (
         f"peak force {failed.force.max():.4g}",
+        "(elastic: beyond delamination at 26.5655 and the first failure)",
         "passes the delamination threshold of",
         f"first failure: {first.mode} ({first.criterion.replace('_', ' ')}), ply {first.ply}",
         "doubtful",

@@ -39,7 +39,7 @@ from fecm.results.exposures import largest_exposures
 from fecm.results.first_failure import first_failures, threshold_energy
 from fecm.results.metrics import INTEGERS, METRICS
 from fecm.results.result import Result
-from fecm.results.summary import LABEL_WIDTH, UNDECIDED, summary
+from fecm.results.summary import LABEL_WIDTH, UNDECIDED, elastic_doubt, summary
 
 WORDS = {
     Level.WITHIN: "All quantities are within the range of the model.",
@@ -163,9 +163,9 @@ def _sentence(result: Result, problem: Problem | None) -> str:
     parts = []
     if force[peak] > 0.0:
         at_least = "at least " if result.end in UNDECIDED else ""
-        parts.append(
-            f"peak force {at_least}{said(force[peak], 'force')} at {said(time[peak], 'time')}"
-        )
+        size = f"{at_least}{said(force[peak], 'force')} at {said(time[peak], 'time')}"
+        doubt = elastic_doubt(result, float(force[peak]))
+        parts.append(f"peak force {size} ({doubt})" if doubt else f"peak force {size}")
     else:
         parts.append("there was no contact")
     if result.threshold:
@@ -234,8 +234,23 @@ def _metrics(results: Mapping[str, Result]) -> list[Block]:
             whole = key in INTEGERS and math.isfinite(value)
             unit = unit_of(dimension, result.units)
             cells.append(Number(value, f"{value:.0f}") if whole else number(value, unit))
+        if key == "peak_force":
+            description = f"{description}{_elastic_peaks(results)}"
         rows.append((key.replace("_", " "), *cells, description))
     return table(rows, ("metric", *(results if len(results) > 1 else ("value",)), "meaning"))
+
+
+def _elastic_peaks(results: Mapping[str, Result]) -> str:
+    """Peaks that are those of an elastic plate only, in brackets."""
+    doubts = {
+        name: elastic_doubt(one, float(one["history/force"].max(initial=0.0)))
+        for name, one in results.items()
+        if "history/force" in one
+    }
+    said = [f"{name} {doubt}" for name, doubt in doubts.items() if doubt]
+    if len(results) == 1:
+        said = [doubt for doubt in doubts.values() if doubt]
+    return f" ({'; '.join(said)})" if said else ""
 
 
 def _lower_bound(result: Result) -> Cell:

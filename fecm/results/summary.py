@@ -227,7 +227,7 @@ def _peak_force(result: Stored) -> str:
         text = f"{_quantity(result, force[peak], 'force')} at time {at} (step {peak + 1})"
         if (end := end_of(result)) in UNDECIDED:
             text = f"at least {text}, as the run ends {UNDECIDED[end]}"
-    doubt = _elastic(result, float(force[peak]))
+    doubt = elastic_doubt(result, float(force[peak]))
     return f"{text} ({doubt})" if doubt else text
 
 
@@ -286,7 +286,7 @@ def _energy_balance(result: Stored) -> str:
     return f"worst error {share} {_quantity(result, initial, 'force*length')}"
 
 
-def _elastic(result: Stored, peak: float) -> str:
+def elastic_doubt(result: Stored, peak: float) -> str:
     """Why a peak force is that of an elastic plate only; empty if it may be real."""
     beyond = []
     if result.threshold and peak > CROSSED * (force := float(result.threshold["force"])):
