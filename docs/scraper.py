@@ -11,11 +11,11 @@ from sphinx_gallery.scrapers import figure_rst
 # In the gallery; others follow.
 ORDER = (
     "drop_weight_test", "first_failure", "energy_of_delamination", "probability_of_delamination",
-    "contact_from_a_measurement", "overlay_of_a_measurement", "posterior", "deck_without_text",
-    "parametric_study", "table_of_cases", "animation", "plate_with_a_hole", "ply_stresses",
-    "stretching_plate", "sandwich_core", "mesh_convergence", "layup_optimisation", "sobol_indices",
-    "process_pool", "dask_cluster", "trusted_result", "own_projectile", "own_contact_law",
-    "axisymmetric_projectile",
+    "contact_from_a_measurement", "reports", "overlay_of_a_measurement", "posterior",
+    "deck_without_text", "parametric_study", "table_of_cases", "animation", "plate_with_a_hole",
+    "ply_stresses", "stretching_plate", "sandwich_core", "mesh_convergence", "layup_optimisation",
+    "sobol_indices", "process_pool", "dask_cluster", "trusted_result", "own_projectile",
+    "own_contact_law", "axisymmetric_projectile",
 )  # fmt: skip
 # Variables of the scripts that were run, for their thumbnails.
 _VARIABLES: dict[str, dict[str, Any]] = {}
@@ -36,7 +36,26 @@ def written_pictures(block: Any, variables: dict[str, Any], conf: dict[str, Any]
         target.write_bytes(written.read_bytes())
         written.unlink()
         shown.append(target)
-    return figure_rst(shown, conf["src_dir"]) if shown else ""
+    pictures = figure_rst(shown, conf["src_dir"]) if shown else ""
+    return f"{pictures}{_written_pages(Path(conf['src_dir']))}"
+
+
+def _written_pages(source: Path) -> str:
+    """Move the pages that a script has written to the site's static files, and link them."""
+    items = []
+    for written in sorted(Path().glob("*.html")):
+        folder = source / "_static" / "reports"
+        folder.mkdir(exist_ok=True)
+        picture = thumbnails.of_page(written.read_text("utf-8"))
+        (folder / f"{written.stem}.svg").write_bytes(picture)
+        (folder / written.name).write_bytes(written.read_bytes())
+        written.unlink()
+        address, name = f"../_static/reports/{written.stem}", written.stem.replace("-", " ")
+        items.append(
+            f'<a href="{address}.html"><img src="{address}.svg" width="160" alt=""><br>{name}</a>'
+        )
+    lines = "".join(f"    {item}\n" for item in items)
+    return f'\n.. raw:: html\n\n    <div class="reports">\n{lines}    </div>\n\n' if items else ""
 
 
 def draw_thumbnails(app: Any) -> None:

@@ -5,6 +5,8 @@ They are drawn from what a script has computed, when the site is built.
 
 from __future__ import annotations
 
+import base64
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -147,9 +149,17 @@ OWN: dict[str, Callable[[Any, Names], None]] = {
     "ply_stresses": lambda ax, names: as_drawn(ax, names["left"]),
     "posterior": density,
     "probability_of_delamination": probability,
+    "reports": lambda ax, names: forces(ax, {key: names["pages"][key] for key in ("drop-weight",)}),
     "sobol_indices": lambda ax, names: bars(ax, names["found"]["S1"], names["indices"].first),
     "table_of_cases": lambda ax, names: bars(ax, names["results"]["peak_force"]),
 }
+
+
+def of_page(html: str) -> bytes:
+    """The first drawing of a report, for its link."""
+    found = re.search(r'src="data:image/svg\+xml;base64,([^"]+)"', html)
+    assert found is not None
+    return base64.b64decode(found[1])
 
 
 def drawn(script: str, names: Names, path: Path) -> bool:

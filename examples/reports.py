@@ -1,0 +1,31 @@
+"""Pages to hand on
+================
+
+A report is one HTML file about a run, a sweep, a random sweep, or a fit. These are five of them:
+the report's experiment, a drop-weight test, a map, a probability, and a contact law from a measured
+force.
+"""
+
+import warnings
+
+import numpy as np
+
+import fecm
+
+warnings.simplefilter("ignore", fecm.FecmWarning)  # the pages say how far each result holds
+report, drop, measured = (
+    fecm.examples.path(name) for name in ("impact-115.inp", "drop-weight.inp", "measured-force.csv")
+)
+laws = {"velocity": "normal:1300,60", "k": "lognormal:42000,0.2"}
+grid = {"velocity": [600, 900, 1200, 1500, 1800], "k": [2e4, 3e4, 4e4, 6e4]}
+threshold = {"peak_force": "threshold"}
+time, force = np.loadtxt(measured, delimiter=",", skiprows=3, unpack=True)
+pages = {
+    "report-deck": fecm.run_one(report),
+    "drop-weight": fecm.run_one(drop),
+    "map": fecm.sweep(drop, grid),
+    "random": fecm.sweep(drop, random=laws, samples=64, exceed=threshold),
+    "identification": fecm.identify(report, time, force, ["k", "velocity"]),
+}
+for name, found in pages.items():
+    found.report(f"{name}.html")
