@@ -20,7 +20,7 @@ from fecm.results.first_failure import first_failures
 from fecm.results.metrics import METRICS
 from fecm.results.result import Result
 from tests.calls import assert_unusable, call
-from tests.decks import LONG, small
+from tests.decks import LONG, ROOT, small
 from tests.pages import Page, agrees, read_page
 from tests.test_first_failure import failing
 
@@ -331,3 +331,31 @@ def test_the_notation_of_a_layup_is_read_back(
     angles = plies * times
     angles = angles + angles[::-1] if mirrored else angles
     assert parse_layup(layup_text(angles)) == angles
+
+
+@pytest.mark.usefixtures("_undrawn")
+def test_a_static_result_beyond_the_linear_plate_is_outside_the_model() -> None:
+    result = fecm.run_one(ROOT / "decks" / "static-bending.inp")
+    assert "464 h" in result.notes[0]
+    assert page(static=result).row("notes of the run")[1].text == "outside the model"
+
+
+@pytest.mark.usefixtures("_undrawn")
+def test_what_a_run_that_is_cut_off_has_not_reached_is_doubtful() -> None:
+    row = page(one=fecm.run_one(failing(steps=20))).row("largest exposure")
+    assert row[1].text == "doubtful"
+    assert "so far" in row[2].text
+
+
+@pytest.mark.usefixtures("_undrawn")
+def test_a_result_without_a_readable_deck_is_doubtful() -> None:
+    result = fecm.run_one(small())
+    result.deck_text = ""
+    assert page(one=result).row("deck")[1].text == "doubtful"
+
+
+@pytest.mark.usefixtures("_undrawn")
+def test_the_range_of_a_sweep_says_how_many_cases_have_it() -> None:
+    sweep = fecm.sweep(small(), {"velocity": [50.0, 80.0], "duration": [2e-6, 4e-4]})
+    known = int(np.isfinite(sweep["peak_force"]).sum())
+    assert f"in the {known} of 4 cases that have it" in page(sweep=sweep).text

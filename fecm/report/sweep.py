@@ -80,7 +80,9 @@ def _sentences(sweep: SweepResult) -> Iterator[str]:
     if np.isfinite(values).any():
         unit = sweep.unit(what)
         ends = [shown(float(end), unit) for end in (np.nanmin(values), np.nanmax(values))]
-        yield f"{what.replace('_', ' ').capitalize()}: {' to '.join(ends)}."
+        known = int(np.isfinite(values).sum())
+        some = f" in the {known} of {len(values)} cases that have it" if known < len(values) else ""
+        yield f"{what.replace('_', ' ').capitalize()}: {' to '.join(ends)}{some}."
 
 
 def _fine(sweep: SweepResult, name: str) -> np.ndarray:

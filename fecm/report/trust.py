@@ -20,12 +20,14 @@ from fecm.results.errors import ResultFileError
 from fecm.results.exposures import FEWEST, evaluations_in_contact, largest_exposures
 from fecm.results.metrics import MOBILITY
 from fecm.results.result import Result
+from fecm.results.summary import UNDECIDED
 from fecm.results.validity import BENT, CROSSED, INDENTATION, SLOPE, STRAIN, Reason, reasons_of
 
 # Errors of the energy balance, relative to the energy put in, up to which it is fine.
 BALANCED = 1e-3
 # Change of the static deflection by the shear stiffness from equilibrium that is worth a doubt.
 NOTABLE_SHEAR = 0.02
+SO_FAR = "so far: the run ends before its peak"
 ENDS = {
     End.OVER: (Level.WITHIN, "contact over", ""),
     End.PASSED: (
@@ -61,6 +63,13 @@ def problem_of(result: Result) -> tuple[Problem | None, list[str]]:
 def judgements(result: Result, problem: Problem | None) -> Iterator[Judgement]:
     """Judge a result by what its file holds, and by its deck."""
     reasons = reasons_of(result.validity)
+    if problem is None:
+        words = "the result holds no deck that can be read: mesh and limits are not judged"
+        yield Judgement(Level.DOUBTFUL, "deck", UNKNOWN, words)
+    if result.notes and not result.validity:  # without impact, or of an older version
+        count = len(result.notes)
+        words = "what the run itself says of its range; see the notes"
+        yield Judgement(Level.OUTSIDE, "notes of the run", Number(count, str(count)), words)
     if result.end is not None:
         level, said, words = ENDS[result.end]
         yield Judgement(level, "end of the run", said, words)
@@ -123,7 +132,9 @@ def _failure(result: Result) -> Iterator[Judgement]:
     words = f"{spelt(top.criterion)}; " + (
         "the run is elastic beyond the first failure" if broken else "1 is failure"
     )
-    level = Level.DOUBTFUL if broken else Level.WITHIN
+    if is_open := result.end in UNDECIDED and not broken:
+        words = f"{words}; {SO_FAR}"
+    level = Level.DOUBTFUL if broken or is_open else Level.WITHIN
     yield Judgement(level, "largest exposure", number(top.exposure, digits=4), words)
     count = evaluations_in_contact(result)
     if count is not None and "history/force" in result:
@@ -145,8 +156,9 @@ def _threshold(result: Result) -> Iterator[Judgement]:
         return
     ratio = float(result["history/force"].max(initial=0.0)) / float(result.threshold["force"])
     crossed = ratio > CROSSED
-    words = "the run is elastic beyond delamination" if crossed else ""
-    level = Level.DOUBTFUL if crossed else Level.WITHIN
+    is_open = result.end in UNDECIDED and not crossed
+    words = "the run is elastic beyond delamination" if crossed else SO_FAR if is_open else ""
+    level = Level.DOUBTFUL if crossed or is_open else Level.WITHIN
     yield Judgement(level, "largest force over the threshold", number(ratio, digits=3), words)
 
 
