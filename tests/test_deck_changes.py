@@ -36,7 +36,7 @@ ROD = fecm.Rod.cylinder(20.0, 16.0, 2e5, 8e-9)
 SPHERE = fecm.Contact.estimate(radius=8)
 QUICK: dict[str, Any] = {"velocity": 1000.0, "duration": 2e-5, "units": "mm-N-s"}
 DAMAGED: dict[str, Any] = QUICK | {"damage": True}
-DECK = fecm.impact(PLATE, PLIES, MASS, SPHERE, **DAMAGED)
+DECK = fecm.impact(PLATE, PLIES, MASS, SPHERE, plies=False, **DAMAGED)
 
 
 def parts(deck: fecm.Deck) -> list[str]:

@@ -52,7 +52,7 @@ MISTAKES: dict[str, tuple[Edit, str, str]] = {  # change, code, and what the tex
     "radius of the indenter for the patch": (
         with_card("PATC", "DISC,8.,"), "W475", "radius of the indenter"),
     "the same without exposures": (
-        lambda text: replaced(r"^FAIL .*\n", "")(with_card("PATC", "DISC,8.,")(text)),
+        lambda text: replaced(r"^(FAIL|PLYS).*\n", "")(with_card("PATC", "DISC,8.,")(text)),
         "N475", "2.7 times the thickness"),
     "damping ratio for a": (with_card("DAMP", "0.02,"), "W479", "looks like a damping ratio"),
     "a = 5e4": (with_card("DAMP", "5E4,"), "W480", "above 2.0"),
