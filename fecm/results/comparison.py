@@ -54,18 +54,38 @@ class Measurement:
 
 @frozen
 class Comparison:
-    """A result's force, interpolated at measured times, against the measured force."""
+    """A result's force, interpolated at measured times, against the measured force.
 
-    points: int  # measured times within the times of the result
-    begin: float  # the first of them
+    ``str()`` says it in one line.
+
+    Attributes
+    ----------
+    points : int
+        Number of measured times within the times of the result.
+    begin, end : float
+        The first and the last of them.
+    peak, measured_peak : float
+        Largest forces.
+    impulse, measured_impulse : float
+        Time integrals of the forces, linear between the points.
+    rms : float
+        Root of the mean square of the difference, force.
+    correlation : float
+        Pearson's coefficient; NaN if one of the forces is constant.
+    units : dict of str
+        Names of the units; empty if the deck names none.
+    """
+
+    points: int
+    begin: float
     end: float
     peak: float
     measured_peak: float
-    impulse: float  # time integral of the force, linear between the points
+    impulse: float
     measured_impulse: float
-    rms: float  # root of the mean square of the difference, force
-    correlation: float  # Pearson's coefficient; NaN if one of the forces is constant
-    units: Mapping[str, str]  # names; empty if the deck names none
+    rms: float
+    correlation: float
+    units: Mapping[str, str]
 
     def __str__(self) -> str:
         clock, pound = (self.units.get(name, "") for name in ("time", "force"))

@@ -31,28 +31,50 @@ class Plies:
     In-plane values are in the axes of the ply, at the points of each element and both faces of each
     ply, (rows, elements, points, plies, 2).  Interlaminar stresses are in the axes of the plate,
     from equilibrium, at the centre of each element and three levels of each ply, (rows, elements,
-    plies, 3).  sigma_z is not computed.
+    plies, 3).  sigma_z is not computed.  Of a plate of several laminates, `z` and `angles` begin
+    with the elements, (elements, plies, ...); they and the stresses are NaN at plies that an
+    element lacks.
+
+    Attributes
+    ----------
+    step, time : ndarray (rows,)
+        Steps and times of the rows.
+    element : ndarray (elements,)
+        Numbers of the elements.
+    x, y : ndarray (elements, points)
+        Places of the points, length.
+    z : ndarray (plies, 3)
+        Lower, middle and upper z, from the struck face at -h/2, length.
+    angles : ndarray (plies,)
+        Of the fibres, degrees.
+    under_load : ndarray of bool (elements,)
+        Those so near to the load that plate theory fails.
+    sigma_1, sigma_2, tau_12 : ndarray (rows, elements, points, plies, 2)
+        Stresses along and across the fibres, and in shear.
+    eps_1, eps_2, gamma_12 : ndarray (rows, elements, points, plies, 2)
+        Strains by the compliance of the ply.
+    tau_xz, tau_yz : ndarray (rows, elements, plies, 3)
+        Interlaminar stresses; NaN in elements without nine nodes.
+    residual : ndarray (rows, elements, 2)
+        tau_xz and tau_yz of equilibrium at z = h/2, removed linearly in z.
     """
 
-    step: Array  # (rows,), as `time`
+    step: Array
     time: Floats
-    element: Array  # (elements,): numbers
-    x: Floats  # (elements, points), as `y`: places of the points, length
+    element: Array
+    x: Floats
     y: Floats
-    # Of a plate of several laminates the next two are (elements, plies, ...), and NaN, as are the
-    # stresses, at plies that an element lacks.
-    z: Floats  # (plies, 3): lower, middle and upper z, from the struck face at -h/2, length
-    angles: Floats  # (plies,): of the fibres, degrees
-    under_load: Bools  # (elements,): mask of those so near to the load that plate theory fails
-    sigma_1: Floats  # (rows, elements, points, plies, 2): stresses along and across the fibres
+    z: Floats
+    angles: Floats
+    under_load: Bools
+    sigma_1: Floats
     sigma_2: Floats
     tau_12: Floats
-    eps_1: Floats  # of the same shape: strains by the compliance of the ply
+    eps_1: Floats
     eps_2: Floats
     gamma_12: Floats
-    tau_xz: Floats  # (rows, elements, plies, 3); NaN in elements without nine nodes
+    tau_xz: Floats
     tau_yz: Floats
-    # (rows, elements, 2): tau_xz and tau_yz of equilibrium at z = h/2, removed linearly in z.
     residual: Floats
 
 

@@ -31,7 +31,7 @@ OBJECTS = ("plate", "laminate", "projectile", "contact")
 
 
 class Values(TypedDict, total=False):
-    """What :meth:`fecm.Deck.with_` changes."""
+    """What :meth:`fecm.Deck.with_` changes: values by their names in sweeps, and whole objects."""
 
     plate: Plate
     laminate: Laminate

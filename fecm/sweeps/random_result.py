@@ -23,15 +23,31 @@ THRESHOLD_FORCE = "threshold_force"
 
 
 class Exceedance(NamedTuple):
-    """Probabilities that quantities exceed limits; with varied values, the combinations first."""
+    """Probabilities that quantities exceed limits; with varied values, the combinations first.
 
-    quantity: NDArray[np.str_]  # (e,)
-    limit: Floats  # (e,): in the unit of the quantity; NaN: the threshold of each case
-    probability: Floats  # (e,)
-    lower: Floats  # (e,): ends of its 95 % interval; see :func:`bounds`
+    Attributes
+    ----------
+    quantity : ndarray of str (e,)
+        Names of the quantities.
+    limit : ndarray (e,)
+        In the unit of the quantity; NaN: the threshold of each case.
+    probability : ndarray (e,)
+        Share of the draws above the limit.
+    lower, upper : ndarray (e,)
+        Ends of its 95 % interval, which holds for the open draws too.
+    draws : ndarray of int (e,)
+        Number of draws that have a value.
+    open : ndarray of int (e,)
+        Number of draws that ended before they had one.
+    """
+
+    quantity: NDArray[np.str_]
+    limit: Floats
+    probability: Floats
+    lower: Floats  # of :func:`bounds`, as `upper`
     upper: Floats
-    draws: NDArray[np.int64]  # (e,): number of draws that have a value
-    open: NDArray[np.int64]  # (e,): number of draws that ended before they had one
+    draws: NDArray[np.int64]
+    open: NDArray[np.int64]
 
 
 @dataclass(frozen=True)

@@ -19,21 +19,39 @@ ROUNDING = 1e-12  # variation relative to the largest value below which a quanti
 
 
 class Statistics(NamedTuple):
-    """Statistics of a quantity over the draws that have a value."""
+    """Statistics of a quantity over the draws that have a value.
 
-    draws: NDArray[np.int64]  # number of them
+    Attributes
+    ----------
+    draws : ndarray of int
+        Number of them.
+    mean, standard_deviation : ndarray
+        Of the quantity.
+    quantiles : ndarray (5,)
+        At the probabilities 1, 5, 50, 95 and 99 %.
+    """
+
+    draws: NDArray[np.int64]
     mean: Floats
     standard_deviation: Floats
-    quantiles: Floats  # (5,): at the probabilities `QUANTILES`
+    quantiles: Floats  # at `QUANTILES`
 
 
 class Indices(NamedTuple):
-    """Sobol' indices of a quantity; with varied values, the combinations come first."""
+    """Sobol' indices of a quantity; with varied values, the combinations come first.
 
-    first: Floats  # (d,): first-order index of each random value
-    total: Floats  # (d,): total index
-    first_interval: Floats  # (d, 2): 95 % interval
-    total_interval: Floats  # (d, 2)
+    Attributes
+    ----------
+    first, total : ndarray (d,)
+        First-order and total index of each of the d random values.
+    first_interval, total_interval : ndarray (d, 2)
+        Their 95 % intervals.
+    """
+
+    first: Floats
+    total: Floats
+    first_interval: Floats
+    total_interval: Floats
 
 
 def statistics(values: Floats) -> Statistics:

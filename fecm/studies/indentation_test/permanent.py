@@ -19,7 +19,7 @@ UNLIKELY = 0.01  # probability below which the scatter exceeds the noise of the 
 
 @frozen
 class Line:
-    """Equation 3-8."""
+    """Permanent indentation by equation 3-8, alpha_0 = s_p (alpha_m - alpha_p)."""
 
     s_p: Estimate
     alpha_p: Estimate
@@ -85,7 +85,7 @@ def _scatter(chi: float, freedom: int) -> float:
 
 @frozen
 class Critical:
-    """Equation 3-7."""
+    """Permanent indentation by equation 3-7, with the critical indentation alpha_cr."""
 
     alpha_cr: Estimate
     scatter: float  # as that of a line
