@@ -37,17 +37,16 @@ def written_pictures(block: Any, variables: dict[str, Any], conf: dict[str, Any]
         written.unlink()
         shown.append(target)
     pictures = figure_rst(shown, conf["src_dir"]) if shown else ""
-    return f"{pictures}{_written_pages(Path(conf['src_dir']))}"
+    return f"{pictures}{_written_pages(Path(conf['src_dir']), variables['example_globals'])}"
 
 
-def _written_pages(source: Path) -> str:
+def _written_pages(source: Path, names: dict[str, Any]) -> str:
     """Move the pages that a script has written to the site's static files, and link them."""
     items = []
     for written in sorted(Path().glob("*.html")):
         folder = source / "_static" / "reports"
-        folder.mkdir(exist_ok=True)
-        picture = thumbnails.of_page(written.read_text("utf-8"))
-        (folder / f"{written.stem}.svg").write_bytes(picture)
+        folder.mkdir(parents=True, exist_ok=True)
+        thumbnails.of_page(names["pages"][written.stem], folder / f"{written.stem}.svg")
         (folder / written.name).write_bytes(written.read_bytes())
         written.unlink()
         address, name = f"../_static/reports/{written.stem}", written.stem.replace("-", " ")

@@ -5,13 +5,13 @@ They are drawn from what a script has computed, when the site is built.
 
 from __future__ import annotations
 
-import base64
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+
+import fecm
 
 Names = dict[str, Any]  # variables of a script
 
@@ -155,11 +155,31 @@ OWN: dict[str, Callable[[Any, Names], None]] = {
 }
 
 
-def of_page(html: str) -> bytes:
-    """The first drawing of a report, for its link."""
-    found = re.search(r'src="data:image/svg\+xml;base64,([^"]+)"', html)
-    assert found is not None
-    return base64.b64decode(found[1])
+def fitted(ax: Any, found: Any) -> None:
+    """A fitted force through the measured points."""
+    ax.plot(found.time, found.force, "o", color=COLOURS[0], ms=STROKE)
+    ax.plot(found.time, found.model, color=COLOURS[1], lw=STROKE / 2)
+
+
+def impact(ax: Any, result: Any) -> None:
+    """The contact force, and the delamination threshold if there is one."""
+    curves(ax, (result.time, result.force))
+    if "threshold_force" in result.metrics:
+        ax.axhline(result.metrics["threshold_force"], color=COLOURS[1], lw=STROKE)
+
+
+def of_page(found: Any, path: Path) -> None:
+    """Draw what a report is about."""
+    match found:
+        case fecm.Result():
+            _save(path, lambda ax: impact(ax, found))
+        case fecm.Identification():
+            _save(path, lambda ax: fitted(ax, found))
+        case fecm.SweepResult(random=None):
+            _save(path, lambda ax: map_of(ax, {"found": found}))
+        case _:
+            names = {"found": found, "chance": found.random.exceedance}
+            _save(path, lambda ax: probability(ax, names))
 
 
 def drawn(script: str, names: Names, path: Path) -> bool:
@@ -167,17 +187,22 @@ def drawn(script: str, names: Names, path: Path) -> bool:
     draw = OWN.get(script)
     if draw is None and "ax" not in names:
         return False
+    if draw is None:
+        _save(path, lambda ax: as_drawn(ax, names["ax"]))
+    else:
+        _save(path, lambda ax: draw(ax, names))
+    return True
+
+
+def _save(path: Path, draw: Callable[[Any], None]) -> None:
+    """Write a thumbnail."""
     from matplotlib.figure import Figure
 
     figure = Figure(SIZE, layout="constrained")
     ax = figure.add_subplot()
-    if draw is None:
-        as_drawn(ax, names["ax"])
-    else:
-        draw(ax, names)
+    draw(ax)
     ax.set(xticks=[], yticks=[])
     ax.minorticks_off()
     ax.spines[["top", "right"]].set_visible(False)
     ax.spines[["left", "bottom"]].set_linewidth(STROKE / 2)
     figure.savefig(path, dpi=100)
-    return True

@@ -165,3 +165,19 @@ def has(line: str, value: str) -> bool:
 def test_the_logo_is_what_its_script_draws() -> None:
     drawn = runpy.run_path(str(DOCS / "logo.py"))["picture"]()
     assert (DOCS / "_static" / "logo.svg").read_text(encoding="utf-8") == drawn
+
+
+def test_the_page_about_reports_links_to_those_that_the_gallery_writes() -> None:
+    page = (DOCS / "report.md").read_text(encoding="utf-8")
+    linked = re.findall(
+        r'href="_static/reports/([\w-]+)\.html"><img src="_static/reports/\1\.svg"', page
+    )
+    script = ast.parse((ROOT / "examples" / "reports.py").read_text(encoding="utf-8"))
+    (pages,) = (
+        node.value
+        for node in script.body
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "pages"
+    )
+    assert isinstance(pages, ast.Dict)
+    written = [ast.literal_eval(key) for key in pages.keys if key]
+    assert linked == written
