@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from fecm.deck.units import short_name
+from fecm.deck.units import short_name, unit_of
 from fecm.plot.kinds import Kind
 from fecm.report import figures
 from fecm.report.content import (
@@ -272,10 +272,11 @@ def _pictures(name: str, sweep: SweepResult) -> Iterator[Block]:
 def _provenance(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> Iterator[Block]:
     """Checksums, time steps, and the deck."""
     text = sweep.deck_text
-    steps = sorted({f"{dt:.5g}" for dt in sweep.dt.tolist()})
+    unit = unit_of("time", sweep.units)
+    steps = [shown(dt, unit) for dt in np.unique(sweep.dt).tolist()]
     rows: list[tuple[Cell, ...]] = [
         ("cases", Number(len(sweep), str(len(sweep)))),
-        ("time steps", ", ".join(steps[:4]) + (", …" if len(steps) > 4 else "")),
+        ("size of the time step", ", ".join(steps[:4]) + (", …" if len(steps) > 4 else "")),
         ("deck, SHA-256", hashlib.sha256(text.encode()).hexdigest()),
     ]
     if name in digests:
