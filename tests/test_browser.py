@@ -22,7 +22,7 @@ from tests.decks import LONG, small
 from tests.pages import read_page
 from tests.test_first_failure import failing
 
-KINDS = ("run", "runs", "sweep", "random", "fit")
+KINDS = ("run", "d7136", "runs", "sweep", "random", "fit")
 LARGEST = 1_500_000  # bytes of a page
 AA = 4.5  # contrast of text, WCAG 2.2, success criterion 1.4.3
 A4 = (595.0, 842.0)  # points
@@ -44,6 +44,40 @@ COLOURS = """
   }))]
 """
 
+# Words of letters that go on in the next line; longer ones may have to.
+BROKEN = r"""
+(() => {
+  const walker = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+  const range = document.createRange();
+  const broken = [];
+  while (walker.nextNode()) {
+    for (const word of walker.currentNode.data.matchAll(/\b[A-Za-z]{2,14}\b/g)) {
+      range.setStart(walker.currentNode, word.index);
+      range.setEnd(walker.currentNode, word.index + word[0].length);
+      const lines = Array.from(range.getClientRects(), box => box.top);
+      if (new Set(lines).size > 1) broken.push(word[0]);
+    }
+  }
+  return broken;
+})()
+"""
+
+# Pictures with something dark in their outermost pixels: it goes on beyond them.
+CUT = """
+Array.from(document.images).filter(image => {
+  const [width, height] = [image.naturalWidth, image.naturalHeight];
+  const canvas = Object.assign(document.createElement("canvas"), {width, height});
+  const context = canvas.getContext("2d");
+  context.fillStyle = "white";
+  context.fillRect(0, 0, width, height);
+  context.drawImage(image, 0, 0);
+  const edges = [
+    [0, 0, width, 1], [0, height - 1, width, 1], [0, 0, 1, height], [width - 1, 0, 1, height],
+  ];
+  return edges.some(edge => context.getImageData(...edge).data.some(part => part < 200));
+}).map(image => image.alt)
+"""
+
 pytestmark = pytest.mark.browser
 
 
@@ -61,6 +95,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     )
     results = {
         "run": {"run": run},
+        "d7136": {"drop-weight": fecm.run_one(fecm.examples.path("drop-weight.inp"))},
         "runs": {"one": run, "other": fecm.run_one(small())},
         "sweep": {"map": fecm.sweep(LONG, {"velocity": [50.0, 80.0, 400.0], "k": [1e6, 2e6]})},
         "random": {"random": random},
@@ -116,6 +151,7 @@ def test_a_page_asks_for_nothing_complains_of_nothing_and_fits_the_window(
     assert browser.complaints() == []
     assert browser.value("document.documentElement.scrollWidth") == width
     assert browser.value("[...document.images].every(one => one.naturalWidth > 0)")
+    assert browser.value(BROKEN) == []
     dark = _luminance(browser.value("getComputedStyle(document.body).backgroundColor")) < 0.2
     assert dark == (scheme == "dark")
 
@@ -158,6 +194,10 @@ def test_on_paper_no_row_is_cut_and_no_picture(
     )
     assert all(right <= PAPER[0] + 1 and height <= PAPER[1] for right, height in sizes)
     assert browser.value("document.documentElement.scrollWidth") == PAPER[0]
+    assert browser.value(BROKEN) == []
+    assert browser.value(
+        '[...document.querySelectorAll("pre")].every(one => one.checkVisibility())'
+    )
     printed = pypdf.PdfReader(io.BytesIO(browser.pdf())).pages
     assert len(printed) >= 2
     for sheet in printed:
@@ -166,6 +206,30 @@ def test_on_paper_no_row_is_cut_and_no_picture(
     rows = ["".join(cell.text for cell in row) for row in read_page(pages[kind].read_text()).rows]
     assert len(rows) > 10
     assert [row for row in rows if not any(packed(row) in text for text in texts)] == []
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_a_picture_shows_ends_before_its_edge(
+    pages: dict[str, Path], browser: Browser, kind: str
+) -> None:
+    browser.open(pages[kind])
+    assert browser.value(CUT) == []
+
+
+def test_these_tests_notice_a_request_a_refused_one_and_a_broken_word(
+    browser: Browser, tmp_path: Path
+) -> None:
+    style = (tmp_path / "other.css").as_uri()
+    link = f"<link rel=stylesheet href={style}>"
+    page = tmp_path / "page.html"
+    page.write_text(f"{link}<p style='width: 2em; overflow-wrap: anywhere'>interlaminar</p>")
+    browser.open(page)
+    assert style in browser.requests()
+    assert browser.value(BROKEN) == ["interlaminar"]
+    policy = "style-src 'unsafe-inline'"
+    page.write_text(f'<meta http-equiv=Content-Security-Policy content="{policy}">{link}')
+    browser.open(page)
+    assert "Content Security Policy" in str(browser.complaints())
 
 
 @pytest.mark.parametrize("kind", KINDS)

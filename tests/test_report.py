@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import re
 import sys
+from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
@@ -174,6 +175,39 @@ def test_a_page_fetches_nothing_and_runs_nothing(html: str, shown: Page) -> None
     assert "url(" not in html
     assert not {"script", "link", "iframe", "object"} & set(shown.names)
     assert "default-src 'none'" in html
+
+
+# Foreground and background; the limits of WCAG 2.2: 4.5 for text (1.4.3).
+TEXTS = [
+    ("text", "paper"),
+    ("text", "shade"),
+    *((name, "paper") for name in ("faint", "within", "doubtful", "outside", "unjudged")),
+]
+
+
+def luminance(color: str) -> float:
+    """Relative luminance of a colour as ``#rrggbb``, as WCAG 2.2 defines it."""
+    parts = (int(color[at : at + 2], 16) / 255 for at in (1, 3, 5))
+    linear = (
+        part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in parts
+    )
+    return float(np.dot((0.2126, 0.7152, 0.0722), list(linear)))
+
+
+def test_text_stands_out_from_its_background_in_every_scheme() -> None:
+    style = (files("fecm.report") / "page.css").read_text("utf-8")
+    blocks = re.findall(r":root \{(.*?)\}", style, re.DOTALL)
+    schemes = [dict(re.findall(r"--(\w+): (#\w{6});", block)) for block in blocks]
+    assert len(schemes) == 3  # light, dark, paper
+    for colors in schemes:
+        for front, back in TEXTS:
+            light, dark = sorted((luminance(colors[front]), luminance(colors[back])), reverse=True)
+            assert (light + 0.05) / (dark + 0.05) >= 4.5, (front, back, colors)
+    outside = re.sub(r":root \{.*?\}", "", style, flags=re.DOTALL)
+    assert set(re.findall(r"(?<!-)color: ([^;]+);", outside)) <= {
+        f"var(--{front})" for front, _ in TEXTS
+    }
+    assert set(re.findall("#[0-9a-f]{3,6}", outside)) == {"#ffffff"}  # behind pictures
 
 
 def test_pictures_have_words_and_headings_their_order(shown: Page) -> None:

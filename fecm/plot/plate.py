@@ -138,7 +138,8 @@ def contour(results: Results, *, times: Sequence[float] = (), width: Width = "co
     place = style.scale_of(results, "length", [cut.points])
     columns = min(len(rows), 2 if width == "column" else 4)
     lines = math.ceil(len(rows) / columns)
-    ratio = aspect(cut.points) + 0.65 * columns / lines / style.WIDTHS[width]
+    words = 0.7 + 0.3 * lines  # height of colour bar, titles and the name of x (in)
+    ratio = aspect(cut.points) + words * columns / lines / style.WIDTHS[width]
     figure, axes = style.panels(width, lines, columns, sharex=True, sharey=True, ratio=ratio)
     fields = [cut.values(row) for row in w]
     peak = float(np.abs(fields).max()) or 1.0  # may exceed the nodal values

@@ -16,7 +16,7 @@ PERIOD = 180.0  # degrees after which a fibre direction repeats
 MOST_NAMED = 40  # plies that are labelled one by one
 PLY_HEIGHT = 0.13  # of a label (in)
 WIDTH = 3.5  # of the figure (in)
-HEIGHTS = (1.2, 5.5)  # smallest and largest height of the plies (in)
+HEIGHTS = (1.5, 5.5)  # smallest and largest height of the plies (in)
 
 
 def stack(layers: Sequence[Layer], names: Mapping[int, str]) -> Figure:
