@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 import unicodedata
 from collections.abc import Iterator
 from pathlib import Path
@@ -81,24 +82,24 @@ Array.from(document.images).filter(image => {
 pytestmark = pytest.mark.browser
 
 
+def random_sweep() -> fecm.SweepResult:
+    """A small sweep over random velocities and stiffnesses."""
+    laws = {"velocity": "normal:115,5", "k": "lognormal:1.9e6,0.1"}
+    return fecm.sweep(LONG, random=laws, samples=16, exceed={"peak_force": 85.0})
+
+
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """A page of every kind, as files."""
     folder = tmp_path_factory.mktemp("pages")
     run = fecm.run_one(failing(steps=160).replace("EXPE", "DELA\n       .02\nEXPE", 1))
     run.attributes["title"] = LONG_TITLE
-    random = fecm.sweep(
-        LONG,
-        random={"velocity": "normal:115,5", "k": "lognormal:1.9e6,0.1"},
-        samples=16,
-        exceed={"peak_force": 85.0},
-    )
     results = {
         "run": {"run": run},
         "d7136": {"drop-weight": fecm.run_one(fecm.examples.path("drop-weight.inp"))},
         "runs": {"one": run, "other": fecm.run_one(small())},
         "sweep": {"map": fecm.sweep(LONG, {"velocity": [50.0, 80.0, 400.0], "k": [1e6, 2e6]})},
-        "random": {"random": random},
+        "random": {"random": random_sweep()},
     }
     for kind, given in results.items():
         html = render(page_of(given))  # type: ignore[arg-type]
@@ -230,6 +231,18 @@ def test_these_tests_notice_a_request_a_refused_one_and_a_broken_word(
     page.write_text(f'<meta http-equiv=Content-Security-Policy content="{policy}">{link}')
     browser.open(page)
     assert "Content Security Policy" in str(browser.complaints())
+
+
+def test_another_process_writes_the_same_bytes(pages: dict[str, Path], tmp_path: Path) -> None:
+    code = (
+        "import sys; from pathlib import Path; from tests import test_browser as here;"
+        "html = here.render(here.page_of({'random': here.random_sweep()}));"
+        "Path(sys.argv[1]).write_text(html, encoding='utf-8', newline='')"
+    )
+    root = str(Path(__file__).parents[1])
+    command = [sys.executable, "-W", "ignore", "-c", code, str(tmp_path / "again.html")]
+    subprocess.run(command, check=True, cwd=root, env=os.environ | {"PYTHONHASHSEED": "7"})
+    assert (tmp_path / "again.html").read_bytes() == pages["random"].read_bytes()
 
 
 @pytest.mark.parametrize("kind", KINDS)
