@@ -23,6 +23,7 @@ from fecm.results.result import Result
 from tests.calls import assert_unusable, call
 from tests.decks import LONG, ROOT, small
 from tests.pages import Page, agrees, read_page
+from tests.test_extensions import Dented
 from tests.test_first_failure import failing
 
 # A light projectile, whose contact ends within the run and passes the threshold.
@@ -122,6 +123,25 @@ def test_an_open_peak_is_a_lower_bound() -> None:
     assert found.row("largest force by the end")[0].value == result.force.max()
     assert found.row("end of the run")[1].text == "outside the model"
     assert found.row("peak force")[0].text == "–"
+
+
+def test_a_projectile_and_a_law_of_the_user_stand_for_those_of_the_deck() -> None:
+    heavy = fecm.RigidMass(3e-3)
+    result = fecm.run_one(small(), projectile=heavy, law=Dented())
+    found = page(small=result)
+    assert "RigidMass, instead of PROJ" in found.row("projectile")[0].text
+    assert found.row("contact law")[0].text == "Dented, instead of EXPE"
+    assert found.row("mass")[0].value is not None
+    masses = [row[1].value for row in found.rows if row[0].text == "mass"]
+    assert masses[-1] == pytest.approx(3e-3, rel=1e-12)
+    assert "A mass of 0.003 at 115 (19.84)" in found.text
+
+
+def test_the_energy_of_a_run_with_slips_is_that_of_its_own_projectile() -> None:
+    result = fecm.run_one(small(), mode="listing")
+    found = page(small=result)
+    initial = result.attributes_of("energy")["initial"]
+    assert found.row("energy")[0].value == pytest.approx(initial, rel=1e-12)
 
 
 def test_the_constants_of_the_law_have_units_and_the_deck_its_warnings() -> None:

@@ -160,8 +160,8 @@ def largest_in_plies(
 ) -> list[PlyExposure]:
     """Largest exposure of each criterion under stresses of the plies, (plies, faces, 3).
 
-    The strengths are those of all plies or of each, None where they are not given; without any
-    there is no exposure.
+    The strengths are those of all plies or of each, None where they are not given.  Without any
+    strengths the list is empty.
     """
     given = strengths if isinstance(strengths, Sequence) else [strengths] * len(stresses)
     found = []

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -53,7 +54,7 @@ def of_problem(result: Result, problem: Problem) -> Iterator[Block]:
         names = {material: f"material {material}" for material in deck.plies}
         yield Picture(inside(stack(layers, names)), words, words)
     yield from _materials(deck)
-    yield from table(_impact(deck), caption="Projectile and contact")
+    yield from table(_impact(result, deck), caption="Projectile and contact")
     yield from table(_program(problem), caption="Program")
 
 
@@ -123,23 +124,48 @@ def _materials(deck: model.Deck) -> Iterator[Block]:
     yield from table(rows, header, "Ply strengths")
 
 
-def _impact(deck: model.Deck) -> Iterator[tuple[Cell, ...]]:
-    """Projectile, its velocity and energy, contact law, patch and toughness."""
-    impact, law = deck.last(model.Impact), deck.last(model.Indentation)
-    in_units = partial(_in_units, deck)
-    if impact is None or law is None:
-        return
+class Impactor(NamedTuple):
+    """What hits the plate in a run; slips and a user's projectile differ from the deck's."""
+
+    name: str
+    mass: float
+    velocity: float
+    energy: float
+
+
+def impactor(result: Result, deck: model.Deck) -> Impactor | None:
+    """Projectile of a run; None without impact.  Its mass follows from the energy put in."""
+    impact = deck.last(model.Impact)
+    if impact is None:
+        return None
     projectile = build_projectile(deck)
-    mass = projectile.total_mass
-    rigid = isinstance(projectile, RigidMass)
-    yield "projectile", "rigid mass" if rigid else "elastic rod"
-    yield "mass", Number(mass, _mass(deck, mass))
-    yield "velocity", in_units(impact.velocity, "length/time")
-    yield "energy", in_units(0.5 * mass * impact.velocity**2, "force*length")
-    yield "contact law", "equation 3-7 (ACR)" if law.word else "equation 3-8"
-    for name, value, dimension in zip(law.names(), law.values(), LAW, strict=True):
-        if value or dimension == COEFFICIENT:
-            yield name, in_units(value, dimension)
+    mass, velocity = projectile.total_mass, impact.velocity
+    initial = result.attributes_of("energy").get("initial")
+    if isinstance(initial, float) and velocity:
+        mass = 2.0 * initial / velocity**2
+    own = result.attributes.get("projectile")
+    kind = "rigid mass" if isinstance(projectile, RigidMass) else "elastic rod"
+    name = f"{own}, instead of PROJ" if own else kind
+    return Impactor(name, mass, velocity, 0.5 * mass * velocity**2)
+
+
+def _impact(result: Result, deck: model.Deck) -> Iterator[tuple[Cell, ...]]:
+    """Projectile, its velocity and energy, contact law, patch and toughness."""
+    hits, law = impactor(result, deck), deck.last(model.Indentation)
+    in_units = partial(_in_units, deck)
+    if hits is None or law is None:
+        return
+    yield "projectile", hits.name
+    yield "mass", Number(hits.mass, _mass(deck, hits.mass))
+    yield "velocity", in_units(hits.velocity, "length/time")
+    yield "energy", in_units(hits.energy, "force*length")
+    if own := result.attributes.get("law"):
+        yield "contact law", f"{own}, instead of EXPE"
+    else:
+        yield "contact law", "equation 3-7 (ACR)" if law.word else "equation 3-8"
+        for name, value, dimension in zip(law.names(), law.values(), LAW, strict=True):
+            if value or dimension == COEFFICIENT:
+                yield name, in_units(value, dimension)
     if (patch := deck.last(model.Patch)) is not None:
         yield "patch", {"DISC": "uniform pressure", "HERT": "Hertz's pressure"}[patch.shape]
     if (toughness := deck.last(model.Delamination)) is not None:

@@ -11,7 +11,6 @@ import numpy as np
 from fecm.deck import model
 from fecm.deck.layup import layup_text
 from fecm.deck.units import MASS, mass_in_si, quantity, unit_names, unit_of
-from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
 from fecm.report import figures
 from fecm.report.content import (
@@ -32,7 +31,7 @@ from fecm.report.content import (
     table,
     worst,
 )
-from fecm.report.model import extent, of_problem
+from fecm.report.model import extent, impactor, of_problem
 from fecm.report.trust import judgements, problem_of
 from fecm.results.criteria import spelt, where
 from fecm.results.exposures import largest_exposures
@@ -111,7 +110,7 @@ def _several(
         doubts = tuple(one for one in judged[name] if one.level is not Level.WITHIN)
         trust += [Judgements(doubts, caption=name)] if doubts else []
         trust += notes(result.notes, f"Notes of {name}")
-    models = {name: _model_row(problems[name]) for name in results}
+    models = {name: _model_row(one, problems[name]) for name, one in results.items()}
     names = list(dict.fromkeys(key for row in models.values() for key in row))
     rows = [(key, *(row.get(key, UNKNOWN) for row in models.values())) for key in names]
     return sections(
@@ -131,7 +130,7 @@ def _common_pictures(results: Mapping[str, Result]) -> list[Block]:
     return list(figures.of_runs(results))
 
 
-def _model_row(problem: Problem | None) -> dict[str, Cell]:
+def _model_row(result: Result, problem: Problem | None) -> dict[str, Cell]:
     """What distinguishes the models of several results."""
     if problem is None:
         return {}
@@ -144,12 +143,12 @@ def _model_row(problem: Problem | None) -> dict[str, Cell]:
         "kinematics": "von Kármán" if problem.plate.nonlinear else "linear",
         "elements": Number(deck.control.numel, str(deck.control.numel)),
     }
-    if (impact := deck.last(model.Impact)) is not None:
-        mass = build_projectile(deck).total_mass
-        row["projectile mass"] = Number(mass, mass_in_si(mass, units) or f"{mass:.5g}")
-        row["velocity"] = number(impact.velocity, unit_of("length/time", units))
-        energy = 0.5 * mass * impact.velocity**2
-        row["energy"] = number(energy, unit_of("force*length", units))
+    if (hits := impactor(result, deck)) is not None:
+        weight = mass_in_si(hits.mass, units) or f"{hits.mass:.5g}"
+        row["projectile"] = hits.name
+        row["projectile mass"] = Number(hits.mass, weight)
+        row["velocity"] = number(hits.velocity, unit_of("length/time", units))
+        row["energy"] = number(hits.energy, unit_of("force*length", units))
     return row
 
 
@@ -187,17 +186,18 @@ def _sentence(result: Result, problem: Problem | None) -> str:
     if problem is None:
         text = "; ".join(parts)
         return f"{text[0].upper()}{text[1:]}."
-    return f"{_scene(problem)}: {'; '.join(parts)}."
+    return f"{_scene(result, problem)}: {'; '.join(parts)}."
 
 
-def _scene(problem: Problem) -> str:
+def _scene(result: Result, problem: Problem) -> str:
     """What hits what, and how hard."""
     deck, units = problem.deck, unit_names(problem.deck)
-    impact = deck.require(model.Impact)
-    mass = build_projectile(deck).total_mass
-    weight = mass_in_si(mass, units) or quantity(mass, unit_of(MASS, units), 4)
-    speed = f"{impact.velocity:.4g} {unit_of('length/time', units)}".rstrip()
-    energy = quantity(0.5 * mass * impact.velocity**2, unit_of("force*length", units), 4)
+    hits = impactor(result, deck)
+    if hits is None:
+        return "An impact"
+    weight = mass_in_si(hits.mass, units) or quantity(hits.mass, unit_of(MASS, units), 4)
+    speed = f"{hits.velocity:.4g} {unit_of('length/time', units)}".rstrip()
+    energy = quantity(hits.energy, unit_of("force*length", units), 4)
     layup = layup_text([layer.angle for layer in deck.require(model.Material).layers])
     thickness = f"{problem.laminate.thickness:.4g} {unit_of('length', units)}".rstrip()
     return (
@@ -210,12 +210,11 @@ def _results(results: Mapping[str, Result]) -> list[Block]:
     """Metrics of impacts, or what the summary says of a result without impact."""
     if any(result.metrics for result in results.values()):
         return _metrics(results)
-    rows = [
-        (line[:LABEL_WIDTH].strip(), line[LABEL_WIDTH:])
-        for result in results.values()
-        for line in summary(result)
-    ]
-    return table(rows, caption="Summary")
+    blocks: list[Block] = []
+    for name, result in results.items():
+        lines = ((line[:LABEL_WIDTH].strip(), line[LABEL_WIDTH:]) for line in summary(result))
+        blocks += table(lines, caption=f"Summary of {name}" if len(results) > 1 else "Summary")
+    return blocks
 
 
 def _metrics(results: Mapping[str, Result]) -> list[Block]:
