@@ -318,6 +318,25 @@ class Preload(Segment, keyword="PREL"):
 
 
 @frozen
+class Curvature(Segment, keyword="CURV"):
+    """CURV: (3F10.0); radii of a shallow curved panel (not in the report's program)."""
+
+    # Length; 0 or blank is infinite.  Positive: the centre of curvature is on the side of -w.
+    radius_x: float = 0.0
+    radius_y: float = 0.0
+    radius_xy: float = 0.0
+
+    fields: ClassVar[Fields] = layout("F10 Rx", "F10 Ry", "F10 Rxy")
+
+    @property
+    def curvatures(self) -> tuple[float, float, float]:
+        """1/Rx, 1/Ry and 1/Rxy, 1/length; 0 of an infinite radius."""
+        radii = (self.radius_x, self.radius_y, self.radius_xy)
+        x, y, xy = (1.0 / radius if radius else 0.0 for radius in radii)
+        return x, y, xy
+
+
+@frozen
 class Expansion(Record):
     """CURE card: (I5,5X,4F10.0); free strains of a material along and across its fibres."""
 

@@ -20,6 +20,7 @@ from fecm.deck.material_cards import (
     MATERIAL,
     Allowables,
     Cure,
+    Curvature,
     Damping,
     Delamination,
     Expansion,
@@ -58,8 +59,8 @@ if TYPE_CHECKING:
     from fecm.sweeps.changes import Values
 
 __all__ = [
-    "Allowables", "Boundary", "Control", "Coordinates", "Cure", "Damping", "Deck",
-    "Delamination", "ElementNodes", "Elements", "Expansion", "Forces", "Gage", "Gages",
+    "Allowables", "Boundary", "Control", "Coordinates", "Cure", "Curvature", "Damping",
+    "Deck", "Delamination", "ElementNodes", "Elements", "Expansion", "Forces", "Gage", "Gages",
     "Impact", "Indentation", "Integration", "LaminateNumber", "Laminates", "Layer", "LoadTable",
     "Macro", "Material", "MaterialNumber", "Materials", "NodeCodes", "NodeValues", "Nonlinear",
     "NumberedLaminate", "NumberedPly", "NumberedSegment", "Page", "Patch", "Ply", "Preload",
@@ -91,6 +92,7 @@ SEGMENTS: dict[str, type[Segment]] = {
     "DAMP": Damping,
     "NONL": Nonlinear,
     "PREL": Preload,
+    "CURV": Curvature,
     "CURE": Cure,
     "GAGE": Gages,
     "UNIT": Units,

@@ -11,8 +11,14 @@ import numpy as np
 from fecm._memory import require
 from fecm.mechanics.element_matrices import geometric_stiffness
 from fecm.mechanics.plate import UNLOADED, PlateModel
-from fecm.mechanics.solutions import DENSE, FACTORS, SingularStiffnessError, factorised
-from fecm.mechanics.symmetry import restrain_plane
+from fecm.mechanics.solutions import (
+    DENSE,
+    FACTORS,
+    SingularStiffnessError,
+    factorised,
+    in_plane_pins,
+)
+from fecm.mechanics.symmetry import restrain_plane, with_codes
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -31,7 +37,7 @@ def buckling_factor(plate: PlateModel) -> float:
     """Factor on the preload at which the plate buckles; infinite beyond FAR, NaN if unknown.
 
     The smallest positive lambda of (K + lambda K_sigma) phi = 0 with the plate's supports: at 1 the
-    preload is the buckling load.  0 where the supports allow motion without strain.  The plate,
+    preload is the buckling load.  0 where the supports allow motion without strain.  A flat plate,
     whose laminate has B = 0, buckles without u and v.
 
     Lanczos iteration for the largest mu of -K_sigma phi = mu (K + shift K_sigma) phi, which is
@@ -40,7 +46,7 @@ def buckling_factor(plate: PlateModel) -> float:
     definite below the smallest lambda, so that its factors bracket it: shift < lambda <= STRIDE
     shift.  Raises NotEnoughMemoryError.
     """
-    bending = restrain_plane(plate)
+    bending = _pinned(plate) if plate.is_curved else restrain_plane(plate)
     n = bending.neq
     if not plate.is_compressed or not n:
         return math.inf
@@ -59,6 +65,13 @@ def buckling_factor(plate: PlateModel) -> float:
     else:
         found = _sparse_factor(K, K_sigma, FAR if _pulls(plate) else 0.0)
     return math.inf if found > FAR else found
+
+
+def _pinned(plate: PlateModel) -> PlateModel:
+    """The plate without rigid motions in its plane."""
+    pins = np.array(in_plane_pins(plate), dtype=int) + 1
+    held = np.isin(plate.mesh.equations, pins)
+    return with_codes(plate, np.where(held, 1, plate.mesh.codes).astype(np.int32))
 
 
 def _pulls(plate: PlateModel) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics import assumed_shear
+from fecm.mechanics.curvature import FLAT, Curvature, strain_of_deflection
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import (
     NDOF,
@@ -38,8 +39,11 @@ class IntegrationRules:
     assumes_shear: bool = False
 
 
-def membrane_and_bending(at: Interpolation) -> Floats:
-    """B matrix of midplane strains and curvatures, equations 2-6 to 2-9: (ne, npt, 6, 5 nn)."""
+def membrane_and_bending(at: Interpolation, curvature: Curvature = FLAT) -> Floats:
+    """B matrix of midplane strains and curvatures, equations 2-6 to 2-9: (ne, npt, 6, 5 nn).
+
+    The midplane strains of a curved panel contain those of w.
+    """
     ne, npt, _, nn = at.dN.shape
     B = np.zeros((ne, npt, 6, nn, NDOF))
     x, y = at.dN[:, :, 0], at.dN[:, :, 1]
@@ -49,6 +53,8 @@ def membrane_and_bending(at: Interpolation) -> Floats:
     B[:, :, 3, :, 3] = -x
     B[:, :, 4, :, 4] = -y
     B[:, :, 5, :, 3], B[:, :, 5, :, 4] = -y, -x
+    if curvature != FLAT:
+        B[:, :, :3, :, 2] = strain_of_deflection(curvature)[:, None] * at.N[:, None]
     return B.reshape(ne, npt, 6, nn * NDOF)
 
 
@@ -71,7 +77,12 @@ def _integrate(B: Floats, C: Floats, jxw: Floats) -> Floats:
     return np.asarray((product + product.swapaxes(1, 2)) / 2.0)
 
 
-def stiffness(family: ElementBlock, laminate: Laminate, rules: IntegrationRules) -> Floats:
+def stiffness(
+    family: ElementBlock,
+    laminate: Laminate,
+    rules: IntegrationRules,
+    curvature: Curvature = FLAT,
+) -> Floats:
     """Element stiffness matrices, K_p of equation 4-14, (ne, 5 nn, 5 nn).
 
     :mod:`~fecm.mechanics.assumed_shear` has its own rule of the transverse shear energy.
@@ -79,7 +90,7 @@ def stiffness(family: ElementBlock, laminate: Laminate, rules: IntegrationRules)
     ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
     slip = rules.transposed_jacobian
     at = interpolate(family, rules.bending, transposed_jacobian=slip)
-    K = _integrate(membrane_and_bending(at), ABD, at.jxw)
+    K = _integrate(membrane_and_bending(at, curvature), ABD, at.jxw)
     if rules.assumes_shear:
         rule = assumed_shear.quadrature(family)
         jxw = jacobian_determinants(family, rule) * rule.weights

@@ -30,6 +30,7 @@ import numpy as np
 from fecm._frozen import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics import assumed_shear
+from fecm.mechanics.curvature import strain_of_deflection
 from fecm.mechanics.element_matrices import membrane_and_bending
 from fecm.mechanics.elements import Quadrature, gauss
 from fecm.mechanics.interpolation import (
@@ -156,6 +157,19 @@ def quadratic_strains(family: ElementBlock, rule: Quadrature, field: Floats) -> 
     return QuadraticStrains(family, rule).of(field[family.nodes, 2].T)
 
 
+def strains_of_deflection(plate: PlateModel, points: StrainField, field: Floats) -> Floats | None:
+    """Midplane strains of w in a displacement field (numnp, 5) at points, (3, numel, npt).
+
+    w/R of a curved plate, and the tied eps_q of a nonlinear one; None of any other.
+    """
+    strains = quadratic_strains_at(points, field) if plate.nonlinear else None
+    if plate.is_curved:
+        (w,) = points.interpolated(field[:, 2:3])
+        curved = strain_of_deflection(plate.curvature)[:, None, None] * w
+        strains = curved if strains is None else strains + curved
+    return strains
+
+
 def quadratic_strains_at(points: StrainField, field: Floats) -> Floats:
     """Tied eps_q of a displacement field (numnp, 5) at points of every element, (3, numel, npt)."""
     strains = np.empty((3, *points.shape))
@@ -171,6 +185,7 @@ class _Elements:
     nodes: Indices  # (9, ne)
     weight: Floats  # (points, ne): Jacobian determinant times weight
     table: Floats  # (2 points, 9): slopes in xi and in eta
+    values: Floats  # (points, 9)
     inverse: Floats  # (2, 2, points, ne): Jacobian's inverse, dxi_a/dx_i in row i and column a
     tied: QuadraticStrains
     laminate: Laminate
@@ -185,6 +200,8 @@ class Membrane:
 
     def __init__(self, plate: PlateModel, weights: Floats | None = None) -> None:
         self._elements: list[_Elements] = []
+        # Strains (3,) per unit of w of a curved plate.
+        self._curved = strain_of_deflection(plate.curvature) if plate.is_curved else None
         rule = plate.rules.bending
         for family in plate.families:
             of_family = np.ones(len(family.rows)) if weights is None else weights[family.rows]
@@ -192,7 +209,7 @@ class Membrane:
             for start in range(0, len(kept), BLOCK):
                 members = kept[start : start + BLOCK]
                 block = family.take(members)
-                _, local = local_shape_functions(block, rule)
+                values, local = local_shape_functions(block, rule)
                 inverse, determinant = inverse_jacobian(block, local)
                 area = determinant * rule.weights * of_family[members, None]
                 self._elements.append(
@@ -200,6 +217,7 @@ class Membrane:
                         nodes=block.nodes.T.copy(),
                         weight=area.T.copy(),
                         table=np.concatenate([local[:, 0], local[:, 1]]),
+                        values=values,
                         inverse=inverse.transpose(2, 3, 1, 0).copy(),
                         tied=QuadraticStrains(block, rule),
                         laminate=plate.laminate_of(block),
@@ -230,7 +248,10 @@ class Membrane:
         components = tied_components(one, two)
         quadratic = tied.at_points(components)
         stretched = part.weight * np.tensordot(A, quadratic, 1)
-        N = part.weight * np.tensordot(A, _strains(part, q[:2]), 1) + stretched
+        strains = _strains(part, q[:2])
+        if self._curved is not None:
+            strains += self._curved[:, None, None] * (part.values @ q[2])
+        N = part.weight * np.tensordot(A, strains, 1) + stretched
         if coupled:
             N -= part.weight * np.tensordot(B, _strains(part, q[3:]), 1)
         n11, n22, n12 = tied.tied_forces(N)
@@ -238,6 +259,8 @@ class Membrane:
         along_two = np.concatenate([two[:TYING] * n22, one[TYING:] * n12])
         forces = {2: tied.nodal_forces(along_one, along_two)}
         forces[0], forces[1] = _of_stresses(part, stretched)
+        if self._curved is not None:
+            forces[2] += part.values.T @ np.tensordot(self._curved, stretched, 1)
         if coupled:
             moments = -part.weight * np.tensordot(B, quadratic, 1)
             forces[3], forces[4] = _of_stresses(part, moments)
@@ -272,7 +295,7 @@ def tangent(plate: PlateModel, family: ElementBlock, field: Floats) -> Floats:
     rule, laminate = plate.rules.bending, plate.laminate_of(family)
     ne, nn = family.nodes.shape
     at = interpolate(family, rule)
-    linear = membrane_and_bending(at)
+    linear = membrane_and_bending(at, plate.curvature)
     tied = QuadraticStrains(family, rule)
     q = field[family.nodes].transpose(2, 1, 0)
     one, two = tied.slopes(q[2])

@@ -18,6 +18,7 @@ from fecm._frozen import frozen
 from fecm._memory import require
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics import element_matrices
+from fecm.mechanics.curvature import FLAT, Curvature
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, jacobian_determinants
@@ -56,6 +57,7 @@ class PlateModel:
     others: tuple[Laminate, ...] = ()  # laminates beside the first
     # (numel,): number from 0 of the laminate of every element; without it, all have the first.
     laminate_numbers: Indices | None = None
+    curvature: Curvature = FLAT  # 1/R_x, 1/R_y, 1/R_xy of a shallow panel, 1/length
 
     @property
     def neq(self) -> int:
@@ -91,6 +93,16 @@ class PlateModel:
         if not self.others:
             return self.laminate.is_coupled
         return any(self.laminate_of(family).is_coupled for family in self.families)
+
+    @property
+    def is_curved(self) -> bool:
+        """Whether the midplane stretches with the deflection of a curved panel."""
+        return self.curvature != FLAT
+
+    @property
+    def moves_in_plane(self) -> bool:
+        """Whether u and v move with w: B, the curvature or finite deflections couple them."""
+        return self.is_coupled or self.is_curved or self.nonlinear
 
     @property
     def is_preloaded(self) -> bool:
@@ -138,7 +150,7 @@ class PlateModel:
 
         ``replace(plate, preload=UNLOADED)`` is the plate without it.
         """
-        K = element_matrices.stiffness(family, self.laminate_of(family), self.rules)
+        K = element_matrices.stiffness(family, self.laminate_of(family), self.rules, self.curvature)
         if self.is_preloaded:
             K += element_matrices.geometric_stiffness(family, self.preload, self.rules)
         return K

@@ -19,6 +19,7 @@ import numpy as np
 from fecm._frozen import frozen
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics import failure
+from fecm.mechanics.curvature import FLAT, Curvature, strain_of_deflection
 from fecm.mechanics.elements import Quadrature, gauss
 from fecm.mechanics.interpolation import interpolate, inverse_jacobian, local_shape_functions
 from fecm.mechanics.laminate import Laminate
@@ -168,7 +169,8 @@ class PlyStresses:
 
     The rule has the points of the in-plane stresses; the interlaminar ones belong to the element's
     centre.  `initial` is a uniform midplane strain of the undeformed plate, (3,).  The midplane
-    strains of a `nonlinear` plate are eps_l + eps_q; its elements have nine nodes.
+    strains of a plate with a `curvature` contain w/R, those of a `nonlinear` one eps_q; the
+    elements of both have nine nodes.
 
     Arrays have as many plies as the laminate with the most of them; they are NaN at those that an
     element lacks.
@@ -182,6 +184,7 @@ class PlyStresses:
         members: Indices | None = None,
         initial: Floats | None = None,
         *,
+        curvature: Curvature = FLAT,
         nonlinear: bool = False,
     ) -> None:
         self.initial = initial
@@ -192,12 +195,13 @@ class PlyStresses:
         most = max(zone.plies for zone in self.zones)
         # Numbers of elements, points of an element, and plies.
         self.shape = (len(elements), len(rule.xi), most)
+        stretches = nonlinear or curvature != FLAT
         self._families = [
             (
                 family,
                 interpolate(family, rule).dN,
                 second_derivatives(family) if is_complete(elements[family.rows]).all() else None,
-                _Quadratic(family, rule) if nonlinear else None,
+                _OfDeflection(family, rule, curvature, nonlinear=nonlinear) if stretches else None,
             )
             for family in element_blocks(elements, mesh.coordinates)
         ]
@@ -214,18 +218,18 @@ class PlyStresses:
         """
         count, points, _ = self.shape
         strains, gradients = np.empty((count, points, 6)), np.full((count, 2, 6), np.nan)
-        for family, slopes, curved, quadratic in self._families:
+        for family, slopes, second, of_deflection in self._families:
             q = field[family.nodes][:, :, [0, 1, 3, 4]]
             q[:, :, 2:] *= -1.0  # curvatures are the strains of the rotations' negatives
             strains[family.rows] = strains_of(slopes @ q[:, None])
-            if curved is not None:
+            if second is not None:
                 # By x, y of the derivatives by x, y: xx, xy; xy, yy.
-                gradients[family.rows] = strains_of((curved @ q)[:, [[0, 2], [2, 1]]])
-            if quadratic is not None:
+                gradients[family.rows] = strains_of((second @ q)[:, [[0, 2], [2, 1]]])
+            if of_deflection is not None:
                 w = field[family.nodes, 2]
-                strains[family.rows, :, :3] += quadratic.strains(w)
-                if curved is not None:
-                    gradients[family.rows, :, :3] += quadratic.gradients(w, curved)
+                strains[family.rows, :, :3] += of_deflection.strains(w)
+                if second is not None:
+                    gradients[family.rows, :, :3] += of_deflection.gradients(w, second)
         if self.initial is not None:
             strains[..., :3] += self.initial
         return strains, gradients
@@ -263,24 +267,34 @@ def _among(members: Indices, rows: Rows) -> Rows:
     return rows if isinstance(rows, slice) else np.flatnonzero(np.isin(members, rows))
 
 
-class _Quadratic:
-    """Strains eps_q = (w,x^2/2, w,y^2/2, w,x w,y) of a block's elements."""
+class _OfDeflection:
+    """Midplane strains of w of a block's elements: w/R, and eps_q of a nonlinear plate."""
 
-    def __init__(self, family: ElementBlock, rule: Quadrature) -> None:
-        self._tied = QuadraticStrains(family, rule)
+    def __init__(
+        self, family: ElementBlock, rule: Quadrature, curvature: Curvature, *, nonlinear: bool
+    ) -> None:
+        self._values, _ = local_shape_functions(family, rule)
         self._slopes_at_centre = interpolate(family, gauss(1)).dN[:, 0]
+        self._curved = strain_of_deflection(curvature)
+        self._tied = QuadraticStrains(family, rule) if nonlinear else None
 
     def strains(self, w: Floats) -> Floats:
-        """Tied strains at the points, (ne, points, 3), of nodal values (ne, 9)."""
-        return self._tied.of(w.T).transpose(2, 1, 0)
+        """Strains at the points, (ne, points, 3), of nodal values (ne, nn); tied quadratic ones."""
+        strains = (w @ self._values.T)[:, :, None] * self._curved
+        if self._tied is not None:
+            strains += self._tied.of(w.T).transpose(2, 1, 0)
+        return np.asarray(strains)
 
-    def gradients(self, w: Floats, curved: Floats) -> Floats:
+    def gradients(self, w: Floats, second: Floats) -> Floats:
         """Derivatives by x and y at the centre, (ne, 2, 3), with those of `second_derivatives`."""
         x, y = np.einsum("ein,en->ie", self._slopes_at_centre, w)
-        xx, yy, xy = np.einsum("ein,en->ie", curved, w)
-        by_x = (x * xx, y * xy, xx * y + x * xy)
-        by_y = (x * xy, y * yy, xy * y + x * yy)
-        return np.array([by_x, by_y]).transpose(2, 0, 1)
+        gradients = np.stack([x, y], axis=1)[:, :, None] * self._curved
+        if self._tied is not None:
+            xx, yy, xy = np.einsum("ein,en->ie", second, w)
+            by_x = (x * xx, y * xy, xx * y + x * xy)
+            by_y = (x * xy, y * yy, xy * y + x * yy)
+            gradients += np.array([by_x, by_y]).transpose(2, 0, 1)
+        return np.asarray(gradients)
 
 
 def strains_of(slopes: Floats) -> Floats:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fecm._errors import FecmError
 from fecm._frozen import frozen
 from fecm._typing import Bools, Floats, Indices
+from fecm.mechanics.curvature import FLAT, Curvature, strain_of_deflection
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, interpolate, local_shape_functions
 from fecm.mechanics.mesh import ElementBlock, Mesh, element_blocks
@@ -159,7 +160,8 @@ def shortest_side(elements: ElementBlock) -> float:
 # z runs from the midplane towards the face away from the projectile.  Normals stay straight,
 # u(z) = u - z theta, so that the strain at z is the midplane strain plus z times the curvature.
 # Strains are discontinuous between elements: a gage on a common edge or node reads the mean of the
-# adjacent elements.  A plate that stretches as it bends adds (dw/ds)^2/2, of the mean slope.
+# adjacent elements.  A curved plate adds w/R in the gage's direction, and a plate that stretches as
+# it bends (dw/ds)^2/2, of the mean slope.
 
 
 class OutsideError(FecmError, ValueError):
@@ -200,11 +202,12 @@ def gages(
     records: Sequence[GagePlace],
     *,
     transposed_jacobian: bool = False,
+    curvature: Curvature = FLAT,
     nonlinear: bool = False,
 ) -> GageArray:
     """Express the gages' strains by dofs; raises OutsideError if one is not on the plate."""
     families = element_blocks(mesh.elements, mesh.coordinates)
-    found = [_functional(families, record, transposed_jacobian) for record in records]
+    found = [_functional(families, record, transposed_jacobian, curvature) for record in records]
     rows = [linear for linear, _ in found]
     if nonlinear:
         rows += [slope for _, slope in found]
@@ -222,7 +225,10 @@ _Functional = tuple[Indices, Floats]
 
 
 def _functional(
-    families: Sequence[ElementBlock], gage: GagePlace, transposed_jacobian: bool
+    families: Sequence[ElementBlock],
+    gage: GagePlace,
+    transposed_jacobian: bool,
+    curvature: Curvature,
 ) -> tuple[_Functional, _Functional]:
     """A gage's linear strain, and the slope dw/ds in its direction."""
     point = np.array([[gage.x, gage.y]])
@@ -236,11 +242,14 @@ def _functional(
     c, s = np.cos(np.deg2rad(gage.direction)), np.sin(np.deg2rad(gage.direction))
     strain: list[_Functional] = []
     slope: list[_Functional] = []
+    stretch = float(np.array([c * c, s * s, c * s]) @ strain_of_deflection(curvature))
     for element, rule in found:
         at = interpolate(element, rule, transposed_jacobian=transposed_jacobian)
         along = c * at.dN[0, 0, 0] + s * at.dN[0, 0, 1]  # derivative in the gage's direction
         for dof, factor in ((0, c), (1, s), (3, -gage.z * c), (4, -gage.z * s)):
             strain.append((element.nodes[0] * NDOF + dof, factor * along / len(found)))
+        if stretch:
+            strain.append((element.nodes[0] * NDOF + 2, stretch * at.N[0] / len(found)))
         slope.append((element.nodes[0] * NDOF + 2, along / len(found)))
     return _joined(strain), _joined(slope)
 

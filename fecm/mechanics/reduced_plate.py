@@ -33,7 +33,6 @@ there.  Each mode adds g_i^2/omega_i^2 to the static compliance: those that add 
 
 from __future__ import annotations
 
-from dataclasses import replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -46,9 +45,10 @@ from fecm._typing import Floats, Indices
 from fecm.mechanics.element_matrices import membrane_and_bending
 from fecm.mechanics.interpolation import NDOF, interpolate
 from fecm.mechanics.membrane import BLOCK, TYING, QuadraticStrains
-from fecm.mechanics.mesh import ElementBlock, equation_numbers
+from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.solutions import SingularStiffnessError, Tangent, rigid_in_plane
+from fecm.mechanics.symmetry import with_codes
 
 # Residual of a mode relative to its eigenvalue; the error of the frequency is its square.
 CONVERGED = 1e-6
@@ -311,7 +311,7 @@ def _in_plane(plate: PlateModel) -> PlateModel:
     """The plate with only u and v free."""
     codes = plate.mesh.codes.copy()
     codes[:, 2:] = 1
-    return replace(plate, mesh=replace(plate.mesh, codes=codes, equations=equation_numbers(codes)))
+    return with_codes(plate, codes)
 
 
 def _integrated(plate: PlateModel, plane: PlateModel, shapes: Floats) -> Pairs:
@@ -331,7 +331,7 @@ def _integrated(plate: PlateModel, plane: PlateModel, shapes: Floats) -> Pairs:
         for block in family.blocks(BLOCK):
             strains = _pair_strains(plate, block, fields[block.nodes, 2])
             at = interpolate(block, plate.rules.bending)
-            linear = membrane_and_bending(at)  # (ne, points, 6, 5 nodes)
+            linear = membrane_and_bending(at, plate.curvature)  # (ne, points, 6, 5 nodes)
             ne, nodes = block.nodes.shape
             weight = at.jxw[:, :, None, None]
             stresses = _rows(weight * (laminate.A @ strains))

@@ -39,7 +39,7 @@ def strains_and_resultants(
     laminates: Sequence[tuple[Laminate, Rows]],
     field: Floats,
     preload: tuple[float, float, float],
-    quadratic: Floats | None = None,
+    of_deflection: Floats | None = None,
 ) -> dict[str, Floats]:
     """Midplane strains, curvatures, transverse shear strains and resultants (equation 2-20).
 
@@ -47,16 +47,16 @@ def strains_and_resultants(
     displacement field (numnp, 5).  Each laminate has rows of elements.
 
     The membrane forces include `preload`, N_x, N_y, N_xy of the undeformed plate; the strains do
-    not.  To the midplane strains of a nonlinear plate eps_q is added, its `quadratic` ones,
-    (3, numel, npt).
+    not.  The midplane strains `of_deflection`, (3, numel, npt), of a curved or nonlinear plate are
+    added to those of u and v.
     """
     bending = strains.evaluate(field)
     # The curvatures of the rotations (-u, -v) are the midplane strains of u and v.
     in_plane = np.zeros_like(field)
     in_plane[:, 3:] = -field[:, :2]
     membrane = strains.evaluate(in_plane)[:3]
-    if quadratic is not None:
-        membrane = membrane + quadratic
+    if of_deflection is not None:
+        membrane = membrane + of_deflection
     curvature, shear = bending[:3], bending[[4, 3]]
     N, M, Q = np.empty_like(membrane), np.empty_like(curvature), np.empty_like(shear)
     for laminate, rows in laminates:
@@ -113,12 +113,16 @@ class StrainField:
 
     def places(self, coordinates: Floats) -> tuple[Floats, Floats]:
         """Coordinates x and y of the points, (numel, npt)."""
-        x, y = np.empty((2, *self.shape))
+        x, y = self.interpolated(coordinates)
+        return x, y
+
+    def interpolated(self, nodal: Floats) -> Floats:
+        """Values at the points, (n, numel, npt), of nodal values (numnp, n)."""
+        found = np.empty((nodal.shape[1], *self.shape))
         for family in self.families:
             values, _ = local_shape_functions(family, self.rule)
-            place = np.einsum("eni,pn->iep", coordinates[family.nodes], values)
-            x[family.rows], y[family.rows] = place
-        return x, y
+            found[:, family.rows] = np.einsum("eni,pn->iep", nodal[family.nodes], values)
+        return found
 
     def evaluate(self, displacement: Floats) -> Floats:
         """Strains of a displacement field (numnp, 5), or of several (rows, numnp, 5).

@@ -3,9 +3,10 @@
 The strain energy without the preload's part is
 
     1/2 int n A^-1 n dA + 1/2 int (kappa (D - B A^-1 B) kappa + gamma S gamma) dA,
-    n = A eps + B kappa,  eps = eps_l + eps_q.
+    n = A eps + B kappa,  eps = eps_l + eps_q,
 
-Its first part is that of the membrane: 1/2 eps A eps if B is zero.  The membrane force is N0 + n.
+where eps_l contains the strains w/R of a curved plate.  The first part is that of the membrane: 1/2
+eps A eps if B is zero.  The membrane force is N0 + n.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 
 from fecm._typing import Bools, Floats
 from fecm.mechanics import assumed_shear
+from fecm.mechanics.curvature import strain_of_deflection
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import interpolate, jacobian_determinants
 from fecm.mechanics.membrane import QuadraticStrains
@@ -66,6 +68,8 @@ class _Elements:
         self.x, self.y = np.einsum("pn,eni->iep", at.N, block.coordinates)
         self._nodes, self._slopes = block.nodes, at.dN
         self._tied = QuadraticStrains(block, rule)
+        self._values = at.N
+        self._curved = strain_of_deflection(plate.curvature)
 
     def midplane(self, field: Floats) -> _Midplane:
         """The midplane in a displacement field, (numnp, 5)."""
@@ -74,6 +78,7 @@ class _Elements:
         slopes = self._slopes @ q[:, None]
         strains = strains_of(slopes[..., [0, 1, 3, 4]])
         stretch = self._tied.of(q[..., 2].T).transpose(2, 1, 0)
+        stretch += (self._values @ q[..., 2:3]) * self._curved
         return _Midplane(strains[..., :3] + stretch, strains[..., 3:], slopes[..., 2])
 
     def forces(self, at: _Midplane) -> Floats:

@@ -1,10 +1,10 @@
 """Reduction of a plate to the dofs that move independently.
 
-In-plane dofs stay at rest if the laminate does not couple them to bending and no load acts in the
-plane.  If a half turn about the centre maps mesh, supports and loads onto themselves, the response
-to an impact at the centre has the same symmetry: w equals w of the image, the other dofs have the
-opposite sign, and half of the elements suffice.  Every laminate is invariant under the half turn;
-an element and its image must have the same.
+In-plane dofs stay at rest if neither the laminate nor a curvature couples them to bending and no
+load acts in the plane.  If a half turn about the centre maps mesh, supports and loads onto
+themselves, the response to an impact at the centre has the same symmetry: w equals w of the image,
+the other dofs have the opposite sign, and half of the elements suffice.  Every laminate and every
+curvature is invariant under the half turn; an element and its image must have the same laminate.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fecm._frozen import frozen
 from fecm._typing import Floats, Indices
-from fecm.mechanics.mesh import ElementBlock, equation_numbers
+from fecm.mechanics.mesh import ElementBlock, Ints, equation_numbers
 from fecm.mechanics.plate import PlateModel
 
 # Signs of u, v, w, theta_x, theta_y under the half turn.
@@ -119,8 +119,7 @@ def restrain_resting_dofs(plate: PlateModel, contact: Floats | None) -> PlateMod
     mesh = plate.mesh
     in_plane, others = mesh.equations[:, :2].any(), mesh.equations[:, 2:].any()
     pulled = mesh.forces[:, :2].any() or (contact is not None and contact[:, :2].any())
-    stretches = plate.is_coupled or plate.nonlinear
-    if not (in_plane and others) or pulled or stretches:
+    if not (in_plane and others) or pulled or plate.moves_in_plane:
         return plate
     return restrain_plane(plate)
 
@@ -129,6 +128,11 @@ def restrain_plane(plate: PlateModel) -> PlateModel:
     """Restrain the in-plane dofs of a plate."""
     codes = plate.mesh.codes.copy()
     codes[:, :2] = 1
+    return with_codes(plate, codes)
+
+
+def with_codes(plate: PlateModel, codes: Ints) -> PlateModel:
+    """The plate with other restraint codes, (numnp, 5)."""
     mesh = replace(plate.mesh, codes=codes, equations=equation_numbers(codes))
     return replace(plate, mesh=mesh)
 

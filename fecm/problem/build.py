@@ -9,7 +9,7 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._frozen import frozen
-from fecm._typing import Bools
+from fecm._typing import Bools, Indices
 from fecm.deck import model
 from fecm.deck.macros import flat, moves_only
 from fecm.mechanics import contact_law
@@ -253,20 +253,29 @@ def _stresses(
     points = problem.rules[2]
     initial = plate.preload_strain if plate.is_preloaded else None
     zones = plate.rows_by_laminate
+
+    def made(rows: Indices | None) -> PlyStresses:
+        return PlyStresses(
+            problem.mesh,
+            zones,
+            points,
+            rows,
+            initial,
+            curvature=plate.curvature,
+            nonlinear=plate.nonlinear,
+        )
+
     plies = failure = None
     if "PLYS" in words:  # the M elements nearest to the load, or all
         nearest = np.argsort(problem.distances.round(9), kind="stable")
         rows = np.sort(nearest[: int(words["PLYS"].second) or None])
-        plies = PlyStresses(problem.mesh, zones, points, rows, initial, nonlinear=plate.nonlinear)
+        plies = made(rows)
     if "FAIL" in words:
         kind = CompiledMonitor if compiled else FailureMonitor
-        stresses = PlyStresses(
-            problem.mesh, zones, points, initial=initial, nonlinear=plate.nonlinear
-        )
         strengths = strengths_of_deck(problem.deck)
         first = next((ply for plies in strengths for ply in plies if ply is not None), None)
         own = [] if first is None else [one.with_modes(first) for one in criteria]
-        failure = kind(stresses, strengths, own)
+        failure = kind(made(None), strengths, own)
         if cure is not None:
             failure = failure.with_residual([one.stresses for one in cure])
     return plies, failure
@@ -280,6 +289,7 @@ def _gages(problem: Problem, mesh: Mesh, plate: PlateModel) -> GageArray | None:
         mesh,
         cards.records,
         transposed_jacobian=plate.rules.transposed_jacobian,
+        curvature=plate.curvature,
         nonlinear=plate.nonlinear,
     )
 

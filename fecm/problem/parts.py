@@ -13,6 +13,7 @@ from fecm.deck import model
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Deck, RodDiameter
 from fecm.mechanics import contact_law
+from fecm.mechanics.curvature import FLAT
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.laminate import Laminate, laminate
@@ -62,7 +63,7 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
         transposed_jacobian="jacobian" in slips,
         assumes_shear=has_assumed_shear(deck),
     )
-    preload = deck.last(model.Preload)
+    preload, curved = deck.last(model.Preload), deck.last(model.Curvature)
     return PlateModel(
         mesh,
         first,
@@ -71,6 +72,7 @@ def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> 
         nonlinear=deck.has(model.Nonlinear),
         others=tuple(others),
         laminate_numbers=laminate_numbers(deck) if others else None,
+        curvature=FLAT if curved is None else curved.curvatures,
     )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.deck.macros import WORDS, Body, load_factor, number
 from fecm.deck.model import Macro
-from fecm.mechanics.membrane import quadratic_strains_at
+from fecm.mechanics.membrane import strains_of_deflection
 from fecm.mechanics.solutions import ConvergenceError, modes, reactions
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.strains import strains_and_resultants
@@ -267,8 +267,8 @@ def store_stresses(run: Simulation, n: int) -> None:
         return
     plate, model, points = run.state.plate, run.model.plate, run.model.stress_points
     field = run.displacement_field()
-    quadratic = quadratic_strains_at(points, field) if model.nonlinear else None
-    values = strains_and_resultants(points, model.rows_by_laminate, field, model.preload, quadratic)
+    stretch = strains_of_deflection(model, points, field)
+    values = strains_and_resultants(points, model.rows_by_laminate, field, model.preload, stretch)
     run.recorder.row("stresses", plate.step, plate.time, values)
     run.printer.stresses(values, points.places(run.problem.mesh.coordinates), run.state.clock)
 

@@ -75,7 +75,8 @@ class Group(Structure):
     `coupled`         number                        whether B is not 0
     ================  ============================  ==========================================
 
-    With a preload `deflection` has the slopes at the points of bending last.
+    With a preload `deflection` has the slopes at the points of bending last, and after them with a
+    curvature the values there.
     """
 
     _fields_ = (
@@ -132,7 +133,9 @@ class ElementGroup:
             self._rules = (membrane.in_rows(rules.bending), shear)
         if congruent:
             self.kind, fields = self._matrices(weights[0])
-        elif nn == family.shape.nodes == 9 and not (rules.assumes_shear or plate.is_preloaded):
+        elif nn == family.shape.nodes == 9 and not (
+            rules.assumes_shear or plate.is_preloaded or plate.is_curved
+        ):
             self.order = np.lexsort((family.shape.xi, family.shape.eta))
             self.kind, fields = ElementKind.FACTORIZED, self._factors()
         else:
@@ -231,7 +234,7 @@ class ElementGroup:
         bending, shear = self._rules
         nn = family.nodes.shape[1]
         fields: Fields = {"bending": len(bending.xi), "shear": len(shear.xi)}
-        _, local = local_shape_functions(family, bending)
+        at_bending, local = local_shape_functions(family, bending)
         slopes = _slopes(local)
         if self._plate.rules.assumes_shear:
             tied = [
@@ -249,6 +252,8 @@ class ElementGroup:
             deflection = _slopes(local)
         if self._plate.is_preloaded:
             deflection = np.concatenate([deflection, slopes])
+        if self._plate.is_curved:
+            deflection = np.concatenate([deflection, at_bending])
         rotations = np.concatenate([slopes, values])
         return fields | {
             "rotations": rotations,

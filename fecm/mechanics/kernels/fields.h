@@ -63,6 +63,7 @@ static const Entry FIELDS[] = {
     FIELD(Plate, chunk),
     FIELD(Plate, lane),
     FIELD(Plate, preload),
+    FIELD(Plate, curvature),
     FIELD(Plate, nonlinear),
     FIELD(Plate, transposed),
     FIELD(Plate, planes),

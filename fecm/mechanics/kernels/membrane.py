@@ -16,10 +16,11 @@ _UPPER = np.triu_indices(3)
 
 
 def supports(plate: PlateModel) -> bool:
-    """Whether the kernels have the membrane of a plate: of 9-node elements with 3 x 3 points."""
+    """Whether the kernels have the membrane: of flat 9-node elements with 3 x 3 points."""
     rules = plate.rules
     return (
-        rules.assumes_shear
+        not plate.is_curved
+        and rules.assumes_shear
         and len(rules.bending.xi) == 9
         and all(map(membrane.supports, plate.families))
     )

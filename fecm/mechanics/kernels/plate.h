@@ -139,11 +139,11 @@ INLINE void NAME(tabulated)(int nd, int nodes, const Plate *p, const Chunk *c, c
     for (int node = 0; node < nodes; node++) NAME(take)(nd, p, c, b->place[node], u, x + node, nodes);
     const int nb = (int)g->bending, ns = (int)g->shear, nt = (int)g->tying;
     const int values = nt ? 2 * nt : ns, slopes = nt ? 2 * nt : 2 * ns, first = nd == 5 ? 2 : 0;
-    const int sloped = slopes + (p->preload ? 2 * nb : 0);
-    lanes at_w[64], at_r[2][48], at_u[2][32], e[2][16], part[12];
+    const int sloped = slopes + (p->preload ? 2 * nb : 0), valued = sloped + (p->curvature ? nb : 0);
+    lanes at_w[80], at_r[2][48], at_u[2][32], e[2][16], part[12];
     const lanes *w = x + first * nodes;
     const double *C = g->stiffness, *S = g->transverse;
-    NAME(product)(g->deflection, sloped, nodes, w, at_w);
+    NAME(product)(g->deflection, valued, nodes, w, at_w);
     for (int i = 0; i < 2; i++) {
         NAME(product)(g->rotations, 2 * nb + values, nodes, w + (1 + i) * nodes, at_r[i]);
         if (nd == 5) NAME(product)(g->rotations, 2 * nb, nodes, x + i * nodes, at_u[i]);
@@ -167,6 +167,8 @@ INLINE void NAME(tabulated)(int nd, int nodes, const Plate *p, const Chunk *c, c
                 strain[0] = xx * HALF(q[0]) + xe * HALF(q[nb]);
                 strain[1] = yx * HALF(d[0]) + ye * HALF(d[nb]);
                 strain[2] = yx * HALF(q[0]) + ye * HALF(q[nb]) + xx * HALF(d[0]) + xe * HALF(d[nb]);
+                if (p->curvature)
+                    for (int i = 0; i < 3; i++) strain[i] += p->curvature[i] * HALF(at_w[sloped + point]);
             }
             for (int i = from; i < 6; i++) {
                 half sum = zero;
@@ -179,6 +181,11 @@ INLINE void NAME(tabulated)(int nd, int nodes, const Plate *p, const Chunk *c, c
                 lanes *const q = at_u[0] + point, *const d = at_u[1] + point;
                 HALF(q[0]) = xx * stress[0] + yx * stress[2], HALF(q[nb]) = xe * stress[0] + ye * stress[2];
                 HALF(d[0]) = xx * stress[2] + yx * stress[1], HALF(d[nb]) = xe * stress[2] + ye * stress[1];
+                if (p->curvature) {
+                    half sum = zero;
+                    for (int i = 0; i < 3; i++) sum += p->curvature[i] * stress[i];
+                    HALF(at_w[sloped + point]) = sum;
+                }
             }
         }
         if (!nt)
@@ -236,7 +243,7 @@ INLINE void NAME(tabulated)(int nd, int nodes, const Plate *p, const Chunk *c, c
             }
 #undef G
     lanes *const yw = y + first * nodes;
-    NAME(product)(g->deflection_t, nodes, sloped, at_w, yw);
+    NAME(product)(g->deflection_t, nodes, valued, at_w, yw);
     for (int i = 0; i < 2; i++) {
         NAME(product)(g->rotations_t, nodes, 2 * nb + values, at_r[i], yw + (1 + i) * nodes);
         if (nd == 5) NAME(product)(g->in_plane_t, nodes, 2 * nb, at_u[i], y + i * nodes);

@@ -13,8 +13,8 @@ A vector has a part for each chunk, and a last one for the nodes that chunks sha
     a part:  u_0 u_1 u_2 ... u_(nodes - 1) | v_0 v_1 ...     | w_0 ...       | theta_x, theta_y
              one dof of all nodes            the next dof
 
-nd is 3 where u and v are at rest.  Of a nonlinear plate it is 5: the groups of elements have
-matrices or tables of the last three dofs, and the membrane adds the rest.
+nd is 3 where u and v are at rest in a flat plate.  Of a nonlinear plate it is 5: the groups of
+elements have matrices or tables of the last three dofs, and the membrane adds the rest.
 
 A chunk has places for all nodes of its elements: nodes of its own, which it moves; copies of shared
 nodes, which it fills from the last part before its blocks are computed, and whose forces it hands
@@ -50,6 +50,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Array, Floats
+from fecm.mechanics.curvature import strain_of_deflection
 from fecm.mechanics.interpolation import NDOF
 from fecm.mechanics.kernels import LIBRARY, Doubles, Integers, Structure, floats
 from fecm.mechanics.kernels.element_groups import ElementGroup, Group, grouped
@@ -113,6 +114,7 @@ class Plate(Structure):
     ===========  =========================  ===================================================
     `lane`       (rows, 8)                  places of the lanes where they don't follow
     `preload`    (3,)                       initial membrane force; not set without
+    `curvature`  (3,)                       strains per w of a curved plate; not set without
     `mass`       (nodes,) or (nd, nodes)    lumped mass, part by part, divided by `ratio`
     `inverse`    as `mass`                  1 over it, 0 where it is 0
     `ratio`      (nd,)                      mass of each dof over that of the first
@@ -132,6 +134,7 @@ class Plate(Structure):
         ("chunk", POINTER(Chunk)),
         ("lane", Integers),
         ("preload", Doubles),
+        ("curvature", Doubles),
         ("nonlinear", c_int64),  # whether stretching follows from bending
         ("transposed", c_int64),  # whether the inverse Jacobian is, the slip `jacobian`
         ("planes", c_int64),  # first dimension of `mass`: 1, or nd
@@ -159,7 +162,7 @@ class CompiledPlate:
         self, plate: PlateModel, kept: SymmetryReduction, *, nonlinear: bool = False
     ) -> None:
         moves = kept.sign != 0.0
-        in_plane = nonlinear or moves[:, :2].any()
+        in_plane = nonlinear or plate.is_curved or moves[:, :2].any()
         self.columns = columns = np.arange(0 if in_plane else 2, NDOF)
         self._nonlinear = nonlinear
         self._held: list[object] = []  # what the structures point to by addresses
@@ -216,6 +219,7 @@ class CompiledPlate:
             chunk=cuts,
             lane=_integers(lanes),
             preload=np.array(plate.preload) if plate.is_preloaded else None,
+            curvature=strain_of_deflection(plate.curvature) if plate.is_curved else None,
             nonlinear=int(nonlinear),
             transposed=int(plate.rules.transposed_jacobian),
             planes=len(factor) // count,

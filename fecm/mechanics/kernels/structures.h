@@ -64,6 +64,7 @@ typedef struct {
     const Chunk *chunk;
     const int32_t *lane;             /* (rows, 8) */
     const double *preload;           /* (3,): initial membrane force N0 x, y, xy; or NULL */
+    const double *curvature;         /* (3,): strains x, y, xy per w of a curved plate; or NULL */
     int64_t nonlinear;               /* whether the plate is */
     int64_t transposed;              /* whether the Jacobian of FACTORIZED elements is */
     int64_t planes;                  /* of the next two: 1, or one for each dof */

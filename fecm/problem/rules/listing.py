@@ -20,6 +20,7 @@ LATER_SEGMENTS = (
     model.Patch,
     model.Nonlinear,
     model.Preload,
+    model.Curvature,
     model.Cure,
     model.Materials,
     model.Laminates,
@@ -70,7 +71,7 @@ def too_many_layers(problem: Problem) -> Reports:
     Subject.LISTING,
     "The deck has a word that the printed program does not have.",
     cause=(
-        "These are PATC, PLYS, FAIL, ALLO, DELA, DAMP, NONL, PREL, CURE, MATS, LAMS, ZONE, "
+        "These are PATC, PLYS, FAIL, ALLO, DELA, DAMP, NONL, PREL, CURV, CURE, MATS, LAMS, ZONE, "
         "SHEA MITC and SHEA EQUI."
     ),
     remedy=REMEDY,

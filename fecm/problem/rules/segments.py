@@ -22,6 +22,7 @@ SINGLE: Kinds = (
     model.Damping,
     model.Nonlinear,
     model.Preload,
+    model.Curvature,
     model.Cure,
     model.Materials,
     model.Laminates,
