@@ -336,7 +336,7 @@ def _integrated(plate: PlateModel, plane: PlateModel, shapes: Floats) -> Pairs:
             weight = at.jxw[:, :, None, None]
             stresses = _rows(weight * (laminate.A @ strains))
             quartic += _rows(strains).T @ stresses
-            if laminate.is_coupled:
+            if laminate.is_coupled or plate.is_curved:
                 AB = np.hstack([laminate.A, laminate.B])
                 own = fields[block.nodes].reshape(ne, 1, nodes * NDOF, modes)
                 cubic += _rows(weight * (AB @ (linear @ own))).T @ _rows(strains)

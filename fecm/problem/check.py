@@ -17,12 +17,13 @@ from fecm.deck.macros import Body, compile_program
 from fecm.deck.reader import ParsedProblem
 from fecm.deck.rules import apply, apply_first
 from fecm.problem.generate import generate, rod_diameters
-from fecm.problem.parts import W
+from fecm.problem.parts import W, is_curved
 from fecm.problem.problem import Problem
 from fecm.problem.rules import (
     buckling,
     contact,
     cure,
+    curvature,
     damage,
     damping,
     gages,
@@ -51,6 +52,7 @@ ALONE: tuple[type[model.Segment], ...] = (
     model.Delamination,
     model.Damping,
     model.Preload,
+    model.Curvature,
     model.Cure,
     model.Projectile,
     model.Shear,
@@ -162,6 +164,8 @@ def check_segment(segment: model.Segment, findings: Findings) -> None:
             apply(damping.OF_DAMPING, findings, segment)
         case model.Preload():
             apply(preload.ALONE, findings, segment)
+        case model.Curvature():
+            apply(curvature.ALONE, findings, segment)
         case model.Cure():
             apply(cure.OF_CURE, findings, segment)
         case model.Projectile():
@@ -195,6 +199,8 @@ def _check_points(checked: Problem, findings: Findings) -> None:
         apply(nonlinear.OF_NONLINEAR, findings, checked)
     else:
         apply(quadrature.OF_ASSUMED_SHEAR, findings, checked)
+    if is_curved(checked.deck):
+        apply(curvature.OF_PANEL, findings, checked)
     if (card := checked.deck.last(model.Patch)) is None:
         return
     apply_first(patch.OF_PATCH, findings, checked)
@@ -211,8 +217,10 @@ def _check_run(checked: Problem, findings: Findings, sound: Callable[[], bool]) 
     apply(program.OF_PURPOSE, findings, checked)
     if sound():
         apply(mesh.OF_SUPPORTS, findings, checked)
-        if checked.deck.has(model.Nonlinear):
+        if checked.deck.has(model.Nonlinear) or is_curved(checked.deck):
             apply(nonlinear.OF_SYMMETRY, findings, checked)
+        if is_curved(checked.deck):
+            apply(curvature.OF_SUPPORTS, findings, checked)
         apply_first(buckling.OF_PRELOAD, findings, checked)
         check_values(checked, findings)
         if time_step.takes_steps(checked):
@@ -242,6 +250,8 @@ def check_values(checked: Problem, findings: Findings) -> None:
     apply((*laminate.VALUES, *zones.VALUES), findings, checked)
     apply(units.VALUES, findings, checked)
     apply(preload.VALUES, findings, checked)
+    if is_curved(checked.deck):
+        apply(curvature.VALUES, findings, checked)
     if checked.has_impact:
         apply(contact.VALUES, findings, checked)
         apply(impact.NEIGHBOURS, findings, checked)

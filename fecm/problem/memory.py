@@ -100,5 +100,5 @@ def _factors(model: PlateModel, words: set[str]) -> int:
     n = model.neq
     total = FACTORS * n * math.log2(max(2, n)) if "TANG" in words else 0.0
     total += SHIFTED * n**1.5 if "EIGE" in words else 0.0
-    # With coupling all 5 x 5 dofs of two nodes interact, instead of 2 x 2 and 3 x 3.
-    return int(total * (25 / 13 if model.is_coupled else 1.0))
+    # Where u and v move with w all 5 x 5 dofs of two nodes interact, instead of 2 x 2 and 3 x 3.
+    return int(total * (25 / 13 if model.moves_in_plane else 1.0))

@@ -218,6 +218,12 @@ def is_coupled(deck: Deck) -> bool:
     return _are_coupled(material, deck.last(model.Materials), deck.last(model.Laminates))
 
 
+def is_curved(deck: Deck) -> bool:
+    """Whether a deck is that of a curved panel (``CURV``)."""
+    card = deck.last(model.Curvature)
+    return card is not None and any(card.curvatures)
+
+
 @lru_cache(maxsize=256)
 def _are_coupled(
     material: model.Material, materials: model.Materials | None, laminates: model.Laminates | None

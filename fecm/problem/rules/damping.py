@@ -8,6 +8,7 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.mechanics.curvature import strain_of_deflection
 from fecm.problem.problem import Problem
 from fecm.problem.rules.time_step import deck_time_steps, known_safe_step, takes_steps
 
@@ -107,15 +108,18 @@ def clamped_frequency(problem: Problem) -> float:
     """Lowest natural frequency of a clamped rectangle of the plate's size, radians over time.
 
     Rayleigh's quotient of products of the modes of clamped beams, whose integrals are 22.373^2
-    and 12.303^2; thin plate theory, without the coupling D16, D26.  With the preload.
+    and 12.303^2; thin plate theory, without the coupling D16, D26.  With the preload, and with the
+    curvature, where u and v are held.
     """
     D = problem.laminate.D
+    stretch = strain_of_deflection(problem.plate.curvature)
+    curved = float(stretch @ problem.laminate.A @ stretch)
     a, b = np.ptp(problem.mesh.coordinates[problem.mesh.used], axis=0).tolist()
     along, across = 22.373**2 * D[0, 0] / a**4, 22.373**2 * D[1, 1] / b**4
     twist = 2.0 * 12.303**2 * (D[0, 1] + 2.0 * D[2, 2]) / (a * b) ** 2
     n_x, n_y, _ = problem.plate.preload
     preload = 12.303 * (n_x / a**2 + n_y / b**2)
-    return math.sqrt(max(0.0, along + across + twist + preload) / problem.laminate.mass)
+    return math.sqrt(max(0.0, along + across + twist + preload + curved) / problem.laminate.mass)
 
 
 OF_DAMPING = (negative_damping,)

@@ -74,13 +74,18 @@ def without_assumed_shear(problem: Problem) -> Reports:
 )
 def other_elements(problem: Problem) -> Reports:
     """Find elements whose stretching by deflections is not known."""
+    what = "is not a quadrilateral with 9 nodes, as NONL needs"
+    hint = "elements with 3, 4, 8 or 12 nodes are for linear plates only"
+    yield from report_elements(problem.deck, np.flatnonzero(not_nine_nodes(problem)), what, hint)
+
+
+def not_nine_nodes(problem: Problem) -> Bools:
+    """Whether each element is another one than a quadrilateral with 9 nodes, (numel,)."""
     wrong = np.zeros(len(problem.mesh.elements), dtype=bool)
     for family in problem.families:
         nine = family.shape is QUADRILATERAL and family.nodes.shape[1] == QUADRILATERAL.nodes
         wrong[family.rows] = not nine
-    what = "is not a quadrilateral with 9 nodes, as NONL needs"
-    hint = "elements with 3, 4, 8 or 12 nodes are for linear plates only"
-    yield from report_elements(problem.deck, np.flatnonzero(wrong), what, hint)
+    return wrong
 
 
 @rule(
@@ -115,7 +120,7 @@ def other_order(problem: Problem) -> Reports:
 @rule(
     "W495",
     Subject.LAMINATE,
-    "NONL, and a line of symmetry is free to move across itself.",
+    "NONL or CURV, and a line of symmetry is free to move across itself.",
     cause=(
         "On a straight edge the slope across it is held, as by symmetry, but w and the in-plane "
         "displacement across it are free."

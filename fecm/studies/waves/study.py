@@ -174,6 +174,8 @@ def waves_of(problem: Problem, shear_factor: float) -> Waves:
     notes: list[str] = []
     if problem.plate.is_preloaded:
         notes.append("PREL is left out: these are waves of the laminate without preload")
+    if problem.plate.is_curved:
+        notes.append("CURV is left out: these are waves of the flat laminate")
     if problem.plate.others:
         notes.append("the plate has several laminates; these are waves of the one under the load")
     return _waves(problem.laminate, shear_factor, unit_names(problem.deck), notes)
