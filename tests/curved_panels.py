@@ -79,3 +79,8 @@ def struck(
     hit = model.Impact(grid.nearest(x, y)[0], 3, velocity)
     macros = f"LMAS DT={dt!r} LOOP={steps} TIME RODP={every or steps} {more} NEXT"
     return panel(radii, macros, grid, others=(*IMPACT, hit, *others))
+
+
+def shortly(radii: tuple[float, ...], velocity: float = 3000.0) -> model.Deck:
+    """A few steps of an impact on a coarse mesh."""
+    return struck(radii, mesh(12), 5e-7, 300, velocity=velocity)

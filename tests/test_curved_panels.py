@@ -18,7 +18,17 @@ from fecm.studies.estimate import estimate
 from fecm.verification import decks
 from tests import curved_panels
 from tests.builders import DATA, Floats, table
-from tests.curved_panels import ANGLES, DURATION, PANELS, PEAK, SIDES, mesh, panel, struck
+from tests.curved_panels import (
+    ANGLES,
+    DURATION,
+    PANELS,
+    PEAK,
+    SIDES,
+    mesh,
+    panel,
+    shortly,
+    struck,
+)
 
 STATIC = "TANG FORM SOLV DISP"
 ROWS = dict(zip(PANELS, table("curved_panels.csv"), strict=True))
@@ -173,10 +183,6 @@ def test_every_solver_gives_the_same_impact() -> None:
         for path in ("history/force", "gages/strain", "tape8/kappa_x", "energy/plate_strain"):
             size = 1e-10 * np.abs(one[path]).max()
             np.testing.assert_allclose(other[path], one[path], rtol=0.0, atol=size, err_msg=path)
-
-
-def shortly(radii: tuple[float, ...], velocity: float = 3000.0) -> model.Deck:
-    return struck(radii, mesh(12), 5e-7, 300, velocity=velocity)
 
 
 def test_a_sweep_has_the_forces_of_its_runs() -> None:

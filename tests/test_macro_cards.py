@@ -14,6 +14,7 @@ from fecm.deck.macros import WORDS, estimate_work
 from fecm.deck.model import (
     Allowables,
     Cure,
+    Curvature,
     Expansion,
     Impact,
     Indentation,
@@ -231,6 +232,8 @@ STRENGTHS = replace(
         Nonlinear(),
         Preload(50.0),
         Preload(-1 / 3, 0.0, 1e-300),
+        Curvature(-1500.0),
+        Curvature(0.0, 1 / 3, -1e300),
         Cure(-100.0, expansions=(Expansion(1, 2e-8, 22.5e-6),)),
         Cure(0.0),
         Materials((NumberedPly(MaterialNumber(2), Ply(*[1 / 3] * 7)),)),

@@ -22,6 +22,7 @@ import numpy as np
 import pytest
 
 from fecm.deck.model import Ply
+from fecm.mechanics.curvature import FLAT, Curvature
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.membrane import Membrane, quadratic_strains, tangent
 from fecm.mechanics.plate import PlateModel
@@ -89,15 +90,16 @@ def centre(plate: PlateModel) -> Floats:
 # The element --------------------------------------------------------------------------------------
 
 
-def one(corners: Corners, seed: int = 0) -> PlateModel:
+def one(corners: Corners, seed: int = 0, curvature: Curvature = FLAT) -> PlateModel:
     """A free element of the general laminate, its mid-sides off the middle with a seed."""
     coordinates, elements = one_element(corners, 9)
     if seed:
         coordinates = coordinates + np.random.default_rng(seed).normal(0.0, 0.03, (9, 2))
     mesh = with_restraints(coordinates, elements, nothing(coordinates))
-    return PlateModel(mesh, general_plate(), RULES, nonlinear=True)
+    return PlateModel(mesh, general_plate(), RULES, nonlinear=True, curvature=curvature)
 
 
+SHAPES = pytest.mark.parametrize("curvature", [FLAT, (0.7, -0.4, 0.3)])
 ELEMENTS = pytest.mark.parametrize(
     ("corners", "seed"), [(SQUARE, 0), (PARALLELOGRAM, 0), (SKEWED, 0), (SKEWED, 5)]
 )
@@ -136,17 +138,21 @@ def gradient(plate: PlateModel, field: Floats, which: int) -> Floats:
 
 
 @ELEMENTS
+@SHAPES
 def test_the_internal_force_is_the_gradient_of_the_strain_energy(
-    corners: Corners, seed: int
+    corners: Corners, seed: int, curvature: Curvature
 ) -> None:
-    plate, field = one(corners, seed), state()
+    plate, field = one(corners, seed, curvature), state()
     found, _ = force(plate, field)
     assert np.abs(found - gradient(plate, field, 1)).max() < 1e-9 * np.abs(found).max()
 
 
 @ELEMENTS
-def test_the_tangent_is_the_gradient_of_the_internal_force(corners: Corners, seed: int) -> None:
-    plate, field = one(corners, seed), state()
+@SHAPES
+def test_the_tangent_is_the_gradient_of_the_internal_force(
+    corners: Corners, seed: int, curvature: Curvature
+) -> None:
+    plate, field = one(corners, seed, curvature), state()
     (family,) = plate.families
     found = plate.stiffness_of(family)[0] + tangent(plate, family, field)[0]
     assert np.abs(found - gradient(plate, field, 0)).max() < 1e-9 * np.abs(found).max()

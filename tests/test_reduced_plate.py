@@ -9,6 +9,7 @@ import pytest
 from scipy.special import ellipk
 
 from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, LinearPermanent
+from fecm.mechanics.curvature import FLAT, Curvature
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.membrane import Membrane
 from fecm.mechanics.mesh import equation_numbers
@@ -77,11 +78,12 @@ def relaxed_energy(plate: PlateModel, field: Floats) -> float:
 
 
 @pytest.mark.parametrize("held", [True, False])
+@pytest.mark.parametrize("curvature", [FLAT, (0.05, -0.1, 0.02)])
 @pytest.mark.parametrize("lam", [isotropic_plate(THICKNESS), general_plate()])
 def test_the_energy_is_that_of_the_elements_with_the_membrane_in_equilibrium(
-    lam: Laminate, held: bool
+    lam: Laminate, curvature: Curvature, held: bool
 ) -> None:
-    plate = on_square(lam, held=held, distorted=True)
+    plate = replace(on_square(lam, held=held, distorted=True), curvature=curvature)
     plate = plate if lam.is_coupled else replace(plate, preload=(1e-5, -2e-6, 3e-6))
     contact = patch_on(plate, 0.6, 0.45)
     shapes = bending_modes(plate, contact, 5).shapes
@@ -96,7 +98,7 @@ def test_the_energy_is_that_of_the_elements_with_the_membrane_in_equilibrium(
     assert made.bending == 5
     assert energy[0] == pytest.approx(relaxed_energy(plate, field), rel=1e-11)
     linear = 0.5 * float((made.stiffness[:5] * q * q).sum())
-    assert energy[0] > 1.05 * linear  # the plate does stretch
+    assert energy[0] > 1.04 * linear  # the plate does stretch
 
 
 def test_internal_forces_are_the_gradient_of_the_energy() -> None:

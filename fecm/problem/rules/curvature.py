@@ -73,7 +73,7 @@ RADII = "radii are in the deck's unit of length"
 @rule(
     "E523",
     Subject.LAMINATE,
-    "The panel of CURV is not shallow: an arc that rises by more than 1/4 of its side.",
+    "The panel of CURV is deep: an arc that rises by more than 1/4 of its side.",
     cause="The theory of shallow shells takes the slope of the midplane as small.",
     remedy="Larger radii, in the deck's unit of length, or a smaller panel.",
 )
@@ -87,7 +87,7 @@ def deep_panel(problem: Problem) -> Reports:
 @rule(
     "W524",
     Subject.LAMINATE,
-    "The panel of CURV is hardly shallow: an arc that rises by more than 1/8 of its side.",
+    "The panel of CURV is hardly shallow: its arc rises by more than 1/8 of a side.",
     cause="The theory of shallow shells takes the slope of the midplane as small.",
     remedy="Larger radii, or a smaller panel; stiffness and frequencies are approximate.",
 )
