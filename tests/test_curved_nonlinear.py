@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 
 import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from fecm.api import load_deck
 from fecm.deck import model
 from fecm.mechanics.laminate import laminate
 from fecm.mechanics.plate import PlateModel
 from fecm.results.result import Result
+from fecm.studies.estimate import Estimate, estimate
 from fecm.verification import decks
 from tests import curved_panels
 from tests.builders import nothing, with_restraints
@@ -119,6 +122,19 @@ def test_a_hinged_roof_carries_the_published_load(thickness: float, limit: float
         loads.append(state.load)
     assert max(loads) == pytest.approx(limit, rel=0.015)
     assert loads[-1] < max(loads)
+
+
+def test_an_estimate_of_a_panel_that_snaps_through_ends_at_the_load_that_it_carries() -> None:
+    def found(radius: float, velocity: float) -> Estimate:
+        deck = struck((0.0, radius), mesh(12), 5e-7, 10, others=(NONL,), velocity=velocity)
+        return estimate(load_deck(deck).problems[0])
+
+    snapped = found(-500.0, 60000.0)
+    assert [one.name for one in snapped.models] == ["infinite plate", "static plate"]
+    (limit,) = re.findall(r"the panel snaps through at the force ([\d.]+)", snapped.remark)
+    slower = [found(-500.0, velocity).models[-1].impact.peak for velocity in (3000.0, 9000.0)]
+    assert slower[0] < slower[1] < 1.001 * float(limit)
+    assert found(500.0, 60000.0).models[-1].name == "nonlinear static plate"
 
 
 # Impact ------------------------------------------------------------------------------------------

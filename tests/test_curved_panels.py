@@ -185,28 +185,33 @@ def test_every_solver_gives_the_same_impact() -> None:
             np.testing.assert_allclose(other[path], one[path], rtol=0.0, atol=size, err_msg=path)
 
 
+def swept_forces(deck: model.Deck, vary: dict[str, list[float] | list[str]]) -> Floats:
+    """Force histories of the cases of a sweep."""
+    force = fecm.sweep(deck, vary, history=True).force
+    assert force is not None
+    return force
+
+
 def test_a_sweep_has_the_forces_of_its_runs() -> None:
     radii, velocities = (0.0, -500.0), [1000.0, 3000.0]
-    swept = fecm.sweep(shortly(radii), {"velocity": velocities}, history=True)
-    for case, velocity in enumerate(velocities):
+    swept = swept_forces(shortly(radii), {"velocity": velocities})
+    for force, velocity in zip(swept, velocities, strict=True):
         run = fecm.run_one(shortly(radii, velocity))
         close = 1e-11 * run.history.force.max()
-        force = swept.force[case]
         np.testing.assert_allclose(force, run.history.force, rtol=0.0, atol=close)
     flat = fecm.run_one(shortly(()))
-    assert np.abs(flat.history.force - force).max() > 1e-3 * force.max()
+    assert np.abs(flat.history.force - swept[1]).max() > 1e-3 * swept[1].max()
 
 
 def test_a_layup_sweep_keeps_the_curvature() -> None:
     made = shortly((0.0, -500.0))
-    swept = fecm.sweep(made, {"layup": ["[0/90/0/90/0]s", "[90/0/90/0/90]s"]}, history=True)
+    swept = swept_forces(made, {"layup": ["[0/90/0/90/0]s", "[90/0/90/0/90]s"]})
     turned = tuple(90.0 - angle for angle in ANGLES)
     material = decks.material(curved_panels.PLY, turned, 0.2)
     segments = tuple(material if isinstance(s, model.Material) else s for s in made.segments)
-    for case, one in enumerate((made, replace(made, segments=segments))):
+    for force, one in zip(swept, (made, replace(made, segments=segments)), strict=True):
         run = fecm.run_one(one)
         close = 1e-11 * run.history.force.max()
-        force = swept.force[case]
         np.testing.assert_allclose(force, run.history.force, rtol=0.0, atol=close)
 
 

@@ -11,7 +11,7 @@ import pytest
 from fecm.deck import model
 from fecm.mechanics import kernels
 from fecm.mechanics.buckling import buckling_factor
-from fecm.mechanics.curvature import FLAT, strain_of_deflection
+from fecm.mechanics.curvature import FLAT, Curvature, strain_of_deflection
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.kernels.plate import CompiledProduct
 from fecm.mechanics.laminate import Laminate
@@ -41,12 +41,11 @@ PRELOAD = (3.0, -1.0, 0.7)
 STRAIN = np.array([2e-3, -1e-3, 3e-3])
 
 
-def free_panel(laminate: Laminate | None = None, **changed: object) -> PlateModel:
+def free_panel(laminate: Laminate | None = None, curvature: Curvature = BENT) -> PlateModel:
     """A distorted mesh without supports."""
     coordinates, elements = distorted_square(3, 3)
     mesh = with_restraints(coordinates, elements, nothing(coordinates))
-    made = PlateModel(mesh, laminate or general_plate(), rules(), curvature=BENT)
-    return replace(made, **changed)
+    return PlateModel(mesh, laminate or general_plate(), rules(), curvature=curvature)
 
 
 def lifted(plate: PlateModel, w: float = 0.4) -> Floats:

@@ -151,9 +151,13 @@ def nonlinear_curve(problem: Problem, energy: float, force: float) -> StaticCurv
         return work >= energy and not reached < force
 
     try:
-        return static_curve(problem.moving_plate, contact, step, enough)
+        curve = static_curve(problem.moving_plate, contact, step, enough)
     except (SingularStiffnessError, ConvergenceError) as error:
         raise StudyError(f"{NO_CURVE}: {error}") from None
+    if (falls := np.diff(curve.force) < 0.0).any():
+        limit = float(curve.force[np.argmax(falls)])
+        raise StudyError(f"{NO_CURVE}: the panel snaps through at the force {limit:.4g}")
+    return curve
 
 
 def _nonlinear_model(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from ctypes import c_int64
+from dataclasses import replace
 from enum import IntEnum
 
 import numpy as np
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.mechanics import assumed_shear
+from fecm.mechanics.curvature import FLAT
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, jacobian, local_shape_functions
 from fecm.mechanics.kernels import Doubles, Integers, Structure, membrane
@@ -67,7 +69,8 @@ class Group(Structure):
     `tied`            (2, shear, tying)             weights between the tying points
     `tied_t`          (2, tying, shear)             transposed
     Nonlinear plate:
-    `parallelograms`  number                        whether the elements are
+    `parallelograms`  number                        whether the elements are, in a flat plate
+    `curved`          number                        whether the plate is
     `grid`            (9,)                          places of the nodes in rows of eta
     All:
     `stiffness`       (6, 6)                        of midplane strains and negative curvatures
@@ -95,6 +98,7 @@ class Group(Structure):
         ("tied", Doubles),
         ("tied_t", Doubles),
         ("parallelograms", c_int64),
+        ("curved", c_int64),
         ("grid", Integers),
         ("stiffness", Doubles),
         ("transverse", Doubles),
@@ -119,7 +123,9 @@ class ElementGroup:
         congruent: bool,
         nonlinear: bool = False,
     ) -> None:
-        self._plate = plate
+        # The strains w/R of a nonlinear plate are those of its membrane.
+        self._plate = replace(plate, curvature=FLAT) if nonlinear else plate
+        self._curvature = plate.curvature
         self._columns = columns
         self._weights = weights
         self._nonlinear = nonlinear
@@ -140,7 +146,9 @@ class ElementGroup:
             self.kind, fields = ElementKind.FACTORIZED, self._factors()
         else:
             self.kind, fields = ElementKind.TABULATED, self._tables()
-        self.parallelograms = nonlinear and bool(membrane.are_parallelograms(family).all())
+        curved = nonlinear and plate.is_curved
+        flat = nonlinear and not plate.is_curved
+        self.parallelograms = flat and bool(membrane.are_parallelograms(family).all())
         if nonlinear:
             places = np.argsort(self.order)[membrane.grid(family)]
             fields["grid"] = places.astype(np.int32)
@@ -149,6 +157,7 @@ class ElementGroup:
             kind=self.kind,
             nodes=nn,
             parallelograms=int(self.parallelograms),
+            curved=int(curved),
             stiffness=np.block([[laminate.A, -laminate.B], [-laminate.B, laminate.D]]),
             transverse=np.ascontiguousarray(laminate.shear),
             coupled=int(laminate.is_coupled),
@@ -285,7 +294,13 @@ class ElementGroup:
         members = self._differing(members)
         family, weights = self.family.take(members), self._weights[members]
         return _in_lanes(
-            membrane.numbers(self._plate, family, weights, parallelograms=self.parallelograms)
+            membrane.numbers(
+                self._plate,
+                family,
+                weights,
+                self._curvature,
+                parallelograms=self.parallelograms,
+            )
         )
 
     def _coefficients(self, family: ElementBlock, members: Indices) -> list[Floats]:

@@ -31,6 +31,7 @@ static const Entry FIELDS[] = {
     FIELD(Group, tied),
     FIELD(Group, tied_t),
     FIELD(Group, parallelograms),
+    FIELD(Group, curved),
     FIELD(Group, grid),
     FIELD(Group, stiffness),
     FIELD(Group, transverse),

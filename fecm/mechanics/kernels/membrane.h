@@ -40,6 +40,9 @@
  * points of e_11 (6, 2), R_2/2 at those of e_22 (6, 2), both at those of e_12 (4, 4); and `data` as
  * TABULATED elements have it, with the points in rows of eta.
  *
+ * Curved plate.  Its covariant strains contain w/R at the points, with 1/R the last numbers (3) of all
+ * elements: none are taken as parallelograms, for these modes are not those of w.
+ *
  * Functions compute four elements, and are followed by their transposes.  Coefficients c, and forces on them,
  * are of U_1, U_2, w, T_1, T_2; slopes are twice those.
  */
@@ -329,8 +332,26 @@ INLINE void NAME(sum_tied_strains)(const double *data, const NAME(Tied) *tied, h
     NAME(sum_gradient)(2, ALONG, 2, ALONG, xi, eta, force);
 }
 
-/* Forces on the coefficients of an element that is not a parallelogram. */
-INLINE void NAME(of_points)(int coupled, const double *data, const double *points, half (*c)[9], half (*force)[9]) {
+/* Strains w/R of a curved plate, added to those at the 9 points. */
+INLINE void NAME(add_curved)(const double *data, const half *c, half (*e)[9]) {
+    half v[3][3], w[9];
+    for (int b = 0; b < 3; b++) NAME(values)(3, ACROSS, c[3 * b], c[3 * b + 1], c[3 * b + 2], v[b], 1);
+    for (int l = 0; l < 3; l++) NAME(values)(3, ACROSS, v[0][l], v[1][l], v[2][l], w + l, 3);
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 9; k++) e[i][k] += AT(56 + i) * w[k];
+}
+
+INLINE void NAME(sum_curved)(const double *data, half (*n)[9], half *force) {
+    half at[9], v[3][3] = {{{0}}};
+    for (int k = 0; k < 9; k++) at[k] = AT(56) * n[0][k] + AT(57) * n[1][k] + AT(58) * n[2][k];
+    for (int l = 0; l < 3; l++) NAME(sum_values)(3, ACROSS, at + l, 3, &v[0][l], &v[1][l], &v[2][l]);
+    for (int b = 0; b < 3; b++) NAME(sum_values)(3, ACROSS, v[b], 1, force + 3 * b, force + 3 * b + 1, force + 3 * b + 2);
+}
+
+/* Forces on the coefficients of an element that is not a parallelogram, or of a curved plate: those of w/R,
+ * which are linear in w, are `lifting`. */
+INLINE void NAME(of_points)(int coupled, int curved, const double *data, const double *points, half (*c)[9], half (*force)[9],
+                            half *lifting) {
     half e[3][9], linear[3][9], bent[3][9], moment[3][9], R[9][4], A[6], B[6];
     NAME(Tied) tied;
     NAME(tied_strains)(data + 16 * LANES, c[2], &tied, e);
@@ -343,6 +364,7 @@ INLINE void NAME(of_points)(int coupled, const double *data, const double *point
         R[k][2] = yx * xi_x + yy * xi_y, R[k][3] = yx * eta_x + yy * eta_y;
     }
     NAME(strains_of)(R, c, linear);
+    if (curved) NAME(add_curved)(data, c[2], linear);
     if (coupled) NAME(strains_of)(R, c + 3, bent);
     for (int i = 0; i < 6; i++) A[i] = AT(4 + i), B[i] = AT(10 + i);
     for (int k = 0; k < 9; k++) {
@@ -362,6 +384,7 @@ INLINE void NAME(of_points)(int coupled, const double *data, const double *point
     NAME(sum_strains)(R, e, force);
     if (coupled) NAME(sum_strains)(R, moment, force + 3);
     NAME(sum_tied_strains)(data + 16 * LANES, &tied, e, force[2]);
+    if (curved) NAME(sum_curved)(data, e, lifting);
 }
 
 /* Components along the base vectors, from those in x and y. */
@@ -382,14 +405,14 @@ INLINE void NAME(cartesian)(const double *data, half *a, half *b) {
 }
 
 /* Forces of the membrane of a block, and the work of its membrane forces on the quadratic strains. */
-INLINE void NAME(stretch)(int coupled, int modes, const Plate *p, const Chunk *chunk, const Block *b, const double *u, double *f, half *work) {
+INLINE void NAME(stretch)(int coupled, int modes, int curved, const Plate *p, const Chunk *chunk, const Block *b, const double *u, double *f, half *work) {
     const int nd = coupled ? 5 : 3;
     const int32_t *grid = b->group->grid;
     lanes x[5][9] ALIGNED;
     for (int i = 0; i < 9; i++) NAME(take)(nd, p, chunk, b->place[grid[i]], u, x[0] + i, 9);
     for (int side = 0; side < 2; side++) {
         const double *data = b->membrane + 4 * side;
-        half c[5][9] ALIGNED, force[5][9] ALIGNED;
+        half c[5][9] ALIGNED, force[5][9] ALIGNED, lifting[9] ALIGNED = {{0}};
         for (int dof = 0; dof < nd; dof++)
             for (int i = 0; i < 9; i++) c[dof][i] = HALF(x[dof][i]);
         NAME(covariant)(data, c[0], c[1]);
@@ -398,11 +421,13 @@ INLINE void NAME(stretch)(int coupled, int modes, const Plate *p, const Chunk *c
         if (modes)
             NAME(of_modes)(coupled, data, c, force);
         else
-            NAME(of_points)(coupled, data, b->data + 4 * side, c, force);
+            NAME(of_points)(coupled, curved, data, b->data + 4 * side, c, force, lifting);
         /* w f_w is twice that work, as eps_q is of the second order. */
         half sum = 0.5 * c[2][1] * force[2][1];
         for (int i = 2; i < 9; i++) sum += 0.5 * c[2][i] * force[2][i];
         *work += sum;
+        if (curved)
+            for (int i = 0; i < 9; i++) force[2][i] += lifting[i];
         for (int dof = 0; dof < nd; dof++) NAME(nodal)(force[dof]);
         NAME(cartesian)(data, force[0], force[1]);
         if (coupled) NAME(cartesian)(data, force[3], force[4]);
@@ -414,13 +439,20 @@ INLINE void NAME(stretch)(int coupled, int modes, const Plate *p, const Chunk *c
 
 TARGET void NAME(membrane)(const Plate *p, const Chunk *chunk, const Block *b, const double *u, double *f, half *work) {
     if (b->group->parallelograms && b->group->coupled)
-        NAME(stretch)(1, 1, p, chunk, b, u, f, work);
+        NAME(stretch)(1, 1, 0, p, chunk, b, u, f, work);
     else if (b->group->parallelograms)
-        NAME(stretch)(0, 1, p, chunk, b, u, f, work);
+        NAME(stretch)(0, 1, 0, p, chunk, b, u, f, work);
     else if (b->group->coupled)
-        NAME(stretch)(1, 0, p, chunk, b, u, f, work);
+        NAME(stretch)(1, 0, 0, p, chunk, b, u, f, work);
     else
-        NAME(stretch)(0, 0, p, chunk, b, u, f, work);
+        NAME(stretch)(0, 0, 0, p, chunk, b, u, f, work);
+}
+
+TARGET void NAME(curved_membrane)(const Plate *p, const Chunk *chunk, const Block *b, const double *u, double *f, half *work) {
+    if (b->group->coupled)
+        NAME(stretch)(1, 0, 1, p, chunk, b, u, f, work);
+    else
+        NAME(stretch)(0, 0, 1, p, chunk, b, u, f, work);
 }
 
 #undef AT

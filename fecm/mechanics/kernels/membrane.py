@@ -6,6 +6,7 @@ import numpy as np
 
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics import assumed_shear, membrane
+from fecm.mechanics.curvature import FLAT, Curvature, strain_of_deflection
 from fecm.mechanics.elements import Quadrature, gauss
 from fecm.mechanics.interpolation import inverse_jacobian, jacobian, local_shape_functions
 from fecm.mechanics.mesh import TOLERANCE, ElementBlock
@@ -16,11 +17,10 @@ _UPPER = np.triu_indices(3)
 
 
 def supports(plate: PlateModel) -> bool:
-    """Whether the kernels have the membrane: of flat 9-node elements with 3 x 3 points."""
+    """Whether the kernels have the membrane of a plate: of 9-node elements with 3 x 3 points."""
     rules = plate.rules
     return (
-        not plate.is_curved
-        and rules.assumes_shear
+        rules.assumes_shear
         and len(rules.bending.xi) == 9
         and all(map(membrane.supports, plate.families))
     )
@@ -45,16 +45,21 @@ def are_parallelograms(family: ElementBlock) -> Bools:
 
 
 def numbers(
-    plate: PlateModel, family: ElementBlock, weights: Floats, *, parallelograms: bool
+    plate: PlateModel,
+    family: ElementBlock,
+    weights: Floats,
+    curvature: Curvature = FLAT,
+    *,
+    parallelograms: bool,
 ) -> Floats:
-    """Numbers of elements, (ne, 16) for parallelograms and (ne, 56) for others.
+    """Numbers of elements, (ne, 16) for parallelograms and (ne, 56) or (ne, 59) for others.
 
     All have halves of the base vectors x,xi and x,eta of the centre, (2, 2), and the upper halves
     of A and -B for covariant strains, (6,) each.  For parallelograms the latter are multiplied by
     the Jacobian determinant and by `weights`, the number of elements that each represents.  Others
     have derivatives along half a base vector, per derivative in xi and in eta: along the first one
     at the tying points of e_11, (6, 2), along the second one at those of e_22, (6, 2), and along
-    both at those of e_12, (4, 2, 2).
+    both at those of e_12, (4, 2, 2); and with a curvature the covariant strains per w, (3,).
     """
     centre, laminate = _centre(family), plate.laminate_of(family)
     to_global = membrane.covariant_to_global(centre)
@@ -73,6 +78,8 @@ def numbers(
             _, local = local_shape_functions(family, _product(xi, eta))
             inverse, _ = inverse_jacobian(family, local)
             parts.append((0.5 * centre[:, None] @ inverse)[:, :, rows])
+    if curvature != FLAT:
+        parts.append(np.linalg.inv(to_global) @ strain_of_deflection(curvature))
     return np.concatenate([part.reshape(len(centre), -1) for part in parts], axis=1)
 
 

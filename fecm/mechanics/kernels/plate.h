@@ -131,7 +131,8 @@ INLINE void NAME(two_matrices)(int nd, int pairs, int centre, const Plate *p, co
     }
 }
 
-/* Strains at the points of quadrature from values and slopes in xi and eta, stresses, and back. */
+/* Strains at the points of quadrature from values and slopes in xi and eta, stresses, and back.  The values
+ * of w at the points of bending are those of w/R in a curved plate. */
 INLINE void NAME(tabulated)(int nd, int nodes, const Plate *p, const Chunk *c, const Block *b, const double *u, double *f) {
     const Group *g = b->group;
     const double *data = b->data;
@@ -486,7 +487,7 @@ INLINE void NAME(chunk)(int nd, int nonlinear, const Plate *p, const Chunk *c, i
         case FACTORIZED: NAME(factorized)(last, p, c, b, of_last, on_last); break;
         case TABULATED: NAME(tabulated)(last, nodes, p, c, b, of_last, on_last); break;
         }
-        if (nonlinear) NAME(membrane)(p, c, b, u, force, sums + 4);
+        if (nonlinear) (b->group->curved ? NAME(curved_membrane) : NAME(membrane))(p, c, b, u, force, sums + 4);
     }
     for (int64_t i = 0; i < c->shared; i++)
         for (int64_t dof = 0; dof < nd; dof++)

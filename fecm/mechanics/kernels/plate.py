@@ -114,7 +114,8 @@ class Plate(Structure):
     ===========  =========================  ===================================================
     `lane`       (rows, 8)                  places of the lanes where they don't follow
     `preload`    (3,)                       initial membrane force; not set without
-    `curvature`  (3,)                       strains per w of a curved plate; not set without
+    `curvature`  (3,)                       strains per w of a curved plate; not set without, and
+                                            of a nonlinear plate, whose groups have it
     `mass`       (nodes,) or (nd, nodes)    lumped mass, part by part, divided by `ratio`
     `inverse`    as `mass`                  1 over it, 0 where it is 0
     `ratio`      (nd,)                      mass of each dof over that of the first
@@ -210,6 +211,7 @@ class CompiledPlate:
         self.u, self.d, self.s = np.zeros((3, nd * count))
 
         cuts = self._chunks(parts, places, leader)
+        strain = strain_of_deflection(plate.curvature)
         lanes = self._blocks(cuts, layout, groups, places)
         self.structure = Plate(
             nd=nd,
@@ -219,7 +221,7 @@ class CompiledPlate:
             chunk=cuts,
             lane=_integers(lanes),
             preload=np.array(plate.preload) if plate.is_preloaded else None,
-            curvature=strain_of_deflection(plate.curvature) if plate.is_curved else None,
+            curvature=strain if plate.is_curved and not nonlinear else None,
             nonlinear=int(nonlinear),
             transposed=int(plate.rules.transposed_jacobian),
             planes=len(factor) // count,

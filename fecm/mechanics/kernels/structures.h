@@ -27,8 +27,8 @@ typedef struct {
     const double *rotations_t, *deflection_t; /* TABULATED: transposed.  FACTORIZED: weights of the points */
     const double *in_plane_t;                 /* TABULATED: (nodes, 2 bending) */
     const double *tied, *tied_t;              /* TABULATED: (2, shear, tying), (2, tying, shear) */
-    /* Of a nonlinear plate: whether its elements are parallelograms; (9,): nodes by rows of eta. */
-    int64_t parallelograms;
+    /* Of a nonlinear plate: whether its elements are parallelograms, and curved; (9,): nodes by rows of eta. */
+    int64_t parallelograms, curved;
     const int32_t *grid;
     /* Of the laminate: (6, 6) of strains and negative curvatures; (2, 2); whether B is not 0. */
     const double *stiffness, *transverse;
@@ -44,7 +44,7 @@ typedef struct {
     /* TABULATED: inverse Jacobian with its determinant times the weight, (points, 5, 8), and slopes of the
      * mapping (2 tying, 2, 8).  FACTORIZED: a factor, and coefficients of x and y, (1 + 8 + 8, 8). */
     const double *data;
-    const double *membrane; /* of a nonlinear plate: (16, 8) for parallelograms, (56, 8) for others */
+    const double *membrane; /* of a nonlinear plate: (16, 8) for parallelograms, (56, 8) for others, (59, 8) if curved */
 } Block;
 
 /* Blocks of near elements; the last chunk has no blocks, and the nodes that others share. */
