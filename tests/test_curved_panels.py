@@ -13,6 +13,7 @@ from fecm.api import load_deck
 from fecm.deck import model
 from fecm.deck.grid import Grid, uniform
 from fecm.mechanics import kernels
+from fecm.mechanics.points import gages
 from fecm.results.result import Result
 from fecm.studies.estimate import estimate
 from fecm.verification import decks
@@ -183,6 +184,40 @@ def test_every_solver_gives_the_same_impact() -> None:
         for path in ("history/force", "gages/strain", "tape8/kappa_x", "energy/plate_strain"):
             size = 1e-10 * np.abs(one[path]).max()
             np.testing.assert_allclose(other[path], one[path], rtol=0.0, atol=size, err_msg=path)
+
+
+def test_a_run_stores_stresses_exposures_and_gages_with_the_strains_of_the_radii() -> None:
+    strengths = model.Allowables(2500.0, 1500.0, 60.0, 200.0, 90.0, 90.0, 60.0)
+    made = struck(
+        (0.0, 500.0),
+        mesh(6),
+        5e-7,
+        200,
+        others=(GAGES, strengths),
+        every=40,
+        more="DISP=40 STRE=40 PLYS=40 FAIL=40",
+    )
+    found = fecm.run_one(made)
+    (problem,) = load_deck(made).problems
+    # The mean over the thickness of a symmetric laminate leaves the stress of the midplane strain.
+    first = found.plies.sigma_1[..., 0, 0] + found.plies.sigma_1[..., -1, -1]
+    q = problem.laminate.plies.stiffness[0]
+    strains = found.stresses
+    along = 2.0 * (q[0, 0] * strains.eps_xx + q[0, 1] * strains.eps_yy)
+    np.testing.assert_allclose(first, along, rtol=0.0, atol=1e-9 * np.abs(first).max())
+    assert np.abs(first).max() > 0.01 * found.plies.sigma_1.max()
+    # Exposures are those of the stored stresses.
+    s, tau = strengths, np.abs(found.plies.tau_12)
+    sigma_1, sigma_2 = found.plies.sigma_1, found.plies.sigma_2
+    ratios = [sigma_1 / s.xt, -sigma_1 / s.xc, sigma_2 / s.yt, -sigma_2 / s.yc, tau / s.s12]
+    right = np.max(ratios, axis=(0, 1))
+    np.testing.assert_allclose(found.failure.max_stress.exposure, right, rtol=1e-9, atol=1e-12)
+    # Gages are those of the stored displacements.
+    read = gages(problem.mesh, GAGES.records, curvature=problem.plate.curvature)
+    rows = np.searchsorted(found.gages.step, found.tape3.step)
+    fields = found.tape3.displacement.reshape(len(rows), -1)
+    strain = read.strains((fields[:, read.dof_indices] * read.weights).sum(axis=2))
+    np.testing.assert_allclose(found.gages.strain[rows], strain, rtol=1e-9, atol=1e-15)
 
 
 def swept_forces(deck: model.Deck, vary: dict[str, list[float] | list[str]]) -> Floats:
