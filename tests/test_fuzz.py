@@ -16,6 +16,7 @@ from fecm.deck.model import (
     Control,
     Coordinates,
     Cure,
+    Curvature,
     ElementNodes,
     Elements,
     Expansion,
@@ -111,6 +112,7 @@ def decks(draw: st.DrawFn) -> Deck:
                 st.builds(Indentation, *[numbers] * 4),
                 st.builds(Nonlinear),
                 st.builds(Preload, *[numbers] * 3),
+                st.builds(Curvature, *[numbers] * 3),
                 st.builds(
                     Cure,
                     numbers,

@@ -56,7 +56,7 @@ def _slope(problem: Problem) -> float:
     places = problem.mesh.coordinates[problem.mesh.used]
     middle = (places.min(axis=0) + places.max(axis=0)) / 2.0
     slopes = (places - middle) @ np.array([[x, xy], [xy, y]])
-    return float(np.abs(slopes).max())
+    return float(np.nan_to_num(np.abs(slopes), nan=np.inf).max())
 
 
 def _steepness(problem: Problem) -> str:
