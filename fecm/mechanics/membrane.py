@@ -1,7 +1,8 @@
 """Stretching of a plate that bends: the membrane strains of von Karman, tied.
 
 A plate whose midplane slopes are not small stretches by eps_q = (w,x^2/2, w,y^2/2, w,x w,y).  The
-membrane force is N = N0 + A (eps_l + eps_q) + B kappa, where eps_l is the linear strain of u and v.
+membrane force is N = N0 + A (eps_l + eps_q) + B kappa, where eps_l is the linear strain of u and v,
+and of w/R in a curved plate (:mod:`~fecm.mechanics.curvature`).
 The internal force f is the gradient of the strain energy
 
     U = 1/2 int (eps A eps + 2 eps B kappa + kappa D kappa + gamma S gamma) dA

@@ -13,8 +13,8 @@ belongs to s_ij.  The strain energy is
     1/2 sum omega_i^2 q_i^2 + q' C s + 1/2 s' Q s,    Q = int eps_ij A eps_kl,
     C_i,kl = int N_i eps_q(k, l),    eps_ij = eps_q(i, j) + B_m u_ij,
 
-with the membrane force N_i = A B_m U_i + B kappa_i of a bending mode; U and C are zero unless the
-laminate couples bending and stretching.
+with the membrane force N_i = A (B_m U_i + w_i/R) + B kappa_i of a bending mode; U and C are zero
+unless the laminate or a curvature couples bending and stretching.
 
 A static membrane has no inertia.  That matters where the edges are free in the plane: the lowest
 membrane modes psi_k are then hardly faster than the bending modes.  The few that the quadratic

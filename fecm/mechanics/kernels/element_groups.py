@@ -147,8 +147,9 @@ class ElementGroup:
         else:
             self.kind, fields = ElementKind.TABULATED, self._tables()
         curved = nonlinear and plate.is_curved
-        flat = nonlinear and not plate.is_curved
-        self.parallelograms = flat and bool(membrane.are_parallelograms(family).all())
+        self.parallelograms = (
+            nonlinear and not curved and bool(membrane.are_parallelograms(family).all())
+        )
         if nonlinear:
             places = np.argsort(self.order)[membrane.grid(family)]
             fields["grid"] = places.astype(np.int32)

@@ -211,7 +211,7 @@ class CompiledPlate:
         self.u, self.d, self.s = np.zeros((3, nd * count))
 
         cuts = self._chunks(parts, places, leader)
-        strain = strain_of_deflection(plate.curvature)
+        curved = plate.is_curved and not nonlinear
         lanes = self._blocks(cuts, layout, groups, places)
         self.structure = Plate(
             nd=nd,
@@ -221,7 +221,7 @@ class CompiledPlate:
             chunk=cuts,
             lane=_integers(lanes),
             preload=np.array(plate.preload) if plate.is_preloaded else None,
-            curvature=strain if plate.is_curved and not nonlinear else None,
+            curvature=strain_of_deflection(plate.curvature) if curved else None,
             nonlinear=int(nonlinear),
             transposed=int(plate.rules.transposed_jacobian),
             planes=len(factor) // count,
