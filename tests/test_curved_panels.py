@@ -33,7 +33,12 @@ from tests.curved_panels import (
 
 STATIC = "TANG FORM SOLV DISP"
 ROWS = dict(zip(PANELS, table("curved_panels.csv"), strict=True))
-curved_ones = pytest.mark.parametrize("radii", PANELS[1:])
+
+
+def by_panel(*at_once: tuple[float, float]) -> pytest.MarkDecorator:
+    """Every panel of the files; only some in the short run."""
+    long = (pytest.param(panel, marks=pytest.mark.long) for panel in PANELS if panel not in at_once)
+    return pytest.mark.parametrize("radii", [*at_once, *long])
 
 
 def mean_deflection(found: Result) -> float:
@@ -44,14 +49,14 @@ def mean_deflection(found: Result) -> float:
 # Statics and frequencies --------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("radii", PANELS)
+@by_panel(PANELS[0], PANELS[3])
 def test_the_static_deflection_is_that_of_the_series(radii: tuple[float, float]) -> None:
     found = decks.result_of(panel(radii, STATIC, mesh(48), load=1.0))
     assert mean_deflection(found) == pytest.approx(float(ROWS[radii][curved_panels.W]), rel=1.5e-3)
     assert found.tape3.w.max() == pytest.approx(float(ROWS[radii]["w"]), rel=1e-3)
 
 
-@curved_ones
+@by_panel(PANELS[3])
 def test_membrane_forces_and_moments_are_those_of_the_series(radii: tuple[float, float]) -> None:
     deck = panel(radii, f"{STATIC} STRE", curved_panels.fine_middle(), load=1.0, points=2)
     found = decks.result_of(deck)
@@ -63,7 +68,7 @@ def test_membrane_forces_and_moments_are_those_of_the_series(radii: tuple[float,
         assert value == pytest.approx(float(ROWS[radii][name.replace("_", "")]), rel=0.015), name
 
 
-@pytest.mark.parametrize("radii", PANELS)
+@by_panel(PANELS[2])
 def test_frequencies_are_those_of_the_series(radii: tuple[float, float]) -> None:
     found = decks.result_of(panel(radii, "CMAS EIGE=20", mesh(24)))
     frequencies = found.modes.angular_frequency
@@ -85,10 +90,7 @@ def history(radii: tuple[float, float]) -> dict[str, Floats]:
     return {name: np.array([float(row[name]) for row in rows]) for name in rows[0]}
 
 
-@pytest.mark.parametrize(
-    "radii",
-    [PANELS[2], *(pytest.param(p, marks=pytest.mark.long) for p in PANELS[:2] + PANELS[3:])],
-)
+@by_panel(PANELS[2])
 def test_an_impact_is_that_of_the_series(radii: tuple[float, float]) -> None:
     dt = 2.13e-7
     found = decks.result_of(struck(radii, mesh(60), dt, int(DURATION / dt) + 1))
