@@ -302,7 +302,9 @@ def test_arrays_that_are_no_plate_are_refused(
 def test_a_wrong_group_is_answered_with_those_there_are() -> None:
     with pytest.raises(ValueError, match="no group 'rm'; its groups are boundary, rim"):
         imported(CIRCLE, {"rm": "clamped"})
-    with pytest.raises(ValueError, match="rim=glued: the supports are free, simple, clamped"):
+    with pytest.raises(
+        ValueError, match="rim=glued: the supports are free, simple, pinned, clamped"
+    ):
         imported(CIRCLE, {"rim": "glued"})
 
 

@@ -334,7 +334,7 @@ def test_places_and_sizes_are_read(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "text",
-    ["at=3", "at=(3)", "at=(3,x)", "at=1:2:3", "size=6", "size=axb", "support=pinned", "energy=a",
+    ["at=3", "at=(3)", "at=(3,x)", "at=1:2:3", "size=6", "size=axb", "support=welded", "energy=a",
      "duration=auto", "at=(nan,1)"],
 )  # fmt: skip
 def test_what_is_no_place_size_or_support_is_refused(text: str) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple
@@ -11,6 +10,7 @@ from fecm._errors import warn
 from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.authoring.contact import AnyContact, Sphere, law_of
+from fecm.authoring.energy import doubts_of_energy, energy_note, with_energy
 from fecm.authoring.fixtures import DropWeight
 from fecm.authoring.laminate import (
     Laminate,
@@ -23,7 +23,7 @@ from fecm.authoring.laminate import (
     system_asked,
     toughness,
 )
-from fecm.authoring.mesh import InPlane, placed, supported
+from fecm.authoring.mesh import InPlane, Membrane, curvature_of, placed, supported
 from fecm.authoring.numerics import AUTO, FULL, MITC, Numerics, Quadrature
 from fecm.authoring.parameters import ObjectError, check_kind, check_positive, in_units, is_finite
 from fecm.authoring.plate import Plate
@@ -35,10 +35,9 @@ from fecm.deck.grid import IN_PLANE
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Control, Gage
 from fecm.deck.unit_systems import units_of
-from fecm.deck.units import in_si, unit_of
 from fecm.mechanics.laminate import SOFT_CORE
 from fecm.mechanics.projectile import RigidMass, Rod
-from fecm.problem.parts import build_projectile, projectile_segment
+from fecm.problem.parts import projectile_segment
 
 AnyProjectile = Rod | RigidMass | model.Projectile
 GagePlace = tuple[float, float, float, float]  # x, y, z and degrees
@@ -65,6 +64,8 @@ class Request:
     numerics: Numerics
     units: str | None = None
     in_plane: InPlane | None = None
+    radius_x: float | None = None
+    radius_y: float | None = None
     nonlinear: bool = False
     preload: Sequence[float | str] | None = None
     gages: Iterable[GagePlace] = ()
@@ -133,6 +134,8 @@ def impact(
     shear: Quadrature = "mitc",
     shear_factor: float | Literal["equi"] = 1.0,
     in_plane: InPlane | None = None,
+    radius_x: float | None = None,
+    radius_y: float | None = None,
     nonlinear: bool = False,
     preload: Sequence[float | str] | None = None,
     gages: Iterable[tuple[float, float, float, float]] = (),
@@ -144,8 +147,9 @@ def impact(
 ) -> model.Deck:
     """Deck of an impact, as `fecm new` writes it.
 
-    A linear plate whose laminate is not coupled has its in-plane dofs restrained, as the report's
-    does; any other has them free inside, and restrained on its supports as `in_plane` says.
+    A flat linear plate whose laminate is not coupled has its in-plane dofs restrained, as the
+    report's does; any other has them free inside, and restrained on its supports as `in_plane`
+    says.
 
     Parameters
     ----------
@@ -191,9 +195,13 @@ def impact(
     shear_factor : float or str
         Factor of the transverse shear stiffness, or ``"equi"``, the stiffness from equilibrium.
     in_plane : str, optional
-        Displacements u and v of a nonlinear plate, or a coupled laminate, where it is supported:
-        ``"held"``, the default of edges; ``"free"``, that of fixtures; or ``"normal"``, held across
-        the edge only.
+        Displacements u and v of a curved or nonlinear plate, or a coupled laminate, where it is
+        supported: ``"held"``, the default of edges; ``"free"``, that of fixtures; ``"normal"``,
+        held across the edge only; or ``"tangential"``, held along it only, the default of the
+        simple edges of a curved panel.  Pinned edges hold both.
+    radius_x, radius_y : float, optional
+        Radii of a shallow curved panel (length), positive if the struck face is the hollow one;
+        without them it is flat.
     nonlinear : bool
         The plate stretches as it bends (von Kármán), which matters from a deflection of about half
         the thickness on; `shear` must be ``"mitc"``.
@@ -252,6 +260,8 @@ def impact(
             Numerics(patch, shear, shear_factor, duration, dt, every, plies, failure, damage),
             units=units,
             in_plane=in_plane,
+            radius_x=radius_x,
+            radius_y=radius_y,
             nonlinear=nonlinear,
             preload=preload,
             gages=gages,
@@ -301,8 +311,11 @@ def author(asked: Request) -> Authored:
     damage = damages(plies, asked.giic, notes) if asked.numerics.damage else toughness(asked.giic)
     if asked.numerics.failure and not any(isinstance(s, model.Allowables) for s in damage):
         damage = [strengths_of(plies), *damage]
-    stretches = asked.nonlinear or plies.is_coupled
-    boundary, slides = supported(asked.plate, mesh, asked.in_plane, notes, stretches=stretches)
+    curvature = curvature_of(asked.radius_x, asked.radius_y)
+    membrane = Membrane.of(
+        curved=curvature is not None, stretches=asked.nonlinear or plies.is_coupled
+    )
+    boundary, slides = supported(asked.plate, mesh, asked.in_plane, notes, membrane)
     segments = (
         _units(asked, plies),
         mesh.coordinates(),
@@ -316,6 +329,7 @@ def author(asked: Request) -> Authored:
         cured(plies, asked.cure),
         law,
         asked.numerics.shear_segment(nonlinear=asked.nonlinear),
+        curvature,
         model.Nonlinear() if asked.nonlinear else None,
         _preload(asked, plies),
         *plies.segments(),
@@ -325,9 +339,9 @@ def author(asked: Request) -> Authored:
     deck = model.Deck(asked.title, control, tuple(s for s in segments if s is not None), ())
     dt = asked.numerics.time_step(deck)
     if motion.energy is not None:
-        deck = _with_energy(deck, motion.energy)
-    notes.append(_energy_note(deck, asked, plies))
-    doubts += _doubts_of_energy(deck, asked, plies)
+        deck = with_energy(deck, motion.energy)
+    notes.append(energy_note(deck, plies, per_thickness=asked.test is not None))
+    doubts += doubts_of_energy(deck, fixture, plies)
     deck = asked.numerics.with_program(deck, dt, motion.duration)
     comments = (fixture.comment if fixture else "") + slides + comment
     return Authored(deck, comments, notes, doubts)
@@ -434,49 +448,3 @@ def _gages(places: Iterable[GagePlace]) -> model.Gages | None:
     except (TypeError, ValueError):
         raise ObjectError("`gages` are not x, y, z and degrees of each") from None
     return model.Gages(gages) if gages else None
-
-
-def _energy_of(deck: model.Deck) -> float:
-    """Kinetic energy of the projectile."""
-    velocity, mass = deck.require(model.Impact).velocity, build_projectile(deck).total_mass
-    return 0.5 * mass * velocity**2
-
-
-def _energy_note(deck: model.Deck, asked: Request, plies: Plies) -> str:
-    """Say energy and velocity of the projectile."""
-    energy, velocity = _energy_of(deck), deck.require(model.Impact).velocity
-    names = units_of(plies.system) if plies.system else {}
-    joule = in_si("force*length", names)
-    said = f"{energy * joule:.4g} J" if joule else f"{energy:.4g}"
-    if asked.test is not None:
-        share = energy / plies.thickness
-        said += f" ({share / 1e3:.3g} J per mm of thickness)"
-    speed = f"{velocity:.4g} {unit_of('length/time', names)}".rstrip()
-    return f"energy {said}, {speed}"
-
-
-def _doubts_of_energy(deck: model.Deck, asked: Request, plies: Plies) -> list[str]:
-    """Doubt an energy that is far below a standard's."""
-    fixture = asked.plate.fixture
-    if fixture is None or fixture.test is None:
-        return []
-    energy = _energy_of(deck)
-    share = energy / plies.thickness
-    if share >= fixture.test.least_energy:
-        return []
-    return [
-        f"the energy is {energy / 1e3:.3g} J, {share / 1e3:.2g} J per mm of thickness, "
-        f"where {fixture.name} has {fixture.test.energy / 1e3:g}: `energy` is in mJ unless it has "
-        'a unit, as in "10J"'
-    ]
-
-
-def _with_energy(deck: model.Deck, energy: float) -> model.Deck:
-    """The deck with a velocity for an energy, in as many digits as its card has."""
-    mass = build_projectile(deck).total_mass
-    velocity = math.sqrt(2.0 * energy / mass) if mass > 0.0 else math.inf
-    if not 0.0 < velocity < math.inf:
-        raise ObjectError(f"no velocity gives the energy {energy:g} to the mass {mass:g}")
-    old = deck.require(model.Impact)
-    new = replace(old, velocity=float(f"{velocity:.6g}"))
-    return replace(deck, segments=tuple(new if s is old else s for s in deck.segments))

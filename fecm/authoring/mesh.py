@@ -4,22 +4,31 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from enum import Enum, auto
+from typing import Literal, NamedTuple, Self
 
 from fecm.authoring.laminate import Plies
-from fecm.authoring.parameters import ObjectError, pair
+from fecm.authoring.parameters import ObjectError, is_finite, pair
 from fecm.authoring.plate import MOST, Plate
 from fecm.deck import grid as grids
-from fecm.deck.grid import Grid, Section
-from fecm.deck.model import Boundary, Patch
+from fecm.deck.grid import Grid, Section, held_in_plane
+from fecm.deck.model import Boundary, Curvature, Patch
 from fecm.problem.plate_mesh import PlateMesh
 
 MOST_ELEMENTS = 500_000
 LEAST_RADIUS = 1e-3  # least radius of a patch to which a mesh is refined, over the plate's side
 
-InPlane = Literal["free", "held", "normal"]  # u and v on supports
+InPlane = Literal["free", "held", "normal", "tangential"]  # u and v on supports
 FREE: InPlane = "free"
 HELD: InPlane = "held"
+TANGENTIAL: InPlane = "tangential"
+# What edges of a curved panel hold in its plane, for a note.
+IN_PLANE_WORDS = {
+    "free": "neither u nor v",
+    "held": "u and v",
+    "normal": "the displacement across the edge",
+    "tangential": "the displacement along the edge (SS3)",
+}
 
 AnyMesh = Grid | PlateMesh
 
@@ -135,20 +144,52 @@ class Supported(NamedTuple):
     comment: str
 
 
+class Membrane(Enum):
+    """Why u and v of a plate move."""
+
+    AT_REST = auto()  # they are zero
+    STRETCHES = auto()  # with B or large deflections
+    CURVED = auto()
+
+    @classmethod
+    def of(cls, *, curved: bool, stretches: bool) -> Self:
+        """The kind of a plate."""
+        if curved:
+            return cls.CURVED
+        return cls.STRETCHES if stretches else cls.AT_REST
+
+
+def curvature_of(radius_x: float | None, radius_y: float | None) -> Curvature | None:
+    """CURV segment of a shallow panel; None without a radius."""
+    radii = {"radius_x": radius_x, "radius_y": radius_y}
+    for name, radius in radii.items():
+        if radius is not None and not (is_finite(radius) and radius):
+            raise ObjectError(
+                f"`{name}` is {radius!r}; it must be a finite number other than 0: leave it out "
+                "for a plate that is flat in this direction"
+            )
+    if radius_x is None and radius_y is None:
+        return None
+    return Curvature(radius_x=float(radius_x or 0.0), radius_y=float(radius_y or 0.0))
+
+
 def supported(
-    plate: Plate, mesh: AnyMesh, in_plane: InPlane | None, notes: list[str], *, stretches: bool
+    plate: Plate, mesh: AnyMesh, in_plane: InPlane | None, notes: list[str], membrane: Membrane
 ) -> Supported:
-    """Supports of a plate; u and v are held everywhere in one that does not stretch."""
-    if not stretches:
+    """Supports of a plate; u and v are held everywhere where they are zero."""
+    if membrane is Membrane.AT_REST:
         if in_plane is not None:
             notes.append(
-                "`in_plane` has no effect: the laminate is not coupled and the plate linear, and "
-                "its u and v are held everywhere"
+                "`in_plane` has no effect: the laminate is not coupled and the plate flat and "
+                "linear, and its u and v are held everywhere"
             )
         everywhere, in_plane = (1, 1, 0, 0, 0), HELD
     else:
         everywhere = (0, 0, 0, 0, 0)
-        in_plane = in_plane or (FREE if plate.fixture else HELD)
+        of_edges = TANGENTIAL if membrane is Membrane.CURVED else HELD
+        in_plane = in_plane or (FREE if plate.fixture else of_edges)
+    if membrane is Membrane.CURVED:
+        notes.append(_note_of_curved(plate, in_plane))
     if isinstance(mesh, PlateMesh):
         return Supported(mesh.supported(everywhere, plate.supports, in_plane=in_plane), "")
     window = plate.fixture.window if plate.fixture else None
@@ -156,3 +197,14 @@ def supported(
     slides = window is not None and in_plane == FREE
     comment = "! The plate slides on the window: u and v are free.\n" if slides else ""
     return Supported(boundary, comment)
+
+
+def _note_of_curved(plate: Plate, in_plane: InPlane) -> str:
+    """What the supports of a curved panel hold in its plane, which decides its stiffness."""
+    kinds: dict[str, str] = {"window": in_plane} if plate.fixture else {}
+    for support in sorted(set(plate.supports.values()) - {"free"}):
+        kinds[support] = held_in_plane(support, in_plane)
+    held = ", ".join(f"{name} edges hold {IN_PLANE_WORDS[word]}" for name, word in kinds.items())
+    note = f"the panel is curved (CURV): in its plane {held or 'no edge holds u or v'}"
+    simple = kinds.get("simple") == TANGENTIAL
+    return f"{note}; `support` pinned holds both" if simple else note

@@ -22,7 +22,7 @@ MOST = 2000  # elements in one direction
 WINDOW_MESH = (20, 12)
 WINDOW_GRADING = 3.0
 
-Support = Literal["free", "simple", "clamped"]
+Support = Literal["free", "simple", "pinned", "clamped"]
 
 
 @frozen
@@ -77,7 +77,7 @@ class Plate:
         mesh : tuple of int
             Elements along x and y.
         support : str
-            Support of all edges: ``"free"``, ``"simple"`` or ``"clamped"``.
+            Support of all edges: ``"free"``, ``"simple"``, ``"pinned"`` or ``"clamped"``.
         edges : dict, optional
             Support of single edges: ``"left"``, ``"right"``, ``"bottom"`` or ``"top"``.
         grading : float
@@ -168,9 +168,10 @@ class Plate:
             A file that meshio reads, such as Gmsh's `.msh`; or points (n, 2) and cells (m, k) with
             points counted from 0.
         support : dict or str, optional
-            Support by the name of a group of lines: ``"free"``, ``"simple"`` or ``"clamped"``.  The
-            group ``"boundary"``, or a single support, means all outer sides and those of holes
-            that are in no other group named here.  A group with the name of a support has it.
+            Support by the name of a group of lines: ``"free"``, ``"simple"``, ``"pinned"`` or
+            ``"clamped"``.  The group ``"boundary"``, or a single support, means all outer sides and
+            those of holes that are in no other group named here.  A group with the name of a
+            support has it.
         groups : dict, optional
             Points of groups, for arrays.
 

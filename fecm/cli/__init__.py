@@ -43,7 +43,9 @@ COMMANDS = {
     "identify": LazyCommand("fecm.cli.identify", "Fit parameters to a measured contact force."),
     "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),
     "info": LazyCommand("fecm.cli.info", "Describe the contents of RESULT.", True),
-    "materials": LazyCommand("fecm.cli.new", "List the named plies of `fecm new`, or of a file."),
+    "materials": LazyCommand(
+        "fecm.cli.materials", "List the named plies of `fecm new`, or of a file."
+    ),
     "new": LazyCommand("fecm.cli.new", "Write a deck from plate, layup, supports and impact."),
     "plot": LazyCommand("fecm.cli.plot", "Draw the report's figures, or the map of a sweep.", True),
     "report": LazyCommand("fecm.cli.report", "Write an HTML page about results.", True),

@@ -1,9 +1,8 @@
-"""``fecm new`` and ``fecm materials``."""
+"""``fecm new``."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from pathlib import Path
 from typing import Literal
 
@@ -18,119 +17,49 @@ from fecm.authoring.contact import Sphere, parse_patch
 from fecm.authoring.fixtures import CUSTOM, FIXTURES
 from fecm.authoring.impact import Authored, Request, Strike, author
 from fecm.authoring.mesh import InPlane
-from fecm.authoring.numerics import AUTO, EQUI, FULL, MITC, Numerics, Quadrature
+from fecm.authoring.numerics import AUTO, FULL, MITC, Numerics, Quadrature
 from fecm.authoring.parameters import ObjectError
-from fecm.authoring.plate import MOST, Plate, Support
+from fecm.authoring.plate import Plate, Support
 from fecm.authoring.zones import Zone
-from fecm.cli.common import DASH, RefusedError, echo, echo_json, note, write_text
+from fecm.cli import new_values
+from fecm.cli.common import DASH, RefusedError, echo, note, write_text
 from fecm.cli.help import GroupedCommand, typical
-from fecm.cli.laminate_options import PLIES, LaminateOptions, as_options, laminate_options, unique
+from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options, unique
 from fecm.cli.options import (
     FILE_PATH,
-    FORMAT_OPTION,
     POSITIVE,
-    SYSTEM,
     Finite,
-    Format,
     Parsed,
     assignment,
     collected,
     list_of,
 )
 from fecm.deck.catalogue import (
-    CONTACTS,
-    EXPANSIONS,
-    STRENGTHS,
     NamedContact,
-    NamedPly,
 )
-from fecm.deck.catalogue import materials as named_plies
 from fecm.deck.format import format_deck
 from fecm.deck.grid import IN_PLANE, SUPPORTS
-from fecm.deck.layup import parse_plies
 from fecm.deck.model import Deck, Indentation, Material, Nonlinear, Patch, Ply, Shear
 from fecm.deck.outputs import RowsOfPlies
 from fecm.mechanics.points import DISC, RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.plate_mesh import BOUNDARY
 
-ESTIMATE = "estimate:RADIUS[,ES,NUS]"
 RECTANGLE = ("size", "grading", "columns", "rows")  # besides the mesh
 FIXED = ("size", "columns", "rows", "support", "edges")  # options that a fixture sets
 
-# Constants of a named ply, as `fecm materials` lists them.
-LINES = (
-    ("E1", "E2", "nu12", "nu23", "G12", "G13", "G23", "density", "thickness"),
-    (*STRENGTHS, "S13", "S23"),
-    ("GIc", "GIIc"),
-    (*EXPANSIONS, "stress_free_temperature"),
-)
-
-PROJECTILES: dict[str, tuple[str, Callable[..., Rod | RigidMass]]] = {
-    "mass": ("M", RigidMass),
-    "rod": ("LENGTH,DIAMETER,E,DENSITY", Rod.cylinder),
-}
-
-
-def _projectile(text: str) -> Rod | RigidMass:
-    """Read a rigid mass or a cylindrical rod."""
-    kind, _, values = text.partition(":")
-    if kind not in PROJECTILES:
-        raise ValueError(f"{text!r} is not mass:M or rod:LENGTH,DIAMETER,E,DENSITY")
-    form, made_of = PROJECTILES[kind]
-    return made_of(*list_of(f"{kind}:{form}", Finite(), [form.count(",") + 1])(values))
-
-
-def _contact(text: str) -> NamedContact | Sphere:
-    """Named contact, or a sphere whose k is estimated."""
-    word, _, values = text.partition(":")
-    if word == "estimate":
-        return Sphere(*(list_of(ESTIMATE, POSITIVE, [1, 3])(values) if values else ()))
-    if text not in CONTACTS:
-        raise ValueError(f"{text!r} is none of {', '.join(CONTACTS)}, {ESTIMATE}")
-    return CONTACTS[text]
-
-
-def _mesh(text: str) -> tuple[int, int] | Path:
-    """Numbers of elements, or the file of a mesh."""
-    if re.fullmatch(r"[\s\d.+-]+[xX×][\s\d.+-]+", text):
-        counts = list_of("14x10", click.IntRange(1, MOST), [2], "[xX×]")(text)
-        return counts[0], counts[1]
-    path = Path(text)
-    if not path.suffix and not path.exists():
-        raise ValueError(f"{text!r} is not NXxNY, as in 14x10, or the file of a mesh")
-    return path
-
-
-def _ply_of(text: str) -> tuple[str, Ply]:
-    """Name and constants of a material."""
-    name, equals, values = text.partition("=")
-    if not (name and equals):
-        raise ValueError(f"{text!r} is not NAME=RHO,NU12,E1,E2,G12,G13,G23")
-    return name, Ply(*list_of("RHO,NU12,E1,E2,G12,G13,G23", Finite(), [7])(values))
-
-
-def _core(text: str) -> tuple[str, float]:
-    """Name and thickness of a core."""
-    name, _, thickness = text.rpartition(":")
-    if not name:
-        raise ValueError(f"{text!r} is not NAME:T, as in Divinycell-H60:10")
-    return name, float(POSITIVE.convert(thickness, None, None))
-
-
-def _zone(text: str) -> Zone:
-    """Rectangle or group of a zone, and its layup."""
-    place, _, layup = text.rpartition(":")
-    if not place:
-        raise ValueError(f"{text!r} is not X0,Y0,X1,Y1:LAYUP or GROUP:LAYUP")
-    plies = parse_plies(layup)
-    if place.count(",") != 3:
-        return place, plies
-    return list_of("X0,Y0,X1,Y1", Finite(), [4])(place), plies
-
-
 GROUPS = {
-    "Plate": ("size", "mesh", "grading", "columns", "rows", "nonlinear", "preload"),
+    "Plate": (
+        "size",
+        "mesh",
+        "grading",
+        "columns",
+        "rows",
+        "radius_x",
+        "radius_y",
+        "nonlinear",
+        "preload",
+    ),
     "Laminate": (
         "layup",
         "ply_thickness",
@@ -151,14 +80,6 @@ GROUPS = {
 }
 
 
-def _shear_factor(text: str) -> float | str:
-    """Read a factor, or the word for the stiffness from equilibrium."""
-    try:
-        return text if text == EQUI else float(text)
-    except ValueError:
-        raise ValueError(f"{text!r} is not a number or {EQUI}") from None
-
-
 @frozen
 class Options:
     """Argument and options of ``fecm new``."""
@@ -171,6 +92,8 @@ class Options:
     grading: float
     columns: str
     rows: str
+    radius_x: float | None
+    radius_y: float | None
     nonlinear: bool
     preload: tuple[str, ...] | None
     laminate: LaminateOptions
@@ -252,7 +175,7 @@ class Options:
 )
 @option(
     "--mesh",
-    type=Parsed(_mesh, "NXxNY|FILE"),
+    type=Parsed(new_values.mesh, "NXxNY|FILE"),
     help="Elements along x and y, as in 14x10; or a mesh, Gmsh's .msh or another that meshio "
     "reads, with groups of lines for --edge.",
 )
@@ -271,6 +194,14 @@ class Options:
 )
 @option("--rows", default="", metavar="LIST", help="The same along y.")
 @option(
+    "--radius-x",
+    type=Finite(),
+    metavar="R",
+    help="Radius of a shallow curved panel (CURV) along x; positive if the struck face is the "
+    "hollow one.",
+)
+@option("--radius-y", type=Finite(), metavar="R", help="The same along y.")
+@option(
     "--nonlinear",
     is_flag=True,
     help="The plate stretches as it bends (NONL), which matters from a deflection of about half "
@@ -285,21 +216,21 @@ class Options:
 @laminate_options(required=True)
 @option(
     "--ply-of",
-    type=Parsed(_ply_of, "NAME=RHO,NU12,E1,E2,G12,G13,G23"),
+    type=Parsed(new_values.ply_of, "NAME=RHO,NU12,E1,E2,G12,G13,G23"),
     multiple=True,
     callback=lambda context, parameter, given: unique(given, context, parameter),
     help="Constants of a material, in the deck's units: of a letter of the layup, or of a --core.",
 )
 @option(
     "--core",
-    type=Parsed(_core, "NAME:T"),
+    type=Parsed(new_values.core, "NAME:T"),
     multiple=True,
     help="Core of a sandwich and its thickness, as in Divinycell-H60:10: a named material, which "
     "is K in the layup, as in [0/90/K/90/0]; or a letter of the layup.",
 )
 @option(
     "--zone",
-    type=Parsed(_zone, "X0,Y0,X1,Y1:LAYUP"),
+    type=Parsed(new_values.zone, "X0,Y0,X1,Y1:LAYUP"),
     multiple=True,
     help="Layup of the elements whose centres lie in a rectangle, of the same materials; or of a "
     "group of surfaces of the mesh, as in PATCH:[0/90]4s.  A later zone goes over an earlier one.",
@@ -348,8 +279,10 @@ class Options:
 @option(
     "--in-plane",
     type=click.Choice(list(IN_PLANE)),
-    help="In-plane displacements on the supports, with --nonlinear or a coupled laminate: held, "
-    "normal (held across the edge only) or free.  [default: held; with --fixture free]",
+    help="In-plane displacements on the supports of a curved or --nonlinear plate, or a coupled "
+    "laminate: held, normal (held across the edge only), tangential (held along it only) or free.  "
+    "[default: held; with --radius-x or --radius-y tangential on simple edges; with --fixture "
+    "free]",
 )
 @option(
     "--at", type=list_of("X,Y", Finite(), [2]), help="Impact point.  [default: the plate's centre]"
@@ -372,14 +305,14 @@ class Options:
 )
 @option(
     "--contact",
-    type=Parsed(_contact, "NAME"),
-    help=f"Named law, instead of --law; `fecm indent contacts` lists them.  {ESTIMATE} "
-    "estimates the k of a sphere (default: steel) as `fecm indent estimate` "
+    type=Parsed(new_values.contact, "NAME"),
+    help="Named law, instead of --law; `fecm indent contacts` lists them.  "
+    f"{new_values.ESTIMATE} estimates the k of a sphere (default: steel) as `fecm indent estimate` "
     "does.",
 )
 @option(
     "--projectile",
-    type=Parsed(_projectile, "PROJECTILE"),
+    type=Parsed(new_values.projectile, "PROJECTILE"),
     help="mass:M, or rod:LENGTH,DIAMETER,E,DENSITY.  [default in lbf, in and s: the report's rod]",
 )
 @option(
@@ -399,7 +332,7 @@ class Options:
 )
 @option(
     "--shear-factor",
-    type=Parsed(_shear_factor, "K|equi"),
+    type=Parsed(new_values.shear_factor, "K|equi"),
     default="1",
     show_default=True,
     help="Factor of the transverse shear stiffness, or equi, the stiffness from equilibrium "
@@ -464,36 +397,6 @@ def new(options: Options) -> None:
         echo(output)
 
 
-@click.command(
-    epilog=typical(
-        "fecm materials own-plies.toml",
-        "fecm materials --units mm-ms-kg --format json",
-    )
-)
-@click.argument("plies", type=PLIES, metavar="[FILE.toml]", required=False)
-@option(
-    "--units", type=SYSTEM, help="Units of the constants.  [default: those of each ply's source]"
-)
-@FORMAT_OPTION
-def materials(plies: dict[str, NamedPly] | None, units: str | None, form: Format) -> None:
-    """List the named plies of `fecm new`, or those of a file, with their sources.
-
-    With --format json, each ply is a JSON object on a line, null where a constant is not known.
-    """
-    for material in (plies or named_plies()).values():
-        system = units or material.system
-        if form is Format.JSON:
-            echo_json(material.to_dict(system))
-            continue
-        echo(f"{material.name} ({system})")
-        values = material.constants(system)
-        for keys in LINES:
-            if line := ", ".join(f"{key} {values[key]:g}" for key in keys if key in values):
-                echo(f"  {line}")
-        texts = "; ".join(filter(None, (material.source, material.assumed)))
-        echo(f"  {texts or '(no source)'}")
-
-
 def _author(options: Options, given: Collection[str]) -> Authored:
     """Deck of the options of ``fecm new``; `given` are those on the command line."""
     plate = options.plate(given)
@@ -526,6 +429,8 @@ def _author(options: Options, given: Collection[str]) -> Authored:
             ),
             units=laminate.units,
             in_plane=options.in_plane,
+            radius_x=options.radius_x,
+            radius_y=options.radius_y,
             nonlinear=options.nonlinear,
             preload=options.preload,
             giic=options.giic,

@@ -25,7 +25,7 @@ from fecm.deck.mesh_cards import (
 # Significant digits of coordinates, relative to the plate's size, so that they fit their columns.
 DIGITS = 6
 LEAST_BESIDE = 2  # least number of elements between a window and an edge
-SUPPORTS = ("free", "simple", "clamped")
+SUPPORTS = ("free", "simple", "pinned", "clamped")
 
 
 class EdgeCodes(NamedTuple):
@@ -47,9 +47,19 @@ CLAMPED = (1, 1, 1)
 IN_PLANE = {
     "held": EdgeCodes(along_x=(1, 1), along_y=(1, 1)),
     "normal": EdgeCodes(along_x=(0, 1), along_y=(1, 0)),
+    "tangential": EdgeCodes(along_x=(1, 0), along_y=(0, 1)),
     "free": EdgeCodes(along_x=(0, 0), along_y=(0, 0)),
 }
 EDGES = ("left", "right", "bottom", "top")
+
+
+def held_in_plane(support: str, in_plane: str) -> str:
+    """What a support does to u and v, a key of :data:`IN_PLANE`.
+
+    ``"pinned"`` holds both, and so does ``"clamped"`` where others hold the tangential one.
+    """
+    holds_both = support == "pinned" or (support == "clamped" and in_plane == "tangential")
+    return "held" if holds_both else in_plane
 
 
 @frozen
@@ -241,7 +251,8 @@ class Grid:
         for edge, support in supports.items():
             if support != "free":
                 out_of_plane = CLAMPED if support == "clamped" else SIMPLE.of(edge)
-                codes[edge] = (*IN_PLANE[in_plane].of(edge), *out_of_plane)
+                held = IN_PLANE[held_in_plane(support, in_plane)]
+                codes[edge] = (*held.of(edge), *out_of_plane)
         return self.boundary(everywhere, codes, window, in_plane=in_plane)
 
     def boundary(

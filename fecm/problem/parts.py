@@ -224,6 +224,11 @@ def is_curved(deck: Deck) -> bool:
     return card is not None and any(card.curvatures)
 
 
+def moves_in_plane(deck: Deck) -> bool:
+    """Whether u and v of a deck's plate are not zero: coupled, curved or nonlinear."""
+    return deck.has(model.Nonlinear) or is_curved(deck) or is_coupled(deck)
+
+
 @lru_cache(maxsize=256)
 def _are_coupled(
     material: model.Material, materials: model.Materials | None, laminates: model.Laminates | None

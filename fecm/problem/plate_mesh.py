@@ -22,6 +22,7 @@ from fecm.deck.grid import (
     SUPPORTS,
     W_HELD,
     boundary_cards,
+    held_in_plane,
     round_to,
 )
 from fecm.deck.model import Boundary, Coordinates, ElementNodes, Elements, NodeValues
@@ -97,7 +98,8 @@ class PlateMesh:
         """BOUN cards of the supports of groups; None where nothing is restrained.
 
         The support of the boundary leaves out the other groups.  `in_plane` is what the supports do
-        to u and v; raises MeshError if it is "normal" and a side is along neither x nor y.
+        to u and v; raises MeshError if that depends on the direction of a side that is along
+        neither x nor y.
         """
         codes = np.tile(np.array(everywhere), (self.nodes, 1))
         for name, support in supports.items():
@@ -122,16 +124,17 @@ class PlateMesh:
                 # Three nodes in a line, on a polygon for a curve, would hold its rotation too.
                 rows = np.setdiff1d(rows, self.middles)
             codes[rows, 2:] = np.maximum(codes[rows, 2:], W_HELD)
-            if in_plane == "held":
+            held = held_in_plane(support, in_plane)
+            if held == "held":
                 codes[rows, :2] = 1
-            elif in_plane == "normal":
+            elif held != "free":
                 if not straight:
                     raise MeshError(
-                        f"the sides of {name!r} are not all along x or y: u and v are not normal "
+                        f"the sides of {name!r} are not all along x or y: u and v are not {held} "
                         "to them"
                     )
-                for on, held in zip(lines, IN_PLANE[in_plane], strict=True):
-                    codes[on, :2] = np.maximum(codes[on, :2], held)
+                for on, code in zip(lines, IN_PLANE[held], strict=True):
+                    codes[on, :2] = np.maximum(codes[on, :2], code)
         return boundary_cards(codes)
 
     def _group(self, name: str) -> Integers:

@@ -70,6 +70,8 @@ class Values(TypedDict, total=False):
     preload_x: Number
     preload_y: Number
     preload_xy: Number
+    radius_x: Number
+    radius_y: Number
     cure_dT: Number
     size: str | Iterable[float]
     support: Support

@@ -17,14 +17,14 @@ from fecm.authoring.laminate import (
     strengths_of,
     toughness_of,
 )
-from fecm.authoring.mesh import placed, supported
+from fecm.authoring.mesh import Membrane, placed, supported
 from fecm.authoring.parameters import ObjectError, check_kind
 from fecm.authoring.plate import Plate
 from fecm.deck import model
 from fecm.deck.catalogue import MATERIALS, STANDARD, NamedPly, system_of
 from fecm.deck.material_cards import MATERIAL
 from fecm.mechanics.projectile import RigidMass, Rod
-from fecm.problem.parts import is_coupled
+from fecm.problem.parts import is_coupled, is_curved
 from fecm.sweeps.plates import swapped
 from fecm.sweeps.strike import strike_of, struck_layers
 
@@ -138,7 +138,8 @@ def with_plate(deck: model.Deck, plate: Plate, at: tuple[float, float] | None) -
     patch = None if old is None else replace(old, x=None, y=None, source=None)
     mesh, node, patch = placed(plate, plies_of_deck(deck), at, patch, doubts)
     stretches = deck.has(model.Nonlinear) or is_coupled(deck)
-    boundary, _ = supported(plate, mesh, None, [], stretches=stretches)
+    membrane = Membrane.of(curved=is_curved(deck), stretches=stretches)
+    boundary, _ = supported(plate, mesh, None, [], membrane)
     for doubt in doubts:
         warn(doubt)
     control = replace(

@@ -18,8 +18,8 @@ from fecm.deck.model import Layer, NodeCodes, NodeValues
 from fecm.mechanics.mesh import element_blocks, holds_the_plane
 from fecm.mechanics.points import locate
 from fecm.problem.generate import generate, restraint_codes
-from fecm.problem.parts import is_coupled
-from fecm.problem.plate_mesh import BOUNDARY, PlateMesh
+from fecm.problem.parts import is_curved, moves_in_plane
+from fecm.problem.plate_mesh import BOUNDARY, MeshError, PlateMesh
 from fecm.problem.refine import RefineError, refined
 from fecm.sweeps.case import CasesError, Value, pair
 
@@ -138,6 +138,17 @@ def preload_force(name: str) -> PlateSetter:
     return changed
 
 
+def curvature_radius(name: str) -> PlateSetter:
+    """Setter of a radius of a curved panel; 0 is flat.  A deck without radii gets them."""
+
+    def changed(deck: model.Deck, value: Value) -> model.Deck:
+        old = deck.last(model.Curvature)
+        fields: dict[str, Any] = {name: float(value)}  # mypy compares each with every field
+        return swapped(deck, old, replace(old or model.Curvature(), **fields, source=None))
+
+    return changed
+
+
 def set_cure(deck: model.Deck, value: Value) -> model.Deck:
     """Change the temperature of CURE, which has the coefficients of expansion."""
     if (old := deck.last(model.Cure)) is None:
@@ -234,14 +245,17 @@ def set_support(deck: model.Deck, value: Value) -> model.Deck:
     if deck.has(model.Forces) or mesh.elements.shape[1] not in (4, 9) or not mesh.elements.all():
         raise CasesError("support: the deck must have no FORC, and all elements four or nine nodes")
     plate = PlateMesh(mesh.coordinates, mesh.elements.astype(int) - 1, {}, np.array([], int))
-    stretches = deck.has(model.Nonlinear) or is_coupled(deck)
-    everywhere = (0, 0, 0, 0, 0) if stretches else (1, 1, 0, 0, 0)
-    made = plate.supported(everywhere, {BOUNDARY: support})
+    everywhere = (0, 0, 0, 0, 0) if moves_in_plane(deck) else (1, 1, 0, 0, 0)
+    in_plane = "tangential" if is_curved(deck) else "held"
+    try:
+        made = plate.supported(everywhere, {BOUNDARY: support}, in_plane=in_plane)
+    except MeshError as error:
+        raise CasesError(f"support {support}: {error}") from None
     others = tuple(s for s in deck.segments if not isinstance(s, model.Boundary))
-    if made is not None and support == "simple" and mesh.elements.shape[1] == 4:
+    if made is not None and support in ("simple", "pinned") and mesh.elements.shape[1] == 4:
         codes = restraint_codes([made], deck.control.numnp, deck.control.ndf) != 0
         if (codes[:, 2] & ~codes[:, 3:].any(axis=1)).any():
-            raise CasesError("support simple: elements of four nodes need sides along x or y")
+            raise CasesError(f"support {support}: elements of four nodes need sides along x or y")
     return replace(deck, segments=others if made is None else (*others, made))
 
 
@@ -255,10 +269,24 @@ def refine(deck: model.Deck, value: Value) -> model.Deck:
     return deck
 
 
+def check_free_in_plane(deck: model.Deck) -> None:
+    """Raise CasesError if a curved panel can't stretch: its supports decide how stiff it is."""
+    if _holds_the_plane(deck):
+        raise CasesError(
+            "the deck holds u and v at every node, which clamps the membrane of a curved panel: "
+            "vary its `support` too, or write it with `fecm new --radius-x`"
+        )
+
+
+def _holds_the_plane(deck: model.Deck) -> bool:
+    """Whether a deck restrains u and v at every node."""
+    boundaries = tuple(deck.all(model.Boundary))
+    return holds_the_plane(restraint_codes(boundaries, deck.control.numnp, deck.control.ndf))
+
+
 def free_in_plane(deck: model.Deck) -> model.Deck:
     """Restrain u and v only where w is, if the deck restrains them at every node."""
-    boundaries = tuple(deck.all(model.Boundary))
-    if not holds_the_plane(restraint_codes(boundaries, deck.control.numnp, deck.control.ndf)):
+    if not _holds_the_plane(deck):
         return deck
 
     # Codes are generated for each dof independently, so that copies of the codes of w act like w's.
@@ -266,7 +294,7 @@ def free_in_plane(deck: model.Deck) -> model.Deck:
         w = record.codes[2]
         return replace(record, codes=(w, w, *record.codes[2:]), source=None)
 
-    for old in boundaries:
+    for old in deck.all(model.Boundary):
         new = replace(old, records=tuple(map(freed, old.records)), source=None)
         deck = swapped(deck, old, new)
     return deck

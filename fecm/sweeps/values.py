@@ -133,14 +133,19 @@ PLATE_VALUES: tuple[Variable[PlateSetter], ...] = (
              meaning="the same for N0y"),
     Variable("preload_xy", Changes.LAMINATE, "force/length", plates.preload_force("n_xy"),
              meaning="the same for N0xy"),
+    Variable("radius_x", Changes.LAMINATE, "length", plates.curvature_radius("radius_x"),
+             meaning="radius of a [curved panel](curved.md) (`CURV`), 0 is flat; the deck leaves u "
+                     "and v free"),
+    Variable("radius_y", Changes.LAMINATE, "length", plates.curvature_radius("radius_y"),
+             meaning="the same for Ry"),
     Variable("cure_dT", Changes.RESIDUAL, "", plates.set_cure,
              meaning="change of temperature of `CURE`, K; only exposures depend on it"),
     Variable("size", Changes.PLATE, "", plates.set_size, Kind.TEXT,
              meaning="`AxB`: sides of the plate; coordinates are scaled along x and y, and with "
                      "them the centre of the patch and the gages"),
     Variable("support", Changes.PLATE, "", plates.set_support, Kind.TEXT,
-             meaning="`free`, `simple` or `clamped`: [support](#supports-of-the-outline) of the "
-                     "outline"),
+             meaning="`free`, `simple`, `pinned` or `clamped`: [support](#supports-of-the-outline) "
+                     "of the outline"),
 )
 TIME_VALUES: tuple[Variable[None], ...] = (  # which are set together, after all others
     Variable("dt", Changes.TIME, "time", None,

@@ -7,9 +7,9 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, TypeVar
 
 from fecm.deck.model import Deck
-from fecm.problem.parts import is_coupled
+from fecm.problem.parts import is_coupled, is_curved
 from fecm.sweeps.case import Case, CasesError, pair
-from fecm.sweeps.plates import PlateSetter, free_in_plane
+from fecm.sweeps.plates import PlateSetter, check_free_in_plane, free_in_plane
 from fecm.sweeps.strike import Strike, StrikeSetter, strike_of
 from fecm.sweeps.timing import stable_time_step, with_time_step
 from fecm.sweeps.values import PLATE_VALUES, REFINEMENT, STRIKE_VALUES, Variable, check_names
@@ -66,6 +66,8 @@ def apply_case(deck: Deck, case: Case, objects: Objects | None = None) -> Deck:
         made = strike(made, case).deck()
     if not is_coupled(deck) and is_coupled(made):
         made = free_in_plane(made)
+    if is_curved(made) and not is_curved(deck):
+        check_free_in_plane(made)
     return replace(_timed(deck, made, case), text="")
 
 

@@ -1,0 +1,91 @@
+"""Texts of the options of ``fecm new``; ValueError says what is wrong with one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import click
+
+from fecm.authoring.contact import Sphere
+from fecm.authoring.numerics import EQUI
+from fecm.authoring.plate import MOST
+from fecm.authoring.zones import Zone
+from fecm.cli.options import POSITIVE, Finite, list_of
+from fecm.deck.catalogue import CONTACTS, NamedContact
+from fecm.deck.layup import parse_plies
+from fecm.deck.model import Ply
+from fecm.mechanics.projectile import RigidMass, Rod
+
+ESTIMATE = "estimate:RADIUS[,ES,NUS]"
+
+PROJECTILES: dict[str, tuple[str, Callable[..., Rod | RigidMass]]] = {
+    "mass": ("M", RigidMass),
+    "rod": ("LENGTH,DIAMETER,E,DENSITY", Rod.cylinder),
+}
+
+
+def projectile(text: str) -> Rod | RigidMass:
+    """Read a rigid mass or a cylindrical rod."""
+    kind, _, values = text.partition(":")
+    if kind not in PROJECTILES:
+        raise ValueError(f"{text!r} is not mass:M or rod:LENGTH,DIAMETER,E,DENSITY")
+    form, made_of = PROJECTILES[kind]
+    return made_of(*list_of(f"{kind}:{form}", Finite(), [form.count(",") + 1])(values))
+
+
+def contact(text: str) -> NamedContact | Sphere:
+    """Named contact, or a sphere whose k is estimated."""
+    word, _, values = text.partition(":")
+    if word == "estimate":
+        return Sphere(*(list_of(ESTIMATE, POSITIVE, [1, 3])(values) if values else ()))
+    if text not in CONTACTS:
+        raise ValueError(f"{text!r} is none of {', '.join(CONTACTS)}, {ESTIMATE}")
+    return CONTACTS[text]
+
+
+def mesh(text: str) -> tuple[int, int] | Path:
+    """Numbers of elements, or the file of a mesh."""
+    if re.fullmatch(r"[\s\d.+-]+[xX×][\s\d.+-]+", text):
+        counts = list_of("14x10", click.IntRange(1, MOST), [2], "[xX×]")(text)
+        return counts[0], counts[1]
+    path = Path(text)
+    if not path.suffix and not path.exists():
+        raise ValueError(f"{text!r} is not NXxNY, as in 14x10, or the file of a mesh")
+    return path
+
+
+def ply_of(text: str) -> tuple[str, Ply]:
+    """Name and constants of a material."""
+    name, equals, values = text.partition("=")
+    if not (name and equals):
+        raise ValueError(f"{text!r} is not NAME=RHO,NU12,E1,E2,G12,G13,G23")
+    return name, Ply(*list_of("RHO,NU12,E1,E2,G12,G13,G23", Finite(), [7])(values))
+
+
+def core(text: str) -> tuple[str, float]:
+    """Name and thickness of a core."""
+    name, _, thickness = text.rpartition(":")
+    if not name:
+        raise ValueError(f"{text!r} is not NAME:T, as in Divinycell-H60:10")
+    return name, float(POSITIVE.convert(thickness, None, None))
+
+
+def zone(text: str) -> Zone:
+    """Rectangle or group of a zone, and its layup."""
+    place, _, layup = text.rpartition(":")
+    if not place:
+        raise ValueError(f"{text!r} is not X0,Y0,X1,Y1:LAYUP or GROUP:LAYUP")
+    plies = parse_plies(layup)
+    if place.count(",") != 3:
+        return place, plies
+    return list_of("X0,Y0,X1,Y1", Finite(), [4])(place), plies
+
+
+def shear_factor(text: str) -> float | str:
+    """Read a factor, or the word for the stiffness from equilibrium."""
+    try:
+        return text if text == EQUI else float(text)
+    except ValueError:
+        raise ValueError(f"{text!r} is not a number or {EQUI}") from None
