@@ -30,3 +30,18 @@ def strain_of_deflection(curvature: Curvature) -> Floats:
     """
     x, y, xy = curvature
     return np.array([x, y, 2.0 * xy])
+
+
+def surface(coordinates: Floats, curvature: Curvature) -> Floats:
+    """Height z of the midplane at points (n, 2), from that at the centre of their extent, (n,).
+
+    Examples
+    --------
+    >>> surface(np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]), (0.01, 0.0, 0.0))
+    array([-0.02, -0.  , -0.02])
+    """
+    low, high = np.nanmin(coordinates, axis=0), np.nanmax(coordinates, axis=0)
+    x, y = (coordinates - (low + high) / 2.0).T
+    of_x, of_y, twist = curvature
+    z: Floats = -(of_x * x**2 + of_y * y**2) / 2.0 - twist * x * y
+    return z

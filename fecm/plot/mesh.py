@@ -16,6 +16,7 @@ from fecm.plot import data, style
 from fecm.plot.kinds import Picture, Width
 from fecm.plot.plate import aspect, draw_circle
 from fecm.results.result import Result
+from fecm.results.summary import radii_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -88,8 +89,17 @@ def mesh(
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     place.name(axes.xaxis, "$x$")
     place.name(axes.yaxis, "$y$")
+    if "mesh/z" in result:
+        axes.set_title(_curved(result, name, place), loc="left")
     style.lines_legend(figure, axes)
     return Picture(figure)
+
+
+def _curved(result: Result, name: str, place: style.Scale) -> str:
+    """Title of a curved panel, which is seen from above: its radii and its rise."""
+    (z,) = data.require(result, name, "mesh/z")
+    named = [f"$R_{{{axis}}}$ {place.show(radius)}" for axis, radius in radii_of(result).items()]
+    return ", ".join(["curved", *named, f"rise {place.show(float(np.ptp(z)))}"])
 
 
 def _colour_laminates(axes: Axes, result: Result, name: str, cut: data.Patches) -> None:

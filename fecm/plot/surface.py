@@ -12,7 +12,7 @@ from matplotlib.colors import Normalize
 from matplotlib.ticker import MaxNLocator
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
-from fecm._typing import Array
+from fecm._typing import Array, Floats
 from fecm.plot import data, style
 from fecm.plot.kinds import Picture, Width
 from fecm.results.result import Result
@@ -27,6 +27,7 @@ Show = Callable[[int], None]  # shows a row of tape3
 
 FRAMES = 60
 EXAGGERATION = 0.3  # height of the deflected plate over its longer side
+ON_PANEL = 0.15  # the same of the deflection that is drawn on a curved panel
 
 
 def surface(results: Results, *, times: Sequence[float] = (), width: Width = "column") -> Picture:
@@ -56,13 +57,14 @@ def animation(results: Results, *, times: Sequence[float] = (), width: Width = "
 def _plates(
     results: Results, width: Width, rows: Array, count: int, clock: style.Scale
 ) -> tuple[Figure, list[Show]]:
-    """Draw `count` flat plates on the common scale of all rows, and what shows a row on each."""
+    """Draw `count` plates at rest on the common scale of all rows, and what shows a row on each."""
     ((name, result),) = results.items()
     cut, w = data.patches(result, 2, name), result["tape3/w"]
     stored = w[rows]
     place = style.scale_of(results, "length", [cut.points])
     length = style.scale_of(results, "length", [stored])
     low, high = float(stored.min()), float(stored.max())
+    rest, factor = _at_rest(result, name, cut, max(abs(low), abs(high)))
     columns = 1 if width == "column" else min(count, 2)
     lines = math.ceil(count / columns)
     figure, found = style.panels(width, lines, columns, ratio=0.7, projection="3d")
@@ -71,17 +73,21 @@ def _plates(
         ax.set_axis_off()
 
     def show(plate: Poly3DCollection, title: Text, row: int) -> None:
-        heights = cut.values(w[row])[cut.quads]
+        deflection = cut.values(w[row])[cut.quads]
+        heights = rest[cut.quads] + factor * deflection
         plate.set_verts(np.dstack([cut.points[cut.quads], heights]))
-        plate.set_array(heights.mean(axis=1))
+        plate.set_array(deflection.mean(axis=1))
         title.set_text(f"time {clock.show(float(result['tape3/time'][row]))}")
 
     plates: list[Poly3DCollection] = []
     shows: list[Show] = []
     for ax in axes[:count]:
-        plate = _draw_flat(ax, cut, low, high)
+        plate = _draw_at_rest(ax, cut, low, high)
         title = ax.text2D(0.03, 0.94, "", transform=ax.transAxes)
         _label(ax, place, length)
+        if "mesh/z" in result:
+            _show_shape(ax, cut, rest, factor * np.array([min(low, 0.0), max(high, 0.0)]))
+            ax.text2D(0.03, 0.87, f"deflection drawn {factor:g} times", transform=ax.transAxes)
         plates.append(plate)
         shows.append(functools.partial(show, plate, title))
     bar = style.colour_bar(
@@ -100,7 +106,28 @@ def _plates(
     return figure, shows
 
 
-def _draw_flat(axes: Axes3D, cut: data.Patches, low: float, high: float) -> Poly3DCollection:
+def _at_rest(result: Result, name: str, cut: data.Patches, largest: float) -> tuple[Floats, float]:
+    """Heights of the points at rest, (n,), and the factor by which deflections are drawn.
+
+    The shape of a curved panel has the scale of its sides, on which a deflection would not be seen.
+    """
+    if "mesh/z" not in result:
+        return np.zeros(len(cut.points)), 1.0
+    (z,) = data.require(result, name, "mesh/z")
+    side = float(np.ptp(cut.points, axis=0).max())
+    return cut.values(z), float(f"{ON_PANEL * side / (largest or side):.1g}")
+
+
+def _show_shape(axes: Axes3D, cut: data.Patches, rest: Floats, drawn: Floats) -> None:
+    """Give the axes of a curved panel one scale, with room for the deflections as drawn."""
+    low, high = float(rest.min() + drawn.min()), float(rest.max() + drawn.max())
+    extent = np.ptp(cut.points, axis=0)
+    axes.set_zlim(low, high)
+    axes.set_box_aspect((*(extent / extent.max()), (high - low) / extent.max()), zoom=1.3)
+    axes.set(zlabel="", zticks=[])
+
+
+def _draw_at_rest(axes: Axes3D, cut: data.Patches, low: float, high: float) -> Poly3DCollection:
     """Draw the flat plate in axes with room for deflections from `low` to `high`."""
     flat = cut.points[cut.quads]
     peak = max(abs(low), abs(high)) or 1.0

@@ -12,7 +12,7 @@ from fecm.results.errors import NotStoredError
 from fecm.results.plies import rows_at
 from fecm.results.schema import DATASETS, SCALES, Dataset, dataset_of
 from fecm.results.stored import Stored
-from fecm.results.vtk_cells import vtk_cells
+from fecm.results.vtk_cells import vtk_cells, vtk_points
 
 if TYPE_CHECKING:
     import pandas
@@ -86,10 +86,8 @@ def grid(stored: Stored, time: float | None) -> pyvista.UnstructuredGrid:
         raise NotStoredError("there are no displacements (tape3) in this result; add DISP")
     (row,) = [-1] if time is None else rows_at(stored["tape3/time"], [time], "displacements")
     connectivity, offsets, types = vtk_cells(stored["mesh/elements"])
-    points = np.zeros((len(stored["mesh/coordinates"]), 3))
-    points[:, :2] = stored["mesh/coordinates"][:, :2]
     cells = np.insert(connectivity, offsets[:-1], np.diff(offsets))
-    made: Any = pyvista.UnstructuredGrid(cells, types, points)
+    made: Any = pyvista.UnstructuredGrid(cells, types, vtk_points(stored))
     notes = [*stored.notes]
     for one in fields(stored, np.array([row]), notes.append):
         data = made.point_data if one.at is At.POINTS else made.cell_data

@@ -120,6 +120,9 @@ class Mesh(Group):
     laminate: Annotated[
         Int32s, "numel", "number of the laminate of every element, only with several"
     ]
+    z: Annotated[
+        Floats, "numnp", "height of every node at rest above the centre, only if curved", "length"
+    ]
 
 
 class LaminateStiffness(Group):

@@ -5,13 +5,24 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._typing import Array
+from fecm._typing import Array, Floats
+from fecm.results.stored import Stored
 
 Ints = NDArray[np.int64]
 
 CORNERS = 4
 # VTK's cell types (vtkCellType.h) of elements with 3, 4, 8 or 9 nodes.
 TYPES = {3: 5, 4: 9, 8: 23, 9: 28}
+
+
+def vtk_points(stored: Stored) -> Floats:
+    """Places x, y and z of the nodes at rest, (numnp, 3); z is 0 on a flat plate."""
+    coordinates = stored["mesh/coordinates"][:, :2]
+    points = np.zeros((len(coordinates), 3))
+    points[:, : coordinates.shape[1]] = coordinates
+    if "mesh/z" in stored:
+        points[:, 2] = stored["mesh/z"]
+    return points
 
 
 def vtk_cells(elements: Array) -> tuple[Ints, Ints, Ints]:

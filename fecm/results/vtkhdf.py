@@ -20,7 +20,7 @@ from fecm.results.hdf5_writer import new_hdf5
 from fecm.results.missing import remedy
 from fecm.results.plate_fields import Fields, Note, fields
 from fecm.results.stored import Stored
-from fecm.results.vtk_cells import Ints, vtk_cells
+from fecm.results.vtk_cells import Ints, vtk_cells, vtk_points
 
 VERSION = (2, 2)
 CONTACT = ("force", "indentation", "transducer")
@@ -53,10 +53,8 @@ def write_vtkhdf(
 
 def _write_mesh(root: h5py.Group, result: Stored, times: Array) -> None:
     """The mesh, once, and the times at which it has fields."""
-    coordinates = result["mesh/coordinates"]
     connectivity, offsets, types = vtk_cells(result["mesh/elements"])
-    points = np.zeros((len(coordinates), 3))
-    points[:, : coordinates.shape[1]] = coordinates
+    points = vtk_points(result)
     root["Points"] = points
     root["Connectivity"], root["Offsets"] = connectivity, offsets.astype("i8")
     root["Types"] = types.astype("u1")

@@ -10,6 +10,7 @@ import numpy as np
 
 from fecm._typing import Array, Floats
 from fecm.deck.macros import WorkEstimate
+from fecm.mechanics.curvature import surface
 from fecm.mechanics.failure import CRITERIA
 from fecm.mechanics.ply_stresses import FailureEnvelope
 from fecm.mechanics.strains import STRAINS
@@ -51,6 +52,8 @@ def _absent(model: ImpactModel) -> set[str]:
         absent.add(CURE_STRESS)
     if not model.plate.others:
         absent.add("mesh/laminate")
+    if not model.plate.is_curved:
+        absent.add("mesh/z")
     if model.materials is None or (model.plies is None and model.failure is None):
         absent.add(MATERIAL)
     return absent
@@ -177,6 +180,10 @@ class Recorder:
         if (patch := model.patch) is not None:
             values = {"shape": patch.shape, "radius": patch.radius, "x": patch.x, "y": patch.y}
             self._sink.attributes("patch", values)
+        if model.plate.is_curved:
+            radii = zip(("x", "y", "xy"), model.plate.curvature, strict=True)
+            values = {f"radius_{n}": float(f"{1.0 / one:.12g}") for n, one in radii if one}
+            self._sink.attributes("mesh", values)
         if model.plate.is_preloaded:
             values = dict(zip(("N0_x", "N0_y", "N0_xy"), model.plate.preload, strict=True))
             self._sink.attributes(LAMINATE, values)
@@ -203,6 +210,8 @@ class Recorder:
             found |= {f"{group}/{n}": getattr(laminate, n) for n in ("A", "B", "D", "shear")}
         if model.plate.laminate_numbers is not None:
             found["mesh/laminate"] = np.array(model.laminates)[model.plate.laminate_numbers]
+        if model.plate.is_curved:
+            found["mesh/z"] = surface(mesh.coordinates, model.plate.curvature)
         if self._room["gages"] and model.gages is not None:
             found["gages/number"] = model.gages.numbers
         if (patch := model.patch) is not None:
