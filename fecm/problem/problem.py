@@ -271,6 +271,7 @@ class Problem:
             in_plane_of(self.mesh.codes),
             mobility,
             preloaded=self.plate.is_preloaded,
+            curved=self.plate.is_curved,
             nonlinear=self.plate.nonlinear,
         )
 

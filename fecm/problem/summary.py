@@ -15,6 +15,7 @@ from fecm.deck.macros import flat
 from fecm.deck.model import Shear
 from fecm.deck.units import MASS, mass_in_si, unit_names, unit_of
 from fecm.mechanics.buckling import FAR
+from fecm.mechanics.curvature import surface
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
 from fecm.mechanics.solutions import SingularStiffnessError, compliance
@@ -88,6 +89,10 @@ class ProblemSummary:
         Nodes whose u and v are both free.
     preload : tuple of float
         N0x, N0y and N0xy of PREL, force/length; zeros without it.
+    curvature : tuple of float
+        1/Rx, 1/Ry and 1/Rxy of CURV, 1/length; zeros without it.
+    rise : float
+        Difference of the largest and the least height of a curved panel, length; 0 without CURV.
     A, B, D : ndarray (3, 3)
         Stiffness of the laminate under the load.
     shear : ndarray (2, 2)
@@ -127,6 +132,8 @@ class ProblemSummary:
     nonlinear: bool
     free_in_plane: int
     preload: tuple[float, float, float]
+    curvature: tuple[float, float, float]
+    rise: float
     A: Floats
     B: Floats
     D: Floats
@@ -173,6 +180,12 @@ class ProblemSummary:
             named = zip(("N0x", "N0y", "N0xy"), self.preload, strict=True)
             forces = ", ".join(f"{name} {quantity(n, 'force/length')}" for name, n in named)
             lines.append(f"  preload             {forces}")
+
+        if any(self.curvature):
+            named = zip(("Rx", "Ry", "Rxy"), self.curvature, strict=True)
+            radii = [f"{name} {quantity(1.0 / one, 'length')}" for name, one in named if one]
+            shape = ", ".join([*radii, f"rise {quantity(self.rise, 'length')}"])
+            lines.append(f"  curved panel        {shape}")
 
         def mass(value: float) -> str:
             known = mass_in_si(value, self.units)
@@ -228,6 +241,8 @@ def summarise(problem: Problem) -> ProblemSummary:
         nonlinear=plate.nonlinear,
         free_in_plane=int((plate.mesh.codes[:, :W] == 0).all(axis=1).sum()),
         preload=plate.preload,
+        curvature=plate.curvature,
+        rise=float(np.ptp(surface(plate.mesh.coordinates[plate.mesh.used], plate.curvature))),
         A=laminate.A,
         B=laminate.B,
         D=laminate.D,

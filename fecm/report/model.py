@@ -29,6 +29,7 @@ from fecm.report.content import Block, Cell, Number, Picture, number, table
 from fecm.report.figures import inside
 from fecm.report.stack import stack
 from fecm.results.result import Result
+from fecm.results.summary import radii_of
 
 PLY = (
     ("density", DENSITY),
@@ -80,6 +81,11 @@ def _plate(result: Result, problem: Problem) -> Iterator[tuple[Cell, ...]]:
         held = {str(name): int(nodes.sum()) for name, nodes in supports(result).items()}
         texts = [f"{count} nodes {name}" for name, count in held.items() if count]
         yield "supports", ", ".join(texts) or "none: the plate is free"
+    for axis, radius in radii_of(result).items():
+        yield f"radius R{axis}", in_units(radius, "length")
+    if "mesh/z" in result:
+        rise = in_units(float(np.ptp(result["mesh/z"])), "length")
+        yield "rise of the curved panel", rise
     yield "kinematics", "von Kármán: stretches as it bends" if plate.nonlinear else "linear"
     mass = plate.total_mass()
     yield "mass", Number(mass, _mass(deck, mass))

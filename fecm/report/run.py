@@ -38,7 +38,7 @@ from fecm.results.exposures import largest_exposures
 from fecm.results.first_failure import first_failures, threshold_energy
 from fecm.results.metrics import INTEGERS, METRICS
 from fecm.results.result import Result
-from fecm.results.summary import LABEL_WIDTH, UNDECIDED, elastic_doubt, summary
+from fecm.results.summary import LABEL_WIDTH, UNDECIDED, elastic_doubt, radii_of, summary
 
 WORDS = {
     Level.WITHIN: "All quantities are within the range of the model.",
@@ -143,6 +143,10 @@ def _model_row(result: Result, problem: Problem | None) -> dict[str, Cell]:
         "kinematics": "von Kármán" if problem.plate.nonlinear else "linear",
         "elements": Number(deck.control.numel, str(deck.control.numel)),
     }
+    if radii := radii_of(result):
+        unit = unit_of("length", units)
+        named = ", ".join(f"R{axis} {radius:.5g}" for axis, radius in radii.items())
+        row["curved panel"] = f"{named} {unit}".rstrip()
     if (hits := impactor(result, deck)) is not None:
         weight = mass_in_si(hits.mass, units) or f"{hits.mass:.5g}"
         row["projectile"] = hits.name

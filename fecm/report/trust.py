@@ -18,6 +18,7 @@ from fecm.results.criteria import spelt
 from fecm.results.end import End
 from fecm.results.errors import ResultFileError
 from fecm.results.exposures import FEWEST, evaluations_in_contact, largest_exposures
+from fecm.results.linear_plate import CURVED
 from fecm.results.metrics import MOBILITY
 from fecm.results.result import Result
 from fecm.results.summary import UNDECIDED
@@ -103,6 +104,7 @@ def _reached(result: Result, problem: Problem, reasons: list[str]) -> Iterator[J
             words = f"a linear plate holds up to {limits.limit} h with these supports"
             if bent:
                 words = f"{words}; {limits.softness(max(w, limits.limit))}"
+                words = f"{words}; {CURVED}" if limits.curved else words
             level = Level.OUTSIDE if bent else Level.WITHIN
             yield Judgement(level, "deflection under the load", size, words)
     for reason, name, what, limit in (

@@ -13,6 +13,10 @@ TOO_SOFT = "a linear plate, without membrane stiffening, is too soft"
 PRELOADED = "that is without PREL, whose compression makes it more and whose tension less"
 REMEDY = "NONL includes the stiffening (fecm new --nonlinear)"
 UNSAFE = "threshold energies are therefore too high (unsafe)"
+CURVED = (
+    "all this is of a flat plate: a curved panel that is struck on its convex side softens and may "
+    "snap through"
+)
 
 
 class InPlane(StrEnum):
@@ -56,6 +60,11 @@ def in_plane_of(codes: Array) -> InPlane:
     if held[:, :2].all():
         return InPlane.UNKNOWN
     return InPlane.HELD if supports[:, :2].any(axis=1).mean() > 0.5 else InPlane.FREE
+
+
+def unsafe(*, curved: bool) -> str:
+    """What a plate that is too soft means for thresholds; of a curved panel, that it may not be."""
+    return f"{UNSAFE}; {CURVED}" if curved else UNSAFE
 
 
 def softness(ratio: float, in_plane: InPlane, *, preloaded: bool = False) -> str:

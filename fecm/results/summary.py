@@ -48,6 +48,7 @@ def summary(result: Stored) -> list[str]:
     if clock in result:
         time = result[clock]
         lines.append(_line("steps", f"{len(time)}, up to time {quantity(time[-1], 'time')}"))
+    lines += _curved(result)
     lines += _preload(result)
     if "history/force" in result:
         lines += _impact(result)
@@ -71,6 +72,24 @@ def summary(result: Stored) -> list[str]:
             _line("frequencies", f"{texts}{more} {result.unit('modes/angular_frequency')}".rstrip())
         )
     return lines or ["nothing was stored"]
+
+
+def radii_of(result: Stored) -> dict[str, float]:
+    """Finite radii of a curved panel by ``x``, ``y`` and ``xy``, length; empty if it is flat."""
+    given = result.attributes_of("mesh")
+    radii = {axis: given.get(f"radius_{axis}") for axis in ("x", "y", "xy")}
+    return {axis: float(one) for axis, one in radii.items() if isinstance(one, int | float)}
+
+
+def _curved(result: Stored) -> list[str]:
+    """Line of the radii and the rise of a curved panel."""
+    if "mesh/z" not in result:
+        return []
+    named = [
+        f"R{axis} {_quantity(result, one, 'length')}" for axis, one in radii_of(result).items()
+    ]
+    rise = _quantity(result, float(np.ptp(result["mesh/z"])), "length")
+    return [_line("curved panel", ", ".join([*named, f"rise {rise}"]))]
 
 
 def _preload(result: Stored) -> list[str]:

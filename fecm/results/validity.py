@@ -113,6 +113,7 @@ class Judge:
     # supports hold the plate.
     mobility: float = 0.0
     preloaded: bool = False  # whether an initial membrane force acts
+    curved: bool = False  # whether the plate at rest is curved
     nonlinear: bool = False  # whether stretching follows from bending
 
     def softness(self, ratio: float) -> str:

@@ -12,7 +12,7 @@ from fecm.mechanics.mesh import rigid_deflections
 from fecm.results.criteria import spelt
 from fecm.results.end import OPEN_ENDS, End
 from fecm.results.exposures import FEWEST, count_evaluations, largest_exposures
-from fecm.results.linear_plate import REMEDY, TOO_SOFT, UNSAFE
+from fecm.results.linear_plate import REMEDY, TOO_SOFT, unsafe
 from fecm.results.result import Result
 from fecm.results.validity import BENT, CROSSED, INDENTATION, SLOPE, STRAIN, Reason, joined
 from fecm.simulation import membrane, peaks
@@ -124,10 +124,12 @@ def _bent(simulation: Simulation, result: Result, peak: Peak) -> str:
     limits = simulation.problem.judge
     is_free = rigid_deflections(simulation.problem.mesh).size > 0
     what = "deflection, less its rigid motion," if is_free else "deflection"
-    size = _size(result, peak.value, limits.thickness)
+    h = limits.thickness
+    size = _size(result, peak.value, h)
     note = f"{_reached(result, what, size, peak)} {limits.limit} h {TOO_SOFT}"
     if simulation.problem.has_impact:
-        note = f"{note}: {limits.softness(peak.value / limits.thickness)}; {UNSAFE}"
+        error, meaning = limits.softness(peak.value / h), unsafe(curved=limits.curved)
+        note = f"{note}: {error}; {meaning}"
     return note if simulation.options.slips else f"{note}; {REMEDY}"
 
 

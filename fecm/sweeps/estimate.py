@@ -13,7 +13,7 @@ from fecm.api import sole_problem
 from fecm.deck.model import Deck
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.problem.problem import Problem
-from fecm.results.linear_plate import TOO_SOFT, UNSAFE
+from fecm.results.linear_plate import TOO_SOFT, unsafe
 from fecm.results.metrics import RATIO
 from fecm.results.validity import Judge
 from fecm.studies.estimate import Estimate as QuickEstimate
@@ -76,8 +76,8 @@ class Estimate:
         ``"infinite plate"``, ``"static plate"`` and ``"nonlinear static plate"``, as far as the
         plate has them, and the ``"run"``.
     remarks : dict of str to str
-        What models neglect, ``"damping"`` and ``"preload"``, and how good or why missing the
-        static model of a nonlinear plate is, ``"stretching"``.
+        What models neglect, ``"damping"``, ``"preload"`` and ``"curvature"``, and how good or why
+        missing the static model of a nonlinear plate is, ``"stretching"``.
     notes : tuple of str
         Reasons to doubt the numbers.
     units : dict of str to str
@@ -190,12 +190,17 @@ def estimate_problem(problem: Problem) -> Estimate:
     if not problem.plate.nonlinear:
         bent = [*_bent_statically(quick, problem.judge), *bent]
     if bent:
-        bent = [f"beyond {problem.judge.limit} h {TOO_SOFT}; {UNSAFE}", *bent]
+        bent = [
+            f"beyond {problem.judge.limit} h {TOO_SOFT}; {unsafe(curved=problem.judge.curved)}",
+            *bent,
+        ]
     remarks: dict[str, str] = {}
     if problem.damping:
         remarks["damping"] = "in the run only: the models without a mesh neglect DAMP"
     if problem.plate.is_preloaded:
         remarks["preload"] = "in the static plate and the run: the infinite plate neglects PREL"
+    if problem.plate.is_curved:
+        remarks["curvature"] = "in the static plate and the run: the infinite plate is flat"
     if quick.remark:
         remarks["stretching"] = quick.remark
     return Estimate(

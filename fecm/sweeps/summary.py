@@ -9,10 +9,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from fecm._typing import Bools
-from fecm.deck.model import Preload
+from fecm.deck.model import Curvature, Preload, Segment
 from fecm.deck.units import quantity
 from fecm.results.errors import ResultFileError
-from fecm.results.linear_plate import TOO_SOFT, UNSAFE, InPlane, softness
+from fecm.results.linear_plate import TOO_SOFT, InPlane, softness, unsafe
 from fecm.results.metrics import RATIO
 from fecm.results.validity import BENT, MEANING, counted
 from fecm.sweeps.case import pair
@@ -139,14 +139,15 @@ def remarks(result: StoredSweep) -> Iterator[str]:
         if np.isfinite(ratio).any():
             largest = float(np.nanmax(ratio))
             in_plane = InPlane.UNKNOWN if held else InPlane.FREE
-            error = softness(largest, in_plane, preloaded=_is_preloaded(result))
+            error = softness(largest, in_plane, preloaded=_has(result, Preload))
             size = f" (at w = {largest:.3g} h {error})"
-        yield f"beyond its range {TOO_SOFT}{size}; {UNSAFE}"
+        curved = _has(result, Curvature) or any(name in result for name in ("radius_x", "radius_y"))
+        yield f"beyond its range {TOO_SOFT}{size}; {unsafe(curved=curved)}"
 
 
-def _is_preloaded(result: StoredSweep) -> bool:
-    """Whether the deck has a PREL segment."""
+def _has(result: StoredSweep, kind: type[Segment]) -> bool:
+    """Whether the deck has a segment of one kind."""
     try:
-        return result.deck.has(Preload)
+        return result.deck.has(kind)
     except ResultFileError:  # of a damaged file
         return False
