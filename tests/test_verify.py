@@ -154,6 +154,7 @@ STATED = {
     "static-bending", "frequencies", "wave-fronts", "dispersion", "rod-pulse", "infinite-plate",
     "supported-plate", "patch-impact", "failure", "cured-failure", "small-mass", "large-mass",
     "contact-coefficient", "stretching-plate", "stretching-disc", "stretching-impact", "sandwich",
+    "curved-panel", "curved-impact",
 }  # fmt: skip
 
 
@@ -470,3 +471,25 @@ def test_figures_of_sensitivity_are_those_of_the_reference_file() -> None:
         for number, value in enumerate("xyz", start=1):
             expected = check_of("random-values", f"{kind} index of {value}").expected
             assert expected == pytest.approx(given[f"{letter}{number}"], rel=1e-9)
+
+
+def test_curved_panels_are_those_of_the_series() -> None:
+    panels = {(r["Rx"], r["Ry"]): r for r in reference("curved_panels.csv")}
+    flat, bent = panels["inf", "inf"], panels["inf", "1000.0"]
+    bent_along = panels["500.0", "inf"]
+    deflection = "W mm/N (static, disc c=4 in the middle)"
+    peak = "peak force N (mass 2e-5 t, 3000 mm/s, k 5e4 N/mm^1.5, first .8 ms)"
+    for quantity, row, column in (
+        ("w of R_y", bent, deflection), ("w of R_x", bent_along, deflection),
+        ("N_x", bent_along, "Nx"), ("N_y", bent_along, "Ny"),
+        ("M_x", bent_along, "Mx"), ("M_y", bent_along, "My"),
+        ("ω11", bent, "omega_11"), ("ω21", bent, "omega_21"), ("ω12", bent, "omega_12"),
+    ):  # fmt: skip
+        check = check_of("curved-panel", quantity)
+        assert check.expected == float(row[column])
+        # The flat plate is not within the tolerance.
+        assert abs(float(flat[column]) / check.expected - 1.0) > 5.0 * check.tolerance
+    assert check_of("curved-impact", "peak").expected == float(bent_along[peak])
+    assert check_of("curved-impact", "time").expected == float(bent_along["time of peak"])
+    later = {r["time"]: r for r in reference("curved_impact_Rx500_Ry0.csv")}["0.0002"]
+    assert check_of("curved-impact", "w under").expected == float(later["plate_W"])

@@ -11,6 +11,7 @@ import pytest
 from fecm.verification import CASES, carry_out, chosen
 from fecm.verification.case import Label
 from tests.broken import (
+    curved,
     elements,
     impacts,
     laminates,
@@ -27,6 +28,7 @@ BREAKS = {
     **impacts.BREAKS,
     **plies.BREAKS,
     **stretching.BREAKS,
+    **curved.BREAKS,
     **studies.BREAKS,
 }
 

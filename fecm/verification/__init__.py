@@ -9,6 +9,7 @@ from collections.abc import Iterable
 
 from fecm._errors import FecmError
 from fecm.verification import (  # noqa: F401  (they fill CASE_OF)
+    curved,
     damage,
     fields,
     impacts,

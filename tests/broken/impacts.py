@@ -40,7 +40,7 @@ BREAKS: Breaks = {
             "indentation": ("F(α_p)", "F at the peak", "F halfway down", "F back", "F halfway up",
                             "work", "ACR: F at the peak"),
             "rigid-target": ("deepest", "largest", "contact", "ACR"), "supported-plate": ("",),
-            "small-mass": ("largest force of",),
+            "curved-impact": ("peak", "time"), "small-mass": ("largest force of",),
         },
     ),
     "permanent indentation halved": (

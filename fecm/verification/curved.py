@@ -1,0 +1,74 @@
+"""Shallow curved panels against series: deflections, forces, frequencies and an impact."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from fecm.deck import model
+from fecm.deck.catalogue import MATERIALS
+from fecm.deck.grid import EDGES, Grid, refined, uniform
+from fecm.deck.model import Curvature, Impact, Macro, Patch, Projectile
+from fecm.results.result import Result
+from fecm.verification import decks
+from fecm.verification.case import Value, case
+from fecm.verification.impacts import peak
+
+SIDES = (300.0, 200.0)  # mm
+ELEMENT = 25.0  # side of an element that is not refined
+ANGLES = (0.0, 90.0, 0.0, 90.0, 0.0, 0.0, 90.0, 0.0, 90.0, 0.0)
+PATCH = Patch("DISC", 4.0, SIDES[0] / 2.0, SIDES[1] / 2.0, 1000.0)
+STATIC = decks.program("TANG FORM SOLV DISP STRE")
+
+
+def panel(
+    curvature: Curvature, grid: Grid, macros: Iterable[Macro], *others: model.Segment
+) -> Result:
+    """Run a simply supported panel (SS3) of IM7/8552 (mm, N, s)."""
+    ply = MATERIALS["IM7/8552"].converted("mm-N-s")
+    supports = grid.supported((0,) * 5, dict.fromkeys(EDGES, "simple"), in_plane="tangential")
+    segments = (supports, curvature, *others, decks.MITC, decks.material(ply, ANGLES, 0.2))
+    return decks.result_of(decks.deck(grid, segments, macros))
+
+
+def refined_grid(side: float) -> Grid:
+    """Build a grid with elements of this side where the force acts."""
+    return Grid(*(refined(a, round(a / ELEMENT), a / 2.0, 2.0, side) for a in SIDES))
+
+
+def middle(grid: Grid) -> int:
+    """Number of the node in the middle."""
+    return grid.nearest(SIDES[0] / 2.0, SIDES[1] / 2.0)[0]
+
+
+def pressed(curvature: Curvature, grid: Grid) -> tuple[Result, float]:
+    """Press the panel in its middle; its deflection is the mean over the patch per force."""
+    found = panel(curvature, grid, STATIC, PATCH)
+    w = found.tape3.w[0, found["patch/node"] - 1] @ found["patch/weight"]
+    return found, float(w) / PATCH.load
+
+
+@case
+def _curved_panel() -> Sequence[Value]:
+    """Static deflections, forces and moments in the middle, and frequencies."""
+    coarse, fine = refined_grid(4.0), refined_grid(2.0)
+    flatter = pressed(Curvature(radius_y=1000.0), coarse)[1]
+    found, deflection = pressed(Curvature(radius_x=500.0), fine)
+    at = found["mesh/elements"] == middle(fine)
+    resultants = [
+        field[0][at].mean() / PATCH.load
+        for field in decks.fields(found, "stresses", "N_x N_y M_x M_y")
+    ]
+    even = Grid(*(uniform(side, round(1.5 * side / ELEMENT)) for side in SIDES))
+    modes = panel(Curvature(radius_y=1000.0), even, decks.program("LMAS EIGE=4"))
+    omega = modes.modes.angular_frequency
+    return [flatter, deflection, *resultants, *omega[:3]]
+
+
+@case
+def _curved_impact() -> Sequence[Value]:
+    """A mass of 20 g at 3 m/s until 200 us."""
+    grid, patch = refined_grid(4.0), model.Patch("DISC", 4.0)
+    hit = (Projectile(0, 0, 2.0e-5), Impact(middle(grid), 3, 3000.0), decks.elastic(5.0e4))
+    macros = decks.impact_program(1.6e-7, 1250)
+    found = panel(Curvature(radius_x=500.0), grid, macros, patch, *hit)
+    return [*peak(found), found.plate_w[-1]]
