@@ -85,9 +85,9 @@ def in_laminate(**changes: Callable[[Any], Any]) -> Break:
 def in_stiffness(**changes: Callable[[Any], Any]) -> Break:
     """Change parts of the laminate that the elements' stiffness is made of, and nothing else."""
 
-    def broken(right: Any, family: Any, laminate: Any, rules: Any) -> Any:
+    def broken(right: Any, family: Any, laminate: Any, *others: Any) -> Any:
         other = {name: change(getattr(laminate, name)) for name, change in changes.items()}
-        return right(family, replace(laminate, **other), rules)
+        return right(family, replace(laminate, **other), *others)
 
     return instead(element_matrices, "stiffness", broken)
 

@@ -124,12 +124,13 @@ BREAKS: Breaks = {
     ),
     "a gage on the other face": (
         instead(points, "_functional",
-                lambda right, f, gage, t: right(f, replace(gage, z=-gage.z), t)),
+                lambda right, f, gage, *rest: right(f, replace(gage, z=-gage.z), *rest)),
         {"forced-plate": ("strain",)},
     ),
     "a gage turned the other way": (
         instead(points, "_functional",
-                lambda right, f, gage, t: right(f, replace(gage, direction=-gage.direction), t)),
+                lambda right, f, gage, *rest: right(
+                    f, replace(gage, direction=-gage.direction), *rest)),
         {"forced-plate": ("strain",)},
     ),
     "the exponent of PROP ignored": (
