@@ -27,6 +27,9 @@ if TYPE_CHECKING:
     from fecm.deck.model import Deck, Ply
     from fecm.deck.reader import read_deck
     from fecm.identification.identify import Identification, identify
+    from fecm.location.errors import LocateError
+    from fecm.location.locate import locate
+    from fecm.location.location import Location
     from fecm.mechanics.contact_law import ContactPoint, Law
     from fecm.mechanics.failure import Strengths
     from fecm.mechanics.own_criterion import CriterionError, FailureCriterion
@@ -65,6 +68,8 @@ __all__ = [
     "Law",
     "LawError",
     "LinearProjectile",
+    "LocateError",
+    "Location",
     "MeshError",
     "Plate",
     "Ply",
@@ -86,6 +91,7 @@ __all__ = [
     "impact",
     "load",
     "load_sweep",
+    "locate",
     "materials",
     "mesh_error",
     "pulse_test",
@@ -117,6 +123,8 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "Law": ("fecm.mechanics.contact_law", "Law"),
         "LawError": ("fecm.mechanics.own_law", "LawError"),
         "LinearProjectile": ("fecm.mechanics.own_projectile", "LinearProjectile"),
+        "LocateError": ("fecm.location.errors", "LocateError"),
+        "Location": ("fecm.location.location", "Location"),
         "MeshError": ("fecm.sweeps.mesh_error", "MeshError"),
         "Plate": ("fecm.authoring.plate", "Plate"),
         "Ply": ("fecm.deck.model", "Ply"),
@@ -136,6 +144,7 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "impact": ("fecm.authoring.impact", "impact"),
         "load": ("fecm.results.result", "load"),
         "load_sweep": ("fecm.sweeps.result_file", "load"),
+        "locate": ("fecm.location.locate", "locate"),
         "materials": ("fecm.deck.catalogue", "materials"),
         "mesh_error": ("fecm.sweeps.mesh_error", "mesh_error"),
         "pulse_test": ("fecm.studies.rod_test.study", "pulse_test"),

@@ -93,6 +93,14 @@ def _reduction(plate: PlateModel, images: tuple[Indices, Indices] | None) -> Sym
 
 def half_turn_images(coordinates: Floats) -> Indices | None:
     """Return the image of each node under the half turn about the centre; None if one has none."""
+    return images(coordinates, (-1.0, -1.0))
+
+
+def images(coordinates: Floats, flip: tuple[float, float]) -> Indices | None:
+    """Return the image of each node if x and y from the centre are multiplied by 1 or -1.
+
+    None if a node has no image, or an ambiguous one.
+    """
     if np.isnan(coordinates).any():
         return None
     low, high = coordinates.min(axis=0), coordinates.max(axis=0)
@@ -100,13 +108,13 @@ def half_turn_images(coordinates: Floats) -> Indices | None:
     centred = (coordinates - (low + high) / 2.0) / pitch
     # An uncommon offset keeps the positions away from the edges of the grid, of less than 2**31
     # cells in each direction.
-    cells = (np.floor(c + 1.0 / np.pi).astype(np.int64) for c in (centred, -centred))
+    cells = (np.floor(c + 1.0 / np.pi).astype(np.int64) for c in (centred, centred * flip))
     here, there = (x + 2**32 * y for x, y in (cell.T for cell in cells))
-    order, images = np.argsort(here, kind="stable"), np.argsort(there, kind="stable")
-    if not np.array_equal(here[order], there[images]):
+    order, turned = np.argsort(here, kind="stable"), np.argsort(there, kind="stable")
+    if not np.array_equal(here[order], there[turned]):
         return None
     partners = np.empty(len(coordinates), dtype=np.intp)
-    partners[images] = order
+    partners[turned] = order
     # The images of coincident nodes are ambiguous.
     return partners if np.array_equal(partners[partners], np.arange(len(partners))) else None
 

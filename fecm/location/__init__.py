@@ -1,0 +1,1 @@
+"""Place and force history of an impact from strain gages."""

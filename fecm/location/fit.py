@@ -1,0 +1,197 @@
+"""Least squares for the place and the history of a force that is nowhere negative."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fecm._errors import FecmError
+from fecm._frozen import frozen
+from fecm._typing import Bools, Floats
+from fecm.location.model import StrainModel
+from fecm.location.observation import triangular
+
+NEGLIGIBLE = 1e-9  # norm of a hat's strains over the largest, below which it is left out
+PASSES = 40  # of the Gauss-Newton iteration
+HALVINGS = 8  # of a step that does not lower the misfit
+SETTLED = 1e-4  # change of the place, in standard errors, that ends the iteration
+STEP = 0.02  # of central differences, over the side of an element
+SINGULAR = 1e-12  # least singular value of the scaled Jacobian
+
+
+class Trial(NamedTuple):
+    """Force at a place, and its misfit."""
+
+    x: float
+    y: float
+    shift: float
+    gains: Floats  # (gages,)
+    force: Floats  # (hats,)
+    design: Floats  # (gages, rows, hats), without gains
+    residual: Floats  # (gages, rows)
+    square: float  # sum of the squares of the residual
+
+    @property
+    def active(self) -> Bools:
+        """Hats that the force has, (hats,)."""
+        return np.asarray(self.force > 0.0)
+
+    @property
+    def basis(self) -> Floats:
+        """Strains per coefficient of the force, with gains, (values, hats)."""
+        return (self.gains[:, None, None] * self.design).reshape(-1, self.design.shape[2])
+
+
+class Errors(NamedTuple):
+    """Standard errors of a fit."""
+
+    place: Floats  # (2, 2): covariance of x and y
+    shift: float
+    gains: Floats  # (gages,)
+    # (hats,): of the force; of a hat that it has not, those with this hat added.
+    force: Floats
+
+
+@frozen
+class Fit:
+    """Least squares of a model, and what is fitted besides place and force."""
+
+    model: StrainModel
+    side: float  # of an element
+    shift: bool = False
+    gains: bool = False
+
+    def at(self, x: float, y: float, shift: float = 0.0, gains: Floats | None = None) -> Trial:
+        """Best force at a place.
+
+        Raises PatchError or OutsideError if the force is not on the plate.
+        """
+        seen = self.model.observation
+        own = np.ones(len(seen.values)) if gains is None else gains
+        design = self.model.design(x, y, shift)
+        basis = (own[:, None, None] * design).reshape(-1, design.shape[2])
+        force = non_negative(basis, seen.values.ravel())
+        residual = seen.values - own[:, None] * (design @ force)
+        square = float((residual**2).sum() + seen.left.sum())
+        return Trial(x, y, shift, own, force, design, residual, square)
+
+    def parameters(self, trial: Trial) -> int:
+        """Number of fitted parameters."""
+        return self._others(trial) + int(trial.active.sum())
+
+    def _others(self, trial: Trial) -> int:
+        """Number of fitted parameters besides the force."""
+        return 2 + self.shift + self.gains * (len(trial.gains) - 1)
+
+    def jacobian(self, trial: Trial) -> Floats:
+        """Strains per x, y, shift, gains, as far as they are fitted, and active hat.
+
+        (values, parameters); the gains change without their product.
+        """
+        x, y, shift = trial.x, trial.y, trial.shift
+        h, t = STEP * self.side, 0.5 * self.model.observation.interval
+
+        def slope(size: float, *ends: tuple[float, float, float]) -> Floats:
+            up, down = (self.model.design(*end) @ trial.force for end in ends)
+            return trial.gains[:, None] * (up - down) / (2.0 * size)
+
+        columns = [
+            slope(h, (x + h, y, shift), (x - h, y, shift)),
+            slope(h, (x, y + h, shift), (x, y - h, shift)),
+        ]
+        if self.shift:
+            columns.append(slope(t, (x, y, shift + t), (x, y, shift - t)))
+        if self.gains:
+            own = trial.gains[:, None] * (trial.design @ trial.force)
+            columns += [turn[:, None] * own for turn in ratios(len(own))]
+        others = np.stack([column.ravel() for column in columns], axis=1)
+        return np.hstack([others, trial.basis[:, trial.active]])
+
+    def refined(self, start: Trial, box: Floats) -> Trial:
+        """Gauss-Newton iteration from a trial; the place stays in a box, lowest and highest."""
+        best = start
+        for _ in range(PASSES):
+            try:
+                jacobian = self.jacobian(best)
+            except FecmError:  # at an edge of the plate there are no differences
+                break
+            size = scales(jacobian)
+            both = triangular(np.column_stack([jacobian / size, best.residual.ravel()]))
+            change = np.linalg.lstsq(both[:, :-1], both[:, -1], 1e-10)[0] / size
+            found = self._lower(best, change[: self._others(best)], box)
+            if found is None:
+                break
+            gain, best = best.square - found.square, found
+            if gain <= SETTLED**2 * best.square / best.residual.size:
+                break
+        return best
+
+    def _lower(self, best: Trial, change: Floats, box: Floats) -> Trial | None:
+        """A trial with a smaller misfit along a change; None if there is none."""
+        for halving in range(HALVINGS):
+            part = 0.5**halving
+            x, y = np.clip(np.array([best.x, best.y]) + part * change[:2], *box).tolist()
+            shift, gains = best.shift, best.gains
+            if self.shift:
+                most = self.model.basis
+                shift += float(np.clip(part * change[2], -most, most))
+            if self.gains:
+                turns = ratios(len(gains))
+                gains = gains * np.exp(part * (change[-len(turns) :] @ turns))
+            try:
+                found = self.at(x, y, shift, gains)
+            except FecmError:  # off the plate
+                continue
+            if found.square < best.square:
+                return found
+        return None
+
+    def errors(self, trial: Trial, noise: float) -> Errors:
+        """Standard errors by the Cramer-Rao bound, with a standard deviation of the strains."""
+        jacobian = self.jacobian(trial)
+        idle = trial.basis[:, ~trial.active]
+        size = scales(jacobian)
+        factor = triangular(np.hstack([jacobian / size, idle]))
+        count, others = jacobian.shape[1], self._others(trial)
+        left, singular, right = np.linalg.svd(factor[:, :count], full_matrices=False)
+        root = right.T / np.maximum(singular, SINGULAR * singular[0]) / size[:, None]
+        covariance = noise**2 * root @ root.T
+        force = np.empty(len(trial.force))
+        force[trial.active] = np.sqrt(np.diagonal(covariance)[others:])
+        rest = factor[:, count:] - left @ (left.T @ factor[:, count:])
+        least = SINGULAR * float(scales(trial.basis).max())
+        force[~trial.active] = noise / np.maximum(np.linalg.norm(rest, axis=0), least)
+        gains = np.zeros(len(trial.gains))
+        if self.gains:
+            turns = ratios(len(gains))
+            block = covariance[others - len(turns) : others, others - len(turns) : others]
+            gains = trial.gains * np.sqrt(np.diagonal(turns.T @ block @ turns))
+        shift = float(np.sqrt(covariance[2, 2])) if self.shift else 0.0
+        return Errors(covariance[:2, :2], shift, gains, force)
+
+
+def scales(matrix: Floats) -> Floats:
+    """Norms of columns, 1 of those that are 0."""
+    size = np.linalg.norm(matrix, axis=0)
+    return np.where(size > 0.0, size, 1.0)
+
+
+def non_negative(matrix: Floats, values: Floats) -> Floats:
+    """Least squares with coefficients that are not negative, (columns,)."""
+    from scipy.optimize import nnls  # takes 0.2 s to import
+
+    size = np.linalg.norm(matrix, axis=0)
+    kept = size > NEGLIGIBLE * size.max(initial=0.0)
+    found = np.zeros(matrix.shape[1])
+    if kept.any():
+        # The triangular factor has the same solution, and few rows.
+        both = triangular(np.column_stack([matrix[:, kept] / size[kept], values]))
+        found[kept] = nnls(both[:, :-1], both[:, -1], maxiter=30 * both.shape[1])[0] / size[kept]
+    return found
+
+
+def ratios(gages: int) -> Floats:
+    """Orthonormal changes of the logarithms of gains that keep their sum, (gages - 1, gages)."""
+    rows = np.tri(gages - 1, gages) - np.diag(np.arange(1.0, gages), 1)[: gages - 1]
+    return rows / np.linalg.norm(rows, axis=1, keepdims=True)

@@ -1,0 +1,245 @@
+"""The place and the force of an impact, as strain gages show them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Bools, Floats
+from fecm.deck.model import Deck
+from fecm.deck.units import unit_names, unit_of
+from fecm.results.errors import NotStoredError
+from fecm.results.pictures import plot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+# Physical dimensions of the attributes; those of pure numbers are not here.
+DIMENSIONS = {
+    **dict.fromkeys(("x", "y", "sd_x", "sd_y", "candidates", "gage_places"), "length"),
+    "covariance": "length^2",
+    **dict.fromkeys(("force", "force_sd", "peak_force"), "force"),
+    **dict.fromkeys(("time", "time_of_peak", "contact_end", "determined_until"), "time"),
+    **dict.fromkeys(("strain_time", "shift", "sd_shift"), "time"),
+    "impulse": "force*time",
+    "energy_bound": "force*length",
+    "mass": "force*time^2/length",
+}
+POINTS = 181  # of an ellipse
+
+
+class Candidate(NamedTuple):
+    """A place, and its misfit over that of the place found."""
+
+    x: float
+    y: float
+    ratio: float
+
+
+@dataclass(frozen=True, eq=False)
+class Location:
+    """Place and force history of an impact, located from strain gages.
+
+    Standard deviations are those of independent errors of the strains with the standard deviation
+    `noise` (Cramér-Rao bound); errors of the model come in addition.
+
+    Attributes
+    ----------
+    x, y : float
+        Place of the impact.
+    covariance : ndarray (2, 2)
+        Covariance of x and y.
+    time, force, force_sd : ndarray (hats,)
+        Times of the peaks of the force's hats, force then, and its standard deviation.  The force
+        is linear between these times and 0 one interval before the first.
+    determined : ndarray (hats,) of bool
+        Whether the strains determine the force then.
+    determined_until : float
+        Last time at which they do.
+    peak_force, time_of_peak : float
+        Largest force among the determined ones, and its time.
+    contact_end : float or None
+        Time after the peak from which on the force stays below three standard deviations; None if
+        it does not.
+    impulse : float
+        Time integral of the force until the end of the contact, or as far as it is determined.
+    mass : float or None
+        Mass of the projectile, if given.
+    candidates : ndarray (k, 2)
+        Places that were tried first.
+    candidate_misfit : ndarray (k,)
+        Their misfits over that of the place found.
+    second : Candidate or None
+        The second-best place, away from the first; None if no other candidate is a minimum.
+    noise : float
+        Standard deviation of a strain: the given one, or that of the residual.
+    noise_given : bool
+        Whether it was given.
+    misfit : float
+        Standard deviation of the residual over `noise`; 1 if this is that of the residual.
+    gages : ndarray (gages,)
+        Numbers of the gages.
+    gage_places : ndarray (gages, 2)
+        Their places.
+    strain_time : ndarray (points,)
+        Times of the measured strains.
+    strains, fitted : ndarray (gages, points)
+        Measured and fitted strains.
+    shift, sd_shift : float
+        Time at which the force may begin, and its standard deviation if it was fitted.
+    gains, sd_gains : ndarray (gages,)
+        Fitted gains of the gages over their geometric mean; 1 and 0 if they were not.
+    notes : tuple of str
+        Reasons to doubt the place or the force.
+    accepted : bool
+        Whether the strains determine the place, and the model describes the strains.
+    deck : Deck
+        The deck of the plate.
+    """
+
+    x: float
+    y: float
+    covariance: Floats
+    time: Floats
+    force: Floats
+    force_sd: Floats
+    determined: Bools
+    determined_until: float
+    peak_force: float
+    time_of_peak: float
+    contact_end: float | None
+    impulse: float
+    mass: float | None
+    candidates: Floats
+    candidate_misfit: Floats
+    second: Candidate | None
+    noise: float
+    noise_given: bool
+    misfit: float
+    gages: NDArray[np.int32]
+    gage_places: Floats
+    strain_time: Floats
+    strains: Floats
+    fitted: Floats
+    shift: float
+    sd_shift: float
+    gains: Floats
+    sd_gains: Floats
+    notes: tuple[str, ...]
+    accepted: bool
+    deck: Deck = field(repr=False)
+
+    @property
+    def sd_x(self) -> float:
+        """Standard deviation of x."""
+        return math.sqrt(self.covariance[0, 0])
+
+    @property
+    def sd_y(self) -> float:
+        """Standard deviation of y."""
+        return math.sqrt(self.covariance[1, 1])
+
+    @property
+    def correlation(self) -> float:
+        """Correlation of x and y."""
+        size = self.sd_x * self.sd_y
+        return float(self.covariance[0, 1] / size) if size else 0.0
+
+    @property
+    def energy_bound(self) -> float | None:
+        """Energy of a projectile of `mass` that the impulse I just stops, I^2/2m; None without it.
+
+        A projectile that rebounds had less energy, one that moves on had more.
+        """
+        return None if self.mass is None else self.impulse**2 / (2.0 * self.mass)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Names of the units of length, force and time; empty if the deck names none."""
+        return unit_names(self.deck)
+
+    def unit(self, name: str) -> str:
+        """Unit of an attribute; empty for a pure number, or if the deck names no units.
+
+        Raises
+        ------
+        NotStoredError
+            If there is no such attribute; a KeyError.
+        """
+        if name not in DIMENSIONS and not hasattr(self, name):
+            raise NotStoredError(f"a location has no {name}")
+        return unit_of(DIMENSIONS.get(name, ""), self.units)
+
+    def ellipse(self, level: float = 0.95) -> Floats:
+        """Closed polygon around the confidence region of the place, (points, 2).
+
+        Parameters
+        ----------
+        level : float
+            Probability, between 0 and 1, that the region contains the place.
+
+        Raises
+        ------
+        ValueError
+            If `level` is not between 0 and 1.
+        """
+        if not 0.0 < level < 1.0:
+            raise ValueError(f"level is {level:g}; it must be between 0 and 1")
+        squares, axes = np.linalg.eigh(self.covariance)
+        # The square of the distance in standard deviations is exponential with the mean 2.
+        reach = np.sqrt(-2.0 * math.log1p(-level) * np.maximum(squares, 0.0))
+        angles = np.linspace(0.0, 2.0 * np.pi, POINTS)
+        circle = np.column_stack([np.cos(angles), np.sin(angles)])
+        return np.asarray([self.x, self.y] + (circle * reach) @ axes.T)
+
+    def plot(self, path: str | Path | None = None, *, overwrite: bool = False) -> Axes:
+        """Draw the map of the misfit, the force, and measured and fitted strains.
+
+        Parameters
+        ----------
+        path : str or Path, optional
+            Picture to write: ``.png``, ``.svg`` or ``.pdf``.
+        overwrite : bool
+            Replace an existing file.
+
+        Returns
+        -------
+        matplotlib.axes.Axes
+            The map.
+
+        Raises
+        ------
+        PlotError
+            If the name has another suffix.
+        FileExistsError
+            If the file exists and may not be replaced.
+        ImportError
+            If matplotlib is not installed.
+        """
+        return plot("location", {"the impact": self}, path, None, overwrite=overwrite)
+
+    def save(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write a file as ``fecm locate -o`` does, which :func:`fecm.load_location` reads.
+
+        Parameters
+        ----------
+        path : str or Path
+            HDF5 file to write.
+        overwrite : bool
+            Replace an existing file.
+
+        Raises
+        ------
+        FileExistsError
+            If the file exists and may not be replaced.
+        ResultWriteError
+            If it can't be written.
+        """
+        from fecm.location.file import save  # h5py takes 60 ms to import
+
+        save(self, Path(path), overwrite=overwrite)
