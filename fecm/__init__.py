@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from fecm.deck.reader import read_deck
     from fecm.identification.identify import Identification, identify
     from fecm.location.errors import LocateError
+    from fecm.location.file import load as load_location
     from fecm.location.locate import locate
     from fecm.location.location import Location
     from fecm.mechanics.contact_law import ContactPoint, Law
@@ -90,6 +91,7 @@ __all__ = [
     "identify",
     "impact",
     "load",
+    "load_location",
     "load_sweep",
     "locate",
     "materials",
@@ -143,6 +145,7 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "identify": ("fecm.identification.identify", "identify"),
         "impact": ("fecm.authoring.impact", "impact"),
         "load": ("fecm.results.result", "load"),
+        "load_location": ("fecm.location.file", "load"),
         "load_sweep": ("fecm.sweeps.result_file", "load"),
         "locate": ("fecm.location.locate", "locate"),
         "materials": ("fecm.deck.catalogue", "materials"),

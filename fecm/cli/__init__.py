@@ -43,6 +43,7 @@ COMMANDS = {
     "identify": LazyCommand("fecm.cli.identify", "Fit parameters to a measured contact force."),
     "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),
     "info": LazyCommand("fecm.cli.info", "Describe the contents of RESULT.", True),
+    "locate": LazyCommand("fecm.cli.locate", "Find place and force of an impact by strain gages."),
     "materials": LazyCommand(
         "fecm.cli.materials", "List the named plies of `fecm new`, or of a file."
     ),

@@ -25,9 +25,9 @@ from fecm.results.result import result_of
 from fecm.results.schema import Form
 from fecm.results.summary import about_run
 
-# Attributes of the file that are keys of the JSON output, of runs and of sweeps.
+# Attributes of the file that are keys of the JSON output, of runs and of others.
 RUN_KEYS = ("title", "mode", "slips", "fecm_version", "format", "format_version")
-SWEEP_KEYS = ("title", "fecm_version", "format", "format_version")
+OTHER_KEYS = ("title", "fecm_version", "format", "format_version")
 
 # Attributes of the file with lines of their own.
 HEADING = (*RUN_KEYS, "unit_length", "unit_force", "unit_time", "notes")
@@ -77,8 +77,8 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
 @FORMAT_OPTION
 @reads("result")
 def info(result: Path, form: Format) -> None:
-    """Describe units, summary and every dataset of RESULT, of a run or of a sweep."""
-    contents = read(result, Form.RUN, Form.SWEEP)
+    """Describe units, summary and every dataset of RESULT, of a run, a sweep or a location."""
+    contents = read(result, *Form)
     with contents.held():
         about = _about(contents)
     if form is Format.JSON:
@@ -89,17 +89,14 @@ def info(result: Path, form: Format) -> None:
 
 def _about(contents: Contents) -> dict[str, Any]:
     """What is shown, under the keys of the JSON output."""
-    is_sweep = contents.form == Form.SWEEP
-    if is_sweep:
-        # 48 ms, which the result of a run does not need.
-        from fecm.sweeps.random_tables import tables
-        from fecm.sweeps.result_file import sweep_of
-        from fecm.sweeps.summary import summary
+    if contents.form == Form.SWEEP:
+        extent = _about_sweep(contents)
+    elif contents.form == Form.LOCATION:
+        # 12 ms, which the result of a run does not need.
+        from fecm.location.file import location_of
+        from fecm.location.summary import lines as lines_of
 
-        sweep = sweep_of(contents, history=False)
-        random = [] if sweep.random is None else tables(sweep.random, sweep.unit)
-        failed = len(sweep) - int(sweep.completed.sum())
-        extent = {"cases": len(sweep), "failed": failed, "summary": [*summary(sweep), *random]}
+        extent = {"summary": lines_of(location_of(contents))}
     else:
         extent = about_run(result_of(contents))
     if extent.get("still_in_contact") and PERMANENT in contents.groups["history"]:
@@ -108,7 +105,10 @@ def _about(contents: Contents) -> dict[str, Any]:
     return {
         "file": printable(str(contents.path)),
         "size": contents.path.stat().st_size,
-        **{name: attributes.get(name) for name in (SWEEP_KEYS if is_sweep else RUN_KEYS)},
+        **{
+            name: attributes.get(name)
+            for name in (RUN_KEYS if contents.form == Form.RUN else OTHER_KEYS)
+        },
         "units": declared_units(attributes),
         **extent,
         "attributes": {n: value for n, value in attributes.items() if n not in HEADING},
@@ -118,18 +118,33 @@ def _about(contents: Contents) -> dict[str, Any]:
     }
 
 
+def _about_sweep(contents: Contents) -> dict[str, Any]:
+    """Number of cases, and the summary."""
+    # 48 ms, which the result of a run does not need.
+    from fecm.sweeps.random_tables import tables
+    from fecm.sweeps.result_file import sweep_of
+    from fecm.sweeps.summary import summary
+
+    sweep = sweep_of(contents, history=False)
+    random = [] if sweep.random is None else tables(sweep.random, sweep.unit)
+    failed = len(sweep) - int(sweep.completed.sum())
+    return {"cases": len(sweep), "failed": failed, "summary": [*summary(sweep), *random]}
+
+
 def _page(about: Mapping[str, Any]) -> list[str]:
     """Lines of the text output."""
     rows = [("file", f"{about['file']}, {about['size']} bytes")]
-    if "cases" in about:
-        extent = ("cases", f"{about['cases']}, {about['failed'] or 'none'} failed")
-    else:
+    if about["format"] == Form.SWEEP:
+        extent = [("cases", f"{about['cases']}, {about['failed'] or 'none'} failed")]
+    elif about["format"] == Form.RUN:
         slips = about["slips"] if isinstance(about["slips"], list) else []
         mode, span = about["mode"], about["time"]
         rows.append(("mode", "unknown" if mode is None else mode))
         rows.append(("slips", ", ".join(map(str, slips)) or "none"))
         times = f", time {span[0]:.6g} to {span[1]:.6g}" if span else ""
-        extent = ("steps", f"{about['steps']}{times}")
+        extent = [("steps", f"{about['steps']}{times}")]
+    else:
+        extent = []
     version = about["fecm_version"]
     units = ", ".join(f"{name} {unit}" for name, unit in about["units"].items())
     rows += [
@@ -139,7 +154,7 @@ def _page(about: Mapping[str, Any]) -> list[str]:
             f"format version {about['format_version']}",
         ),
         ("units", units or "the deck names none"),
-        extent,
+        *extent,
         *(("note", text) for text in about.get("notes", ())),
         *((name, shown(value)) for name, value in about["attributes"].items()),
     ]

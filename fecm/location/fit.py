@@ -194,4 +194,4 @@ def non_negative(matrix: Floats, values: Floats) -> Floats:
 def ratios(gages: int) -> Floats:
     """Orthonormal changes of the logarithms of gains that keep their sum, (gages - 1, gages)."""
     rows = np.tri(gages - 1, gages) - np.diag(np.arange(1.0, gages), 1)[: gages - 1]
-    return rows / np.linalg.norm(rows, axis=1, keepdims=True)
+    return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))

@@ -131,7 +131,7 @@ def locate(
     box = None if region is None else tuple(map(float, region))
     if box is not None and len(box) != 4:
         raise StudyError(f"region has {len(box)} numbers; it takes x0, y0, x1, y1")
-    options = Options(box, grid, basis, noise, shift, gains, mass)  # type: ignore[arg-type]
+    options = Options(box, grid, basis, noise, shift, gains, mass)
     found = located(problem_of(deck), strains, options)
     for text in found.notes:
         warn(text)
@@ -169,7 +169,7 @@ class Timing(NamedTuple):
     basis: float  # between two hats
     interval: float  # between two samples
     width: int  # samples between two hats
-    count: int  # samples
+    samples: int
     hats: int
 
 
@@ -217,7 +217,7 @@ def _prepared(problem: Problem, table: StrainTable, options: Options) -> tuple[F
     footprint = _footprint(problem)
     region = Region.of(problem.mesh, footprint.radius, options.region)
     shared = _shared(problem.deck, tuple(table.gages.tolist()), own[2:5], region)
-    seen = observe(table.time - own.origin, table.strains, own.interval, own.count)
+    seen = observe(table.time - own.origin, table.strains, own.interval, own.samples)
     strain_model = StrainModel(footprint, seen, *shared, own.width, own.hats)
     side = float(np.median(longest_sides(problem.mesh.elements, problem.mesh.coordinates)))
     return Fit(strain_model, side, options.shift, options.gains), region
@@ -292,13 +292,15 @@ def _location(
     cards = {card.number: card for card in problem.deck.require(Gages).records}
     places = [(cards[number].x, cards[number].y) for number in table.gages.tolist()]
     samples = fit.model.strains(found.x, found.y, found.shift, found.force)
-    fitted_strains = samples @ interpolation((table.time - own.origin) / own.interval, own.count).T
+    fitted_strains = (
+        samples @ interpolation((table.time - own.origin) / own.interval, own.samples).T
+    )
     made = Location(
         x=found.x,
         y=found.y,
         covariance=errors.place,
         time=knots,
-        force=found.force,
+        force=np.where(force.determined, found.force, 0.0),
         force_sd=errors.force,
         determined=force.determined,
         determined_until=force.determined_until,

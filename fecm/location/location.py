@@ -58,7 +58,8 @@ class Location:
         Times of the peaks of the force's hats, force then, and its standard deviation.  The force
         is linear between these times and 0 one interval before the first.
     determined : ndarray (hats,) of bool
-        Whether the strains determine the force then.
+        Whether the strains determine the force then; `force` is 0 where they do not, as it has
+        hardly reached a gage at the end of the record.
     determined_until : float
         Last time at which they do.
     peak_force, time_of_peak : float

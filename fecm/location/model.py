@@ -34,7 +34,7 @@ class Footprint:
             made = patch_weights(self.mesh, self.shape, self.radius, x, y)
         else:
             made = point_weights(self.mesh, x, y)
-        return np.where(self.held, 0.0, made)
+        return np.asarray(np.where(self.held, 0.0, made))
 
 
 def point_weights(mesh: Mesh, x: float, y: float) -> Floats:
@@ -94,11 +94,12 @@ class StrainModel:
         rows = self._kept[loaded]
         if (rows < 0).any():
             raise OutsideError(f"({x:g}, {y:g}) is outside the region")
-        found = np.einsum("n,gns->gs", weights[loaded], self.responses[:, rows], dtype=float)
+        near = self.responses[:, rows].astype(np.float64)
+        found: Floats = np.einsum("n,gns->gs", weights[loaded], near)
         if shift:
             places = np.arange(found.shape[1]) - shift / self.observation.interval
             found = found @ interpolation(places, found.shape[1]).T
-        return np.asarray(found)
+        return found
 
     def hats_from(self, first: Floats) -> Floats:
         """Samples of the strains of every hat, (gages, hats, samples)."""
@@ -118,4 +119,4 @@ class StrainModel:
     def strains(self, x: float, y: float, shift: float, force: Floats) -> Floats:
         """Samples of the strains of a force, (gages, samples)."""
         every = self.hats_from(self.first_hat(x, y, shift))
-        return np.einsum("h,ghs->gs", force, every)
+        return np.asarray(np.einsum("h,ghs->gs", force, every))

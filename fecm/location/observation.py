@@ -79,5 +79,6 @@ def triangular(matrix: Floats) -> Floats:
     factor = np.zeros((0, matrix.shape[1]))
     step = max(BLOCK, matrix.shape[1])
     for start in range(0, len(matrix), step):
-        factor = np.linalg.qr(np.vstack([factor, matrix[start : start + step]]), mode="r")
+        part = np.vstack([factor, matrix[start : start + step]])
+        factor = np.asarray(np.linalg.qr(part, mode="r"))
     return factor

@@ -101,6 +101,24 @@ class Found(NamedTuple):
     misfit: Floats
 
 
+@frozen
+class Scan:
+    """Misfits of the best forces at candidates."""
+
+    x: Floats  # (columns,)
+    y: Floats  # (rows,)
+    shift: float
+    squares: Floats  # (columns, rows): sums of the squares; infinite off the plate
+
+    def minima(self) -> list[tuple[float, float]]:
+        """Candidates that no neighbour is better than, the best first."""
+        around = np.pad(self.squares, 1, constant_values=math.inf)
+        windows = np.lib.stride_tricks.sliding_window_view(around, (3, 3))
+        least = (self.squares <= windows.min(axis=(2, 3))) & np.isfinite(self.squares)
+        places = np.argwhere(least)[np.argsort(self.squares[least], kind="stable")]
+        return [(float(self.x[i]), float(self.y[j])) for i, j in places]
+
+
 def best_fits(fit: Fit, region: Region, pitch: float | None) -> Found:
     """Find the minima of the misfit.
 
@@ -109,55 +127,40 @@ def best_fits(fit: Fit, region: Region, pitch: float | None) -> Found:
     x, y = region.grid(pitch)
     box = np.array([region.low, region.high])
     begin = _beginning(fit, x, y, box) if fit.shift else 0.0
-    trials = _scan(fit, x, y, begin)
-    starts = _minima(trials)[:STARTS]
-    # Minima that are far above the best one are no rivals, but the second may be asked for.
+    scan = _scanned(fit, x, y, begin)
+    starts = [fit.at(*place, begin) for place in scan.minima()[:STARTS]]
     refined = sorted((fit.refined(start, box) for start in starts), key=lambda one: one.square)
     best = refined[0]
-    tried = [one for one in trials.flat if one is not None]
     apart = APART * float(np.hypot(region.size[0] / len(x), region.size[1] / len(y)))
     others = [r for r in refined if math.hypot(r.x - best.x, r.y - best.y) > apart]
-    tiny = np.finfo(float).tiny
-
-    def ratio(one: Trial) -> float:
-        return math.sqrt(one.square / max(best.square, tiny))
-
+    least = max(best.square, np.finfo(float).tiny)
+    there = np.isfinite(scan.squares)
     return Found(
         best,
-        Candidate(others[0].x, others[0].y, ratio(others[0])) if others else None,
-        np.array([(one.x, one.y) for one in tried]),
-        np.array([ratio(one) for one in tried]),
+        Candidate(others[0].x, others[0].y, math.sqrt(others[0].square / least))
+        if others
+        else None,
+        np.column_stack([x[np.nonzero(there)[0]], y[np.nonzero(there)[1]]]),
+        np.sqrt(scan.squares[there] / least),
     )
 
 
-def _scan(
-    fit: Fit, x: Floats, y: Floats, shift: float
-) -> np.ndarray[tuple[int, ...], np.dtype[np.object_]]:
-    """Best forces at the candidates, (columns, rows); None off the plate."""
-    trials = np.full((len(x), len(y)), None, dtype=object)
-    for i, j in np.ndindex(trials.shape):
+def _scanned(fit: Fit, x: Floats, y: Floats, shift: float) -> Scan:
+    """Misfits at the candidates of columns x and rows y."""
+    squares, pushed = np.full((len(x), len(y)), math.inf), False
+    for i, j in np.ndindex(squares.shape):
         try:
-            trials[i, j] = fit.at(float(x[i]), float(y[j]), shift)
+            trial = fit.at(float(x[i]), float(y[j]), shift)
         except FecmError:  # a hole or a notch
             continue
-    if not any(one is not None and one.active.any() for one in trials.flat):
+        squares[i, j] = trial.square
+        pushed = pushed or bool(trial.active.any())
+    if not pushed:
         raise LocateError(
-            "no force on the region explains the strains: check signs, times and region"
+            "no force in the region explains the strains; check the signs of the gages, the times "
+            "and the region"
         )
-    return trials
-
-
-def _minima(trials: np.ndarray[tuple[int, ...], np.dtype[np.object_]]) -> list[Trial]:
-    """Candidates that no neighbour is better than, the best first."""
-    squares = np.full((trials.shape[0] + 2, trials.shape[1] + 2), math.inf)
-    for (i, j), one in np.ndenumerate(trials):
-        squares[i + 1, j + 1] = math.inf if one is None else one.square
-    found = [
-        one
-        for (i, j), one in np.ndenumerate(trials)
-        if one is not None and one.square <= squares[i : i + 3, j : j + 3].min()
-    ]
-    return sorted(found, key=lambda one: one.square)
+    return Scan(x, y, shift, squares)
 
 
 def _beginning(fit: Fit, x: Floats, y: Floats, box: Floats) -> float:
@@ -166,10 +169,10 @@ def _beginning(fit: Fit, x: Floats, y: Floats, box: Floats) -> float:
     A force that may act much earlier fits as well as one that begins with its first hat.  The last
     of the beginnings that describe the strains is that of the force.
     """
-    seen = fit.model.observation
-    record = seen.interval * (fit.model.responses.shape[2] - 1)
-    trials = _scan(fit, x, y, -BEFORE / (1.0 + BEFORE) * record)
-    early = replace(fit, shift=False).refined(_minima(trials)[0], box)
+    record = fit.model.observation.interval * (fit.model.responses.shape[2] - 1)
+    earliest = -BEFORE / (1.0 + BEFORE) * record
+    (place, *_) = _scanned(fit, x, y, earliest).minima()
+    early = replace(fit, shift=False).refined(fit.at(*place, earliest), box)
     first = int(np.argmax(early.force > ONSET * early.force.max()))
     rough = float(fit.model.knots(early.shift)[first]) - fit.model.basis
     begins = rough + fit.model.basis * np.linspace(-2.0, 2.0, BEGINNINGS)

@@ -35,6 +35,7 @@ from fecm.results.tapes import SHEARS, TAPES, TapeText, W, read_tapes
 SOURCE_NAMES: dict[str, str] = {
     Form.RUN: "the result of a run",
     Form.SWEEP: "the result of a sweep",
+    Form.LOCATION: "the result of a location",
     TAPES: "a folder of tapes",
 }
 # Datasets that tapes hold.
@@ -51,7 +52,7 @@ class IncomparableError(FecmError, ValueError):
 
 @runtime_checkable
 class Savable(Protocol):
-    """The result of a run or of a sweep."""
+    """The result of a run, a sweep or a location."""
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write it as a file."""
@@ -79,8 +80,8 @@ def diff(
 
     Parameters
     ----------
-    a, b : str, Path, Result or SweepResult
-        Result files, folders of tapes, or results; both of runs, or both of sweeps.
+    a, b : str, Path, Result, SweepResult or Location
+        Result files, folders of tapes, or results; both of runs, of sweeps, or of locations.
     rtol, atol : float, optional
         Relative tolerance, and absolute tolerance in the dataset's unit.
     only, exclude : str or sequence of str
@@ -123,7 +124,7 @@ def diff(
     with contextlib.ExitStack() as stack:
         left, right = (_source(one, stack) for one in (a, b))
         forms = left.form, right.form
-        if left.form != right.form and Form.SWEEP in forms:
+        if left.form != right.form and {Form.SWEEP, Form.LOCATION} & {*forms}:
             names = " and B ".join(SOURCE_NAMES[form] for form in forms)
             raise IncomparableError(f"A is {names}: they can't be compared")
         left, right = _fitted(left, right), _fitted(right, left)
@@ -223,9 +224,9 @@ def _source(one: Compared, stack: contextlib.ExitStack) -> Source:
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="fecm-"))
         path = Path(folder) / "result.h5"
         one.save(path)
-        return read(path, Form.RUN, Form.SWEEP)
+        return read(path, *Form)
     path = Path(one)
-    return read_tapes(path) if path.is_dir() else read(path, Form.RUN, Form.SWEEP)
+    return read_tapes(path) if path.is_dir() else read(path, *Form)
 
 
 def _name(one: Compared) -> str:

@@ -1,4 +1,4 @@
-"""Reads result files of runs and sweeps: untrusted HDF5.
+"""Reads result files of runs, sweeps and locations: untrusted HDF5.
 
 :func:`read` lists the contents of a file; numbers are read on demand.  Links, virtual datasets and
 external storage, through which HDF5 would read other files, are refused before any dataset is read.
@@ -30,6 +30,7 @@ COORDINATES = "mesh/coordinates"
 RESULT_OF: dict[str, str] = {
     Form.RUN: "a run",
     Form.SWEEP: "a sweep",
+    Form.LOCATION: "a location",
 }
 # Kinds of links that are refused, by HDF5's number.
 LINKS = {
@@ -77,7 +78,7 @@ class Contents(Mapping[str, Array]):
 
     @property
     def form(self) -> str:
-        """``"fecm"`` for a run, ``"fecm-sweep"`` for a sweep."""
+        """A value of :class:`~fecm.results.schema.Form`."""
         return str(self.attributes["format"])
 
     def __getitem__(self, key: str) -> Array:
@@ -153,7 +154,7 @@ def read(path: Path, *forms: str) -> Contents:
         wanted = forms or (Form.RUN,)
         if form not in wanted:
             what = "not a result of fecm"
-            if form in (Form.RUN, Form.SWEEP):
+            if form in RESULT_OF:
                 asked = " or ".join(RESULT_OF[one] for one in wanted)
                 what = f"the result of {RESULT_OF[form]}, not of {asked}"
             raise ResultFileError(f"{path}: this HDF5 file is {what}")

@@ -38,6 +38,7 @@ class Form(StrEnum):
 
     RUN = "fecm"
     SWEEP = "fecm-sweep"
+    LOCATION = "fecm-location"
 
 
 class Kinematics(StrEnum):
@@ -448,6 +449,7 @@ SCALES = {
     "limits": ("limit", "number of the limit, from 1"),
     "statistics": ("statistic", "name of the statistic; percentages are quantiles"),
     "bounds": ("bound", "ends of the 95 % interval"),
+    "candidates": ("candidate", "number of the candidate place"),
 }
 FROM_0 = ("cases", "combinations")
 # Names of the positions of some axes.

@@ -1,0 +1,79 @@
+"""Summary of a location: in a few lines, and as values for JSON."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fecm.deck.units import quantity
+from fecm.location.location import Location
+
+LABEL_WIDTH = 18
+DIGITS = 5
+
+
+def lines(found: Location) -> list[str]:
+    """Lines about a location, in the deck's units."""
+
+    def shown(name: str, value: float) -> str:
+        return quantity(value, found.unit(name), DIGITS)
+
+    length = found.unit("x")
+    rows = [
+        ("x", f"{found.x:.5g} ± {found.sd_x:.2g} {length}".rstrip()),
+        ("y", f"{found.y:.5g} ± {found.sd_y:.2g} {length}".rstrip()),
+        ("correlation", f"{found.correlation:.2f}"),
+        (
+            "peak force",
+            f"{shown('peak_force', found.peak_force)} at {shown('time', found.time_of_peak)}",
+        ),
+        ("impulse", f"{shown('impulse', found.impulse)} until {shown('time', _end(found))}"),
+    ]
+    if found.energy_bound is not None:
+        bound = shown("energy_bound", found.energy_bound)
+        rows.append(("energy bound", f"{bound}: the impulse stops a projectile that has it"))
+    noise = "as given" if found.noise_given else "from the residual"
+    rows += [
+        ("noise", f"strain {found.noise:.3g}, {noise}"),
+        (
+            "misfit",
+            f"{found.misfit:.3g} times the noise" if found.noise_given else "1, by the noise",
+        ),
+        ("second place", _rival(found)),
+        ("determined until", shown("time", found.determined_until)),
+    ]
+    if found.sd_shift:
+        rows.append(("shift", f"{found.shift:.4g} ± {found.sd_shift:.2g} {found.unit('shift')}"))
+    if found.sd_gains.any():
+        gains = zip(found.gages.tolist(), found.gains, found.sd_gains, strict=True)
+        rows += [(f"gain of gage {n}", f"{gain:.4f} ± {sd:.2g}") for n, gain, sd in gains]
+    rows.append(("accepted", "yes" if found.accepted else "no"))
+    return [f"{name:{LABEL_WIDTH}}{text}".rstrip() for name, text in rows]
+
+
+def _end(found: Location) -> float:
+    """Time until which the impulse is taken."""
+    return found.determined_until if found.contact_end is None else found.contact_end
+
+
+def _rival(found: Location) -> str:
+    if found.second is None:
+        return "none: the misfit has one minimum"
+    x, y, ratio = found.second
+    return f"{x:.4g}, {y:.4g} {found.unit('x')}".rstrip() + f", misfit {ratio:.3g} times as large"
+
+
+def values(found: Location) -> dict[str, Any]:
+    """Values of a location under the names of its attributes, without its notes."""
+    names = (
+        *("x", "y", "sd_x", "sd_y", "correlation", "peak_force", "time_of_peak", "contact_end"),
+        *("impulse", "mass", "energy_bound", "determined_until", "noise", "noise_given", "misfit"),
+        *("shift", "sd_shift", "accepted"),
+    )
+    second = found.second
+    return {
+        **{name: getattr(found, name) for name in names},
+        "second": None if second is None else second._asdict(),
+        "gages": found.gages.tolist(),
+        "gains": found.gains.tolist(),
+        "sd_gains": found.sd_gains.tolist(),
+    }
