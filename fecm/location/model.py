@@ -75,7 +75,7 @@ class StrainModel:
 
     def knots(self, shift: float) -> Floats:
         """Times of the peaks of the hats, (hats,), of a force that starts at `shift`."""
-        return shift + self.basis * np.arange(1, self.hats + 1)
+        return shift + self.basis * np.arange(1.0, self.hats + 1.0)
 
     @cached_property
     def _kept(self) -> Indices:
@@ -84,7 +84,7 @@ class StrainModel:
         rows[self.nodes] = np.arange(len(self.nodes))
         return rows
 
-    def first_hat(self, x: float, y: float, shift: float = 0.0) -> Floats:
+    def first_hat(self, x: float, y: float) -> Floats:
         """Strains of the first hat of a force at a place, (gages, samples).
 
         Raises PatchError or OutsideError as :meth:`Footprint.weights`, and outside the region.
@@ -95,28 +95,26 @@ class StrainModel:
         if (rows < 0).any():
             raise OutsideError(f"({x:g}, {y:g}) is outside the region")
         near = self.responses[:, rows].astype(np.float64)
-        found: Floats = np.einsum("n,gns->gs", weights[loaded], near)
-        if shift:
-            places = np.arange(found.shape[1]) - shift / self.observation.interval
-            found = found @ interpolation(places, found.shape[1]).T
-        return found
+        return np.asarray(np.einsum("n,gns->gs", weights[loaded], near))
 
-    def hats_from(self, first: Floats) -> Floats:
-        """Samples of the strains of every hat, (gages, hats, samples)."""
+    def every_hat(self, x: float, y: float, shift: float) -> Floats:
+        """Samples of the strains of every hat of a force that starts at `shift`."""
+        first = self.first_hat(x, y)
         gages, count = first.shape
         every = np.zeros((gages, self.hats, count))
         for hat in range(self.hats):
             late = hat * self.width
             if late < count:
                 every[:, hat, late:] = first[:, : count - late]
-        return every
+        if not shift:
+            return every
+        places = np.arange(float(count)) - shift / self.observation.interval
+        return every @ interpolation(places, count).T
 
     def design(self, x: float, y: float, shift: float = 0.0) -> Floats:
         """Observed strains per coefficient of the force, (gages, rows, hats)."""
-        every = self.hats_from(self.first_hat(x, y, shift))
-        return self.observation.of(every).swapaxes(1, 2)
+        return self.observation.of(self.every_hat(x, y, shift)).swapaxes(1, 2)
 
     def strains(self, x: float, y: float, shift: float, force: Floats) -> Floats:
         """Samples of the strains of a force, (gages, samples)."""
-        every = self.hats_from(self.first_hat(x, y, shift))
-        return np.asarray(np.einsum("h,ghs->gs", force, every))
+        return np.asarray(np.einsum("h,ghs->gs", force, self.every_hat(x, y, shift)))
