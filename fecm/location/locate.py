@@ -18,6 +18,7 @@ from fecm.deck.model import Deck, Gages, Nonlinear
 from fecm.deck.units import unit_names
 from fecm.location.errors import LocateError
 from fecm.location.fit import Fit
+from fecm.location.force import judged_force
 from fecm.location.location import Location
 from fecm.location.mirrors import shared_symmetry
 from fecm.location.model import Footprint, StrainModel
@@ -25,7 +26,7 @@ from fecm.location.observation import interpolation, observe
 from fecm.location.responses import ROWS, Sampling, W, moving_plate, responses, rows_of
 from fecm.location.search import BEFORE, Found, Region, best_fits
 from fecm.location.table import StrainSource, StrainTable, strain_table
-from fecm.location.verdict import doubts, judged_force
+from fecm.location.verdict import doubts
 from fecm.mechanics.interpolation import NDOF
 from fecm.mechanics.mesh import longest_sides
 from fecm.mechanics.plate_motion import PlateMotion

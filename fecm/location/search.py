@@ -13,6 +13,7 @@ from fecm._frozen import frozen
 from fecm._typing import Floats, Indices
 from fecm.location.errors import LocateError
 from fecm.location.fit import Fit, Trial
+from fecm.location.force import is_determined
 from fecm.location.location import Candidate
 from fecm.mechanics.mesh import Mesh, longest_sides
 
@@ -172,8 +173,10 @@ def _beginning(fit: Fit, x: Floats, y: Floats, box: Floats) -> float:
     record = fit.model.observation.interval * (fit.model.responses.shape[2] - 1)
     earliest = -BEFORE / (1.0 + BEFORE) * record
     (place, *_) = _scanned(fit, x, y, earliest).minima()
-    early = replace(fit, shift=False).refined(fit.at(*place, earliest), box)
-    first = int(np.argmax(early.force > ONSET * early.force.max()))
+    fit_of_place = replace(fit, shift=False)
+    early = fit_of_place.refined(fit.at(*place, earliest), box)
+    known = np.where(is_determined(fit_of_place.errors(early, 1.0).force), early.force, 0.0)
+    first = int(np.argmax(known > ONSET * known.max()))
     rough = float(fit.model.knots(early.shift)[first]) - fit.model.basis
     begins = rough + fit.model.basis * np.linspace(-2.0, 2.0, BEGINNINGS)
     squares = np.array([fit.at(early.x, early.y, begin).square for begin in begins.tolist()])

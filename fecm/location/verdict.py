@@ -1,64 +1,21 @@
-"""What of a fitted force is determined, and whether a location is to be trusted."""
+"""Whether a location is to be trusted."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
-from fecm._typing import Bools, Floats
 from fecm.deck.units import unit_of
 from fecm.identification.misfit import COLOURED, UNDESCRIBED
+from fecm.location.force import CLEAR
 from fecm.location.location import Location
 from fecm.location.search import Region
 
-UNCERTAIN = 5.0  # standard deviation of a force that is not determined, over the usual one
-USUAL = 25.0  # percentile of the standard deviations that is the usual one
-CLEAR = 3.0  # standard deviations of a force that is not 0
-STAYS = 3  # hats that stay below at the end of the contact
 RIVAL = 1.1  # misfit ratio of a place that can hardly be told from the first
 NOT_DESCRIBED = 3.0  # misfit over the noise
 VAGUE = 0.25  # standard deviation of a place over the side of the region
-
-
-class Force(NamedTuple):
-    """A fitted force as far as it is determined."""
-
-    determined: Bools  # (hats,)
-    determined_until: float
-    peak: float
-    time_of_peak: float
-    end: float | None  # of the contact
-    impulse: float
-
-
-def judged_force(time: Floats, force: Floats, error: Floats, basis: float) -> Force:
-    """Judge a force and its standard errors at the peaks of hats.
-
-    A force shortly before the end of the record has not yet reached a gage: its standard error is
-    far above those of the others, and it is not determined.
-    """
-    usual = float(np.percentile(error, USUAL))
-    determined = error <= UNCERTAIN * usual
-    known = np.where(determined, force, 0.0)
-    top = int(known.argmax())
-    quiet = known < CLEAR * error
-    end = None
-    for hat in range(top + 1, len(force)):
-        after = slice(hat, hat + STAYS)
-        if determined[hat] and quiet[after][determined[after]].all():
-            end = hat
-            break
-    return Force(
-        determined=determined,
-        determined_until=float(time[np.flatnonzero(determined)[-1]]),
-        peak=float(known[top]),
-        time_of_peak=float(time[top]),
-        end=None if end is None else float(time[end]),
-        impulse=basis * float(known[:end].sum()),
-    )
 
 
 def doubts(found: Location, region: Region) -> Location:

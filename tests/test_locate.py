@@ -1,0 +1,386 @@
+"""Impacts located from strain gages: reciprocity, known impacts, error bars, doubts."""
+
+from __future__ import annotations
+
+import dataclasses
+import warnings
+from functools import cache
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm.deck import model
+from fecm.location.responses import Sampling, moving_plate, responses, rows_of
+from fecm.mechanics.plate_motion import PlateMotion
+from fecm.mechanics.points import gages, patch_weights
+from fecm.sweeps.api import problem_of
+from fecm.sweeps.responses import plate_response
+from tests.panels import (
+    PUBLIC,
+    PUBLIC_IMPULSE,
+    PUBLIC_PEAK,
+    PUBLIC_PLACE,
+    STRUCK,
+    TIME,
+    Floats,
+    panel,
+    public_panel,
+    scatter,
+    struck,
+    with_gages,
+)
+
+NEAR = (40.0, 30.0, 80.0, 65.0)  # a region that makes a search short
+NOISE = 0.02  # of the largest strain
+
+
+def located(strains: Floats, **options: object) -> fecm.Location:
+    """An impact on the small panel near the place where it is struck."""
+    near: dict[str, object] = {"region": NEAR, "grid": 12.0}
+    return fecm.locate(struck()[0], (TIME, strains), **(near | options))  # type: ignore[arg-type]
+
+
+@cache
+def noisy() -> fecm.Location:
+    """The place of the small panel's impact, from strains with noise."""
+    strains, noise = scatter(struck()[1], NOISE, seed=1)
+    return located(strains, noise=noise)
+
+
+def distance(found: fecm.Location, place: tuple[float, float]) -> float:
+    """Distance of the place found from another."""
+    return float(np.hypot(found.x - place[0], found.y - place[1]))
+
+
+def deviations(found: fecm.Location, place: tuple[float, float]) -> float:
+    """The same in standard deviations, by the covariance."""
+    off = np.array([found.x, found.y]) - place
+    return float(np.sqrt(off @ np.linalg.solve(found.covariance, off)))
+
+
+# The responses ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("layup", ["[45/0/-45/90]s", "[0/90/45/45]"])
+def test_the_run_of_a_gage_gives_the_strains_of_an_impulse(layup: str) -> None:
+    problem = problem_of(panel(layup))
+    motion = PlateMotion(moving_plate(problem.plate))
+    read = gages(problem.mesh, problem.deck.require(model.Gages).records)
+    nodes = np.arange(len(problem.mesh.coordinates))
+    # A hat of one step is an impulse in the second step.
+    impulse = Sampling(dt=2e-7, every=1, count=300, width=1)
+    found = responses(motion, rows_of(read, len(nodes)), nodes, impulse, float)
+    weights = patch_weights(problem.mesh, "DISC", 5.0, *STRUCK)
+    load = np.zeros((len(nodes), 5))
+    load[:, 2] = weights
+    sums = motion.dof_sums(read.dof_indices, read.weights)
+    _, direct = plate_response(motion, motion.load(load), impulse.dt, 298, sums)
+    by_gages = np.einsum("n,gns->gs", weights, found)[:, 2:]
+    assert np.abs(by_gages - direct).max() < 1e-10 * np.abs(direct).max()
+
+
+# Known impacts ------------------------------------------------------------------------------------
+
+
+def test_the_place_and_the_force_of_a_run_are_found() -> None:
+    deck, strains, peak = struck()
+    found = fecm.locate(deck, (TIME, strains), region=NEAR, grid=12.0)
+    assert distance(found, STRUCK) < 0.1  # of elements of 10
+    assert found.peak_force == pytest.approx(peak, rel=0.02)
+    assert found.impulse == pytest.approx(2e-6 * 2000.0, rel=0.05)  # hardly a rebound
+    assert found.accepted
+
+
+def of_the_series(deck: fecm.Deck, strains: Floats, **options: object) -> fecm.Location:
+    """The impact of the public series near its place."""
+    near: dict[str, object] = {"region": (92.0, 61.0, 132.0, 101.0), "grid": 20.0}
+    return fecm.locate(deck, (PUBLIC[:, 0], strains), **(near | options))  # type: ignore[arg-type]
+
+
+def test_the_public_case_is_located_within_four_standard_deviations() -> None:
+    found = of_the_series(public_panel(60, 40), PUBLIC[:, 6:10])
+    assert distance(found, PUBLIC_PLACE) < 0.5
+    assert deviations(found, PUBLIC_PLACE) < 4.0
+    early = found.time < 6e-4
+    assert found.force[early].max() == pytest.approx(PUBLIC_PEAK, rel=0.05)
+    assert found.impulse == pytest.approx(PUBLIC_IMPULSE, rel=0.05)
+    # Unregularised, the last force would be 1000 times the largest one.
+    assert found.peak_force == found.force[early].max()
+    assert 6e-4 < found.determined_until < 7.8e-4
+    assert not found.determined[-1]
+    assert found.force[~found.determined].max() == 0.0
+    assert found.force_sd[~found.determined].min() > 5.0 * np.median(found.force_sd)
+    assert found.accepted
+
+
+@pytest.mark.long
+def test_the_public_case_is_located_on_the_whole_plate() -> None:
+    found = fecm.locate(public_panel(60, 40), (PUBLIC[:, 0], PUBLIC[:, 6:10]))
+    assert len(found.candidates) == 126
+    assert distance(found, PUBLIC_PLACE) < 0.5
+    assert found.second is not None
+    assert found.second.ratio > 5.0
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("mesh", "strain", "force"), [((96, 64), 7e-3, 1.2e-3)])
+def test_strains_and_force_of_a_run_are_those_of_the_series(
+    mesh: tuple[int, int], strain: float, force: float
+) -> None:
+    run = fecm.run_one(public_panel(*mesh, at=PUBLIC_PLACE))
+    time = PUBLIC[:, 0]
+    off = np.interp(time, run.time, run.force) - PUBLIC[:, 1]
+    assert np.abs(off).max() < force * PUBLIC_PEAK
+    for own, series in zip(run.gages.strain.T, PUBLIC[:, 2:6].T, strict=True):
+        assert np.abs(np.interp(time, run.time, own) - series).max() < strain * np.abs(series).max()
+
+
+@pytest.mark.long
+def test_strains_on_the_mesh_of_fecm_new_are_those_of_the_series_within_a_hundredth() -> None:
+    # 60 x 40 elements asked for are refined at the patch.
+    plain = public_panel(60, 40)
+    material = plain.require(model.Material)
+    made = fecm.impact(
+        fecm.Plate.rectangle((300.0, 200.0), (60, 40), support="simple"),
+        fecm.Laminate("[0/90/0/90/0]s", material.ply, 0.2),
+        fecm.RigidMass(2e-5),
+        fecm.Contact(2e4, 0.0, 0.0, 1.5),
+        velocity=2000.0,
+        at=PUBLIC_PLACE,
+        duration=8.02e-4,
+        units="mm-N-s",
+        patch="disc:4",
+        gages=[(g.x, g.y, g.z, g.direction) for g in plain.require(model.Gages).records],
+    )
+    run = fecm.run_one(made)
+    for own, series in zip(run.gages.strain.T, PUBLIC[:, 2:6].T, strict=True):
+        off = np.interp(PUBLIC[:, 0], run.time, own) - series
+        assert np.abs(off).max() < 1e-2 * np.abs(series).max()
+
+
+@pytest.mark.long
+def test_a_modulus_5_percent_too_high_moves_the_place_by_less_than_a_millimetre() -> None:
+    found = of_the_series(public_panel(60, 40, e1=1.05 * 171420.0), PUBLIC[:, 6:10])
+    assert 0.1 < distance(found, PUBLIC_PLACE) < 1.0
+    assert found.peak_force == pytest.approx(1.06 * PUBLIC_PEAK, rel=0.02)
+
+
+@pytest.mark.long
+def test_the_reports_impact_with_a_rod_is_located_within_one_element() -> None:
+    report = fecm.read_one(fecm.examples.path("impact-115"))
+    face = 0.5 * sum(layer.thickness for layer in report.require(model.Material).layers)
+    deck = with_gages(report, (1.8, 1.4, face, 0.0), (4.3, 2.6, face, 90.0), (2.2, 2.9, face, 0.0))
+    run = fecm.run_one(fecm.read_one(deck.to_text()))
+    time = 4e-6 * np.arange(1.0, 201.0)
+    strains = np.column_stack([np.interp(time, run.time, one) for one in run.gages.strain.T])
+    found = fecm.locate(deck, (time, scatter(strains, NOISE, seed=0)[0]))
+    node = run["mesh/coordinates"][report.require(model.Impact).node - 1]
+    assert distance(found, tuple(node)) < 0.02  # elements of .25 in
+    assert found.peak_force == pytest.approx(float(run.force.max()), rel=0.05)
+
+
+# Error bars ---------------------------------------------------------------------------------------
+
+
+def test_the_errors_of_several_seeds_are_those_of_the_covariance() -> None:
+    _, strains, _ = struck()
+    seeds, squares = 10, 0.0
+    for seed in range(seeds):
+        measured, noise = scatter(strains, 2.0 * NOISE, seed)
+        found = located(measured, noise=noise)
+        assert found.misfit == pytest.approx(1.0, abs=0.15)
+        squares += deviations(found, STRUCK) ** 2
+    # Chi-square of 2 values a seed: within its 1 % and 99 % quantiles, 8.3 and 37.6 of 20.
+    assert 8.3 < squares < 37.6
+
+
+@pytest.mark.long
+def test_the_95_percent_ellipse_covers_the_place_in_95_of_100() -> None:
+    deck, clean = public_panel(60, 40), PUBLIC[:, 2:6]
+    covered, off, errors = 0, [], []
+    with warnings.catch_warnings(action="ignore"):
+        for seed in range(100):
+            strains, noise = scatter(clean, NOISE, seed)
+            found = of_the_series(deck, strains, noise=noise)
+            covered += deviations(found, PUBLIC_PLACE) ** 2 < -2.0 * np.log(0.05)
+            off.append((found.x - PUBLIC_PLACE[0], found.y - PUBLIC_PLACE[1]))
+            errors.append((found.sd_x, found.sd_y))
+    assert 90 <= covered <= 100
+    ratio = np.sqrt(np.mean(np.square(off), axis=0)) / np.mean(errors, axis=0)
+    assert (ratio < 1.3).all()
+
+
+def test_the_ellipse_encloses_its_share_of_a_normal_distribution() -> None:
+    found = noisy()
+    edge = found.ellipse(0.5) - [found.x, found.y]
+    squares = np.einsum("ni,ij,nj->n", edge, np.linalg.inv(found.covariance), edge)
+    assert squares == pytest.approx(2.0 * np.log(2.0))
+    assert np.array_equal(edge[0], edge[-1]) or np.abs(edge[0] - edge[-1]).max() < 1e-12
+    with pytest.raises(ValueError, match="between 0 and 1"):
+        found.ellipse(1.0)
+
+
+def test_the_noise_is_that_of_the_residual_unless_it_is_given() -> None:
+    strains, noise = scatter(struck()[1], NOISE, seed=1)
+    found = located(strains)
+    assert found.noise == pytest.approx(noise, rel=0.15)
+    assert found.misfit == 1.0
+    assert not found.noise_given
+    assert found.sd_x == pytest.approx(noisy().sd_x * found.noise / noise)
+
+
+# The force ----------------------------------------------------------------------------------------
+
+
+def test_the_impulse_ends_with_the_contact() -> None:
+    found = noisy()
+    run = fecm.run_one(struck()[0])
+    assert found.contact_end is not None
+    before = run.time <= found.contact_end  # the projectile touches the panel once more
+    assert run.force[before][-1] < 0.06 * run.force.max()  # about 3 standard deviations
+    contact = float(np.trapezoid(run.force[before], run.time[before]))
+    assert found.impulse == pytest.approx(contact, rel=0.03)
+
+
+def test_the_energy_bound_follows_from_impulse_and_mass() -> None:
+    found = dataclasses.replace(noisy(), mass=2e-6)
+    assert found.energy_bound == pytest.approx(found.impulse**2 / 4e-6)
+    assert noisy().energy_bound is None
+
+
+def test_a_force_that_has_not_ended_is_said_to_be_open() -> None:
+    early = TIME < 1.2e-4
+    found = fecm.locate(struck()[0], (TIME[early], struck()[1][early]), region=NEAR, grid=12.0)
+    assert found.contact_end is None
+    assert any("has not ended" in note for note in found.notes)
+
+
+# What may be fitted besides -----------------------------------------------------------------------
+
+
+def test_a_record_that_begins_after_the_impact_is_located_with_a_shift() -> None:
+    late = 10  # points
+    strains, noise = scatter(struck()[1], NOISE, seed=2)
+    table = TIME[late:] - TIME[late - 1], strains[late:]
+    found = fecm.locate(struck()[0], table, region=NEAR, grid=12.0, noise=noise, shift=True)
+    assert distance(found, STRUCK) < 0.3
+    assert found.misfit < 1.2
+    first = found.time[np.argmax(found.force > 0.1 * found.peak_force)]
+    assert first == pytest.approx(-TIME[late - 1], abs=1e-5)
+    assert found.sd_shift > 0.0
+    plain = fecm.locate(struck()[0], table, region=NEAR, grid=12.0, noise=noise)
+    assert not plain.accepted
+    assert any("does not describe these signals" in note for note in plain.notes)
+
+
+def test_a_record_that_begins_before_the_impact_is_located() -> None:
+    before = 3e-6 * np.arange(-20.0, 1.0)
+    time = np.concatenate([before, TIME])
+    strains = np.vstack([np.zeros((len(before), 3)), struck()[1]])
+    found = fecm.locate(struck()[0], (time, strains), region=NEAR, grid=12.0)
+    assert distance(found, STRUCK) < 0.1
+    assert found.force[found.time <= 0.0].max() < 0.05 * found.peak_force
+
+
+def test_a_gage_with_another_gain_is_found_out() -> None:
+    strains, noise = scatter(struck()[1], NOISE / 4.0, seed=3)
+    found = located(strains * [1.1, 1.0, 1.0], noise=noise, gains=True)
+    assert found.gains / found.gains[1] == pytest.approx([1.1, 1.0, 1.0], abs=0.01)
+    assert np.prod(found.gains) == pytest.approx(1.0)
+    assert distance(found, STRUCK) < 0.1
+    assert (found.sd_gains > 0.0).all()
+
+
+def test_fine_samples_give_the_place_of_coarse_ones() -> None:
+    run = fecm.run_one(struck()[0])
+    found = fecm.locate(
+        struck()[0], (run.time, np.asarray(run.gages.strain)), region=NEAR, grid=12.0
+    )
+    assert len(run.time) > 500
+    assert distance(found, STRUCK) < 0.1
+    assert found.fitted.shape == (3, len(run.time))
+    rest = found.fitted - run.gages.strain.T
+    assert np.abs(rest).max() < 0.02 * np.abs(found.fitted).max()
+
+
+def test_unequal_times_give_the_place_of_equal_ones() -> None:
+    run = fecm.run_one(struck()[0])
+    time = np.sort(np.random.default_rng(4).uniform(2e-6, TIME[-1], 150))
+    strains = np.column_stack([np.interp(time, run.time, one) for one in run.gages.strain.T])
+    found = fecm.locate(struck()[0], (time, strains), region=NEAR, grid=12.0)
+    assert distance(found, STRUCK) < 0.1
+
+
+def test_a_plate_without_patch_projectile_and_program_is_enough() -> None:
+    deck = struck()[0]
+    unused = (model.Impact, model.Indentation, model.Projectile, model.Patch)
+    kept = tuple(s for s in deck.segments if not isinstance(s, unused))
+    bare = dataclasses.replace(deck, segments=kept, macros=(), text="")
+    found = fecm.locate(bare, (TIME, struck()[1]), region=NEAR, grid=12.0)
+    assert distance(found, STRUCK) < 1.0  # a point for the disc of 5
+    assert found.peak_force == pytest.approx(struck()[2], rel=0.1)
+
+
+# Doubts -------------------------------------------------------------------------------------------
+
+
+def test_a_wrong_plate_does_not_describe_the_strains() -> None:
+    deck = struck()[0].with_(e1=2.0 * 135000.0)
+    strains, noise = scatter(struck()[1], NOISE, seed=1)
+    found = fecm.locate(deck, (TIME, strains), region=NEAR, grid=12.0, noise=noise)
+    assert found.misfit > 3.0
+    assert not found.accepted
+    assert "does not describe these signals" in found.notes[0]
+
+
+def test_a_place_outside_the_region_is_doubted() -> None:
+    found = located(struck()[1], region=(20.0, 30.0, 50.0, 60.0))
+    assert not found.accepted
+    assert any("edge of the region" in note for note in found.notes)
+
+
+def test_a_second_place_that_fits_almost_as_well_is_named() -> None:
+    # Gages just beside the axis hardly tell the sides of the plate.
+    beside = [(x, 40.3, 0.72, 0.0) for x in (20.0, 45.0, 75.0)]
+    deck = with_gages(panel("[0/90]2s", at=(61.0, 58.0)), *beside)
+    run = fecm.run_one(deck)
+    strains = np.column_stack([np.interp(TIME, run.time, one) for one in run.gages.strain.T])
+    measured, noise = scatter(strains, 5.0 * NOISE, seed=0)
+    found = fecm.locate(deck, (TIME, measured), region=(45, 10, 75, 70), grid=9.0, noise=noise)
+    assert found.second is not None
+    assert 1.0 <= found.second.ratio < 1.1
+    assert abs(found.second.y + found.y - 80.0) < 5.0  # a mirror place
+    assert not found.accepted
+    assert any("almost as well" in note for note in found.notes)
+
+
+def test_gages_on_an_axis_of_symmetry_are_refused_with_both_places() -> None:
+    deck = with_gages(panel("[0/90]2s"), *[(x, 40.0, 0.72, 90.0) for x in (20.0, 45.0, 75.0)])
+    with pytest.raises(fecm.LocateError, match="mirror places can't be told apart") as caught:
+        fecm.locate(deck, (TIME, struck()[1]))
+    places = "(27.5, 22.5) and one at (27.5, 57.5)"
+    assert places in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("layup", "places"),
+    [
+        # Plies off the axes, or a gage that reads shear, tell the sides apart.
+        ("[45/0/-45/90]s", [(20.0, 40.0, 0.72, 0.0), (75.0, 40.0, 0.72, 0.0)]),
+        ("[0/90]2s", [(20.0, 40.0, 0.72, 30.0), (75.0, 40.0, 0.72, 0.0)]),
+        ("[0/90]2s", [(20.0, 41.0, 0.72, 0.0), (75.0, 40.0, 0.72, 0.0)]),
+    ],
+)
+def test_gages_that_tell_the_sides_apart_are_accepted(
+    layup: str, places: list[tuple[float, float, float, float]]
+) -> None:
+    deck = with_gages(panel(layup), *places)
+    found = fecm.locate(deck, (TIME, struck()[1][:, :2]), region=NEAR, grid=40.0)
+    assert len(found.gages) == 2
+
+
+def test_gages_at_the_centre_cant_tell_a_half_turn() -> None:
+    deck = with_gages(panel(), *[(50.0, 40.0, 0.72, angle) for angle in (0.0, 45.0, 90.0)])
+    with pytest.raises(fecm.LocateError, match="half turn"):
+        fecm.locate(deck, (TIME, struck()[1]))
