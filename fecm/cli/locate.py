@@ -24,8 +24,9 @@ from fecm.cli.options import (
 )
 from fecm.cli.outputs import OutputPaths
 from fecm.location.file import save
-from fecm.location.locate import Options, located
+from fecm.location.locate import located
 from fecm.location.location import Location
+from fecm.location.prepare import Options
 from fecm.location.summary import lines, values
 
 
@@ -71,7 +72,8 @@ class LocateOptions:
     "--basis",
     type=POSITIVE,
     metavar="TIME",
-    help="Time between two values of the force.  [default: 1/40 of the record]",
+    help="Time between two values of the force.  [default: 1/40 of the record in the search, "
+    "then a half or a quarter of it]",
 )
 @option(
     "--noise",

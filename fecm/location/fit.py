@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,6 +19,7 @@ PASSES = 40  # of the Gauss-Newton iteration
 HALVINGS = 8  # of a step that does not lower the misfit
 SETTLED = 3e-3  # change of the place, in standard errors, that ends the iteration
 STEP = 0.02  # of central differences, over the side of an element
+VALUES = 5  # strains per value of a force, at least
 SINGULAR = 1e-12  # least singular value of the scaled Jacobian
 
 
@@ -76,9 +79,22 @@ class Fit:
         square = float((residual**2).sum() + seen.left.sum())
         return Trial(x, y, shift, own, force, design, residual, square)
 
-    def parameters(self, trial: Trial) -> int:
-        """Number of fitted parameters."""
-        return self._others(trial) + int(trial.active.sum())
+    def halved(self) -> Fit | None:
+        """The fit with hats of half the width; None if strains or responses are too few."""
+        parts, odd = divmod(self.model.width // self.model.unit, 2)
+        if odd or not parts:
+            return None
+        half = replace(self.model, width=parts * self.model.unit)
+        seen = self.model.observation
+        if half.basis < seen.step or VALUES * half.hats > len(seen.values) * seen.points:
+            return None
+        return replace(self, model=half)
+
+    def deviation(self, trial: Trial) -> float:
+        """Standard deviation of the residual."""
+        seen = self.model.observation
+        parameters = self._others(trial) + int(trial.active.sum())
+        return math.sqrt(trial.square / max(1, len(seen.values) * seen.points - parameters))
 
     def _others(self, trial: Trial) -> int:
         """Number of fitted parameters besides the force."""

@@ -35,7 +35,7 @@ class Force(NamedTuple):
 
 
 def judged_force(time: Floats, force: Floats, error: Floats, basis: float) -> Force:
-    """Judge a force and its standard errors at the peaks of hats. (:func:`is_determined`)."""
+    """Judge a force and its standard errors at the peaks of hats (:func:`is_determined`)."""
     determined = is_determined(error)
     known = np.where(determined, force, 0.0)
     top = int(known.argmax())

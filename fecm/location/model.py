@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 
 import numpy as np
@@ -64,9 +65,16 @@ class StrainModel:
     footprint: Footprint
     observation: Observation
     nodes: Indices  # (kept,): nodes with responses
-    responses: NDArray[np.floating]  # (gages, kept, samples): strains of the first hat
-    width: int  # samples
-    hats: int
+    # (gages, kept, samples): strains of a hat whose peak is `unit` samples after its start.
+    responses: NDArray[np.floating]
+    unit: int
+    width: int  # a multiple of `unit`
+    length: int  # samples at which the force may act
+
+    @property
+    def hats(self) -> int:
+        """Number of hats."""
+        return math.ceil(self.length / self.width)
 
     @property
     def basis(self) -> float:
@@ -95,7 +103,19 @@ class StrainModel:
         if (rows < 0).any():
             raise OutsideError(f"({x:g}, {y:g}) is outside the region")
         near = self.responses[:, rows].astype(np.float64)
-        return np.asarray(np.einsum("n,gns->gs", weights[loaded], near))
+        narrow: Floats = np.einsum("n,gns->gs", weights[loaded], near)
+        return self._of_width(narrow)
+
+    def _of_width(self, narrow: Floats) -> Floats:
+        """Strains of a hat of the force from those of a hat of the responses: a sum of such."""
+        parts, count = self.width // self.unit, narrow.shape[1]
+        wide = np.zeros_like(narrow)
+        for part in range(1, 2 * parts):
+            late = (part - 1) * self.unit
+            if late < count:
+                share = 1.0 - abs(part - parts) / parts
+                wide[:, late:] += share * narrow[:, : count - late]
+        return wide
 
     def every_hat(self, x: float, y: float, shift: float) -> Floats:
         """Samples of the strains of every hat of a force that starts at `shift`."""

@@ -25,6 +25,7 @@ class Observation:
     values: Floats  # (gages, rows)
     left: Floats  # (gages,): squares that no function can describe
     points: int  # measured times
+    step: float  # usual time between two of them
     interval: float  # between two samples
     # Samples of the rows, (rows,), or values of the rows per sample, (rows, samples).
     rows: Indices | Floats
@@ -36,19 +37,19 @@ class Observation:
 
 def observe(time: Floats, strains: Floats, interval: float, count: int) -> Observation:
     """Observe functions with `count` samples from time 0 on by strains, (gages, points)."""
-    places = time / interval
+    places, step = time / interval, float(np.median(np.diff(time)))
     near = np.round(places)
     if (np.abs(places - near) < ON_SAMPLE).all() and near[0] >= 0.0:
         rows: Indices | Floats = near.astype(np.intp)
-        return Observation(strains, np.zeros(len(strains)), len(time), interval, rows)
+        return Observation(strains, np.zeros(len(strains)), len(time), step, interval, rows)
     matrix = interpolation(places, count)
     left = np.zeros(len(strains))
     if len(time) > MANY * count:
         factor = triangular(np.column_stack([matrix, strains.T]))
         matrix, values = factor[:count, :count], factor[:count, count:].T
         left = (factor[count:, count:] ** 2).sum(axis=0)
-        return Observation(values, left, len(time), interval, matrix)
-    return Observation(strains, left, len(time), interval, matrix)
+        return Observation(values, left, len(time), step, interval, matrix)
+    return Observation(strains, left, len(time), step, interval, matrix)
 
 
 def interpolation(places: Floats, count: int) -> Floats:

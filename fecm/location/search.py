@@ -24,6 +24,7 @@ APART = 0.5  # distance of two minima, over that of the candidates, below which 
 EDGE = 1e-6  # rounding of places on the edge of the region, over its side
 ONSET = 0.1  # share of the peak that a force passes at its beginning
 BEGINNINGS = 33  # times that are tried around it
+CHANCE = 3.0  # standard deviations of a fall of the misfit that may be chance
 NOISY = 10.0  # variances of a residual by which two fits differ by chance
 BEFORE = 0.25  # how much earlier a force may begin if the shift is fitted, over the record
 
@@ -144,6 +145,37 @@ def best_fits(fit: Fit, region: Region, pitch: float | None) -> Found:
         np.column_stack([x[np.nonzero(there)[0]], y[np.nonzero(there)[1]]]),
         np.sqrt(scan.squares[there] / least),
     )
+
+
+def narrowed(fit: Fit, found: Found, region: Region, noise: float | None) -> tuple[Fit, Found]:
+    """Fit place and force with narrower hats, from the minimum of wider ones.
+
+    A force of straight lines is off by the curvature of the true one, which moves the place.  Hats
+    of half the width are always taken, if the record determines them; narrower ones if the misfit
+    falls by more than chance.
+    """
+    box, best = np.array([region.low, region.high]), found.best
+    first = True
+    while (half := fit.halved()) is not None:
+        trial = half.refined(half.at(best.x, best.y, best.shift, best.gains), box)
+        if not first and not falls(half, best, trial, noise):
+            break
+        fit, best, first = half, trial, False
+    return fit, found._replace(best=best)
+
+
+def is_wide(fit: Fit, best: Trial, noise: float | None) -> bool:
+    """Whether hats of half the width describe the strains better than by chance."""
+    if (half := fit.halved()) is None:
+        return False
+    return falls(half, best, half.at(best.x, best.y, best.shift, best.gains), noise)
+
+
+def falls(half: Fit, wide: Trial, narrow: Trial, noise: float | None) -> bool:
+    """Whether the misfit falls from wide to narrow hats by more than chance."""
+    added = max(1, int(narrow.active.sum()) - int(wide.active.sum()))
+    variance = (noise or half.deviation(narrow)) ** 2
+    return wide.square - narrow.square > variance * (added + CHANCE * math.sqrt(2.0 * added))
 
 
 def _scanned(fit: Fit, x: Floats, y: Floats, shift: float) -> Scan:

@@ -30,14 +30,17 @@ def lines(found: Location) -> list[str]:
     ]
     if found.energy_bound is not None:
         bound = shown("energy_bound", found.energy_bound)
-        rows.append(("energy bound", f"{bound}: the impulse stops a projectile that has it"))
-    noise = "as given" if found.noise_given else "from the residual"
+        least = shown("energy_bound", 0.25 * found.energy_bound)
+        rows += [
+            ("energy bound", f"{bound} would be stopped by this impulse; a projectile that"),
+            ("", f"rebounds had less (down to {least}), one that moves on had more"),
+        ]
+    noise, misfit = "from the residual", "1, as the noise is that of the residual"
+    if found.noise_given:
+        noise, misfit = "as given", f"{found.misfit:.3g} times the noise"
     rows += [
         ("noise", f"strain {found.noise:.3g}, {noise}"),
-        (
-            "misfit",
-            f"{found.misfit:.3g} times the noise" if found.noise_given else "1, by the noise",
-        ),
+        ("misfit", misfit),
         ("second place", _rival(found)),
         ("determined until", shown("time", found.determined_until)),
     ]

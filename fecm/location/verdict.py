@@ -18,10 +18,13 @@ NOT_DESCRIBED = 3.0  # misfit over the noise
 VAGUE = 0.25  # standard deviation of a place over the side of the region
 
 
-def doubts(found: Location, region: Region) -> Location:
-    """The location with its notes, and whether it is accepted."""
+def judged(found: Location, region: Region, wide: bool) -> Location:
+    """The location with its notes, and whether it is accepted.
+
+    `wide`: whether narrower hats of the force describe the strains better.
+    """
     serious = [*_serious(found, region)]
-    return replace(found, notes=(*serious, *_remarks(found)), accepted=not serious)
+    return replace(found, notes=(*serious, *_remarks(found, wide)), accepted=not serious)
 
 
 def _serious(found: Location, region: Region) -> Iterator[str]:
@@ -56,15 +59,21 @@ def _serious(found: Location, region: Region) -> Iterator[str]:
         yield "the force is not above its noise"
 
 
-def _remarks(found: Location) -> Iterator[str]:
+def _remarks(found: Location, wide: bool) -> Iterator[str]:
     """Other notes."""
+    clock = unit_of("time", found.units)
+    if wide:
+        half = f"{0.5 * (found.time[1] - found.time[0]):.3g} {clock}".rstrip()
+        yield (
+            f"a force every {half} describes the strains better: its error is not in the standard "
+            "deviations; take a smaller basis"
+        )
     near = _neighbours(found)
     if near > COLOURED:
         yield (
             f"neighbouring residuals have the correlation {near:.2f}: the model does not describe "
             "the strains down to their noise, and the standard deviations are too small"
         )
-    clock = unit_of("time", found.units)
     if found.contact_end is None:
         until = f"{found.determined_until:.4g} {clock}".rstrip()
         yield f"the force has not ended at {until}: the impulse is that until then"

@@ -1,0 +1,182 @@
+"""The model of the strains of a table: samples, hats of the force, responses of the plate."""
+
+from __future__ import annotations
+
+import math
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._errors import StudyError
+from fecm._memory import require
+from fecm._typing import Floats, Indices
+from fecm.deck import model
+from fecm.deck.macros import flat
+from fecm.deck.model import Deck, Gages
+from fecm.location.errors import LocateError
+from fecm.location.fit import Fit
+from fecm.location.mirrors import shared_symmetry
+from fecm.location.model import Footprint, StrainModel
+from fecm.location.observation import observe
+from fecm.location.responses import ROWS, Sampling, W, moving_plate, responses, rows_of
+from fecm.location.search import BEFORE, Region
+from fecm.location.table import StrainTable
+from fecm.mechanics.interpolation import NDOF
+from fecm.mechanics.mesh import longest_sides
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.plate_motion import PlateMotion
+from fecm.mechanics.points import RADIUS_PER_THICKNESS, gages
+from fecm.mechanics.time_step import critical_time_step, taken_time_step
+from fecm.problem.problem import Problem
+from fecm.sweeps.api import problem_of
+
+HATS = 40  # of the force in the search, by default
+MOST_HATS = 400
+SAMPLES = 8  # fewest between the peaks of two hats
+UNIFORM = 1e-3  # deviation of times from equal intervals, over these, that is rounding
+LATE = 0.5  # largest first time over the length of the record
+# Widths of the hats over those of the responses: hats are sums of narrower ones.
+SEARCHED, GIVEN = 4, 2
+
+
+class Options(NamedTuple):
+    """Options of a location; see :func:`locate`."""
+
+    region: tuple[float, float, float, float] | None = None
+    grid: float | None = None
+    basis: float | None = None
+    noise: float | None = None
+    shift: bool = False
+    gains: bool = False
+    mass: float | None = None
+
+    def check(self) -> None:
+        """Refuse values that make no sense, by a StudyError."""
+        for name in ("grid", "basis", "noise", "mass"):
+            value = getattr(self, name)
+            if value is not None and not 0.0 < value < math.inf:
+                raise StudyError(f"{name} is {value:g}; it must be positive")
+
+
+class Timing(NamedTuple):
+    """Times of a fit, in samples but for the first two."""
+
+    origin: float  # time of the table from which on the force may act
+    interval: float  # between two samples
+    unit: int  # width of the hat of the responses
+    width: int  # of the hats of the force
+    length: int  # of the record
+    samples: int
+
+
+def timing(table: StrainTable, options: Options) -> Timing:
+    """Samples and hats for a table; StudyError if it is too coarse for them."""
+    name, time = table.name, table.time
+    origin = min(0.0, float(time[0]))
+    record = float(time[-1]) - origin
+    if time[0] > LATE * record:
+        raise StudyError(
+            f"{name} begins at time {time[0]:g} and ends at {time[-1]:g}: the plate is at rest "
+            "before time 0; subtract the time from which on the force may act"
+        )
+    each = float(np.median(np.diff(time)))
+    basis = options.basis or max(record / HATS, 2.0 * each)
+    if basis < each:
+        raise StudyError(
+            f"{name} has a point every {each:.3g}, too few for a force every {basis:.3g}; take a "
+            "larger basis"
+        )
+    parts = GIVEN if options.basis else SEARCHED
+    interval = _interval(time, basis)
+    unit = max(1, round(basis / interval / parts))
+    if options.basis and abs(parts * unit * interval - basis) > UNIFORM * basis:
+        # Hats of the width that was asked for, or of the next number of samples.
+        interval, unit = interval / 2.0, round(basis / interval)
+    length = math.ceil(record * (1.0 + BEFORE * options.shift) / interval - UNIFORM)
+    hats = math.ceil(length / (parts * unit))
+    if hats > MOST_HATS or 2 * (hats + 2) > table.strains.size:
+        raise StudyError(
+            f"{name}: a force of {hats} values does not follow from {table.strains.size} strains; "
+            "take a larger basis"
+        )
+    return Timing(origin, interval, unit, parts * unit, length, length + 3)
+
+
+def _interval(time: Floats, basis: float) -> float:
+    """Time between two samples: equal times are samples if possible."""
+    spacing = (float(time[-1]) - float(time[0])) / (len(time) - 1)
+    equal = time[0] + spacing * np.arange(len(time))
+    if np.abs(time - equal).max() > UNIFORM * spacing:
+        return basis / SAMPLES
+    if spacing * SAMPLES <= basis * (1.0 + UNIFORM):
+        return spacing * math.floor(basis * (1.0 + UNIFORM) / (spacing * SAMPLES))
+    return spacing / math.ceil(spacing * SAMPLES / basis)
+
+
+def prepared(problem: Problem, table: StrainTable, options: Options) -> tuple[Fit, Region, Timing]:
+    """The model of the strains, and the region in which the place is sought."""
+    own = timing(table, options)
+    footprint = _footprint(problem)
+    region = Region.of(problem.mesh, footprint.radius, options.region)
+    samples = own.interval, own.unit, own.samples
+    nodes, found = _shared(problem.deck, tuple(table.gages.tolist()), samples, region)
+    seen = observe(table.time - own.origin, table.strains, own.interval, own.samples)
+    made = StrainModel(footprint, seen, nodes, found, own.unit, own.width, own.length)
+    side = float(np.median(longest_sides(problem.mesh.elements, problem.mesh.coordinates)))
+    return Fit(made, side, options.shift, options.gains), region, own
+
+
+def _footprint(problem: Problem) -> Footprint:
+    """The circle of the deck's patch, or a point."""
+    mesh = problem.mesh
+    held = np.asarray(mesh.codes[:, W] != 0)
+    card = problem.deck.last(model.Patch)
+    if card is None:
+        return Footprint(mesh, "", 0.0, held)
+    radius = card.radius or RADIUS_PER_THICKNESS[card.shape] * problem.laminate.thickness
+    return Footprint(mesh, card.shape, radius, held)
+
+
+@lru_cache(maxsize=1)
+def _shared(
+    deck: Deck, numbers: tuple[int, ...], samples: tuple[float, int, int], region: Region
+) -> tuple[Indices, NDArray[np.floating]]:
+    """Nodes of a region and the responses of gages there, which another table may need too."""
+    interval, unit, count = samples
+    problem = problem_of(deck)
+    mesh, plate = problem.mesh, moving_plate(problem.plate)
+    every = {card.number: card for card in deck.require(Gages).records}
+    read = gages(mesh, [every[number] for number in numbers])
+    rows = rows_of(read, len(mesh.coordinates))
+    _refuse_mirrors(plate, rows, numbers, region)
+    asked = [macro.value for macro in flat(problem.program) if macro.word == "DT"]
+    most = next(filter(None, asked), 0.0) or taken_time_step(critical_time_step(plate))
+    steps = math.ceil(interval / most * (1.0 - 1e-9))
+    sampling = Sampling(interval / steps, steps, count, unit)
+    nodes = region.nodes(mesh)
+    stored = 4 * len(numbers) * len(nodes) * count
+    fields = 2 * 8 * NDOF * ROWS * len(mesh.coordinates)
+    require(stored + fields, f"the responses of {len(numbers)} gages at {len(nodes)} nodes")
+    motion = PlateMotion(plate, damping=problem.damping)
+    return nodes, responses(motion, rows, nodes, sampling)
+
+
+def _refuse_mirrors(
+    plate: PlateModel, rows: Floats, numbers: tuple[int, ...], region: Region
+) -> None:
+    """Raise LocateError if the gages can't tell a place from its image."""
+    if (symmetry := shared_symmetry(plate, rows)) is None:
+        return
+    low, high = plate.mesh.coordinates.min(axis=0), plate.mesh.coordinates.max(axis=0)
+    middle = 0.5 * (low + high)
+    one = region.low + 0.25 * region.size
+    other = middle + (one - middle) * symmetry.flip
+    named = ", ".join(map(str, numbers))
+    raise LocateError(
+        f"mirror places can't be told apart: a {symmetry.name} maps plate, supports, laminate and "
+        f"the readings of all gages ({named}) onto themselves, so that an impact at "
+        f"({one[0]:.4g}, {one[1]:.4g}) and one at ({other[0]:.4g}, {other[1]:.4g}) give the same "
+        "strains; add a gage off its axis"
+    )
