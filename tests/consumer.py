@@ -154,6 +154,8 @@ own: fecm.Result = fecm.run_one(
 )
 of_law: fecm.SweepResult = fecm.sweep(deck, {"velocity": [1.0]}, law="bilinear")
 fit: fecm.Identification = fecm.identify(deck, own.time, own.force, "velocity", law=law)
+place: fecm.Location = fecm.locate(deck, "strains.csv", noise=1e-6, region=(0.0, 0.0, 1.0, 1.0))
+around: NDArray[np.float64] = fecm.load_location("located.h5").ellipse(0.95)
 quick: float = fecm.estimate(deck).models["run"].peak_force
 speeds: NDArray[np.float64] = fecm.waves(laminates[0], units="mm-ms-kg").fronts([0.0]).velocity
 fitted: fecm.Contact | None = fecm.fit_indentation("test.csv", units=("mm", "N")).law

@@ -22,6 +22,7 @@ NOTES = {
     "simulation/judge.py": (),
     "simulation/macros.py": ("PINNED",),
     "simulation/membrane.py": (),
+    "location/verdict.py": ("_serious", "_remarks"),
     "results/end.py": ("OPEN_ENDS", "OPEN_LATER"),
     "results/linear_plate.py": ("TOO_SOFT", "PRELOADED", "REMEDY", "UNSAFE", "softness"),
     "results/validity.py": ("MEANING",),

@@ -7,7 +7,6 @@ from pathlib import Path
 import click
 from click import option
 
-from fecm._files import OPTION
 from fecm._frozen import frozen
 from fecm.cli.common import DASH, FAILED, echo, echo_json, every_minute, note
 from fecm.cli.decks import load_single
@@ -23,7 +22,6 @@ from fecm.cli.options import (
     list_of,
 )
 from fecm.cli.outputs import OutputPaths
-from fecm.location.file import save
 from fecm.location.locate import located
 from fecm.location.location import Location
 from fecm.location.prepare import Options
@@ -130,7 +128,7 @@ def locate(options: LocateOptions) -> None:
         found = located(problem, options.strains, wanted)
     targets.draw("location:location_picture", found)
     if options.output is not None:
-        save(found, options.output, overwrite=options.overwrite, allowed_by=OPTION)
+        found.save(options.output, overwrite=options.overwrite)
         note(f"wrote {options.output}")
     note(*found.notes)
     if options.form is Format.JSON:

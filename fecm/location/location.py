@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Deck
 from fecm.deck.units import unit_names, unit_of
+from fecm.location.writer import DATASETS, save
 from fecm.results.errors import NotStoredError
 from fecm.results.pictures import plot
 
@@ -31,6 +32,12 @@ DIMENSIONS = {
     "mass": "force*time^2/length",
 }
 POINTS = 181  # of an ellipse
+# Numbers that are attributes of the group of the force, or of the place.
+OF_FORCE = ("determined_until", "peak_force", "time_of_peak", "contact_end", "impulse")
+OF_PLACE = (
+    *("x", "y", "sd_x", "sd_y", "correlation", "noise", "misfit", "shift", "sd_shift"),
+    *("mass", "energy_bound"),
+)
 
 
 class Candidate(NamedTuple):
@@ -241,6 +248,35 @@ class Location:
         ResultWriteError
             If it can't be written.
         """
-        from fecm.location.file import save  # h5py takes 60 ms to import
+        arrays = {name: getattr(self, name) for name in DATASETS if name != "place"}
+        save(
+            Path(path),
+            {**arrays, "place": np.array([self.x, self.y])},
+            {
+                "": self._about(),
+                "locate": self._of_place(),
+                "locate/force": self._present(*OF_FORCE),
+            },
+            self.deck.to_text(),
+            overwrite=overwrite,
+        )
 
-        save(self, Path(path), overwrite=overwrite)
+    def _about(self) -> dict[str, Any]:
+        """Attributes of the file."""
+        units = {f"unit_{name}": unit for name, unit in self.units.items()}
+        return {"title": self.deck.title, "notes": list(self.notes), **units}
+
+    def _of_place(self) -> dict[str, Any]:
+        """Attributes of the group of the place."""
+        second = {} if self.second is None else self.second._asdict()
+        return {
+            **self._present(*OF_PLACE),
+            **{f"second_{name}": value for name, value in second.items()},
+            "noise_given": self.noise_given,
+            "accepted": self.accepted,
+        }
+
+    def _present(self, *names: str) -> dict[str, Any]:
+        """Attributes of these names that are not None."""
+        values = {name: getattr(self, name) for name in names}
+        return {name: value for name, value in values.items() if value is not None}

@@ -90,7 +90,7 @@ def timing(table: StrainTable, options: Options) -> Timing:
         )
     parts = GIVEN if options.basis else SEARCHED
     interval = _interval(time, basis)
-    unit = max(1, round(basis / interval / parts))
+    unit = max(1, math.floor(basis / interval / parts + 0.5 + UNIFORM))
     if options.basis and abs(parts * unit * interval - basis) > UNIFORM * basis:
         # Hats of the width that was asked for, or of the next number of samples.
         interval, unit = interval / 2.0, round(basis / interval)
