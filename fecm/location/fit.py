@@ -19,7 +19,7 @@ PASSES = 40  # of the Gauss-Newton iteration
 HALVINGS = 8  # of a step that does not lower the misfit
 SETTLED = 3e-3  # change of the place, in standard errors, that ends the iteration
 STEP = 0.02  # of central differences, over the side of an element
-VALUES = 5  # strains per value of a force, at least
+VALUES = 2  # strains per value of a force, at least
 SINGULAR = 1e-12  # least singular value of the scaled Jacobian
 
 
@@ -86,7 +86,7 @@ class Fit:
             return None
         half = replace(self.model, width=parts * self.model.unit)
         seen = self.model.observation
-        if half.basis < seen.step or VALUES * half.hats > len(seen.values) * seen.points:
+        if half.basis < seen.step or VALUES * half.hats > seen.count:
             return None
         return replace(self, model=half)
 
@@ -94,7 +94,7 @@ class Fit:
         """Standard deviation of the residual."""
         seen = self.model.observation
         parameters = self._others(trial) + int(trial.active.sum())
-        return math.sqrt(trial.square / max(1, len(seen.values) * seen.points - parameters))
+        return math.sqrt(trial.square / max(1, seen.count - parameters))
 
     def _others(self, trial: Trial) -> int:
         """Number of fitted parameters besides the force."""

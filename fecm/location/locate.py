@@ -60,8 +60,8 @@ def locate(
         Distance of the candidate places; by default that of about 126 in the region.
     basis : float, optional
         Time between the peaks of two hats of the force.  By default about 1/40 of the record in the
-        search; place and force are then fitted with hats half as wide, and with those a quarter as
-        wide if these describe the strains significantly better.
+        search; place and force are then fitted with hats half as wide if there are strains enough,
+        and with narrower ones that describe the strains significantly better.
     noise : float, optional
         Standard deviation of the strains' errors; by default that of the residual.
     shift : bool

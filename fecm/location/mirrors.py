@@ -55,7 +55,7 @@ def shared_symmetry(plate: PlateModel, rows: Floats) -> Symmetry | None:
 
 
 def _maps(plate: PlateModel, one: Symmetry, nodes: Indices) -> bool:
-    """Whether a symmetry of the nodes maps elements, supports, laminates and preload too."""
+    """Whether a symmetry of the nodes maps elements, supports, laminates and loads too."""
     mesh = plate.mesh
     if ((mesh.codes != 0) != (mesh.codes[nodes] != 0)).any():
         return False
@@ -77,7 +77,7 @@ def _elements(mesh: Mesh, numbers: Indices, nodes: Indices | None) -> Floats:
 
 
 def _unturned(plate: PlateModel) -> bool:
-    """Whether the laminates and the preload are those of reversed angles."""
+    """Whether laminates, preload and curvature are those of reversed angles."""
     for laminate in plate.laminates:
         for matrix in (laminate.A, laminate.B, laminate.D):
             scale = SAME * np.abs(laminate.A if matrix is laminate.B else matrix).max()
@@ -87,4 +87,4 @@ def _unturned(plate: PlateModel) -> bool:
                 return False
         if abs(laminate.shear[0, 1]) > SAME * np.abs(laminate.shear).max():
             return False
-    return plate.preload[2] == 0.0
+    return plate.preload[2] == 0.0 and plate.curvature[2] == 0.0

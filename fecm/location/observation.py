@@ -30,6 +30,11 @@ class Observation:
     # Samples of the rows, (rows,), or values of the rows per sample, (rows, samples).
     rows: Indices | Floats
 
+    @property
+    def count(self) -> int:
+        """Number of measured strains."""
+        return len(self.values) * self.points
+
     def of(self, samples: Floats) -> Floats:
         """Rows of functions with samples, (..., samples): (..., rows)."""
         return samples[..., self.rows] if self.rows.ndim == 1 else samples @ self.rows.T

@@ -148,7 +148,8 @@ def _shared(
     problem = problem_of(deck)
     mesh, plate = problem.mesh, moving_plate(problem.plate)
     every = {card.number: card for card in deck.require(Gages).records}
-    read = gages(mesh, [every[number] for number in numbers])
+    cards = [every[number] for number in numbers]
+    read = gages(mesh, cards, curvature=plate.curvature)
     rows = rows_of(read, len(mesh.coordinates))
     _refuse_mirrors(plate, rows, numbers, region)
     asked = [macro.value for macro in flat(problem.program) if macro.word == "DT"]

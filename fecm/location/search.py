@@ -24,6 +24,7 @@ APART = 0.5  # distance of two minima, over that of the candidates, below which 
 EDGE = 1e-6  # rounding of places on the edge of the region, over its side
 ONSET = 0.1  # share of the peak that a force passes at its beginning
 BEGINNINGS = 33  # times that are tried around it
+ENOUGH = 5  # strains per value of a force that determine it
 CHANCE = 3.0  # standard deviations of a fall of the misfit that may be chance
 NOISY = 10.0  # variances of a residual by which two fits differ by chance
 BEFORE = 0.25  # how much earlier a force may begin if the shift is fitted, over the record
@@ -151,14 +152,15 @@ def narrowed(fit: Fit, found: Found, region: Region, noise: float | None) -> tup
     """Fit place and force with narrower hats, from the minimum of wider ones.
 
     A force of straight lines is off by the curvature of the true one, which moves the place.  Hats
-    of half the width are always taken, if the record determines them; narrower ones if the misfit
-    falls by more than chance.
+    of half the width are always taken if there are strains enough; and as long as the misfit falls
+    by more than chance.
     """
     box, best = np.array([region.low, region.high]), found.best
     first = True
     while (half := fit.halved()) is not None:
         trial = half.refined(half.at(best.x, best.y, best.shift, best.gains), box)
-        if not first and not falls(half, best, trial, noise):
+        enough = ENOUGH * half.model.hats <= half.model.observation.count
+        if not (first and enough) and not falls(half, best, trial, noise):
             break
         fit, best, first = half, trial, False
     return fit, found._replace(best=best)
