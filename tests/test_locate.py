@@ -120,6 +120,17 @@ def test_an_impact_on_a_curved_panel_is_found() -> None:
     assert found.peak_force == pytest.approx(float(run.force.max()), rel=0.05)
 
 
+def test_an_impact_beside_the_edge_is_found() -> None:
+    place = (60.0, 6.0)
+    deck, strains, peak = struck(at=place)
+    found = fecm.locate(deck, (TIME, strains), region=(40.0, 0.0, 80.0, 30.0), grid=12.0)
+    assert distance(found, place) < 0.5
+    assert found.peak_force == pytest.approx(peak, rel=0.05)
+    at_edge = fecm.locate(deck, (TIME, strains), region=(40.0, 0.0, 80.0, 5.01), grid=12.0)
+    assert 0.0 < at_edge.sd_y < np.inf
+    assert not at_edge.accepted
+
+
 def of_the_series(deck: fecm.Deck, strains: Floats, **options: object) -> fecm.Location:
     """The impact of the public series near its place."""
     near: dict[str, object] = {"region": (92.0, 61.0, 132.0, 101.0), "grid": 20.0}

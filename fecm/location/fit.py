@@ -105,33 +105,37 @@ class Fit:
 
         (values, parameters); the gains change without their product.
         """
-        x, y, shift = trial.x, trial.y, trial.shift
         h, t = STEP * self.side, 0.5 * self.model.observation.interval
-
-        def slope(size: float, *ends: tuple[float, float, float]) -> Floats:
-            up, down = (self.model.design(*end) @ trial.force for end in ends)
-            return trial.gains[:, None] * (up - down) / (2.0 * size)
-
-        columns = [
-            slope(h, (x + h, y, shift), (x - h, y, shift)),
-            slope(h, (x, y + h, shift), (x, y - h, shift)),
-        ]
+        columns = [self._slope(trial, h, 0.0, 0.0), self._slope(trial, 0.0, h, 0.0)]
         if self.shift:
-            columns.append(slope(t, (x, y, shift + t), (x, y, shift - t)))
+            columns.append(self._slope(trial, 0.0, 0.0, t))
         if self.gains:
             own = trial.gains[:, None] * (trial.design @ trial.force)
             columns += [turn[:, None] * own for turn in ratios(len(own))]
         others = np.stack([column.ravel() for column in columns], axis=1)
         return np.hstack([others, trial.basis[:, trial.active]])
 
+    def _slope(self, trial: Trial, dx: float, dy: float, dt: float) -> Floats:
+        """Strains per length or time in one direction, (gages, rows).
+
+        Central differences; at an edge of the plate one-sided ones, and 0 between two edges.
+        """
+        ends, reach = [], 0.0
+        for sign in (1.0, -1.0):
+            place = trial.x + sign * dx, trial.y + sign * dy, trial.shift + sign * dt
+            try:
+                design = self.model.design(*place)
+                reach += 1.0
+            except FecmError:  # off the plate
+                design = trial.design
+            ends.append(trial.gains[:, None] * (design @ trial.force))
+        return np.asarray((ends[0] - ends[1]) / (max(reach, 1.0) * (dx + dy + dt)))
+
     def refined(self, start: Trial, box: Floats) -> Trial:
         """Gauss-Newton iteration from a trial; the place stays in a box, lowest and highest."""
         best = start
         for _ in range(PASSES):
-            try:
-                jacobian = self.jacobian(best)
-            except FecmError:  # at an edge of the plate there are no differences
-                break
+            jacobian = self.jacobian(best)
             size = scales(jacobian)
             both = triangular(np.column_stack([jacobian / size, best.residual.ravel()]))
             change = np.linalg.lstsq(both[:, :-1], both[:, -1], 1e-10)[0] / size

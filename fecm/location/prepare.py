@@ -152,8 +152,10 @@ def _shared(
     read = gages(mesh, cards, curvature=plate.curvature)
     rows = rows_of(read, len(mesh.coordinates))
     _refuse_mirrors(plate, rows, numbers, region)
+    critical = critical_time_step(plate)
     asked = [macro.value for macro in flat(problem.program) if macro.word == "DT"]
-    most = next(filter(None, asked), 0.0) or taken_time_step(critical_time_step(plate))
+    stable = [dt for dt in asked if 0.0 < dt < critical]
+    most = stable[0] if stable else taken_time_step(critical)
     steps = math.ceil(interval / most * (1.0 - 1e-9))
     sampling = Sampling(interval / steps, steps, count, unit)
     nodes = region.nodes(mesh)
