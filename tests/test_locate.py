@@ -12,9 +12,12 @@ import pytest
 
 import fecm
 from fecm.deck import model
+from fecm.location.mirrors import shared_symmetry
 from fecm.location.responses import Sampling, moving_plate, responses, rows_of
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.points import gages, patch_weights
+from fecm.problem.generate import generate
+from fecm.problem.parts import build_plate
 from fecm.sweeps.api import problem_of
 from fecm.sweeps.responses import plate_response
 from tests.panels import (
@@ -203,7 +206,7 @@ def test_strains_on_the_mesh_of_fecm_new_are_those_of_the_series_within_a_hundre
 def test_a_modulus_5_percent_too_high_moves_the_place_by_less_than_a_millimetre() -> None:
     found = of_the_series(public_panel(60, 40, e1=1.05 * 171420.0), PUBLIC[:, 6:10])
     assert 0.1 < distance(found, PUBLIC_PLACE) < 1.0
-    assert found.peak_force == pytest.approx(1.06 * PUBLIC_PEAK, rel=0.02)
+    assert 1.0 < found.peak_force / PUBLIC_PEAK < 1.07
 
 
 @pytest.mark.long
@@ -225,14 +228,14 @@ def test_the_reports_impact_with_a_rod_is_located_within_one_element() -> None:
 
 def test_the_errors_of_several_seeds_are_those_of_the_covariance() -> None:
     _, strains, _ = struck()
-    seeds, squares = 6, 0.0
+    seeds, squares = 10, 0.0
     for seed in range(seeds):
         measured, noise = scatter(strains, 2.0 * NOISE, seed)
-        found = located(measured, noise=noise)
+        found = located(measured, noise=noise, basis=7.5e-6)
         assert found.misfit == pytest.approx(1.0, abs=0.15)
         squares += deviations(found, STRUCK) ** 2
-    # Chi-square of 2 values a seed: within its 1 % and 99 % quantiles, 3.6 and 26.2 of 12.
-    assert 3.6 < squares < 26.2
+    # Chi-square of 2 values a seed: within its 1 % and 99 % quantiles, 8.3 and 37.6 of 20.
+    assert 8.3 < squares < 37.6
 
 
 def of_a_run() -> Floats:
@@ -367,6 +370,10 @@ def test_fine_samples_give_the_place_of_coarse_ones() -> None:
     assert found.fitted.shape == (3, len(run.time))
     rest = found.fitted - run.gages.strain.T
     assert np.abs(rest).max() < 0.02 * np.abs(found.fitted).max()
+    strains, noise = scatter(np.asarray(run.gages.strain), NOISE, seed=5)
+    rough = fecm.locate(struck()[0], (run.time, strains), region=NEAR, grid=12.0)
+    assert rough.noise == pytest.approx(noise, rel=0.05)
+    assert deviations(rough, STRUCK) < 4.0
 
 
 def test_unequal_times_give_the_place_of_equal_ones() -> None:
@@ -443,6 +450,22 @@ def test_gages_that_tell_the_sides_apart_are_accepted(
     deck = with_gages(panel(layup), *places)
     found = fecm.locate(deck, (TIME, struck()[1][:, :2]), region=NEAR, grid=40.0)
     assert len(found.gages) == 2
+
+
+def test_a_twisted_panel_or_a_shear_preload_tells_the_sides_apart() -> None:
+    plain = with_gages(panel("[0/90]2s"), *[(x, 40.0, 0.72, 0.0) for x in (20.0, 45.0, 75.0)])
+    twist = model.Curvature(radius_xy=2000.0)
+    for extra, found in (
+        (model.Curvature(radius_x=600.0), True),
+        (twist, False),
+        (model.Preload(1.0, 1.0, 0.0), True),
+        (model.Preload(1.0, 1.0, 0.1), False),
+    ):
+        deck = dataclasses.replace(plain, segments=(*plain.segments, extra), text="")
+        plate = build_plate(deck, generate(deck))
+        read = gages(plate.mesh, deck.require(model.Gages).records, curvature=plate.curvature)
+        rows = rows_of(read, len(plate.mesh.coordinates))
+        assert (shared_symmetry(plate, rows) is not None) == found
 
 
 def test_gages_at_the_centre_cant_tell_a_half_turn() -> None:
