@@ -92,7 +92,7 @@ def _about(contents: Contents) -> dict[str, Any]:
     if contents.form == Form.SWEEP:
         extent = _about_sweep(contents)
     elif contents.form == Form.LOCATION:
-        # 12 ms, which the result of a run does not need.
+        # 5 ms, which the result of a run does not need.
         from fecm.location.file import location_of
         from fecm.location.summary import lines as lines_of
 
