@@ -11,7 +11,7 @@ from fecm.plot.pictures import draw
 from fecm.results.result import Result
 from tests.decks import DATA_CARDS, PROGRAM, small
 
-OF_RUNS = [name for name, kind in KINDS.items() if kind.shows is not Shows.SWEEP]
+OF_RUNS = [name for name, kind in KINDS.items() if kind.shows in (Shows.RUN, Shows.RUNS)]
 
 NAMED = small(data=DATA_CARDS + "UNIT\nin lbf s\n")
 
@@ -44,3 +44,8 @@ def ticks(axis: Any) -> list[tuple[float, str]]:
 def legend_of(figure: Any) -> list[str]:
     """Texts of a figure's legend."""
     return [text.get_text() for text in figure.legends[0].get_texts()]
+
+
+def legend_of_axes(axes: Any) -> list[str]:
+    """Texts of the legend in an axes."""
+    return [text.get_text() for text in axes.get_legend().get_texts()]

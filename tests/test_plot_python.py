@@ -15,6 +15,7 @@ from fecm.plot.pictures import draw
 from fecm.results.pictures import RunKind, SweepKind
 from tests.calls import call
 from tests.decks import APPENDIX, DATA_CARDS, PROGRAM, small
+from tests.pictures import OF_RUNS
 
 matplotlib = pytest.importorskip("matplotlib")
 pyplot = pytest.importorskip("matplotlib.pyplot")
@@ -135,9 +136,9 @@ def test_a_file_is_that_of_the_command_line_whatever_the_users_style(
 
 
 def test_the_kinds_for_type_checkers_are_those_of_results() -> None:
-    of_sweeps = {name: kind.shows is Shows.SWEEP for name, kind in KINDS.items()}
-    assert list(get_args(RunKind)) == [name for name, sweep in of_sweeps.items() if not sweep]
-    assert list(get_args(SweepKind)) == [name for name, sweep in of_sweeps.items() if sweep]
+    assert list(get_args(RunKind)) == OF_RUNS
+    of_sweeps = [name for name, kind in KINDS.items() if kind.shows is Shows.SWEEP]
+    assert list(get_args(SweepKind)) == of_sweeps
 
 
 def test_a_warning_of_a_picture_is_one_of_the_users_line(sweep: fecm.SweepResult) -> None:

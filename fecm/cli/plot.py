@@ -28,14 +28,15 @@ from fecm.cli.options import (
     list_of,
 )
 from fecm.mechanics.failure import CRITERIA
-from fecm.plot.kinds import KINDS, LackingError, Picture
+from fecm.plot.kinds import KINDS, Kind, LackingError, Picture
 from fecm.plot.pictures import check_options, check_suffix, draw, options_of, save
-from fecm.results.hdf5_reader import read
+from fecm.results.hdf5_reader import Contents, read
 from fecm.results.metrics import COLUMNS
 from fecm.results.result import Result, result_of
 from fecm.results.schema import Form
 
 if TYPE_CHECKING:
+    from fecm.location.location import Location
     from fecm.sweeps.result import SweepResult
 
 _KIND_HELP = "; ".join(f"{name}: {kind.summary}" for name, kind in KINDS.items())
@@ -88,7 +89,7 @@ class PictureOptions:
     multiple=True,
     metavar="KIND",
     help=f"Picture to draw; may be repeated.  {_KIND_HELP}.  [default: force; map of a sweep, "
-    "exceedance of a random one]",
+    "exceedance of a random one; location of a located impact]",
 )
 @option(
     "-o",
@@ -194,16 +195,15 @@ def plot(
     be drawn.
     """
     options = asked.given()
-    named = named_results(results)
-    first = next(iter(named.values()))
-    usual = "force" if isinstance(first, Result) else "exceedance" if first.random else "map"
-    chosen = list(dict.fromkeys(kinds)) or [usual]
+    drawn = {name: _loaded(read(path, *Form)) for name, path in named(results).items()}
+    first = next(iter(drawn.values()))
+    chosen = list(dict.fromkeys(kinds)) or [_usual(first)]
     check_options(chosen, options)
     paths = _paths(results[0], chosen, output)
     folder = output if output is not None and output not in paths.values() else None
     if folder is None or folder.is_dir():
         check_outputs(list(paths.values()), overwrite, results)
-    pictures, lacking = _draw(named, chosen, options)
+    pictures, lacking = _draw(drawn, chosen, options)
     if not pictures:
         raise next(iter(lacking.values()))
     if folder is not None:
@@ -218,6 +218,18 @@ def plot(
         )
 
 
+def _usual(first: Result | SweepResult | Location) -> Kind:
+    """Kind of picture that is drawn unless others are asked for."""
+    if isinstance(first, Result):
+        return Kind.FORCE
+    # 46 ms, which results of runs do not need.
+    from fecm.sweeps.result import SweepResult
+
+    if isinstance(first, SweepResult):
+        return Kind.EXCEEDANCE if first.random else Kind.MAP
+    return Kind.LOCATION
+
+
 def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path]:
     """Path of each picture, by kind."""
     is_folder = output is None or output.is_dir() or not (output.exists() or output.suffix)
@@ -230,28 +242,40 @@ def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path
     return {kind: folder / f"{first.stem}-{kind}{KINDS[kind].suffixes[0]}" for kind in kinds}
 
 
-def named_results(paths: tuple[Path, ...]) -> dict[str, Result | SweepResult]:
-    """Results by the shortest distinct names."""
+def named(paths: tuple[Path, ...]) -> dict[str, Path]:
+    """Paths of results by their shortest distinct names."""
     names = [printable(path.stem) for path in paths]
     if len(set(names)) < len(names):
         names = [printable(str(path)) for path in paths]
     if len(set(names)) < len(names):
         raise RefusedError("a result is given twice")
-    found: dict[str, Result | SweepResult] = {}
-    for name, path in zip(names, paths, strict=True):
-        contents = read(path, Form.RUN, Form.SWEEP)
-        if contents.form == Form.SWEEP:
-            # 46 ms, which results of runs do not need.
-            from fecm.sweeps.result_file import sweep_of
+    return dict(zip(names, paths, strict=True))
 
-            found[name] = sweep_of(contents, history=False)
-        else:
-            found[name] = result_of(contents)
-    return found
+
+def run_or_sweep(contents: Contents) -> Result | SweepResult:
+    """The result of a run, or of a sweep without its forces."""
+    if contents.form == Form.RUN:
+        return result_of(contents)
+    # 46 ms, which results of runs do not need.
+    from fecm.sweeps.result_file import sweep_of
+
+    return sweep_of(contents, history=False)
+
+
+def _loaded(contents: Contents) -> Result | SweepResult | Location:
+    """The result of a run or a sweep, or a located impact."""
+    if contents.form != Form.LOCATION:
+        return run_or_sweep(contents)
+    # 12 ms, which other results do not need.
+    from fecm.location.file import location_of
+
+    return location_of(contents)
 
 
 def _draw(
-    results: dict[str, Result | SweepResult], kinds: list[str], options: Mapping[str, Any]
+    results: dict[str, Result | SweepResult | Location],
+    kinds: list[str],
+    options: Mapping[str, Any],
 ) -> tuple[dict[str, Picture], dict[str, LackingError]]:
     """Draw all pictures before writing any; the pictures, and why others are not drawn, by kind."""
     pictures, lacking = {}, {}

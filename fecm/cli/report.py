@@ -11,8 +11,10 @@ from fecm.cli.common import RefusedError, echo
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
 from fecm.cli.options import FILE_PATH
-from fecm.cli.plot import named_results
+from fecm.cli.plot import named, run_or_sweep
 from fecm.report.page import check_page
+from fecm.results.hdf5_reader import read
+from fecm.results.schema import Form
 
 
 @click.command(
@@ -42,9 +44,10 @@ def report(results: tuple[Path, ...], output: Path | None, opens: bool, overwrit
     check_page(path, overwrite, results)
     from fecm.report.report import digest, write_report
 
-    named = named_results(results)
-    digests = dict(zip(named, map(digest, results), strict=True))
-    write_report(named, path, digests, overwrite=overwrite)
+    paths = named(results)
+    found = {name: run_or_sweep(read(one, Form.RUN, Form.SWEEP)) for name, one in paths.items()}
+    digests = {name: digest(one) for name, one in paths.items()}
+    write_report(found, path, digests, overwrite=overwrite)
     echo(path)
     if opens and click.launch(str(path)):
         raise RefusedError(f"{path} is written, but no browser could be started")

@@ -60,6 +60,7 @@ class Kind(StrEnum):
     EXCEEDANCE = auto()
     SENSITIVITY = auto()
     SCATTER = auto()
+    LOCATION = auto()
 
 
 class Shows(Enum):
@@ -68,6 +69,7 @@ class Shows(Enum):
     RUN = auto()  # the result of one run
     RUNS = auto()  # the results of one or more runs
     SWEEP = auto()  # the result of one sweep
+    LOCATION = auto()  # one impact that gages located
 
 
 @frozen
@@ -110,6 +112,9 @@ KINDS: dict[str, Drawing] = {
     ),
     Kind.SENSITIVITY: Drawing("random_sweep:sensitivity", Shows.SWEEP, "indices of a random sweep"),
     Kind.SCATTER: Drawing("random_sweep:scatter", Shows.SWEEP, "a quantity over the random values"),
+    Kind.LOCATION: Drawing(
+        "location:location", Shows.LOCATION, "place, force and strains that locate found"
+    ),
 }
 
 Width = Literal["column", "full"]  # of a journal's column, or of its page

@@ -12,7 +12,7 @@ import contextlib
 import inspect
 import logging
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping
 from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
@@ -34,8 +34,16 @@ from fecm.results.result import Result
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+    from fecm.location.location import Location
     from fecm.sweeps.result import SweepResult
 
+# What kinds show, in words.
+SOURCES = {
+    Shows.RUN: "the result of a run",
+    Shows.RUNS: "the result of a run",
+    Shows.SWEEP: "the result of a sweep",
+    Shows.LOCATION: "a located impact",
+}
 ANIMATION = ".gif"
 FRAMES_PER_SECOND = 15
 
@@ -103,27 +111,28 @@ def _errors_as_one(what: str) -> Iterator[None]:
         raise PlotError(f"{what} can't be drawn: {type(error).__name__}: {message}") from error
 
 
-def _check_source(kind: Kind, results: Mapping[str, Result | SweepResult]) -> None:
-    """Refuse the result of a run for a kind of sweeps, and of a sweep for a kind of runs."""
-    shows = KINDS[kind].shows
+def _source(result: Result | SweepResult | Location) -> str:
+    """What a result is, as a word of :data:`SOURCES`."""
+    if isinstance(result, Result):
+        return SOURCES[Shows.RUN]
+    from fecm.sweeps.result import SweepResult  # loaded already if there is such a result
+
+    return SOURCES[Shows.SWEEP if isinstance(result, SweepResult) else Shows.LOCATION]
+
+
+def _check_source(kind: Kind, results: Mapping[str, Result | SweepResult | Location]) -> None:
+    """Refuse a result that this kind can't show, such as that of a sweep for a kind of runs."""
     for name, result in results.items():
-        is_sweep = not isinstance(result, Result)
-        if is_sweep and shows is not Shows.SWEEP:
-            of_sweeps = [one for one, drawing in KINDS.items() if drawing.shows is Shows.SWEEP]
-            raise PlotError(
-                f"{name} is the result of a sweep, which the kind {kind} can't show; the kinds "
-                f"{', '.join(of_sweeps)} do"
-            )
-        if not is_sweep and shows is Shows.SWEEP:
-            raise PlotError(
-                f"{name} is the result of a run, which the kind {kind} can't show; the other kinds "
-                "do"
-            )
+        what = _source(result)
+        if what != SOURCES[KINDS[kind].shows]:
+            able = [one for one, drawing in KINDS.items() if SOURCES[drawing.shows] == what]
+            kinds = f"kind {able[0]} does" if len(able) == 1 else f"kinds {', '.join(able)} do"
+            raise PlotError(f"{name} is {what}, which the kind {kind} can't show; the {kinds}")
 
 
 def draw(
     kind: str,
-    results: Mapping[str, Result | SweepResult],
+    results: Mapping[str, Result | SweepResult | Location],
     style: Mapping[str, Any] | None = None,
     **options: Unpack[Options],
 ) -> Picture:
@@ -150,7 +159,7 @@ def draw(
 
 def plot(
     kind: str,
-    results: Mapping[str, Result | SweepResult],
+    results: Mapping[str, Result | SweepResult | Location],
     path: str | Path | None = None,
     ax: Axes | None = None,
     *,
@@ -194,7 +203,9 @@ def plot(
     --------
     >>> plot("loop", {"lumped": one, "consistent": other}, "rods.pdf")  # doctest: +SKIP
     """
-    if kind not in list(Kind) and any(kind in result for result in results.values()):
+    if kind not in list(Kind) and any(
+        isinstance(result, Container) and kind in result for result in results.values()
+    ):
         raise PlotError(f"{kind} is no kind of picture but a quantity: give quantity={kind!r}")
     if path is not None:
         if ax is not None:
