@@ -13,6 +13,8 @@ CONTENTS = {
     "impact-115.inp": "the report's experiment at 115 in/s, with a contact patch (lbf, in, s)",
     "drop-weight.inp": "ASTM D7136 at 2.5 J, with strengths and delamination threshold (mm, N, s)",
     "plate-with-gages.inp": "a ball of 20 g on a clamped plate with strain gages (mm, N, s)",
+    "panel-with-gages.inp": "a panel with four strain gages, to locate an impact (mm, N, s)",
+    "panel-strains.csv": "strains of an impact somewhere on that panel: time, gages 1 to 4",
     "hole.msh": "mesh of Gmsh: 60 x 40 with a hole of radius 6, groups edge and hole",
     "measured-force.csv": "a force of impact-115 as a transducer shows it: time, force",
     "indentation-test.csv": "an indentation test in five cycles: indentation, force",
