@@ -13,6 +13,7 @@ from fecm.verification import (  # noqa: F401  (they fill CASE_OF)
     damage,
     fields,
     impacts,
+    location,
     parts,
     plates,
     stretching,

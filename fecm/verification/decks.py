@@ -7,9 +7,10 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+from fecm import examples
 from fecm._errors import FecmWarning
 from fecm._typing import Floats
-from fecm.api import Mode, run_one
+from fecm.api import Mode, read_one, run_one
 from fecm.deck import model
 from fecm.deck.grid import Grid, Section, lines, uniform
 from fecm.deck.model import Control, Integration, Layer, Macro, NodeCodes, NodeValues, Ply
@@ -207,3 +208,13 @@ def report_impact(steps: int = 4000) -> model.Deck:
     plate = material(REPORT_PLY, REPORT_ANGLES, REPORT_THICKNESS)
     law = model.Indentation(1.912e6, 6.564e-4, 0.094, 2.0)
     return struck_plate(grid, plate, None, 115.0, law, 2e-7, steps)
+
+
+def panel_with_gages(along: int, up: int) -> model.Deck:
+    """Build the panel of examples/panel-with-gages.inp (mm, N, s) with other elements."""
+    example = read_one(examples.path("panel-with-gages.inp"))
+    grid = Grid(uniform(300.0, along), uniform(200.0, up))
+    kinds = (model.Material, model.Shear, model.Patch, model.Gages)
+    middle = grid.nearest(150.0, 100.0)[0]
+    others = (*(example.require(kind) for kind in kinds), model.Impact(middle, 3, 0.0))
+    return deck(grid, (supports(grid, SUPPORTED), *others), DEFLECTION)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from fecm.identification import fitting
+from fecm.location import responses
+from fecm.location.model import Footprint
 from fecm.mechanics import half_space
 from fecm.sweeps import convergence, distributions, statistics
 from fecm.sweeps import random as random_values
@@ -39,6 +41,13 @@ BREAKS: Breaks = {
     ),
     "the computed force 1 % too large": (
         changed(fitting.Model, "at", lambda force: 1.01 * force), {"identification": ("",)},
+    ),
+    "the strains of the gages 1 % too large in their runs": (
+        changed(responses, "rows_of", lambda rows: 1.01 * rows), {"reciprocity": ("",)},
+    ),
+    "a force on the panel 2 mm beside its place, and 10 % too large": (
+        instead(Footprint, "weights", lambda right, self, x, y: 1.1 * right(self, x + 2, y + 2)),
+        {"location": ("",)},
     ),
     "E3 taken for the indentation modulus": (
         instead(half_space, "indentation_modulus", lambda _, C: 1.0 / np.linalg.inv(C)[2, 2]),
