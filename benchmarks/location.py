@@ -1,0 +1,144 @@
+"""Errors of ``fecm locate``: those of a wrong model, and those of the noise beside its error bars.
+
+    python benchmarks/location.py models
+    python benchmarks/location.py seeds [NUMBER]
+
+The strains are those of a run of examples/panel-with-gages.inp struck at 112.5, 81 mm, every 2 us,
+with a normal scatter of 2 % of the largest strain of each gage.  `models` locates the impact with
+decks that are wrong by some per cent and prints the table of docs/locate.md.  `seeds` repeats the
+scatter 100 times and prints how often the 95 % ellipse covers the place, for strains of the same
+deck and for those of a series solution (examples/panel-strains.csv is one of them).
+"""
+
+from __future__ import annotations
+
+import sys
+import warnings
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import fecm
+from fecm._typing import Floats
+
+ROOT = Path(__file__).parent.parent
+SERIES = ROOT / "tests" / "data" / "locate_public.csv"
+DECK = fecm.read_one(fecm.examples.path("panel-with-gages.inp"))
+PLACE = np.array([112.5, 81.0])
+NEAR = (90.0, 60.0, 135.0, 100.0)  # where seeds are located: no other place is a rival
+INTERVAL, LAST = 2e-6, 8e-4
+NOISE = 0.02  # standard deviation over the largest strain
+COVERED = -2.0 * np.log(1.0 - 0.95)  # square of the ellipse's size in standard deviations
+
+
+class Strains(NamedTuple):
+    """Strains of a known impact without noise."""
+
+    time: Floats
+    strains: Floats  # (points, gages)
+    peak_force: float
+    impulse: float
+
+    def measured(self, seed: int) -> Floats:
+        """Strains with noise, (points, gages)."""
+        scatter = np.random.default_rng(seed).normal(size=self.strains.shape)
+        return self.strains + self.noise * scatter
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of the noise: of the largest strain of all gages."""
+        return NOISE * float(np.abs(self.strains).max())
+
+
+def of_a_run() -> Strains:
+    """Strains of a run of the deck, struck at the place."""
+    with warnings.catch_warnings(action="ignore", category=fecm.FecmWarning):
+        run = fecm.run_one(DECK.with_(x0=PLACE[0], y0=PLACE[1]))
+    time = np.asarray(INTERVAL * np.arange(1.0, round(LAST / INTERVAL) + 1.0))
+    strains = [np.interp(time, run.time, one) for one in run.gages.strain.T]
+    impulse = float(np.trapezoid(run.force, run.time))
+    return Strains(time, np.column_stack(strains), float(run.force.max()), impulse)
+
+
+def of_the_series() -> Strains:
+    """Strains of the series solution of the same impact."""
+    table = np.genfromtxt(SERIES, delimiter=",", names=True)
+    strains = np.column_stack([table[f"gage{n}"] for n in range(1, 5)])
+    impulse = float(np.trapezoid(table["force_N"], table["time_s"]))
+    return Strains(table["time_s"], strains, float(table["force_N"].max()), impulse)
+
+
+def models() -> None:
+    """Print the table of wrong models."""
+    true = of_a_run()
+    measured = true.measured(seed=0)
+    thickness = 2.0
+    gain = measured * np.array([1.05, 1.0, 1.0, 1.0])
+    late = true.time + 5e-6
+    right = (true.time, measured)
+    cases: list[tuple[str, fecm.Deck, tuple[Floats, Floats], dict[str, bool]]] = [
+        ("none", DECK, right, {}),
+        ("E1 5 % too high", DECK.with_(e1=1.05 * 171420), right, {}),
+        ("E1 5 % too low", DECK.with_(e1=0.95 * 171420), right, {}),
+        ("thickness 2 % too high", DECK.with_(thickness=1.02 * thickness), right, {}),
+        ("thickness 2 % too low", DECK.with_(thickness=0.98 * thickness), right, {}),
+        ("density 5 % too high", DECK.with_(density=1.05 * 1.57e-9), right, {}),
+        ("strains recorded 5 µs late", DECK, (late, measured), {}),
+        ("the same, with `--shift`", DECK, (late, measured), {"shift": True}),
+        ("gage 1 reads 5 % too much", DECK, (true.time, gain), {}),
+        ("the same, with `--gains`", DECK, (true.time, gain), {"gains": True}),
+    ]
+    print("| wrong in the deck or the strains | place moves | sd | peak force | impulse | misfit |")
+    print("|---|---|---|---|---|---|")
+    for name, deck, table, free in cases:
+        found = located(deck, table, true.noise, **free)
+        moved = np.hypot(found.x - PLACE[0], found.y - PLACE[1])
+        sd = np.hypot(found.sd_x, found.sd_y)
+        peak = found.peak_force / true.peak_force - 1.0
+        impulse = found.impulse / true.impulse - 1.0
+        print(
+            f"| {name} | {moved:.2f} mm | {sd:.2f} mm | {100 * peak:+.1f} % "
+            f"| {100 * impulse:+.1f} % | {found.misfit:.2f} |"
+        )
+
+
+def located(
+    deck: fecm.Deck, strains: tuple[Floats, Floats], noise: float, **others: Any
+) -> fecm.Location:
+    """The impact that the strains show; its notes are not of interest here."""
+    with warnings.catch_warnings(action="ignore", category=fecm.FecmWarning):
+        return fecm.locate(deck, strains, noise=noise, **others)
+
+
+def seeds(number: int) -> None:
+    """Print how often the ellipse covers the place, and the errors over their deviations."""
+    for name, true in (("the same deck", of_a_run()), ("the series", of_the_series())):
+        found = [
+            located(DECK, (true.time, true.measured(seed)), true.noise, region=NEAR, grid=20.0)
+            for seed in range(number)
+        ]
+        off = np.array([[one.x, one.y] for one in found]) - PLACE
+        inverse = np.linalg.inv([one.covariance for one in found])
+        inside = np.einsum("ni,nij,nj->n", off, inverse, off) <= COVERED
+        sd = np.array([[one.sd_x, one.sd_y] for one in found])
+        size = np.linalg.norm(off, axis=1).mean() / np.sqrt((sd**2).sum(axis=1)).mean()
+        print(f"strains of {name}, {number} seeds")
+        print(f"  the 95 % ellipse covers the place   {100 * inside.mean():.0f} %")
+        print(f"  mean error of the place             {np.linalg.norm(off, axis=1).mean():.3f} mm")
+        print(f"  over its standard deviation         {size:.2f}")
+        print(f"  bias of x, y                        {off.mean(axis=0).round(3)} mm")
+        peak = np.array([one.peak_force for one in found]) / true.peak_force - 1.0
+        print(f"  peak force                          {peak.mean():+.1%} ± {peak.std():.1%}")
+
+
+if __name__ == "__main__":
+    match sys.argv[1:]:
+        case ["models"]:
+            models()
+        case ["seeds"]:
+            seeds(100)
+        case ["seeds", text]:
+            seeds(int(text))
+        case _:
+            sys.exit(__doc__)
