@@ -11,9 +11,10 @@ from sphinx_gallery.scrapers import figure_rst
 # In the gallery; others follow.
 ORDER = (
     "drop_weight_test", "first_failure", "energy_of_delamination", "probability_of_delamination",
-    "contact_from_a_measurement", "reports", "overlay_of_a_measurement", "posterior",
-    "deck_without_text", "parametric_study", "table_of_cases", "animation", "plate_with_a_hole",
-    "ply_stresses", "stretching_plate", "curved_panel", "sandwich_core", "mesh_convergence",
+    "contact_from_a_measurement", "located_impact", "reports", "overlay_of_a_measurement",
+    "posterior", "deck_without_text", "parametric_study", "table_of_cases", "animation",
+    "plate_with_a_hole", "ply_stresses", "stretching_plate", "curved_panel", "sandwich_core",
+    "mesh_convergence",
     "layup_optimisation", "sobol_indices", "process_pool", "dask_cluster", "trusted_result",
     "own_projectile", "own_contact_law", "axisymmetric_projectile",
 )  # fmt: skip

@@ -134,6 +134,16 @@ def density(ax: Any, names: Names) -> None:
     ax.hexbin(names["velocity"], names["k"], gridsize=20, cmap="Blues")
 
 
+def place(ax: Any, names: Names) -> None:
+    """The misfit at the candidates, and the place found."""
+    found = names["found"]
+    ax.tricontourf(*found.candidates.T, np.log(found.candidate_misfit), 12)
+    ax.plot(*found.gage_places.T, "ko", ms=2 * STROKE)
+    ax.plot(found.x, found.y, "x", color=COLOURS[1], ms=5 * STROKE, mew=STROKE)
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+
+
 OWN: dict[str, Callable[[Any, Names], None]] = {
     "animation": lambda ax, names: deflected(ax, names["result"], 6),
     "axisymmetric_projectile": ringing,
@@ -141,6 +151,7 @@ OWN: dict[str, Callable[[Any, Names], None]] = {
     "energy_of_delamination": energy,
     "first_failure": exposures,
     "layup_optimisation": points,
+    "located_impact": place,
     "overlay_of_a_measurement": overlay,
     "own_contact_law": lambda ax, names: loops(ax, *names["results"].values()),
     "own_projectile": lambda ax, names: forces(ax, names["results"]),
