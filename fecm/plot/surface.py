@@ -87,7 +87,7 @@ def _plates(
         _label(ax, place, length)
         if "mesh/z" in result:
             _show_shape(ax, cut, rest, factor * np.array([min(low, 0.0), max(high, 0.0)]))
-            ax.text2D(0.03, 0.87, f"deflection drawn {factor:g} times", transform=ax.transAxes)
+            ax.text2D(0.03, 0.87, f"deflection times {factor:g}", transform=ax.transAxes)
         plates.append(plate)
         shows.append(functools.partial(show, plate, title))
     bar = style.colour_bar(
