@@ -13,6 +13,7 @@ from fecm.deck import model
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Deck, RodDiameter
 from fecm.mechanics import contact_law
+from fecm.mechanics.contact_law import Number
 from fecm.mechanics.curvature import FLAT
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
@@ -99,9 +100,16 @@ def projectile_segment(rod: DeckProjectile, transducer: int = 0) -> model.Projec
 
 def build_constants(measured: model.Indentation) -> contact_law.ContactParameters:
     """Build the contact parameters of an EXPE segment."""
-    if measured.word == model.Indentation.ACR:
-        return contact_law.YangSunPermanent(measured.k, measured.alpha_p)
-    return contact_law.LinearPermanent(*measured.values())
+    return constants_of(measured.word, *measured.values())
+
+
+def constants_of(
+    word: str, k: Number, alpha_p: Number, s_p: Number, q: Number
+) -> contact_law.ContactParameters[Number]:
+    """Build contact parameters from the second word and the values of an EXPE card."""
+    if word == model.Indentation.ACR:
+        return contact_law.YangSunPermanent(k, alpha_p)
+    return contact_law.LinearPermanent(k, alpha_p, s_p, q)
 
 
 def build_station(

@@ -81,14 +81,14 @@ def counted(validity: Texts) -> Iterator[tuple[Reason, Bools]]:
     Reasons of other versions, whose number is not bounded, count together.
     """
     known = set(Reason)
-    own = [
-        {name if name in known else Reason.OTHER for name in reasons_of(text)}
-        for text in validity.tolist()
-    ]
+    texts = validity.tolist()
+    own = {
+        text: {name if name in known else Reason.OTHER for name in reasons_of(text)}
+        for text in set(texts)
+    }
     for reason in Reason:
-        some = np.array([reason in names for names in own], dtype=bool)
-        if some.any():
-            yield reason, some
+        if any(reason in names for names in own.values()):
+            yield reason, np.array([reason in own[text] for text in texts], dtype=bool)
 
 
 @frozen

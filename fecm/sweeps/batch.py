@@ -20,9 +20,8 @@ from fecm._memory import require
 from fecm._typing import Floats
 from fecm.deck.macros import flat
 from fecm.deck.model import Deck, Nonlinear
-from fecm.mechanics.contact_law import HystereticLaw, Law, stacked
+from fecm.mechanics.contact_law import HystereticLaw, Law
 from fecm.mechanics.own_law import CaseByCase
-from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_model
 from fecm.problem.problem import Problem
@@ -46,11 +45,10 @@ from fecm.sweeps.plan import Measure, Plan, Settings, Task, shares_plate
 from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
 from fecm.sweeps.responses import Hits, Impacts, impacts, largest_sums, plate_response
 from fecm.sweeps.strike import Strike
+from fecm.sweeps.strike_table import columns_of, tabled
 from fecm.sweeps.timing import Clock, lengthened, with_clock
 from fecm.sweeps.values import plate_values
 from fecm.sweeps.vary import apply_case, strike
-
-UNIT = RigidMass(1.0)
 
 
 def run(task: Task) -> Outcome:
@@ -81,17 +79,22 @@ def run(task: Task) -> Outcome:
     return merge(parts, history=settings.history)
 
 
-def _strikes(task: Task, checked: Problem) -> tuple[dict[int, Strike], dict[int, str]]:
+def _strikes(task: Task, checked: Problem) -> tuple[Strikes, dict[int, str]]:
     """The strikes of the cases, and why others have none, by the numbers of the cases."""
-    strikes: dict[int, Strike] = {}
+    law = task.settings.law
+    table = tabled(checked, task.numbers, task.cases, law)
+    others: dict[int, Strike] = {}
     reasons: dict[int, str] = {}
     for number, case in zip(task.numbers, task.cases, strict=True):
+        if number in table:
+            continue
         try:
-            made = strike(checked.deck, case)._replace(own_law=task.settings.law)
+            made = strike(checked.deck, case)._replace(own_law=law)
             made.check(checked)
-            strikes[number] = made
+            others[number] = made
         except CasesError as error:
             reasons[number] = str(error)
+    strikes = dict(sorted({**table, **others}.items())) if others else table
     return strikes, reasons
 
 
@@ -229,25 +232,17 @@ class _Ordered(NamedTuple):
 
 
 def _ordered(strikes: Strikes) -> _Ordered:
-    rods = [made.projectile for made in strikes.values()]
-    # All rigid masses are one kind: a unit mass under the force over the mass.
-    units = [UNIT if isinstance(rod, RigidMass) else rod for rod in rods]
-    kinds = {unit: number for number, unit in enumerate(dict.fromkeys(units))}
-    kind = np.array([kinds[unit] for unit in units], dtype=np.intp)
-    order = np.argsort(kind, kind="stable")
-    mass = np.array([rod.total_mass for rod in rods])[order]
-    scale = np.where([units[row] is UNIT for row in order], mass, 1.0)
-    all_strikes = list(strikes.values())
-    ordered = [all_strikes[row] for row in order]
-    law: Law[Floats] = HystereticLaw(stacked([made.law for made in ordered]))
-    if (own := ordered[0].own_law) is not None:
-        law = CaseByCase(own, len(ordered))
-    speed = np.array([made.velocity for made in ordered])
-    numbers = list(strikes)
+    columns, numbers = columns_of(strikes), list(strikes)
+    order = np.argsort(columns.kind, kind="stable")
+    made = columns.of_cases(order)
+    own_law = strikes[numbers[0]].own_law
+    law: Law[Floats] = HystereticLaw(made.constants)
+    if own_law is not None:
+        law = CaseByCase(own_law, len(numbers))
     return _Ordered(
-        numbers=[numbers[row] for row in order],
-        hits=Hits(list(kinds), kind[order], scale, law, speed),
-        projectiles=Projectiles(mass, speed),
+        numbers=[numbers[row] for row in order.tolist()],
+        hits=Hits(made.kinds, made.kind, made.scale, law, made.velocity),
+        projectiles=Projectiles(made.mass, made.velocity),
         back=np.argsort(order),
     )
 
@@ -295,5 +290,6 @@ def _together(
     if not (judged and doubtful.any()):
         return outcome
     # Cases near the limits of a run are run in full, which accepts or rejects them.
-    full = _one_by_one(checked, measures, dict(compress(strikes.items(), doubtful)))
+    chosen = {number: strikes[number] for number in compress(strikes, doubtful)}
+    full = _one_by_one(checked, measures, chosen)
     return merge([outcome.select(np.flatnonzero(~doubtful)), *full])

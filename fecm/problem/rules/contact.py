@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from fecm._typing import Bools, Floats
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import COEFFICIENT, in_si, unit_names
@@ -35,23 +36,32 @@ REACH = 8.0  # greatest ratio to the usual radius at which a unit is named
 )
 def invalid_parameter(law: model.Indentation) -> Reports:
     """Find parameters that no contact law has."""
-    limits = [(law.k > 0.0, "positive")]
-    if law.word == model.Indentation.ACR:
-        power = law.q in (0.0, ACR_POWER)
-        limits += [
-            (law.alpha_p > 0.0, "positive"),
-            (law.s_p == 0.0, "blank or 0 with ACR, whose equation 3-7 has no such constant"),
-            (power, "blank or 2.5 with ACR, as equation 3-7 holds for no other"),
-        ]
-    else:
-        limits += [
-            (law.alpha_p >= 0.0, "0 or more"),
-            (0.0 <= law.s_p < 1.0, "at least 0 and below 1"),
-            (law.q > 0.0, "positive"),
-        ]
+    limits = limits_of(law.word, *law.values())
     for name, value, (valid, must) in zip(law.names(), law.values(), limits, strict=True):
         if not valid:
             yield Report(f"The {name} is {value:g}; it must be {must}.", law.place(name))
+
+
+def limits_of(
+    word: str, k: float | Floats, alpha_p: float | Floats, s_p: float | Floats, q: float | Floats
+) -> list[tuple[bool | Bools, str]]:
+    """Whether each value of an EXPE card is valid, and what it must be; of numbers or arrays."""
+    if word == model.Indentation.ACR:
+        return [
+            (k > 0.0, "positive"),
+            (alpha_p > 0.0, "positive"),
+            (s_p == 0.0, "blank or 0 with ACR, whose equation 3-7 has no such constant"),
+            (
+                (q == 0.0) | (q == ACR_POWER),
+                "blank or 2.5 with ACR, as equation 3-7 holds for no other",
+            ),
+        ]
+    return [
+        (k > 0.0, "positive"),
+        (alpha_p >= 0.0, "0 or more"),
+        ((s_p >= 0.0) & (s_p < 1.0), "at least 0 and below 1"),
+        (q > 0.0, "positive"),
+    ]
 
 
 @rule(

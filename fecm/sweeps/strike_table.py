@@ -1,0 +1,156 @@
+"""Strikes of many cases on one plate as columns, for sweeps whose cases take microseconds.
+
+A card, a projectile and a strike for every case would take longer than its impact.  Here values of
+cases are arrays.  Columns have only the cases whose values are certainly valid; the others get
+their strike, or the reason why they have none, one by one from :mod:`fecm.sweeps.strike`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Bools, Floats
+from fecm.deck import model
+from fecm.mechanics.contact_law import ContactParameters, Law, stacked
+from fecm.mechanics.projectile import DeckProjectile, RigidMass
+from fecm.problem.parts import constants_of
+from fecm.problem.problem import Problem
+from fecm.problem.rules.contact import limits_of
+from fecm.sweeps.case import Case, CasesError
+from fecm.sweeps.strike import Strike, strike_of
+from fecm.sweeps.values import RESIDUAL_NAMES, plate_values
+from fecm.sweeps.vary import strike
+
+UNIT = RigidMass(1.0)
+CONSTANTS = ("k", "alpha_p", "s_p", "q")
+MASSES = ("mass", "rod_mass")
+TABLED = {"velocity", "energy", *CONSTANTS, *MASSES, *RESIDUAL_NAMES}
+
+
+class StrikeColumns(NamedTuple):
+    """Strikes as arrays, (cases,) each."""
+
+    velocity: Floats
+    constants: ContactParameters[Floats]
+    kinds: list[DeckProjectile]  # of projectiles; all rigid masses are a unit mass
+    kind: NDArray[np.intp]  # places in them
+    mass: Floats
+    scale: Floats  # mass and stiffness over those of the kind
+
+    def of_cases(self, rows: NDArray[np.intp]) -> StrikeColumns:
+        """Select some cases."""
+        return StrikeColumns(
+            velocity=self.velocity[rows],
+            constants=self.constants.of_cases(rows),
+            kinds=self.kinds,
+            kind=self.kind[rows],
+            mass=self.mass[rows],
+            scale=self.scale[rows],
+        )
+
+
+class StrikeTable(Mapping[int, Strike]):
+    """Strikes by the numbers of their cases; each is made when it is asked for."""
+
+    def __init__(
+        self,
+        plate: model.Deck,
+        cases: Mapping[int, Case],
+        own_law: Law | None,
+        columns: StrikeColumns,
+    ) -> None:
+        self.plate, self.cases, self.own_law = plate, cases, own_law
+        self.columns = columns
+
+    def __getitem__(self, number: int) -> Strike:
+        return strike(self.plate, self.cases[number])._replace(own_law=self.own_law)
+
+    def __contains__(self, number: object) -> bool:
+        return number in self.cases
+
+    def __iter__(self) -> Iterator[int]:
+        return iter(self.cases)
+
+    def __len__(self) -> int:
+        return len(self.cases)
+
+
+def tabled(
+    checked: Problem, numbers: Sequence[int], cases: Sequence[Case], own_law: Law | None
+) -> Mapping[int, Strike]:
+    """Strikes of the cases whose values are certainly valid; none if columns can't hold them."""
+    own = strike_of(checked.deck)
+    names = cases[0].keys() - plate_values(cases[0]).keys()
+    if own.impact is None or own.indentation is None or not _holds(own, names):
+        return {}
+    values = {name: np.array([float(case[name]) for case in cases]) for name in names}
+    columns, valid = _columns(own, own.indentation, values, len(cases))
+    rows = np.flatnonzero(valid)
+    try:  # what does not depend on these values is the same for all
+        for row in rows[:1].tolist():
+            strike(checked.deck, cases[row]).check(checked)
+    except CasesError:
+        return {}
+    kept = {numbers[row]: cases[row] for row in rows.tolist()}
+    if len(kept) < len(cases):
+        columns = columns.of_cases(rows)
+    return StrikeTable(checked.deck, kept, own_law, columns)
+
+
+def _holds(own: Strike, names: Collection[str]) -> bool:
+    """Whether columns can hold values of these names: a rod of another mass is another kind."""
+    rigid = isinstance(own.projectile, RigidMass)
+    return TABLED.issuperset(names) and (rigid or not {*MASSES}.intersection(names))
+
+
+def _columns(
+    own: Strike, law: model.Indentation, values: Mapping[str, Floats], count: int
+) -> tuple[StrikeColumns, Bools]:
+    """Columns of cases with values by name, the others of their deck; and which are valid."""
+    projectile, rigid = own.projectile, isinstance(own.projectile, RigidMass)
+    total = next((values[name] for name in MASSES if name in values), projectile.total_mass)
+    mass = np.array(np.broadcast_to(total, count))
+    valid = mass > 0.0
+    velocity = np.array(np.broadcast_to(values.get("velocity", own.velocity), count))
+    with np.errstate(all="ignore"):
+        if "energy" in values:
+            valid &= values["energy"] >= 0.0
+            velocity = np.sqrt(2.0 * values["energy"] / mass)
+        valid &= velocity >= 0.0
+    given = [
+        np.array(np.broadcast_to(values.get(name, constant), count))
+        for name, constant in zip(CONSTANTS, law.values(), strict=True)
+    ]
+    for within, _ in limits_of(law.word, *given):
+        valid &= within
+    columns = StrikeColumns(
+        velocity=velocity,
+        constants=constants_of(law.word, *given),
+        kinds=[UNIT if rigid else projectile],
+        kind=np.zeros(count, dtype=np.intp),
+        mass=mass,
+        scale=mass if rigid else np.ones(count),
+    )
+    return columns, valid
+
+
+def columns_of(strikes: Mapping[int, Strike]) -> StrikeColumns:
+    """Columns of strikes."""
+    if isinstance(strikes, StrikeTable):
+        return strikes.columns
+    made = list(strikes.values())
+    units = [UNIT if isinstance(one.projectile, RigidMass) else one.projectile for one in made]
+    kinds = {unit: place for place, unit in enumerate(dict.fromkeys(units))}
+    mass = np.array([one.projectile.total_mass for one in made])
+    return StrikeColumns(
+        velocity=np.array([one.velocity for one in made]),
+        constants=stacked([one.law for one in made]),
+        kinds=list(kinds),
+        kind=np.array([kinds[unit] for unit in units], dtype=np.intp),
+        mass=mass,
+        scale=np.where([unit is UNIT for unit in units], mass, 1.0),
+    )
