@@ -19,17 +19,18 @@
  * A step.  The displacement of a step is known when it begins.
  *
  *   thread 0      begin_step: contact force and projectile for this displacement, records
- *   all threads   run_chunk: K u of their chunks; d and u of the next step without the contact force
+ *   all threads   run_chunk: K u of chunks that they take; d and u of the next step without the contact force
  *   thread 0      finish: forces on shared nodes, their update, the sums of all chunks
  *                 end_step: the pull of the contact force on d and u, records
  *
  * The last step of a burst leaves d and u as they are and stores s, with which the next burst moves
  * them.
  *
- * Threads.  Thread t of n takes the chunks from chunks t/n up to chunks (t + 1)/n, one after another,
- * and has a buffer of forces for the chunk in work.  They meet twice in a step: when the contact is
- * known, and when all chunks are computed.  Threads wait busily at first, as a step takes
- * microseconds, and then give the processor away.
+ * Threads.  All threads take chunks from one counter, which thread 0 sets to 0 when the contact of a
+ * step is known; each has a buffer of forces for the chunk in work.  A thread that the system does not
+ * run takes none, so that the others compute its part.  When no chunk is left, thread 0 waits until all
+ * are computed, and the others for the next step: busily for some microseconds, as a step takes no
+ * more, and then asleep, as the processor may be needed by another.
  *
  * Sums.  The force on a node is the sum over the blocks of a chunk in their order, and for shared
  * nodes the sum over the chunks in their order.  Energies are summed per chunk in four lanes, then
@@ -41,7 +42,6 @@
 #endif
 #include <math.h>
 #include <pthread.h>
-#include <sched.h>
 #include <stdatomic.h>
 #include <stddef.h>
 #include <stdint.h>
@@ -58,6 +58,12 @@
 #define PASSES 5 /* of the contact iteration */
 #define TOLERANCE 1.0e-6
 #define MOST_THREADS 64
+#define MOST_SPINS 2000 /* of a waiting thread, before it sleeps: some ten microseconds, as waking takes */
+#if defined __x86_64__ || defined __i386__
+#define PAUSE() __builtin_ia32_pause()
+#else
+#define PAUSE() atomic_signal_fence(memory_order_seq_cst)
+#endif
 
 typedef double half __attribute__((vector_size(32), aligned(8), may_alias));
 typedef struct {
@@ -170,21 +176,48 @@ typedef struct {
     half *sums;     /* (chunks, SUMS) */
     double *forces; /* (threads, nd, most): of the chunk in work, zero between chunks */
     Sums result;
-    int stop;
-    atomic_int arrived, round, ready;
+    int stop, moves;            /* moves: whether chunks move d and u on to a next step */
+    atomic_llong chunk, done;   /* the next to be taken; number of those computed */
+    atomic_int over, asleep;    /* no more steps; threads asleep */
+    pthread_mutex_t lock;       /* of the sleep */
+    pthread_cond_t begun, ended;
 } Job;
 
-/* Wait for the other threads; they give the processor away, as it may be needed by another. */
-static void meet(Job *job) {
-    if (job->threads == 1) return;
-    const int round = atomic_load(&job->round);
-    if (atomic_fetch_add(&job->arrived, 1) + 1 == job->threads) {
-        atomic_store(&job->arrived, 0);
-        atomic_fetch_add(&job->round, 1);
-        return;
+static int has_work(Job *job) { return atomic_load(&job->chunk) < job->plate->chunks || atomic_load(&job->over); }
+
+static int is_computed(Job *job) { return atomic_load(&job->done) == job->plate->chunks; }
+
+/* Wait for a state of the job; who brings it about calls wake.  Either that sees the sleeper, or the
+ * sleeper sees the state, as both write before they read. */
+static void wait_for(Job *job, int (*state)(Job *), pthread_cond_t *signal) {
+    for (int spins = 0; spins < MOST_SPINS; spins++) {
+        if (state(job)) return;
+        PAUSE();
     }
-    for (int spins = 0; atomic_load(&job->round) == round; spins++)
-        if (spins > 1000) sched_yield();
+    pthread_mutex_lock(&job->lock);
+    atomic_fetch_add(&job->asleep, 1);
+    while (!state(job)) pthread_cond_wait(signal, &job->lock);
+    atomic_fetch_sub(&job->asleep, 1);
+    pthread_mutex_unlock(&job->lock);
+}
+
+static void wake(Job *job, pthread_cond_t *signal) {
+    if (!atomic_load(&job->asleep)) return;
+    pthread_mutex_lock(&job->lock);
+    pthread_cond_broadcast(signal);
+    pthread_mutex_unlock(&job->lock);
+}
+
+/* Compute chunks while there are any. */
+static void take_chunks(Job *job, int64_t thread) {
+    const Plate *p = job->plate;
+    double *forces = job->forces + thread * p->nd * p->most;
+    for (;;) {
+        const int64_t c = atomic_fetch_add(&job->chunk, 1);
+        if (c >= p->chunks) return;
+        CHOSEN(run_chunk)(p, c, job->moves, forces, job->sums + SUMS * c);
+        if (atomic_fetch_add(&job->done, 1) + 1 == p->chunks && thread) wake(job, &job->ended);
+    }
 }
 
 /* Take the step of the plate without K u: the displacement under the last internal force. */
@@ -261,19 +294,18 @@ static void end_step(Job *job, int64_t number, int next) {
     row[QUADRATIC] = job->result.quadratic;
 }
 
-static void take_steps(Job *job, int64_t thread) {
-    const Plate *p = job->plate;
-    const int64_t first = p->chunks * thread / job->threads, end = p->chunks * (thread + 1) / job->threads;
+static void take_steps(Job *job) {
     for (int64_t step = 0; step < job->steps; step++) {
         const int next = step + 1 < job->steps;
-        if (!thread && job->impact) begin_step(job, step);
-        meet(job);
+        if (job->impact) begin_step(job, step);
         if (job->stop) return;
-        double *forces = job->forces + thread * p->nd * p->most;
-        for (int64_t c = first; c < end; c++) CHOSEN(run_chunk)(p, c, next, forces, job->sums + SUMS * c);
-        meet(job);
-        if (thread) continue;
-        job->result = CHOSEN(finish)(p, next, job->sums);
+        job->moves = next;
+        atomic_store(&job->done, 0);
+        atomic_store(&job->chunk, 0);
+        if (job->threads > 1) wake(job, &job->begun);
+        take_chunks(job, 0);
+        wait_for(job, is_computed, &job->ended);
+        job->result = CHOSEN(finish)(job->plate, next, job->sums);
         if (job->impact) end_step(job, step, next);
         job->taken = step + 1;
     }
@@ -286,8 +318,8 @@ typedef struct {
 
 static void *thread_main(void *given) {
     Share *share = given;
-    while (!atomic_load(&share->job->ready)) sched_yield();
-    take_steps(share->job, share->thread);
+    Job *job = share->job;
+    while (wait_for(job, has_work, &job->begun), !atomic_load(&job->over)) take_chunks(job, share->thread);
     return NULL;
 }
 
@@ -296,14 +328,22 @@ static void carry_out(Job *job) {
     pthread_t others[MOST_THREADS];
     Share shares[MOST_THREADS];
     const int64_t wanted = job->threads;
+    pthread_mutex_init(&job->lock, NULL);
+    pthread_cond_init(&job->begun, NULL);
+    pthread_cond_init(&job->ended, NULL);
+    atomic_store(&job->chunk, job->plate->chunks);
     for (job->threads = 1; job->threads < wanted; job->threads++) {
         const int64_t i = job->threads;
         shares[i] = (Share){job, i};
         if (pthread_create(others + i, NULL, thread_main, shares + i)) break;
     }
-    atomic_store(&job->ready, 1);
-    take_steps(job, 0);
+    take_steps(job);
+    atomic_store(&job->over, 1);
+    wake(job, &job->begun);
     for (int64_t i = 1; i < job->threads; i++) pthread_join(others[i], NULL);
+    pthread_cond_destroy(&job->ended);
+    pthread_cond_destroy(&job->begun);
+    pthread_mutex_destroy(&job->lock);
 }
 
 /* Allocate the memory of a job and carry it out; returns 0 if there is not enough memory. */
