@@ -288,8 +288,8 @@ def run(
     solver : str
         How K·u is computed: ``"auto"`` depends on the mesh, ``"csr"`` uses a sparse matrix.
     threads : int
-        Threads that share the work of a step; 0 uses every core for a large mesh.  The result does
-        not depend on it.
+        Threads that share the work of a step; 0 takes as many for a large mesh as other work leaves
+        processors free.  The result does not depend on it.
     rod_mass : str
         The projectile's mass matrix: ``"lumped"`` as in the report's program, or ``"consistent"``.
     rod_integrator : str

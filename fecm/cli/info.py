@@ -42,8 +42,8 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
     import h5py
     import scipy
 
+    from fecm._processors import available
     from fecm.mechanics import kernels
-    from fecm.mechanics.stiffness_product import available
 
     for name, text in (
         ("fecm", __version__),

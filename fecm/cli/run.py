@@ -170,7 +170,8 @@ class Job(NamedTuple):
     type=click.IntRange(0, 1024),
     default=0,
     metavar="N",
-    help="Threads that share the work of a step; 0 uses every core for a large mesh.  [default: 0]",
+    help="Threads that share the work of a step; 0 takes as many for a large mesh as "
+    "other work leaves processors free.  [default: 0]",
 )
 @option(
     "--rod-mass",

@@ -112,7 +112,7 @@ class Options:
     overwrite: bool
     model: str | None
     modes: int | None
-    workers: int
+    workers: int | None
     scheduler: str | None
     scheduler_file: Path | None
     allow_failed: bool
@@ -139,7 +139,7 @@ class Options:
         if (self.find is None) != (self.until is None):
             raise click.UsageError("--find velocity and --until QUANTITY=VALUE belong together")
         scheduled = (self.scheduler is not None) + (self.scheduler_file is not None)
-        if (self.workers > 1) + scheduled > 1:
+        if ((self.workers or 1) > 1) + scheduled > 1:
             raise click.UsageError("give only one of --workers, --scheduler and --scheduler-file")
         if self.full and self.find:
             raise click.UsageError("--full runs given velocities: --vary velocity=FOUND --full 0")
@@ -274,10 +274,9 @@ class Options:
 @option(
     "--workers",
     type=click.IntRange(1, 1024),
-    default=1,
-    show_default=True,
     metavar="N",
-    help="Worker processes on this machine.",
+    help="Worker processes on this machine.  [default: if the sweep takes more than some seconds, "
+    "as many as other work leaves processors free]",
 )
 @option(
     "--scheduler",
@@ -336,7 +335,7 @@ def sweep(options: Options) -> None:
         told = cost(cases, design, shared=shared, motions=motions)
         note(*filter(None, (doubt(design), told)))
     here = options.workers if scheduler is None else 0
-    check_memory(problem, planned, here, streamed=True)
+    check_memory(problem, planned, 1 if here is None else here, streamed=True)
     if count := freed(tasks(problem, planned)):
         note(
             f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the deck "
@@ -422,7 +421,7 @@ def _carry_out(
     problem: Problem,
     planned: Plan,
     parts: PartialResults,
-    workers: int,
+    workers: int | None,
     scheduler: str | None,
 ) -> SweepResult:
     """Run the plan with a progress bar; finished cases survive any interruption."""
@@ -430,8 +429,9 @@ def _carry_out(
 
     def rate(_: object) -> str:
         seconds = time.monotonic() - begin
-        per_core = finished / seconds / workers if seconds else 0.0
-        return f"{per_core:.3g} cases a second per worker" if finished else ""
+        per_core = finished / seconds / (workers or 1) if seconds else 0.0
+        of_each = "" if workers is None else " per worker"
+        return f"{per_core:.3g} cases a second{of_each}" if finished else ""
 
     def done(task: Task, outcome: Outcome) -> None:
         nonlocal finished

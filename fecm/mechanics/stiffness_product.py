@@ -11,7 +11,6 @@ number of threads.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING, TypeVar
 
@@ -36,13 +35,6 @@ SOLVERS = AUTO, KERNELS, NUMPY, CSR = "auto", "kernels", "numpy", "csr"
 SAFE = 0.9
 
 T = TypeVar("T")
-
-
-def available() -> int:
-    """Cores that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 class Workers:

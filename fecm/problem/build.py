@@ -9,6 +9,7 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._frozen import frozen
+from fecm._processors import free
 from fecm._typing import Bools, Indices
 from fecm.deck import model
 from fecm.deck.macros import flat, moves_only
@@ -27,7 +28,7 @@ from fecm.mechanics.ply_stresses import FailureMonitor, PlyStresses
 from fecm.mechanics.points import GageArray, gages
 from fecm.mechanics.projectile import STEPS, Projectile, RodMethod, Transducer
 from fecm.mechanics.residual_stresses import Residual
-from fecm.mechanics.stiffness_product import AUTO, CSR, KERNELS, SOLVERS, Workers, available
+from fecm.mechanics.stiffness_product import AUTO, CSR, KERNELS, SOLVERS, Workers
 from fecm.mechanics.strains import StrainField
 from fecm.mechanics.stretching import Stretching
 from fecm.mechanics.symmetry import restrain_resting_dofs, symmetry_reduction
@@ -58,8 +59,8 @@ class RunOptions:
     # Computation of K·u, one of ``SOLVERS``: compiled kernels where there are any, else NumPy; or
     # one of them; or a sparse matrix.
     solver: str = AUTO
-    # Threads that share the work of a step; 0 takes every core for a large mesh.  The result does
-    # not depend on it.
+    # Threads that share the work of a step; 0 takes as many for a large mesh as other work leaves
+    # processors free.  The result does not depend on it.
     threads: int = 0
     rod_method: RodMethod = field(default_factory=RodMethod)  # the rod's mass matrix and integrator
     # Error of the energy balance, relative to the supplied energy, that ends a run without slips.
@@ -222,7 +223,7 @@ def _motion(
     if moves_only(problem.program) and chosen.solver != CSR:
         reduced = symmetry_reduction(mobile, problem.contact)
     count = mobile.neq if reduced is None else reduced.count
-    workers = Workers(chosen.threads or (available() if count >= WORTH_SHARING else 1))
+    workers = Workers(chosen.threads or (free() if count >= WORTH_SHARING else 1))
     return PlateMotion(mobile, chosen.solver, reduced, workers, problem.damping), workers
 
 

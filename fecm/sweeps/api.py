@@ -6,6 +6,7 @@ import pickle
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -15,6 +16,8 @@ from numpy.typing import ArrayLike
 
 from fecm._errors import warn
 from fecm._files import ARGUMENT, check_outputs
+from fecm._memory import NotEnoughMemoryError
+from fecm._processors import free
 from fecm._progress import once_a_minute
 from fecm.api import LOGGER, LoadedDeck, Progress, load_deck
 from fecm.deck.findings import DeckError
@@ -118,7 +121,7 @@ def carry_out(
     problem: Problem,
     made: Plan,
     *,
-    workers: int = 1,
+    workers: int | None = 1,
     scheduler: object = None,
     executor: Executor | None = None,
     parts: PartialResults | None = None,
@@ -128,6 +131,8 @@ def carry_out(
 ) -> SweepResult:
     """Run the tasks of a plan in this process, on an executor, a scheduler or several workers.
 
+    Without a number of workers, tasks begin in this process, see
+    :func:`~fecm.sweeps.schedule.here_first`.
     Tasks that `parts` has stored are not run again; with it, the result has no forces.  `done` is
     called with each task and its outcome, including tasks finished earlier, `idle` regularly,
     `note` with messages for the user.  Raises SchedulerError if the scheduler cannot be used, and
@@ -136,6 +141,7 @@ def carry_out(
     run = partial(
         _outcomes,
         workers=workers,
+        most_workers=partial(_most_workers, problem, made, streamed=parts is not None),
         scheduler=scheduler,
         executor=executor,
         parts=parts,
@@ -158,7 +164,8 @@ def carry_out(
 def _outcomes(
     whole: Sequence[Task],
     *,
-    workers: int,
+    workers: int | None,
+    most_workers: Callable[[], int],
     scheduler: object,
     executor: Executor | None,
     parts: PartialResults | None,
@@ -192,13 +199,22 @@ def _outcomes(
         schedule.on_executor(left, executor, keep, idle)
     elif scheduler is not None:
         schedule.on_dask(left, scheduler, keep, idle)
+    elif workers is None:
+        schedule.here_first(left, most_workers, keep, idle)
     elif workers > 1 and len(left) > 1:
         schedule.on_workers(left, workers, keep, idle)
     else:
-        for task in left:
-            idle()
-            keep(task, schedule.attempt(task))
+        schedule.here(left, keep, idle)
     return outcomes
+
+
+def _most_workers(problem: Problem, made: Plan, *, streamed: bool) -> int:
+    """Worker processes for which processors and memory are free."""
+    for count in range(free(), 1, -1):
+        with suppress(NotEnoughMemoryError):
+            check_memory(problem, made, count, streamed=streamed)
+            return count
+    return 1
 
 
 def sweep(
@@ -220,7 +236,7 @@ def sweep(
     measure: MeasureFunction | str | Sequence[str] | None = None,
     model: Literal["reduced"] | None = None,
     modes: int | None = None,
-    workers: int = 1,
+    workers: int | None = 1,
     scheduler: object = None,
     executor: Executor | None = None,
     output: str | Path | None = None,
@@ -286,8 +302,9 @@ def sweep(
         runs; :attr:`SweepResult.reduced` has its differences from three of these.
     modes : int, optional
         Number of bending modes of that model; 21 by default.
-    workers : int
-        Worker processes on this machine.  With more than 1, a script needs
+    workers : int or None
+        Worker processes on this machine.  None: if the sweep takes more than some seconds, as many
+        as other work leaves processors free.  With None or more than 1, a script needs
         ``if __name__ == "__main__"``.
     scheduler : str, distributed.Client or cluster, optional
         Dask scheduler, by its address or by an object of Dask (requires dask.distributed).
@@ -373,8 +390,9 @@ def sweep(
         made = random_cases(drawn, made)
         if text := doubt(drawn):
             warn(text)
-    if workers > 1 or isinstance(executor, ProcessPoolExecutor):
-        _check_sendable(workers > 1, build=build, measure=own, law=own_contact)
+    spawns = (workers is None and scheduler is None and executor is None) or (workers or 1) > 1
+    if spawns or isinstance(executor, ProcessPoolExecutor):
+        _check_sendable(spawns, build=build, measure=own, law=own_contact)
     prepared = _prepared(deck, build, made)
     if output is not None:
         check_outputs([Path(output)], overwrite, [Path(prepared.source)], allowed_by=ARGUMENT)
@@ -397,7 +415,7 @@ def sweep(
     check_draws(planned)
     for text in doubtful_values(problem, made) if build is None else ():
         warn(text)
-    here = workers if executor is None else getattr(executor, "_max_workers", 0)
+    here = workers or 1 if executor is None else getattr(executor, "_max_workers", 0)
     check_memory(problem, planned, 0 if scheduler is not None else here)
     LOGGER.info("%s: %d cases", problem.deck.title, len(made))
     result = carry_out(
@@ -451,11 +469,11 @@ def modes_of(model: str | None, modes: int | None) -> int | None:
     return MODES if modes is None else modes
 
 
-def _check_means(workers: int, scheduler: object, executor: object) -> None:
+def _check_means(workers: int | None, scheduler: object, executor: object) -> None:
     """Raise CasesError if more than one of the means to run cases is given."""
     if executor is not None and not isinstance(executor, Executor):
         raise CasesError(f"executor is {executor!r}, not a concurrent.futures.Executor")
-    if (workers > 1) + (scheduler is not None) + (executor is not None) > 1:
+    if ((workers or 1) > 1) + (scheduler is not None) + (executor is not None) > 1:
         raise CasesError("give only one of workers, scheduler and executor")
 
 

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import time
 
+from fecm._processors import free
 from fecm.problem.problem import Problem
 from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.find_in_full import USUAL
 from fecm.sweeps.in_full import alone
 from fecm.sweeps.plan import Plan, tasks
+from fecm.sweeps.schedule import WORTH_WORKERS
 from fecm.sweeps.timing import duration_of, lengthened
 from fecm.sweeps.values import REFINE
 
@@ -20,10 +22,11 @@ ENOUGH = 0.1
 UNITS = ((3600.0, "h"), (60.0, "min"), (1.0, "s"))
 
 
-def expected(problem: Problem, made: Plan, workers: int) -> str:
+def expected(problem: Problem, made: Plan, workers: int | None) -> str:
     """Say how many full runs the cases of a plan take, and about how long.
 
-    The time is that of `workers` on this machine; 0 if a cluster runs the cases.
+    The time is that of `workers` on this machine; 0 if a cluster runs the cases, None if their
+    number depends on the time.
     """
     count = len(made.cases)
     cases = f"{count} case{'' if count == 1 else 's'}"
@@ -45,6 +48,8 @@ def expected(problem: Problem, made: Plan, workers: int) -> str:
     duration = duration_of(problem)
     steps = sum(_full_steps(case, duration, problem.work.steps) for case in chosen)
     seconds = each * (begin * count + step * steps)
+    if workers is None:
+        workers = free() if seconds >= WORTH_WORKERS else 1
     where = f" by {workers} workers" if workers > 1 else ""
     if not workers:
         where = " of computation"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import os
+import pickle
 import socket
 import threading
 import time
@@ -16,7 +17,6 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent import futures
 from contextlib import nullcontext
 from pathlib import Path
-from pickle import PicklingError
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -30,6 +30,7 @@ from fecm.sweeps.plan import Task
 Done = Callable[[Task, Outcome], None]
 Idle = Callable[[], None]  # called regularly while workers run, to handle signals
 DEATHS = 3  # of workers without a finished task, after which the remaining tasks count as lost
+WORTH_WORKERS = 10.0  # seconds that tasks take, from which on workers are worth their start
 LOOK = 0.5  # polling interval in seconds
 PATIENCE = 5.0  # seconds for the scheduler to answer
 LOST = "lost with its worker"
@@ -68,7 +69,7 @@ def _run_on(
         for task in tasks:
             try:
                 running[executor.submit(attempt, task)] = task
-            except (RuntimeError, TypeError, PicklingError) as error:
+            except (RuntimeError, TypeError, pickle.PicklingError) as error:
                 raise SchedulerError(f"the executor takes no tasks: {error}") from None
         while running:
             idle()
@@ -77,6 +78,41 @@ def _run_on(
     finally:
         for future in running:
             future.cancel()
+
+
+def here(tasks: Sequence[Task], done: Done, idle: Idle) -> None:
+    """Run tasks in this process."""
+    for task in tasks:
+        idle()
+        done(task, attempt(task))
+
+
+def here_first(
+    tasks: Sequence[Task], most_workers: Callable[[], int], done: Done, idle: Idle
+) -> None:
+    """Run tasks in this process, but on workers those that take longer than workers to start.
+
+    `most_workers` gives the largest number of workers.
+    """
+    begin = time.monotonic()
+    for count, task in enumerate(tasks):
+        left = tasks[count:]
+        expected = len(left) * (time.monotonic() - begin) / max(1, count)
+        worth = expected >= WORTH_WORKERS and _can_be_sent(task)
+        workers = min(most_workers(), len(left)) if worth else 1
+        if workers > 1:
+            on_workers(left, workers, done, idle)
+            return
+        here([task], done, idle)
+
+
+def _can_be_sent(task: Task) -> bool:
+    """Whether another process can get a task, whose contact law may be any object."""
+    try:
+        pickle.dumps(task)
+    except Exception:  # pickle raises several types
+        return False
+    return True
 
 
 def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> None:
