@@ -139,33 +139,11 @@ def summarise(
     Values that the end of a case has not decided are NaN: if it ends in contact everything except
     the peaks, and the peaks too unless the projectile leaves and they have passed.
     """
-    cases = force.shape[1]
-    mass, velocity = (np.broadcast_to(v, cases) for v in projectiles)
-    if cases > PART:
-        parts = []
-        for some in (slice(start, start + PART) for start in range(0, cases, PART)):
-            depths = Indentation(*(values[some] for values in indentation))
-            own = Projectiles(mass[some], velocity[some])
-            parts.append(summarise(force[:, some], times, depths, own, threshold, mobility))
-        return Metrics(
-            {n: np.concatenate([part.columns[n] for part in parts]) for n in parts[0].columns},
-            np.concatenate([part.end for part in parts]),
-            np.concatenate([part.reached for part in parts]),
-        )
-    force = np.ascontiguousarray(force.T)
-    dt = np.diff(times, prepend=0.0)
-    touching = force > 0.0
-    begins = touching.copy()
-    begins[:, 1:] &= ~touching[:, :-1]
-    last = len(times) - 1 - np.argmax(touching[:, ::-1], axis=1)
-    peak = np.argmax(force, axis=1)
-    met = touching.any(axis=1)
-    # The force is linear between steps, and 0 before the first.  These sums are the same for a case
-    # with any others.
-    impulse = (0.5 * (dt + np.append(dt[1:], 0.0)) * force).sum(axis=1)
+    found = _from_forces(force, times, threshold)
+    mass, velocity = (np.broadcast_to(v, force.shape[1]) for v in projectiles)
+    impulse, reached, met = found.impulse, found.reached, found.met
     rebound = impulse / mass - velocity
-    reached = force.max(axis=1)
-    end = ends(force[:, -1], reached, rebound + mobility * impulse, velocity)
+    end = ends(found.last, reached, rebound + mobility * impulse, velocity)
     finished, known = over(end), peak_known(end)
 
     def where(mask: Bools, values: Floats) -> Floats:
@@ -173,10 +151,10 @@ def summarise(
 
     columns = {
         "peak_force": where(known, reached),
-        "time_of_peak": where(known & met, times[peak]),
-        "contacts": where(finished, begins.sum(axis=1).astype(float)),
-        "contact_time": where(finished, (dt * touching).sum(axis=1)),
-        "last_contact": where(finished & met, times[last]),
+        "time_of_peak": where(known & met, found.time_of_peak),
+        "contacts": where(finished, found.contacts),
+        "contact_time": where(finished, found.contact_time),
+        "last_contact": where(finished & met, found.last_contact),
         "max_indentation": decided(indentation.largest, indentation.last, end),
         "permanent_indentation": where(finished, indentation.permanent),
         "impulse": where(finished, impulse),
@@ -184,10 +162,61 @@ def summarise(
         "energy_absorbed": where(finished, 0.5 * mass * (velocity**2 - rebound**2)),
     }
     if threshold is not None:
+        columns["threshold_force"] = np.full(len(reached), threshold)
+        columns["threshold_margin"] = where(known, 1.0 - reached / threshold)
+        columns["threshold_time"] = found.threshold_time
+        columns["time_above"] = where(finished, found.time_above)
+    return Metrics(columns, end, reached)
+
+
+class _OfForces(NamedTuple):
+    """What the contact forces of cases tell alone, (cases,) each."""
+
+    impulse: Floats
+    reached: Floats  # largest force
+    last: Floats  # the last one
+    met: Bools  # whether there is a contact
+    time_of_peak: Floats
+    contacts: Floats
+    contact_time: Floats
+    last_contact: Floats  # time; meaningless without a contact
+    threshold_time: Floats  # NaN without a threshold, or where it is not reached
+    time_above: Floats
+
+
+def _from_forces(force: Floats, times: Floats, threshold: float | None) -> _OfForces:
+    """Evaluate contact forces (steps, cases), so many cases at a time as stay in the cache."""
+    starts = range(0, force.shape[1], PART)
+    parts = [_of_part(force[:, n : n + PART], times, threshold) for n in starts]
+    if len(parts) == 1:
+        return parts[0]
+    return _OfForces(*map(np.concatenate, zip(*parts, strict=True)))
+
+
+def _of_part(force: Floats, times: Floats, threshold: float | None) -> _OfForces:
+    force = np.ascontiguousarray(force.T)
+    dt = np.diff(times, prepend=0.0)
+    touching = force > 0.0
+    begins = touching.copy()
+    begins[:, 1:] &= ~touching[:, :-1]
+    last = len(times) - 1 - np.argmax(touching[:, ::-1], axis=1)
+    threshold_time = time_above = np.full(len(force), np.nan)
+    if threshold is not None:
         above = force >= threshold
         first = times[np.argmax(above, axis=1)]
-        columns["threshold_force"] = np.full(len(force), threshold)
-        columns["threshold_margin"] = where(known, 1.0 - reached / threshold)
-        columns["threshold_time"] = np.where(above.any(axis=1), first, np.nan)
-        columns["time_above"] = where(finished, (dt * above).sum(axis=1))
-    return Metrics(columns, end, reached)
+        threshold_time = np.where(above.any(axis=1), first, np.nan)
+        time_above = (dt * above).sum(axis=1)
+    return _OfForces(
+        # The force is linear between steps, and 0 before the first.  These sums are the same for a
+        # case with any others.
+        impulse=(0.5 * (dt + np.append(dt[1:], 0.0)) * force).sum(axis=1),
+        reached=force.max(axis=1),
+        last=force[:, -1],
+        met=touching.any(axis=1),
+        time_of_peak=times[np.argmax(force, axis=1)],
+        contacts=begins.sum(axis=1).astype(float),
+        contact_time=(dt * touching).sum(axis=1),
+        last_contact=times[last],
+        threshold_time=threshold_time,
+        time_above=time_above,
+    )

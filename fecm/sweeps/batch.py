@@ -45,10 +45,14 @@ from fecm.sweeps.plan import Measure, Plan, Settings, Task, shares_plate
 from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
 from fecm.sweeps.responses import Hits, Impacts, impacts, largest_sums, plate_response
 from fecm.sweeps.strike import Strike
-from fecm.sweeps.strike_table import columns_of, tabled
+from fecm.sweeps.strike_table import columns_of, split, tabled
 from fecm.sweeps.timing import Clock, lengthened, with_clock
 from fecm.sweeps.values import plate_values
 from fecm.sweeps.vary import apply_case, strike
+
+# Contact forces that are computed before they are evaluated, where none are stored: 16 MB, which
+# the C library keeps for the next ones and does not give back to the system.
+FORCES = 2_000_000
 
 
 def run(task: Task) -> Outcome:
@@ -257,6 +261,9 @@ def _together(
 ) -> Outcome:
     """Run cases of a plate; if judged, those with doubtful energies in full."""
     steps, dt = plate.steps, plate.dt
+    if not history and len(strikes) > (most := max(1, FORCES // steps)):
+        run_some = partial(_together, checked, plate, measures, history, judged=judged)
+        return merge([run_some(some) for some in split(strikes, most)], history=False)
     require(ADVANCED_BYTES * steps * len(strikes), f"{len(strikes)} cases of {steps} steps")
     with np.errstate(all="ignore"):
         ordered = _ordered(strikes)

@@ -78,6 +78,12 @@ class StrikeTable(Mapping[int, Strike]):
     def __len__(self) -> int:
         return len(self.cases)
 
+    def part(self, start: int, numbers: Sequence[int]) -> StrikeTable:
+        """The strikes of successive cases, given by their first row and their numbers."""
+        rows = np.arange(start, start + len(numbers))
+        cases = {number: self.cases[number] for number in numbers}
+        return StrikeTable(self.plate, cases, self.own_law, self.columns.of_cases(rows))
+
 
 def tabled(
     checked: Problem, numbers: Sequence[int], cases: Sequence[Case], own_law: Law | None
@@ -154,3 +160,14 @@ def columns_of(strikes: Mapping[int, Strike]) -> StrikeColumns:
         mass=mass,
         scale=np.where([unit is UNIT for unit in units], mass, 1.0),
     )
+
+
+def split(strikes: Mapping[int, Strike], most: int) -> Iterator[Mapping[int, Strike]]:
+    """Parts of strikes, of at most so many cases."""
+    numbers = list(strikes)
+    for start in range(0, len(numbers), most):
+        some = numbers[start : start + most]
+        if isinstance(strikes, StrikeTable):
+            yield strikes.part(start, some)
+        else:
+            yield {number: strikes[number] for number in some}

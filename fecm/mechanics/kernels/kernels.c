@@ -142,10 +142,12 @@ __attribute__((constructor)) static void ask_processor(void) {
 #define INLINE static inline __attribute__((always_inline, target("avx2,fma")))
 #define TARGET static __attribute__((target("avx2,fma")))
 #define ROOT(x) ((half)_mm256_sqrt_pd((__m256d)(x)))
+#define ANY(x) (!_mm256_testz_si256((__m256i)(x), (__m256i)(x)))
 #include "plate.h"
 #include "sweep.h"
 #include "failure.h"
 #undef ROOT
+#undef ANY
 #undef NAME
 #undef INLINE
 #undef TARGET
@@ -157,6 +159,7 @@ __attribute__((constructor)) static void ask_processor(void) {
 #define INLINE static inline __attribute__((always_inline))
 #define TARGET static
 #define ROOT(x) ((half){sqrt((x)[0]), sqrt((x)[1]), sqrt((x)[2]), sqrt((x)[3])})
+#define ANY(x) (((x)[0] | (x)[1] | (x)[2] | (x)[3]) != 0)
 #ifdef HAS_AVX2_CODE
 #pragma GCC push_options
 #pragma GCC optimize("O1") /* for few processors; more takes GCC as long as all the rest */

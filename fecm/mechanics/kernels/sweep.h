@@ -21,7 +21,7 @@
 
 INLINE half NAME(choose)(mask where, half a, half b) { return (half)((where & (mask)a) | (~where & (mask)b)); }
 INLINE half NAME(size)(half x) { return (half)((mask)x & INT64_MAX); }
-INLINE int NAME(any)(mask where) { return (where[0] | where[1] | where[2] | where[3]) != 0; }
+INLINE int NAME(any)(mask where) { return ANY(where); }
 
 /* Fourier transform of 2 FAR numbers (re, im); frequencies are in bit-reversed order. */
 INLINE void NAME(transform)(half *z, const double *turn) {
@@ -75,6 +75,22 @@ INLINE void NAME(add_product)(const double *g, const double *h, const half *f, h
     sum[0] -= g[1] * im, sum[1] += g[0] * im, opposite[0] += h[1] * im, opposite[1] -= h[0] * im;
 }
 
+/* Spectrum of those sums at a place and those after it, and at the opposite place and those before it. */
+INLINE void NAME(far_places)(const Response *r, int64_t block, int64_t used, int first, int last, const int places) {
+    half sum[2][2] = {{{0}}}, opposite[2][2] = {{{0}}};
+    for (int64_t k = 0; k < used; k++) {
+        const double *g = r->filter + (block - 1 - r->used[k]) * SPACED;
+        const half *f = r->spectra + r->used[k] * SPACED;
+        for (int i = 0; i < places; i++)
+            NAME(add_product)(g + 2 * (first + i), g + 2 * (last - i), f + 2 * (first + i), sum[i], opposite[i]);
+    }
+    for (int i = 0; i < places; i++) {
+        half *at = r->work + 2 * (first + i), *to = r->work + 2 * (last - i);
+        at[0] = sum[i][0], at[1] = sum[i][1];
+        to[0] = opposite[i][0], to[1] = opposite[i][1];
+    }
+}
+
 /* Sums over the forces of earlier blocks, (FAR, 2), in `work`; `used` of them have forces other than 0. */
 INLINE void NAME(far_sums)(const Response *r, int64_t block, int64_t used) {
     half *z = r->work;
@@ -95,17 +111,10 @@ INLINE void NAME(far_sums)(const Response *r, int64_t block, int64_t used) {
         }
         z[2 * place] = sum[0], z[2 * place + 1] = sum[1];
     }
-    for (int n = 2; n < 2 * FAR; n *= 2)
-        for (int first = n, last = 2 * n - 1; first < last; first++, last--) {
-            half sum[2] = {{0}}, opposite[2] = {{0}};
-            for (int64_t k = 0; k < used; k++) {
-                const double *g = r->filter + (block - 1 - r->used[k]) * SPACED;
-                const half *f = r->spectra + r->used[k] * SPACED;
-                NAME(add_product)(g + 2 * first, g + 2 * last, f + 2 * first, sum, opposite);
-            }
-            z[2 * first] = sum[0], z[2 * first + 1] = sum[1];
-            z[2 * last] = opposite[0], z[2 * last + 1] = opposite[1];
-        }
+    NAME(far_places)(r, block, used, 2, 3, 1);
+    for (int n = 4; n < 2 * FAR; n *= 2)
+        for (int first = n, last = 2 * n - 1; first < last; first += 2, last -= 2)
+            NAME(far_places)(r, block, used, first, last, 2);
     NAME(restore)(z, r->turn);
 }
 
@@ -151,6 +160,8 @@ INLINE half NAME(curve)(const half *m, half a) {
 /* Motion of the modes of four projectiles after some steps under forces on the tip. */
 INLINE void NAME(move_modes)(const Sweep *x, const Response *r, const half *applied, int steps) {
     const int64_t n = x->modes;
+    int pushed = 0;
+    for (int step = 0; step < steps && !pushed; step++) pushed = NAME(any)(applied[step] != 0.0);
     for (int64_t i = 0; i < n; i++) {
         half *y = r->motion + 3 * i;
         if (steps < CHECKED) {
@@ -165,7 +176,7 @@ INLINE void NAME(move_modes)(const Sweep *x, const Response *r, const half *appl
         }
         const double *P = r->power + 9 * i, *g = r->reach + 3 * CHECKED * i;
         half sum[4][3] = {{{0}}};
-        for (int step = 0; step < CHECKED; step += 4, g += 12)
+        for (int step = 0; step < CHECKED && pushed; step += 4, g += 12)
             for (int part = 0; part < 4; part++)
                 for (int row = 0; row < 3; row++) sum[part][row] += g[3 * part + row] * applied[step + part];
         const half q = y[0], v = y[1], a = y[2];
