@@ -6,8 +6,9 @@ The report's plate over 800 µs (4000 steps) is hit at 40 velocities with 25 con
 ``fecm sweep`` in a process of its own, from its start to its end, and the same with ``--history``.
 Every 50th case is run in full by ``fecm.run``; what is compared is the contact force of every step,
 over the peak force.  The plain loop is that of run.py, once, times 1000.
-`--many` also runs 10^5 cases, and 100 layups at 100 velocities; their processor times are compared
-with those of a full run by NumPy and of a sweep by NumPy, measured in turns.
+`--many` also runs 10^5 cases of a grid, 10^5 random ones, and 100 layups at 100 velocities; their
+processor times are compared with those of a full run by NumPy and of a sweep by NumPy, measured in
+turns.
 `--write` keeps the figures in benchmarks/results, under the machine's name.
 """
 
@@ -43,6 +44,10 @@ STEPS = 4000
 EVERY = 50
 MANY = ("--vary", "velocity=50:300:400", "--vary", "k=1e6:3e6:250")
 MANY_CASES = 100_000
+RANDOM = (
+    *("--random", "velocity=normal:115,10", "--random", "k=lognormal:1.9e6,0.15"),
+    *("--samples", str(MANY_CASES), "--workers", "1"),
+)
 LAYUPS = ",".join(f"[{angle}/{angle + 45}]5s" for angle in range(100))
 LAYERS = ("--vary", f"layup={LAYUPS}", "--vary", "velocity=50:300:100")
 
@@ -152,6 +157,7 @@ def throughput() -> dict[str, float | int]:
         runs += [here(lambda: fecm.run(report(), solver="numpy")) for _ in range(ROUNDS)]
         many = processor(path, MANY)
         peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss / 1024
+        drawn = processor(path, RANDOM)
         runs += [here(lambda: fecm.run(report(), solver="numpy")) for _ in range(ROUNDS)]
         layers = processor(path, LAYERS)
         runs += [here(lambda: fecm.run(report(), solver="numpy")) for _ in range(ROUNDS)]
@@ -159,6 +165,7 @@ def throughput() -> dict[str, float | int]:
     return {
         "many_cases": MANY_CASES,
         "many_cases_a_cpu_second": round(MANY_CASES / many),
+        "random_cases_a_cpu_second": round(MANY_CASES / drawn),
         "many_peak_memory_mb": round(peak, 1),
         "layups_cpu_seconds": round(layers, 2),
         "numpy_run_cpu_seconds": round(alone, 3),
