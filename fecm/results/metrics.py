@@ -212,7 +212,7 @@ def _of_part(force: Floats, times: Floats, threshold: float | None) -> _OfForces
         impulse=(0.5 * (dt + np.append(dt[1:], 0.0)) * force).sum(axis=1),
         reached=force.max(axis=1),
         last=force[:, -1],
-        met=touching.any(axis=1),
+        met=np.asarray(touching.any(axis=1)),
         time_of_peak=times[np.argmax(force, axis=1)],
         contacts=begins.sum(axis=1).astype(float),
         contact_time=(dt * touching).sum(axis=1),
