@@ -12,11 +12,12 @@ import fecm
 from fecm.deck.model import Allowables, Ply
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.failure import CRITERIA, exposure_of
+from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.mechanics.interpolation import interpolate
 from fecm.mechanics.laminate import laminate
 from fecm.mechanics.mesh import element_blocks
 from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.ply_stresses import FailureMonitor, PlyStresses
+from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.results.sinks import MemorySink
 from fecm.simulation.run import simulate
 from fecm.sweeps.in_full import without_output

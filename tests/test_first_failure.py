@@ -13,7 +13,8 @@ from fecm.api import load_deck
 from fecm.deck.model import Allowables
 from fecm.mechanics.exposures import OutsideLoad
 from fecm.mechanics.failure import CRITERIA, exposure_of
-from fecm.mechanics.ply_stresses import FailureEnvelope, Maxima, PlyStresses
+from fecm.mechanics.failure_monitor import FailureEnvelope, Maxima
+from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.results.exposures import evaluations_in_contact
 from fecm.results.first_failure import first_failures
 from fecm.results.result import Result

@@ -22,6 +22,7 @@ from fecm.mechanics.impact_sweep import Found, Given
 from fecm.mechanics.interpolation import NDOF
 from fecm.mechanics.kernels.element_groups import ElementKind
 from fecm.mechanics.kernels.layout import LANES
+from fecm.mechanics.kernels.midplane import TYING
 from fecm.mechanics.kernels.plate import CompiledProduct
 from fecm.mechanics.kernels.strains import Strains
 from fecm.mechanics.projectile import Rod, RodState, WilsonStep
@@ -226,7 +227,7 @@ def test_the_structures_of_python_lie_as_those_of_c() -> None:
             at = getattr(kind, field)
             expected[name, field] = at.offset, at.size
     found = entries(kernels.LIBRARY.fecm_fields())
-    assert len(structures) == 13
+    assert len(structures) == 15
     assert found == expected
 
 
@@ -244,6 +245,7 @@ def test_the_enumerations_of_python_have_the_values_of_those_in_c() -> None:
         "LANES": LANES,
         "CRITERIA": len(failure.CRITERIA),
         "PASSES": impact.PASSES,
+        "TYING": TYING,
     }
     expected |= {("Count", name): count for name, count in counts.items()}
     found = entries(kernels.LIBRARY.fecm_constants())

@@ -37,13 +37,12 @@ from fecm.deck.model import (
     Zone,
     Zones,
 )
+from fecm.mechanics.failure_monitor import UNKNOWN, FailureMonitor
 from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.laminate import Laminate, laminate
 from fecm.mechanics.mesh import equation_numbers
 from fecm.mechanics.ply_stresses import (
-    UNKNOWN,
-    FailureMonitor,
     PlyStresses,
     equilibrium_shear_stiffness,
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from fecm._frozen import frozen
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.mechanics.failure import CRITERIA
-from fecm.mechanics.ply_stresses import FailureEnvelope
+from fecm.mechanics.failure_monitor import FailureEnvelope
 
 
 class Largest(NamedTuple):
@@ -36,25 +37,35 @@ class OutsideLoad:
     x: Floats
     y: Floats
 
+    @cached_property
+    def _far(self) -> Indices:
+        """Elements without a point under the load."""
+        return np.flatnonzero(~self.near.any(axis=1))
+
+    @cached_property
+    def _means(self) -> tuple[Floats, Floats]:
+        """Means of the points of each element, (elements,): x and y."""
+        return self.x.mean(axis=1), self.y.mean(axis=1)
+
     def largest(self, envelope: FailureEnvelope) -> dict[str, Array]:
         """Fields of :class:`Largest`, (criteria,) each: the interlaminar before those of users."""
         plies = self._of_plies(envelope)
         known = len(CRITERIA)
         found = [*plies[:known], self._of_interfaces(envelope), *plies[known:]]
-        return {name: np.array([getattr(one, name) for one in found]) for name in Largest._fields}
+        return {
+            name: np.array(values)
+            for name, values in zip(Largest._fields, zip(*found, strict=True), strict=True)
+        }
 
     def worst_states(self, envelope: FailureEnvelope) -> Indices | None:
         """States of the largest exposures of the plies, (criteria,); None if none counts."""
         near, exposure = self.near.ravel(), envelope.plies.exposure
         if near.all():
             return None
-        at_points = exposure.reshape(len(exposure), near.size, -1)
-        # Points under the load are hidden for the search, which is much faster than one in a copy.
-        hidden = at_points[:, near]
-        at_points[:, near] = -1.0
-        states = np.asarray(exposure.argmax(axis=1))
-        at_points[:, near] = hidden
-        return states
+        points = np.where(near, -np.inf, envelope.peaks(near.size)).argmax(axis=1)
+        of_point = exposure.reshape(len(exposure), near.size, -1)
+        states = of_point[np.arange(len(exposure)), points].argmax(axis=1)
+        return np.asarray(points * of_point.shape[2] + states)
 
     def _of_plies(self, envelope: FailureEnvelope) -> list[Largest]:
         """Of each criterion of the plies."""
@@ -74,13 +85,17 @@ class OutsideLoad:
 
     def _of_interfaces(self, envelope: FailureEnvelope) -> Largest:
         """Of the interlaminar criterion."""
-        exposure = envelope.interfaces.exposure
-        counts = np.isfinite(exposure)
-        counts[self.near.any(axis=1)] = False
-        if not counts.any():
+        exposure = envelope.interfaces.exposure[self._far]
+        if not exposure.size:
             return NONE
-        place = np.unravel_index(np.where(counts, exposure, -1.0).argmax(), counts.shape)
-        element, interface = (int(index) for index in place)
-        mode = int(envelope.interfaces.mode[place])
-        x, y = float(self.x[element].mean()), float(self.y[element].mean())
-        return Largest(float(exposure[place]), mode, interface + 1, x, y)
+        place = int(exposure.argmax())  # that of the first NaN if there is one
+        if not math.isfinite(exposure.flat[place]):
+            counts = np.isfinite(exposure)
+            if not counts.any():
+                return NONE
+            place = int(np.where(counts, exposure, -1.0).argmax())
+        row, interface = divmod(place, exposure.shape[1])
+        element = self._far[row]
+        mode = int(envelope.interfaces.mode[element, interface])
+        x, y = (float(means[element]) for means in self._means)
+        return Largest(float(exposure[row, interface]), mode, interface + 1, x, y)

@@ -79,27 +79,27 @@ class QuadraticStrains:
         centre = jacobian(family, at_centre)[:, 0]  # (ne, a, i): base vectors of the centre
         points = [_with_corners(assumed_shear.tying_points(9, axis)) for axis in (0, 1)]
         # Slope along base vector a per slope in xi and in eta, (2, points, ne), and their table.
-        self._metric: list[Floats] = []
-        self._tables: list[Floats] = []
+        self.metric: list[Floats] = []
+        self.tables: list[Floats] = []
         for axis, at in enumerate(points):
             _, local = local_shape_functions(family, at)
             inverse, _ = inverse_jacobian(family, local)
             along = np.einsum("ei,etib->bte", centre[:, axis], inverse)
-            self._metric.append(np.ascontiguousarray(along))
-            self._tables.append(np.concatenate([local[:, 0], local[:, 1]]))
+            self.metric.append(np.ascontiguousarray(along))
+            self.tables.append(np.concatenate([local[:, 0], local[:, 1]]))
         # Interpolation of e_11, e_22 and e_12 to the points of the rule, (points, tying).
-        self._weights = [
+        self.weights = [
             assumed_shear.tying_weights(9, 0, rule),
             assumed_shear.tying_weights(9, 1, rule),
             _corner_weights(rule),
         ]
-        self._to_global = covariant_to_global(centre).transpose(1, 2, 0)
+        self.to_global = covariant_to_global(centre).transpose(1, 2, 0)
 
     def slopes(self, w: Floats) -> tuple[Floats, Floats]:
         """Slopes w,1 and w,2 of nodal values (9, ne) at their tying points, (10, ne) each."""
         one, two = (
             (metric * (table @ w).reshape(metric.shape)).sum(axis=0)
-            for metric, table in zip(self._metric, self._tables, strict=True)
+            for metric, table in zip(self.metric, self.tables, strict=True)
         )
         return one, two
 
@@ -111,7 +111,7 @@ class QuadraticStrains:
         """Matrices of the slopes w,1 and w,2, (10, 9, ne) each."""
         one, two = (
             np.einsum("bte,btn->tne", metric, table.reshape(2, -1, 9))
-            for metric, table in zip(self._metric, self._tables, strict=True)
+            for metric, table in zip(self.metric, self.tables, strict=True)
         )
         return one, two
 
@@ -120,17 +120,17 @@ class QuadraticStrains:
 
         These are e_11, e_22 (6, ..., ne) and e_12 (4, ..., ne); other axes may stand between.
         """
-        parts = [np.tensordot(H, e, 1) for H, e in zip(self._weights, tied, strict=True)]
-        shape = (3, 3, *[1] * (parts[0].ndim - 1), self._to_global.shape[2])
-        return np.asarray((self._to_global.reshape(shape) * np.stack(parts)).sum(axis=1))
+        parts = [np.tensordot(H, e, 1) for H, e in zip(self.weights, tied, strict=True)]
+        shape = (3, 3, *[1] * (parts[0].ndim - 1), self.to_global.shape[2])
+        return np.asarray((self.to_global.reshape(shape) * np.stack(parts)).sum(axis=1))
 
     def tied_forces(self, N: Floats) -> tuple[Floats, Floats, Floats]:
         """Forces n_11, n_22, n_12 on the tied components, of membrane forces (3, points, ne).
 
         These contain the weights of the points.
         """
-        covariant = (self._to_global[:, :, None] * N[:, None]).sum(axis=0)
-        one, two, both = (H.T @ n for H, n in zip(self._weights, covariant, strict=True))
+        covariant = (self.to_global[:, :, None] * N[:, None]).sum(axis=0)
+        one, two, both = (H.T @ n for H, n in zip(self.weights, covariant, strict=True))
         return one, two, both
 
     def nodal_forces(self, along_one: Floats, along_two: Floats) -> Floats:
@@ -138,7 +138,7 @@ class QuadraticStrains:
         one, two = (
             table.T @ (metric * force).reshape(-1, force.shape[1])
             for force, metric, table in zip(
-                (along_one, along_two), self._metric, self._tables, strict=True
+                (along_one, along_two), self.metric, self.tables, strict=True
             )
         )
         return one + two

@@ -18,7 +18,7 @@ from fecm._typing import Bools, Floats
 from fecm.deck.model import Material
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import CRITERIA
-from fecm.mechanics.ply_stresses import UNKNOWN
+from fecm.mechanics.failure_monitor import UNKNOWN
 from fecm.plot import style
 from fecm.plot.data import deck_of, mesh_of, require
 from fecm.plot.kinds import Picture, PlotError, Width

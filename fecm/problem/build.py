@@ -15,6 +15,7 @@ from fecm.deck import model
 from fecm.deck.macros import flat, moves_only
 from fecm.mechanics import contact_law
 from fecm.mechanics.exposures import OutsideLoad
+from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.impact_steps import ImpactSteps, supports
 from fecm.mechanics.kernels import LIBRARY
@@ -24,7 +25,7 @@ from fecm.mechanics.mesh import Ints, Mesh
 from fecm.mechanics.own_criterion import OwnCriterion
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import Load, PlateMotion
-from fecm.mechanics.ply_stresses import FailureMonitor, PlyStresses
+from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.mechanics.points import GageArray, gages
 from fecm.mechanics.projectile import STEPS, Projectile, RodMethod, Transducer
 from fecm.mechanics.residual_stresses import Residual

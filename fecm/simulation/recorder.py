@@ -12,7 +12,7 @@ from fecm._typing import Array, Floats
 from fecm.deck.macros import WorkEstimate
 from fecm.mechanics.curvature import surface
 from fecm.mechanics.failure import CRITERIA
-from fecm.mechanics.ply_stresses import FailureEnvelope
+from fecm.mechanics.failure_monitor import FailureEnvelope
 from fecm.mechanics.strains import STRAINS
 from fecm.problem.build import ImpactModel
 from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR, OWN_CRITERIA

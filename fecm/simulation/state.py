@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.mechanics.failure_monitor import FailureEnvelope
 from fecm.mechanics.impact import ImpactState
 from fecm.mechanics.plate_motion import DivergenceError, PlateState
-from fecm.mechanics.ply_stresses import FailureEnvelope
 from fecm.problem.problem import Threshold
 from fecm.simulation.step_recorder import Columns
 

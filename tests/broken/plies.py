@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fecm.mechanics import failure, ply_stresses, residual_stresses
-from fecm.mechanics.ply_stresses import FailureMonitor
+from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.problem import parts
 from tests.breaks import (
     Breaks,

@@ -7,7 +7,8 @@ Each kernel has one Python file, with its structures, what goes in and what come
 - steps of an impact: :mod:`fecm.mechanics.impact_steps`;
 - many impacts on one plate: :mod:`fecm.mechanics.impact_sweep`;
 - strains: :mod:`~fecm.mechanics.kernels.strains`;
-- exposures of plies: :mod:`~fecm.mechanics.kernels.failure`.
+- exposures of plies: :mod:`~fecm.mechanics.kernels.failure`, from the strains of
+  :mod:`~fecm.mechanics.kernels.midplane`.
 
 This one finds and loads the library.
 """
@@ -53,7 +54,9 @@ FUNCTIONS = {
     "fecm_impact_steps": (c_int64, [c_void_p, c_void_p, c_int64, c_int64]),
     "fecm_sweep": (c_int, [c_void_p]),
     "fecm_strains": (None, [c_void_p, c_int64, c_int64, c_int64, Doubles, Doubles]),
+    "fecm_midplane": (None, [c_void_p, Doubles, Doubles, Doubles]),
     "fecm_failure": (None, [c_void_p, Doubles, c_double]),
+    "fecm_interfaces": (None, [c_void_p, Doubles, c_double]),
     "fecm_fields": (c_void_p, []),
     "fecm_constants": (c_void_p, []),
 }
@@ -146,3 +149,11 @@ def _passed(value: Any) -> Any:
 def floats(array: Floats) -> _Pointer[c_double]:
     """Pointer to the first number of an array, which the caller keeps alive."""
     return array.ctypes.data_as(Doubles)
+
+
+def filled(array: Floats) -> Floats:
+    """An array in C order whose last axis is filled up to fours with zeros."""
+    *leading, count = array.shape
+    whole = np.zeros((*leading, -(-count // 4) * 4))
+    whole[..., :count] = array
+    return whole

@@ -7,6 +7,7 @@
  *   plate.h       K u, the plate's update, and strains; twice, with AVX2 and without
  *   membrane.h    forces of the membrane of a nonlinear plate; twice
  *   sweep.h       many impacts on one plate, four at a time; twice
+ *   midplane.h    strains of the midplane and curvatures for the exposures; twice
  *   failure.h     exposures of plies, four states of stress at a time; twice
  *   fields.h      places of the fields of structures, for a test
  *
@@ -120,6 +121,36 @@ static const double OF_SUM[] = {2.0 / 9.0, 5.0 / 36.0, 0.64549722436790281, 5.0 
 static const double OF_DIFFERENCE[] = {0.76980035891950105, 0.48112522432468813, 0.55901699437494745, 0.72168783648703216};
 static const double OF_CORNERS[] = {1.0 / 4.0, 0.86602540378443865, 3.0 / 4.0};
 
+/* Constants of the failure criteria. */
+typedef struct {
+    double xt, xc, yt, yc, s12; /* reciprocals; those of compression are negative */
+    double xx, xy, yy, x, y;    /* Tsai and Wu: coefficients of the quadratic and of the linear terms */
+    /* Puck: coefficients of s2 outside and in the root, for tension and for compression; of mode C. */
+    double pull, pull_root, press, shear, across;
+    double resistance, critical;
+} Limits;
+
+static Limits limits_of(const Ply *p) {
+    const double x = p->xt * p->xc, y = p->yt * p->yc, s = p->s12;
+    const double slope = p->p_minus * p->resistance / s, wide = 2.0 * (1.0 + slope) * s;
+    return (Limits){
+        .xt = 1.0 / p->xt, .xc = -1.0 / p->xc, .yt = 1.0 / p->yt, .yc = -1.0 / p->yc, .s12 = 1.0 / s,
+        .xx = 1.0 / x, .xy = 2.0 * p->f12 / sqrt(x * y), .yy = 1.0 / y,
+        .x = 1.0 / p->xt - 1.0 / p->xc, .y = 1.0 / p->yt - 1.0 / p->yc,
+        .pull = p->p_plus / s, .pull_root = 1.0 / p->yt - p->p_plus / s, .press = p->p_minus / s,
+        .shear = p->yc / (wide * wide), .across = 1.0 / p->yc,
+        .resistance = p->resistance, .critical = p->critical,
+    };
+}
+
+/* Candidates of all criteria: codes of their modes (indices of MODES), and where those of each begin. */
+enum { CANDIDATES = 15, HASHIN = 2 };
+static const int64_t CODES[CANDIDATES] = {1, 2, 3, 4, 5, 6, 1, 2, 3, 4, 1, 2, 7, 8, 9};
+static const int BEGIN[CRITERIA + 1] = {0, 5, 6, 10, 15};
+
+/* Exposures whose squares may be too small for a number. */
+#define TINY 1e-100
+
 #define TARGET static
 #include "impact.h"
 #undef TARGET
@@ -143,11 +174,16 @@ __attribute__((constructor)) static void ask_processor(void) {
 #define TARGET static __attribute__((target("avx2,fma")))
 #define ROOT(x) ((half)_mm256_sqrt_pd((__m256d)(x)))
 #define ANY(x) (!_mm256_testz_si256((__m256i)(x), (__m256i)(x)))
+#define LARGER(a, b) ((half)_mm256_max_pd((__m256d)(a), (__m256d)(b))) /* b if one is not a number */
+#define SIGNS(where) _mm256_movemask_pd((__m256d)(where))
 #include "plate.h"
 #include "sweep.h"
+#include "midplane.h"
 #include "failure.h"
 #undef ROOT
 #undef ANY
+#undef LARGER
+#undef SIGNS
 #undef NAME
 #undef INLINE
 #undef TARGET
@@ -160,12 +196,15 @@ __attribute__((constructor)) static void ask_processor(void) {
 #define TARGET static
 #define ROOT(x) ((half){sqrt((x)[0]), sqrt((x)[1]), sqrt((x)[2]), sqrt((x)[3])})
 #define ANY(x) (((x)[0] | (x)[1] | (x)[2] | (x)[3]) != 0)
+#define LARGER(a, b) NAME(choose)((a) > (b), a, b)
+#define SIGNS(where) (int)(((where)[0] & 1) | ((where)[1] & 2) | ((where)[2] & 4) | ((where)[3] & 8))
 #ifdef HAS_AVX2_CODE
 #pragma GCC push_options
 #pragma GCC optimize("O1") /* for few processors; more takes GCC as long as all the rest */
 #endif
 #include "plate.h"
 #include "sweep.h"
+#include "midplane.h"
 #include "failure.h"
 #ifdef HAS_AVX2_CODE
 #pragma GCC pop_options
@@ -455,9 +494,19 @@ EXPORT void fecm_strains(const Strains *family, int64_t fields, int64_t numnp, i
     CHOSEN(strains)(family, fields, numnp, numel, u, strains);
 }
 
-/* Raise exposures to those of strains (points, 6). */
-EXPORT void fecm_failure(const Failure *failure, const double *strains, double time) {
+/* Strains (elements, points, 6) of a displacement field (numnp, 5), and their derivatives (elements, 2, 6). */
+EXPORT void fecm_midplane(const Midplane *family, const double *u, double *strains, double *gradients) {
+    CHOSEN(midplane)(family, u, strains, gradients);
+}
+
+/* Raise exposures to those of strains (rows, 6). */
+EXPORT void fecm_failure(Failure *failure, const double *strains, double time) {
     CHOSEN(failure)(failure, strains, time);
+}
+
+/* Raise exposures of interfaces to those of derivatives of the strains, (rows, 2, 6). */
+EXPORT void fecm_interfaces(const Interfaces *interfaces, const double *gradients, double time) {
+    CHOSEN(interfaces)(interfaces, gradients, time);
 }
 
 /* Places of the fields of structures, and values of enumerations; each ends with an empty entry. */

@@ -169,13 +169,53 @@ typedef struct {
 } Ply;
 
 /* Largest exposures of neighbouring states of stress (plies, faces) at points; `width` is `states` in
- * fours.  In the arrays of all points, (CRITERIA, rows, stride), they begin at `first`. */
+ * fours.  In the arrays of all points, (CRITERIA, rows, stride), they begin at `first`.  failure.h says what
+ * `keep`, `proportional` and the outermost states are for; `outer_width` is `outermost` in fours, or 0. */
 typedef struct {
     int64_t points, states, width, rows, stride, first;
     const int64_t *row;     /* (points,): of the points in these arrays; all if NULL */
     const double *in_plane; /* (6, 3, width): stresses per strain */
     const double *residual; /* (3, width): stresses without strain */
     Ply ply;
-    double *exposure, *time; /* (CRITERIA, rows, stride) */
+    double keep;
+    int64_t proportional, outermost, outer_width;
+    const int64_t *outer;       /* (outermost,): states */
+    const int64_t *stands;      /* (width / 4,): of four states, the bits of those that stand for them */
+    const double *outer_stress; /* (3, 3, outer_width): stresses per curvature */
+    double *reached;            /* (points, CRITERIA, outer_width): exposures of the outermost states */
+    double *exposure, *time;    /* (CRITERIA, rows, stride) */
     int8_t *mode;
+    double *peak; /* (CRITERIA, rows): largest exposure of a point */
 } Failure;
+
+/* Largest exposures of the interfaces of elements; `width` is `interfaces` in fours, `stride` their number
+ * in the arrays of all elements. */
+typedef struct {
+    int64_t elements, interfaces, width, stride;
+    const int64_t *row;  /* (elements,): in the arrays of all elements; all if NULL */
+    const double *shear; /* (12, 4, width): tau_13 and tau_23 over their strengths, of both plies, per gradient */
+    int64_t code;        /* of the mode of failure */
+    double *exposure, *time; /* (rows, stride) */
+    int8_t *mode;
+} Interfaces;
+
+/* Midplane strains, curvatures and their derivatives at the centre, of elements with the same nodes present;
+ * `width` is that of `points` in fours. */
+typedef struct {
+    int64_t elements, nodes, points, width;
+    const int64_t *row, *node, *shape; /* (elements,), (elements, nodes), (elements,): row of arrays of shapes */
+    const double *table;   /* (nodes, 3, width): slopes in xi and eta, values */
+    const double *metric;  /* (shapes, 4, width): inverse Jacobian */
+    const double *initial; /* (3,): midplane strains of the undeformed plate */
+    const double *curved;  /* (3,): midplane strains per w; or NULL */
+    const double *centre;  /* (shapes, 5, nodes): derivatives xx, yy, xy, x, y at the centre; or NULL */
+    /* Of a nonlinear plate, else NULL: slopes in xi and eta at the tying points of w,1 and of w,2; slope along
+     * a base vector per slope in xi and in eta; interpolation of e_11, e_22, e_12; strains per component. */
+    const double *tying;        /* (nodes, 2, 2, TYING) */
+    const double *tying_metric; /* (shapes, 2, 2, TYING) */
+    const double *tied;         /* (16, width) */
+    const double *tied_strain;  /* (shapes, 3, 3) */
+} Midplane;
+
+/* Tying points of w,1 and of w,2, in fours: six of e_11 or e_22, four of e_12. */
+enum { TYING = 12 };
