@@ -72,16 +72,18 @@ class OutsideLoad:
         plies = envelope.plies
         if (states := self.worst_states(envelope)) is None:
             return [NONE] * len(plies.exposure)
-        found = []
-        for number, state in enumerate(states.tolist()):
-            if plies.exposure[number, state] < 0.0:  # no ply has strengths
-                found.append(NONE)
-                continue
-            point, ply_and_face = divmod(state, plies.exposure.shape[1] // self.near.size)
-            exposure, mode = float(plies.exposure[number, state]), int(plies.mode[number, state])
-            place = float(self.x.flat[point]), float(self.y.flat[point])
-            found.append(Largest(exposure, mode, ply_and_face // 2 + 1, *place))
-        return found
+        criteria = np.arange(len(states))
+        points, of_point = np.divmod(states, plies.exposure.shape[1] // self.near.size)
+        columns = (
+            plies.exposure[criteria, states],
+            plies.mode[criteria, states],
+            of_point // 2 + 1,
+            self.x.ravel()[points],
+            self.y.ravel()[points],
+        )
+        found = (Largest(*one) for one in zip(*(c.tolist() for c in columns), strict=True))
+        # Below 0 where no ply has strengths.
+        return [NONE if one.exposure < 0.0 else one for one in found]
 
     def _of_interfaces(self, envelope: FailureEnvelope) -> Largest:
         """Of the interlaminar criterion."""

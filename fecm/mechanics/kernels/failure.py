@@ -190,7 +190,7 @@ class _Outermost(NamedTuple):
         """Of every four states, the bits of those that stand for them, (width / 4,)."""
         bits = np.zeros(-(-len(self.of) // 4) * 4, dtype=np.int64)
         bits[: len(self.of)] = np.left_shift(1, self.of % BITS)
-        return np.bitwise_or.reduce(bits.reshape(-1, 4), axis=1)
+        return np.asarray(np.bitwise_or.reduce(bits.reshape(-1, 4), axis=1))
 
 
 @dataclass
