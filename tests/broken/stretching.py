@@ -21,7 +21,7 @@ def without_component(component: int) -> Any:
 
     def broken(right: Any, strains: Any, *args: Any) -> None:
         right(strains, *args)
-        strains._to_global[:, component] = 0.0
+        strains.to_global[:, component] = 0.0
 
     return instead(QuadraticStrains, "__init__", broken)
 
