@@ -68,6 +68,23 @@ def _transverse_shear(at: Interpolation) -> Floats:
     return B.reshape(ne, npt, 2, nn * NDOF)
 
 
+def transverse_shear(
+    family: ElementBlock, rules: IntegrationRules, at: Interpolation
+) -> tuple[Floats, Floats]:
+    """B matrix of transverse shear strains, (ne, npt, 2, 5 nn), and its points' areas, (ne, npt).
+
+    `at` is the interpolation at the points of bending, which are often those of shear too.
+    :mod:`~fecm.mechanics.assumed_shear` has its own points.
+    """
+    if rules.assumes_shear:
+        rule = assumed_shear.quadrature(family)
+        jxw = jacobian_determinants(family, rule) * rule.weights
+        return assumed_shear.strain_matrix(family, rule), jxw
+    if rules.shear is not rules.bending:
+        at = interpolate(family, rules.shear, transposed_jacobian=rules.transposed_jacobian)
+    return _transverse_shear(at), at.jxw
+
+
 def _integrate(B: Floats, C: Floats, jxw: Floats) -> Floats:
     """Integral of B' C B by quadrature, (ne, n, n); exactly symmetric."""
     ne, npt, rows, n = B.shape
@@ -83,20 +100,12 @@ def stiffness(
     rules: IntegrationRules,
     curvature: Curvature = FLAT,
 ) -> Floats:
-    """Element stiffness matrices, K_p of equation 4-14, (ne, 5 nn, 5 nn).
-
-    :mod:`~fecm.mechanics.assumed_shear` has its own rule of the transverse shear energy.
-    """
+    """Element stiffness matrices, K_p of equation 4-14, (ne, 5 nn, 5 nn)."""
     ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
-    slip = rules.transposed_jacobian
-    at = interpolate(family, rules.bending, transposed_jacobian=slip)
+    at = interpolate(family, rules.bending, transposed_jacobian=rules.transposed_jacobian)
     K = _integrate(membrane_and_bending(at, curvature), ABD, at.jxw)
-    if rules.assumes_shear:
-        rule = assumed_shear.quadrature(family)
-        jxw = jacobian_determinants(family, rule) * rule.weights
-        return K + _integrate(assumed_shear.strain_matrix(family, rule), laminate.shear, jxw)
-    at = interpolate(family, rules.shear, transposed_jacobian=slip)
-    return K + _integrate(_transverse_shear(at), laminate.shear, at.jxw)
+    B, jxw = transverse_shear(family, rules, at)
+    return K + _integrate(B, laminate.shear, jxw)
 
 
 def geometric_stiffness(
@@ -117,6 +126,15 @@ def geometric_stiffness(
     return K.reshape(ne, nn * NDOF, nn * NDOF)
 
 
+def lumped_shares(values: Floats, areas: Floats) -> Floats:
+    """Shares of the nodes in the elements' areas, (ne, nn); see :func:`lumped_mass`.
+
+    `values` (npt, nn) are those of the shape functions, `areas` (ne, npt) those of the points.
+    """
+    diagonal = np.einsum("ep,pn->en", areas, values**2)
+    return np.asarray(diagonal * (areas.sum(axis=1) / diagonal.sum(axis=1))[:, None])
+
+
 def lumped_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) -> Floats:
     """Lumped element masses: diagonal of the consistent matrix, scaled to the element's mass.
 
@@ -125,9 +143,7 @@ def lumped_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) -> F
     (ne, nn, 5): mass for u, v, w; mass times length squared for the rotations.
     """
     values, _ = local_shape_functions(family, rule)
-    area = jacobian_determinants(family, rule) * rule.weights
-    diagonal = np.einsum("ep,pn->en", area, values**2)
-    share = diagonal * (area.sum(axis=1) / diagonal.sum(axis=1))[:, None]
+    share = lumped_shares(values, jacobian_determinants(family, rule) * rule.weights)
     inertia = np.repeat([laminate.mass, laminate.rotary_inertia], (3, 2))
     return np.asarray(share[:, :, None] * inertia)
 

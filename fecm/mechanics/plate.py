@@ -237,6 +237,7 @@ class PlateModel:
         )
         return made[:, : self.neq].tocsr()
 
+    @cached_property
     def _areas(self) -> list[float]:
         """Area of every block, length squared."""
         rule = self.rules.bending
@@ -245,14 +246,14 @@ class PlateModel:
 
     def area(self) -> float:
         """Area of the plate, length squared."""
-        return sum(self._areas())
+        return sum(self._areas)
 
     def total_mass(self) -> float:
         """Mass of the plate."""
         if not self.others:
             return self.area() * self.laminate.mass
         masses = (self.laminate_of(family).mass for family in self.families)
-        return sum(a * m for a, m in zip(self._areas(), masses, strict=True))
+        return sum(a * m for a, m in zip(self._areas, masses, strict=True))
 
     def profile(self) -> int:
         """Number of entries of K from the first of each column: the listing's JDIAG(NEQ)."""

@@ -323,6 +323,13 @@ class CompiledPlate:
             raise MemoryError
         return work.value
 
+    def accelerations(self, u: Floats) -> Floats:
+        """M^-1 K u of a vector with a place for each entry; the next call overwrites it."""
+        self.u[:] = u
+        self.set_scale(1.0)
+        self.internal_force()
+        return self.s
+
 
 class CompiledProduct(StiffnessOperator):
     """K u by the compiled kernels, or with `nonlinear` the internal force of a nonlinear plate.
