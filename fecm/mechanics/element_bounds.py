@@ -90,7 +90,7 @@ def _largest_eigenvalue(rows: Floats) -> Floats:
     """Largest eigenvalue of R' R, (ne,), for R (ne, npt, 2, nn); NaN if R' R is not finite."""
     flat = rows.reshape(len(rows), -1, rows.shape[-1])
     products = flat.swapaxes(1, 2) @ flat
-    sound = np.isfinite(products).all(axis=(1, 2))
+    sound = np.asarray(np.isfinite(products).all(axis=(1, 2)))
     found = np.linalg.eigvalsh(np.where(sound[:, None, None], products, 0.0))[:, -1]
     return np.where(sound, found, np.nan)
 

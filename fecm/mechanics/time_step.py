@@ -148,9 +148,7 @@ def _largest_of_few(
     return float(np.linalg.eigvalsh(np.column_stack(columns))[-1])
 
 
-def _largest_eigenvalue(
-    product: Callable[[Floats], Floats], mass: Floats, start: Floats
-) -> float:
+def _largest_eigenvalue(product: Callable[[Floats], Floats], mass: Floats, start: Floats) -> float:
     """Largest eigenvalue of M^-1 K by Lanczos iteration in the inner product of the masses."""
     # Without reorthogonalisation, whose lack only repeats converged eigenvalues.
     last, before, beta = start / math.sqrt(float((mass * start * start).sum())), 0.0 * start, 0.0
