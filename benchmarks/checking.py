@@ -40,9 +40,8 @@ T = TypeVar("T")
 def written(deck: Deck) -> str:
     """The text of a deck with a short program."""
     mesh = deck.to_text().partition("MACR\n")[0]
-    return (
-        f"{mesh}MACR\nLMAS\nDT,,{time_step(deck):.6E}\nLOOP,,20\nTIME\nRODP,,20\nNEXT\nEND\nSTOP\n"
-    )
+    program = "LOOP,,20\nTIME\nRODP,,20\nNEXT\nEND\nSTOP\n"
+    return f"{mesh}MACR\nLMAS\nDT,,{time_step(deck):.6E}\n{program}"
 
 
 def parts_of_check(path: str) -> dict[str, float]:
