@@ -8,16 +8,22 @@ stored in the plate, by its static force over deflection, and in the indentation
 from __future__ import annotations
 
 import math
+import operator
+from collections.abc import Iterator
+from itertools import chain
+from typing import NamedTuple
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
 
 from fecm._frozen import frozen
-from fecm._typing import Floats
+from fecm.mechanics.roots import root
 from fecm.mechanics.static_curve import StaticCurve
 
 MIDPOINTS = 1000  # of the quadratures over the force and the deflection
+# Expansions of the motion on an infinite plate.
+ORDER = 20
+ROUNDING = 1e-14  # of the last terms, relative to the first
+LONGEST = 1e6  # time of a contact
 
 
 @frozen
@@ -43,28 +49,97 @@ def inelasticity(
 def infinite_plate(mass: float, velocity: float, k: float, parameter: float) -> QuickImpact:
     """Impact on an infinite plate with the parameter lambda.
 
-    F = a^1.5 M V/T with the time scale T = (M/(k sqrt(V)))^0.4.
+    F = a^1.5 M V/T with the time scale T = (M/(k sqrt(V)))^0.4.  The duration is infinite if the
+    contact lasts longer than 10^6 T.
+    """
+    motions = _motion(parameter)
+    turning = next(motion for motion in motions if motion.turns)
+    last = next(one for one in chain([turning], motions) if one.leaves or one.time[0] > LONGEST)
+    peak, time = turning.peak()
+    duration = last.end() if last.leaves else math.inf
+    scale = _time_scale(mass, velocity, k)
+    return QuickImpact(peak * mass * velocity / scale, time * scale, duration * scale)
+
+
+def peak_on_infinite_plate(mass: float, velocity: float, k: float, parameter: float) -> float:
+    """Peak force of :func:`infinite_plate`, without the motion after it."""
+    peak, _ = next(motion for motion in _motion(parameter) if motion.turns).peak()
+    return peak * mass * velocity / _time_scale(mass, velocity, k)
+
+
+def _time_scale(mass: float, velocity: float, k: float) -> float:
+    return float((mass / (k * velocity**0.5)) ** 0.4)
+
+
+class _Expansion(NamedTuple):
+    """Motion of the contact up to a step: coefficients of the powers of s, from 0 on.
+
+    With z = sqrt(a) and dt = 2 z ds the equation has no square roots: dz/ds = w, the velocity of
+    the indentation, and dw/ds = -3 lambda z^2 w - 2 z^4.
     """
 
-    def rate(_: float, state: Floats) -> Floats:
-        root = np.sqrt(max(state[0], 0.0))
-        return np.array([state[1], -1.5 * parameter * root * state[1] - root**3])
+    z: list[float]
+    w: list[float]
+    time: list[float]
+    step: float
 
-    def leaves(_: float, state: Floats) -> float:
-        return float(state[0])
+    @classmethod
+    def of(cls, z: float, w: float, time: float, parameter: float) -> _Expansion:
+        """Expand the motion from a state on."""
+        zs, ws, times = [z], [w], [time]
+        squares: list[float] = []  # z^2
+        for k in range(ORDER):
+            squares.append(_product(zs, zs))
+            slowing = 3.0 * parameter * _product(squares, ws) + 2.0 * _product(squares, squares)
+            zs.append(ws[k] / (k + 1))
+            times.append(2.0 * zs[k] / (k + 1))
+            ws.append(-slowing / (k + 1))
+        small = ROUNDING * (z or 1.0)
+        last = range(ORDER - 4, ORDER + 1)  # without damping, powers are missing
+        step = min((small / abs(zs[k])) ** (1.0 / k) for k in last if zs[k])
+        return cls(zs, ws, times, step)
 
-    def turns(_: float, state: Floats) -> float:
-        return float(state[1])
+    @property
+    def turns(self) -> bool:
+        """Whether the indentation has its peak within the step."""
+        return self.w[0] > 0.0 >= _value(self.w, self.step)
 
-    leaves.terminal, leaves.direction, turns.direction = True, -1.0, -1.0  # type: ignore[attr-defined]
-    found = solve_ivp(
-        rate, (0.0, 1e6), [0.0, 1.0], "DOP853", events=(leaves, turns), rtol=1e-11, atol=1e-13
-    )
-    scale = (mass / (k * velocity**0.5)) ** 0.4
-    peak = float(found.y_events[1][0][0]) ** 1.5 * mass * velocity / scale
-    ends = found.t_events[0]
-    duration = float(ends[0]) * scale if len(ends) else float("inf")
-    return QuickImpact(peak, float(found.t_events[1][0]) * scale, duration)
+    @property
+    def leaves(self) -> bool:
+        """Whether the contact ends within the step."""
+        return _value(self.z, self.step) <= 0.0
+
+    def peak(self) -> tuple[float, float]:
+        """Largest a^1.5, and its time."""
+        at = root(lambda s: _value(self.w, s), 0.0, self.step, ROUNDING * self.step)
+        return _value(self.z, at) ** 3, _value(self.time, at)
+
+    def end(self) -> float:
+        """Time at which the contact ends."""
+        at = root(lambda s: _value(self.z, s), 0.0, self.step, ROUNDING * self.step)
+        return _value(self.time, at)
+
+
+def _motion(parameter: float) -> Iterator[_Expansion]:
+    """The motion from the first contact on, step by step; it has no end."""
+    z, w, time = 0.0, 1.0, 0.0
+    while True:
+        motion = _Expansion.of(z, w, time, parameter)
+        yield motion
+        z, w, time = (_value(powers, motion.step) for powers in motion[:3])
+
+
+def _product(first: list[float], second: list[float]) -> float:
+    """Last coefficient of the product of two series of the same length."""
+    return sum(map(operator.mul, first, reversed(second)))
+
+
+def _value(powers: list[float], s: float) -> float:
+    """Sum of a power series."""
+    value = 0.0
+    for coefficient in reversed(powers):
+        value = value * s + coefficient
+    return value
 
 
 def static_plate(mass: float, velocity: float, k: float, stiffness: float) -> QuickImpact:
@@ -79,7 +154,7 @@ def static_plate(mass: float, velocity: float, k: float, stiffness: float) -> Qu
         return force**2 / (2.0 * stiffness) + 0.4 * math.cbrt(force**5 / k**2) - energy
 
     duration = math.pi * math.sqrt(mass / stiffness)
-    peak = float(brentq(missing, 0.0, most, xtol=1e-12 * most))
+    peak = root(missing, 0.0, most, 1e-12 * most)
     return QuickImpact(peak, duration / 2.0, duration)
 
 
@@ -110,8 +185,8 @@ def curved_plate(mass: float, velocity: float, k: float, curve: StaticCurve) -> 
     energy = 0.5 * mass * velocity**2
     most = curve.deflection[-1]
     tight = 1e-12 * most
-    deflection = brentq(lambda w: stored_at(curve, k, w)[1] - energy, 0.0, most, xtol=tight)
-    alone = brentq(lambda w: curve.at(w)[1] - energy, 0.0, most, xtol=tight)  # without indentation
+    deflection = root(lambda w: stored_at(curve, k, w)[1] - energy, 0.0, most, tight)
+    alone = root(lambda w: float(curve.at(w)[1]) - energy, 0.0, most, tight)  # not indented
     s = (np.arange(MIDPOINTS) + 0.5) / MIDPOINTS
     _, work = curve.at(alone * (1.0 - s * s))
     duration = 2.0 * float(np.mean(2.0 * alone * s / np.sqrt(2.0 * (energy - work) / mass)))

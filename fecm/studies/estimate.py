@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import brentq
 
 from fecm._frozen import frozen
 from fecm.deck.model import Impact, Indentation
@@ -17,9 +16,11 @@ from fecm.mechanics.quick_models import (
     curved_plate,
     inelasticity,
     infinite_plate,
+    peak_on_infinite_plate,
     static_plate,
     stored_at,
 )
+from fecm.mechanics.roots import root
 from fecm.mechanics.solutions import ConvergenceError, SingularStiffnessError, static_stiffness
 from fecm.mechanics.static_curve import StaticCurve, static_curve
 from fecm.problem.parts import build_projectile
@@ -85,16 +86,15 @@ def estimate(problem: Problem) -> Estimate:
     force = math.nan if problem.threshold is None else problem.threshold.force
     parameter = _inelasticity(problem, mass, velocity)
 
-    def large(v: float) -> QuickImpact:
-        return static_plate(mass, v, k, stiffness)
-
-    applies = ratio < SMALL
-    small = _on_infinite_plate(problem, mass)
-    models = [_model("infinite plate", small, velocity, SMALL_MASS * force, applies=applies)]
+    small = infinite_plate(mass, velocity, k, parameter)
+    reached = _velocity(_peaks_on_infinite_plate(problem, mass), velocity, SMALL_MASS * force)
+    models = [Model("infinite plate", small, SMALL_MASS * force, reached, applies=ratio < SMALL)]
     stiffness = static_stiffness(problem.moving_plate, contact)
     if not math.isfinite(stiffness):
         return Estimate(mass, ratio, parameter, stiffness, tuple(models))
-    static = _model("static plate", large, velocity, force, applies=ratio > LARGE)
+    large = static_plate(mass, velocity, k, stiffness)
+    reached = _velocity(lambda v: static_plate(mass, v, k, stiffness).peak, velocity, force)
+    static = Model("static plate", large, force, reached, applies=ratio > LARGE)
     models.append(static)
     remark = ""
     if problem.plate.nonlinear:
@@ -121,15 +121,14 @@ def velocity_at(problem: Problem, force: float) -> float:
     mass, velocity = build_projectile(deck).total_mass, deck.require(Impact).velocity
     k = deck.require(Indentation).k
     if mass < problem.plate.total_mass():
-        small = _on_infinite_plate(problem, mass)
-        return _reaching(lambda v: small(v).peak, velocity, force)
+        return _velocity(_peaks_on_infinite_plate(problem, mass), velocity, force)
     try:
         return _static_velocity(nonlinear_curve(problem, 0.0, force), mass, k, force)
     except StudyError:
         stiffness = static_stiffness(problem.moving_plate, contact)
     if math.isnan(stiffness):
         return velocity
-    return _reaching(lambda v: static_plate(mass, v, k, stiffness).peak, velocity, force)
+    return _velocity(lambda v: static_plate(mass, v, k, stiffness).peak, velocity, force)
 
 
 def nonlinear_curve(problem: Problem, energy: float, force: float) -> StaticCurve:
@@ -174,7 +173,7 @@ def _nonlinear_model(
 def _static_velocity(curve: StaticCurve, mass: float, k: float, force: float) -> float:
     """Velocity at which the static model reaches a force of the curve."""
     most = curve.deflection[-1]
-    at = brentq(lambda w: stored_at(curve, k, w)[0] - force, 0.0, most, xtol=1e-12 * most)
+    at = root(lambda w: stored_at(curve, k, w)[0] - force, 0.0, most, 1e-12 * most)
     return math.sqrt(2.0 * stored_at(curve, k, at)[1] / mass)
 
 
@@ -184,29 +183,16 @@ def _inelasticity(problem: Problem, mass: float, velocity: float) -> float:
     return inelasticity(mass, velocity, k, laminate.mass, effective_rigidity(laminate))
 
 
-def _on_infinite_plate(problem: Problem, mass: float) -> Callable[[float], QuickImpact]:
-    """Impacts on the infinite plate by their velocity."""
+def _peaks_on_infinite_plate(problem: Problem, mass: float) -> Callable[[float], float]:
+    """Peak forces on the infinite plate by the velocity."""
     k = problem.deck.require(Indentation).k
-    return lambda v: infinite_plate(mass, v, k, _inelasticity(problem, mass, v))
+    return lambda v: peak_on_infinite_plate(mass, v, k, _inelasticity(problem, mass, v))
 
 
-def _model(
-    name: str,
-    impact: Callable[[float], QuickImpact],
-    velocity: float,
-    threshold: float,
-    *,
-    applies: bool,
-) -> Model:
-    """A model, with the velocity at which its peak reaches the threshold."""
-    found = math.nan
-    if math.isfinite(threshold):
-        found = _reaching(lambda v: impact(v).peak, velocity, threshold)
-    return Model(name, impact(velocity), threshold, found, applies)
-
-
-def _reaching(peak: Callable[[float], float], start: float, force: float) -> float:
-    """Velocity at which a peak force that grows with it has a value."""
+def _velocity(peak: Callable[[float], float], start: float, force: float) -> float:
+    """Velocity at which a peak force that grows with it has a value; NaN if it is not finite."""
+    if not math.isfinite(force):
+        return math.nan
     low = high = start
     while peak(low) > force:
         low /= 2.0
@@ -214,4 +200,4 @@ def _reaching(peak: Callable[[float], float], start: float, force: float) -> flo
         high *= 2.0
     if low == high:
         low /= 2.0
-    return float(brentq(lambda v: peak(v) - force, low, high, rtol=1e-9))
+    return root(lambda v: peak(v) - force, low, high, 1e-12 * high)
