@@ -51,9 +51,7 @@ from fecm.problem.problem import Problem
 from fecm.problem.slips import NAMES, active_slips
 from fecm.problem.summary import larger_steps
 from fecm.results import hdf5_writer
-from fecm.results.exposures import largest_exposures
-from fecm.results.hdf5_reader import read
-from fecm.results.result import Result, result_of
+from fecm.results.exposures import LargestExposure, largest_exposures
 from fecm.results.summary import about_run
 from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
 from fecm.simulation.printout import Printer
@@ -248,11 +246,11 @@ def run(options: Options) -> None:
         if job.complete:
             note(f"{job.path} is complete")
             continue
-        result = _run_one(job, choices, options)
+        exposures = _run_one(job, choices, options)
         if limit is not None:
             exceeded += [
                 f"exposure {e.exposure:.4g} of {e.criterion}"
-                for e in largest_exposures(result)
+                for e in exposures
                 if e.exposure > limit
             ]
     if exceeded:
@@ -294,8 +292,8 @@ def _jobs(problems: Sequence[Problem], options: Options) -> list[Job]:
     ]
 
 
-def _run_one(job: Job, choices: RunOptions, options: Options) -> Result:
-    """Run one problem of a deck into a file, print what came out and return its result."""
+def _run_one(job: Job, choices: RunOptions, options: Options) -> list[LargestExposure]:
+    """Run one problem of a deck into a file, print what came out and return its exposures."""
     problem, path = job.problem, job.path
     _check_space(problem, path)
     check_memory(problem, solver=choices.solver)
@@ -314,24 +312,22 @@ def _run_one(job: Job, choices: RunOptions, options: Options) -> Result:
         if job.resumes:
             checkpointer.restore(simulation)
             note(f"{path} resumes after step {simulation.state.plate.step}")
-        simulate_run(simulation)
-    checkpointer.clear()
-    contents = read(path)
-    result = result_of(contents, problem.deck)
-    with contents.held():
+        result = simulate_run(simulation)
         about = about_run(result)
+        exposures = largest_exposures(result)
+    checkpointer.clear()
     note(*simulation.state.notes, *result.notes)
     if options.form is Format.JSON:
         named = {"title": problem.deck.title, "result": str(path), "printed": job.printed}
         echo_json({**named, "units": result.units, **about})
-        return result
+        return exposures
     echo(problem.deck.title or "(no title)")
     for line in (*about["summary"], *larger_steps(problem)):
         echo(f"  {line}")
     echo(f"  result            {path}")
     if job.printed is not None:
         echo(f"  printed           {job.printed}")
-    return result
+    return exposures
 
 
 def _check_space(problem: Problem, path: Path) -> None:

@@ -42,7 +42,10 @@ class FileSink:
         self._file = file
         self._guarded = guarded
         self._units: dict[str, str] = {}
-        self.arrays: dict[str, Any] = {}  # datasets that are stored so far, by path
+        # Datasets, single texts, and attributes of groups that are stored so far, by path.
+        self.arrays: dict[str, Any] = {}
+        self.texts: dict[str, str] = {}
+        self.groups: dict[str, dict[str, Any]] = {}
         self._made: list[schema.Dataset] = []
         self._groups: dict[str, h5py.Group] = {"": file}
         self.axis_names = dict(schema.AXIS_NAMES)
@@ -64,6 +67,7 @@ class FileSink:
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
         """Set attributes of a group; a list of strings becomes an array of strings."""
         self._note(Operation.ATTRIBUTES, group=group, values=dict(values))
+        self.groups.setdefault(group, {}).update(values)
         target = self._group(group)
         if not group:
             self._units = declared_units(values)
@@ -153,7 +157,9 @@ class FileSink:
         """Store a text, or texts along an axis."""
         self._note(Operation.TEXT, path=path, value=value, description=description)
         made = self._file.create_dataset(path, data=value, dtype=TEXT)
-        if not isinstance(value, str):
+        if isinstance(value, str):
+            self.texts[path] = value
+        else:
             self.arrays[path] = made
             self._made.append(schema.Dataset(path, axes, description))
         made.attrs["description"] = description

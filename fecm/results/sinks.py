@@ -7,7 +7,7 @@ sink keeps arrays, the file sink (:mod:`fecm.results.hdf5_writer`) writes them a
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -52,6 +52,35 @@ class MemorySink:
 
 
 Sink: TypeAlias = "MemorySink | FileSink"
+
+
+class ReadOnce(Mapping[str, Array]):
+    """Datasets of a sink by path, for the result of a run that is about to end.
+
+    Each is read when it is needed first, and kept; rows of it are not.
+    """
+
+    def __init__(self, sink: Sink) -> None:
+        self._datasets: Mapping[str, Any] = sink.arrays
+        self._read: dict[str, Array] = {}
+
+    def __getitem__(self, path: str) -> Array:
+        if path not in self._read:
+            self._read[path] = np.asarray(self._datasets[path])
+        return self._read[path]
+
+    def rows(self, path: str, start: int, stop: int) -> Array:
+        """Rows `start` to `stop` of a dataset."""
+        return np.asarray(self._read.get(path, self._datasets[path])[start:stop])
+
+    def __contains__(self, path: object) -> bool:
+        return path in self._datasets  # Mapping's own method would read the dataset
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._datasets)
+
+    def __len__(self) -> int:
+        return len(self._datasets)
 
 
 class RowBuffer:

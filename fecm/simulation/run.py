@@ -23,7 +23,7 @@ from fecm.results.exposures import AT_REST, count_evaluations
 from fecm.results.metrics import MOBILITY, VALIDITY
 from fecm.results.result import Result
 from fecm.results.schema import FORMAT_VERSION, KINEMATICS, Form, Kinematics
-from fecm.results.sinks import Sink
+from fecm.results.sinks import ReadOnce, Sink
 from fecm.simulation.divergence import likely_cause
 from fecm.simulation.judge import judge
 from fecm.simulation.macros import STORING, bind, bind_loop
@@ -42,8 +42,10 @@ def simulate(
     return simulation
 
 
-def run(simulation: Simulation) -> None:
-    """Carry out a program, from its beginning or from the restored state.
+def run(simulation: Simulation) -> Result:
+    """Carry out a program, from its beginning or from the restored state; return its result.
+
+    The result reads from the sink, as long as that is open.
 
     Raises DivergenceError, with the likely cause, if the motion grows without bound or the energy
     balance exceeds its limit.  Raises SingularStiffnessError if a static solution is
@@ -69,7 +71,7 @@ def run(simulation: Simulation) -> None:
     except DivergenceError as diverged:
         cause = likely_cause(problem, simulation.model, state.dt, simulation.options.law)
         raise DivergenceError(diverged.step, f"{diverged.reason}; {cause}") from None
-    _write_footer(simulation)
+    return _write_footer(simulation)
 
 
 def _write_header(simulation: Simulation) -> None:
@@ -136,13 +138,14 @@ def _units(deck: Deck) -> dict[str, str]:
     return {f"unit_{name}": unit for name, unit in unit_names(deck).items()}
 
 
-def _write_footer(simulation: Simulation) -> None:
+def _write_footer(simulation: Simulation) -> Result:
     """Store what the end of the run has decided, and reasons to doubt the result."""
     sink = simulation.sink
     history = _history_attributes(simulation)
     if history:
         sink.attributes("history", history)
-    result = _finished(simulation, history)
+    datasets = ReadOnce(sink)
+    result = _undoubted(simulation, datasets, history)
     if (threshold := simulation.problem.threshold) is not None:
         crossing = simulation.state.monitor.crossing
         sink.attributes("threshold", _threshold_attributes(threshold, crossing, result))
@@ -153,6 +156,7 @@ def _write_footer(simulation: Simulation) -> None:
         sink.attributes("", {VALIDITY: verdict.validity})
     if verdict.notes:
         sink.attributes("", {"notes": verdict.notes})
+    return Result(datasets, sink.texts, sink.groups, simulation.problem.deck)
 
 
 def _history_attributes(simulation: Simulation) -> dict[str, Any]:
@@ -169,8 +173,8 @@ def _history_attributes(simulation: Simulation) -> dict[str, Any]:
     return attributes
 
 
-def _finished(simulation: Simulation, history: dict[str, Any]) -> Result:
-    """The result so far, with what its metrics need."""
+def _undoubted(simulation: Simulation, datasets: ReadOnce, history: dict[str, Any]) -> Result:
+    """The result before it is judged, with what its metrics need."""
     problem = simulation.problem
     groups: dict[str, dict[str, Any]] = {
         "": _units(problem.deck),
@@ -180,7 +184,7 @@ def _finished(simulation: Simulation, history: dict[str, Any]) -> Result:
     }
     if problem.threshold is not None:
         groups["threshold"] = {"force": problem.threshold.force}
-    return Result(simulation.sink.arrays, {}, groups, problem.deck)
+    return Result(datasets, {}, groups, problem.deck)
 
 
 def _threshold_attributes(threshold: Threshold, crossing: float, result: Result) -> dict[str, Any]:
