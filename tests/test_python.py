@@ -93,15 +93,35 @@ def test_importing_fecm_imports_neither_numpy_nor_scipy() -> None:
     assert done.stdout == "set()\n"
 
 
+def test_help_and_version_import_neither_numpy_nor_a_command() -> None:
+    code = """
+import contextlib, sys
+from fecm.cli import main
+for option in ("--help", "--version"):
+    with contextlib.suppress(SystemExit):
+        main([option])
+names = ("numpy", "h5py", "fecm.api", "fecm.deck", "fecm.cli.run")
+print([name for name in names if name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines()[-1] == "[]"
+
+
 # Modules that a command does not use on a small deck: their import takes a part of its time.
 ELSEWHERE = "scipy fecm.sweeps fecm.objects tomllib multiprocessing concurrent.futures decimal html"
+NOT_IN_A_RUN = (
+    "numpy.ma fecm.results.hdf5_reader fecm.results.conversions fecm.results.first_failure "
+    "fecm.results.plies fecm.mechanics.buckling fecm.mechanics.residual_stresses "
+    "fecm.mechanics.stretching"
+)
 UNUSED = {
-    "run small.inp": f"{ELSEWHERE} matplotlib fecm.plot numpy.ma hashlib zipfile json",
+    "run small.inp": f"{ELSEWHERE} {NOT_IN_A_RUN} matplotlib fecm.plot hashlib zipfile json",
     "check small.inp": f"{ELSEWHERE} matplotlib fecm.plot numpy.ma hashlib zipfile json h5py",
     "info small.h5": f"{ELSEWHERE} matplotlib fecm.plot numpy.ma fecm.mechanics.kernels",
     "tapes small.h5": f"{ELSEWHERE} matplotlib numpy.ma fecm.mechanics.kernels",
     "diff small.h5 small.h5": "scipy matplotlib numpy.ma fecm.sweeps fecm.mechanics.kernels",
     "export small.h5 --to csv": f"{ELSEWHERE} matplotlib numpy.ma pandas fecm.mechanics.kernels",
+    "estimate small.inp": "scipy.integrate scipy.optimize",
     "--help": "scipy matplotlib pandas vtk",
     "plot small.h5": "scipy fecm.sweeps fecm.objects fecm.mechanics.kernels matplotlib.pyplot",
 }

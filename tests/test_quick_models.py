@@ -12,11 +12,12 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
-from scipy.special import ellipk
+from scipy.special import beta, ellipk
 
 import fecm
 from fecm.api import load_deck
 from fecm.deck.model import Ply
+from fecm.mechanics import quick_models
 from fecm.mechanics.laminate import (
     SMALL_MASS,
     Laminate,
@@ -130,6 +131,25 @@ def test_the_infinite_plate_is_zeners(row: dict[str, str]) -> None:
     assert found.peak == pytest.approx(peak, rel=1e-7)
     assert found.time == pytest.approx(float(row["t_peak/T"]) * scale, rel=1e-7)
     assert found.duration == pytest.approx(float(row["t_contact/T"]) * scale, rel=1e-7)
+
+
+def test_without_damping_the_contact_is_that_of_hertz() -> None:
+    mass, velocity, k = 0.3, 2.0, 5e5
+    found = infinite_plate(mass, velocity, k, 0.0)
+    # M V^2/2 = 2/5 k a^2.5, and the duration 2 a/V times the integral of dx/sqrt(1 - x^2.5).
+    depth = (1.25 * mass * velocity**2 / k) ** 0.4
+    integral = 0.4 * beta(0.4, 0.5)
+    assert found.peak == pytest.approx(k * depth**1.5, rel=1e-12)
+    assert found.time == pytest.approx(integral * depth / velocity, rel=1e-12)
+    assert found.duration == pytest.approx(2.0 * found.time, rel=1e-12)
+
+
+def test_a_contact_without_an_end_in_sight_lasts_for_ever(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert infinite_plate(1.0, 1.0, 1.0, 0.5).duration == pytest.approx(3.6244414, rel=1e-7)
+    monkeypatch.setattr(quick_models, "LONGEST", 3.0)
+    assert infinite_plate(1.0, 1.0, 1.0, 0.5).duration == math.inf
 
 
 @pytest.mark.parametrize("row", table("large_mass_energy_balance.csv"), ids=lambda row: row["M"])

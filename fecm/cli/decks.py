@@ -31,7 +31,6 @@ from fecm.cli.common import (
 from fecm.cli.help import typical
 from fecm.cli.options import FILE_PATH, MODE_OPTION, Format, format_option
 from fecm.deck.findings import DeckError, Finding
-from fecm.deck.format import format_deck
 from fecm.deck.source_text import load_text
 from fecm.deck.units import unit_names, unit_of
 from fecm.problem.build import RunOptions
@@ -276,6 +275,8 @@ def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrit
     The model, comments and blank cards stay as they are.  A DECK of - is standard input, whose
     aligned deck goes to standard output.
     """
+    from fecm.deck.format import format_deck  # which other commands do not need
+
     if output is not None and len(decks) > 1:
         raise click.UsageError("-o takes one DECK")
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import contextlib
-import shutil
+import os
+import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -332,11 +333,21 @@ def _run_one(job: Job, choices: RunOptions, options: Options) -> list[LargestExp
 
 def _check_space(problem: Problem, path: Path) -> None:
     """Refuse a run whose result does not fit on the disk."""
-    free = shutil.disk_usage(path.parent).free
+    free = _free_space(path.parent)
     if problem.output_bytes > free:
         size = format_bytes(problem.output_bytes)
         left = f"the disk has {format_bytes(free)} left"
         raise RefusedError(f"{path}: the result takes about {size}, and {left}")
+
+
+def _free_space(folder: Path) -> int:
+    """Bytes that the user may still write to the disk of a folder."""
+    if sys.platform != "win32":
+        found = os.statvfs(folder)
+        return found.f_bavail * found.f_frsize
+    import shutil  # 2 ms
+
+    return shutil.disk_usage(folder).free
 
 
 @contextlib.contextmanager

@@ -9,12 +9,12 @@ from __future__ import annotations
 
 import ctypes
 from ctypes import c_double, c_int64
-from dataclasses import dataclass
 from enum import IntEnum
 from typing import Generic, NamedTuple, cast
 
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics.contact_law import (
     ContactParameters,
@@ -200,7 +200,7 @@ def kernel_law(constants: ContactParameters[Number]) -> KernelLaw[Number]:
     raise TypeError(f"the kernels have no law of {type(constants).__name__}")
 
 
-@dataclass(frozen=True)
+@frozen
 class Burst:
     """Records of consecutive steps."""
 

@@ -168,7 +168,8 @@ class OutsideError(FecmError, ValueError):
     """A point is not on the plate."""
 
 
-@dataclass(frozen=True, match_args=False)  # attributes that need not be assignable
+# Attributes that need not be assignable, without methods, whose definition takes 0.4 ms.
+@dataclass(frozen=True, init=False, eq=False, repr=False, match_args=False)
 class GagePlace(Protocol):
     """Number, position (length) and direction (degrees from the x-axis) of a gage."""
 

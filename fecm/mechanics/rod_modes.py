@@ -5,10 +5,9 @@ The first mode is the rigid motion, whose displacement is left to the tip.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
+from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.projectile import RodIntegrator, RodState, rigid_dofs
 
@@ -16,7 +15,7 @@ from fecm.mechanics.projectile import RodIntegrator, RodState, rigid_dofs
 EQUAL = 1e-10
 
 
-@dataclass(frozen=True)
+@frozen
 class Modes:
     """Natural modes of a projectile, of unit modal mass; the first is its rigid motion."""
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,10 +29,8 @@ from fecm.mechanics.plate_motion import Load, PlateMotion
 from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.mechanics.points import GageArray, gages
 from fecm.mechanics.projectile import STEPS, Projectile, RodMethod, Transducer
-from fecm.mechanics.residual_stresses import Residual
 from fecm.mechanics.stiffness_product import AUTO, CSR, KERNELS, SOLVERS, Workers
 from fecm.mechanics.strains import StrainField
-from fecm.mechanics.stretching import Stretching
 from fecm.mechanics.symmetry import restrain_resting_dofs, symmetry_reduction
 from fecm.problem.generate import generate
 from fecm.problem.parts import (
@@ -44,6 +43,10 @@ from fecm.problem.parts import (
     strengths_of_deck,
 )
 from fecm.problem.problem import ContactPatch, Problem
+
+if TYPE_CHECKING:
+    from fecm.mechanics.residual_stresses import Residual
+    from fecm.mechanics.stretching import Stretching
 
 ENERGY_LIMIT = 0.1  # relative error of the energy balance that ends a run
 WORTH_SHARING = 100_000  # number of equations above which threads save more than they cost
@@ -302,4 +305,6 @@ def _stretching(problem: Problem, plate: PlateModel) -> Stretching | None:
     rows = work.contact_rows if problem.has_impact else work.passes["DISP"]
     if not (plate.nonlinear and rows):
         return None
+    from fecm.mechanics.stretching import Stretching  # 0.5 ms, for NONL only
+
     return Stretching(plate, problem.under_load, problem.load_place)

@@ -16,12 +16,11 @@ from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.mesh import element_blocks
 from fecm.results.errors import NotStoredError, ResultFileError
 from fecm.results.missing import remedy
-from fecm.results.schema import PlyRows
+from fecm.results.schema import CURE_STRESS, PlyRows
 from fecm.results.stored import Stored
 
 IN_PLANE = ("sigma_1", "sigma_2", "tau_12")
 INTERLAMINAR = ("tau_xz", "tau_yz")
-CURE_STRESS = "plies/cure_stress"  # residual stresses of CURE, of the entire plate
 
 
 @frozen

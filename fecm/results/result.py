@@ -9,16 +9,11 @@ from fecm._errors import warn
 from fecm._tables import html_table
 from fecm._typing import Floats
 from fecm.deck.model import Deck
-from fecm.results import conversions, schema
-from fecm.results.checks import attribute_error, shape_error
-from fecm.results.criteria import criteria_of
+from fecm.results import schema
 from fecm.results.end import End
 from fecm.results.errors import NotStoredError, ResultFileError
-from fecm.results.first_failure import FirstFailure, first_failures
 from fecm.results.group import Group
 from fecm.results.missing import not_stored
-from fecm.results.pictures import RunKind, plot, report
-from fecm.results.plies import PlyGroup
 from fecm.results.run_metrics import end_of, metrics_of
 from fecm.results.stored import Stored
 
@@ -30,7 +25,10 @@ if TYPE_CHECKING:
 
     from fecm.deck.findings import Finding
     from fecm.results.comparison import Comparison
+    from fecm.results.first_failure import FirstFailure
     from fecm.results.hdf5_reader import Contents
+    from fecm.results.pictures import RunKind
+    from fecm.results.plies import PlyGroup
 
 
 class Result(Stored, schema.Contact):
@@ -83,6 +81,8 @@ class Result(Stored, schema.Contact):
     @property
     def plies(self) -> PlyGroup:
         """Ply stresses: ``result.plies(time, elements)``, or a dataset ``result.plies.sigma_1``."""
+        from fecm.results.plies import PlyGroup  # 1 ms, and few results have plies
+
         return PlyGroup(self)
 
     @property
@@ -91,6 +91,8 @@ class Result(Stored, schema.Contact):
 
         Empty without FAIL, or if all exposures stay below 1.
         """
+        from fecm.results.first_failure import first_failures  # 1 ms, for FAIL only
+
         return first_failures(self)
 
     @property
@@ -125,7 +127,9 @@ class Result(Stored, schema.Contact):
         KeyError
             If the run has no impact step.
         """
-        return conversions.dataframe(self)
+        from fecm.results.conversions import dataframe  # 1 ms, which a run does not need
+
+        return dataframe(self)
 
     def to_xarray(self) -> xarray.DataTree:
         """The result as a tree of labelled arrays; needs xarray.
@@ -138,7 +142,9 @@ class Result(Stored, schema.Contact):
         >>> tree = result.to_xarray()  # doctest: +SKIP
         >>> tree["tape3"].w.sel(time=1e-4, method="nearest").max()  # doctest: +SKIP
         """
-        return conversions.datatree(self)
+        from fecm.results.conversions import datatree  # 1 ms, which a run does not need
+
+        return datatree(self)
 
     def to_pyvista(self, time: float | None = None) -> pyvista.UnstructuredGrid:
         """The plate and its fields at a time, as point and cell data; needs PyVista.
@@ -168,7 +174,9 @@ class Result(Stored, schema.Contact):
         >>> grid.warp_by_vector("displacement", factor=20.0).plot(scalars="sigma_2")
         ... # doctest: +SKIP
         """
-        return conversions.grid(self, time)
+        from fecm.results.conversions import grid  # 1 ms, which a run does not need
+
+        return grid(self, time)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the result as a file, such as one of a run in memory.
@@ -286,6 +294,8 @@ class Result(Stored, schema.Contact):
         >>> ax = result.plot("force", width="full")  # doctest: +SKIP
         >>> ax.plot(time, force, ".")  # doctest: +SKIP
         """
+        from fecm.results.pictures import plot  # which a run does not need
+
         named = {self.title or "the result": self}
         return plot(kind, named, path, ax, overwrite=overwrite, **options)
 
@@ -314,6 +324,8 @@ class Result(Stored, schema.Contact):
         --------
         >>> result.report("impact.html")  # doctest: +SKIP
         """
+        from fecm.results.pictures import report  # which a run does not need
+
         report({self.title or "the result": self}, path, overwrite=overwrite)
 
     def compare(
@@ -419,6 +431,10 @@ def result_of(contents: Contents, model: Deck | None = None) -> Result:
 
     Raises ResultFileError if a dataset has the wrong shape or type, or an attribute the wrong type.
     """
+    # 1 ms, which the result of a run itself does not need.
+    from fecm.results.checks import attribute_error, shape_error
+    from fecm.results.criteria import criteria_of
+
     kinds = {name: dtype.kind for name, dtype in contents.dtypes.items()}
     criteria = len(criteria_of(contents.groups.get("failure", {})))
     found = shape_error(contents.shapes, kinds, criteria) or attribute_error(contents.groups)

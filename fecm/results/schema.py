@@ -391,9 +391,11 @@ def criterion_datasets(name: str) -> list[Dataset]:
     ]
 
 
+CURE_STRESS = "plies/cure_stress"  # residual stresses of CURE, of the entire plate
+
 # Datasets that have one axis more in front, `laminates`, if there are several; NaN at plies that a
 # laminate lacks.
-BY_LAMINATE = ("plies/z", "plies/material", "plies/cure_stress")
+BY_LAMINATE = ("plies/z", "plies/material", CURE_STRESS)
 
 
 def by_laminate(dataset: Dataset) -> Dataset:

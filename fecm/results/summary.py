@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from functools import partial
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,10 +14,12 @@ from fecm.deck.units import unit_of
 from fecm.results.criteria import spelt, where
 from fecm.results.end import End
 from fecm.results.exposures import LargestExposure, evaluations_in_contact, largest_exposures
-from fecm.results.first_failure import FirstFailure, failure_metrics, first_failures
 from fecm.results.run_metrics import end_of, metrics_of
 from fecm.results.stored import Stored
 from fecm.results.validity import CROSSED
+
+if TYPE_CHECKING:
+    from fecm.results.first_failure import FirstFailure
 
 NEAR = 0.05  # of the time of the peak, up to which a row is that of the peak
 LABEL_WIDTH = 18  # of the lines
@@ -147,7 +149,7 @@ def _delaminations(result: Stored) -> str:
 
 def _exposures(result: Stored) -> list[str]:
     """Lines about the largest exposures and the first failure."""
-    largest, first = largest_exposures(result), first_failures(result)
+    largest, first = largest_exposures(result), _first_failures(result)
     reached = {one.criterion: one.force for one in first if not math.isnan(one.force)}
     lines = []
     for exposure in largest:
@@ -163,6 +165,15 @@ def _exposures(result: Stored) -> list[str]:
         ends = " by the end of the run, which is in contact: open"
         lines.append(_line("first failure", f"none{ends if result.still_in_contact else ''}"))
     return lines
+
+
+def _first_failures(result: Stored) -> list[FirstFailure]:
+    """When each criterion first reaches an exposure of 1; empty without FAIL."""
+    if "exposures/exposure" not in result:
+        return []
+    from fecm.results.first_failure import first_failures  # 1 ms, for FAIL only
+
+    return first_failures(result)
 
 
 def _first_failure(result: Stored, first: FirstFailure) -> str:
@@ -339,6 +350,10 @@ def about_run(result: Stored) -> dict[str, Any]:
 
 def _metrics(result: Stored) -> dict[str, Any]:
     """Impact metrics, and those of FAIL under ``failure``."""
+    if "failure/x" not in result:
+        return metrics_of(result)
+    from fecm.results.first_failure import failure_metrics  # 1 ms, for FAIL only
+
     failure = failure_metrics(result)
     return {**metrics_of(result), "failure": failure} if failure else metrics_of(result)
 

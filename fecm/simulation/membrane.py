@@ -9,7 +9,6 @@ import numpy as np
 
 from fecm.deck.units import quantity, unit_of
 from fecm.mechanics.points import shortest_side
-from fecm.mechanics.stretching import principal_values
 from fecm.results.result import Result
 from fecm.simulation import peaks
 from fecm.simulation.simulation import Simulation
@@ -33,6 +32,8 @@ def _time_step(simulation: Simulation, result: Result) -> Iterator[str]:
     w^2 <= w_linear^2 + N k^2/(rho h), where k is that of the shortest wave of the mesh, whose
     length is the shortest side: nodes are half a side apart.
     """
+    from fecm.mechanics.stretching import principal_values  # 0.5 ms, for NONL only
+
     problem, dt, plate = simulation.problem, simulation.state.dt, simulation.model.motion.plate
     largest = peaks.membrane_force(result)
     # The frequencies of the linear plate contain the preload.

@@ -18,9 +18,9 @@ from fecm.problem.build import ImpactModel
 from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR, OWN_CRITERIA
 from fecm.results.exposures import LOAD_FACTOR
 from fecm.results.groups import STORED_BY
-from fecm.results.plies import CURE_STRESS
 from fecm.results.schema import (
     BY_LAMINATE,
+    CURE_STRESS,
     DATASETS,
     FIXED,
     Dataset,
