@@ -16,7 +16,9 @@ from pathlib import Path
 
 from figures import keep
 
-DECKS = Path(__file__).parents[1] / "decks"
+ROOT = Path(__file__).parents[1]
+DECKS = ROOT / "decks"
+EXAMPLES = ROOT / "fecm" / "examples"
 BARE = ["-c", "import numpy, h5py, click"]
 RUN = ["-m", "fecm", "run", "--overwrite"]
 COMMANDS = {
@@ -26,6 +28,8 @@ COMMANDS = {
     "run appendix": [*RUN, str(DECKS / "appendix.inp")],
     "check impact-115": ["-m", "fecm", "check", str(DECKS / "impact-115.inp")],
     "info": ["-m", "fecm", "info", "impact-115.h5"],
+    "estimate drop-weight": ["-m", "fecm", "estimate", str(EXAMPLES / "drop-weight.inp")],
+    "--version": ["-m", "fecm", "--version"],
     "plot": ["-m", "fecm", "plot", "impact-115.h5", "--overwrite"],
 }
 

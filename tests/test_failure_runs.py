@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm._json import jsonable
 from fecm.deck.model import Allowables, Ply
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.failure import CRITERIA, exposure_of
@@ -19,6 +21,7 @@ from fecm.mechanics.mesh import element_blocks
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.results.sinks import MemorySink
+from fecm.results.summary import about_run
 from fecm.simulation.run import simulate
 from fecm.sweeps.in_full import without_output
 from tests.builders import nothing, rules, square, table, with_restraints
@@ -162,3 +165,14 @@ def test_a_sweep_evaluates_no_criteria_in_its_cases() -> None:
     groups = {name.split("/")[0] for name in sink.arrays}
     assert "history" in groups
     assert not groups & {"failure", "tape3", "tape8"}
+
+
+def test_the_printed_summary_is_that_of_the_file(tmp_path: Path) -> None:
+    text = failing().replace("ALLO\n", "DELA\n1.0E-3,\nALLO\n")
+    (tmp_path / "d.inp").write_text(text.replace("         10", "        150"))
+    done = call("run", "d.inp", "--format", "json", cwd=tmp_path)
+    printed = json.loads(done.stdout)
+    stored = json.loads(json.dumps(jsonable(about_run(fecm.load(tmp_path / "d.h5")))))
+    assert {name: printed[name] for name in stored} == stored
+    assert printed["metrics"]["failure"]["evaluations_in_contact"] > 20
+    assert len(printed["summary"]) > 8
