@@ -131,7 +131,8 @@ def _motion(parameter: float) -> Iterator[_Expansion]:
 
 def _product(first: list[float], second: list[float]) -> float:
     """Last coefficient of the product of two series of the same length."""
-    return sum(map(operator.mul, first, reversed(second)))
+    total: float = sum(map(operator.mul, first, reversed(second)))
+    return total
 
 
 def _value(powers: list[float], s: float) -> float:

@@ -114,7 +114,8 @@ class FileSink:
             if made == clock or not {*dataset.shape} <= {"rows", *schema.SCALES}:
                 continue
             for axis, (size, length) in enumerate(zip(dataset.shape, made.shape, strict=True)):
-                scale = clock if size == "rows" else self._scale(size, length)
+                rows = size == "rows"
+                scale = clocks[dataset.group] if rows else self._scale(size, length)
                 h5py.h5ds.attach_scale(made.id, scale.id, axis)
 
     def _scale(self, size: Any, length: int) -> h5py.Dataset:
