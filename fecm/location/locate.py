@@ -55,7 +55,7 @@ def locate(
         their numbers (``gage 1``) or else taken in the order of the deck; times and strains
         (points, gages); or columns by name.  Times are in the deck's unit.
     region : sequence of float, optional
-        x0, y0, x1, y1 of the rectangle that contains the place; the plate by default.
+        Rectangle that contains the place: x0, y0, x1, y1; the plate by default.
     grid : float, optional
         Distance of the candidate places; by default that of about 126 in the region.
     basis : float, optional
