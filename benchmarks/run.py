@@ -159,10 +159,15 @@ def patched() -> Deck:
     return replace(deck, segments=(*deck.segments, Patch()), text="")
 
 
+def tied(deck: Deck) -> Deck:
+    """The deck with assumed shear strains."""
+    return replace(deck, segments=(*deck.segments, Shear(assumed=True)), text="")
+
+
 def stretched(deck: Deck) -> Deck:
     """The deck with NONL and assumed shear strains, u and v free."""
     segments = [s for s in deck.segments if not isinstance(s, Boundary)]
-    return replace(deck, segments=(*segments, Shear(assumed=True), Nonlinear()), text="")
+    return tied(replace(deck, segments=(*segments, Nonlinear()), text=""))
 
 
 def linear(deck: Deck) -> Deck:
@@ -175,12 +180,15 @@ CASES: dict[str, Callable[[], Deck]] = {
     "report": report,
     "patch": patched,
     "distorted": lambda: distorted(refined(1), 0.04),
+    "MITC distorted": lambda: tied(distorted(refined(1), 0.04)),
     "x3": lambda: refined(3),
     "x10": lambda: refined(10),
     "x10 off-centre": lambda: refined(10, 20),
     "x10 graded": lambda: graded(10),
     "x10 distorted": lambda: distorted(refined(10), 0.004),
     "x10 distorted, B": lambda: coupled(distorted(refined(10), 0.004)),
+    "x10 MITC distorted": lambda: tied(distorted(refined(10), 0.004)),
+    "x10 MITC distorted, B": lambda: tied(coupled(distorted(refined(10), 0.004))),
     "x32": lambda: refined(32),
     "NONL": lambda: stretched(report()),
     "NONL distorted": lambda: stretched(distorted(refined(1), 0.04)),

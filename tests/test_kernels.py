@@ -15,8 +15,9 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.mechanics import failure, impact, kernels
+from fecm.mechanics import assumed_shear, failure, impact, kernels
 from fecm.mechanics.contact_law import RELOADING, UNLOADING, VIRGIN
+from fecm.mechanics.elements import Quadrature, gauss, nodal
 from fecm.mechanics.impact_steps import COLUMNS, LawKind
 from fecm.mechanics.impact_sweep import Found, Given
 from fecm.mechanics.interpolation import NDOF
@@ -24,14 +25,26 @@ from fecm.mechanics.kernels.element_groups import ElementKind
 from fecm.mechanics.kernels.layout import LANES
 from fecm.mechanics.kernels.midplane import TYING
 from fecm.mechanics.kernels.plate import CompiledProduct
-from fecm.mechanics.kernels.strains import Strains
+from fecm.mechanics.kernels.strains import CompiledStrains, Strains
+from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.projectile import Rod, RodState, WilsonStep
 from fecm.mechanics.rod_modes import Modes
 from fecm.mechanics.stiffness_product import stiffness_operator
+from fecm.mechanics.strains import StrainField
+from fecm.mechanics.symmetry import symmetry_reduction
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.problem import Problem
 from fecm.results.result import Result
-from tests.builders import distorted_square, square
+from tests.builders import (
+    boundary,
+    distorted_square,
+    general_plate,
+    isotropic_plate,
+    rules,
+    square,
+    with_restraints,
+)
 from tests.calls import call
 from tests.decks import small
 from tests.stopped_runs import StoppedError
@@ -74,18 +87,60 @@ def assert_same_product(text: str, dofs: int, slips: frozenset[str]) -> None:
 def test_the_product_is_numpys_for_every_family_and_rule(kind: int, coupled: bool) -> None:
     meshes = square(8, 8, kind), distorted_square(5, 4, kind)
     for mesh, orders, variant in itertools.product(
-        meshes, ((3, 3, 3), (4, 2, 3)), ("", "SHEA MITC", "jacobian")
+        meshes, ((3, 3, 3), (4, 2, 3)), ("", "SHEA MITC", "jacobian", "SHEA MITC, jacobian")
     ):
-        if variant == "SHEA MITC" and kind not in (4, 9):
+        assumed = "SHEA MITC" in variant
+        if assumed and kind not in (4, 9):
             continue
         text = element_deck(mesh, orders)
         if coupled:
             text = text.replace("2,90.,.053", "2,30.,.053").replace(",1,1,0,0,0", ",0,0,0,0,0")
             text = text.replace("800000.,800000.\n", "800000.,500000.\n")  # A*45 is not 0
-        if variant == "SHEA MITC":
+        if assumed:
             text = text.replace("EXPE\n", "SHEA MITC\nEXPE\n", 1)
-        slips = frozenset(["jacobian"] if variant == "jacobian" else [])
+        slips = frozenset(["jacobian"] if "jacobian" in variant else [])
         assert_same_product(text, NDOF if coupled else 3, slips)
+
+
+@compiled
+@pytest.mark.parametrize("laminate", [isotropic_plate(0.1), general_plate()], ids=["B = 0", "B"])
+@pytest.mark.parametrize("orders", [(3, 2), (2, 2), (4, 3)], ids=str)
+def test_assumed_shear_strains_of_curved_elements_are_sums_along_xi_and_eta(
+    laminate: Laminate, orders: tuple[int, int]
+) -> None:
+    """With every node moved, mid-sides and centres too, so that no slope of the mapping is 0."""
+    coordinates, elements = square(5, 4)
+    inner = ~boundary(coordinates, elements)[:, :1]
+    shifts = np.random.default_rng(2).uniform(-0.02, 0.02, coordinates.shape)
+    mesh = with_restraints(coordinates + inner * shifts, elements, boundary(coordinates, elements))
+    plate = PlateModel(mesh, laminate, replace(rules(*orders), assumes_shear=True))
+    kept = symmetry_reduction(plate, None)
+    u = np.random.default_rng(0).standard_normal(kept.count)
+    wanted = stiffness_operator(plate, "numpy", kept)(u)
+    product = CompiledProduct(plate, kept)
+    np.testing.assert_allclose(product(u), wanted, rtol=0.0, atol=5e-15 * np.abs(wanted).max())
+    chunk = product.plate.structure.chunk[0]
+    kinds = {chunk.block[number].group.contents.kind for number in range(chunk.blocks)}
+    assert kinds == {ElementKind.FACTORIZED}
+
+
+@compiled
+@pytest.mark.parametrize("kind", [4, 9])
+@pytest.mark.parametrize("slip", [False, True])
+@pytest.mark.parametrize("rule", [gauss(1), gauss(3), nodal(3), gauss(4)], ids=lambda r: len(r.xi))
+def test_assumed_shear_strains_of_fields_are_numpys(
+    kind: int, slip: bool, rule: Quadrature, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    coordinates, elements = distorted_square(3, 2, kind)
+    fields = np.random.default_rng(3).standard_normal((2, len(coordinates), NDOF))
+    known = StrainField(elements, coordinates, rule, transposed_jacobian=slip, assumes_shear=True)
+    wanted = known.evaluate(fields)
+    monkeypatch.delattr(StrainField, "evaluate")
+    found = CompiledStrains(
+        elements, coordinates, rule, transposed_jacobian=slip, assumes_shear=True
+    )
+    atol = 1e-14 * np.abs(wanted).max()
+    np.testing.assert_allclose(found.evaluate(fields), wanted, rtol=0.0, atol=atol)
 
 
 @compiled
@@ -114,6 +169,9 @@ DECKS = {
     ),
     "damping": FIRST.replace("EXPE", "DAMP\n     3000.\n\nEXPE"),
     "distorted": element_deck(distorted_square(6, 6), (3, 2, 3), steps=300),
+    "assumed shear strains": element_deck(distorted_square(6, 6), (3, 2, 3), steps=300).replace(
+        "EXPE\n", "SHEA MITC\nEXPE\n", 1
+    ),
     "rows far apart": REPORT.replace("EXPE\n", "SHEA MITC\nEXPE\n", 1).replace(
         "        20", "      3000"
     ),
@@ -244,6 +302,8 @@ def test_the_enumerations_of_python_have_the_values_of_those_in_c() -> None:
         "FOUND": len(Found),
         "LANES": LANES,
         "CRITERIA": len(failure.CRITERIA),
+        "TIED": 2
+        * max(len(along) * len(across) for along, across, _ in assumed_shear.TYING.values()),
         "PASSES": impact.PASSES,
         "TYING": TYING,
     }

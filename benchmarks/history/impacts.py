@@ -16,6 +16,7 @@ import fecm
 STEPS = {
     "report": 4000,
     "distorted": 4000,
+    "MITC distorted": 4000,
     "patch": 4000,
     "x3": 1000,
     "x10": 100,

@@ -59,6 +59,7 @@ class Group(Structure):
     `rotations_t`     (bending, bending)            weights of the points of bending
     `deflection`      (shear,)                      points of shear, ascending
     `deflection_t`    (shear, shear)                weights of the points of shear
+    `tying`           number                        whether the shear strains are assumed ones
     TABULATED:
     `bending`         number                        points, also `shear`
     `tying`           number                        tying points of each strain, or 0
@@ -139,9 +140,7 @@ class ElementGroup:
             self._rules = (membrane.in_rows(rules.bending), shear)
         if congruent:
             self.kind, fields = self._matrices(weights[0])
-        elif nn == family.shape.nodes == 9 and not (
-            rules.assumes_shear or plate.is_preloaded or plate.is_curved
-        ):
+        elif self._is_factorized():
             self.order = np.lexsort((family.shape.xi, family.shape.eta))
             self.kind, fields = ElementKind.FACTORIZED, self._factors()
         else:
@@ -177,6 +176,16 @@ class ElementGroup:
     def needs_data(self) -> bool:
         """Whether the kernels need numbers at the points of quadrature."""
         return not self.has_matrix or (self._nonlinear and not self.parallelograms)
+
+    def _is_factorized(self) -> bool:
+        """Whether the kernels have sums along xi and eta for elements without a matrix."""
+        plate, family, rules = self._plate, self.family, self._plate.rules
+        return family.nodes.shape[1] == family.shape.nodes == 9 and not (
+            self._nonlinear
+            or plate.is_preloaded
+            or plate.is_curved
+            or (rules.assumes_shear and rules.transposed_jacobian)
+        )
 
     def _differing(self, members: Indices) -> Indices:
         """The first element in all lanes of a block instead of congruent ones."""
@@ -236,6 +245,7 @@ class ElementGroup:
             "shear": len(of_shear),
             "deflection": of_shear,
             "deflection_t": _in_rows(shear),
+            "tying": int(self._plate.rules.assumes_shear),
         }
 
     def _tables(self) -> Fields:
@@ -285,9 +295,15 @@ class ElementGroup:
         if self.kind == ElementKind.FACTORIZED:
             parts = self._coefficients(family, members)
         else:
-            parts = [self._at_points(rule, family, members) for rule in self._rules]
-            if self._plate.rules.assumes_shear:
-                parts += _slopes_of_mapping(family)
+            assumed, slip = self._plate.rules.assumes_shear, self._plate.rules.transposed_jacobian
+            # Assumed shear strains don't have the slip.
+            slips = (slip, slip and not assumed)
+            parts = [
+                self._at_points(rule, family, members, transposed=transposed)
+                for rule, transposed in zip(self._rules, slips, strict=True)
+            ]
+            if assumed:
+                parts += slopes_of_mapping(family)
         return _in_lanes(np.concatenate([part.reshape(len(members), -1) for part in parts], axis=1))
 
     def membrane(self, members: Indices) -> Floats:
@@ -315,10 +331,12 @@ class ElementGroup:
         x, y = c.reshape(-1, 9, 2)[:, 1:].transpose(2, 0, 1)
         return [0.25 * self._weights[members, None], x, y]
 
-    def _at_points(self, rule: Quadrature, family: ElementBlock, members: Indices) -> Floats:
+    def _at_points(
+        self, rule: Quadrature, family: ElementBlock, members: Indices, *, transposed: bool
+    ) -> Floats:
         """Inverse Jacobian, and its determinant times the weight, (ne, npt, 5)."""
         _, local = local_shape_functions(family, rule)
-        inverse, determinant = jacobians(family, local, self._plate.rules.transposed_jacobian)
+        inverse, determinant = jacobians(family, local, transposed)
         jxw = determinant * rule.weights * self._weights[members, None]
         return np.concatenate([inverse, jxw[:, :, None]], axis=2)
 
@@ -360,7 +378,7 @@ def _slopes(local: Floats) -> Floats:
     return local.transpose(1, 0, 2).reshape(-1, local.shape[2])
 
 
-def _slopes_of_mapping(family: ElementBlock) -> list[Floats]:
+def slopes_of_mapping(family: ElementBlock) -> list[Floats]:
     """Slopes x,xi and y,xi at the tying points along xi, and those in eta; (ne, tying, 2) each."""
     nn = family.nodes.shape[1]
     found: list[Floats] = []

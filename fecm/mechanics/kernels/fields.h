@@ -163,11 +163,15 @@ static const Entry FIELDS[] = {
     FIELD(Strains, nodes),
     FIELD(Strains, points),
     FIELD(Strains, width),
+    FIELD(Strains, tying),
     FIELD(Strains, row),
     FIELD(Strains, node),
     FIELD(Strains, shape),
     FIELD(Strains, table),
     FIELD(Strains, metric),
+    FIELD(Strains, tying_table),
+    FIELD(Strains, mapping),
+    FIELD(Strains, tied),
 
     WHOLE(Ply),
     FIELD(Ply, xt),
@@ -293,6 +297,7 @@ static const Entry CONSTANTS[] = {
     VALUE(Count, , LANES),
     VALUE(Count, , CRITERIA),
     VALUE(Count, , TYING),
+    VALUE(Count, , TIED),
     VALUE(Count, , PASSES),
 
     {NULL, NULL, 0, 0},

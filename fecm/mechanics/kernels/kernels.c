@@ -5,6 +5,7 @@
  *   structures.h  what Python passes
  *   impact.h      contact law, projectile and contact iteration of one case
  *   plate.h       K u, the plate's update, and strains; twice, with AVX2 and without
+ *   assumed_shear.h  assumed shear strains of factorized elements; twice
  *   membrane.h    forces of the membrane of a nonlinear plate; twice
  *   sweep.h       many impacts on one plate, four at a time; twice
  *   midplane.h    strains of the midplane and curvatures for the exposures; twice

@@ -245,17 +245,6 @@ INLINE void NAME(sum_gradient)(int m, const double *y, int n, const double *x, c
     }
 }
 
-/* Values of a linear function at -sqrt(3/5), 0, sqrt(3/5) from those at +-1/sqrt(3). */
-INLINE void NAME(spread)(half low, half high, half *v, int step) {
-    const half middle = 0.5 * (low + high), odd = SPREAD * (high - low);
-    v[0] = middle - odd, v[step] = middle, v[2 * step] = middle + odd;
-}
-
-INLINE void NAME(gather)(const half *v, int step, half *low, half *high) {
-    const half middle = 0.5 * (v[0] + v[step] + v[2 * step]), odd = SPREAD * (v[2 * step] - v[0]);
-    *low = middle - odd, *high = middle + odd;
-}
-
 /* Strains of U_1 and U_2 at the 9 points, with R there. */
 INLINE void NAME(strains_of)(half (*R)[4], half (*c)[9], half (*e)[9]) {
     half a[2][9], b[2][9];

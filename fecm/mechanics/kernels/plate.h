@@ -6,7 +6,8 @@
  *
  *   ONE_MATRIX     y = K x with the one matrix of congruent elements
  *   TWO_MATRICES   the same with the even and the odd motions under half a turn apart: half the work
- *   FACTORIZED     quadrature of 9-node elements, sums along xi and then along eta
+ *   FACTORIZED     quadrature of 9-node elements, sums along xi and then along eta; with `tying`
+ *                  the shear strains are assumed ones, see assumed_shear.h
  *   TABULATED      quadrature with tables of shape functions, for all other elements
  *
  * Of a nonlinear plate K is that of w, theta_x and theta_y alone, and membrane.h adds the rest.
@@ -311,19 +312,24 @@ INLINE void NAME(nodal)(half *f) {
         }
 }
 
-/* Forces on the coefficients of the dofs from strains at n x n points, added: those of membrane and
- * bending strains, of transverse shear strains, or of both if they have the same points.
+#include "assumed_shear.h"
+
+/* Forces on the coefficients of the dofs from strains at n x n points: those of membrane and bending
+ * strains, which are stored, of transverse shear strains, which are added, or of both, stored, if they have
+ * the same points.  If `tied`, `assumed` are twice the covariant shear strains at the points, (2, xi, eta),
+ * and become forces on them.
  *
  * Coefficients of x and y follow those of the dofs; `weight` are those of the points, and `factor`
  * that of the element.  With twice the slopes J of x and y, d their determinant and g twice the slopes
  * of a field, strains are adj(J) g/d and the area of a point is its weight times d/4. */
-INLINE void NAME(points)(int nd, int n, int bends, int shears, const Plate *p, const Group *g, const double *x,
-                         const double *weight, half factor, half (*c)[9], half (*force)[9]) {
-    const int w = nd - 3, fields = nd + 2;
+INLINE void NAME(points)(int nd, int tied, int n, int bends, int shears, const Plate *p, const Group *g, const double *x,
+                         const double *weight, half factor, half (*c)[9], half (*assumed)[3][3], half (*force)[9]) {
+    const int w = nd - 3, fields = nd + 2, free = shears && !tied;
     const double *C = g->stiffness, *S = g->transverse;
+    const int transposed = !tied && p->transposed;
     half V[7][3][4] ALIGNED, D[7][3][4] ALIGNED; /* values and slopes along xi */
-#define SLOPES(i) ((i) >= nd || ((i) == w ? shears : bends))
-#define VALUES(i) ((i) > w && (i) < nd && shears)
+#define SLOPES(i) ((i) >= nd || ((i) == w ? free : bends))
+#define VALUES(i) ((i) > w && (i) < nd && free)
     for (int i = 0; i < fields; i++)
         for (int b = 0; b < 3; b++) {
             const half *f = c[i] + 3 * b;
@@ -339,8 +345,8 @@ INLINE void NAME(points)(int nd, int n, int bends, int shears, const Plate *p, c
             }
             if (VALUES(i)) NAME(values)(n, x, V[i][0][k], V[i][1][k], V[i][2][k], angle[i - w - 1], 1);
         }
-        const half *const of_xe = p->transposed ? across[nd] : along[nd + 1];
-        const half *const of_yx = p->transposed ? along[nd + 1] : across[nd];
+        const half *const of_xe = transposed ? across[nd] : along[nd + 1];
+        const half *const of_yx = transposed ? along[nd + 1] : across[nd];
         for (int l = 0; l < n; l++) {
             const half xx = across[nd + 1][l], ye = along[nd][l], xe = -of_xe[l], yx = -of_yx[l];
             const half det = xx * ye - xe * yx, area = factor * weight[n * k + l] / det;
@@ -362,7 +368,12 @@ INLINE void NAME(points)(int nd, int n, int bends, int shears, const Plate *p, c
                     along[i + 1][l] = xx * q[2] + yx * q[1], across[i + 1][l] = xe * q[2] + ye * q[1];
                 }
             }
-            if (shears) {
+            if (shears && tied) {
+                half *const one = &assumed[0][k][l], *const other = &assumed[1][k][l];
+                const half sx = area * (xx * *one + xe * *other), sy = area * (yx * *one + ye * *other);
+                const half qx = S[0] * sx + S[1] * sy, qy = S[2] * sx + S[3] * sy;
+                *one = xx * qx + yx * qy, *other = xe * qx + ye * qy;
+            } else if (shears) {
                 const half sx = area * (xx * along[w][l] + xe * across[w][l] - det * angle[0][l]);
                 const half sy = area * (yx * along[w][l] + ye * across[w][l] - det * angle[1][l]);
                 const half qx = S[0] * sx + S[1] * sy, qy = S[2] * sx + S[3] * sy;
@@ -385,13 +396,17 @@ INLINE void NAME(points)(int nd, int n, int bends, int shears, const Plate *p, c
             half sum[3] = {{0}};
             if (SLOPES(i)) NAME(sum_slopes)(n, x, D[i][b], 1, sum + 1, sum + 2);
             if (VALUES(i) || (SLOPES(i) && b)) NAME(sum_values)(n, x, V[i][b], 1, sum, sum + 1, sum + 2);
-            for (int a = 0; a < 3; a++) force[i][3 * b + a] += sum[a];
+            for (int a = 0; a < 3; a++)
+                if (bends)
+                    force[i][3 * b + a] = sum[a];
+                else
+                    force[i][3 * b + a] += sum[a];
         }
 #undef SLOPES
 #undef VALUES
 }
 
-INLINE void NAME(factorized)(int nd, const Plate *p, const Chunk *chunk, const Block *b, const double *u, double *f) {
+INLINE void NAME(factorized)(int nd, int tied, const Plate *p, const Chunk *chunk, const Block *b, const double *u, double *f) {
     const Group *g = b->group;
     const int nb = (int)g->bending, ns = (int)g->shear;
     const double *xb = g->rotations, *wb = g->rotations_t, *xs = g->deflection, *ws = g->deflection_t;
@@ -400,7 +415,6 @@ INLINE void NAME(factorized)(int nd, const Plate *p, const Chunk *chunk, const B
     for (int side = 0; side < 2; side++) {
         half c[7][9] ALIGNED, force[5][9] ALIGNED;
         const half factor = NAME(load)(b->data + 4 * side);
-        memset(force, 0, sizeof force);
         for (int dof = 0; dof < nd; dof++) {
             for (int node = 0; node < 9; node++) c[dof][node] = HALF(x[dof][node]);
             NAME(coefficients)(c[dof]);
@@ -408,18 +422,31 @@ INLINE void NAME(factorized)(int nd, const Plate *p, const Chunk *chunk, const B
         c[nd][0] = c[nd + 1][0] = factor; /* of no effect on slopes */
         for (int i = 1; i < 9; i++)
             for (int axis = 0; axis < 2; axis++) c[nd + axis][i] = NAME(load)(b->data + LANES * (8 * axis + i) + 4 * side);
+        half assumed[2][3][3] ALIGNED, mapping[2][2][2][3] ALIGNED;
+        if (tied)
+            for (int axis = 0; axis < 2; axis++) NAME(assume)(axis, c + nd - 3, mapping[axis], assumed[axis]);
         if (nb == 3 && ns == 3) /* the usual numbers, for which loops are unrolled */
-            NAME(points)(nd, 3, 1, 1, p, g, xb, wb, factor, c, force);
+            NAME(points)(nd, tied, 3, 1, 1, p, g, tied ? ACROSS : xb, wb, factor, c, assumed, force);
         else {
-            NAME(points)(nd, nb, 1, 0, p, g, xb, wb, factor, c, force);
-            NAME(points)(nd, ns, 0, 1, p, g, xs, ws, factor, c, force);
+            NAME(points)(nd, tied, nb, 1, 0, p, g, xb, wb, factor, c, assumed, force);
+            NAME(points)(nd, tied, tied ? 3 : ns, 0, 1, p, g, xs, ws, factor, c, assumed, force);
         }
+        if (tied)
+            for (int axis = 0; axis < 2; axis++) NAME(sum_assumed)(axis, assumed[axis], mapping[axis], force + nd - 3);
         for (int dof = 0; dof < nd; dof++) {
             NAME(nodal)(force[dof]);
             for (int node = 0; node < 9; node++) HALF(y[dof][node]) = force[dof][node];
         }
     }
     for (int node = 0; node < 9; node++) NAME(give)(nd, p, chunk, b->place[node], y[0] + node, 9, f);
+}
+
+/* Elements with assumed shear strains, whose inverse Jacobian is never transposed. */
+TARGET void NAME(tied)(int nd, const Plate *p, const Chunk *chunk, const Block *b, const double *u, double *f) {
+    if (nd == 3)
+        NAME(factorized)(3, 1, p, chunk, b, u, f);
+    else
+        NAME(factorized)(5, 1, p, chunk, b, u, f);
 }
 
 #include "membrane.h"
@@ -484,7 +511,12 @@ INLINE void NAME(chunk)(int nd, int nonlinear, const Plate *p, const Chunk *c, i
             else
                 NAME(two_matrices)(last, pairs, nodes - 2 * pairs, p, c, b, of_last, on_last);
             break;
-        case FACTORIZED: NAME(factorized)(last, p, c, b, of_last, on_last); break;
+        case FACTORIZED:
+            if (b->group->tying)
+                NAME(tied)(last, p, c, b, of_last, on_last);
+            else
+                NAME(factorized)(last, 0, p, c, b, of_last, on_last);
+            break;
         case TABULATED: NAME(tabulated)(last, nodes, p, c, b, of_last, on_last); break;
         }
         if (nonlinear) (b->group->curved ? NAME(curved_membrane) : NAME(membrane))(p, c, b, u, force, sums + 4);
@@ -533,6 +565,21 @@ TARGET Sums NAME(finish)(const Plate *p, int next, half *sums) {
     return (Sums){added[0], added[1], added[2], added[3], added[4]};
 }
 
+/* Covariant shear strains of an element at its tying points, four at a time. */
+INLINE void NAME(strains_at_tying)(const Strains *g, int64_t e, const double *u, double *strain) {
+    const int64_t *node = g->node + g->nodes * e, n = g->tying;
+    for (int64_t t = 0; t < n; t += 4) {
+        half w = {0}, a = {0}, b = {0};
+        const double *table = g->tying_table + t, *mapping = g->mapping + 2 * n * g->shape[e] + t;
+        for (int64_t i = 0; i < g->nodes; i++, table += 2 * n) {
+            const double *q = u + 5 * node[i];
+            const half slope = NAME(load)(table), value = NAME(load)(table + n);
+            w += q[2] * slope, a += q[3] * value, b += q[4] * value;
+        }
+        NAME(store)(strain + t, w - a * NAME(load)(mapping) - b * NAME(load)(mapping + n));
+    }
+}
+
 /* Curvatures x, y, xy and shear strains yz, xz, as StrainField evaluates them, four points at a time. */
 TARGET void NAME(strains)(const Strains *g, int64_t fields, int64_t numnp, int64_t numel, const double *u, double *strains) {
     const int64_t width = g->width, points = g->points, component = fields * numel * points;
@@ -540,6 +587,8 @@ TARGET void NAME(strains)(const Strains *g, int64_t fields, int64_t numnp, int64
         for (int64_t e = 0; e < g->elements; e++) {
             const int64_t *node = g->node + g->nodes * e;
             double *out = strains + (field * numel + g->row[e]) * points;
+            double tied[TIED];
+            NAME(strains_at_tying)(g, e, u, tied);
             for (int64_t p = 0; p < width; p += 4) {
                 half w[2] = {{0}}, a[3] = {{0}}, b[3] = {{0}};
                 const double *t = g->table + p;
@@ -553,11 +602,19 @@ TARGET void NAME(strains)(const Strains *g, int64_t fields, int64_t numnp, int64
                 const double *m = g->metric + 4 * width * g->shape[e] + p;
                 const half xx = NAME(load)(m), xe = NAME(load)(m + width);
                 const half yx = NAME(load)(m + 2 * width), ye = NAME(load)(m + 3 * width);
+                half xz = xx * w[0] + xe * w[1] - a[2], yz = yx * w[0] + ye * w[1] - b[2];
+                if (g->tying) {
+                    half of_xi = {0}, of_eta = {0};
+                    const int64_t each = g->tying / 2;
+                    const double *one = g->tied + p, *other = one + each * width;
+                    for (int64_t i = 0; i < each; i++, one += width, other += width)
+                        of_xi += tied[i] * NAME(load)(one), of_eta += tied[each + i] * NAME(load)(other);
+                    xz = xx * of_xi + xe * of_eta, yz = yx * of_xi + ye * of_eta;
+                }
                 /* 0 - a, as -a would give negative zeros of a plate at rest. */
                 const half found[5] = {
                     0.0 - (xx * a[0] + xe * a[1]), 0.0 - (yx * b[0] + ye * b[1]),
-                    0.0 - (yx * a[0] + ye * a[1]) - (xx * b[0] + xe * b[1]),
-                    yx * w[0] + ye * w[1] - b[2], xx * w[0] + xe * w[1] - a[2]};
+                    0.0 - (yx * a[0] + ye * a[1]) - (xx * b[0] + xe * b[1]), yz, xz};
                 const int count = points - p < 4 ? (int)(points - p) : 4;
                 for (int c = 0; c < 5; c++)
                     for (int i = 0; i < count; i++) out[c * component + p + i] = found[c][i];

@@ -15,9 +15,10 @@ from functools import cached_property
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.mechanics import assumed_shear
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.kernels import LIBRARY, Doubles, Longs, Structure, floats
-from fecm.mechanics.kernels.element_groups import jacobians
+from fecm.mechanics.kernels.element_groups import jacobians, slopes_of_mapping
 from fecm.mechanics.mesh import ElementBlock, congruence
 from fecm.mechanics.strains import STRAINS, StrainField
 
@@ -27,13 +28,17 @@ class Strains(Structure):
 
     The arrays:
 
-    =========  ====================  ==========================================================
-    `row`      (elements,)           number of the element in the result
-    `node`     (elements, nodes)     numbers of its nodes
-    `shape`    (elements,)           row of `metric`
-    `table`    (nodes, 3, width)     slopes in xi and eta, and value, of the shape functions
-    `metric`   (shapes, 4, width)    inverse Jacobian of the elements of one shape, 1/length
-    =========  ====================  ==========================================================
+    =============  ===================  ======================================================
+    `row`          (elements,)          number of the element in the result
+    `node`         (elements, nodes)    numbers of its nodes
+    `shape`        (elements,)          row of `metric` and of `mapping`
+    `table`        (nodes, 3, width)    slopes in xi and eta, and value, of the shape functions
+    `metric`       (shapes, 4, width)   inverse Jacobian of the elements of one shape, 1/length
+    Assumed shear strains:
+    `tying_table`  (nodes, 2, tying)    slope in the direction of the strain, and value
+    `mapping`      (shapes, 2, tying)   slopes of x and of y in this direction, length
+    `tied`         (tying, width)       interpolation between the tying points of a strain
+    =============  ===================  ======================================================
     """
 
     _fields_ = (
@@ -41,16 +46,20 @@ class Strains(Structure):
         ("nodes", c_int64),
         ("points", c_int64),
         ("width", c_int64),  # number of points, filled up to fours
+        ("tying", c_int64),  # tying points of both assumed shear strains, e_xi first; or 0
         ("row", Longs),
         ("node", Longs),
         ("shape", Longs),
         ("table", Doubles),
         ("metric", Doubles),
+        ("tying_table", Doubles),
+        ("mapping", Doubles),
+        ("tied", Doubles),
     )
 
 
 class CompiledStrains(StrainField):
-    """The same strains; those of assumed shear strains remain NumPy's."""
+    """The same strains."""
 
     @cached_property
     def _structures(self) -> list[Strains]:
@@ -69,6 +78,7 @@ class CompiledStrains(StrainField):
         table[:, 2, :points] = values.T
         metric = np.zeros((len(inverse), 4, width))
         metric[:, :, :points] = inverse.swapaxes(1, 2)
+        tied = self._tied(family.take(same.representatives), width) if self.assumes_shear else {}
         return Strains(
             elements=len(family.rows),
             nodes=nodes,
@@ -79,12 +89,32 @@ class CompiledStrains(StrainField):
             shape=np.ascontiguousarray(same.group, dtype=np.int64),
             table=table,
             metric=metric,
+            **tied,
         )
+
+    def _tied(self, shapes: ElementBlock, width: int) -> dict[str, int | Floats]:
+        """Fields of assumed shear strains, for an element of each shape."""
+        nodes, points = shapes.nodes.shape[1], self.shape[1]
+        tables: list[Floats] = []
+        weights: list[Floats] = []
+        for axis in (0, 1):
+            values, local = local_shape_functions(shapes, assumed_shear.tying_points(nodes, axis))
+            tables.append(np.stack([local[:, axis], values]))
+            weights.append(assumed_shear.tying_weights(nodes, axis, self.rule))
+        table = np.concatenate(tables, axis=1)  # (2, tying, nodes)
+        mapping = np.concatenate(slopes_of_mapping(shapes), axis=1)  # (shapes, tying, 2)
+        tying = table.shape[1]
+        tied = np.zeros((tying, width))
+        tied[:, :points] = np.concatenate(weights, axis=1).T
+        return {
+            "tying": tying,
+            "tying_table": np.ascontiguousarray(table.transpose(2, 0, 1)),
+            "mapping": np.ascontiguousarray(mapping.swapaxes(1, 2)),
+            "tied": tied,
+        }
 
     def evaluate(self, displacement: Floats) -> Floats:
         """Strains of fields; see :meth:`StrainField.evaluate`."""
-        if self.assumes_shear:
-            return super().evaluate(displacement)
         *leading, numnp, _ = displacement.shape
         fields = np.ascontiguousarray(displacement)
         count = math.prod(leading)

@@ -20,7 +20,8 @@ typedef struct {
     int64_t kind, nodes;
     int64_t pairs;        /* TWO_MATRICES: node i < `pairs` is the image of i + `pairs` under half a turn */
     const double *matrix; /* ONE_MATRIX: (n, n); TWO_MATRICES: (even, even) and (odd, odd) */
-    /* TABULATED: number of points; `tying` of each covariant strain, or 0.  FACTORIZED: in a direction. */
+    /* TABULATED: number of points; `tying` of each covariant strain, or 0.  FACTORIZED: in a direction; `tying`:
+     * whether the shear strains are assumed ones. */
     int64_t bending, shear, tying;
     /* TABULATED: (2 bending + values, nodes), (slopes, nodes).  FACTORIZED: points in a direction. */
     const double *rotations, *deflection;
@@ -153,13 +154,19 @@ enum {
     FOUND_INITIAL, FOUND_UNCONVERGED, FOUND
 };
 
-/* Strains of elements with the same nodes present; `width` is that of `points` in fours. */
+/* Strains of elements with the same nodes present; `width` is that of `points` in fours.  `tying` are the
+ * tying points of both assumed shear strains, those of e_xi first, or 0. */
 typedef struct {
-    int64_t elements, nodes, points, width;
+    int64_t elements, nodes, points, width, tying;
     const int64_t *row, *node, *shape; /* (elements,), (elements, nodes), (elements,): row of `metric` */
     const double *table;  /* (nodes, 3, width): slopes in xi and eta, values */
     const double *metric; /* (shapes, 4, width): inverse Jacobian */
+    const double *tying_table; /* (nodes, 2, tying): slopes along the direction of the strain, values */
+    const double *mapping;     /* (shapes, 2, tying): these slopes of x and of y */
+    const double *tied;        /* (tying, width): interpolation between the tying points */
 } Strains;
+
+enum { TIED = 12 }; /* most tying points, those of 9-node elements */
 
 enum { CRITERIA = 4 };
 
