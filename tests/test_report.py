@@ -117,6 +117,7 @@ def test_a_run_without_impact_has_a_page() -> None:
     assert "at node" in found.row("largest w")[0].text
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_an_open_peak_is_a_lower_bound() -> None:
     result = fecm.run_one(small())
     found = page(small=result)
@@ -125,6 +126,7 @@ def test_an_open_peak_is_a_lower_bound() -> None:
     assert found.row("peak force")[0].text == "–"
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_a_projectile_and_a_law_of_the_user_stand_for_those_of_the_deck() -> None:
     heavy = fecm.RigidMass(3e-3)
     result = fecm.run_one(small(), projectile=heavy, law=Dented())
@@ -137,6 +139,7 @@ def test_a_projectile_and_a_law_of_the_user_stand_for_those_of_the_deck() -> Non
     assert "A mass of 0.003 at 115 (19.84)" in found.text
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_the_energy_of_a_run_with_slips_is_that_of_its_own_projectile() -> None:
     result = fecm.run_one(small(), mode="listing")
     found = page(small=result)
@@ -144,6 +147,7 @@ def test_the_energy_of_a_run_with_slips_is_that_of_its_own_projectile() -> None:
     assert found.row("energy")[0].value == pytest.approx(initial, rel=1e-12)
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_the_constants_of_the_law_have_units_and_the_deck_its_warnings() -> None:
     found = page(small=fecm.run_one(small().replace("ROD", "UNIT\nin lbf s\nROD", 1)))
     assert found.row("contact coefficient k")[0].text == "1.912e+06 lbf/in^1.5"
@@ -299,6 +303,7 @@ def test_the_page_of_a_random_sweep_has_its_probabilities() -> None:
     assert len(shown.pictures) >= 2
 
 
+@pytest.mark.usefixtures("_undrawn")
 def test_a_fit_has_a_page(tmp_path: Path) -> None:
     example = {name: fecm.examples.path(name) for name in ("impact-115.inp", "measured-force.csv")}
     output = tmp_path / "fit.html"
