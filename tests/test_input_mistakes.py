@@ -121,7 +121,7 @@ def new_deck(
 
     side = own(100.0, "length")
     deck = fecm.impact(
-        fecm.Plate.rectangle((side, side), (4, 4), support="simple"),
+        fecm.Plate.rectangle((side, side), (2, 2), support="simple"),
         fecm.Laminate("[0/90]2s", ply, own(thickness, "length")),  # type: ignore[arg-type]
         fecm.RigidMass(own(2e-5, MASS)),
         fecm.Contact(own(k, "force/length^1.5"), 0.0, 0.0, 1.5),
@@ -145,7 +145,8 @@ def test_no_ply_of_the_catalogue_has_a_finding_in_any_units(name: str, system: s
     has_damage = {"XT", "GIIc"} & MATERIALS[name].values.keys()
     text = new_deck(name, system, 0.25, damage=bool(has_damage))
     assert found(text) == []
-    assert found(replaced(r"^UNIT\n.*\n", "")(text)) == [] or system == "in-lbf-s"
+    if system != "in-lbf-s":
+        assert found(replaced(r"^UNIT\n.*\n", "")(text)) == []
 
 
 # Density (t/mm^3), nu12, E1, E2, G (MPa); XT, XC, YT, YC, S (MPa); G_IIc (N/mm).

@@ -171,7 +171,7 @@ def test_the_compliance_left_out_is_in_series_with_the_contact() -> None:
     plate = ReducedPlate(1, np.array([1e16]), np.array([1e-3]), c, cubic=none, quartic=none)
     law = LinearPermanent(*(np.full(2, x) for x in (k, 1e9, 0.0, 1.5)))
     hits = Hits([RigidMass(mass)], np.zeros(2, np.intp), np.ones(2), HystereticLaw(law), speeds)
-    found = ReducedImpacts(plate, 2e-7, 5000).impacts(hits)
+    found = ReducedImpacts(plate, 5e-7, 2000).impacts(hits)
     peak = found.force.max(axis=0)
     assert found.force[-1].max() == 0.0
     assert found.error.max() < 1e-4
