@@ -49,7 +49,15 @@ def format_real(value: float, width: int) -> str | None:
     The most readable form that fits, not padded; None if none fits.  Only fields of ten columns or
     more get an exponent without its letter: 2.5E-7 as ``25-8`` is hard to read.
     """
-    return _formatted(repr(value), width)
+    numeral = repr(value)
+    mantissa, has_exponent, _ = numeral.partition("e")
+    is_finite = "n" not in numeral  # neither nan nor inf
+    if is_finite and not has_exponent and len(numeral) < width:
+        return numeral
+    digits = mantissa.lstrip("-").replace(".", "").strip("0")
+    if is_finite and len(digits) > width:
+        return None
+    return _formatted(numeral, width)
 
 
 @lru_cache(4096)

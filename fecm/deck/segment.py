@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import ClassVar, Generic, Self, TypeVar, cast
 
 from fecm._frozen import frozen
 from fecm.deck.card import Card, Fields, Source
 from fecm.deck.record import Control, Record
 from fecm.deck.stream import CardStream
+from fecm.deck.table import Table, write_rows
 
 _R = TypeVar("_R", bound=Record)
 
@@ -38,9 +39,12 @@ class Segment(Record):
 
 @frozen
 class NumberedSegment(Segment, Generic[_R]):
-    """A segment of any number of cards, ended by a blank one."""
+    """A segment of any number of cards, ended by a blank one.
 
-    records: tuple[_R, ...]
+    The records are a tuple, or what compares and hashes like one.
+    """
+
+    records: Sequence[_R]
     record: ClassVar[type[Record]]
 
     def __init_subclass__(cls, keyword: str, record: type[Record]) -> None:
@@ -62,14 +66,17 @@ class NumberedSegment(Segment, Generic[_R]):
         """Read the cards up to a blank one; unreadable ones are reported and left out."""
         control = cards.control
         fields = cls.card_fields(control)
-        found = cards.until_blank(head, cls.record, fields, lambda r: cls.is_last(r, control))
+        found = cards.table(head, cls.record, fields, lambda r: cls.is_last(r, control))
         # No class variable can have the type of the class's parameter.
-        return cls(cast("tuple[_R, ...]", found), source=Source(head))
+        return cls(cast("Table[_R]", found), source=Source(head))
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
         fields = self.card_fields(control)
         yield self.keyword
-        for record in self.records:
-            yield record.to_card(fields)
+        if isinstance(self.records, Table) and self.records.fields == fields:
+            yield from write_rows(self.records)
+        else:
+            for record in self.records:
+                yield record.to_card(fields)
         yield ""

@@ -8,6 +8,7 @@ from typing import TypeVar
 from fecm.deck.card import Card, Fields, Source, Value
 from fecm.deck.findings import Findings
 from fecm.deck.record import Control, Record
+from fecm.deck.table import Table, TableReader
 from fecm.deck.values import read_values
 
 _R = TypeVar("_R", bound=Record)
@@ -131,24 +132,42 @@ class CardStream:
             self.unsound.add(head.keyword)
         return record
 
-    def until_blank(
-        self,
-        head: Card,
-        kind: type[_R],
-        fields: Fields | None = None,
-        is_last: Callable[[_R], bool] | None = None,
-    ) -> tuple[_R, ...]:
-        """Records of a segment's cards up to a blank card, or up to one that is the last."""
+    def until_blank(self, head: Card, kind: type[_R]) -> tuple[_R, ...]:
+        """Records of a segment's cards up to a blank card."""
         found: list[_R] = []
         while (card := self.take_data()) is not None and not card.is_blank:
-            if (record := self.record(card, kind, fields)) is None:
+            if (record := self.record(card, kind)) is None:
                 self.unsound.add(head.keyword)
             else:
                 found.append(record)
-        complete = is_last is not None and bool(found) and is_last(found[-1])
-        if not complete:
-            self.end(head, card)
+        self.end(head, card)
         return tuple(found)
+
+    def table(
+        self, head: Card, kind: type[_R], fields: Fields, is_last: Callable[[_R], bool]
+    ) -> Table[_R]:
+        """Records of cards of numbers up to a blank card, or up to one that is the last."""
+        reader = TableReader(fields)
+        self._take_table(reader)
+        while (card := self.take_data()) is not None and not card.is_blank:
+            if (row := self.row(card, fields)) is None:
+                self.unsound.add(head.keyword)
+            else:
+                reader.add((card.line, card.text), [float(value) for value in row[0]])
+            self._take_table(reader)
+        found = Table(kind, fields, reader.values, reader.lines)
+        if not (found and is_last(found[-1])):
+            self.end(head, card)
+        return found
+
+    def _take_table(self, reader: TableReader) -> None:
+        """Take the cards that are read in a block, if any."""
+        if self.findings.closed:
+            return
+        count = reader.take(self._cards, self.position)
+        self.position += count
+        if self._keeps_values:
+            self.read.update(reader.last_rows(count))
 
     def end(self, head: Card, card: Card | None) -> None:
         """Report that no blank card ends a segment, if `card`, which should be one, is None."""

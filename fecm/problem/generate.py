@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import bisect
 import operator
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import pairwise
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
@@ -23,7 +24,9 @@ from fecm.deck.model import (
     NodeCodes,
     NodeValues,
     Projectile,
+    Record,
 )
+from fecm.deck.table import Table
 from fecm.mechanics.mesh import Ints, Mesh, equation_numbers
 
 # Nodes that cards may generate or reset.
@@ -38,14 +41,14 @@ class _Budget:
         self._limit = self._left = GENERATED_PER_NODE * nodes + GENERATED
         self._findings = findings
 
-    def covers(self, count: int, place: Place | None) -> bool:
+    def covers(self, count: int, place: Callable[[], Place | None]) -> bool:
         """Take `count` nodes off the budget; report the first card that exceeds it."""
         exceeded = self._left < 0
         self._left -= count
         if self._left < 0 and not exceeded:
             nodes = f"more than {self._limit} nodes, counted with repetitions"
             message = f"The cards up to this one generate {nodes}."
-            self._findings.add("E012", message, place, "generate each node once")
+            self._findings.add("E012", message, place(), "generate each node once")
         return self._left >= 0
 
 
@@ -65,7 +68,7 @@ def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool =
     budget = _Budget(control.numnp, noted)
     for segment in deck.segments:
         if isinstance(segment, Coordinates):
-            if not budget.covers(control.numnp, segment.place()):
+            if not budget.covers(control.numnp, segment.place):
                 break
             coordinates[:] = np.nan  # a second COOR replaces the first, as in the listing
             _interpolate(coordinates, segment.records, noted, budget)
@@ -112,105 +115,140 @@ def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floa
 _R = TypeVar("_R", NodeValues, NodeCodes, ElementNodes)
 
 
+class _Cards(NamedTuple):
+    """Cards of nodes or elements as arrays, and their records, which know the places."""
+
+    numbers: Indices  # of the nodes or elements
+    increments: Indices
+    values: Floats | Ints  # (cards, values)
+    records: Sequence[Record]
+
+    def place(self, card: int, field: str) -> Place | None:
+        """Place of a field of a card."""
+        return self.records[card].place(field)
+
+
+def _cards(records: Sequence[_R], number: str, values: str) -> _Cards:
+    """Arrays of records; `number` and `values` are the names of their attributes."""
+    kind = float if values == "values" else np.int32
+    if isinstance(records, Table):
+        table = np.frombuffer(records.values).reshape(-1, records.width)
+        packed = records.kind.packed
+        numbers, increments = np.delete(table, packed, axis=1).astype(np.intp).T
+        return _Cards(numbers, increments, table[:, packed].astype(kind), records)
+
+    def column(name: str, dtype: type) -> NDArray[Any]:
+        return np.array(list(map(operator.attrgetter(name), records)), dtype=dtype)
+
+    return _Cards(
+        column(number, np.intp), column("increment", np.intp), column(values, kind), records
+    )
+
+
 def _existing(
-    records: Sequence[_R], what: str, count: int, code: str, findings: Findings
-) -> Sequence[_R]:
-    """Records whose node or element exists; the others are reported together."""
-    numbers = list(map(operator.attrgetter(what), records))
-    if not numbers or (min(numbers) >= 1 and max(numbers) <= count):
-        return records
-    pairs = list(zip(numbers, records, strict=True))
-    outside = [pair for pair in pairs if not 1 <= pair[0] <= count]
-    (number, record), more = outside[0], len(outside) - 1
-    first = f"{what.capitalize()} {number}" + (f" (and {more} more)" if more else "")
-    message = f"{first} does not exist; the control card defines the {what}s 1 to {count}."
-    findings.add(code, message, record.place(what))
-    return [record for number, record in pairs if 1 <= number <= count]
+    records: Sequence[_R], number: str, values: str, count: int, code: str, findings: Findings
+) -> _Cards:
+    """Cards whose node or element exists; the others are reported together."""
+    cards = _cards(records, number, values)
+    inside = (cards.numbers >= 1) & (cards.numbers <= count)
+    if inside.all():
+        return cards
+    outside = np.flatnonzero(~inside)
+    first, more = outside[0], len(outside) - 1
+    which = f"{number.capitalize()} {cards.numbers[first]}" + (f" (and {more} more)" * (more > 0))
+    message = f"{which} does not exist; the control card defines the {number}s 1 to {count}."
+    findings.add(code, message, records[first].place(number))
+    kept = [records[card] for card in np.flatnonzero(inside)]
+    return _Cards(cards.numbers[inside], cards.increments[inside], cards.values[inside], kept)
 
 
-def _rows(first: NodeValues | NodeCodes, last: NodeValues | NodeCodes) -> Indices:
+def _rows(first: int, last: int, increment: int) -> Indices:
     """Rows of the nodes from one card up to the next, without that of the next."""
-    step = abs(first.increment) if last.node >= first.node else -abs(first.increment)
-    return np.arange(first.node - 1, last.node - 1, step)
+    step = abs(increment) if last >= first else -abs(increment)
+    return np.arange(first - 1, last - 1, step)
 
 
 def _interpolate(
     values: Floats, records: Sequence[NodeValues], findings: Findings, budget: _Budget
 ) -> None:
     """Fill rows between two cards linearly, adding one constant step at a time (GENVEC)."""
-    known = _existing(records, "node", len(values), "E301", findings)
-    if not known:
-        return
-    rows = [record.node - 1 for record in known]
-    given = np.array([record.values for record in known])
-    generating = [i for i, record in enumerate(known, start=1) if record.increment != 0]
-    for begin, i in pairwise([0, *generating, len(known)]):
-        values[rows[begin : i + 1]] = given[begin : i + 1]
-        if i == len(known):
+    cards = _existing(records, "node", "values", len(values), "E301", findings)
+    count = len(cards.numbers)
+    generating = np.flatnonzero(cards.increments) + 1
+    for begin, i in pairwise([0, *generating.tolist(), count]):
+        values[cards.numbers[begin : i + 1] - 1] = cards.values[begin : i + 1]
+        if i == count:
             return
-        last, record = known[i - 1], known[i]
-        if record.node == last.node:
-            message = f"Node {record.node} follows itself, so nothing can be generated."
+        last, node = cards.numbers[i - 1 : i + 1].tolist()
+        if node == last:
+            message = f"Node {node} follows itself, so nothing can be generated."
             hint = "the card before has a generation increment"
-            findings.add("E302", message, record.place("node"), hint)
-        run = _rows(last, record)
-        if not budget.covers(len(run), record.place("node")):
+            findings.add("E302", message, cards.place(i, "node"), hint)
+        run = _rows(last, node, int(cards.increments[i - 1]))
+        if not budget.covers(len(run), partial(cards.place, i, "node")):
             return
         if len(run) > 1:
-            ends = values[record.node - 1] - values[last.node - 1]
+            ends = values[node - 1] - values[last - 1]
             steps = np.tile(ends / len(run), (len(run), 1))
-            steps[0] = values[last.node - 1]
+            steps[0] = values[last - 1]
             # Summed one by one, so that each node has the listing's rounding.
             values[run[1:]] = np.add.accumulate(steps, axis=0)[1:]
 
 
 def _carry(codes: Ints, records: Sequence[NodeCodes], findings: Findings, budget: _Budget) -> None:
     """Set restraint codes; negative ones carry on through generated nodes (PMESH)."""
-    last: NodeCodes | None = None
-    for record in _existing(records, "node", len(codes), "E301", findings):
-        row = codes[record.node - 1]
-        row[:] = record.codes
-        if last is not None:
-            row[(row == 0) & (codes[last.node - 1] < 0)] = -1
-            if last.increment != 0:
-                run = _rows(last, record)
-                if not budget.covers(len(run), record.place("node")):
-                    return
-                if len(run) > 1:
-                    carried = np.logical_or.accumulate(codes[run] < 0, axis=0)[:-1]
-                    codes[run[1:]] = np.where(carried, -1, codes[run[1:]])
-        last = record
+    cards = _existing(records, "node", "codes", len(codes), "E301", findings)
+    if not (cards.increments.any() or (cards.values < 0).any()):
+        codes[cards.numbers - 1] = cards.values
+        return
+    last, increment = 0, 0
+    for i, node in enumerate(cards.numbers.tolist()):
+        row = codes[node - 1]
+        row[:] = cards.values[i]
+        if last:
+            row[(row == 0) & (codes[last - 1] < 0)] = -1
+        if increment:
+            run = _rows(last, node, increment)
+            if not budget.covers(len(run), partial(cards.place, i, "node")):
+                return
+            if len(run) > 1:
+                carried = np.logical_or.accumulate(codes[run] < 0, axis=0)[:-1]
+                codes[run[1:]] = np.where(carried, -1, codes[run[1:]])
+        last, increment = node, int(cards.increments[i])
 
 
 def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -> None:
     """Set elements; those between two cards add the earlier card's increment (PMESH)."""
-    last: ElementNodes | None = None
-    for record in _existing(records, "element", len(elements), "E303", findings):
-        number, previous = record.element, 0 if last is None else last.element
-        if number <= previous:
-            message = f"Element {number} follows element {previous}; elements must ascend."
-            findings.add("E304", message, record.place("element"))
-            continue
-        if last is None and number > 1:
-            message = f"Element {number} is the first; the elements before it are missing."
-            findings.add("E305", message, record.place("element"))
-        if last is not None:
-            _fill(elements, last, number)
-        elements[number - 1] = record.nodes
-        last = record
-    if last is not None:
-        _fill(elements, last, len(elements) + 1)
+    cards = _existing(records, "element", "nodes", len(elements), "E303", findings)
+    numbers = cards.numbers
+    if not len(numbers):
+        return
+    if numbers[0] > 1:
+        message = f"Element {numbers[0]} is the first; the elements before it are missing."
+        findings.add("E305", message, cards.place(0, "element"))
+    previous = np.concatenate(([0], np.maximum.accumulate(numbers)[:-1]))
+    for i in np.flatnonzero(numbers <= previous):
+        message = f"Element {numbers[i]} follows element {previous[i]}; elements must ascend."
+        findings.add("E304", message, cards.place(i, "element"))
+
+    ascending = np.flatnonzero(numbers > previous)
+    elements[numbers[ascending] - 1] = cards.values[ascending]
+    ends = np.append(numbers[ascending[1:]], len(elements) + 1)
+    for i, end in zip(ascending, ends, strict=True):
+        if end > numbers[i] + 1:
+            _fill(elements, cards, int(i), int(end))
 
 
-def _fill(elements: Ints, record: ElementNodes, end: int) -> None:
+def _fill(elements: Ints, cards: _Cards, card: int, end: int) -> None:
     """Generate the elements between a card's own and number `end`."""
-    nodes = np.asarray(record.nodes, dtype=np.int64)
-    steps = np.arange(1, end - record.element)[:, None] * (record.increment or 1)
+    number, increment = int(cards.numbers[card]), int(cards.increments[card])
+    nodes = cards.values[card].astype(np.int64)
+    steps = np.arange(1, end - number)[:, None] * (increment or 1)
     # Nodes that become 0 or exceed the integers are invalid; the checks report them.
     generated = np.where(nodes + steps == 0, -1, nodes + steps)
     limits = np.iinfo(np.int32)
     generated = np.where(nodes == 0, 0, np.clip(generated, limits.min, limits.max))
-    elements[record.element : end - 1] = generated
+    elements[number : end - 1] = generated
 
 
 def place_of_element(deck: Deck, number: int) -> Place | None:

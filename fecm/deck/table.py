@@ -1,0 +1,205 @@
+"""Cards of numbers by the thousand: read and written in blocks, and kept in one array.
+
+A line is read here only if :func:`fecm.deck.values.read_values` would take the same numbers from it
+and report nothing.  Every other line is left to that function.
+"""
+
+from __future__ import annotations
+
+import re
+from array import array
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from itertools import pairwise
+from typing import TypeVar, overload
+
+from fecm.deck.card import Card, Field, FieldKind, Fields, Source, Value, write_card
+from fecm.deck.numerals import format_real
+from fecm.deck.record import Record
+
+_R = TypeVar("_R", bound=Record)
+Line = tuple[int, str]  # a line's number in the file, and its text
+Match = Callable[[str], re.Match[str] | None]
+
+# Numbers between commas, short enough to be finite and to fit their kind.
+_INTEGER = "[+-]?[0-9]{1,9}"
+_REAL = r"[+-]?(?:[0-9]{1,20}(?:\.[0-9]{0,30})?|\.[0-9]{1,30})(?:[Ee][+-]?[0-9]{1,2})?"
+
+
+class Table(Sequence[_R]):
+    """Records of cards of numbers, in one array; a record is made when it is asked for.
+
+    It compares, hashes and prints as the tuple of its records does.
+
+    Parameters
+    ----------
+    kind : type of Record
+        Class of the records.
+    fields : tuple of Field
+        Fields of a card, all of them numbers.
+    values : array of float
+        Values of the cards, one after the other.  Integers of cards are exact in double precision.
+    lines : list of tuple, optional
+        Number and text of each card's line; empty for records built in Python.
+    """
+
+    def __init__(
+        self, kind: type[_R], fields: Fields, values: array[float], lines: Sequence[Line] = ()
+    ) -> None:
+        self.kind = kind
+        self.fields = fields
+        self.values = values
+        self._lines = lines
+
+    @property
+    def width(self) -> int:
+        """Number of values of a card."""
+        return len(self.fields)
+
+    def rows(self) -> Iterator[list[Value]]:
+        """Values of each card, integers as such."""
+        return _rows(self.fields, self.values)
+
+    def __len__(self) -> int:
+        return len(self.values) // self.width
+
+    @overload
+    def __getitem__(self, index: int) -> _R: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[_R, ...]: ...
+    def __getitem__(self, index: int | slice) -> _R | tuple[_R, ...]:
+        if isinstance(index, slice):
+            return tuple(self[i] for i in range(*index.indices(len(self))))
+        i = range(len(self))[index]
+        (row,) = _rows(self.fields, self.values[i * self.width : (i + 1) * self.width])
+        source = Source(Card(*self._lines[i]), self.fields) if self._lines else None
+        return self.kind.from_row(row, source)
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, Table) and (self.kind, self.width) == (other.kind, other.width):
+            return self.values == other.values
+        if isinstance(other, Table | tuple):
+            return tuple(self) == tuple(other)
+        return NotImplemented
+
+    def __hash__(self) -> int:
+        return hash(tuple(self))
+
+    def __repr__(self) -> str:
+        return repr(tuple(self))
+
+    def __add__(self, other: Sequence[_R]) -> tuple[_R, ...]:
+        return (*self, *other)
+
+    def __radd__(self, other: Sequence[_R]) -> tuple[_R, ...]:
+        return (*other, *self)
+
+
+def _rows(fields: Fields, values: array[float]) -> Iterator[list[Value]]:
+    whole = [i for i, field in enumerate(fields) if field.kind is FieldKind.INTEGER]
+    for begin in range(0, len(values), len(fields)):
+        row: list[Value] = values[begin : begin + len(fields)].tolist()
+        for i in whole:
+            row[i] = int(row[i])
+        yield row
+
+
+# Reading ------------------------------------------------------------------------------------------
+
+
+class TableReader:
+    """Takes the values of the lines that hold nothing but the numbers of some fields."""
+
+    def __init__(self, fields: Fields) -> None:
+        self.fields = fields
+        self.values = array("d")
+        self.lines: list[Line] = []
+        self._in_columns, self._with_commas = _patterns(fields)
+
+    def take(self, lines: Sequence[Line], begin: int) -> int:
+        """Take lines from `begin` on up to one that it can't read; return how many."""
+        values = self.values
+        end = begin
+        for end in range(begin, len(lines)):
+            line = lines[end][1]
+            match = self._with_commas if "," in line else self._in_columns
+            if (found := match(line)) is None:
+                break
+            complete = len(values)
+            try:
+                values.extend(map(float, found.groups("0")))
+            except ValueError:
+                del values[complete:]
+                break
+        else:
+            end = len(lines)
+        self.lines += lines[begin:end]
+        return end - begin
+
+    def add(self, line: Line, row: Sequence[float]) -> None:
+        """Add a line that was read otherwise."""
+        self.values.extend(row)
+        self.lines.append(line)
+
+    def last_rows(self, count: int) -> Iterator[tuple[int, tuple[Fields, list[Value]]]]:
+        """Line number, fields and values of the last lines."""
+        begin = len(self.values) - count * len(self.fields)
+        rows = _rows(self.fields, self.values[begin:])
+        lines = self.lines[len(self.lines) - count :]
+        for (number, _), row in zip(lines, rows, strict=True):
+            yield number, (self.fields, row)
+
+
+@cache
+def _patterns(fields: Fields) -> tuple[Match, Match]:
+    """Matches of a line in columns and of one with commas; a group a field, none where blank.
+
+    The first field is not blank.  In columns a number ends with its field, so that one that touches
+    the number before it fills its field.  What a match in columns takes for a number need not be
+    one; `float` decides.
+    """
+    in_columns = with_commas = ""
+    for before, field in reversed(list(pairwise((None, *fields)))):
+        gap = field.first - 1 - (before.last if before else 0)
+        column, piece = f"({_in_columns(field)})", f"({_with_commas(field)})"
+        if before:
+            column = f"(?: {{{gap}}}(?: {{{field.width}}}|{column}){in_columns})?"
+            piece = f"(?:, *(?:{piece} *)?{with_commas})?"
+        else:
+            column, piece = f"{column}{in_columns} *", f" *{piece} *{with_commas}"
+        in_columns, with_commas = column, piece
+    return re.compile(in_columns).fullmatch, re.compile(with_commas).fullmatch
+
+
+def _in_columns(field: Field) -> str:
+    """Pattern of a field whose last column is not blank."""
+    width = field.width
+    if field.kind is FieldKind.INTEGER:
+        return f"[ 0-9+-]{{{width - 1}}}[0-9]"
+    begin = "[ 0-9.+-]"
+    exponents = f"{begin}{{{width - 4}}}[Ee][+-][0-9]{{2}}|{begin}{{{width - 3}}}[Ee][0-9+-][0-9]"
+    return f"{begin}{{{width - 1}}}[0-9.]|{exponents}|{begin}{{{width - 2}}}[Ee][0-9]"
+
+
+def _with_commas(field: Field) -> str:
+    return _INTEGER if field.kind is FieldKind.INTEGER else _REAL
+
+
+# Writing ------------------------------------------------------------------------------------------
+
+
+def write_rows(table: Table[_R]) -> Iterator[str]:
+    """Write the cards of a table as :func:`write_card` writes each."""
+    template = ""
+    column = 0
+    for field in table.fields:
+        template += " " * (field.first - 1 - column) + f"%{field.width}s"
+        column = field.last
+    reals = [(i, f.width) for i, f in enumerate(table.fields) if f.kind is FieldKind.REAL]
+    for row in table.rows():
+        texts: list[int | float | str | None] = list(row)
+        for i, width in reals:
+            texts[i] = format_real(row[i], width)
+        line = template % tuple(texts)
+        is_too_long = None in texts or len(line) > column
+        yield write_card(table.fields, row) if is_too_long else line
