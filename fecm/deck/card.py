@@ -161,14 +161,15 @@ def write_card(fields: Fields, values: Sequence[Value]) -> str:
     for field, value in zip(fields, values, strict=True):
         text = format_real(float(value), field.width) if isinstance(value, float) else str(value)
         if text is None or len(text) > field.width:
-            return _in_free_format(values)
+            return in_free_format(values)
         line = line.ljust(field.first - 1)
         is_word = field.kind is FieldKind.WORD
         line += text.ljust(field.width) if is_word else text.rjust(field.width)
     return line.rstrip()
 
 
-def _in_free_format(values: Sequence[Value]) -> str:
+def in_free_format(values: Sequence[Value]) -> str:
+    """Write values separated by commas."""
     texts = [_free(value) for value in values]
     if len(texts) == 1:
         texts.append("")  # a comma makes the format free

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from typing import TypeVar
 
 from fecm.deck.card import Card, Fields, Source, Value
@@ -45,7 +45,7 @@ class CardStream:
         self._keeps_values = keeps_values
         self.position: int = 0  # number of cards taken
         self.findings: Findings = Findings()
-        self.read: dict[int, tuple[Fields, list[Value]]] = {}  # by line number
+        self.read: dict[int, tuple[Fields, Sequence[Value]]] = {}  # by line number
         self.control: Control  # of the problem that is read, once its control card was
         # Keywords of the problem's segments with unreadable cards.
         self.unsound: set[str] = set()

@@ -13,7 +13,7 @@ from functools import cache
 from itertools import pairwise
 from typing import TypeVar, overload
 
-from fecm.deck.card import Card, Field, FieldKind, Fields, Source, Value, write_card
+from fecm.deck.card import Card, Field, FieldKind, Fields, Source, Value, in_free_format
 from fecm.deck.numerals import format_real
 from fecm.deck.record import Record
 
@@ -56,7 +56,7 @@ class Table(Sequence[_R]):
         """Number of values of a card."""
         return len(self.fields)
 
-    def rows(self) -> Iterator[list[Value]]:
+    def rows(self) -> Iterator[list[float]]:
         """Values of each card, integers as such."""
         return _rows(self.fields, self.values)
 
@@ -95,10 +95,10 @@ class Table(Sequence[_R]):
         return (*other, *self)
 
 
-def _rows(fields: Fields, values: array[float]) -> Iterator[list[Value]]:
+def _rows(fields: Fields, values: array[float]) -> Iterator[list[float]]:
     whole = [i for i, field in enumerate(fields) if field.kind is FieldKind.INTEGER]
     for begin in range(0, len(values), len(fields)):
-        row: list[Value] = values[begin : begin + len(fields)].tolist()
+        row = values[begin : begin + len(fields)].tolist()
         for i in whole:
             row[i] = int(row[i])
         yield row
@@ -141,7 +141,7 @@ class TableReader:
         self.values.extend(row)
         self.lines.append(line)
 
-    def last_rows(self, count: int) -> Iterator[tuple[int, tuple[Fields, list[Value]]]]:
+    def last_rows(self, count: int) -> Iterator[tuple[int, tuple[Fields, Sequence[Value]]]]:
         """Line number, fields and values of the last lines."""
         begin = len(self.values) - count * len(self.fields)
         rows = _rows(self.fields, self.values[begin:])
@@ -159,15 +159,13 @@ def _patterns(fields: Fields) -> tuple[Match, Match]:
     one; `float` decides.
     """
     in_columns = with_commas = ""
-    for before, field in reversed(list(pairwise((None, *fields)))):
-        gap = field.first - 1 - (before.last if before else 0)
-        column, piece = f"({_in_columns(field)})", f"({_with_commas(field)})"
-        if before:
-            column = f"(?: {{{gap}}}(?: {{{field.width}}}|{column}){in_columns})?"
-            piece = f"(?:, *(?:{piece} *)?{with_commas})?"
-        else:
-            column, piece = f"{column}{in_columns} *", f" *{piece} *{with_commas}"
-        in_columns, with_commas = column, piece
+    for before, field in reversed(list(pairwise(fields))):
+        gap, blank = (f" {{{n}}}" for n in (field.first - 1 - before.last, field.width))
+        in_columns = f"(?:{gap}(?:{blank}|({_in_columns(field)})){in_columns})?"
+        with_commas = f"(?:, *(?:({_with_commas(field)}) *)?{with_commas})?"
+    first = fields[0]
+    in_columns = " " * (first.first - 1) + f"({_in_columns(first)}){in_columns} *"
+    with_commas = f" *({_with_commas(first)}) *{with_commas}"
     return re.compile(in_columns).fullmatch, re.compile(with_commas).fullmatch
 
 
@@ -189,7 +187,7 @@ def _with_commas(field: Field) -> str:
 
 
 def write_rows(table: Table[_R]) -> Iterator[str]:
-    """Write the cards of a table as :func:`write_card` writes each."""
+    """Write the cards of a table as :func:`fecm.deck.card.write_card` writes each."""
     template = ""
     column = 0
     for field in table.fields:
@@ -197,9 +195,9 @@ def write_rows(table: Table[_R]) -> Iterator[str]:
         column = field.last
     reals = [(i, f.width) for i, f in enumerate(table.fields) if f.kind is FieldKind.REAL]
     for row in table.rows():
-        texts: list[int | float | str | None] = list(row)
+        texts: list[float | str | None] = list(row)
         for i, width in reals:
             texts[i] = format_real(row[i], width)
         line = template % tuple(texts)
         is_too_long = None in texts or len(line) > column
-        yield write_card(table.fields, row) if is_too_long else line
+        yield in_free_format(row) if is_too_long else line

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import bisect
-import operator
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
@@ -130,19 +129,18 @@ class _Cards(NamedTuple):
 
 def _cards(records: Sequence[_R], number: str, values: str) -> _Cards:
     """Arrays of records; `number` and `values` are the names of their attributes."""
-    kind = float if values == "values" else np.int32
+    kind = "f8" if values == "values" else "i4"
     if isinstance(records, Table):
         table = np.frombuffer(records.values).reshape(-1, records.width)
         packed = records.kind.packed
         numbers, increments = np.delete(table, packed, axis=1).astype(np.intp).T
         return _Cards(numbers, increments, table[:, packed].astype(kind), records)
-
-    def column(name: str, dtype: type) -> NDArray[Any]:
-        return np.array(list(map(operator.attrgetter(name), records)), dtype=dtype)
-
-    return _Cards(
-        column(number, np.intp), column("increment", np.intp), column(values, kind), records
+    numbers, increments = (
+        np.array([getattr(record, name) for record in records], dtype=np.intp)
+        for name in (number, "increment")
     )
+    rows = np.array([getattr(record, values) for record in records], dtype=kind)
+    return _Cards(numbers, increments, rows, records)
 
 
 def _existing(
@@ -153,12 +151,12 @@ def _existing(
     inside = (cards.numbers >= 1) & (cards.numbers <= count)
     if inside.all():
         return cards
-    outside = np.flatnonzero(~inside)
+    outside = np.flatnonzero(~inside).tolist()
     first, more = outside[0], len(outside) - 1
     which = f"{number.capitalize()} {cards.numbers[first]}" + (f" (and {more} more)" * (more > 0))
     message = f"{which} does not exist; the control card defines the {number}s 1 to {count}."
     findings.add(code, message, records[first].place(number))
-    kept = [records[card] for card in np.flatnonzero(inside)]
+    kept = [records[card] for card in np.flatnonzero(inside).tolist()]
     return _Cards(cards.numbers[inside], cards.increments[inside], cards.values[inside], kept)
 
 
@@ -172,6 +170,8 @@ def _interpolate(
     values: Floats, records: Sequence[NodeValues], findings: Findings, budget: _Budget
 ) -> None:
     """Fill rows between two cards linearly, adding one constant step at a time (GENVEC)."""
+    if not records:
+        return
     cards = _existing(records, "node", "values", len(values), "E301", findings)
     count = len(cards.numbers)
     generating = np.flatnonzero(cards.increments) + 1
@@ -197,6 +197,8 @@ def _interpolate(
 
 def _carry(codes: Ints, records: Sequence[NodeCodes], findings: Findings, budget: _Budget) -> None:
     """Set restraint codes; negative ones carry on through generated nodes (PMESH)."""
+    if not records:
+        return
     cards = _existing(records, "node", "codes", len(codes), "E301", findings)
     if not (cards.increments.any() or (cards.values < 0).any()):
         codes[cards.numbers - 1] = cards.values
@@ -219,24 +221,24 @@ def _carry(codes: Ints, records: Sequence[NodeCodes], findings: Findings, budget
 
 def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -> None:
     """Set elements; those between two cards add the earlier card's increment (PMESH)."""
+    if not records:
+        return
     cards = _existing(records, "element", "nodes", len(elements), "E303", findings)
     numbers = cards.numbers
-    if not len(numbers):
-        return
-    if numbers[0] > 1:
+    if len(numbers) and numbers[0] > 1:
         message = f"Element {numbers[0]} is the first; the elements before it are missing."
         findings.add("E305", message, cards.place(0, "element"))
-    previous = np.concatenate(([0], np.maximum.accumulate(numbers)[:-1]))
-    for i in np.flatnonzero(numbers <= previous):
+    previous = np.maximum.accumulate(np.append(0, numbers))[:-1]
+    for i in np.flatnonzero(numbers <= previous).tolist():
         message = f"Element {numbers[i]} follows element {previous[i]}; elements must ascend."
         findings.add("E304", message, cards.place(i, "element"))
 
     ascending = np.flatnonzero(numbers > previous)
     elements[numbers[ascending] - 1] = cards.values[ascending]
     ends = np.append(numbers[ascending[1:]], len(elements) + 1)
-    for i, end in zip(ascending, ends, strict=True):
+    for i, end in zip(ascending.tolist(), ends.tolist(), strict=True):
         if end > numbers[i] + 1:
-            _fill(elements, cards, int(i), int(end))
+            _fill(elements, cards, i, end)
 
 
 def _fill(elements: Ints, cards: _Cards, card: int, end: int) -> None:
