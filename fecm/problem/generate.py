@@ -235,7 +235,7 @@ def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -
 
     ascending = np.flatnonzero(numbers > previous)
     elements[numbers[ascending] - 1] = cards.values[ascending]
-    ends = np.append(numbers[ascending[1:]], len(elements) + 1)
+    ends = np.append(numbers[ascending], len(elements) + 1)[1:]
     for i, end in zip(ascending.tolist(), ends.tolist(), strict=True):
         if end > numbers[i] + 1:
             _fill(elements, cards, i, end)
