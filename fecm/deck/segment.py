@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Iterator, Sequence
-from typing import ClassVar, Generic, Self, TypeVar, cast
+from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar, cast
 
 from fecm._frozen import frozen
 from fecm.deck.card import Card, Fields, Source
 from fecm.deck.record import Control, Record
 from fecm.deck.stream import CardStream
 from fecm.deck.table import Table, write_rows
+
+if TYPE_CHECKING:
+    from fecm._typing import Floats
 
 _R = TypeVar("_R", bound=Record)
 
@@ -50,6 +54,12 @@ class NumberedSegment(Segment, Generic[_R]):
     def __init_subclass__(cls, keyword: str, record: type[Record]) -> None:
         super().__init_subclass__(keyword)
         cls.record = record
+
+    @classmethod
+    def of(cls, control: Control, cards: Floats) -> Self:
+        """Segment with the values of its cards, (cards, fields)."""
+        kind = cast("type[_R]", cls.record)
+        return cls(Table(kind, cls.card_fields(control), array("d", cards.tobytes())))
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:

@@ -25,7 +25,7 @@ from fecm.deck.grid import (
     held_in_plane,
     round_to,
 )
-from fecm.deck.model import Boundary, Coordinates, ElementNodes, Elements, NodeValues
+from fecm.deck.model import Boundary, Control, Coordinates, Elements
 
 Integers = NDArray[np.int_]
 # Kinds of cells by their number of nodes: meshio's name, which is that of the corners' number too.
@@ -82,15 +82,21 @@ class PlateMesh:
         row = int(np.hypot(*(self.points - (x, y)).T).argmin())
         return row + 1, *self.points[row].tolist()
 
+    @property
+    def _control(self) -> Control:
+        return Control(self.nodes, self.elements, layers=1, ndm=2, ndf=5, nen=self.most_nodes)
+
     def coordinates(self) -> Coordinates:
         """COOR cards, one per node."""
-        places = enumerate(self.points.tolist(), start=1)
-        return Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in places))
+        numbers = np.arange(1, self.nodes + 1)
+        cards = np.column_stack((numbers, np.zeros(self.nodes), self.points))
+        return Coordinates.of(self._control, cards)
 
     def element_cards(self) -> Elements:
         """ELEM cards, one per element."""
-        rows = enumerate((self.cells + 1).tolist(), start=1)
-        return Elements(tuple(ElementNodes(n, tuple(nodes), 0) for n, nodes in rows))
+        numbers = np.arange(1, self.elements + 1)
+        cards = np.column_stack((numbers, self.cells + 1, np.zeros(self.elements)))
+        return Elements.of(self._control, cards)
 
     def supported(
         self, everywhere: Sequence[int], supports: Mapping[str, str], *, in_plane: str = "held"

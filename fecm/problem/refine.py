@@ -17,11 +17,8 @@ from fecm.deck.model import (
     Boundary,
     Coordinates,
     Deck,
-    ElementNodes,
     Elements,
     Forces,
-    NodeCodes,
-    NodeValues,
     Segment,
 )
 from fecm.mechanics.mesh import Ints, Mesh, element_blocks
@@ -113,23 +110,27 @@ class _Nodes:
         return self._known[key]
 
 
+def _node_cards(values: Floats | Bools) -> Floats:
+    """Cards of the nodes from 1 on, without increments."""
+    count = len(values)
+    return np.column_stack((np.arange(1, count + 1), np.zeros(count), values))
+
+
 def _rebuilt(deck: Deck, mesh: Mesh, nodes: _Nodes, elements: list[tuple[int, list[int]]]) -> Deck:
     """The deck with other nodes and elements, each on a card of its own."""
-    width = mesh.elements.shape[1]
-    places = (NodeValues(n, 0, tuple(p.tolist())) for n, p in enumerate(nodes.coordinates, 1))
-    children = ((*child, *[0] * (width - len(child))) for _, child in elements)
-    cards = (ElementNodes(n, child, 0) for n, child in enumerate(children, 1))
-    restrained = ((n, (codes != 0).astype(int)) for n, codes in enumerate(nodes.codes, 1))
-    codes = (NodeCodes(n, 0, tuple(held.tolist())) for n, held in restrained if held.any())
+    control = replace(deck.control, numnp=len(nodes.coordinates), numel=len(elements))
+    children = np.zeros((len(elements), mesh.elements.shape[1]))
+    for row, (_, child) in zip(children, elements, strict=True):
+        row[: len(child)] = child
+    numbers = np.arange(1, len(elements) + 1)
+    codes, forces = np.array(nodes.codes) != 0, np.array(nodes.forces)
     written: list[Segment] = [
-        Coordinates(tuple(places)),
-        Elements(tuple(cards)),
-        Boundary(tuple(codes)),
+        Coordinates.of(control, _node_cards(np.array(nodes.coordinates))),
+        Elements.of(control, np.column_stack((numbers, children, np.zeros(len(elements))))),
+        Boundary.of(control, _node_cards(codes)[codes.any(axis=1)]),
     ]
-    loaded = [(n, force) for n, force in enumerate(nodes.forces, 1) if force.any()]
-    if loaded:
-        written.append(Forces(tuple(NodeValues(n, 0, tuple(f.tolist())) for n, f in loaded)))
+    if forces.any():
+        written.append(Forces.of(control, _node_cards(forces)[forces.any(axis=1)]))
     replaced = (Coordinates, Elements, Boundary, Forces)
     rest = [segment for segment in deck.segments if not isinstance(segment, replaced)]
-    control = replace(deck.control, numnp=len(nodes.coordinates), numel=len(elements))
     return replace(deck, control=control, segments=(*written, *rest), text="")
