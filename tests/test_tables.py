@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import pickle
 import random
-from array import array
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -18,7 +17,7 @@ import fecm
 from fecm.deck.card import Card, FieldKind, Fields, layout
 from fecm.deck.findings import Findings
 from fecm.deck.format import format_deck
-from fecm.deck.mesh_cards import Boundary, Coordinates, Elements, Forces, NodeValues
+from fecm.deck.mesh_cards import Boundary, Coordinates, Elements, Forces
 from fecm.deck.model import Control, Deck
 from fecm.deck.numerals import _formatted, format_real
 from fecm.deck.reader import Reader, read_deck
@@ -167,10 +166,9 @@ def distorted(count: int) -> Deck:
     places = chance.random((nodes, 2)).round(6)
     places[::2] += chance.random((len(places[::2]), 2))
     values = np.column_stack((np.arange(1, nodes + 1), np.zeros(nodes), places))
-    records = Table(NodeValues, FIELDS["COOR"], array("d", values.ravel().tolist()))
-    deck = read_deck(small())
-    assert isinstance(deck, Deck)
-    return replace(deck, segments=(Coordinates(records), *deck.segments[1:]), text="")
+    deck = fecm.read_one(small())
+    made = Coordinates.of(deck.control, values)
+    return replace(deck, segments=(made, *deck.segments[1:]), text="")
 
 
 @pytest.mark.parametrize("free", [True, False], ids=["commas", "columns"])
@@ -266,10 +264,7 @@ def test_segments_without_cards_generate_nothing(records: str) -> None:
     control = Control(4, 1, 1, 2, 5, 4)
     kinds = (Coordinates, Elements, Boundary, Forces)
     segments = tuple(
-        kind(
-            () if records == "tuple" else Table(kind.record, kind.card_fields(control), array("d"))
-        )
-        for kind in kinds
+        kind(()) if records == "tuple" else kind.of(control, np.empty((0, 6))) for kind in kinds
     )
     mesh = generate(Deck("", control, segments, ()))
     assert np.isnan(mesh.coordinates).all()

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, ClassVar, Generic, Self, TypeVar, cast
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, cast
 
 from fecm._frozen import frozen
 from fecm.deck.card import Card, Fields, Source
@@ -13,7 +13,7 @@ from fecm.deck.stream import CardStream
 from fecm.deck.table import Table, write_rows
 
 if TYPE_CHECKING:
-    from fecm._typing import Floats
+    from numpy.typing import NDArray
 
 _R = TypeVar("_R", bound=Record)
 
@@ -56,10 +56,10 @@ class NumberedSegment(Segment, Generic[_R]):
         cls.record = record
 
     @classmethod
-    def of(cls, control: Control, cards: Floats) -> Self:
+    def of(cls, control: Control, cards: NDArray[Any]) -> Self:
         """Segment with the values of its cards, (cards, fields)."""
         kind = cast("type[_R]", cls.record)
-        return cls(Table(kind, cls.card_fields(control), array("d", cards.tobytes())))
+        return cls(Table(kind, cls.card_fields(control), array("d", cards.astype(float).tobytes())))
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
