@@ -244,7 +244,7 @@ def test_the_surface_is_the_panel_with_its_deflection_enlarged(
     monkeypatch.setattr(Poly3DCollection, "set_verts", kept)
     figure: Any = plot(curved, "surface")
     axes = figure.axes[0]
-    (said,) = [t.get_text() for t in axes.texts if t.get_text().startswith("deflection drawn")]
+    (said,) = [t.get_text() for t in axes.texts if t.get_text().startswith("deflection times")]
     w = curved.tape3.w[int(np.ptp(curved.tape3.w, axis=1).argmax())]
     x, y = curved["mesh/coordinates"].T
     (middle,) = np.flatnonzero((np.abs(x - 15.0) < 1e-6) & (np.abs(y - 10.0) < 1e-6))

@@ -154,7 +154,7 @@ STATED = {
     "static-bending", "frequencies", "wave-fronts", "dispersion", "rod-pulse", "infinite-plate",
     "supported-plate", "patch-impact", "failure", "cured-failure", "small-mass", "large-mass",
     "contact-coefficient", "stretching-plate", "stretching-disc", "stretching-impact", "sandwich",
-    "curved-panel", "curved-impact",
+    "curved-panel", "curved-impact", "location",
 }  # fmt: skip
 
 
@@ -493,3 +493,9 @@ def test_curved_panels_are_those_of_the_series() -> None:
     assert check_of("curved-impact", "time").expected == float(bent_along["time of peak"])
     later = {r["time"]: r for r in reference("curved_impact_Rx500_Ry0.csv")}["0.0002"]
     assert check_of("curved-impact", "w under").expected == float(later["plate_W"])
+
+
+def test_the_located_impact_is_that_of_the_series() -> None:
+    (truth,) = reference("locate_truth.csv")
+    for quantity, column in (("x (mm)", "x0_mm"), ("y (mm)", "y0_mm"), ("peak", "peak_force_N")):
+        assert check_of("location", quantity).expected == float(truth[column])
