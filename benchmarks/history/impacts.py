@@ -20,7 +20,7 @@ STEPS = {
     "patch": 4000,
     "x3": 1000,
     "x10": 100,
-    "off-centre": 100,
+    "x10 off-centre": 100,
 }
 
 
