@@ -57,8 +57,11 @@ def cost(work: Callable[[], object], rounds: int) -> float:
 
 
 def texts(times: int) -> dict[str, str]:
-    """Text of the deck by the form of its cards."""
-    commas = distorted(refined(times), 0.04 / times).to_text()
+    """Text of the deck by the form of its cards; five columns hold numbers up to 99,999."""
+    deck = distorted(refined(times), 0.04 / times)
+    commas = deck.to_text()
+    if deck.control.numnp > 99_999:
+        return {"commas": commas}
     return {"commas": commas, "columns": in_columns(commas)}
 
 
