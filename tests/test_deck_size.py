@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -154,7 +154,7 @@ def test_cards_that_generate_the_same_nodes_again_and_again_are_refused(
 ) -> None:
     covers, nodes = generate._Budget.covers, 0
 
-    def counted(budget: Any, count: int, place: Place | None) -> bool:
+    def counted(budget: Any, count: int, place: Callable[[], Place | None]) -> bool:
         nonlocal nodes
         covered = covers(budget, count, place)
         nodes += count * covered

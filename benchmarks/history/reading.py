@@ -24,15 +24,15 @@ class Reading:
         """Write the deck."""
         warnings.simplefilter("ignore")
         self.text = texts(10)[form]
-        self.deck = fecm.read_deck(self.text)
+        self.deck = fecm.read_one(self.text)
 
     def time_read(self, form: str) -> None:
         """Time from the text to the deck."""
-        fecm.read_deck(self.text)
+        fecm.read_one(self.text)
 
     def peakmem_read(self, form: str) -> None:
         """Peak memory of reading."""
-        fecm.read_deck(self.text)
+        fecm.read_one(self.text)
 
     def time_model(self, form: str) -> None:
         """Time from the text to the model."""
