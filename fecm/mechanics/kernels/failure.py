@@ -65,7 +65,7 @@ class Failure(Structure):
     `residual`      (3, width)                          stresses without strain
     `outer`         (outermost,)                        outermost states
     `stands`        (width / 4,)                        of four states, the bits of the outermost
-                                                        states that stand for them
+                                                        states that represent them
     `outer_stress`  (3, 3, outer_width)                 their stresses per curvature
     `reached`       (points, criteria, outer_width)     their largest exposures
     `exposure`      (criteria, rows, stride)            largest exposure so far
@@ -168,7 +168,7 @@ class _Outermost(NamedTuple):
     """Of plies with the same stiffness on one side of the midplane, the states farthest from it."""
 
     states: Indices  # (outermost,): numbers among the states of a run
-    of: Indices  # (states,): which of these stands for each state
+    of: Indices  # (states,): which of these represents each state
     share: Floats  # (states,): |z| over that of this one
 
     @classmethod
@@ -187,7 +187,7 @@ class _Outermost(NamedTuple):
         return cls(states, of, share)
 
     def stands(self) -> NDArray[np.int64]:
-        """Of every four states, the bits of those that stand for them, (width / 4,)."""
+        """Of every four states, the bits of those that represent them, (width / 4,)."""
         bits = np.zeros(-(-len(self.of) // 4) * 4, dtype=np.int64)
         bits[: len(self.of)] = np.left_shift(1, self.of % BITS)
         return np.asarray(np.bitwise_or.reduce(bits.reshape(-1, 4), axis=1))
