@@ -11,7 +11,7 @@ rectangle, and of the small square.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from functools import cache
 
@@ -131,23 +131,30 @@ def _bilinear(nodes: int, xi: Floats, eta: Floats) -> Floats:
     return S
 
 
+def _present(nodes: Iterable[int], present: Bools) -> list[int]:
+    """Nodes that are present; the functions of the others stay zero."""
+    return [i for i in nodes if present[i]]
+
+
 def _quadratic(xi: Floats, eta: Floats, present: Bools) -> Floats:
     """Four to nine nodes (equations 4-7 ff.)."""
     # First each function without the other nodes of its side.
     S = _bilinear(9, xi, eta)
-    for i in (4, 6):  # mid-sides at eta = -1 and +1
+    for i in _present((4, 6), present):  # mid-sides at eta = -1 and +1
         a, b = 1.0 - xi**2, 1.0 + _ETA_9[i] * eta
         S[:, i] = a * b / 2.0, -xi * b, _ETA_9[i] * a / 2.0
-    for i in (5, 7):  # mid-sides at xi = +1 and -1
+    for i in _present((5, 7), present):  # mid-sides at xi = +1 and -1
         a, b = 1.0 + _XI_9[i] * xi, 1.0 - eta**2
         S[:, i] = a * b / 2.0, _XI_9[i] * b / 2.0, -a * eta
-    S[:, 8] = (1.0 - xi**2) * (1.0 - eta**2), -2.0 * xi * (1.0 - eta**2), -2.0 * eta * (1.0 - xi**2)
-    S[:, ~present] = 0.0
+    if present[8]:
+        a, b = 1.0 - xi**2, 1.0 - eta**2
+        S[:, 8] = a * b, -2.0 * xi * b, -2.0 * eta * a
     # Then subtract from each function its values at the mid-sides and the centre.
+    if not present[4:].any():
+        return S
     centre = S[:, 8].copy()
-    for i in range(4, 8):
-        if present[i]:
-            S[:, i] -= centre / 2.0
+    for i in _present(range(4, 8), present):
+        S[:, i] -= centre / 2.0
     for i, (before, after) in enumerate(((7, 4), (4, 5), (5, 6), (6, 7))):  # mid-sides beside it
         S[:, i] -= centre / 4.0 + (S[:, before] + S[:, after]) / 2.0
     return S
@@ -167,15 +174,14 @@ def _cubic(xi: Floats, eta: Floats, present: Bools) -> Floats:
     """Four to twelve nodes (the listing's SHAP3 and CSHAPE)."""
     # First each function without the other nodes of its side.
     S = _bilinear(12, xi, eta)
-    for i in (4, 6, 9, 11):  # third points at eta = -1 and +1
+    for i in _present((4, 6, 9, 11), present):  # third points at eta = -1 and +1
         f, slope = _side(xi, _XI_12[i])
         a = (1.0 + _ETA_12[i] * eta) / 2.0
         S[:, i] = f * a, slope * a, f * _ETA_12[i] / 2.0
-    for i in (5, 7, 8, 10):  # third points at xi = +1 and -1
+    for i in _present((5, 7, 8, 10), present):  # third points at xi = +1 and -1
         f, slope = _side(eta, _ETA_12[i])
         a = (1.0 + _XI_12[i] * xi) / 2.0
         S[:, i] = f * a, f * _XI_12[i] / 2.0, slope * a
-    S[:, ~present] = 0.0
     # Then subtract from each corner function its values at the third points.
     for i in range(4):
         near, far = S[:, _NEAR[i]].sum(axis=1), S[:, _FAR[i]].sum(axis=1)
