@@ -191,24 +191,25 @@ def _list(contents: Contents, file_size: int, name: str, item: h5py.HLObject) ->
     if created.get_external_count():
         what = "has external storage: its numbers are in another file, which is not read"
         raise ResultFileError(f"{path}: {name} {what}")
-    is_text = h5py.check_string_dtype(item.dtype) is not None
+    dtype, shape = item.dtype, item.shape  # each access reads the file
+    is_text = h5py.check_string_dtype(dtype) is not None
     if "/" not in name and item.is_scale:
         return  # a scale numbers an axis
-    if is_text and item.shape == ():
+    if is_text and shape == ():
         contents.texts[name] = str(_plain(item[()]))
     elif is_text and contents.form == Form.SWEEP and item.ndim == 1:
         contents.lists[name] = [str(_plain(value)) for value in item[()].tolist()]
-        contents.shapes[name], contents.dtypes[name] = item.shape, np.dtype(object)
-    elif item.dtype.kind in "biuf" and item.shape is not None and not item.dtype.shape:
-        shape = tuple(map(int, item.shape))
+        contents.shapes[name], contents.dtypes[name] = shape, np.dtype(object)
+    elif dtype.kind in "biuf" and shape is not None and not dtype.shape:
+        shape = tuple(map(int, shape))
         room = file_size * (PACKED if item.chunks else 1)
         # A damaged shape could have more rows than any disk holds.
-        if math.prod(shape) * item.dtype.itemsize > room:
+        if math.prod(shape) * dtype.itemsize > room:
             message = f"{path}: {name} has the shape {shape}, which is more than the file holds"
             raise ResultFileError(message)
-        contents.shapes[name], contents.dtypes[name] = shape, item.dtype.newbyteorder("=")
+        contents.shapes[name], contents.dtypes[name] = shape, dtype.newbyteorder("=")
     else:
-        references = h5py.check_ref_dtype(item.dtype) is not None
+        references = h5py.check_ref_dtype(dtype) is not None
         what = "references; they are not followed" if references else "neither numbers nor a text"
         raise ResultFileError(f"{path}: {name} holds {what}")
 
