@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 import fecm
 from fecm.deck import model
 from fecm.deck.output_cards import Gage, Gages
+from fecm.deck.segment import Segment
 from tests.decks import DATA
 
 Floats = NDArray[np.float64]
@@ -19,6 +20,7 @@ Place = tuple[float, float]
 # x, y, z and degrees of gages off the axes of a plate of 100 x 80 mm.
 OFF_AXIS = ((22.0, 18.0, 0.72, 0.0), (80.0, 24.0, 0.72, 45.0), (26.0, 64.0, 0.72, 90.0))
 STRUCK = (61.0, 47.0)
+SMALL = 0.5  # radius of a disc that acts as a point: both give places within .003
 TIME = 3e-6 * np.arange(1.0, 101.0)
 
 # Simply supported panel of 300 x 200 x 2 mm, [0/90/0/90/0]s, struck at (112.5, 81) by 20 g at
@@ -47,7 +49,13 @@ def with_gages(deck: fecm.Deck, *places: tuple[float, float, float, float]) -> f
     return replace(deck, segments=(*others, cards), text="")
 
 
-def panel(layup: str = "[45/0/-45/90]s", at: Place = STRUCK) -> fecm.Deck:
+def without(deck: fecm.Deck, *kinds: type[Segment]) -> fecm.Deck:
+    """A deck without segments of some kinds."""
+    kept = tuple(s for s in deck.segments if not isinstance(s, kinds))
+    return replace(deck, segments=kept, text="")
+
+
+def panel(layup: str = "[45/0/-45/90]s", at: Place = STRUCK, radius: float = 5.0) -> fecm.Deck:
     """A small panel of 10 x 8 elements, struck by 2 g at 2 m/s."""
     deck = fecm.impact(
         fecm.Plate.rectangle((100.0, 80.0), (10, 8), support="simple"),
@@ -60,7 +68,7 @@ def panel(layup: str = "[45/0/-45/90]s", at: Place = STRUCK) -> fecm.Deck:
         patch=None,
         gages=OFF_AXIS,
     )
-    return with_patch(deck, 5.0, at)
+    return with_patch(deck, radius, at)
 
 
 def public_panel(nx: int, ny: int, at: Place = (150.0, 100.0), e1: float = 171420.0) -> fecm.Deck:
@@ -81,12 +89,32 @@ def public_panel(nx: int, ny: int, at: Place = (150.0, 100.0), e1: float = 17142
 
 
 @cache
-def struck(layup: str = "[45/0/-45/90]s", at: Place = STRUCK) -> tuple[fecm.Deck, Floats, float]:
+def run_of(layup: str = "[45/0/-45/90]s", at: Place = STRUCK, radius: float = 5.0) -> fecm.Result:
+    """A run of the small panel."""
+    return fecm.run_one(panel(layup, at, radius))
+
+
+def at_times(run: fecm.Result) -> Floats:
+    """Strains of a run at :data:`TIME`, (times, gages)."""
+    return np.column_stack([np.interp(TIME, run.time, one) for one in run.gages.strain.T])
+
+
+@cache
+def struck(
+    layup: str = "[45/0/-45/90]s", at: Place = STRUCK, radius: float = 5.0
+) -> tuple[fecm.Deck, Floats, float]:
     """The small panel, the strains of an impact on it at :data:`TIME`, and its peak force."""
-    deck = panel(layup, at)
-    run = fecm.run_one(deck)
-    strains = np.column_stack([np.interp(TIME, run.time, one) for one in run.gages.strain.T])
-    return deck, strains, float(run.force.max())
+    run = run_of(layup, at, radius)
+    return panel(layup, at, radius), at_times(run), float(run.force.max())
+
+
+@cache
+def struck_on_a_point(
+    layup: str = "[45/0/-45/90]s", at: Place = STRUCK
+) -> tuple[fecm.Deck, Floats, float]:
+    """The same for a small disc, but the panel without it: forces on points are soon located."""
+    deck, strains, peak = struck(layup, at, SMALL)
+    return without(deck, model.Patch), strains, peak
 
 
 def scatter(strains: Floats, share: float, seed: int) -> tuple[Floats, float]:

@@ -25,30 +25,37 @@ from tests.panels import (
     PUBLIC_IMPULSE,
     PUBLIC_PEAK,
     PUBLIC_PLACE,
+    SMALL,
     STRUCK,
     TIME,
     Floats,
+    at_times,
     panel,
     public_panel,
+    run_of,
     scatter,
     struck,
+    struck_on_a_point,
     with_gages,
+    without,
 )
 
 NEAR = (40.0, 30.0, 80.0, 65.0)  # a region that makes a search short
+CLOSE = (52.0, 38.0, 72.0, 58.0)  # of one candidate, where the search is not what is tested
 NOISE = 0.02  # of the largest strain
 
 
 def located(strains: Floats, **options: object) -> fecm.Location:
     """An impact on the small panel near the place where it is struck."""
-    near: dict[str, object] = {"region": NEAR, "grid": 12.0}
-    return fecm.locate(struck()[0], (TIME, strains), **(near | options))  # type: ignore[arg-type]
+    close: dict[str, object] = {"region": CLOSE, "grid": 20.0}
+    deck = struck_on_a_point()[0]
+    return fecm.locate(deck, (TIME, strains), **(close | options))  # type: ignore[arg-type]
 
 
 @cache
 def noisy() -> fecm.Location:
     """The place of the small panel's impact, from strains with noise."""
-    strains, noise = scatter(struck()[1], NOISE, seed=1)
+    strains, noise = scatter(struck_on_a_point()[1], NOISE, seed=1)
     return located(strains, noise=noise)
 
 
@@ -117,8 +124,7 @@ def test_the_place_and_the_force_of_a_run_are_found() -> None:
 def test_an_impact_on_a_curved_panel_is_found() -> None:
     deck = curved(panel("[0/90/45/45]"))
     run = fecm.run_one(deck)
-    strains = np.column_stack([np.interp(TIME, run.time, one) for one in run.gages.strain.T])
-    found = fecm.locate(deck, (TIME, strains), region=NEAR, grid=12.0)
+    found = fecm.locate(deck, (TIME, at_times(run)), region=NEAR, grid=12.0)
     assert distance(found, STRUCK) < 0.2
     assert found.peak_force == pytest.approx(float(run.force.max()), rel=0.05)
 
@@ -227,10 +233,10 @@ def test_the_reports_impact_with_a_rod_is_located_within_one_element() -> None:
 
 
 def test_the_errors_of_several_seeds_are_those_of_the_covariance() -> None:
-    _, strains, _ = struck()
+    _, strains, _ = struck_on_a_point()
     seeds, squares = 10, 0.0
     for seed in range(seeds):
-        measured, noise = scatter(strains, 2.0 * NOISE, seed)
+        measured, noise = scatter(strains, NOISE, seed)
         found = located(measured, noise=noise, basis=7.5e-6)
         assert found.misfit == pytest.approx(1.0, abs=0.15)
         squares += deviations(found, STRUCK) ** 2
@@ -274,7 +280,7 @@ def test_the_ellipse_encloses_its_share_of_a_normal_distribution() -> None:
 
 
 def test_the_noise_is_that_of_the_residual_unless_it_is_given() -> None:
-    strains, noise = scatter(struck()[1], NOISE, seed=1)
+    strains, noise = scatter(struck_on_a_point()[1], NOISE, seed=1)
     found = located(strains)
     assert found.noise == pytest.approx(noise, rel=0.15)
     assert found.misfit == 1.0
@@ -287,7 +293,7 @@ def test_the_noise_is_that_of_the_residual_unless_it_is_given() -> None:
 
 def test_the_impulse_ends_with_the_contact() -> None:
     found = noisy()
-    run = fecm.run_one(struck()[0])
+    run = run_of(radius=SMALL)
     assert found.contact_end is not None
     before = run.time <= found.contact_end  # the projectile touches the panel once more
     assert run.force[before][-1] < 0.1 * run.force.max()  # hats are coarse beside it
@@ -303,7 +309,8 @@ def test_the_energy_bound_follows_from_impulse_and_mass() -> None:
 
 def test_a_force_that_has_not_ended_is_said_to_be_open() -> None:
     early = TIME < 1.2e-4
-    found = fecm.locate(struck()[0], (TIME[early], struck()[1][early]), region=NEAR, grid=12.0)
+    deck, strains, _ = struck_on_a_point()
+    found = fecm.locate(deck, (TIME[early], strains[early]), region=CLOSE, grid=20.0)
     assert found.contact_end is None
     assert any("has not ended" in note for note in found.notes)
 
@@ -311,7 +318,7 @@ def test_a_force_that_has_not_ended_is_said_to_be_open() -> None:
 def test_hats_are_narrowed_where_the_strains_show_it_and_a_given_width_is_kept() -> None:
     # A thin plate has a force with a narrow peak.
     deck, strains, peak = struck("[0/90/45/45]")
-    near: dict[str, object] = {"region": NEAR, "grid": 12.0}
+    near: dict[str, object] = {"region": CLOSE, "grid": 20.0}
     found = fecm.locate(deck, (TIME, strains), **near)  # type: ignore[arg-type]
     assert np.diff(found.time)[0] < TIME[-1] / 60.0
     assert found.peak_force == pytest.approx(peak, rel=0.05)
@@ -329,15 +336,16 @@ def test_hats_are_narrowed_where_the_strains_show_it_and_a_given_width_is_kept()
 
 def test_a_record_that_begins_after_the_impact_is_located_with_a_shift() -> None:
     late = 10  # points
-    strains, noise = scatter(struck()[1], NOISE, seed=2)
+    deck, clean, _ = struck_on_a_point()
+    strains, noise = scatter(clean, NOISE, seed=2)
     table = TIME[late:] - TIME[late - 1], strains[late:]
-    found = fecm.locate(struck()[0], table, region=NEAR, grid=12.0, noise=noise, shift=True)
+    found = fecm.locate(deck, table, region=CLOSE, grid=20.0, noise=noise, shift=True)
     assert distance(found, STRUCK) < 0.3
     assert found.misfit < 1.2
     first = found.time[np.argmax(found.force > 0.1 * found.peak_force)]
     assert first == pytest.approx(-TIME[late - 1], abs=1e-5)
     assert found.sd_shift > 0.0
-    plain = fecm.locate(struck()[0], table, region=NEAR, grid=12.0, noise=noise)
+    plain = fecm.locate(deck, table, region=CLOSE, grid=20.0, noise=noise)
     assert not plain.accepted
     assert any("does not describe these signals" in note for note in plain.notes)
 
@@ -345,14 +353,15 @@ def test_a_record_that_begins_after_the_impact_is_located_with_a_shift() -> None
 def test_a_record_that_begins_before_the_impact_is_located() -> None:
     before = 3e-6 * np.arange(-20.0, 1.0)
     time = np.concatenate([before, TIME])
-    strains = np.vstack([np.zeros((len(before), 3)), struck()[1]])
-    found = fecm.locate(struck()[0], (time, strains), region=NEAR, grid=12.0)
+    deck, clean, _ = struck_on_a_point()
+    strains = np.vstack([np.zeros((len(before), 3)), clean])
+    found = fecm.locate(deck, (time, strains), region=NEAR, grid=12.0)
     assert distance(found, STRUCK) < 0.1
     assert found.force[found.time <= 0.0].max() < 0.05 * found.peak_force
 
 
 def test_a_gage_with_another_gain_is_found_out() -> None:
-    strains, noise = scatter(struck()[1], NOISE / 4.0, seed=3)
+    strains, noise = scatter(struck_on_a_point()[1], NOISE / 4.0, seed=3)
     found = located(strains * [1.1, 1.0, 1.0], noise=noise, gains=True)
     assert found.gains / found.gains[1] == pytest.approx([1.1, 1.0, 1.0], abs=0.01)
     assert np.prod(found.gains) == pytest.approx(1.0)
@@ -361,34 +370,31 @@ def test_a_gage_with_another_gain_is_found_out() -> None:
 
 
 def test_fine_samples_give_the_place_of_coarse_ones() -> None:
-    run = fecm.run_one(struck()[0])
-    found = fecm.locate(
-        struck()[0], (run.time, np.asarray(run.gages.strain)), region=NEAR, grid=12.0
-    )
+    deck, run = struck_on_a_point()[0], run_of(radius=SMALL)
+    found = fecm.locate(deck, (run.time, np.asarray(run.gages.strain)), region=CLOSE, grid=20.0)
     assert len(run.time) > 500
     assert distance(found, STRUCK) < 0.1
     assert found.fitted.shape == (3, len(run.time))
     rest = found.fitted - run.gages.strain.T
     assert np.abs(rest).max() < 0.02 * np.abs(found.fitted).max()
     strains, noise = scatter(np.asarray(run.gages.strain), NOISE, seed=5)
-    rough = fecm.locate(struck()[0], (run.time, strains), region=NEAR, grid=12.0)
+    rough = fecm.locate(deck, (run.time, strains), region=CLOSE, grid=20.0)
     assert rough.noise == pytest.approx(noise, rel=0.05)
     assert deviations(rough, STRUCK) < 4.0
 
 
 def test_unequal_times_give_the_place_of_equal_ones() -> None:
-    run = fecm.run_one(struck()[0])
+    deck, run = struck_on_a_point()[0], run_of(radius=SMALL)
     time = np.sort(np.random.default_rng(4).uniform(2e-6, TIME[-1], 150))
     strains = np.column_stack([np.interp(time, run.time, one) for one in run.gages.strain.T])
-    found = fecm.locate(struck()[0], (time, strains), region=NEAR, grid=12.0)
+    found = fecm.locate(deck, (time, strains), region=CLOSE, grid=20.0)
     assert distance(found, STRUCK) < 0.1
 
 
 def test_a_plate_without_patch_projectile_and_program_is_enough() -> None:
     deck = struck()[0]
     unused = (model.Impact, model.Indentation, model.Projectile, model.Patch)
-    kept = tuple(s for s in deck.segments if not isinstance(s, unused))
-    bare = dataclasses.replace(deck, segments=kept, macros=(), text="")
+    bare = dataclasses.replace(without(deck, *unused), macros=())
     found = fecm.locate(bare, (TIME, struck()[1]), region=NEAR, grid=12.0)
     assert distance(found, STRUCK) < 1.0  # a point for the disc of 5
     assert found.peak_force == pytest.approx(struck()[2], rel=0.1)
@@ -398,16 +404,17 @@ def test_a_plate_without_patch_projectile_and_program_is_enough() -> None:
 
 
 def test_a_wrong_plate_does_not_describe_the_strains() -> None:
-    deck = struck()[0].with_(e1=2.0 * 135000.0)
-    strains, noise = scatter(struck()[1], NOISE, seed=1)
-    found = fecm.locate(deck, (TIME, strains), region=NEAR, grid=12.0, noise=noise)
+    plate, clean, _ = struck_on_a_point()
+    deck = plate.with_(e1=2.0 * 135000.0)
+    strains, noise = scatter(clean, NOISE, seed=1)
+    found = fecm.locate(deck, (TIME, strains), region=CLOSE, grid=20.0, noise=noise)
     assert found.misfit > 3.0
     assert not found.accepted
     assert "does not describe these signals" in found.notes[0]
 
 
 def test_a_place_outside_the_region_is_doubted() -> None:
-    found = located(struck()[1], region=(20.0, 30.0, 50.0, 60.0))
+    found = located(struck_on_a_point()[1], region=(20.0, 30.0, 50.0, 60.0), grid=15.0)
     assert not found.accepted
     assert any("edge of the region" in note for note in found.notes)
 
@@ -415,11 +422,10 @@ def test_a_place_outside_the_region_is_doubted() -> None:
 def test_a_second_place_that_fits_almost_as_well_is_named() -> None:
     # Gages just beside the axis hardly tell the sides of the plate.
     beside = [(x, 40.3, 0.72, 0.0) for x in (20.0, 45.0, 75.0)]
-    deck = with_gages(panel("[0/90]2s", at=(61.0, 58.0)), *beside)
-    run = fecm.run_one(deck)
-    strains = np.column_stack([np.interp(TIME, run.time, one) for one in run.gages.strain.T])
-    measured, noise = scatter(strains, 5.0 * NOISE, seed=0)
-    found = fecm.locate(deck, (TIME, measured), region=(45, 10, 75, 70), grid=9.0, noise=noise)
+    deck = with_gages(panel("[0/90]2s", (61.0, 58.0), SMALL), *beside)
+    measured, noise = scatter(at_times(fecm.run_one(deck)), 5.0 * NOISE, seed=0)
+    bare = without(deck, model.Patch)
+    found = fecm.locate(bare, (TIME, measured), region=(45, 10, 75, 70), grid=9.0, noise=noise)
     assert found.second is not None
     assert 1.0 <= found.second.ratio < 1.1
     assert abs(found.second.y + found.y - 80.0) < 5.0  # a mirror place
@@ -447,8 +453,8 @@ def test_gages_on_an_axis_of_symmetry_are_refused_with_both_places() -> None:
 def test_gages_that_tell_the_sides_apart_are_accepted(
     layup: str, places: list[tuple[float, float, float, float]]
 ) -> None:
-    deck = with_gages(panel(layup), *places)
-    found = fecm.locate(deck, (TIME, struck()[1][:, :2]), region=NEAR, grid=40.0)
+    deck = with_gages(without(panel(layup), model.Patch), *places)
+    found = fecm.locate(deck, (TIME, struck()[1][:, :2]), region=CLOSE, grid=20.0)
     assert len(found.gages) == 2
 
 
