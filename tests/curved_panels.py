@@ -33,11 +33,11 @@ def mesh(along: int) -> Grid:
     return Grid(uniform(SIDES[0], along), uniform(SIDES[1], along * 2 // 3))
 
 
-def fine_middle() -> Grid:
-    """Elements of 2.5 mm in the middle, and larger ones around."""
+def fine_middle(number: int) -> Grid:
+    """So many elements across the 40 mm in the middle, and larger ones around."""
     return Grid(
-        [Section(0.0, 110.0, 11), Section(110.0, 190.0, 32), Section(190.0, 300.0, 11)],
-        [Section(0.0, 60.0, 6), Section(60.0, 140.0, 32), Section(140.0, 200.0, 6)],
+        [Section(0.0, 130.0, 8), Section(130.0, 170.0, number), Section(170.0, 300.0, 8)],
+        [Section(0.0, 80.0, 5), Section(80.0, 120.0, number), Section(120.0, 200.0, 5)],
     )
 
 
