@@ -192,7 +192,8 @@ NUMPY = ("--solver", "numpy")
 
 @pytest.mark.posix
 def test_a_disk_that_fills_leaves_the_last_checkpoint_usable(whole: Path) -> None:
-    shutil.copy(LONG, whole / "short.inp")
+    short = LONG.read_text().replace("LOOP       4000", "LOOP       2000")
+    (whole / "short.inp").write_text(short)
     (whole / "f.h5").write_text("precious")
     done = program(
         "run",
@@ -204,7 +205,7 @@ def test_a_disk_that_fills_leaves_the_last_checkpoint_usable(whole: Path) -> Non
         "0",
         *NUMPY,
         cwd=whole,
-        preexec_fn=lambda: small_files(2_000_000),
+        preexec_fn=lambda: small_files(1_000_000),
     )
     assert done.exit_code == 2
     assert "Traceback" not in done.stderr

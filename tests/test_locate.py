@@ -124,7 +124,7 @@ def test_the_place_and_the_force_of_a_run_are_found() -> None:
 def test_an_impact_on_a_curved_panel_is_found() -> None:
     deck = curved(panel("[0/90/45/45]"))
     run = fecm.run_one(deck)
-    found = fecm.locate(deck, (TIME, at_times(run)), region=NEAR, grid=12.0)
+    found = fecm.locate(deck, (TIME, at_times(run)), region=CLOSE, grid=10.0)
     assert distance(found, STRUCK) < 0.2
     assert found.peak_force == pytest.approx(float(run.force.max()), rel=0.05)
 
@@ -132,7 +132,7 @@ def test_an_impact_on_a_curved_panel_is_found() -> None:
 def test_an_impact_beside_the_edge_is_found() -> None:
     place = (60.0, 6.0)
     deck, strains, peak = struck(at=place)
-    found = fecm.locate(deck, (TIME, strains), region=(40.0, 0.0, 80.0, 30.0), grid=12.0)
+    found = fecm.locate(deck, (TIME, strains), region=(48.0, 0.0, 76.0, 30.0), grid=14.0)
     assert distance(found, place) < 0.5
     assert found.peak_force == pytest.approx(peak, rel=0.05)
     at_edge = fecm.locate(deck, (TIME, strains), region=(40.0, 0.0, 80.0, 5.01), grid=12.0)
@@ -142,7 +142,7 @@ def test_an_impact_beside_the_edge_is_found() -> None:
 
 def of_the_series(deck: fecm.Deck, strains: Floats, **options: object) -> fecm.Location:
     """The impact of the public series near its place."""
-    near: dict[str, object] = {"region": (92.0, 61.0, 132.0, 101.0), "grid": 20.0}
+    near: dict[str, object] = {"region": (98.0, 68.0, 124.0, 92.0), "grid": 26.0}
     return fecm.locate(deck, (PUBLIC[:, 0], strains), **(near | options))  # type: ignore[arg-type]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -68,8 +69,14 @@ def axes_of(found: fecm.Location) -> dict[str, Any]:
     return dict(zip(names, figure.axes, strict=True))
 
 
+@cache
+def usual() -> dict[str, Any]:
+    """Axes of the usual location; left alone."""
+    return axes_of(located())
+
+
 def test_a_force_that_is_not_determined_is_no_line_but_an_area_with_words() -> None:
-    axes = axes_of(located())["force"]
+    axes = usual()["force"]
     time, force = lines(axes)["fitted force"]
     np.testing.assert_array_equal(time, np.arange(6.0))
     np.testing.assert_array_equal(force, [0.0, 1.0, 3.0, 2.0, 0.0, np.nan])
@@ -81,9 +88,7 @@ def test_a_force_that_is_not_determined_is_no_line_but_an_area_with_words() -> N
 
 def test_the_band_of_the_force_is_two_standard_deviations_wide() -> None:
     (band,) = [
-        one
-        for one in axes_of(located())["force"].collections
-        if one.get_label() == "± 2 standard deviations"
+        one for one in usual()["force"].collections if one.get_label() == "± 2 standard deviations"
     ]
     corners = band.get_paths()[0].vertices
     at_three = corners[corners[:, 0] == 3.0][:, 1]
@@ -91,7 +96,7 @@ def test_the_band_of_the_force_is_two_standard_deviations_wide() -> None:
 
 
 def test_gages_are_lines_in_their_directions_at_their_places_with_their_numbers() -> None:
-    axes = axes_of(located())["map"]
+    axes = usual()["map"]
     first, fourth = (np.array(line.get_data()) for line in axes.get_lines()[:2])
     np.testing.assert_allclose(first, [[0.45, 0.55], [0.5, 0.5]])
     np.testing.assert_allclose(fourth, [[1.5, 1.5], [0.45, 0.55]])
@@ -108,7 +113,7 @@ def test_the_second_panel_shows_the_ellipse_from_the_place_found() -> None:
 
 
 def test_a_second_place_is_shown_with_its_misfit_if_there_is_one() -> None:
-    assert legend_of_axes(axes_of(located())["map"]) == ["place found"]
+    assert legend_of_axes(usual()["map"]) == ["place found"]
     second = Candidate(0.5, 1.2, 1.07)
     axes = axes_of(located(second=second))["map"]
     text = "second place, misfit × 1.07"
@@ -117,7 +122,7 @@ def test_a_second_place_is_shown_with_its_misfit_if_there_is_one() -> None:
 
 
 def test_each_gage_has_a_graph_of_its_own_and_all_have_the_same_range() -> None:
-    found = axes_of(located())
+    found = usual()
     for name, values in (("gage 1", 1e-6), ("gage 4", -1e-6)):
         axes = found[name]
         assert axes.get_title(loc="left") == name
@@ -128,7 +133,7 @@ def test_each_gage_has_a_graph_of_its_own_and_all_have_the_same_range() -> None:
 
 
 def test_the_outline_has_the_sides_of_the_plate_and_none_inside() -> None:
-    sides = axes_of(located())["map"].collections[0].get_segments()
+    sides = usual()["map"].collections[0].get_segments()
     middles = {tuple(side.mean(axis=0)) for side in sides}
     assert middles == {(x, y) for x in (0.5, 1.5) for y in (0.0, 2.0)} | {
         (x, y) for x in (0.0, 2.0) for y in (0.5, 1.5)

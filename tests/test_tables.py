@@ -143,9 +143,10 @@ def test_a_line_is_read_in_a_block_only_if_its_card_has_no_finding(keyword: str)
     assert taken > 500
 
 
-def test_mutated_decks_read_in_blocks_as_card_by_card() -> None:
+@pytest.mark.parametrize("seeds", [range(60), pytest.param(range(60, 600), marks=pytest.mark.long)])
+def test_mutated_decks_read_in_blocks_as_card_by_card(seeds: range) -> None:
     base = small().replace("ROD\n", f"{FORC}ROD\n").replace("ROD\n", f"{OWN}ROD\n", 1)
-    for seed in range(150):
+    for seed in seeds:
         text = mutate(base, random.Random(seed))
         assert described(text) == by_card(text), seed
 
