@@ -1,22 +1,32 @@
 """Upper bounds of the highest frequencies of single elements, far cheaper than the frequencies.
 
-The largest eigenvalue of a sum of matrices is at most the sum of theirs: of membrane and bending,
-of transverse shear, of the curvature and of the preload.
+The five fields u, v, w, theta_x and theta_y of an element, scaled by the roots of their masses, get
+the same bound of their energies, p1 f,x^2 + p2 f,y^2 + q f^2 at a point, so that a matrix with a
+row for each node takes the place of one with five.
 
-The first one dominates.  Its energy at a point is g' D g with the gradients g of u, v, theta_x and
-theta_y, scaled by the roots of the masses.  With numbers p1 and p2 such that
-g' D g <= p1 |g,x|^2 + p2 |g,y|^2, the four fields are independent of one another and alike, so
-that a matrix with a row for each node takes the place of one with five.
+Membrane and bending: their energy is g' D g with the gradients g of u, v, theta_x and theta_y.  p1
+and p2 are such that g' D g <= p1 |g,x|^2 + p2 |g,y|^2.
+
+Transverse shear: (w,x - theta_x)^2 <= (1 + s) w,x^2 + (1 + 1/s) theta_x^2 for any s > 0.  s is as
+large as p1 and p2 allow, of which w has no other need but the preload's.  Where shear has points of
+its own, a bound of its matrix is added instead: the largest eigenvalue of a sum of matrices is at
+most the sum of theirs.
+
+Curvature: the strains w/R of a shallow panel are taken apart from those of u and v in the same way.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.mechanics import element_matrices
+from fecm.mechanics import assumed_shear
 from fecm.mechanics.curvature import strain_of_deflection
-from fecm.mechanics.interpolation import interpolate
+from fecm.mechanics.element_matrices import IntegrationRules, lumped_shares
+from fecm.mechanics.elements import Quadrature
+from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel
@@ -24,13 +34,22 @@ from fecm.mechanics.plate import PlateModel
 # Excess of p1 over the least possible one.  A smaller p1 needs a larger p2: what is better depends
 # on the elements' shapes.
 EXCESSES = 0.02, 0.05, 0.1, 0.2, 0.4, 0.8
-PART = 128  # elements whose matrices are computed at once, which fit the cache
+PART = 512  # elements whose matrices are computed at once, which fit the cache
+DOUBLINGS = 3  # of the exponent of a matrix, before the trace of its square
 
 # Strains and curvatures of u,x v,x theta_x,x theta_y,x and of u,y v,y theta_x,y theta_y,y.
 ALONG_X = np.zeros((6, 4))
 ALONG_X[[0, 2, 3, 5], [0, 1, 2, 3]] = 1.0, 1.0, -1.0, -1.0
 ALONG_Y = np.zeros((6, 4))
 ALONG_Y[[2, 1, 5, 4], [0, 1, 2, 3]] = 1.0, 1.0, -1.0, -1.0
+
+
+class Majorant(NamedTuple):
+    """Numbers that bound the energies of all fields over their masses."""
+
+    along_x: float  # p1, length squared over time squared
+    along_y: float  # p2, the same
+    value: float  # q, 1/time squared
 
 
 def eigenvalue_bounds(model: PlateModel, family: ElementBlock) -> Floats:
@@ -40,35 +59,34 @@ def eigenvalue_bounds(model: PlateModel, family: ElementBlock) -> Floats:
     is folded.
     """
     with np.errstate(all="ignore"):
-        pairs = _majorants(model.laminate_of(family))
         sample = family.take(np.arange(min(PART, len(family.rows))))
-        best = min(pairs, key=lambda pair: _bounds(model, sample, pair).max(), default=None)
+        majorants = _majorants(model, model.laminate_of(family))
+        best = min(majorants, key=lambda one: _bounds(model, sample, one).max(), default=None)
         if best is None:
             return np.full(len(family.rows), np.inf)
         return np.concatenate([_bounds(model, part, best) for part in family.blocks(PART)])
 
 
-def _bounds(model: PlateModel, block: ElementBlock, majorant: tuple[float, float]) -> Floats:
-    """Bounds of the elements of a block, (ne,), with the numbers p1 and p2."""
-    laminate, rules = model.laminate_of(block), model.rules
-    at = interpolate(block, rules.bending, transposed_jacobian=rules.transposed_jacobian)
-    shares = element_matrices.lumped_shares(at.N, at.jxw)
-    roots = np.sqrt(at.jxw[:, :, None] / shares[:, None])
-    slopes = at.dN * (np.sqrt(majorant)[:, None] * roots[:, :, None, :])
-    bound = _largest_eigenvalue(slopes)
-    if model.is_preloaded:
-        bound *= 1.0 + _largest_tension(model.preload) / laminate.mass / min(majorant)
-    if model.is_curved:
-        strain = strain_of_deflection(model.curvature)
-        rise = float(strain @ laminate.A @ strain) / laminate.mass
-        bound += rise * ((at.N * roots) ** 2).sum(axis=(1, 2))
-    B, areas = element_matrices.transverse_shear(block, rules, at)
-    bound += _shear_bound(B, areas, shares, laminate)
-    return np.where(np.isfinite(bound), bound, np.inf)
+def _majorants(model: PlateModel, laminate: Laminate) -> list[Majorant]:
+    """Majorants of elements of a laminate, which differ in what p1 is and p2."""
+    inertia = np.array([laminate.mass, laminate.rotary_inertia])
+    shear = np.zeros(2) if _has_own_points(model.rules) else _stiffest(laminate) / inertia
+    tension = _largest_tension(model.preload) / inertia[0]
+    strain = strain_of_deflection(model.curvature)
+    rise = float(strain @ laminate.A @ strain) / inertia[0]
+    found: list[Majorant] = []
+    for excess, (along_x, along_y) in _of_gradients(laminate):
+        of_w = max(min(along_x, along_y), tension + 2.0 * shear[0])
+        spare = of_w - tension
+        value = max(shear[1] * spare / (spare - shear[0]), rise * (1.0 + 1.0 / excess))
+        stretched = value / (value - rise) if rise > 0.0 else 1.0
+        slopes = max(along_x * stretched, of_w), max(along_y * stretched, of_w)
+        found.append(Majorant(*slopes, value))
+    return found
 
 
-def _majorants(laminate: Laminate) -> list[tuple[float, float]]:
-    """Pairs p1, p2 of a laminate, length squared over time squared."""
+def _of_gradients(laminate: Laminate) -> list[tuple[float, tuple[float, float]]]:
+    """Pairs p1, p2 of membrane and bending, with the excess of p1."""
     stiffness = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
     inertia = np.repeat([laminate.mass, laminate.rotary_inertia], 2)
     scale = 1.0 / np.sqrt(inertia[:, None] * inertia)
@@ -78,37 +96,141 @@ def _majorants(laminate: Laminate) -> list[tuple[float, float]]:
     if not np.isfinite([xx, xy, yy]).all():
         return []
     least = float(np.linalg.eigvalsh(xx)[-1])
-    pairs: list[tuple[float, float]] = []
+    pairs: list[tuple[float, tuple[float, float]]] = []
     for excess in EXCESSES:
         along_x = (1.0 + excess) * least
         complement = yy + xy.T @ np.linalg.solve(along_x * np.eye(len(xx)) - xx, xy)
-        pairs.append((along_x, float(np.linalg.eigvalsh(complement)[-1])))
+        pairs.append((excess, (along_x, float(np.linalg.eigvalsh(complement)[-1]))))
     return pairs
 
 
-def _largest_eigenvalue(rows: Floats) -> Floats:
-    """Largest eigenvalue of R' R, (ne,), for R (ne, npt, 2, nn); NaN if R' R is not finite."""
-    flat = rows.reshape(len(rows), -1, rows.shape[-1])
-    products = flat.swapaxes(1, 2) @ flat
-    sound = np.asarray(np.isfinite(products).all(axis=(1, 2)))
-    found = np.linalg.eigvalsh(np.where(sound[:, None, None], products, 0.0))[:, -1]
-    return np.where(sound, found, np.nan)
+def _has_own_points(rules: IntegrationRules) -> bool:
+    """Whether transverse shear has other points than bending."""
+    return rules.assumes_shear or rules.shear is not rules.bending
 
 
-def _shear_bound(B: Floats, areas: Floats, shares: Floats, laminate: Laminate) -> Floats:
+def _bounds(model: PlateModel, block: ElementBlock, majorant: Majorant) -> Floats:
+    """Bounds of the elements of a block, (ne,)."""
+    rules = model.rules
+    values, local = local_shape_functions(block, rules.bending)
+    mapping = _mapping(block, local, transposed=rules.transposed_jacobian)
+    metric, areas = _metric(mapping, rules.bending, majorant.along_x, majorant.along_y)
+    energies = np.concatenate([metric, majorant.value * areas[:, None]], axis=1)
+    table = np.concatenate([_products(local[:, 0], local[:, 1]), _outer(values)])
+    shares = lumped_shares(values, areas)
+    roots = 1.0 / np.sqrt(shares)
+    matrices = _contracted(energies, table)
+    matrices *= roots[:, :, None]
+    matrices *= roots[:, None, :]
+    bound = _largest_eigenvalue(matrices)
+    if _has_own_points(rules):
+        bound += _shear_bound(block, rules, shares, model.laminate_of(block))
+    return np.where(np.isfinite(bound) & (areas > 0.0).all(axis=1), bound, np.inf)
+
+
+def _shear_bound(
+    block: ElementBlock, rules: IntegrationRules, shares: Floats, laminate: Laminate
+) -> Floats:
     """Bound of the largest eigenvalue of the transverse shear part, (ne,).
 
-    It is the fourth root of the sum of their fourth powers.
+    The part is B' Q B with the covariant strains B at tying points, which are those of the rule
+    unless strains are assumed.  Q B M^-1 B', with two rows for a point, has its eigenvalues.
     """
-    ne, points, _, n = B.shape
-    inertia = np.repeat([laminate.mass, laminate.rotary_inertia], (3, 2))
-    mass = (shares[:, :, None] * inertia).reshape(ne, n)
-    rows = B.reshape(ne, 2 * points, n) / np.sqrt(mass)[:, None, :]
-    rows *= np.sqrt(np.repeat(areas, 2, axis=1))[:, :, None]
-    squares = rows @ rows.swapaxes(1, 2)  # their eigenvalues are those of the part
-    fourths = squares @ squares
-    stiffest = float(np.abs(laminate.shear).sum(axis=1).max())
-    return np.asarray(stiffest * np.einsum("eij,eij->e", fourths, fourths) ** 0.25)
+    nn = block.nodes.shape[1]
+    if rules.assumes_shear:
+        rule, transposed = assumed_shear.quadrature(block), False
+        points = [assumed_shear.tying_points(nn, axis) for axis in (0, 1)]
+        weights = [assumed_shear.tying_weights(nn, axis, rule) for axis in (0, 1)]
+    else:
+        rule, transposed = rules.shear, rules.transposed_jacobian
+        points = [rule, rule]
+        weights = [np.eye(len(rule.xi))] * 2
+    (at_xi, of_xi), (at_eta, of_eta) = (local_shape_functions(block, tying) for tying in points)
+    values = np.concatenate([at_xi, at_eta])
+    local = np.concatenate([of_xi, of_eta])
+    mapping = _mapping(block, local, transposed=transposed)
+    along_xi, along_eta = np.split(np.arange(len(local)), 2)
+
+    slopes = np.concatenate([of_xi[:, 0], of_eta[:, 1]])
+    bases = np.concatenate([mapping[:, :, 0, along_xi], mapping[:, :, 1, along_eta]], axis=2)
+    compliance = _contracted(1.0 / shares, _outer(slopes.T)[0] / laminate.mass)
+    turning = _contracted(1.0 / shares, _outer(values.T)[0] / laminate.rotary_inertia)
+    compliance += turning * (bases.swapaxes(1, 2) @ bases)
+
+    _, local = local_shape_functions(block, rule)
+    metric, _ = _metric(_mapping(block, local, transposed=transposed), rule, 1.0, 1.0)
+    none = np.zeros_like(weights[0])
+    tied = np.hstack([weights[0], none]), np.hstack([none, weights[1]])
+    stiffness = _contracted(metric, _products(*tied))
+    return _stiffest(laminate) * _largest_eigenvalue(stiffness @ compliance)
+
+
+def _stiffest(laminate: Laminate) -> float:
+    """Upper bound of the largest transverse shear stiffness, force/length."""
+    return float(np.abs(laminate.shear).sum(axis=1).max())
+
+
+def _mapping(block: ElementBlock, local: Floats, *, transposed: bool) -> Floats:
+    """Slopes dx_i/dxi_a at points, (ne, i, a, npt); `transposed` swaps i and a, a slip."""
+    ne, nn = block.nodes.shape
+    places = block.coordinates.swapaxes(1, 2).reshape(2 * ne, nn)
+    slopes = places @ local.swapaxes(0, 1).reshape(-1, nn).T
+    mapping = slopes.reshape(ne, 2, 2, -1)
+    return mapping.swapaxes(1, 2) if transposed else mapping
+
+
+def _metric(
+    mapping: Floats, rule: Quadrature, along_x: float, along_y: float
+) -> tuple[Floats, Floats]:
+    """Coefficients of f,xi^2, f,xi f,eta and f,eta^2, (ne, 3, npt), and areas, (ne, npt).
+
+    Their sum over the points is the integral of p1 f,x^2 + p2 f,y^2.
+    """
+    (x_xi, x_eta), (y_xi, y_eta) = mapping.transpose(1, 2, 0, 3)
+    determinant = x_xi * y_eta - x_eta * y_xi
+    first = along_x * (weights := rule.weights / determinant)
+    second = along_y * weights
+    metric = np.stack(
+        [
+            first * y_eta**2 + second * x_eta**2,
+            -first * y_eta * y_xi - second * x_eta * x_xi,
+            first * y_xi**2 + second * x_xi**2,
+        ],
+        axis=1,
+    )
+    return metric, determinant * rule.weights
+
+
+def _outer(rows: Floats) -> Floats:
+    """Products of the entries of each row with one another, (1, rows, n, n)."""
+    return np.asarray(rows[None, :, :, None] * rows[None, :, None, :])
+
+
+def _products(along_xi: Floats, along_eta: Floats) -> Floats:
+    """Matrices of f,xi^2, 2 f,xi f,eta and f,eta^2 at points, (3, npt, n, n)."""
+    mixed = along_xi[None, :, :, None] * along_eta[None, :, None, :]
+    both = mixed + mixed.swapaxes(2, 3)
+    return np.concatenate([_outer(along_xi), both, _outer(along_eta)])
+
+
+def _contracted(coefficients: Floats, table: Floats) -> Floats:
+    """Sums of the matrices of a table, (..., n, n), with coefficients, (ne, ...): (ne, n, n)."""
+    ne, n = len(coefficients), table.shape[-1]
+    sums = coefficients.reshape(ne, -1) @ table.reshape(-1, n * n)
+    return np.asarray(sums.reshape(ne, n, n))
+
+
+def _largest_eigenvalue(matrices: Floats) -> Floats:
+    """Upper bound of the largest eigenvalue, (ne,), of matrices that have no negative one.
+
+    Root of the trace of a power, per cent above it: the sum of the eigenvalues' powers.
+    """
+    scale = np.einsum("eii->e", matrices)
+    power = matrices / scale[:, None, None]
+    for _ in range(DOUBLINGS):
+        power = power @ power
+    trace = np.einsum("eij,eji->e", power, power)
+    return np.asarray(scale * trace ** 0.5 ** (DOUBLINGS + 1))
 
 
 def _largest_tension(preload: tuple[float, float, float]) -> float:

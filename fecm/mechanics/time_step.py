@@ -10,7 +10,7 @@ import numpy as np
 
 from fecm._typing import Floats, Indices
 from fecm.mechanics import element_matrices
-from fecm.mechanics.element_bounds import PART, eigenvalue_bounds
+from fecm.mechanics.element_bounds import eigenvalue_bounds
 from fecm.mechanics.kernels.plate import CompiledProduct
 from fecm.mechanics.mesh import ElementBlock, congruence
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError, pieces
@@ -22,6 +22,7 @@ TOLERANCE = 1.0e-4
 # close together that the number of steps to TOLERANCE grows with the plate's size.
 RELAXED = 1.0e-3
 PATIENCE = 100
+PART = 32  # elements whose highest frequencies are computed at once
 FEW = 20  # fewer equations are solved as a dense problem
 MOST_STEPS = 1000  # of the iteration
 ROUNDING = 1.0e-9  # of eigenvalues, at most
