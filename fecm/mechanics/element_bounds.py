@@ -26,7 +26,7 @@ from fecm.mechanics import assumed_shear
 from fecm.mechanics.curvature import strain_of_deflection
 from fecm.mechanics.element_matrices import IntegrationRules, lumped_shares
 from fecm.mechanics.elements import Quadrature
-from fecm.mechanics.interpolation import local_shape_functions
+from fecm.mechanics.interpolation import local_shape_functions, mapping
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel
@@ -113,8 +113,8 @@ def _bounds(model: PlateModel, block: ElementBlock, majorant: Majorant) -> Float
     """Bounds of the elements of a block, (ne,)."""
     rules = model.rules
     values, local = local_shape_functions(block, rules.bending)
-    mapping = _mapping(block, local, transposed=rules.transposed_jacobian)
-    metric, areas = _metric(mapping, rules.bending, majorant.along_x, majorant.along_y)
+    slopes = _mapping(block, local, transposed=rules.transposed_jacobian)
+    metric, areas = _metric(slopes, rules.bending, majorant.along_x, majorant.along_y)
     energies = np.concatenate([metric, majorant.value * areas[:, None]], axis=1)
     table = np.concatenate([_products(local[:, 0], local[:, 1]), _outer(values)])
     shares = lumped_shares(values, areas)
@@ -172,11 +172,8 @@ def _stiffest(laminate: Laminate) -> float:
 
 def _mapping(block: ElementBlock, local: Floats, *, transposed: bool) -> Floats:
     """Slopes dx_i/dxi_a at points, (ne, i, a, npt); `transposed` swaps i and a, a slip."""
-    ne, nn = block.nodes.shape
-    places = block.coordinates.swapaxes(1, 2).reshape(2 * ne, nn)
-    slopes = places @ local.swapaxes(0, 1).reshape(-1, nn).T
-    mapping = slopes.reshape(ne, 2, 2, -1)
-    return mapping.swapaxes(1, 2) if transposed else mapping
+    found = mapping(block, local)
+    return found.swapaxes(1, 2) if transposed else found
 
 
 def _metric(
@@ -230,7 +227,7 @@ def _largest_eigenvalue(matrices: Floats) -> Floats:
     for _ in range(DOUBLINGS):
         power = power @ power
     trace = np.einsum("eij,eji->e", power, power)
-    return np.asarray(scale * trace ** 0.5 ** (DOUBLINGS + 1))
+    return np.asarray(scale * trace ** (0.5 ** (DOUBLINGS + 1)))
 
 
 def _largest_tension(preload: tuple[float, float, float]) -> float:

@@ -135,15 +135,23 @@ def lumped_shares(values: Floats, areas: Floats) -> Floats:
     return np.asarray(diagonal * (areas.sum(axis=1) / diagonal.sum(axis=1))[:, None])
 
 
-def lumped_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) -> Floats:
+def lumped_mass(
+    family: ElementBlock,
+    laminate: Laminate,
+    rule: Quadrature,
+    determinants: Floats | None = None,
+) -> Floats:
     """Lumped element masses: diagonal of the consistent matrix, scaled to the element's mass.
 
     The listing's MASS01, the method of Hinton, Rock and Zienkiewicz (1976).  Every entry is
     positive unless a node's shape function is zero at all points, as with order 1 for mid-sides.
-    (ne, nn, 5): mass for u, v, w; mass times length squared for the rotations.
+    (ne, nn, 5): mass for u, v, w; mass times length squared for the rotations.  `determinants` are
+    those of the Jacobian at the points of the rule, (ne, npt), if they are known.
     """
     values, _ = local_shape_functions(family, rule)
-    share = lumped_shares(values, jacobian_determinants(family, rule) * rule.weights)
+    if determinants is None:
+        determinants = jacobian_determinants(family, rule)
+    share = lumped_shares(values, determinants * rule.weights)
     inertia = np.repeat([laminate.mass, laminate.rotary_inertia], (3, 2))
     return np.asarray(share[:, :, None] * inertia)
 

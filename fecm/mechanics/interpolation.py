@@ -10,12 +10,14 @@ from functools import lru_cache
 import numpy as np
 
 from fecm._frozen import frozen
-from fecm._typing import Array, Floats
+from fecm._typing import Array, Bools, Floats
 from fecm.mechanics.elements import ElementShape, Quadrature
 from fecm.mechanics.mesh import ElementBlock
 
 # Degrees of freedom of a node: u, v, w, theta_x, theta_y.
 NDOF = 5
+# Determinants of Jacobians that rounding may have changed, over the square of the coordinates.
+DOUBTFUL = 1.0e-10
 
 
 @frozen
@@ -54,6 +56,17 @@ def jacobian(family: ElementBlock, local: Floats) -> Floats:
     return np.ascontiguousarray(total.transpose(3, 0, 1, 2))
 
 
+def mapping(family: ElementBlock, local: Floats) -> Floats:
+    """The Jacobian as :func:`jacobian` but for rounding, dx_i/dxi_a, in a layout (ne, i, a, npt).
+
+    One product of matrices, at a fifth of the cost.
+    """
+    ne, nn = family.nodes.shape
+    places = family.coordinates.swapaxes(1, 2).reshape(2 * ne, nn)
+    slopes = places @ local.swapaxes(0, 1).reshape(-1, nn).T
+    return np.asarray(slopes.reshape(ne, 2, 2, -1))
+
+
 def inverse_jacobian(
     family: ElementBlock, local: Floats, *, transposed_jacobian: bool = False
 ) -> tuple[Floats, Floats]:
@@ -73,6 +86,19 @@ def jacobian_determinants(family: ElementBlock, rule: Quadrature) -> Floats:
     """Determinant of the Jacobian at the points of a rule, (ne, npt), length squared."""
     _, local = local_shape_functions(family, rule)
     return np.asarray(np.linalg.det(jacobian(family, local)))
+
+
+def has_positive_jacobians(family: ElementBlock, rule: Quadrature) -> Bools:
+    """Whether the determinant of the Jacobian is positive at all points of a rule, (ne,)."""
+    _, local = local_shape_functions(family, rule)
+    (x_xi, x_eta), (y_xi, y_eta) = mapping(family, local).transpose(1, 2, 0, 3)
+    determinants = x_xi * y_eta - x_eta * y_xi
+    margin = DOUBTFUL * np.square(family.coordinates).max()
+    positive = (determinants > margin).all(axis=1)
+    doubtful = np.flatnonzero(~positive)
+    exact = jacobian_determinants(family.take(doubtful), rule)
+    positive[doubtful] = (exact > 0.0).all(axis=1)
+    return np.asarray(positive)
 
 
 def interpolate(

@@ -218,14 +218,24 @@ class PlateModel:
         return self._with_supports[:, self.neq :].tocsr()
 
     @cached_property
+    def _determinants(self) -> list[Floats]:
+        """Determinant of the Jacobian at the points of bending, (ne, npt), of every block."""
+        rule = self.rules.bending
+        return [
+            np.concatenate([jacobian_determinants(part, rule) for part in family.blocks(BLOCK)])
+            for family in self.families
+        ]
+
+    @cached_property
     def mass(self) -> Floats:
         """Lumped M, (neq,)."""
         mass = np.zeros(self._numbers.size)
-        for family in self.families:
-            laminate = self.laminate_of(family)
-            for block in family.blocks(BLOCK):
-                lumped = element_matrices.lumped_mass(block, laminate, self.rules.bending)
-                np.add.at(mass, self._numbers[block.nodes].ravel(), lumped.ravel())
+        for family, determinants in zip(self.families, self._determinants, strict=True):
+            laminate, rule = self.laminate_of(family), self.rules.bending
+            for number, part in enumerate(family.blocks(BLOCK)):
+                own = determinants[number * BLOCK : (number + 1) * BLOCK]
+                lumped = element_matrices.lumped_mass(part, laminate, rule, own)
+                np.add.at(mass, self._dofs(part).ravel(), lumped.ravel())
         return mass[: self.neq]
 
     @cached_property
@@ -240,9 +250,8 @@ class PlateModel:
     @cached_property
     def _areas(self) -> list[float]:
         """Area of every block, length squared."""
-        rule = self.rules.bending
-        areas = (jacobian_determinants(family, rule) @ rule.weights for family in self.families)
-        return [float(area.sum()) for area in areas]
+        weights = self.rules.bending.weights
+        return [float((determinants @ weights).sum()) for determinants in self._determinants]
 
     def area(self) -> float:
         """Area of the plate, length squared."""

@@ -18,7 +18,7 @@ from fecm.problem.problem import Problem
 from fecm.problem.rules.numbering import describe_elements, report_elements
 
 FEW_LOADED = 4  # loaded nodes up to this number are single forces, more are a pressure
-BLOCK = 4096  # elements whose Jacobians are computed together
+BLOCK = 1024  # elements whose Jacobians are computed together
 NO_MASS = 1e-12  # sum of a node's squared shape functions at the points of L1 that is zero
 HOURGLASS = "E321"
 
@@ -60,15 +60,15 @@ def folded_elements(problem: Problem) -> Reports:
     bending, shear, strains = problem.rules
     folded: dict[str, list[int]] = {}  # rows by the hint about the numbering
     for family in problem.families:
-        used = [bending, shear]
+        used = {bending, shear}
         if not _has_singular_points(problem, family):
-            used.append(strains)
+            used.add(strains)
+        wrong = folded.setdefault(family.shape.numbering, [])
         with np.errstate(all="ignore"):
             for block in family.blocks(BLOCK):
                 for points in used:
-                    found = interpolation.jacobian_determinants(block, points)
-                    rows = block.rows[~(found > 0.0).all(axis=1)]
-                    folded.setdefault(family.shape.numbering, []).extend(rows.tolist())
+                    sound = interpolation.has_positive_jacobians(block, points)
+                    wrong += block.rows[~sound].tolist()
     what = "has a Jacobian that is zero or negative"
     for numbering, wrong in folded.items():
         rows = distinct(wrong).astype(np.intp)
