@@ -95,9 +95,10 @@ def has_positive_jacobians(family: ElementBlock, rule: Quadrature) -> Bools:
     determinants = x_xi * y_eta - x_eta * y_xi
     margin = DOUBTFUL * np.square(family.coordinates).max()
     positive = (determinants > margin).all(axis=1)
-    doubtful = np.flatnonzero(~positive)
-    exact = jacobian_determinants(family.take(doubtful), rule)
-    positive[doubtful] = (exact > 0.0).all(axis=1)
+    if not positive.all():
+        doubtful = np.flatnonzero(~positive)
+        exact = jacobian_determinants(family.take(doubtful), rule)
+        positive[doubtful] = (exact > 0.0).all(axis=1)
     return np.asarray(positive)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -84,6 +85,14 @@ def holds_the_plane(codes: Ints) -> bool:
 
 
 @frozen
+class Congruence:
+    """Groups of elements of a block that are translations of one another."""
+
+    representatives: Indices  # (ng,): position in the block of one element per group
+    group: Indices  # (ne,): group of every element
+
+
+@frozen
 class ElementBlock:
     """Elements that have the same nodes present."""
 
@@ -97,12 +106,36 @@ class ElementBlock:
     def blocks(self, size: int) -> Iterator[ElementBlock]:
         """Split into blocks of at most `size` elements."""
         for start in range(0, len(self.rows), size):
-            yield self.take(np.arange(start, min(start + size, len(self.rows))))
+            yield self.take(slice(start, start + size))
 
-    def take(self, members: Indices) -> ElementBlock:
+    def take(self, members: Indices | slice) -> ElementBlock:
         """Select elements by their position in the block."""
         names = ("rows", "nodes", "coordinates")
         return replace(self, **{name: getattr(self, name)[members] for name in names})
+
+    @cached_property
+    def congruence(self) -> Congruence:
+        """The congruent elements.
+
+        Positions are compared on a grid of :data:`TOLERANCE` times the largest element's size.
+        Congruent elements that rounding separates form two groups, which costs time but no
+        accuracy.
+        """
+        places = self.coordinates[:, 1:] - self.coordinates[:, :1]
+        flat = places.reshape(len(places), -1)
+        pitch = TOLERANCE * float(np.abs(flat).max())
+        # An uncommon offset keeps round numbers away from the grid lines.
+        cells = np.floor(flat / pitch + 1.0 / np.pi).astype(np.int64)
+        low = cells.min(axis=0)
+        spans = cells.max(axis=0) - low
+        group = np.zeros(len(cells), dtype=np.intp)
+        representatives = group[:1]
+        for i in np.flatnonzero(spans):  # in lexicographic order, until all are told apart
+            keys = group * (spans[i] + 1) + cells[:, i] - low[i]
+            _, representatives, group = np.unique(keys, return_index=True, return_inverse=True)
+            if len(representatives) == len(cells):
+                break
+        return Congruence(representatives, group)
 
 
 def element_blocks(
@@ -119,7 +152,9 @@ def element_blocks(
     found: list[ElementBlock] = []
     given = nodes > 0
     # Patterns in the order of their bits, first node first.
-    codes = given @ (1 << np.arange(given.shape[1])[::-1])
+    codes = np.zeros(len(given), dtype=np.intp)
+    for column in given.T:
+        codes = 2 * codes + column
     for code in distinct(codes):
         rows = np.flatnonzero(codes == code)
         present = given[rows[0]]
@@ -162,37 +197,12 @@ def longest_sides(elements: Ints, coordinates: Floats) -> Floats:
     return longest
 
 
+def extent(places: Floats) -> tuple[Floats, Floats]:
+    """Lowest and highest coordinates of places, (n, 2)."""
+    x, y = places.T  # each alone: along both at once NumPy takes ten times as long
+    return np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
+
+
 def distinct(values: ArrayLike) -> NDArray[Any]:
     """Sorted distinct values; without an index np.unique would import numpy.ma."""
     return np.unique(values, return_index=True)[0]
-
-
-@frozen
-class Congruence:
-    """Groups of elements of a block that are translations of one another."""
-
-    representatives: Indices  # (ng,): position in the block of one element per group
-    group: Indices  # (ne,): group of every element
-
-
-def congruence(family: ElementBlock) -> Congruence:
-    """Group the congruent elements of a block.
-
-    Positions are compared on a grid of :data:`TOLERANCE` times the largest element's size.
-    Congruent elements that rounding separates form two groups, which costs time but no accuracy.
-    """
-    places = family.coordinates[:, 1:] - family.coordinates[:, :1]
-    flat = places.reshape(len(places), -1)
-    pitch = TOLERANCE * float(np.abs(flat).max())
-    # An uncommon offset keeps round numbers away from the grid lines.
-    cells = np.floor(flat / pitch + 1.0 / np.pi).astype(np.int64)
-    low = cells.min(axis=0)
-    spans = cells.max(axis=0) - low
-    group = np.zeros(len(cells), dtype=np.intp)
-    representatives = group[:1]
-    for i in np.flatnonzero(spans):  # in lexicographic order, until all are told apart
-        keys = group * (spans[i] + 1) + cells[:, i] - low[i]
-        _, representatives, group = np.unique(keys, return_index=True, return_inverse=True)
-        if len(representatives) == len(cells):
-            break
-    return Congruence(representatives, group)

@@ -23,7 +23,7 @@ from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, jacobian_determinants
 from fecm.mechanics.laminate import Laminate
-from fecm.mechanics.mesh import ElementBlock, Mesh, congruence, element_blocks, rigid_deflections
+from fecm.mechanics.mesh import ElementBlock, Mesh, element_blocks, rigid_deflections
 from fecm.mechanics.strains import Rows, StrainField
 
 if TYPE_CHECKING:
@@ -170,7 +170,7 @@ class PlateModel:
                 for part in family.blocks(BLOCK):
                     yield self._dofs(part), matrices_of(part)
                 continue
-            same = congruence(family)
+            same = family.congruence
             for start in range(0, len(family.rows), BLOCK):
                 block = np.arange(start, min(start + BLOCK, len(family.rows)))
                 wanted, which = np.unique(same.group[block], return_inverse=True)

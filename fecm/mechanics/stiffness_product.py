@@ -21,7 +21,7 @@ from fecm.mechanics import kernels
 from fecm.mechanics.kernels import membrane
 from fecm.mechanics.kernels.plate import CompiledProduct
 from fecm.mechanics.membrane import Membrane
-from fecm.mechanics.mesh import congruence, distinct
+from fecm.mechanics.mesh import distinct
 from fecm.mechanics.plate import PlateModel, R, StiffnessOperator, pieces
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 
@@ -269,7 +269,7 @@ def stiffness_operator(
         members = np.flatnonzero(weights)
         entries = len(members) * family.nodes.shape[1] * kept.dofs_per_node
         shares = 1 if entries <= BATCH else SHARES * -(-entries // (SHARES * BATCH))
-        same = congruence(family)
+        same = family.congruence
         # An element that is its own image counts once, the others twice.
         common = weights == weights.max()
         sizes = np.bincount(same.group[common], minlength=len(same.representatives))

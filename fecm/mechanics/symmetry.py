@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from fecm._frozen import frozen
 from fecm._typing import Floats, Indices
-from fecm.mechanics.mesh import ElementBlock, Ints, equation_numbers
+from fecm.mechanics.mesh import ElementBlock, Ints, equation_numbers, extent
 from fecm.mechanics.plate import PlateModel
 
 # Signs of u, v, w, theta_x, theta_y under the half turn.
@@ -61,29 +61,31 @@ class SymmetryReduction:
 
 def unreduced(plate: PlateModel) -> SymmetryReduction:
     """All dofs without restraint, each independent."""
-    return _reduction(plate, None)
+    equations = plate.mesh.equations
+    index = equations.astype(np.intp) - 1
+    index[index < 0] = plate.neq
+    weights = np.ones(len(plate.mesh.elements), dtype=int)
+    return SymmetryReduction(plate.neq, index, (equations > 0).astype(float), weights)
 
 
 def symmetry_reduction(plate: PlateModel, contact: Floats | None) -> SymmetryReduction:
     """Independent dofs of a plate at rest under its loads and a contact force, (numnp, 5)."""
     resting = restrain_resting_dofs(plate, contact)
-    return _reduction(resting, _images(resting, contact))
+    turned = _images(resting, contact)
+    return unreduced(resting) if turned is None else _reduction(resting, *turned)
 
 
-def _reduction(plate: PlateModel, images: tuple[Indices, Indices] | None) -> SymmetryReduction:
-    """Number the independent dofs in the order of nodes and dofs."""
+def _reduction(plate: PlateModel, nodes: Indices, elements: Indices) -> SymmetryReduction:
+    """Number the independent dofs in the order of nodes and dofs, given the images."""
     sign = (plate.mesh.equations > 0).astype(float)
     dof_indices = np.arange(sign.size).reshape(sign.shape)
-    leaders, weights = dof_indices, np.ones(len(plate.mesh.elements), dtype=int)
-    if images is not None:
-        nodes, elements = images
-        own, at = np.arange(len(elements)), np.arange(len(nodes))
-        weights = np.where(own < elements, 2, np.where(own == elements, 1, 0))
-        follows = nodes < at
-        leaders = np.where(follows[:, None], dof_indices[nodes], dof_indices)
-        sign[follows] *= TURNED
-        # A node at the centre is its own image: its dofs that change sign are at rest.
-        sign[nodes == at] *= TURNED > 0.0
+    own, at = np.arange(len(elements)), np.arange(len(nodes))
+    weights = np.where(own < elements, 2, np.where(own == elements, 1, 0))
+    follows = nodes < at
+    leaders = np.where(follows[:, None], dof_indices[nodes], dof_indices)
+    sign[follows] *= TURNED
+    # A node at the centre is its own image: its dofs that change sign are at rest.
+    sign[nodes == at] *= TURNED > 0.0
     leads = (leaders == dof_indices) & (sign != 0.0)
     count = int(np.count_nonzero(leads))
     numbers = np.full(sign.size, count, dtype=np.intp)
@@ -103,7 +105,7 @@ def images(coordinates: Floats, flip: tuple[float, float]) -> Indices | None:
     """
     if np.isnan(coordinates).any():
         return None
-    low, high = coordinates.min(axis=0), coordinates.max(axis=0)
+    low, high = extent(coordinates)
     pitch = TOLERANCE * float((high - low).max())
     centred = (coordinates - (low + high) / 2.0) / pitch
     # An uncommon offset keeps the positions away from the edges of the grid, of less than 2**31

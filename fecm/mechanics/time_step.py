@@ -12,7 +12,7 @@ from fecm._typing import Floats, Indices
 from fecm.mechanics import element_matrices
 from fecm.mechanics.element_bounds import eigenvalue_bounds
 from fecm.mechanics.kernels.plate import CompiledProduct
-from fecm.mechanics.mesh import ElementBlock, congruence
+from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError, pieces
 from fecm.mechanics.stiffness_product import SAFE, stiffness_operator
 
@@ -39,7 +39,7 @@ def safe_time_step(model: PlateModel) -> float:
     """
     fastest = 0.0
     for family in model.families:
-        unlike = family.take(congruence(family).representatives)
+        unlike = family.take(family.congruence.representatives)
         # For few elements, bounds would not pay.
         many = len(unlike.rows) > PART
         bounds = eigenvalue_bounds(model, unlike) if many else np.full(len(unlike.rows), np.inf)

@@ -16,7 +16,6 @@ from fecm import _memory
 from fecm.deck.macros import every, flat
 from fecm.deck.model import Projectile
 from fecm.mechanics import interpolation
-from fecm.mechanics.mesh import congruence
 from fecm.mechanics.plate import ASSEMBLED, BLOCK, PlateModel
 from fecm.mechanics.projectile import REPORT_ELEMENTS
 from fecm.mechanics.solutions import DENSE, FACTORS
@@ -87,7 +86,7 @@ def _product(model: PlateModel, *, exact: bool) -> int:
         count, n = len(family.rows), interpolation.NDOF * family.nodes.shape[1]
         alone, shared = count, 0
         if exact:
-            sizes = np.bincount(congruence(family).group)
+            sizes = np.bincount(family.congruence.group)
             shared = int((sizes >= WORTH_GROUPING).sum())
             alone = int(sizes[sizes < WORTH_GROUPING].sum())
         total += (alone + shared) * n * n * KEPT + count * n * PLACE

@@ -16,7 +16,7 @@ from fecm.deck.model import Deck
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import CRITERIA, PlyExposure, largest_in_plies
 from fecm.mechanics.laminate import Laminate, effective_rigidity, threshold_force
-from fecm.mechanics.mesh import ElementBlock, Mesh, element_blocks, element_centres
+from fecm.mechanics.mesh import ElementBlock, Mesh, element_blocks, element_centres, extent
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import uniform_stresses
 from fecm.mechanics.points import RADIUS_PER_THICKNESS, locate, patch_weights
@@ -80,7 +80,8 @@ class Problem:
     @cached_property
     def longer_side(self) -> float:
         """Longer side of the rectangle around the plate, length."""
-        return float(np.ptp(self.mesh.coordinates, axis=0).max())
+        low, high = extent(self.mesh.coordinates)
+        return float((high - low).max())
 
     @cached_property
     def span(self) -> Span:

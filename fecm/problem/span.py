@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import Mesh, extent
 from fecm.problem.parts import W
 
 # Most nodes whose distances are compared.
@@ -32,7 +32,8 @@ def unsupported(mesh: Mesh, load: tuple[float, float] | None) -> Span:
     places, held = mesh.coordinates[mesh.used], mesh.codes[mesh.used, W] != 0
     free, supports = places[~held], places[held]
     if not len(supports) or not len(free):
-        return Span(float(np.ptp(places, axis=0).min()), "plate's shorter side")
+        low, high = extent(places)
+        return Span(float((high - low).min()), "plate's shorter side")
     free = free[:: -(-len(free) // FREE)]
     supports = supports[:: -(-len(supports) // SUPPORTED)]
     radii = np.hypot(*(free[:, None, :] - supports).transpose(2, 0, 1)).min(axis=1)

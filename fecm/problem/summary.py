@@ -15,7 +15,7 @@ from fecm.deck.macros import flat
 from fecm.deck.model import Shear
 from fecm.deck.units import MASS, mass_in_si, unit_names, unit_of
 from fecm.mechanics.curvature import surface
-from fecm.mechanics.plate import UnsoundPlateError
+from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
 from fecm.mechanics.solutions import SingularStiffnessError, compliance
 from fecm.mechanics.stiffness_product import SAFE
@@ -243,7 +243,7 @@ def summarise(problem: Problem) -> ProblemSummary:
         free_in_plane=int((plate.mesh.codes[:, :W] == 0).all(axis=1).sum()),
         preload=plate.preload,
         curvature=plate.curvature,
-        rise=float(np.ptp(surface(plate.mesh.coordinates[plate.mesh.used], plate.curvature))),
+        rise=_rise(plate) if plate.is_curved else 0.0,
         A=laminate.A,
         B=laminate.B,
         D=laminate.D,
@@ -261,6 +261,11 @@ def summarise(problem: Problem) -> ProblemSummary:
         laminate=list(deck.layers)[problem.laminate_number] if plate.others else None,
         leaves_out_equilibrium=without_equilibrium,
     )
+
+
+def _rise(plate: PlateModel) -> float:
+    """Difference of the largest and the least height of a curved panel, length."""
+    return float(np.ptp(surface(plate.mesh.coordinates[plate.mesh.used], plate.curvature)))
 
 
 def _matrix(name: str, values: Floats, unit: str) -> list[str]:

@@ -16,7 +16,7 @@ from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, jacobian, local_shape_functions
 from fecm.mechanics.kernels import Doubles, Integers, Structure, membrane
 from fecm.mechanics.kernels.layout import LANES, Indices
-from fecm.mechanics.mesh import ElementBlock, congruence, distinct
+from fecm.mechanics.mesh import ElementBlock, distinct
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.symmetry import TURNED, opposite_nodes
 
@@ -26,6 +26,9 @@ WORTH_GROUPING = 8
 SYMMETRIC = 1e-14
 
 
+# Value, twice the slope, and second derivative at 0 of a quadratic function by its values at -1, 0
+# and 1.
+QUADRATIC = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 1.0], [1.0, -2.0, 1.0]])
 # Fields of a Group by their names.
 Fields = dict[str, int | Floats | NDArray[np.int32]]
 
@@ -291,19 +294,18 @@ class ElementGroup:
         the tying points, (2 tying, 2).
         """
         members = self._differing(members)
-        family = self.family.take(members)
         if self.kind == ElementKind.FACTORIZED:
-            parts = self._coefficients(family, members)
-        else:
-            assumed, slip = self._plate.rules.assumes_shear, self._plate.rules.transposed_jacobian
-            # Assumed shear strains don't have the slip.
-            slips = (slip, slip and not assumed)
-            parts = [
-                self._at_points(rule, family, members, transposed=transposed)
-                for rule, transposed in zip(self._rules, slips, strict=True)
-            ]
-            if assumed:
-                parts += slopes_of_mapping(family)
+            return _in_lanes(self._coefficients(members))
+        family = self.family.take(members)
+        assumed, slip = self._plate.rules.assumes_shear, self._plate.rules.transposed_jacobian
+        # Assumed shear strains don't have the slip.
+        slips = (slip, slip and not assumed)
+        parts = [
+            self._at_points(rule, family, members, transposed=transposed)
+            for rule, transposed in zip(self._rules, slips, strict=True)
+        ]
+        if assumed:
+            parts += slopes_of_mapping(family)
         return _in_lanes(np.concatenate([part.reshape(len(members), -1) for part in parts], axis=1))
 
     def membrane(self, members: Indices) -> Floats:
@@ -320,16 +322,14 @@ class ElementGroup:
             )
         )
 
-    def _coefficients(self, family: ElementBlock, members: Indices) -> list[Floats]:
+    def _coefficients(self, members: Indices) -> Floats:
         """A quarter of the weights, and coefficients of the coordinates but the constant ones."""
-        places = family.coordinates[:, self.order]
-        # Coefficients (eta, xi) of a biquadratic function of nodal values.
-        c = (places - places[:, 4:5]).reshape(-1, 3, 3, 2)
-        for axis in (1, 2):
-            first, middle, last = np.moveaxis(c, axis, 0)
-            c = np.stack([middle, last - first, first + last - 2.0 * middle], axis=axis)
-        x, y = c.reshape(-1, 9, 2)[:, 1:].transpose(2, 0, 1)
-        return [0.25 * self._weights[members, None], x, y]
+        places = np.ascontiguousarray(self.family.coordinates.swapaxes(1, 2))
+        places -= places[:, :, self.order[4], None]  # the centre
+        table = np.kron(QUADRATIC, QUADRATIC)[1:, np.argsort(self.order)]
+        coefficients = (places.reshape(-1, 9) @ table.T).reshape(-1, 16)
+        weights = 0.25 * self._weights[members, None]
+        return np.concatenate([weights, coefficients[members]], axis=1)
 
     def _at_points(
         self, rule: Quadrature, family: ElementBlock, members: Indices, *, transposed: bool
@@ -349,7 +349,7 @@ def grouped(
     Elements of weight 0 are left out: they are images of others.  Of a nonlinear plate, groups are
     either of parallelograms or of other elements.
     """
-    same = congruence(family)
+    same = family.congruence
     (stepped,) = np.nonzero(weights)
     key = 3 * same.group[stepped] + weights[stepped].astype(int)
     _, group, counts = np.unique(key, return_inverse=True, return_counts=True)

@@ -165,8 +165,13 @@ def places_of(layout: Layout, families: list[ElementBlock], leader: Indices) -> 
     found, first, which = np.unique(
         np.concatenate(pairs)[order], return_index=True, return_inverse=True
     )
-    ranks = np.argsort(first)
-    chunk, node = np.divmod(found[ranks], numnp)
+    # In the order in which they come first.
+    begins = np.zeros(len(order), dtype=bool)
+    begins[first] = True
+    rank = (np.cumsum(begins) - 1)[first]
+    ordered = np.empty_like(found)
+    ordered[rank] = found
+    chunk, node = np.divmod(ordered, numnp)
     # Nodes of one chunk alone that nothing follows are its own; the others are shared.
     follows = node[leader[node] != node]
     own = np.bincount(node, minlength=numnp) == 1
@@ -176,9 +181,8 @@ def places_of(layout: Layout, families: list[ElementBlock], leader: Indices) -> 
     sizes = np.append(np.diff(starts)[:-1] + 1, len(shared))
     sizes += -sizes % LANES
     place = np.arange(len(node)) - starts[chunk]
-    at, of_pair = np.empty(len(order), dtype=np.intp), np.empty_like(ranks)
-    of_pair[ranks] = place
-    at[order] = of_pair[which]
+    at = np.empty(len(order), dtype=np.intp)
+    at[order] = place[rank][which]
     home = np.full((2, numnp), -1)
     mine = own[node]
     home[:, node[mine]] = chunk[mine], place[mine]

@@ -34,7 +34,7 @@ def grid(family: ElementBlock) -> Indices:
 def are_parallelograms(family: ElementBlock) -> Bools:
     """Whether elements are parallelograms, with their inner nodes in the middle, (ne,).
 
-    Positions are compared as for :func:`~fecm.mechanics.mesh.congruence`.
+    Positions are compared as for :attr:`~fecm.mechanics.mesh.ElementBlock.congruence`.
     """
     shape = family.shape
     middle = np.flatnonzero((shape.xi == 0.0) & (shape.eta == 0.0))

@@ -19,7 +19,7 @@ from fecm.mechanics.interpolation import interpolate, local_shape_functions
 from fecm.mechanics.kernels import LIBRARY, Doubles, Longs, Structure, filled, floats
 from fecm.mechanics.kernels.element_groups import jacobians
 from fecm.mechanics.membrane import QuadraticStrains
-from fecm.mechanics.mesh import ElementBlock, congruence
+from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.ply_stresses import PlyStresses, second_derivatives
 
 TYING = 12  # tying points of w,1 and of w,2 in fours; structures.h has it too
@@ -92,7 +92,7 @@ class CompiledMidplane:
 def _structure(stresses: PlyStresses, family: ElementBlock, complete: bool) -> Midplane:
     """The structure of a family."""
     rule = stresses.rule
-    same = congruence(family)
+    same = family.congruence
     shapes = family.take(same.representatives)
     values, local = local_shape_functions(family, rule)
     inverse, _ = jacobians(shapes, local, transposed=False)

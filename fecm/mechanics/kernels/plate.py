@@ -186,17 +186,18 @@ class CompiledPlate:
         places = places_of(layout, families, leader)
         nd, count = len(columns), int(places.sizes.sum())
 
-        # A dof that follows another has a node without a home.
         chunk, place = places.home
-        nodes, dofs = np.nonzero(moves & (chunk >= 0)[:, None])
-        first, size = places.firsts[chunk[nodes]], places.sizes[chunk[nodes]]
-        dof = dofs - columns[0]
-        index = kept.index[nodes, dofs]
+        first, size = places.firsts[chunk], places.sizes[chunk]
+        leads = kept.index[plate.mesh.equations > 0]
+        masses = np.bincount(leads, plate.mass, kept.count + 1)
         self.position = np.empty(kept.count, dtype=np.intp)
-        self.position[index] = nd * first + dof * size + place[nodes]
         mass = np.zeros((nd, count))
-        masses = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
-        mass[dof, first + place[nodes]] = masses[index]
+        for row, column in enumerate(columns):
+            # A dof that follows another has a node without a home.
+            (nodes,) = np.nonzero(moves[:, column] & (chunk >= 0))
+            index, at = kept.index[nodes, column], (first + place)[nodes]
+            self.position[index] = at + ((nd - 1) * first + row * size)[nodes]
+            mass[row, at] = masses[index]
 
         parts = [
             mass[:, begin : begin + n]
@@ -384,13 +385,13 @@ class CompiledProduct(StiffnessOperator):
 
 def _leaders(kept: SymmetryReduction) -> Indices:
     """Node that each node follows, (numnp,): itself if it moves independently."""
-    numnp = len(kept.index)
-    nodes, dofs = np.nonzero(kept.sign)
-    index = kept.index[nodes, dofs]
+    leader = np.arange(len(kept.index))
     first = np.empty(kept.count, dtype=np.intp)
-    first[index[::-1]] = nodes[::-1]  # the lowest is assigned last
-    leader = np.arange(numnp)
-    leader[nodes] = first[index]
+    for column, moves in zip(kept.index.T, (kept.sign != 0.0).T, strict=True):
+        (nodes,) = np.nonzero(moves)
+        index = column[nodes]
+        first[index[::-1]] = nodes[::-1]  # the lowest is assigned last
+        leader[nodes] = first[index]
     return leader
 
 

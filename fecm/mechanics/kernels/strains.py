@@ -19,7 +19,7 @@ from fecm.mechanics import assumed_shear
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.kernels import LIBRARY, Doubles, Longs, Structure, floats
 from fecm.mechanics.kernels.element_groups import jacobians, slopes_of_mapping
-from fecm.mechanics.mesh import ElementBlock, congruence
+from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.strains import STRAINS, StrainField
 
 
@@ -67,7 +67,7 @@ class CompiledStrains(StrainField):
         return [self._structure(family) for family in self.families]
 
     def _structure(self, family: ElementBlock) -> Strains:
-        same = congruence(family)
+        same = family.congruence
         values, local = local_shape_functions(family, self.rule)
         inverse, _ = jacobians(family.take(same.representatives), local, self.transposed_jacobian)
         nodes = family.nodes.shape[1]

@@ -7,7 +7,7 @@ import math
 from fecm._typing import Bools
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
-from fecm.mechanics.mesh import distinct
+from fecm.mechanics.mesh import distinct, extent
 from fecm.problem.parts import W
 from fecm.problem.problem import Problem
 from fecm.problem.resolution import ENOUGH_PER_WAVE, resolution, said_error
@@ -133,9 +133,10 @@ def held_around_impact(problem: Problem) -> Reports:
     mesh, impact = problem.mesh, problem.deck.require(model.Impact)
     touching = mesh.elements[(mesh.elements == impact.node).any(axis=1)]
     around = distinct(touching[(touching > 0) & (touching != impact.node)]) - 1
-    places = mesh.coordinates
-    inner: Bools = ((places > places.min(axis=0)) & (places < places.max(axis=0))).all(axis=1)
-    if inner[around].any() and (mesh.equations[around, impact.dof - 1] == 0).all():
+    low, high = extent(mesh.coordinates)
+    places = mesh.coordinates[around]
+    inner: Bools = ((places > low) & (places < high)).all(axis=1)
+    if inner.any() and (mesh.equations[around, impact.dof - 1] == 0).all():
         where = f"the impact node {impact.node} is restrained in dof {impact.dof}"
         message = f"Every other node of the elements at {where}."
         yield Report(message, impact.place("impact node"), "restrain the supports only")

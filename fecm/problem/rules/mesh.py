@@ -18,6 +18,7 @@ CORNERS = TRIANGLE.corners
 FEW_SUPPORTS = 2  # nodes that hold w up to which they are no support
 # Distance of a mid-side node from its place along the side, over the side's length.
 OFF_PLACE = 0.05
+UNCOMMON = 2.0**-0.5  # x + UNCOMMON y differs from node to node of any usual mesh
 
 # Found while the mesh is generated, in generate.py.
 declare(
@@ -177,6 +178,10 @@ def nothing_free(problem: Problem) -> Reports:
 def coincident_nodes(problem: Problem) -> Reports:
     """Find nodes with the same coordinates."""
     coordinates = problem.mesh.coordinates
+    x, y = coordinates.T
+    with np.errstate(all="ignore"):
+        if (np.diff(np.sort(x + UNCOMMON * y)) > 0.0).all():
+            return  # at a tenth of the cost of sorting by both
     order = np.lexsort(coordinates.T)
     sorted_places = coordinates[order]
     same = (sorted_places[1:] == sorted_places[:-1]).all(axis=1)
