@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from fecm.mechanics import interpolation
-from fecm.mechanics.elements import CUBIC, QUADRILATERAL, TRIANGLE, ElementShape, Quadrature
+from fecm.mechanics.elements import CUBIC, QUADRILATERAL, TRIANGLE, ElementShape, Quadrature, nodal
 from fecm.mechanics.mesh import SHAPES, ElementBlock, element_blocks, longest_sides, shape_of
 from tests.builders import Bools, Floats
 
@@ -349,3 +349,21 @@ def test_shape_functions_of_a_family_come_for_the_nodes_it_has() -> None:
     values, local = interpolation.local_shape_functions(family, rule)
     assert (values.shape, local.shape) == ((2, 6), (2, 2, 6))
     np.testing.assert_allclose(values.sum(axis=1), 1.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("away", [0.0, 1.0, 1.0e7])
+def test_jacobians_are_positive_where_their_determinants_are_also_at_straight_corners(
+    away: float,
+) -> None:
+    random = np.random.default_rng(2)
+    corners = np.array([[0, 0], [1, 0], [1, 1], [0, 1]]) + 0.2 * random.random((200, 4, 2))
+    share = random.random((200, 1))
+    corners[:, 2] = corners[:, 1] * (1.0 - share) + corners[:, 3] * share
+    nodes = np.arange(800, dtype=np.int32).reshape(-1, 4) + 1
+    (family,) = element_blocks(nodes, corners.reshape(-1, 2) + away)
+    determinants = interpolation.jacobian_determinants(family, nodal(2))
+    assert np.abs(determinants[:, 2]).max() < 1e-6  # rounding decides there
+    expected = (determinants > 0.0).all(axis=1)
+    found = interpolation.has_positive_jacobians(family, nodal(2))
+    assert found.tolist() == expected.tolist()
+    assert 0 < expected.sum() < 200

@@ -9,14 +9,16 @@ and p2 are such that g' D g <= p1 |g,x|^2 + p2 |g,y|^2.
 
 Transverse shear: (w,x - theta_x)^2 <= (1 + s) w,x^2 + (1 + 1/s) theta_x^2 for any s > 0.  s is as
 large as p1 and p2 allow, of which w has no other need but the preload's.  Where shear has points of
-its own, a bound of its matrix is added instead: the largest eigenvalue of a sum of matrices is at
-most the sum of theirs.
+its own, its matrices of w and of the rotations are bounded one by one; at the best s of an element
+the whole has the larger eigenvalue of [[a + r, (r w)^(1/2)], [., w]] with the bounds r and w, and a
+of all else.
 
 Curvature: the strains w/R of a shallow panel are taken apart from those of u and v in the same way.
 """
 
 from __future__ import annotations
 
+from itertools import product
 from typing import NamedTuple
 
 import numpy as np
@@ -34,6 +36,9 @@ from fecm.mechanics.plate import PlateModel
 # Excess of p1 over the least possible one.  A smaller p1 needs a larger p2: what is better depends
 # on the elements' shapes.
 EXCESSES = 0.02, 0.05, 0.1, 0.2, 0.4, 0.8
+# 1 + s, at least.  A larger one needs larger p1 and p2: what is better depends on the thickness.
+SHARES = 2.0, 4.0, 12.0
+SAMPLE = 64  # elements that decide on these
 PART = 512  # elements whose matrices are computed at once, which fit the cache
 DOUBLINGS = 3  # of the exponent of a matrix, before the trace of its square
 
@@ -59,11 +64,11 @@ def eigenvalue_bounds(model: PlateModel, family: ElementBlock) -> Floats:
     is folded.
     """
     with np.errstate(all="ignore"):
-        sample = family.take(np.arange(min(PART, len(family.rows))))
+        sample = family.take(np.arange(0, count := len(family.rows), -(-count // SAMPLE)))
         majorants = _majorants(model, model.laminate_of(family))
         best = min(majorants, key=lambda one: _bounds(model, sample, one).max(), default=None)
         if best is None:
-            return np.full(len(family.rows), np.inf)
+            return np.full(count, np.inf)
         return np.concatenate([_bounds(model, part, best) for part in family.blocks(PART)])
 
 
@@ -75,8 +80,8 @@ def _majorants(model: PlateModel, laminate: Laminate) -> list[Majorant]:
     strain = strain_of_deflection(model.curvature)
     rise = float(strain @ laminate.A @ strain) / inertia[0]
     found: list[Majorant] = []
-    for excess, (along_x, along_y) in _of_gradients(laminate):
-        of_w = max(min(along_x, along_y), tension + 2.0 * shear[0])
+    for (excess, (along_x, along_y)), share in product(_of_gradients(laminate), SHARES):
+        of_w = max(min(along_x, along_y), tension + share * shear[0])
         spare = of_w - tension
         value = max(shear[1] * spare / (spare - shear[0]), rise * (1.0 + 1.0 / excess))
         stretched = value / (value - rise) if rise > 0.0 else 1.0
@@ -124,17 +129,19 @@ def _bounds(model: PlateModel, block: ElementBlock, majorant: Majorant) -> Float
     matrices *= roots[:, None, :]
     bound = _largest_eigenvalue(matrices)
     if _has_own_points(rules):
-        bound += _shear_bound(block, rules, shares, model.laminate_of(block))
+        of_w = bound if model.is_preloaded or model.is_curved else 0.0
+        by_slopes, by_rotations = _shear_bounds(block, rules, shares, model.laminate_of(block))
+        bound = _largest_of_two(bound + by_rotations, of_w + by_slopes, by_slopes * by_rotations)
     return np.where(np.isfinite(bound) & (areas > 0.0).all(axis=1), bound, np.inf)
 
 
-def _shear_bound(
+def _shear_bounds(
     block: ElementBlock, rules: IntegrationRules, shares: Floats, laminate: Laminate
 ) -> Floats:
-    """Bound of the largest eigenvalue of the transverse shear part, (ne,).
+    """Bounds of the eigenvalues of the transverse shear of w and of the rotations, (2, ne).
 
-    The part is B' Q B with the covariant strains B at tying points, which are those of the rule
-    unless strains are assumed.  Q B M^-1 B', with two rows for a point, has its eigenvalues.
+    Both are B' Q B with the covariant strains B at tying points, which are those of the rule unless
+    strains are assumed.  Q B M^-1 B', with two rows for a point, has their eigenvalues.
     """
     nn = block.nodes.shape[1]
     if rules.assumes_shear:
@@ -153,16 +160,16 @@ def _shear_bound(
 
     slopes = np.concatenate([of_xi[:, 0], of_eta[:, 1]])
     bases = np.concatenate([mapping[:, :, 0, along_xi], mapping[:, :, 1, along_eta]], axis=2)
-    compliance = _contracted(1.0 / shares, _outer(slopes.T)[0] / laminate.mass)
-    turning = _contracted(1.0 / shares, _outer(values.T)[0] / laminate.rotary_inertia)
-    compliance += turning * (bases.swapaxes(1, 2) @ bases)
+    of_w = _contracted(1.0 / shares, _outer(slopes.T)[0] / laminate.mass)
+    of_rotations = _contracted(1.0 / shares, _outer(values.T)[0] / laminate.rotary_inertia)
+    of_rotations *= bases.swapaxes(1, 2) @ bases
 
     _, local = local_shape_functions(block, rule)
     metric, _ = _metric(_mapping(block, local, transposed=transposed), rule, 1.0, 1.0)
     none = np.zeros_like(weights[0])
     tied = np.hstack([weights[0], none]), np.hstack([none, weights[1]])
     stiffness = _contracted(metric, _products(*tied))
-    return _stiffest(laminate) * _largest_eigenvalue(stiffness @ compliance)
+    return _stiffest(laminate) * _largest_eigenvalue(stiffness @ np.stack([of_w, of_rotations]))
 
 
 def _stiffest(laminate: Laminate) -> float:
@@ -218,16 +225,21 @@ def _contracted(coefficients: Floats, table: Floats) -> Floats:
 
 
 def _largest_eigenvalue(matrices: Floats) -> Floats:
-    """Upper bound of the largest eigenvalue, (ne,), of matrices that have no negative one.
+    """Upper bound of the largest eigenvalue, (..., ne), of matrices that have no negative one.
 
     Root of the trace of a power, per cent above it: the sum of the eigenvalues' powers.
     """
-    scale = np.einsum("eii->e", matrices)
-    power = matrices / scale[:, None, None]
+    scale = np.einsum("...ii->...", matrices)
+    power = matrices / scale[..., None, None]
     for _ in range(DOUBLINGS):
         power = power @ power
-    trace = np.einsum("eij,eji->e", power, power)
+    trace = np.einsum("...ij,...ji->...", power, power)
     return np.asarray(scale * trace ** (0.5 ** (DOUBLINGS + 1)))
+
+
+def _largest_of_two(first: Floats, second: Floats, square: Floats) -> Floats:
+    """Larger eigenvalue of symmetric matrices of two rows; `square` is that of the other entry."""
+    return np.asarray((first + second + np.sqrt((first - second) ** 2 + 4.0 * square)) / 2.0)
 
 
 def _largest_tension(preload: tuple[float, float, float]) -> float:
