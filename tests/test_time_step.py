@@ -54,6 +54,12 @@ def largest_eigenvalues(model: PlateModel, family: ElementBlock) -> Floats:
 
 # More distinct elements than are computed without bounds.
 MANY = 12
+# The transverse shear of w is faster than bending and stretching.
+STIFF = replace(
+    free_plate(distorted_square(MANY, MANY, 9)),
+    laminate=replace(isotropic_plate(0.1), shear=8.0 * isotropic_plate(0.1).shear),
+    rules=replace(rules(), assumes_shear=True),
+)
 MODELS = {
     "4 nodes": free_plate(distorted_square(MANY, MANY, 4)),
     "8 nodes": free_plate(distorted_square(MANY, MANY, 8)),
@@ -65,6 +71,13 @@ MODELS = {
     "assumed shear": replace(
         free_plate(distorted_square(MANY, MANY, 9)), rules=replace(rules(), assumes_shear=True)
     ),
+    "assumed shear, thin": replace(
+        free_plate(distorted_square(MANY, MANY, 9), 0.02),
+        rules=replace(rules(), assumes_shear=True),
+    ),
+    "assumed shear, stiff": STIFF,
+    "assumed shear, tension": replace(STIFF, preload=(0.3, -0.2, 0.1)),
+    "assumed shear, tension alone": replace(STIFF, preload=(50.0, -20.0, 30.0)),
     "other order of shear": replace(
         free_plate(distorted_square(MANY, MANY, 8)), rules=rules(3, 2, transposed_jacobian=True)
     ),
@@ -89,12 +102,23 @@ def test_the_safe_step_is_that_of_the_fastest_element(model: PlateModel) -> None
     assert safe_time_step(model) == pytest.approx(2.0 / np.sqrt(fastest), rel=1e-12)
 
 
+@pytest.mark.parametrize(
+    ("name", "most"), [("thin", 1.2), ("report", 1.2), ("assumed shear, thin", 1.45)]
+)
+def test_bounds_are_close_whatever_the_thickness(name: str, most: float) -> None:
+    (family,) = MODELS[name].families
+    exact = largest_eigenvalues(MODELS[name], family)
+    assert np.median(eigenvalue_bounds(MODELS[name], family) / exact) < most
+
+
 def test_the_bound_of_a_folded_element_is_infinite() -> None:
     coordinates, elements = distorted_square(MANY, MANY, 4)
     elements[7] = elements[7][[0, 2, 1, 3]]
+    near, far = coordinates[elements[0, [0, 2]] - 1]
+    coordinates[elements[0, 2] - 1] = 0.6 * near + 0.4 * far  # folded at one point only
     model = free_plate((coordinates, elements))
     (family,) = model.families
-    assert np.isinf(eigenvalue_bounds(model, family)).nonzero()[0].tolist() == [7]
+    assert np.isinf(eigenvalue_bounds(model, family)).nonzero()[0].tolist() == [0, 7]
 
 
 @pytest.mark.parametrize("nodes", [4, 9])

@@ -83,7 +83,8 @@ def _majorants(model: PlateModel, laminate: Laminate) -> list[Majorant]:
     for (excess, (along_x, along_y)), share in product(_of_gradients(laminate), SHARES):
         of_w = max(min(along_x, along_y), tension + share * shear[0])
         spare = of_w - tension
-        value = max(shear[1] * spare / (spare - shear[0]), rise * (1.0 + 1.0 / excess))
+        turning = shear[1] * spare / (spare - shear[0]) if shear[0] > 0.0 else 0.0
+        value = max(turning, rise * (1.0 + 1.0 / excess))
         stretched = value / (value - rise) if rise > 0.0 else 1.0
         slopes = max(along_x * stretched, of_w), max(along_y * stretched, of_w)
         found.append(Majorant(*slopes, value))
