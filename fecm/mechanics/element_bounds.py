@@ -28,7 +28,7 @@ from fecm.mechanics import assumed_shear
 from fecm.mechanics.curvature import strain_of_deflection
 from fecm.mechanics.element_matrices import IntegrationRules, lumped_shares
 from fecm.mechanics.elements import Quadrature
-from fecm.mechanics.interpolation import local_shape_functions, mapping
+from fecm.mechanics.interpolation import local_shape_functions, mapping_slopes
 from fecm.mechanics.laminate import Laminate
 from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel
@@ -64,7 +64,8 @@ def eigenvalue_bounds(model: PlateModel, family: ElementBlock) -> Floats:
     is folded.
     """
     with np.errstate(all="ignore"):
-        sample = family.take(np.arange(0, count := len(family.rows), -(-count // SAMPLE)))
+        count = len(family.rows)
+        sample = family.take(slice(0, count, -(-count // SAMPLE)))
         majorants = _majorants(model, model.laminate_of(family))
         best = min(majorants, key=lambda one: _bounds(model, sample, one).max(), default=None)
         if best is None:
@@ -82,9 +83,9 @@ def _majorants(model: PlateModel, laminate: Laminate) -> list[Majorant]:
     found: list[Majorant] = []
     for (excess, (along_x, along_y)), share in product(_of_gradients(laminate), SHARES):
         of_w = max(min(along_x, along_y), tension + share * shear[0])
-        spare = of_w - tension
-        turning = shear[1] * spare / (spare - shear[0]) if shear[0] > 0.0 else 0.0
-        value = max(turning, rise * (1.0 + 1.0 / excess))
+        spare = of_w - tension  # (1 + s) times the shear's part
+        rotations = shear[1] * spare / (spare - shear[0]) if shear[0] > 0.0 else 0.0
+        value = max(rotations, rise * (1.0 + 1.0 / excess))
         stretched = value / (value - rise) if rise > 0.0 else 1.0
         slopes = max(along_x * stretched, of_w), max(along_y * stretched, of_w)
         found.append(Majorant(*slopes, value))
@@ -119,8 +120,8 @@ def _bounds(model: PlateModel, block: ElementBlock, majorant: Majorant) -> Float
     """Bounds of the elements of a block, (ne,)."""
     rules = model.rules
     values, local = local_shape_functions(block, rules.bending)
-    slopes = _mapping(block, local, transposed=rules.transposed_jacobian)
-    metric, areas = _metric(slopes, rules.bending, majorant.along_x, majorant.along_y)
+    mapping = _mapping(block, local, transposed=rules.transposed_jacobian)
+    metric, areas = _metric(mapping, rules.bending, majorant.along_x, majorant.along_y)
     energies = np.concatenate([metric, majorant.value * areas[:, None]], axis=1)
     table = np.concatenate([_products(local[:, 0], local[:, 1]), _outer(values)])
     shares = lumped_shares(values, areas)
@@ -156,11 +157,10 @@ def _shear_bounds(
     (at_xi, of_xi), (at_eta, of_eta) = (local_shape_functions(block, tying) for tying in points)
     values = np.concatenate([at_xi, at_eta])
     local = np.concatenate([of_xi, of_eta])
-    mapping = _mapping(block, local, transposed=transposed)
-    along_xi, along_eta = np.split(np.arange(len(local)), 2)
-
     slopes = np.concatenate([of_xi[:, 0], of_eta[:, 1]])
-    bases = np.concatenate([mapping[:, :, 0, along_xi], mapping[:, :, 1, along_eta]], axis=2)
+    mapping = _mapping(block, local, transposed=transposed)
+    half = len(at_xi)
+    bases = np.concatenate([mapping[:, :, 0, :half], mapping[:, :, 1, half:]], axis=2)
     of_w = _contracted(1.0 / shares, _outer(slopes.T)[0] / laminate.mass)
     of_rotations = _contracted(1.0 / shares, _outer(values.T)[0] / laminate.rotary_inertia)
     of_rotations *= bases.swapaxes(1, 2) @ bases
@@ -180,21 +180,21 @@ def _stiffest(laminate: Laminate) -> float:
 
 def _mapping(block: ElementBlock, local: Floats, *, transposed: bool) -> Floats:
     """Slopes dx_i/dxi_a at points, (ne, i, a, npt); `transposed` swaps i and a, a slip."""
-    found = mapping(block, local)
-    return found.swapaxes(1, 2) if transposed else found
+    slopes = mapping_slopes(block, local)
+    return slopes.swapaxes(1, 2) if transposed else slopes
 
 
 def _metric(
     mapping: Floats, rule: Quadrature, along_x: float, along_y: float
 ) -> tuple[Floats, Floats]:
-    """Coefficients of f,xi^2, f,xi f,eta and f,eta^2, (ne, 3, npt), and areas, (ne, npt).
+    """Coefficients of f,xi^2, 2 f,xi f,eta and f,eta^2, (ne, 3, npt), and areas, (ne, npt).
 
-    Their sum over the points is the integral of p1 f,x^2 + p2 f,y^2.
+    The sum of all terms is the integral of p1 f,x^2 + p2 f,y^2.
     """
     (x_xi, x_eta), (y_xi, y_eta) = mapping.transpose(1, 2, 0, 3)
     determinant = x_xi * y_eta - x_eta * y_xi
-    first = along_x * (weights := rule.weights / determinant)
-    second = along_y * weights
+    weights = rule.weights / determinant
+    first, second = along_x * weights, along_y * weights
     metric = np.stack(
         [
             first * y_eta**2 + second * x_eta**2,

@@ -56,10 +56,10 @@ def jacobian(family: ElementBlock, local: Floats) -> Floats:
     return np.ascontiguousarray(total.transpose(3, 0, 1, 2))
 
 
-def mapping(family: ElementBlock, local: Floats) -> Floats:
-    """The Jacobian as :func:`jacobian` but for rounding, dx_i/dxi_a, in a layout (ne, i, a, npt).
+def mapping_slopes(family: ElementBlock, local: Floats) -> Floats:
+    """The Jacobian, dx_i/dxi_a, in another layout, (ne, i, a, npt).
 
-    One product of matrices, at a fifth of the cost.
+    That of :func:`jacobian` but for rounding, by one product of matrices, at a fifth of the cost.
     """
     ne, nn = family.nodes.shape
     places = family.coordinates.swapaxes(1, 2).reshape(2 * ne, nn)
@@ -91,7 +91,7 @@ def jacobian_determinants(family: ElementBlock, rule: Quadrature) -> Floats:
 def has_positive_jacobians(family: ElementBlock, rule: Quadrature) -> Bools:
     """Whether the determinant of the Jacobian is positive at all points of a rule, (ne,)."""
     _, local = local_shape_functions(family, rule)
-    (x_xi, x_eta), (y_xi, y_eta) = mapping(family, local).transpose(1, 2, 0, 3)
+    (x_xi, x_eta), (y_xi, y_eta) = mapping_slopes(family, local).transpose(1, 2, 0, 3)
     determinants = x_xi * y_eta - x_eta * y_xi
     margin = DOUBTFUL * np.square(family.coordinates).max()
     positive = (determinants > margin).all(axis=1)
