@@ -53,7 +53,7 @@ def test_the_first_ply_fails_at_the_load_of_the_exact_solution(name: str) -> Non
     field = equilibrium(PlateModel(loaded, plate, replace(rules(), assumes_shear=True)))
     monitor = FailureMonitor(PlyStresses(mesh, plate, gauss(3)), STRENGTHS)
     envelope = monitor.start()
-    monitor.update(envelope, field, 0.0)
+    monitor.update(envelope, field[None], [0.0])
     number = list(CRITERIA).index({"max stress": "max_stress", "Tsai-Wu": "tsai_wu"}[name])
     exposure = envelope.plies.exposure[number].reshape(256, 9, 4, 2)
     element, _, layer, face = np.unravel_index(int(exposure.argmax()), exposure.shape)
@@ -153,7 +153,8 @@ def test_interlaminar_exposures_of_elements_without_nine_nodes_are_nan() -> None
     plate = laminate(Ply(1.0, 0.3, 20.0, 1.0, 0.5, 0.5, 0.5), (0.0, 90.0), [0.1, 0.1])
     monitor = FailureMonitor(PlyStresses(mesh, plate, gauss(2)), STRENGTHS)
     envelope = monitor.start()
-    monitor.update(envelope, np.random.default_rng(2).normal(size=(len(coordinates), 5)), 1.0)
+    field = np.random.default_rng(2).normal(size=(1, len(coordinates), 5))
+    monitor.update(envelope, field, [1.0])
     assert np.isnan(envelope.interfaces.exposure).all()
     assert (envelope.plies.exposure > 0.0).any()
 

@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm._typing import Array, Bools
 from fecm.api import load_deck
 from fecm.deck.model import Allowables
-from fecm.mechanics.exposures import OutsideLoad
+from fecm.mechanics.exposures import Evaluations, FailureEnvelope, Largest, Maxima, Places
 from fecm.mechanics.failure import CRITERIA, exposure_of
-from fecm.mechanics.failure_monitor import FailureEnvelope, Maxima
 from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.results.exposures import evaluations_in_contact
 from fecm.results.first_failure import first_failures
@@ -195,7 +195,17 @@ def test_points_under_the_load_do_not_count_and_keep_their_exposures() -> None:
     interfaces = Maxima.none(elements, plies - 1)
     interfaces.exposure[:] = [[3.0] * 4, [9.0] * 4, [1.0, 2.0, 8.0, 2.0]]
     before = states.exposure.copy()
-    found = OutsideLoad(near, x, y).largest(FailureEnvelope(states, interfaces))
+
+    def largest(counts: Bools) -> dict[str, Array]:
+        envelope = FailureEnvelope(states, interfaces, Largest.none(len(CRITERIA) + 1))
+        envelope.find_largest(counts)
+        one = envelope.largest
+        found = Evaluations(one.exposure[None], one.state[None], one.mode[None])
+        place, own = np.divmod(found.state[:, :-1], plies * 2)
+        columns = Places(x, y).columns(found, place, own // 2 + 1, plies - 1)
+        return {name: values[0] for name, values in columns.items()}
+
+    found = largest(~near)
     np.testing.assert_array_equal(states.exposure, before)
     for number in range(len(CRITERIA)):
         outside = np.where(near[:, :, None, None], 0.0, each[number])
@@ -206,5 +216,5 @@ def test_points_under_the_load_do_not_count_and_keep_their_exposures() -> None:
     # Elements 2 and 3 have a point under the load.
     assert (found["exposure"][-1], found["ply"][-1]) == (3.0, 1)
     assert found["x"][-1] == pytest.approx(x[0].mean())
-    nothing = OutsideLoad(np.ones_like(near), x, y).largest(FailureEnvelope(states, interfaces))
+    nothing = largest(np.zeros_like(near))
     assert np.isnan(nothing["exposure"]).all()

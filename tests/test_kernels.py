@@ -285,7 +285,7 @@ def test_the_structures_of_python_lie_as_those_of_c() -> None:
             at = getattr(kind, field)
             expected[name, field] = at.offset, at.size
     found = entries(kernels.LIBRARY.fecm_fields())
-    assert len(structures) == 15
+    assert len(structures) == 18
     assert found == expected
 
 

@@ -402,7 +402,7 @@ def test_stresses_and_exposures_are_those_of_each_elements_own_laminate() -> Non
     for kind in kinds:
         monitor = kind(several, of_plies)
         envelope = monitor.start()
-        monitor.update(envelope, field, 1.0)
+        monitor.update(envelope, field[None], [1.0])
         exposures = envelope.plies.exposure.reshape(4, 16, -1, 3, 2)
         for (zone, rows), own in zip(plate.rows_by_laminate, of_plies, strict=True):
             assert not isinstance(rows, slice)
@@ -417,7 +417,7 @@ def test_stresses_and_exposures_are_those_of_each_elements_own_laminate() -> Non
                 np.testing.assert_allclose(plies, values, rtol=1e-12)
             single = kind(alone, [own])
             wanted = single.start()
-            single.update(wanted, field, 1.0)
+            single.update(wanted, field[None], [1.0])
             expected = wanted.plies.exposure.reshape(4, len(rows), -1, count, 2)
             np.testing.assert_allclose(exposures[:, rows, :, :count], expected, rtol=1e-12)
             assert (exposures[:, rows, :, count:] == UNKNOWN).all()
@@ -438,7 +438,7 @@ def test_an_interface_of_unlike_materials_takes_the_weaker_strength() -> None:
     def exposures(*strengths: model.Allowables) -> Floats:
         monitor = FailureMonitor(stresses, [strengths])
         envelope = monitor.start()
-        monitor.update(envelope, field, 1.0)
+        monitor.update(envelope, field[None], [1.0])
         return envelope.interfaces.exposure
 
     both = exposures(replace(strong, s13=20.0), replace(strong, s13=20.0))

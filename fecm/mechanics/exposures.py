@@ -1,103 +1,164 @@
-"""Largest exposures outside the load, near which plate theory does not hold."""
+"""Largest exposures over time, and the largest of those that count."""
 
 from __future__ import annotations
 
-import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fecm._frozen import frozen
 from fecm._typing import Array, Bools, Floats, Indices
-from fecm.mechanics.failure import CRITERIA
-from fecm.mechanics.failure_monitor import FailureEnvelope
+from fecm.mechanics.failure import CRITERIA, Codes
+
+Numbers = NDArray[np.int64]
+NOWHERE = -1  # number of the state of a criterion none of whose exposures counts
 
 
-class Largest(NamedTuple):
-    """Largest exposure of a criterion so far."""
+@dataclass
+class Maxima:
+    """Largest exposure of every state so far, its time and mode."""
 
-    exposure: float
-    mode: int  # index into :data:`~fecm.mechanics.failure.MODES`
-    ply: int  # from 1 at z = -h/2; of an interface the one above it
-    # Place; of an interface the mean of its element's points.
-    x: float
-    y: float
+    exposure: Floats
+    time: Floats
+    mode: Codes  # index into :data:`~fecm.mechanics.failure.MODES`
+
+    @classmethod
+    def none(cls, *shape: int) -> Maxima:
+        """No exposure yet."""
+        return cls(np.zeros(shape), np.zeros(shape), np.zeros(shape, np.int8))
 
 
-NONE = Largest(math.nan, 0, 0, math.nan, math.nan)
+@dataclass
+class Largest:
+    """Of each criterion the largest exposure so far that counts; the interlaminar one is the last.
+
+    Of equal ones it is that with the lowest number.
+    """
+
+    exposure: Floats  # (criteria,); NaN where none counts
+    state: Numbers  # (criteria,): number among the evaluated states, or the interfaces; or NOWHERE
+    mode: Codes  # (criteria,)
+    # (criteria, 6): midplane strains and curvatures at its point when it was reached.
+    strain: Floats
+
+    @classmethod
+    def none(cls, count: int) -> Largest:
+        """No exposure yet, of so many criteria."""
+        states = np.full(count, NOWHERE, dtype=np.int64)
+        return cls(np.full(count, np.nan), states, np.zeros(count, np.int8), np.zeros((count, 6)))
+
+
+@dataclass
+class FailureEnvelope:
+    """Largest exposures over time, in arrays that are changed in place."""
+
+    # (criteria, states): states are points and those that a monitor evaluates at each; UNKNOWN of
+    # plies without strengths, or that an element lacks.
+    plies: Maxima
+    # (elements, plies - 1); NaN where there is none, or no strength, or an element lacks nodes.
+    interfaces: Maxima
+    largest: Largest
+    # Structures of the kernels that point to these arrays; no checkpoint has it.
+    kept: object = field(default=None, init=False, repr=False, compare=False)
+
+    def find_largest(self, counts: Bools, strains: Floats | None = None) -> None:
+        """Find the largest exposures of the points that count, (elements, points).
+
+        The strains, (elements, points, 6), are those of the exposures that have just risen.
+        """
+        largest, plies = self.largest, self.plies
+        of_point = plies.exposure.shape[1] // counts.size
+        for number, state in enumerate(_of_plies(plies.exposure, counts).tolist()):
+            exposure = np.nan if state == NOWHERE else plies.exposure[number, state]
+            risen = exposure > largest.exposure[number] or state != largest.state[number]
+            if strains is not None and risen:
+                largest.strain[number] = strains.reshape(-1, 6)[state // of_point]
+            largest.exposure[number], largest.state[number] = exposure, state
+            largest.mode[number] = 0 if state == NOWHERE else plies.mode[number, state]
+        between = self.interfaces
+        largest.state[-1] = state = _of_interfaces(between.exposure, counts)
+        largest.exposure[-1] = np.nan if state == NOWHERE else between.exposure.flat[state]
+        largest.mode[-1] = 0 if state == NOWHERE else between.mode.flat[state]
+
+
+def _of_plies(exposure: Floats, counts: Bools) -> Indices:
+    """State of the largest exposure of each criterion, (criteria,), of points that count."""
+    at = counts.ravel()
+    if not at.any():
+        return np.full(len(exposure), NOWHERE)
+    of_point = exposure.reshape(len(exposure), at.size, -1)
+    points = np.where(at, of_point.max(axis=2), -np.inf).argmax(axis=1)
+    criteria = np.arange(len(exposure))
+    states = of_point[criteria, points].argmax(axis=1)
+    found = points * of_point.shape[2] + states
+    # Below 0 where no ply has strengths.
+    return np.where(exposure[criteria, found] < 0.0, NOWHERE, found)
+
+
+def _of_interfaces(exposure: Floats, counts: Bools) -> int:
+    """Number of the interface with the largest exposure, of elements all of whose points count."""
+    far = counts.all(axis=1, keepdims=True)
+    known = np.where(far & np.isfinite(exposure), exposure, -1.0)
+    if not (known >= 0.0).any():
+        return NOWHERE
+    return int(known.argmax())
+
+
+class Evaluations(NamedTuple):
+    """Largest exposures that count after each of some evaluations; see :class:`Largest`."""
+
+    # (evaluations, criteria) each.
+    exposure: Floats
+    state: Numbers
+    mode: Codes
+
+    @classmethod
+    def of(cls, rows: Sequence[Largest]) -> Self:
+        """Those of some evaluations."""
+        return cls(
+            np.array([row.exposure for row in rows]),
+            np.array([row.state for row in rows]),
+            np.array([row.mode for row in rows]),
+        )
 
 
 @frozen
-class OutsideLoad:
-    """Points of the plies whose exposures count; all arrays are (elements, points)."""
+class Places:
+    """Coordinates of the points of the plies, (elements, points)."""
 
-    near: Bools  # points under the load, which do not count
-    # Coordinates of the points.
     x: Floats
     y: Floats
-
-    @cached_property
-    def _far(self) -> Indices:
-        """Elements without a point under the load."""
-        return np.flatnonzero(~self.near.any(axis=1))
 
     @cached_property
     def _means(self) -> tuple[Floats, Floats]:
         """Means of the points of each element, (elements,): x and y."""
         return self.x.mean(axis=1), self.y.mean(axis=1)
 
-    def largest(self, envelope: FailureEnvelope) -> dict[str, Array]:
-        """Fields of :class:`Largest`, (criteria,) each: the interlaminar before those of users."""
-        plies = self._of_plies(envelope)
-        known = len(CRITERIA)
-        found = [*plies[:known], self._of_interfaces(envelope), *plies[known:]]
-        return {
-            name: np.array(values)
-            for name, values in zip(Largest._fields, zip(*found, strict=True), strict=True)
+    def columns(
+        self, found: Evaluations, points: Indices, plies: Indices, interfaces: int
+    ) -> dict[str, Array]:
+        """Columns of evaluations, the interlaminar criterion before those of users.
+
+        `points` and `plies`, from 1, are those of the states of the plies, and `interfaces` is the
+        number of an element's.  The ply of an interface is the one above it, its place the mean of
+        its element's points.
+        """
+        element, interface = np.divmod(found.state[:, -1:], max(interfaces, 1))
+        x, y = self._means
+        numbers = {"mode": found.mode, "ply": np.concatenate([plies, interface + 1], axis=1)}
+        floats = {
+            "exposure": found.exposure,
+            "x": np.concatenate([self.x.ravel()[points], x[element]], axis=1),
+            "y": np.concatenate([self.y.ravel()[points], y[element]], axis=1),
         }
-
-    def worst_states(self, envelope: FailureEnvelope) -> Indices | None:
-        """States of the largest exposures of the plies, (criteria,); None if none counts."""
-        near, exposure = self.near.ravel(), envelope.plies.exposure
-        if near.all():
-            return None
-        points = np.where(near, -np.inf, envelope.peaks(near.size)).argmax(axis=1)
-        of_point = exposure.reshape(len(exposure), near.size, -1)
-        states = of_point[np.arange(len(exposure)), points].argmax(axis=1)
-        return np.asarray(points * of_point.shape[2] + states)
-
-    def _of_plies(self, envelope: FailureEnvelope) -> list[Largest]:
-        """Of each criterion of the plies."""
-        plies = envelope.plies
-        if (states := self.worst_states(envelope)) is None:
-            return [NONE] * len(plies.exposure)
-        criteria = np.arange(len(states))
-        points, of_point = np.divmod(states, plies.exposure.shape[1] // self.near.size)
-        columns = (
-            plies.exposure[criteria, states],
-            plies.mode[criteria, states],
-            of_point // 2 + 1,
-            self.x.ravel()[points],
-            self.y.ravel()[points],
-        )
-        found = (Largest(*one) for one in zip(*(c.tolist() for c in columns), strict=True))
-        # Below 0 where no ply has strengths.
-        return [NONE if one.exposure < 0.0 else one for one in found]
-
-    def _of_interfaces(self, envelope: FailureEnvelope) -> Largest:
-        """Of the interlaminar criterion."""
-        exposure = envelope.interfaces.exposure[self._far]
-        if not exposure.size:
-            return NONE
-        place = int(exposure.argmax())  # that of the first NaN if there is one
-        if not math.isfinite(exposure.flat[place]):
-            counts = np.isfinite(exposure)
-            if not counts.any():
-                return NONE
-            place = int(np.where(counts, exposure, -1.0).argmax())
-        row, interface = divmod(place, exposure.shape[1])
-        element = self._far[row]
-        mode = int(envelope.interfaces.mode[element, interface])
-        x, y = (float(means[element]) for means in self._means)
-        return Largest(float(exposure[row, interface]), mode, interface + 1, x, y)
+        columns = {
+            **{name: np.where(found.state == NOWHERE, 0, of) for name, of in numbers.items()},
+            **{name: np.where(found.state == NOWHERE, np.nan, of) for name, of in floats.items()},
+        }
+        known, count = len(CRITERIA), found.state.shape[1]
+        order = [*range(known), count - 1, *range(known, count - 1)]
+        return {name: values[:, order] for name, values in columns.items()}

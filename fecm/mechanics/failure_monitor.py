@@ -2,83 +2,39 @@
 
 A state of stress is a ply at one of its faces, at a point of the plate.  Exposures are evaluated of
 all states, modes only where an exposure rises.
+
+Where a plate without residual stresses only bends, stresses are proportional to z, and so are
+exposures: of plies of the same stiffness and strengths, on one side of the midplane, the state
+farthest from it has the largest, and represents the others.  A monitor may evaluate these
+:class:`Representatives` alone.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
-from dataclasses import dataclass, field
+from copy import copy, deepcopy
 from itertools import groupby
-from typing import Self
+from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
 from fecm._frozen import frozen
-from fecm._typing import Floats, Indices
+from fecm._typing import Array, Bools, Floats, Indices
 from fecm.mechanics import failure
+from fecm.mechanics.exposures import (
+    NOWHERE,
+    Evaluations,
+    FailureEnvelope,
+    Largest,
+    Maxima,
+    Places,
+)
 from fecm.mechanics.own_criterion import OwnCriterion, with_own
 from fecm.mechanics.ply_stresses import PlyStresses, Zone
 from fecm.mechanics.strains import Rows
 
 # Points per matrix product: so few that BLAS uses one thread.
 BLOCK = 512
-
-
-@dataclass
-class Maxima:
-    """Largest exposure of every state so far, its time and mode."""
-
-    exposure: Floats
-    time: Floats
-    mode: failure.Codes  # index into :data:`~fecm.mechanics.failure.MODES`
-
-    @classmethod
-    def none(cls, *shape: int) -> Maxima:
-        """No exposure yet."""
-        return cls(np.zeros(shape), np.zeros(shape), np.zeros(shape, np.int8))
-
-
-@dataclass
-class WorstStates:
-    """The state of stress with the largest exposure of each criterion of the plies so far."""
-
-    exposure: Floats  # (criteria,)
-    state: Indices  # (criteria,): its number among those of the plate
-    added: Floats  # (criteria, 3): its stresses less those at rest
-
-    @classmethod
-    def none(cls, count: int = len(failure.CRITERIA)) -> WorstStates:
-        """No exposure yet, of so many criteria."""
-        return cls(np.zeros(count), np.zeros(count, dtype=np.intp), np.zeros((count, 3)))
-
-
-@dataclass
-class Kept:
-    """What follows from the exposures so far, and is kept up to date with them."""
-
-    peaks: Floats  # (criteria, points): largest exposure of every point
-
-
-@dataclass
-class FailureEnvelope:
-    """Largest exposures over time."""
-
-    # (criteria, states): states are elements, points, plies and faces; :data:`UNKNOWN` of plies
-    # without strengths, or that an element lacks.
-    plies: Maxima
-    interfaces: Maxima  # (elements, plies - 1); NaN where there is none
-    worst: WorstStates = field(default_factory=WorstStates.none)  # only with residual stresses
-    # Of the kernels; None where the exposures have changed without them.  No checkpoint has it.
-    kept: Kept | None = field(default=None, init=False, repr=False, compare=False)
-
-    def peaks(self, points: int) -> Floats:
-        """Largest exposure of each criterion at every point, (criteria, points)."""
-        if self.kept is not None:
-            return self.kept.peaks
-        exposure = self.plies.exposure
-        return np.asarray(exposure.reshape(len(exposure), points, -1).max(axis=2))
-
 
 UNKNOWN = -1.0  # exposure that no criterion can find
 # Strengths of all plies, or of the plies of each laminate, None where they are not given.
@@ -105,8 +61,53 @@ def _runs(strengths: Sequence[failure.Strengths | None]) -> list[Run]:
     return found
 
 
+class Representatives(NamedTuple):
+    """States of a point that are evaluated, and the exposures of all by theirs."""
+
+    states: Indices  # (evaluated,): their numbers among all states of a point, ascending
+    of: Indices  # (states,): which of these represents each state
+    share: Floats  # (states,): its exposure over that of this one
+
+    @classmethod
+    def every(cls, count: int) -> Self:
+        """Every state represents itself."""
+        return cls(np.arange(count), np.arange(count), np.ones(count))
+
+    @classmethod
+    def outermost(cls, z: Floats, stiffness: Floats, runs: Sequence[Run]) -> Self:
+        """Those farthest from the midplane, of states at z, (states,).
+
+        The stiffness is their stresses per midplane strain, (components, states).  States without
+        strengths represent themselves.
+        """
+        group = np.arange(len(z))
+        for run in runs:
+            # 0.0 is added as zeros may have signs.
+            own = [0.0 + stiffness[:, run.states], z[None, run.states] < 0.0]
+            _, first, same = np.unique(
+                np.concatenate(own), axis=1, return_index=True, return_inverse=True
+            )
+            group[run.states] = run.states.start + first[same.ravel()]
+        order = np.lexsort((-np.abs(z), group))
+        farthest = order[np.unique(group[order], return_index=True)[1]]
+        states = np.sort(farthest)
+        of = np.searchsorted(states, farthest)[np.unique(group, return_inverse=True)[1].ravel()]
+        most = np.abs(z)[states][of]
+        share = np.divide(np.abs(z), most, out=np.ones_like(z), where=most > 0.0)
+        return cls(states, of, share)
+
+    def placed(self, run: Run) -> Run:
+        """A run of all states as one of those that are evaluated."""
+        ends = np.searchsorted(self.states, [run.states.start, run.states.stop]).tolist()
+        return Run(run.strengths, slice(*ends))
+
+
 class ZoneCriteria:
-    """Stresses and strengths of the plies of some elements."""
+    """Stresses and strengths of the plies of some elements.
+
+    `residual` are residual stresses, (plies, 2, 3).  `outermost` asks for the representatives of
+    proportional states.
+    """
 
     def __init__(
         self,
@@ -114,20 +115,36 @@ class ZoneCriteria:
         points: Rows,
         strengths: Sequence[failure.Strengths | None],
         initial: Floats | None,
+        residual: Floats | None = None,
+        *,
+        outermost: bool = False,
     ) -> None:
+        self._zone, self._initial = zone, initial
         self.elements, self.points = zone.rows, points  # rows of its elements and their points
-        faces = zone.laminate.plies.faces
-        self.z = np.stack([faces[:-1], faces[1:]], axis=1).ravel()  # of the states of a point
-        self.strengths, self.runs = strengths, _runs(strengths)
-        self._initial = initial
-        plies = zone.laminate.plies
+        self.strengths = strengths
         # Stresses by components, plies and faces.
-        self.in_plane = zone.in_plane.transpose(3, 2, 0, 1).reshape(6, 3, -1).copy()
-        self.add(np.zeros((zone.plies, 2, 3)))
+        in_plane = zone.in_plane.transpose(3, 2, 0, 1).reshape(6, 3, -1)
+        runs = _runs(strengths)
+        self.represent = Representatives.every(in_plane.shape[2])
+        if outermost:
+            faces = zone.laminate.plies.faces
+            z = np.stack([faces[:-1], faces[1:]], axis=1).ravel()
+            stiffness = in_plane[:3].reshape(9, -1)
+            self.represent = Representatives.outermost(z, stiffness, runs)
+        self.runs = [self.represent.placed(run) for run in runs]
+        self.in_plane = in_plane[:, :, self.represent.states].copy()
+        # Components by states; at rest with those of the initial strain.
+        self.has_residual = residual is not None and bool(residual.any())
+        self.residual = np.zeros(self.in_plane.shape[1:])
+        if residual is not None:
+            self.residual = residual.reshape(-1, 3).T[:, self.represent.states].copy()
+        self.at_rest = self.residual
+        if initial is not None:
+            self.at_rest = self.residual + np.tensordot(initial, self.in_plane[:3], 1)
         # Stresses by interfaces, plies beside, and tau_13, tau_23.
         self.interfaces = zone.plies - 1
         tau = zone.interlaminar[:-1, 2].reshape(self.interfaces, 2, 12)
-        angles = np.deg2rad(plies.angles)
+        angles = np.deg2rad(zone.laminate.plies.angles)
         c, s = np.cos(angles), np.sin(angles)
         turn = np.array([[c, s], [-s, c]]).transpose(2, 0, 1)
         beside = np.stack([turn[:-1], turn[1:]], axis=1)
@@ -138,20 +155,9 @@ class ZoneCriteria:
         )
         self.weaker = np.minimum(own[:-1], own[1:])
 
-    def add(self, residual: Floats) -> None:
-        """Add residual stresses, (plies, 2, 3), to those of every strain."""
-        self.has_residual = bool(residual.any())
-        # Components by plies and faces; at rest with those of the initial strain.
-        self.residual = residual.reshape(-1, 3).T.copy()
-        self.at_rest = self.residual
-        if self._initial is not None:
-            self.at_rest = self.residual + np.tensordot(self._initial, self.in_plane[:3], 1)
-
-    def with_residual(self, residual: Floats) -> Self:
-        """The same with residual stresses, (plies, 2, 3)."""
-        made = copy(self)
-        made.add(residual)
-        return made
+    def with_residual(self, residual: Floats) -> ZoneCriteria:
+        """The same with residual stresses, (plies, 2, 3), of which every state is evaluated."""
+        return ZoneCriteria(self._zone, self.points, self.strengths, self._initial, residual)
 
     def between_plies(self, gradients: Floats) -> Floats:
         """Exposures of the interfaces, (elements, interfaces), of derivatives of the strains."""
@@ -163,25 +169,36 @@ class ZoneCriteria:
 
 
 class FailureMonitor:
-    """Evaluates the failure criteria of all plies."""
+    """Evaluates the failure criteria of all plies.
+
+    `counts` says at which points, (elements, points), exposures count among the largest, by default
+    at all.
+    """
+
+    represents: ClassVar[bool] = False  # whether it evaluates representatives where it can
 
     def __init__(
         self,
         stresses: PlyStresses,
         strengths: AllStrengths,
         criteria: Sequence[OwnCriterion] = (),
+        counts: Bools | None = None,
     ) -> None:
         self.stresses = stresses
         # By name, those of users last, and the modes that their codes mean.
         self.criteria, self.modes = with_own(criteria)
         elements, points, _ = stresses.shape
+        self.counts = np.ones((elements, points), dtype=bool) if counts is None else counts
+        # Users' criteria may not be proportional to the stresses.
+        outermost = self.represents and not stresses.stretches and not criteria
         self.zones: list[ZoneCriteria] = []
         for number, zone in enumerate(stresses.zones):
             rows = zone.rows
             own = strengths[number] if isinstance(strengths, Sequence) else [strengths] * zone.plies
             if not isinstance(rows, slice):
                 rows = (rows[:, None] * points + np.arange(points)).ravel()
-            self.zones.append(ZoneCriteria(zone, rows, own, stresses.initial))
+            made = ZoneCriteria(zone, rows, own, stresses.initial, outermost=outermost)
+            self.zones.append(made)
         self._zone_of = np.zeros(elements, dtype=np.intp)
         for number, zone in enumerate(stresses.zones):
             self._zone_of[zone.rows] = number
@@ -190,6 +207,11 @@ class FailureMonitor:
     def has_residual(self) -> bool:
         """Whether the plies have residual stresses."""
         return any(zone.has_residual for zone in self.zones)
+
+    @property
+    def states(self) -> int:
+        """Number of evaluated states of a point, of the zone with the most of them."""
+        return max(len(zone.represent.states) for zone in self.zones)
 
     def with_residual(self, residual: Sequence[Floats]) -> Self:
         """The same criteria for plies with residual stresses in their axes.
@@ -206,30 +228,67 @@ class FailureMonitor:
     def start(self) -> FailureEnvelope:
         """No exposure yet."""
         elements, points, plies = self.stresses.shape
-        states = Maxima.none(len(self.criteria), elements * points * plies * 2)
+        states = Maxima.none(len(self.criteria), elements * points * self.states)
         interfaces = Maxima.none(elements, max(plies - 1, 0))
-        known = np.zeros((elements * points, plies * 2), dtype=bool)
+        known = np.zeros((elements * points, self.states), dtype=bool)
         for zone in self.zones:
             for run in zone.runs:
                 known[zone.points, run.states] = True
-            interfaces.exposure[zone.elements, zone.interfaces :] = np.nan
+            unknown = np.ones(interfaces.exposure.shape[1], dtype=bool)
+            unknown[: zone.interfaces] = np.isnan(zone.weaker).any(axis=1)
+            interfaces.exposure[zone.elements] = np.where(unknown, np.nan, 0.0)
+        for family, complete in self.stresses.families:
+            if not complete:
+                interfaces.exposure[family.rows] = np.nan
         states.exposure[:, ~known.ravel()] = UNKNOWN
-        return FailureEnvelope(states, interfaces, WorstStates.none(len(self.criteria)))
+        envelope = FailureEnvelope(states, interfaces, Largest.none(len(self.criteria) + 1))
+        envelope.find_largest(self.counts)
+        return envelope
 
-    def update(self, envelope: FailureEnvelope, field: Floats, time: float) -> Floats:
-        """Raise the exposures to those of a displacement field, (numnp, 5).
+    def update(
+        self, envelope: FailureEnvelope, fields: Floats, times: Sequence[float]
+    ) -> Evaluations:
+        """Raise the exposures to those of displacement fields, (fields, numnp, 5), at their times.
 
-        Returns its strains and curvatures, (elements, points, 6).
+        Returns the largest ones that count after each.
         """
-        envelope.kept = None
-        strains, gradients = self.stresses.strains(field)
-        for zone in self.zones:
-            for run in zone.runs:
-                every = range(len(self.criteria))
-                self._raise_by(every, zone, run, envelope.plies, strains.reshape(-1, 6), time)
+        rows = []
+        for displacement, time in zip(fields, times, strict=True):
+            self._evaluate(envelope, displacement, time)
+            rows.append(deepcopy(envelope.largest))
+        return Evaluations.of(rows)
+
+    def _evaluate(self, envelope: FailureEnvelope, displacement: Floats, time: float) -> None:
+        """Raise the exposures to those of a displacement field."""
+        strains, gradients = self.stresses.strains(displacement)
+        every = range(len(self.criteria))
+        self._raise_plies(every, envelope.plies, strains, time)
         for zone in self.zones:
             self._raise_interfaces(zone, envelope.interfaces, gradients, time)
-        return strains
+        envelope.find_largest(self.counts, strains)
+
+    def every_state(self, envelope: FailureEnvelope) -> Maxima:
+        """Largest exposures of all states, (criteria, states).
+
+        States are elements, points, plies and faces; UNKNOWN of plies without strengths, or that an
+        element lacks.
+        """
+        elements, points, plies = self.stresses.shape
+        evaluated, count = envelope.plies, len(self.criteria)
+        if all(len(zone.represent.states) == len(zone.represent.of) for zone in self.zones):
+            return evaluated
+        found = Maxima.none(count, elements * points * plies * 2)
+        found.exposure[...] = UNKNOWN
+        every, own = (
+            [values.reshape(count, elements * points, -1) for values in vars(one).values()]
+            for one in (found, evaluated)
+        )
+        for zone in self.zones:
+            _, of, share = zone.represent
+            factors = share, share > 0.0, share > 0.0  # no time and mode at the midplane
+            for values, given, factor in zip(every, own, factors, strict=True):
+                values[:, zone.points, : len(of)] = given[:, zone.points][:, :, of] * factor
+        return found
 
     @staticmethod
     def _raise_interfaces(
@@ -246,41 +305,44 @@ class FailureMonitor:
         mode = failure.MODES.index("interlaminar shear")
         interfaces.mode[place] = np.where(higher, mode, interfaces.mode[place])
 
-    def _place(self, state: int) -> tuple[int, ZoneCriteria, int]:
-        """Point, zone, and number among the ply's faces of a state of the plate."""
-        _, points, plies = self.stresses.shape
-        point, own = divmod(state, 2 * plies)
-        return point, self.zones[self._zone_of[point // points]], own
+    def located(self, found: Evaluations, places: Places) -> dict[str, Array]:
+        """Columns of evaluations with the plies and places of the largest exposures."""
+        _, of_element, most = self.stresses.shape
+        points, own = np.divmod(found.state[:, :-1], self.states)
+        plies = np.zeros((len(self.zones), self.states), dtype=np.intp)
+        for row, zone in zip(plies, self.zones, strict=True):
+            row[: len(zone.represent.states)] = zone.represent.states // 2 + 1
+        at = plies[self._zone_of[points // of_element], own]
+        return places.columns(found, points, at, most - 1)
 
-    def follow(self, envelope: FailureEnvelope, worst: Indices, strains: Floats) -> None:
-        """Keep the stresses at the worst states, (criteria,), where their exposure has risen."""
-        kept = envelope.worst
-        for number, (exposure, state) in enumerate(
-            zip(envelope.plies.exposure, worst.tolist(), strict=True)
-        ):
-            if exposure[state] > kept.exposure[number]:
-                point, zone, own = self._place(state)
-                kept.exposure[number], kept.state[number] = exposure[state], state
-                kept.added[number] = strains.reshape(-1, 6)[point] @ zone.in_plane[:, :, own]
-                kept.added[number] -= zone.at_rest[:, own] - zone.residual[:, own]
-
-    def load_factors(self, worst: WorstStates) -> dict[str, float]:
-        """Factors on the stresses less those at rest at which the exposures are 1.
+    def load_factors(self, largest: Largest) -> dict[str, float]:
+        """Factors on the stresses less those at rest at which the largest exposures are 1.
 
         NaN where no exposure was found.
         """
-        factors = {}
-        for (name, criterion), state, added in zip(
-            self.criteria.items(), worst.state.tolist(), worst.added, strict=True
+        factors = dict.fromkeys(self.criteria, np.nan)
+        for (name, criterion), state, strain in zip(
+            self.criteria.items(), largest.state[:-1].tolist(), largest.strain, strict=False
         ):
-            _, zone, own = self._place(state)
-            strengths = zone.strengths[own // 2]
-            factors[name] = (
-                np.nan
-                if strengths is None
-                else failure.load_factor(strengths, criterion, zone.at_rest[:, own], added)
-            )
+            if state == NOWHERE:
+                continue
+            point, own = divmod(state, self.states)
+            zone = self.zones[self._zone_of[point // self.stresses.shape[1]]]
+            strengths = zone.strengths[zone.represent.states[own] // 2]
+            added = strain @ zone.in_plane[:, :, own]
+            added -= zone.at_rest[:, own] - zone.residual[:, own]
+            if strengths is not None:
+                at_rest = zone.at_rest[:, own]
+                factors[name] = failure.load_factor(strengths, criterion, at_rest, added)
         return factors
+
+    def _raise_plies(
+        self, numbers: Sequence[int], plies: Maxima, strains: Floats, time: float
+    ) -> None:
+        """Raise exposures of some criteria to those of strains, (elements, points, 6)."""
+        for zone in self.zones:
+            for run in zone.runs:
+                self._raise_by(numbers, zone, run, plies, strains.reshape(-1, 6), time)
 
     def _raise_by(
         self,

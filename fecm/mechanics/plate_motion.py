@@ -223,6 +223,11 @@ class PlateMotion:
         """Whether nodal forces act or dofs are prescribed."""
         return self._loads is not None or self._prescribes
 
+    @property
+    def moves_in_plane(self) -> bool:
+        """Whether u and v may be other than 0 somewhere."""
+        return bool(self._reduction.sign[:, :2].any() or self._prescribed[:, :2].any())
+
     def start(self) -> PlateState:
         """State of the plate at rest."""
         count = len(self.mass)

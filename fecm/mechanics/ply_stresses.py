@@ -166,7 +166,8 @@ class PlyStresses:
     The rule has the points of the in-plane stresses; the interlaminar ones belong to the element's
     centre.  `initial` is a uniform midplane strain of the undeformed plate, (3,).  The midplane
     strains of a plate with a `curvature` contain w/R, those of a `nonlinear` one eps_q; the
-    elements of both have nine nodes.
+    elements of both have nine nodes.  A plate that never `stretches` has none: u and v of all its
+    fields are 0.
 
     Arrays have as many plies as the laminate with the most of them; they are NaN at those that an
     element lacks.
@@ -182,6 +183,7 @@ class PlyStresses:
         *,
         curvature: Curvature = FLAT,
         nonlinear: bool = False,
+        stretches: bool = True,
     ) -> None:
         self.initial = initial
         self.members = np.arange(len(mesh.elements)) if members is None else members
@@ -192,9 +194,10 @@ class PlyStresses:
         # Numbers of elements, points of an element, and plies.
         self.shape = (len(elements), len(rule.xi), most)
         self.rule, self.curvature, self.nonlinear = rule, curvature, nonlinear
+        self.stretches = stretches
         self._mesh = elements, mesh.coordinates
 
-    @property
+    @cached_property
     def families(self) -> list[tuple[ElementBlock, bool]]:
         """The elements, in blocks with the same nodes present, and whether these are all nine."""
         elements, coordinates = self._mesh

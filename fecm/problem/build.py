@@ -15,7 +15,7 @@ from fecm._typing import Bools, Indices
 from fecm.deck import model
 from fecm.deck.macros import flat, moves_only
 from fecm.mechanics import contact_law
-from fecm.mechanics.exposures import OutsideLoad
+from fecm.mechanics.exposures import Places
 from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.impact_steps import ImpactSteps, supports
@@ -125,7 +125,7 @@ class ImpactModel:
     patch: ContactPatch | None
     plies: PlyStresses | None  # elements whose ply stresses are stored; None without PLYS
     failure: FailureMonitor | None  # failure criteria; None without FAIL
-    outside: OutsideLoad | None  # where their exposures count; None without FAIL
+    stress_places: Places | None  # of the points of these stresses; None without PLYS and FAIL
     # (numel, points): where plate theory does not hold; None without PLYS and FAIL.
     under_load: Bools | None
     # Residual stresses of the plies of each laminate; None without CURE.
@@ -156,13 +156,12 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         impact = ImpactSystem(motion, rod, law, conditions, STEPS[chosen.rod_method.integrator])
     compiled = motion.solver == KERNELS
     cure = residuals_of_deck(deck, plate.laminates)
-    plies, failure = _stresses(problem, plate, cure, chosen.criteria, compiled=compiled)
     stress_points = plate.strain_field(problem.rules[2])
-    under_load = outside = None
-    if plies or failure:
-        places = stress_points.places(mesh.coordinates)
-        under_load = problem.under_load(*places)
-        outside = OutsideLoad(under_load, *places) if failure else None
+    places = under_load = None
+    if {"PLYS", "FAIL"} & {macro.word for macro in flat(problem.program)}:
+        places = Places(*stress_points.places(mesh.coordinates))
+        under_load = problem.under_load(places.x, places.y)
+    plies, failure = _stresses(problem, plate, motion, cure, chosen.criteria, under_load)
     read, station = (
         _gages(problem, mesh, plate),
         build_station(deck, rod, slips, is_own=chosen.projectile is not None),
@@ -186,7 +185,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         patch=problem.patch,
         plies=plies,
         failure=failure,
-        outside=outside,
+        stress_places=places,
         under_load=under_load,
         cure=cure,
         laminates=tuple(deck.layers),
@@ -248,16 +247,17 @@ def _conditions(
 def _stresses(
     problem: Problem,
     plate: PlateModel,
+    motion: PlateMotion,
     cure: Sequence[Residual] | None,
     criteria: Sequence[OwnCriterion],
-    *,
-    compiled: bool,
+    under_load: Bools | None,
 ) -> tuple[PlyStresses | None, FailureMonitor | None]:
     """Ply stresses of PLYS, and the failure criteria of FAIL; None where there is no such macro."""
     words = {macro.word: macro for macro in flat(problem.program)}
     points = problem.rules[2]
     initial = plate.preload_strain if plate.is_preloaded else None
     zones = plate.rows_by_laminate
+    stretches = motion.moves_in_plane or plate.is_curved or plate.nonlinear or plate.is_preloaded
 
     def made(rows: Indices | None) -> PlyStresses:
         return PlyStresses(
@@ -268,6 +268,7 @@ def _stresses(
             initial,
             curvature=plate.curvature,
             nonlinear=plate.nonlinear,
+            stretches=stretches,
         )
 
     plies = failure = None
@@ -276,11 +277,12 @@ def _stresses(
         rows = np.sort(nearest[: int(words["PLYS"].second) or None])
         plies = made(rows)
     if "FAIL" in words:
-        kind = CompiledMonitor if compiled else FailureMonitor
+        kind = CompiledMonitor if motion.solver == KERNELS else FailureMonitor
         strengths = strengths_of_deck(problem.deck)
         first = next((ply for plies in strengths for ply in plies if ply is not None), None)
         own = [] if first is None else [one.with_modes(first) for one in criteria]
-        failure = kind(made(None), strengths, own)
+        counts = None if under_load is None else ~under_load
+        failure = kind(made(None), strengths, own, counts)
         if cure is not None:
             failure = failure.with_residual([one.stresses for one in cure])
     return plies, failure

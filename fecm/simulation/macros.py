@@ -232,15 +232,12 @@ def _store_ply_stresses(run: Simulation, steps: Steps, times: Times, fields: Flo
 
 
 def _evaluate_failure(run: Simulation, steps: Steps, times: Times, fields: Floats) -> None:
-    envelope, monitor, outside = run.state.failure, run.model.failure, run.model.outside
-    if envelope is not None and monitor is not None and outside is not None:
-        for step, time, field in zip(steps, times, fields, strict=True):
-            strains = monitor.update(envelope, field, time)
-            if monitor.has_residual and (worst := outside.worst_states(envelope)) is not None:
-                monitor.follow(envelope, worst, strains)
-            run.recorder.row("exposures", step, time, outside.largest(envelope))
-            for other in run.others:
-                other.monitor.update(other.envelope, field, time)
+    envelope, monitor, places = run.state.failure, run.model.failure, run.model.stress_places
+    if envelope is not None and monitor is not None and places is not None:
+        found = monitor.update(envelope, fields, times)
+        run.recorder.rows("exposures", steps, times, monitor.located(found, places))
+        for other in run.others:
+            other.monitor.update(other.envelope, fields, times)
 
 
 # What is done with displacement fields, (rows, numnp, 5), at every N-th step of RODP or pass.

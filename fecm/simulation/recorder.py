@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,8 +11,9 @@ import numpy as np
 from fecm._typing import Array, Floats
 from fecm.deck.macros import WorkEstimate
 from fecm.mechanics.curvature import surface
+from fecm.mechanics.exposures import FailureEnvelope
 from fecm.mechanics.failure import CRITERIA
-from fecm.mechanics.failure_monitor import FailureEnvelope
+from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.mechanics.strains import STRAINS
 from fecm.problem.build import ImpactModel
 from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR, OWN_CRITERIA
@@ -82,11 +83,11 @@ def _padded(parts: Sequence[Floats]) -> Floats:
     return found
 
 
-def exposures_of(found: FailureEnvelope, criteria: Collection[str] = CRITERIA) -> dict[str, Array]:
+def exposures_of(monitor: FailureMonitor, found: FailureEnvelope) -> dict[str, Array]:
     """Datasets of the largest exposures of criteria, those of plies as (states,)."""
-    arrays = {}
+    arrays, plies = {}, monitor.every_state(found)
     for part in ("exposure", "time", "mode"):
-        for name, values in zip(criteria, getattr(found.plies, part), strict=True):
+        for name, values in zip(monitor.criteria, getattr(plies, part), strict=True):
             if part == "exposure":
                 values = np.where(values < 0.0, np.nan, values)
             arrays[f"failure/{name}/{part}"] = values
@@ -281,12 +282,13 @@ class Recorder:
     def failure(self, found: FailureEnvelope) -> None:
         """Store the largest exposures of FAIL."""
         monitor = self._model.failure
+        if monitor is None:
+            return
         shapes = {dataset.path: shape for dataset, shape in self._datasets}
-        criteria = CRITERIA if monitor is None else monitor.criteria
-        for path, values in exposures_of(found, criteria).items():
+        for path, values in exposures_of(monitor, found).items():
             self._sink.write(path, 0, values.reshape(shapes[path]))
-        if monitor is not None and monitor.has_residual:
-            for name, factor in monitor.load_factors(found.worst).items():
+        if monitor.has_residual:
+            for name, factor in monitor.load_factors(found.largest).items():
                 self._sink.attributes(f"failure/{name}", {LOAD_FACTOR: factor})
 
     def finish(self) -> None:

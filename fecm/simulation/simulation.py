@@ -11,7 +11,8 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.deck.macros import load_factor
-from fecm.mechanics.failure_monitor import FailureEnvelope, FailureMonitor
+from fecm.mechanics.exposures import FailureEnvelope
+from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.mechanics.solutions import Tangent
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.problem import Problem
@@ -128,8 +129,6 @@ class Simulation:
         type.
         """
         restore(self.state, "state", stored)
-        if self.state.failure is not None:
-            self.state.failure.kept = None
         if self.model.impact is not None:
             self.model.impact.first_dt = self.state.first_dt
         self.printer.restore(stored["printed"])

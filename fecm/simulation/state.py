@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.mechanics.failure_monitor import FailureEnvelope
+from fecm.mechanics.exposures import FailureEnvelope
 from fecm.mechanics.impact import ImpactState
 from fecm.mechanics.plate_motion import DivergenceError, PlateState
 from fecm.problem.problem import Threshold

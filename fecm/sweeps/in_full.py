@@ -135,7 +135,7 @@ def in_one_motion(
         run(simulation)
     except (CasesError, DivergenceError, LawError, ArithmeticError) as error:
         return [Outcome.failed({number: str(error)}) for number in numbers]
-    found = [{}, *(exposures_of(other.envelope) for other in simulation.others)]
+    found = [{}, *(exposures_of(*other) for other in simulation.others)]
     outcomes = []
     for number, case, one, arrays in zip(numbers, cases, problems, found, strict=True):
         own = {path: values.reshape(sink.arrays[path].shape) for path, values in arrays.items()}
@@ -152,7 +152,7 @@ def _criteria(simulation: Simulation, checked: Problem) -> Criteria:
     assert residuals is not None
     made = monitor.with_residual([one.stresses for one in residuals])
     envelope = made.start()
-    made.update(envelope, np.zeros(checked.mesh.equations.shape), 0.0)
+    made.update(envelope, np.zeros((1, *checked.mesh.equations.shape)), [0.0])
     return Criteria(made, envelope)
 
 

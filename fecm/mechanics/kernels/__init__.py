@@ -54,9 +54,7 @@ FUNCTIONS = {
     "fecm_impact_steps": (c_int64, [c_void_p, c_void_p, c_int64, c_int64]),
     "fecm_sweep": (c_int, [c_void_p]),
     "fecm_strains": (None, [c_void_p, c_int64, c_int64, c_int64, Doubles, Doubles]),
-    "fecm_midplane": (None, [c_void_p, Doubles, Doubles, Doubles]),
-    "fecm_failure": (None, [c_void_p, Doubles, c_double]),
-    "fecm_interfaces": (None, [c_void_p, Doubles, c_double]),
+    "fecm_failure": (None, [c_void_p, c_int64, c_int64, Doubles, Doubles, Doubles, Longs, Codes]),
     "fecm_fields": (c_void_p, []),
     "fecm_constants": (c_void_p, []),
 }

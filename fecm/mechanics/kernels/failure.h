@@ -1,21 +1,18 @@
 /* Largest exposures of plies and interfaces; included once for each instruction set.
  *
  * Layout.  A state of stress is a ply at one of its faces; four states are computed at once, from the
- * strains of a point, (6,), a table of stresses per strain, (6, 3, width), and the stresses without
- * strain, (3, width).  `width` is the number of states in fours; lanes beyond the last state compute
- * zeros and are not stored.
+ * strains of a point, (strains,), a table of stresses per strain, (strains, 3, width), and the stresses
+ * without strain, (3, width), whose `width` is the number of states in fours.  The last four overlap those
+ * before them where the number is no multiple of four; of less than four, lanes beyond the last compute
+ * zeros and are not stored.  Which states there are is decided in Python: where exposures are proportional
+ * to z, one for many.
  *
- * Sums run over the six strains in their order, after the stress without strain.  Of equal exposures of
- * one criterion the first mode stays, and of equal exposures in time the first time.  A call is one thread's.
+ * Sums run over the strains in their order, after the stress without strain.  Of equal exposures of one
+ * criterion the first mode stays, of equal exposures in time the first time, and of the largest ones of
+ * the plate that with the lowest number.  A call is one thread's.
  *
- * What cannot rise is not evaluated.  Exposures are compared with `keep` times those stored, which is so
- * little below 1 that rounding changes no decision; with a `keep` of 0 all states are evaluated.
- *
- * - Where the midplane is not strained, and without residual stresses, the stresses of a ply are
- *   proportional to z, and so are its exposures.  Of the plies with the same stiffness, on one side of the
- *   midplane, the outermost state then tells whether any exposure rises.  This holds as long as it has held
- *   at all times before: `proportional`, until a midplane strain is not 0.
- * - Otherwise `may_rise` compares four states without roots and quotients.
+ * What cannot rise is not evaluated: `may_rise` compares four states, without roots and quotients, with
+ * KEEP times the exposures stored, which is so little less that rounding changes no decision.
  */
 
 /* Candidates of four states of stress: exposures, and for Hashin's criterion their squares. */
@@ -63,22 +60,6 @@ INLINE mask NAME(may_rise)(const Limits *p, half s1, half s2, half tau, const ha
     return found | (along > F[3]) | (steep & c) | (~steep & ab);
 }
 
-/* The outermost states, a bit of each, whose exposures may rise at a point without midplane strains. */
-INLINE int64_t NAME(rising)(const Failure *f, const Limits *p, const double *curvature, const double *reached) {
-    const int64_t width = f->outer_width;
-    int64_t found = 0;
-    for (int64_t first = 0; first < width; first += 4) {
-        half s[3] = {{0}}, F[CRITERIA];
-        const double *stress = f->outer_stress + first;
-        for (int k = 0; k < 3; k++)
-            for (int c = 0; c < 3; c++, stress += width) s[c] += curvature[k] * NAME(load)(stress);
-        for (int i = 0; i < CRITERIA; i++) F[i] = f->keep * NAME(load)(reached + i * width + first);
-        const mask higher = NAME(may_rise)(p, s[0], s[1], s[2], F);
-        found |= (int64_t)SIGNS(higher) << first;
-    }
-    return found;
-}
-
 /* Largest candidate of each criterion, and its exposure. */
 INLINE void NAME(exposures)(const half *v, half *candidate, half *exposure) {
     const half zero = {0};
@@ -91,8 +72,31 @@ INLINE void NAME(exposures)(const half *v, half *candidate, half *exposure) {
     }
 }
 
+/* `count` stored exposures in four lanes, the others so large that nothing is above them. */
+INLINE half NAME(stored)(const double *exposure, int count) {
+    if (count == 4) return NAME(load)(exposure);
+    half found = {HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
+    for (int lane = 0; lane < count; lane++) found[lane] = exposure[lane];
+    return found;
+}
+
+/* Where four states of `count` begin that are to begin at `first`, so that none is beyond the last. */
+INLINE int64_t NAME(begin)(int64_t first, int64_t count) {
+    return first + 4 > count && count >= 4 ? count - 4 : first;
+}
+
+/* Make an exposure the largest of a criterion if it is that, or equals it and has a lower number. */
+INLINE void NAME(follow)(const Largest *largest, int64_t criterion, double exposure, int64_t state, int8_t mode, const double *strain, int64_t strains) {
+    const double before = largest->exposure[criterion];
+    if (!(exposure > before || (exposure == before && state < largest->state[criterion]))) return;
+    largest->exposure[criterion] = exposure;
+    largest->state[criterion] = state;
+    largest->mode[criterion] = mode;
+    if (strain) memcpy(largest->strain + 6 * criterion + 6 - strains, strain, sizeof(double) * strains);
+}
+
 /* Store exposures of a criterion that are `higher` than before, with the time and the first mode of equals. */
-INLINE void NAME(raise)(const Failure *f, int64_t at, int higher, int criterion, const half *v, half candidate, half exposure, double now) {
+INLINE void NAME(raise)(const Maxima *m, int64_t at, int higher, int criterion, const half *v, half candidate, half exposure, double now) {
     mask mode = {0};
 #pragma GCC unroll 5
     for (int i = BEGIN[criterion + 1] - 1; i >= BEGIN[criterion]; i--) {
@@ -100,98 +104,109 @@ INLINE void NAME(raise)(const Failure *f, int64_t at, int higher, int criterion,
         mode = (first & CODES[i]) | (~first & mode);
     }
     if (higher == 15) {
-        NAME(store)(f->exposure + at, exposure);
-        NAME(store)(f->time + at, (half){now, now, now, now});
-        for (int lane = 0; lane < 4; lane++) f->mode[at + lane] = (int8_t)mode[lane];
+        NAME(store)(m->exposure + at, exposure);
+        NAME(store)(m->time + at, (half){now, now, now, now});
+        for (int lane = 0; lane < 4; lane++) m->mode[at + lane] = (int8_t)mode[lane];
         return;
     }
     for (int lane = 0; lane < 4; lane++) {
         if (!(higher >> lane & 1)) continue;
-        f->exposure[at + lane] = exposure[lane], f->time[at + lane] = now;
-        f->mode[at + lane] = (int8_t)mode[lane];
+        m->exposure[at + lane] = exposure[lane], m->time[at + lane] = now;
+        m->mode[at + lane] = (int8_t)mode[lane];
     }
 }
 
-TARGET void NAME(failure)(Failure *given, const double *strains, double now) {
-    const Failure copy = *given, *const f = &copy; /* which no store changes */
-    int64_t proportional = f->proportional;
-    const int64_t states = f->states, width = f->width, stride = f->stride, all = f->rows * stride;
+/* Four states of stress of a point, of which the arrays have `count`: raise their exposures. */
+INLINE void NAME(four_states)(const Exposures *m, const Limits *limits, int prunes, int64_t point, int64_t state, int count, half s1, half s2, half tau, double now) {
+    const int64_t all = m->points * m->states, at = point * m->states + state;
+    const Maxima *plies = &m->plies;
+    half before[CRITERIA], F[CRITERIA], v[CANDIDATES], candidate[CRITERIA], exposure[CRITERIA];
+#pragma GCC unroll 4
+    for (int i = 0; i < CRITERIA; i++) {
+        before[i] = NAME(stored)(plies->exposure + i * all + at, count);
+        F[i] = KEEP * before[i];
+    }
+    if (prunes) {
+        const mask higher = NAME(may_rise)(limits, s1, s2, tau, F);
+        if (!SIGNS(higher)) return;
+    }
+    NAME(candidates)(limits, s1, s2, tau, v);
+    NAME(exposures)(v, candidate, exposure);
+#pragma GCC unroll 4
+    for (int i = 0; i < CRITERIA; i++) {
+        const mask higher = exposure[i] > before[i], largest = higher & (exposure[i] >= m->largest.exposure[i]);
+        const int which = SIGNS(higher);
+        if (!which) continue;
+        NAME(raise)(plies, i * all + at, which, i, v, candidate[i], exposure[i], now);
+        if (!SIGNS(largest) || !m->counts[point]) continue;
+        for (int lane = 0; lane < 4; lane++)
+            if (which >> lane & 1)
+                NAME(follow)(&m->largest, i, exposure[i][lane], at + lane, plies->mode[i * all + at + lane], m->strain + m->strains * point, m->strains);
+    }
+}
+
+/* Raise the exposures of plies of the same strengths. */
+INLINE void NAME(plies)(const Exposures *m, const Plies *f, int strains, double now) {
+    const int64_t width = f->width;
     const Limits limits = limits_of(&f->ply);
     for (int64_t point = 0; point < f->points; point++) {
         const int64_t row = f->row ? f->row[point] : point;
-        const double *e = strains + 6 * row;
-        const int bent = e[0] == 0.0 && e[1] == 0.0 && e[2] == 0.0;
-        double *reached = f->reached + CRITERIA * f->outer_width * point;
-        if (!bent) proportional = 0;
-        const int64_t rising = proportional ? NAME(rising)(f, &limits, e + 3, reached) : 0;
-        if (proportional && !rising) continue;
-        half largest[CRITERIA] = {{0}};
-        for (int64_t first = 0; first < width; first += 4) {
-            if (proportional && !(rising & f->stands[first / 4])) continue;
-            const int64_t at = row * stride + f->first + first;
-            const int count = states - first < 4 ? (int)(states - first) : 4;
-            half s[3], before[CRITERIA], F[CRITERIA], v[CANDIDATES], candidate[CRITERIA], exposure[CRITERIA];
-#pragma GCC unroll 4
-            for (int i = 0; i < CRITERIA; i++) {
-                before[i] = (half){HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
-                if (count == 4)
-                    before[i] = NAME(load)(f->exposure + i * all + at);
-                else
-                    memcpy(before + i, f->exposure + i * all + at, sizeof(double) * count);
-                F[i] = f->keep * before[i];
-            }
+        const double *e = m->strain + strains * row;
+        for (int64_t four = 0; four < f->states; four += 4) {
+            const int64_t first = NAME(begin)(four, f->states);
+            half s[3];
             for (int c = 0; c < 3; c++) s[c] = NAME(load)(f->residual + c * width + first);
-            const double *stress = f->in_plane + first + (bent ? 9 * width : 0);
-            for (int k = bent ? 3 : 0; k < 6; k++)
+            const double *stress = f->stress + first;
+            for (int k = 0; k < strains; k++)
                 for (int c = 0; c < 3; c++, stress += width) s[c] += e[k] * NAME(load)(stress);
-            if (f->keep > 0.0 && !proportional) {
-                const mask higher = NAME(may_rise)(&limits, s[0], s[1], s[2], F);
-                if (!SIGNS(higher)) continue;
-            }
-            NAME(candidates)(&limits, s[0], s[1], s[2], v);
-            NAME(exposures)(v, candidate, exposure);
-#pragma GCC unroll 4
-            for (int i = 0; i < CRITERIA; i++) {
-                const mask higher = exposure[i] > before[i];
-                const int which = SIGNS(higher);
-                if (!which) continue;
-                largest[i] = LARGER(exposure[i], largest[i]);
-                NAME(raise)(f, i * all + at, which, i, v, candidate[i], exposure[i], now);
-            }
-        }
-        for (int i = 0; i < CRITERIA; i++) {
-            const mask raised = largest[i] > 0.0;
-            if (!SIGNS(raised)) continue;
-            double *peak = f->peak + i * f->rows + row;
-            for (int lane = 0; lane < 4; lane++)
-                if (largest[i][lane] > *peak) *peak = largest[i][lane];
-            if (!proportional) continue;
-            const double *stored = f->exposure + i * all + row * stride + f->first;
-            for (int64_t n = 0; n < f->outermost; n++) reached[i * f->outer_width + n] = stored[f->outer[n]];
+            NAME(four_states)(m, &limits, (int)f->prunes, row, f->first + first, f->states < 4 ? (int)f->states : 4, s[0], s[1], s[2], now);
         }
     }
-    given->proportional = proportional;
 }
 
-/* Interlaminar exposures; NaN where the gradients or a strength are not known. */
-TARGET void NAME(interfaces)(const Interfaces *f, const double *gradients, double now) {
+/* Raise the interlaminar exposures; NaN where the gradients or a strength are not known. */
+INLINE void NAME(interfaces)(const Exposures *m, const Interfaces *f, int strains, double now) {
+    const Maxima *between = &m->between;
+    const int count = f->interfaces < 4 ? (int)f->interfaces : 4;
     for (int64_t element = 0; element < f->elements; element++) {
         const int64_t row = f->row ? f->row[element] : element;
-        const double *g = gradients + 12 * row;
-        for (int64_t first = 0; first < f->interfaces; first += 4) {
+        const double *g = m->gradient + 2 * strains * row;
+        for (int64_t four = 0; four < f->interfaces; four += 4) {
+            const int64_t first = NAME(begin)(four, f->interfaces), at = m->interfaces * row + first;
+            const half before = NAME(stored)(between->exposure + at, count);
             half t[4] = {{0}};
             const double *shear = f->shear + first;
-            for (int k = 0; k < 12; k++)
+            for (int k = 0; k < 2 * strains; k++)
                 for (int i = 0; i < 4; i++, shear += f->width) t[i] += g[k] * NAME(load)(shear);
-            const half above = ROOT(t[0] * t[0] + t[1] * t[1]), below = ROOT(t[2] * t[2] + t[3] * t[3]);
-            const half larger = LARGER(above, below);
-            for (int lane = 0; lane < 4 && first + lane < f->interfaces; lane++) {
-                const int64_t at = f->stride * row + first + lane;
+            const half above = t[0] * t[0] + t[1] * t[1], below = t[2] * t[2] + t[3] * t[3];
+            const half F = KEEP * before;
+            const mask as_before = (above <= F * F) & (below <= F * F);
+            if (SIGNS(as_before) == 15) continue;
+            const half larger = ROOT(LARGER(above, below));
+            for (int lane = 0; lane < count; lane++) {
                 if (isnan(above[lane]) || isnan(below[lane]))
-                    f->exposure[at] = NAN;
-                else if (larger[lane] > f->exposure[at])
-                    f->exposure[at] = larger[lane], f->time[at] = now, f->mode[at] = (int8_t)f->code;
+                    between->exposure[at + lane] = NAN;
+                else if (larger[lane] > before[lane]) {
+                    between->exposure[at + lane] = larger[lane], between->time[at + lane] = now;
+                    between->mode[at + lane] = (int8_t)f->code;
+                    if (m->far[row])
+                        NAME(follow)(&m->largest, m->criteria - 1, larger[lane], at + lane, (int8_t)f->code, NULL, 0);
+                }
             }
         }
     }
+}
+
+INLINE void NAME(evaluate)(const Exposures *m, const double *u, int strains, double now) {
+    for (int64_t i = 0; i < m->families; i++) NAME(midplane)(m->family + i, u, strains, m->strain, m->gradient);
+    for (int64_t i = 0; i < m->runs; i++) NAME(plies)(m, m->run + i, strains, now);
+    for (int64_t i = 0; i < m->zones; i++) NAME(interfaces)(m, m->zone + i, strains, now);
+}
+
+/* Raise the exposures to those of a displacement field, (numnp, 5). */
+TARGET void NAME(failure)(const Exposures *m, const double *u, double now) {
+    if (m->strains == 6)
+        NAME(evaluate)(m, u, 6, now);
+    else
+        NAME(evaluate)(m, u, 3, now);
 }

@@ -151,6 +151,8 @@ static const int BEGIN[CRITERIA + 1] = {0, 5, 6, 10, 15};
 
 /* Exposures whose squares may be too small for a number. */
 #define TINY 1e-100
+/* Exposures below this share of those stored are not evaluated: far more than rounding. */
+#define KEEP (1.0 - 1e-9)
 
 #define TARGET static
 #include "impact.h"
@@ -495,19 +497,15 @@ EXPORT void fecm_strains(const Strains *family, int64_t fields, int64_t numnp, i
     CHOSEN(strains)(family, fields, numnp, numel, u, strains);
 }
 
-/* Strains (elements, points, 6) of a displacement field (numnp, 5), and their derivatives (elements, 2, 6). */
-EXPORT void fecm_midplane(const Midplane *family, const double *u, double *strains, double *gradients) {
-    CHOSEN(midplane)(family, u, strains, gradients);
-}
-
-/* Raise exposures to those of strains (rows, 6). */
-EXPORT void fecm_failure(Failure *failure, const double *strains, double time) {
-    CHOSEN(failure)(failure, strains, time);
-}
-
-/* Raise exposures of interfaces to those of derivatives of the strains, (rows, 2, 6). */
-EXPORT void fecm_interfaces(const Interfaces *interfaces, const double *gradients, double time) {
-    CHOSEN(interfaces)(interfaces, gradients, time);
+/* Raise the exposures to those of displacement fields, (rows, numbers), at their times; the largest that
+ * count after each, their states and modes, (rows, criteria). */
+EXPORT void fecm_failure(const Exposures *m, int64_t rows, int64_t numbers, const double *u, const double *time, double *exposure, int64_t *state, int8_t *mode) {
+    for (int64_t row = 0; row < rows; row++) {
+        CHOSEN(failure)(m, u + numbers * row, time[row]);
+        memcpy(exposure + m->criteria * row, m->largest.exposure, sizeof *exposure * m->criteria);
+        memcpy(state + m->criteria * row, m->largest.state, sizeof *state * m->criteria);
+        memcpy(mode + m->criteria * row, m->largest.mode, sizeof *mode * m->criteria);
+    }
 }
 
 /* Places of the fields of structures, and values of enumerations; each ends with an empty entry. */

@@ -1,7 +1,8 @@
 /* Midplane strains, curvatures and their derivatives, as PlyStresses evaluates them; included once for each
  * instruction set.
  *
- * Four points of an element are computed at once.  Sums run over the nodes in their order. */
+ * Of 6 `strains` the first three are those of the midplane; of 3 there are the curvatures alone.  Four points of
+ * an element are computed at once.  Sums run over the nodes in their order. */
 
 /* Components e_11 (6), e_22 (6) and e_12 (4) of the quadratic strains at their tying points. */
 INLINE void NAME(tied_components)(const Midplane *g, const int64_t *node, const double *metric, const double *u, double *e) {
@@ -21,8 +22,8 @@ INLINE void NAME(tied_components)(const Midplane *g, const int64_t *node, const 
     for (int t = 0; t < 4; t++) e[12 + t] = slope[0][6 + t] * slope[1][6 + t];
 }
 
-/* Derivatives by x and y at the centre, (2, 6); `d` has those of the shape functions. */
-INLINE void NAME(gradients)(const Midplane *g, const int64_t *node, const double *d, const double *u, double *out) {
+/* Derivatives by x and y at the centre, (2, strains); `d` has those of the shape functions. */
+INLINE void NAME(gradients)(const Midplane *g, const int64_t *node, const double *d, const double *u, int strains, double *out) {
     half xx = {0}, yy = {0}, xy = {0}; /* of u, v, theta_x, theta_y */
     double w[5] = {0.0};
     const int64_t n = g->nodes;
@@ -35,9 +36,9 @@ INLINE void NAME(gradients)(const Midplane *g, const int64_t *node, const double
     }
     const double by_x[6] = {xx[0], xy[1], xy[0] + xx[1], -xx[2], -xy[3], -xy[2] - xx[3]};
     const double by_y[6] = {xy[0], yy[1], yy[0] + xy[1], -xy[2], -yy[3], -yy[2] - xy[3]};
-    memcpy(out, by_x, sizeof by_x);
-    memcpy(out + 6, by_y, sizeof by_y);
-    if (!of_w) return;
+    memcpy(out, by_x + 6 - strains, strains * sizeof *out);
+    memcpy(out + strains, by_y + 6 - strains, strains * sizeof *out);
+    if (strains < 6) return;
     for (int k = 0; g->curved && k < 3; k++) out[k] += g->curved[k] * w[3], out[6 + k] += g->curved[k] * w[4];
     if (!g->tying) return;
     const double x = w[3], y = w[4];
@@ -45,46 +46,63 @@ INLINE void NAME(gradients)(const Midplane *g, const int64_t *node, const double
     out[6] += x * w[2], out[7] += y * w[1], out[8] += w[2] * y + x * w[1];
 }
 
-TARGET void NAME(midplane)(const Midplane *g, const double *u, double *strains, double *gradients) {
-    const int64_t n = g->nodes, width = g->width;
-    for (int64_t e = 0; e < g->elements; e++) {
-        const int64_t *node = g->node + n * e, shape = g->shape[e];
-        double tied[16], *out = strains + 6 * g->points * g->row[e], *slopes = gradients + 12 * g->row[e];
-        if (g->tying) NAME(tied_components)(g, node, g->tying_metric + 4 * TYING * shape, u, tied);
-        for (int64_t p = 0; p < width; p += 4) {
-            half xi[4] = {{0}}, eta[4] = {{0}}, w = {0}; /* of u, v, theta_x, theta_y */
-            const double *t = g->table + p;
-            for (int64_t i = 0; i < n; i++, t += 3 * width) {
-                const double *q = u + 5 * node[i];
-                const half by_xi = NAME(load)(t), by_eta = NAME(load)(t + width);
-                xi[0] += q[0] * by_xi, xi[1] += q[1] * by_xi, xi[2] += q[3] * by_xi, xi[3] += q[4] * by_xi;
-                eta[0] += q[0] * by_eta, eta[1] += q[1] * by_eta, eta[2] += q[3] * by_eta, eta[3] += q[4] * by_eta;
-                if (g->curved) w += q[2] * NAME(load)(t + 2 * width);
-            }
-            const double *m = g->metric + 4 * width * shape + p;
-            const half xx = NAME(load)(m), xe = NAME(load)(m + width);
-            const half yx = NAME(load)(m + 2 * width), ye = NAME(load)(m + 3 * width);
-            half x[4], y[4];
-            for (int i = 0; i < 4; i++) x[i] = xx * xi[i] + xe * eta[i], y[i] = yx * xi[i] + ye * eta[i];
+/* Derivatives by x and y at four points, of u, v, theta_x and theta_y, or of the last two, from `first` on. */
+INLINE void NAME(derivatives)(const Midplane *g, const int64_t *node, int64_t shape, int64_t point, int first, const double *u, half *x, half *y) {
+    static const int dofs[4] = {0, 1, 3, 4};
+    half xi[4] = {{0}}, eta[4] = {{0}};
+    const double *t = g->table + point;
+    for (int64_t i = 0; i < g->nodes; i++, t += 3 * g->width) {
+        const double *q = u + 5 * node[i];
+        const half by_xi = NAME(load)(t), by_eta = NAME(load)(t + g->width);
+#pragma GCC unroll 4
+        for (int k = first; k < 4; k++) xi[k] += q[dofs[k]] * by_xi, eta[k] += q[dofs[k]] * by_eta;
+    }
+    const double *m = g->metric + 4 * g->width * shape + point;
+    const half xx = NAME(load)(m), xe = NAME(load)(m + g->width);
+    const half yx = NAME(load)(m + 2 * g->width), ye = NAME(load)(m + 3 * g->width);
+#pragma GCC unroll 4
+    for (int k = first; k < 4; k++) x[k] = xx * xi[k] + xe * eta[k], y[k] = yx * xi[k] + ye * eta[k];
+}
+
+/* Midplane strains of four points. */
+INLINE void NAME(stretching)(const Midplane *g, const int64_t *node, int64_t shape, int64_t point, const double *u, const double *tied, const half *x, const half *y, half *found) {
+    const int64_t width = g->width;
+    found[0] = x[0], found[1] = y[1], found[2] = y[0] + x[1];
+    if (g->tying) {
+        half covariant[3] = {{0}};
+        for (int i = 0; i < 16; i++)
+            covariant[i < 6 ? 0 : i < 12 ? 1 : 2] += tied[i] * NAME(load)(g->tied + width * i + point);
+        const double *to = g->tied_strain + 9 * shape;
+        for (int k = 0; k < 3; k++, to += 3)
+            found[k] += to[0] * covariant[0] + to[1] * covariant[1] + to[2] * covariant[2];
+    }
+    if (g->curved) {
+        half w = {0};
+        for (int64_t i = 0; i < g->nodes; i++)
+            w += u[5 * node[i] + 2] * NAME(load)(g->table + (3 * i + 2) * width + point);
+        for (int k = 0; k < 3; k++) found[k] += g->curved[k] * w;
+    }
+    for (int k = 0; k < 3; k++) found[k] += g->initial[k];
+}
+
+/* Strains at the points, (elements, points, strains), and their derivatives at the centres, (elements, 2, strains). */
+INLINE void NAME(midplane)(const Midplane *g, const double *u, int strains, double *strain, double *gradient) {
+    for (int64_t element = 0; element < g->elements; element++) {
+        const int64_t *node = g->node + g->nodes * element, shape = g->shape[element], row = g->row[element];
+        double tied[16], *out = strain + strains * g->points * row, *slopes = gradient + 2 * strains * row;
+        if (strains == 6 && g->tying) NAME(tied_components)(g, node, g->tying_metric + 4 * TYING * shape, u, tied);
+        for (int64_t point = 0; point < g->width; point += 4) {
+            half x[4], y[4], found[6];
+            NAME(derivatives)(g, node, shape, point, strains == 6 ? 0 : 2, u, x, y);
+            if (strains == 6) NAME(stretching)(g, node, shape, point, u, tied, x, y, found);
             /* Curvatures are the strains of the rotations' negatives. */
-            half found[6] = {x[0], y[1], y[0] + x[1], 0.0 - x[2], 0.0 - y[3], 0.0 - y[2] - x[3]};
-            if (g->tying) {
-                half covariant[3] = {{0}};
-                for (int i = 0; i < 16; i++)
-                    covariant[i < 6 ? 0 : i < 12 ? 1 : 2] += tied[i] * NAME(load)(g->tied + width * i + p);
-                const double *to = g->tied_strain + 9 * shape;
-                for (int k = 0; k < 3; k++, to += 3)
-                    found[k] += to[0] * covariant[0] + to[1] * covariant[1] + to[2] * covariant[2];
-            }
-            for (int k = 0; g->curved && k < 3; k++) found[k] += g->curved[k] * w;
-            for (int k = 0; k < 3; k++) found[k] += g->initial[k];
-            const int count = g->points - p < 4 ? (int)(g->points - p) : 4;
-            for (int i = 0; i < count; i++)
-                for (int k = 0; k < 6; k++) out[6 * (p + i) + k] = found[k][i];
+            found[3] = 0.0 - x[2], found[4] = 0.0 - y[3], found[5] = 0.0 - y[2] - x[3];
+            for (int i = 0; i < 4 && point + i < g->points; i++)
+                for (int k = 6 - strains; k < 6; k++) *out++ = found[k][i];
         }
         if (g->centre)
-            NAME(gradients)(g, node, g->centre + 5 * n * shape, u, slopes);
+            NAME(gradients)(g, node, g->centre + 5 * g->nodes * shape, u, strains, slopes);
         else
-            for (int k = 0; k < 12; k++) slopes[k] = NAN;
+            for (int k = 0; k < 2 * strains; k++) slopes[k] = NAN;
     }
 }

@@ -1,13 +1,13 @@
 """Midplane strains, curvatures and their derivatives by the compiled kernels.
 
 In: a displacement field, (numnp, 5).  Out: strains (elements, points, 6) and gradients (elements,
-2, 6), as :meth:`~fecm.mechanics.ply_stresses.PlyStresses.strains` has them.  Four points of an
+2, 6), as :meth:`~fecm.mechanics.ply_stresses.PlyStresses.strains` has them; the curvatures alone,
+(elements, points, 3) and (elements, 2, 3), where the midplane does not stretch.  Four points of an
 element are computed at once; tables are filled up to fours of points with zeros.
 """
 
 from __future__ import annotations
 
-import ctypes
 from ctypes import c_int64
 
 import numpy as np
@@ -16,7 +16,7 @@ from fecm._typing import Floats
 from fecm.mechanics.curvature import FLAT, strain_of_deflection
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.interpolation import interpolate, local_shape_functions
-from fecm.mechanics.kernels import LIBRARY, Doubles, Longs, Structure, filled, floats
+from fecm.mechanics.kernels import Doubles, Longs, Structure, filled
 from fecm.mechanics.kernels.element_groups import jacobians
 from fecm.mechanics.membrane import QuadraticStrains
 from fecm.mechanics.mesh import ElementBlock
@@ -67,26 +67,9 @@ class Midplane(Structure):
     )
 
 
-class CompiledMidplane:
-    """The strains of the same elements and points as those of some ply stresses."""
-
-    def __init__(self, stresses: PlyStresses) -> None:
-        elements, points, _ = stresses.shape
-        self._shape = elements, points
-        self._structures = [
-            _structure(stresses, family, complete) for family, complete in stresses.families
-        ]
-
-    def evaluate(self, field: Floats) -> tuple[Floats, Floats]:
-        """Strains and gradients; see :meth:`~fecm.mechanics.ply_stresses.PlyStresses.strains`."""
-        elements, points = self._shape
-        strains, gradients = np.empty((elements, points, 6)), np.empty((elements, 2, 6))
-        displacement = np.ascontiguousarray(field)
-        for structure in self._structures:
-            LIBRARY.fecm_midplane(
-                ctypes.byref(structure), floats(displacement), floats(strains), floats(gradients)
-            )
-        return strains, gradients
+def midplanes(stresses: PlyStresses) -> list[Midplane]:
+    """The elements of some ply stresses, for the kernels."""
+    return [_structure(stresses, family, complete) for family, complete in stresses.families]
 
 
 def _structure(stresses: PlyStresses, family: ElementBlock, complete: bool) -> Midplane:

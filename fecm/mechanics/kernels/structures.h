@@ -2,7 +2,7 @@
  *
  * Python fills them in, and points them to arrays that it owns: the kernels allocate nothing that
  * outlives a call.  Each is repeated with ctypes in the Python file of its kernel: plate.py and
- * element_groups.py (Plate, Chunk, Block, Group), strains.py (Strains), failure.py (Failure), and beside
+ * element_groups.py (Plate, Chunk, Block, Group), strains.py (Strains), midplane.py (Midplane), failure.py (Exposures), and beside
  * this folder impact_steps.py (Impact) and impact_sweep.py (Sweep).  fields.h says where each field lies,
  * for a test that compares both sides.
  *
@@ -175,35 +175,23 @@ typedef struct {
     double xt, xc, yt, yc, s12, f12, p_plus, p_minus, resistance, critical;
 } Ply;
 
-/* Largest exposures of neighbouring states of stress (plies, faces) at points; `width` is `states` in
- * fours.  In the arrays of all points, (CRITERIA, rows, stride), they begin at `first`.  failure.h says what
- * `keep`, `proportional` and the outermost states are for; `outer_width` is `outermost` in fours, or 0. */
+/* Neighbouring states of stress (plies, faces) of the same strengths at points; `width` is `states` in fours.
+ * Among the states of a point they begin at `first`. */
 typedef struct {
-    int64_t points, states, width, rows, stride, first;
-    const int64_t *row;     /* (points,): of the points in these arrays; all if NULL */
-    const double *in_plane; /* (6, 3, width): stresses per strain */
+    int64_t points, states, width, first;
+    const int64_t *row;     /* (points,): of the points among those of the plate; all if NULL */
+    const double *stress;   /* (strains, 3, width): stresses per strain */
     const double *residual; /* (3, width): stresses without strain */
     Ply ply;
-    double keep;
-    int64_t proportional, outermost, outer_width;
-    const int64_t *outer;       /* (outermost,): states */
-    const int64_t *stands;      /* (width / 4,): of four states, the bits of those that stand for them */
-    const double *outer_stress; /* (3, 3, outer_width): stresses per curvature */
-    double *reached;            /* (points, CRITERIA, outer_width): exposures of the outermost states */
-    double *exposure, *time;    /* (CRITERIA, rows, stride) */
-    int8_t *mode;
-    double *peak; /* (CRITERIA, rows): largest exposure of a point */
-} Failure;
+    int64_t prunes;         /* whether states that cannot rise are not evaluated, see failure.h */
+} Plies;
 
-/* Largest exposures of the interfaces of elements; `width` is `interfaces` in fours, `stride` their number
- * in the arrays of all elements. */
+/* Interfaces between the plies of elements; `width` is `interfaces` in fours. */
 typedef struct {
-    int64_t elements, interfaces, width, stride;
-    const int64_t *row;  /* (elements,): in the arrays of all elements; all if NULL */
-    const double *shear; /* (12, 4, width): tau_13 and tau_23 over their strengths, of both plies, per gradient */
+    int64_t elements, interfaces, width;
+    const int64_t *row;  /* (elements,): among those of the plate; all if NULL */
+    const double *shear; /* (2, strains, 4, width): tau_13 and tau_23 over their strengths, of both plies, per gradient */
     int64_t code;        /* of the mode of failure */
-    double *exposure, *time; /* (rows, stride) */
-    int8_t *mode;
 } Interfaces;
 
 /* Midplane strains, curvatures and their derivatives at the centre, of elements with the same nodes present;
@@ -226,3 +214,31 @@ typedef struct {
 
 /* Tying points of w,1 and of w,2, in fours: six of e_11 or e_22, four of e_12. */
 enum { TYING = 12 };
+
+/* Largest exposures so far, their times and modes. */
+typedef struct {
+    double *exposure, *time;
+    int8_t *mode;
+} Maxima;
+
+/* Of each criterion the largest exposure that counts, its state, mode, and the strains when it was reached. */
+typedef struct {
+    double *exposure, *strain; /* (criteria,), (criteria, 6) */
+    int64_t *state;
+    int8_t *mode;
+} Largest;
+
+/* Exposures of a plate.  In the arrays a point has `states` states, and an element `interfaces` interfaces. */
+typedef struct {
+    int64_t elements, points, states, interfaces;
+    int64_t strains;            /* of a point: 3 midplane strains and 3 curvatures, or these alone */
+    int64_t criteria;           /* with the interlaminar one, which is the last */
+    int64_t families, runs, zones;
+    const Midplane *family;     /* (families,) */
+    const Plies *run;           /* (runs,) */
+    const Interfaces *zone;     /* (zones,) */
+    const int8_t *counts, *far; /* (points,), (elements,): whether the exposures there count */
+    Maxima plies, between;      /* (CRITERIA, points, states), (elements, interfaces) */
+    Largest largest;
+    double *strain, *gradient;  /* (points, strains), (elements, 2, strains): of the displacement in work */
+} Exposures;
