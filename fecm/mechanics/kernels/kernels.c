@@ -7,7 +7,7 @@
  *   plate.h       K u, the plate's update, and strains; twice, with AVX2 and without
  *   assumed_shear.h  assumed shear strains of factorized elements; twice
  *   membrane.h    forces of the membrane of a nonlinear plate; twice
- *   sweep.h       many impacts on one plate, four at a time; twice
+ *   sweep.h       many impacts on one plate, eight at a time; twice
  *   midplane.h    strains of the midplane and curvatures for the exposures; twice
  *   failure.h     exposures of plies, four states of stress at a time; twice
  *   fields.h      places of the fields of structures, for a test
@@ -57,6 +57,7 @@
 #endif
 
 #define LANES 8
+#define APART __attribute__((noinline)) /* loops that need all registers, which compilers find only there */
 #define PASSES 5 /* of the contact iteration */
 #define TOLERANCE 1.0e-6
 #define MOST_THREADS 64
@@ -80,21 +81,39 @@ typedef int64_t mask __attribute__((vector_size(32)));
 
 /* Sizes of a sweep. */
 enum {
-    CASES = 4,
+    WIDTH = 4,  /* lanes of a half */
+    GROUPS = 2, /* of so many cases, computed together */
+    CASES = WIDTH * GROUPS,
     CHECKED = 64, /* steps from one check of the energies to the next */
-    FAR = 128,    /* steps whose forces act on later blocks of steps by Fourier transforms */
-    SPACED = 4 * FAR + 8 /* from one spectrum to the next; a power of two would share few sets of the cache */
+    FAR = 128     /* steps whose forces act on later blocks of steps by Fourier transforms */
 };
 
 /* Responses of plate and tip to a unit force, and memory for their sums over forces. */
 typedef struct {
     double *response, unit, gain; /* (steps, 2), the tip's over `unit`; its acceleration at once */
     double *power, *reach; /* (modes, 3, 3), (modes, CHECKED, 3): a block of steps, a force in each */
-    double *turn, *filter; /* (FAR, 2): cos and sin; spectra (blocks, 2 FAR, 2) */
-    half *work, *spectra;  /* (2 FAR, 2); spectra (blocks, 2 FAR, 2) */
-    half *force, *motion;  /* (FAR,), (modes, 3) */
+    double *turn, *filter; /* (FAR, 2): cos and sin; spectra (2 FAR, spaced, 2) */
+    half *work, *spectra;  /* (GROUPS, 2 FAR, 2); spectra (2 FAR, spaced, GROUPS, 2) */
+    half *force, *motion;  /* (FAR, GROUPS), (modes, GROUPS, 3) */
     int64_t *used;         /* (blocks,): those whose forces are not all 0 */
+    int64_t spaced;        /* blocks, or one more: a power of two would share few sets of the cache */
 } Response;
+
+/* Loading histories of four cases; see History. */
+typedef struct {
+    half branch, f, b, w, p, peak, peak_force, permanent;
+} Histories;
+
+/* Four cases of a sweep after a step. */
+typedef struct {
+    int64_t at[WIDTH]; /* their columns */
+    Law law[WIDTH];
+    Histories history;
+    half scale, gain; /* factor of mass and stiffness; acceleration of the tip per force */
+    half tip, velocity, acceleration, indentation, force, push, w, dw;
+    half initial, contact_work, plate_work; /* energies */
+    half deepest, highest, sharpest, lost, unconverged; /* see FOUND_DEEPEST and so on */
+} Cases;
 
 /* Inner products of a state: d M d, d f, u f, f s with the internal force f = K u; and the work of the
  * membrane force on the quadratic strains of a nonlinear plate. */
@@ -428,30 +447,43 @@ EXPORT int64_t fecm_impact_steps(const Plate *plate, Impact *impact, int64_t ste
     return with_memory(&job) ? job.taken : -1;
 }
 
+/* Add the responses of four modes of the projectile, a lane each, of which `count` are modes. */
+static void respond_modes(const Sweep *x, Response *r, int64_t first, int count) {
+    half T[3][3], y[4][3] = {{{0}}}, shape; /* columns of y: motion after a unit of each motion; after a unit force */
+    for (int lane = 0; lane < WIDTH; lane++) {
+        const int64_t n = x->modes, i = first + (lane < count ? lane : 0);
+        for (int row = 0; row < 3; row++) {
+            for (int column = 0; column < 3; column++) T[row][column][lane] = x->T[(3 * row + column) * n + i];
+            y[row][row][lane] = 1.0;
+            y[3][row][lane] = x->h[row * n + i];
+        }
+        shape[lane] = x->tip_shape[i];
+    }
+    for (int64_t step = 0; step < x->steps || step < CHECKED; step++) {
+        for (int lane = 0; lane < count && step < CHECKED; lane++)
+            for (int row = 0; row < 3; row++)
+                r->reach[3 * (CHECKED * (first + lane) + CHECKED - 1 - step) + row] = y[3][row][lane];
+        for (int column = step < CHECKED ? 0 : 3; column < 4; column++) {
+            const half q = y[column][0], v = y[column][1], a = y[column][2];
+            for (int row = 0; row < 3; row++) y[column][row] = T[row][0] * q + T[row][1] * v + T[row][2] * a;
+        }
+        const half tip = shape * y[3][2];
+        for (int lane = 0; lane < count && step < x->steps; lane++) r->response[2 * step + 1] += tip[lane];
+        if (step != CHECKED - 1) continue;
+        for (int lane = 0; lane < count; lane++)
+            for (int row = 0; row < 3; row++)
+                for (int column = 0; column < 3; column++)
+                    r->power[9 * (first + lane) + 3 * row + column] = y[column][row][lane];
+    }
+}
+
 /* Fill in the responses of the tip, and tables of sines. */
 static void respond(const Sweep *x, Response *r) {
     const int64_t n = x->modes;
     double largest[2] = {0.0, 0.0}, now = 0.0;
     memset(r->response, 0, sizeof(double) * 2 * x->steps);
-    for (int64_t i = 0; i < n; i++) {
-        /* Column 3 of y: motion after a unit force; others: after a unit of each motion. */
-        double y[4][3] = {{1.0}, {0.0, 1.0}, {0.0, 0.0, 1.0}, {x->h[i], x->h[n + i], x->h[2 * n + i]}};
-        for (int64_t step = 0; step < x->steps || step < CHECKED; step++) {
-            if (step < CHECKED) memcpy(r->reach + 3 * (CHECKED * i + CHECKED - 1 - step), y[3], sizeof y[3]);
-            for (int column = step < CHECKED ? 0 : 3; column < 4; column++) {
-                const double q = y[column][0], v = y[column][1], a = y[column][2];
-                for (int row = 0; row < 3; row++) {
-                    const double *T = x->T + 3 * row * n + i;
-                    y[column][row] = T[0] * q + T[n] * v + T[2 * n] * a;
-                }
-            }
-            if (step < x->steps) r->response[2 * step + 1] += x->tip_shape[i] * y[3][2];
-            if (step == CHECKED - 1)
-                for (int row = 0; row < 3; row++)
-                    for (int column = 0; column < 3; column++) r->power[9 * i + 3 * row + column] = y[column][row];
-        }
-        r->gain += x->tip_shape[i] * x->h[2 * n + i];
-    }
+    for (int64_t i = 0; i < n; i += WIDTH) respond_modes(x, r, i, n - i < WIDTH ? n - i : WIDTH);
+    for (int64_t i = 0; i < n; i++) r->gain += x->tip_shape[i] * x->h[2 * n + i];
     for (int64_t step = 0; step < x->steps; step++) {
         double *at = r->response + 2 * step;
         const double before = step ? now : 0.0; /* the force of a step is that at t + theta dt */
@@ -469,15 +501,15 @@ static void respond(const Sweep *x, Response *r) {
 
 /* Compute impacts; returns 0 if there is not enough memory. */
 EXPORT int fecm_sweep(const Sweep *x) {
-    const int64_t blocks = (x->steps + FAR - 1) / FAR, n = x->modes;
-    const int64_t numbers[] = {2 * x->steps, 9 * n, 3 * CHECKED * n, 2 * FAR, SPACED * blocks};
-    const int64_t halves[] = {4 * FAR, SPACED * blocks, FAR, 3 * n};
+    const int64_t blocks = (x->steps + FAR - 1) / FAR, spaced = blocks | 1, n = x->modes;
+    const int64_t numbers[] = {2 * x->steps, 9 * n, 3 * CHECKED * n, 2 * FAR, 4 * FAR * spaced};
+    const int64_t halves[] = {4 * FAR * GROUPS, 4 * FAR * spaced * GROUPS, FAR * GROUPS, 3 * n * GROUPS};
     int64_t size = sizeof(int64_t) * blocks;
     for (int i = 0; i < 5; i++) size += sizeof(double) * numbers[i];
     for (int i = 0; i < 4; i++) size += sizeof(half) * halves[i];
     half *memory = malloc(size);
     if (!memory) return 0;
-    Response r = {.gain = 0.0};
+    Response r = {.gain = 0.0, .spaced = spaced};
     half **of_halves[] = {&r.work, &r.spectra, &r.force, &r.motion};
     double **of_numbers[] = {&r.response, &r.power, &r.reach, &r.turn, &r.filter};
     half *at = memory;

@@ -1,10 +1,11 @@
-/* Many impacts on one plate, four cases at a time; included once for each instruction set.
+/* Many impacts on one plate, eight cases at a time; included once for each instruction set.
  *
  * Plate and projectile are linear.  The displacement w of the plate and the acceleration of the tip
  * are sums over the earlier contact forces of a case with `response`, the answers to a unit force:
  * w_n = sum over m < n of g_(n-m) F_m.  The force of a step follows from w by the contact iteration.
  *
- * Layout.  Each of four lanes is a case; those beyond the last case repeat it.  Response and spectra
+ * Layout.  Cases are computed in GROUPS of four, a lane each, whose chains of divisions and roots
+ * overlap, and which share what they load; lanes beyond the last case repeat it.  Response and spectra
  * interleave plate and tip, (.., 2), so that both sums are one complex transform: the plate is the
  * real part, the tip the imaginary one, divided by `unit` to be of the same size.
  *
@@ -21,191 +22,360 @@
 
 INLINE half NAME(choose)(mask where, half a, half b) { return (half)((where & (mask)a) | (~where & (mask)b)); }
 INLINE half NAME(size)(half x) { return (half)((mask)x & INT64_MAX); }
-INLINE int NAME(any)(mask where) { return ANY(where); }
 
-/* Fourier transform of 2 FAR numbers (re, im); frequencies are in bit-reversed order. */
-INLINE void NAME(transform)(half *z, const double *turn) {
-    for (int width = FAR, step = 1; width; width /= 2, step *= 2)
-        for (int first = 0; first < 2 * FAR; first += 2 * width)
+/* Whether a lane of any group is set. */
+INLINE int NAME(any)(const mask *where) {
+    mask found = where[0];
+    for (int g = 1; g < GROUPS; g++) found |= where[g];
+    return ANY(found);
+}
+
+/* A butterfly of a Fourier transform: u + v, and u - v turned back. */
+INLINE void NAME(part)(half *u, half *v, const double *turn) {
+    const double c = turn[0], s = turn[1];
+    const half re = u[0] - v[0], im = u[1] - v[1];
+    u[0] += v[0], u[1] += v[1];
+    v[0] = c * re + s * im, v[1] = c * im - s * re;
+}
+
+/* The inverse of `part`, times 2. */
+INLINE void NAME(join)(half *u, half *v, const double *turn) {
+    const double c = turn[0], s = turn[1];
+    const half re = c * v[0] - s * v[1], im = c * v[1] + s * v[0];
+    v[0] = u[0] - re, v[1] = u[1] - im;
+    u[0] += re, u[1] += im;
+}
+
+/* Fourier transform of `count` numbers (re, im), a power of two up to 2 FAR; frequencies are in bit-reversed
+ * order.  Two stages at a time, so that numbers are loaded and stored half as often. */
+TARGET void NAME(transform)(half *z, int count, const double *turn) {
+    int width = count / 2, step = 2 * FAR / count;
+    for (; width > 1; width /= 4, step *= 4)
+        for (half *first = z; first < z + 2 * count; first += 4 * width)
+            for (int i = 0; i < width / 2; i++) {
+                half *at = first + 2 * i, u[4][2];
+                for (int k = 0; k < 4; k++) u[k][0] = at[k * width], u[k][1] = at[k * width + 1];
+                NAME(part)(u[0], u[2], turn + 2 * i * step);
+                NAME(part)(u[1], u[3], turn + 2 * (i + width / 2) * step);
+                NAME(part)(u[0], u[1], turn + 4 * i * step);
+                NAME(part)(u[2], u[3], turn + 4 * i * step);
+                for (int k = 0; k < 4; k++) at[k * width] = u[k][0], at[k * width + 1] = u[k][1];
+            }
+    if (width)
+        for (half *first = z; first < z + 2 * count; first += 4) NAME(part)(first, first + 2, turn);
+}
+
+/* The same for 2 FAR real numbers, at half of the places: for n <= i < 2 n, n a power of two, place
+ * 3 n - 1 - i has the opposite frequency of place i, and only the smaller of both is computed. */
+TARGET void NAME(transform_real)(half *z, const double *turn) {
+    for (int width = FAR, step = 1; width > 1; width /= 2, step *= 2) {
+        for (int i = 0; i < width / 2; i++) {
+            half *u = z + 2 * i, *v = u + width, *w = v + width, *x = w + width;
+            NAME(part)(u, w, turn + 2 * i * step);
+            NAME(part)(v, x, turn + 2 * (i + width / 2) * step);
+            w[0] += x[0], w[1] += x[1]; /* the next stage; w - x leads to the other half */
+        }
+        NAME(transform)(z + 2 * width, width / 2, turn);
+    }
+    NAME(part)(z, z + 2, turn);
+}
+
+/* The first FAR numbers of the inverse of a transform, times 2 FAR. */
+TARGET void NAME(restore)(half *z, const double *turn) {
+    for (int width = 1, step = FAR; width < FAR; width *= 4, step /= 4)
+        for (half *first = z; first < z + 4 * FAR; first += 8 * width)
             for (int i = 0; i < width; i++) {
-                half *u = z + 2 * (first + i), *v = u + 2 * width;
-                const double c = turn[2 * i * step], s = turn[2 * i * step + 1];
-                const half re = u[0] - v[0], im = u[1] - v[1];
-                u[0] += v[0], u[1] += v[1];
-                v[0] = c * re + s * im, v[1] = c * im - s * re;
+                half *at = first + 2 * i, u[4][2];
+                for (int k = 0; k < 4; k++) u[k][0] = at[2 * k * width], u[k][1] = at[2 * k * width + 1];
+                NAME(join)(u[0], u[1], turn + 2 * i * step);
+                NAME(join)(u[2], u[3], turn + 2 * i * step);
+                NAME(join)(u[0], u[2], turn + i * step);
+                NAME(join)(u[1], u[3], turn + (i + width) * step);
+                for (int k = 0; k < 4; k++) at[2 * k * width] = u[k][0], at[2 * k * width + 1] = u[k][1];
             }
 }
 
-/* The inverse of `transform`, times 2 FAR. */
-INLINE void NAME(restore)(half *z, const double *turn) {
-    for (int width = 1, step = FAR; width <= FAR; width *= 2, step /= 2)
-        for (int first = 0; first < 2 * FAR; first += 2 * width)
-            for (int i = 0; i < width; i++) {
-                half *u = z + 2 * (first + i), *v = u + 2 * width;
-                const double c = turn[2 * i * step], s = turn[2 * i * step + 1];
-                const half re = c * v[0] - s * v[1], im = c * v[1] + s * v[0];
-                v[0] = u[0] - re, v[1] = u[1] - im;
-                u[0] += re, u[1] += im;
-            }
-}
-
-/* Spectra (blocks - 1, 2 FAR, 2) of the responses that a block of forces meets 1, 2, ... blocks later. */
+/* Spectra (2 FAR, blocks - 1, 2) of the responses that a block of forces meets 1, 2, ... blocks later. */
 TARGET void NAME(filters)(const Sweep *x, const Response *r) {
     const int64_t count = (x->steps - 1) / FAR;
-    for (int64_t first = 0; first < count; first += CASES) {
+    for (int64_t first = 0; first < count; first += WIDTH) {
         half *z = r->work;
         memset(z, 0, sizeof(half) * 4 * FAR);
-        for (int64_t lane = 0; lane < CASES; lane++)
+        for (int64_t lane = 0; lane < WIDTH; lane++)
             for (int64_t i = 1 - FAR; i < FAR; i++) {
                 const int64_t n = (first + lane + 1) * FAR + i - 1;
                 if (n >= x->steps) break;
                 for (int part = 0; part < 2; part++)
                     z[2 * (i < 0 ? i + 2 * FAR : i) + part][lane] = r->response[2 * n + part] / (2 * FAR);
             }
-        NAME(transform)(z, r->turn);
-        for (int64_t lane = 0; lane < CASES && first + lane < count; lane++)
-            for (int64_t i = 0; i < 4 * FAR; i++) r->filter[(first + lane) * SPACED + i] = z[i][lane];
+        NAME(transform)(z, 2 * FAR, r->turn);
+        for (int64_t lane = 0; lane < WIDTH && first + lane < count; lane++)
+            for (int64_t i = 0; i < 4 * FAR; i++)
+                r->filter[2 * (i / 2 * r->spaced + first + lane) + i % 2] = z[i][lane];
     }
 }
 
-/* sum += g f, and at the opposite frequency opposite += h f*; f is the spectrum of real numbers. */
-INLINE void NAME(add_product)(const double *g, const double *h, const half *f, half *sum, half *opposite) {
-    const half re = f[0], im = f[1];
-    sum[0] += g[0] * re, sum[1] += g[1] * re, opposite[0] += h[0] * re, opposite[1] += h[1] * re;
-    sum[0] -= g[1] * im, sum[1] += g[0] * im, opposite[0] += h[1] * im, opposite[1] -= h[0] * im;
-}
-
-/* Spectrum of those sums at a place and those after it, and at the opposite place and those before it. */
-INLINE void NAME(far_places)(const Response *r, int64_t block, int64_t used, int first, int last, const int places) {
-    half sum[2][2] = {{{0}}}, opposite[2][2] = {{{0}}};
+/* Spectrum of the sums over earlier blocks at two places of opposite frequencies, or at one that is its own. */
+INLINE void NAME(far_places)(const Response *r, int64_t block, int64_t used, int place, int other) {
+    const int64_t row = 2 * GROUPS * r->spaced;
+    const double *filter = r->filter + 2 * place * r->spaced, *opposite_filter = r->filter + 2 * other * r->spaced;
+    half sum[GROUPS][2] = {{{0}}}, opposite[GROUPS][2] = {{{0}}};
     for (int64_t k = 0; k < used; k++) {
-        const double *g = r->filter + (block - 1 - r->used[k]) * SPACED;
-        const half *f = r->spectra + r->used[k] * SPACED;
-        for (int i = 0; i < places; i++)
-            NAME(add_product)(g + 2 * (first + i), g + 2 * (last - i), f + 2 * (first + i), sum[i], opposite[i]);
+        const int64_t lag = 2 * (block - 1 - r->used[k]);
+        const double *at = filter + lag, *to = opposite_filter + lag;
+        const half *f = r->spectra + place * row + 2 * GROUPS * r->used[k];
+        __builtin_prefetch(f + row), __builtin_prefetch(f + row + 2); /* those of the next place */
+        for (int g = 0; g < GROUPS; g++, f += 2) { /* the spectrum of real numbers: f* at the other place */
+            const half re = f[0], im = f[1];
+            sum[g][0] += at[0] * re, sum[g][1] += at[1] * re, opposite[g][0] += to[0] * re, opposite[g][1] += to[1] * re;
+            sum[g][0] -= at[1] * im, sum[g][1] += at[0] * im, opposite[g][0] += to[1] * im, opposite[g][1] -= to[0] * im;
+        }
     }
-    for (int i = 0; i < places; i++) {
-        half *at = r->work + 2 * (first + i), *to = r->work + 2 * (last - i);
-        at[0] = sum[i][0], at[1] = sum[i][1];
-        to[0] = opposite[i][0], to[1] = opposite[i][1];
+    for (int g = 0; g < GROUPS; g++) {
+        half *z = r->work + 4 * FAR * g;
+        z[2 * other] = opposite[g][0], z[2 * other + 1] = opposite[g][1];
+        z[2 * place] = sum[g][0], z[2 * place + 1] = sum[g][1];
     }
 }
 
-/* Sums over the forces of earlier blocks, (FAR, 2), in `work`; `used` of them have forces other than 0. */
-INLINE void NAME(far_sums)(const Response *r, int64_t block, int64_t used) {
-    half *z = r->work;
-    if (used && r->used[used - 1] == block - 1) {
-        half *spectrum = r->spectra + (block - 1) * SPACED;
-        memset(z, 0, sizeof(half) * 4 * FAR);
-        for (int i = 0; i < FAR; i++) z[2 * i] = r->force[i];
-        NAME(transform)(z, r->turn);
-        /* Places i and 3 n - 1 - i, n the largest power of two in i, have opposite frequencies. */
-        memcpy(spectrum, z, sizeof(half) * 4);
-        for (int n = 2; n < 2 * FAR; n *= 2) memcpy(spectrum + 2 * n, z + 2 * n, sizeof(half) * n);
-    }
-    for (int place = 0; place < 2; place++) { /* their own opposites */
-        half sum[2] = {{0}}, opposite[2] = {{0}};
-        for (int64_t k = 0; k < used; k++) {
-            const double *g = r->filter + (block - 1 - r->used[k]) * SPACED + 2 * place;
-            NAME(add_product)(g, g, r->spectra + r->used[k] * SPACED + 2 * place, sum, opposite);
+/* Store a place of the spectrum of the forces of a block. */
+INLINE void NAME(keep)(const Response *r, const half *z, int place, int64_t block, int g) {
+    half *to = r->spectra + 2 * (GROUPS * (place * r->spaced + block) + g);
+    to[0] = z[2 * place], to[1] = z[2 * place + 1];
+}
+
+/* Sums over the forces of earlier blocks, (GROUPS, FAR, 2), in `work`; `used` of them have forces other than 0. */
+APART TARGET void NAME(far_sums)(const Response *r, int64_t block, int64_t used) {
+    if (used && r->used[used - 1] == block - 1)
+        for (int g = 0; g < GROUPS; g++) {
+            half *z = r->work;
+            memset(z, 0, sizeof(half) * 4 * FAR);
+            for (int i = 0; i < FAR; i++) z[2 * i] = r->force[GROUPS * i + g];
+            NAME(transform_real)(z, r->turn);
+            NAME(keep)(r, z, 0, block - 1, g);
+            for (int n = 1; n < 2 * FAR; n *= 2)
+                for (int i = n; i <= 3 * n - 1 - i; i++) NAME(keep)(r, z, i, block - 1, g);
         }
-        z[2 * place] = sum[0], z[2 * place + 1] = sum[1];
-    }
-    NAME(far_places)(r, block, used, 2, 3, 1);
-    for (int n = 4; n < 2 * FAR; n *= 2)
-        for (int first = n, last = 2 * n - 1; first < last; first += 2, last -= 2)
-            NAME(far_places)(r, block, used, first, last, 2);
-    NAME(restore)(z, r->turn);
+    NAME(far_places)(r, block, used, 0, 0);
+    for (int n = 1; n < 2 * FAR; n *= 2)
+        for (int i = n; i <= 3 * n - 1 - i; i++) NAME(far_places)(r, block, used, i, 3 * n - 1 - i);
+    for (int g = 0; g < GROUPS; g++) NAME(restore)(r->work + 4 * FAR * g, r->turn);
 }
 
 /* Sums over the forces of this block before an even row, for it and for the next one. */
-INLINE void NAME(near_sums)(const Response *r, int row, half near[2][2]) {
-    const double *g = r->response + 2 * row;
-    half sum[2][4]; /* of even and odd forces */
-    for (int i = 0; i < 8; i++) sum[i / 4][i % 4] = (half){0};
-    for (int past = 0; past < row; past += 2)
-        for (int odd = 0; odd < 2; odd++, g -= 2) {
-            const half f = r->force[past + odd];
-            sum[odd][0] += g[-2] * f, sum[odd][1] += g[-1] * f, sum[odd][2] += g[0] * f, sum[odd][3] += g[1] * f;
+APART TARGET void NAME(near_sums)(const Response *r, int row, half near[GROUPS][2][2]) {
+    memset(near, 0, sizeof(half) * GROUPS * 4);
+    for (int odd = 0; odd < 2; odd++) { /* even and odd forces are summed apart, and in registers */
+        half sum[GROUPS][4] = {{{0}}};
+        for (int past = odd; past < row; past += 2) {
+            const double *at = r->response + 2 * (row - past - 1);
+            const half *f = r->force + GROUPS * past;
+            for (int i = 0; i < 4; i++)
+                for (int g = 0; g < GROUPS; g++) sum[g][i] += at[i] * f[g];
         }
-    for (int i = 0; i < 4; i++) near[i / 2][i % 2] = sum[0][i] + sum[1][i];
+        for (int g = 0; g < GROUPS; g++)
+            for (int i = 0; i < 4; i++) near[g][i / 2][i % 2] += sum[g][i];
+    }
 }
 
 /* Cases whose indentation may leave the branch. */
-INLINE mask NAME(turns)(const half *m, half last, half a) {
-    const mask falls = a < last, virgin = m[0] == (double)VIRGIN, unloading = m[0] == (double)UNLOADING;
-    const mask back = (a >= m[5]) | (unloading & (a > last)) | (~unloading & falls);
+INLINE mask NAME(turns)(const Cases *c, half last, half a) {
+    const Histories *m = &c->history;
+    const mask falls = a < last, virgin = m->branch == (double)VIRGIN, unloading = m->branch == (double)UNLOADING;
+    const mask back = (a >= m->peak) | (unloading & (a > last)) | (~unloading & falls);
     return (virgin & falls) | (~virgin & back);
 }
 
-INLINE History NAME(pick)(const half *m, int lane) {
-    return (History){m[0][lane], m[1][lane], m[2][lane], m[3][lane],
-                     m[4][lane], m[5][lane], m[6][lane], m[7][lane]};
+/* History of a case after a step that ends at an indentation. */
+INLINE History NAME(turned)(const Cases *c, int lane, Point last, double a) {
+    const Histories *m = &c->history;
+    const History old = {m->branch[lane], m->f[lane], m->b[lane], m->w[lane],
+                         m->p[lane], m->peak[lane], m->peak_force[lane], m->permanent[lane]};
+    return accepted(c->law + lane, &old, &last, a);
 }
 
-/* Force on the curves of the branches. */
-INLINE half NAME(curve)(const half *m, half a) {
-    const half none = {0}, p = m[4];
-    const mask on = a > m[2];
-    if (!NAME(any)(on)) return none;
-    const half x = NAME(choose)(on, (a - m[2]) / m[3], none), root = ROOT(x);
-    half value = NAME(choose)(p == 1.5, x * root, NAME(choose)(p == 2.0, x * x, x * x * root));
-    const mask other = on & (p != 1.5) & (p != 2.0) & (p != 2.5);
-    if (NAME(any)(other))
-        for (int lane = 0; lane < CASES; lane++)
-            if (other[lane]) value[lane] = pow(x[lane], p[lane]);
-    return NAME(choose)(on, m[1] * value, none);
-}
-
-/* Motion of the modes of four projectiles after some steps under forces on the tip. */
-INLINE void NAME(move_modes)(const Sweep *x, const Response *r, const half *applied, int steps) {
-    const int64_t n = x->modes;
-    int pushed = 0;
-    for (int step = 0; step < steps && !pushed; step++) pushed = NAME(any)(applied[step] != 0.0);
-    for (int64_t i = 0; i < n; i++) {
-        half *y = r->motion + 3 * i;
-        if (steps < CHECKED) {
-            for (int step = 0; step < steps; step++) {
-                const half q = y[0], v = y[1], a = y[2];
-                for (int row = 0; row < 3; row++) {
-                    const double *T = x->T + 3 * row * n + i;
-                    y[row] = T[0] * q + T[n] * v + T[2 * n] * a + x->h[row * n + i] * applied[step];
-                }
-            }
-            continue;
-        }
-        const double *P = r->power + 9 * i, *g = r->reach + 3 * CHECKED * i;
-        half sum[4][3] = {{{0}}};
-        for (int step = 0; step < CHECKED && pushed; step += 4, g += 12)
-            for (int part = 0; part < 4; part++)
-                for (int row = 0; row < 3; row++) sum[part][row] += g[3 * part + row] * applied[step + part];
-        const half q = y[0], v = y[1], a = y[2];
-        for (int row = 0; row < 3; row++)
-            y[row] = ((sum[0][row] + sum[1][row]) + (sum[2][row] + sum[3][row])) +
-                     (P[3 * row] * q + P[3 * row + 1] * v + P[3 * row + 2] * a);
-    }
-}
-
-/* The impacts of four cases; lanes beyond the last repeat it. */
-TARGET void NAME(run_cases)(const Sweep *x, const Response *r, int64_t first) {
+/* Forces on the curves of the branches. */
+INLINE void NAME(curves)(const Cases *cases, const half *a, half *force) {
     const half none = {0};
-    int64_t at[CASES];
-    half given[GIVEN];
-    for (int lane = 0; lane < CASES; lane++) {
-        at[lane] = first + lane < x->cases ? first + lane : x->cases - 1;
-        for (int row = 0; row < GIVEN; row++) given[row][lane] = x->given[row * x->stride + at[lane]];
+    mask on[GROUPS], other[GROUPS];
+    for (int g = 0; g < GROUPS; g++) on[g] = a[g] > cases[g].history.b, force[g] = none;
+    if (!NAME(any)(on)) return;
+    half x[GROUPS];
+    for (int g = 0; g < GROUPS; g++) {
+        const Histories *m = &cases[g].history;
+        const half p = m->p;
+        x[g] = NAME(choose)(on[g], (a[g] - m->b) / m->w, none);
+        const half root = ROOT(x[g]);
+        force[g] = NAME(choose)(p == 1.5, x[g] * root, NAME(choose)(p == 2.0, x[g] * x[g], x[g] * x[g] * root));
+        other[g] = on[g] & (p != 1.5) & (p != 2.0) & (p != 2.5);
     }
-    Law law[CASES];
-    for (int lane = 0; lane < CASES; lane++)
-        law[lane] = (Law){given[GIVEN_K][lane], given[GIVEN_Q][lane], given[GIVEN_CRITICAL][lane], given[GIVEN_SLOPE][lane], x->law};
-    const half scale = given[GIVEN_FACTOR], gain = r->gain / scale;
-    half m[8] = {none, given[GIVEN_K], none, none + 1.0, none + 1.5, none, none, none};
-    half tip = none, velocity = -given[GIVEN_VELOCITY], acceleration = none, indentation = none, force = none, w = none;
-    half deepest = none, highest = none, sharpest = none, lost = none, unconverged = none;
-    half plate_work = none, contact_work = none, dw = none, applied[CHECKED], near[2][2] = {{none}};
-    for (int64_t i = 0; i < 3 * x->modes; i++) r->motion[i] = none;
-    r->motion[1] = velocity / x->tip_shape[0]; /* the rigid motion */
-    const half initial = 0.5 * scale * r->motion[1] * r->motion[1];
+    if (NAME(any)(other))
+        for (int g = 0; g < GROUPS; g++)
+            for (int lane = 0; lane < WIDTH; lane++)
+                if (other[g][lane]) force[g][lane] = pow(x[g][lane], cases[g].history.p[lane]);
+    for (int g = 0; g < GROUPS; g++) force[g] = NAME(choose)(on[g], cases[g].history.f * force[g], none);
+}
+
+/* Motion of a mode of the projectiles after some steps under forces on the tip, step by step. */
+INLINE void NAME(move_mode)(const Sweep *x, int64_t mode, const half *applied, int steps, half motion[GROUPS][3]) {
+    const int64_t n = x->modes;
+    const double *T = x->T + mode, *h = x->h + mode;
+    for (int step = 0; step < steps; step++)
+        for (int g = 0; g < GROUPS; g++) {
+            const half q = motion[g][0], v = motion[g][1], a = motion[g][2];
+            for (int row = 0; row < 3; row++)
+                motion[g][row] = T[3 * row * n] * q + T[(3 * row + 1) * n] * v + T[(3 * row + 2) * n] * a + h[row * n] * applied[GROUPS * step + g];
+        }
+}
+
+/* Sums over two of four forces for the motion after CHECKED steps. */
+INLINE void NAME(reach_sums)(const double *reach, const half *applied, half total[GROUPS][3]) {
+    half sum[2][GROUPS][3] = {{{{0}}}};
+    for (int step = 0; step < CHECKED; step += 4, reach += 12, applied += 4 * GROUPS)
+        for (int part = 0; part < 2; part++)
+            for (int row = 0; row < 3; row++)
+                for (int g = 0; g < GROUPS; g++) sum[part][g][row] += reach[3 * part + row] * applied[GROUPS * part + g];
+    for (int g = 0; g < GROUPS; g++)
+        for (int row = 0; row < 3; row++) total[g][row] = sum[0][g][row] + sum[1][g][row];
+}
+
+/* The same after CHECKED steps at once. */
+INLINE void NAME(leap_mode)(const Response *r, int64_t mode, const half *applied, int pushed, half motion[GROUPS][3]) {
+    const double *P = r->power + 9 * mode, *reach = r->reach + 3 * CHECKED * mode;
+    half sum[2][GROUPS][3] = {{{{0}}}};
+    if (pushed) {
+        NAME(reach_sums)(reach, applied, sum[0]);
+        NAME(reach_sums)(reach + 6, applied + 2 * GROUPS, sum[1]);
+    }
+    for (int g = 0; g < GROUPS; g++) {
+        const half q = motion[g][0], v = motion[g][1], a = motion[g][2];
+        for (int row = 0; row < 3; row++)
+            motion[g][row] = (sum[0][g][row] + sum[1][g][row]) + (P[3 * row] * q + P[3 * row + 1] * v + P[3 * row + 2] * a);
+    }
+}
+
+/* Motion of all modes after some steps. */
+APART TARGET void NAME(move_modes)(const Sweep *x, const Response *r, const half *applied, int steps) {
+    int pushed = 0;
+    for (int i = 0; i < GROUPS * steps && !pushed; i++) pushed = ANY(applied[i] != 0.0);
+    for (int64_t mode = 0; mode < x->modes; mode++) {
+        half(*motion)[3] = (half(*)[3])(r->motion + 3 * GROUPS * mode);
+        if (steps == CHECKED)
+            NAME(leap_mode)(r, mode, applied, pushed, motion);
+        else
+            NAME(move_mode)(x, mode, applied, steps, motion);
+    }
+}
+
+/* Cases before their impacts; those beyond the last repeat it. */
+INLINE void NAME(begin)(const Sweep *x, const Response *r, int64_t first, Cases *c) {
+    const half none = {0};
+    half given[GIVEN];
+    for (int lane = 0; lane < WIDTH; lane++) {
+        c->at[lane] = first + lane < x->cases ? first + lane : x->cases - 1;
+        for (int row = 0; row < GIVEN; row++) given[row][lane] = x->given[row * x->stride + c->at[lane]];
+        c->law[lane] = (Law){given[GIVEN_K][lane], given[GIVEN_Q][lane], given[GIVEN_CRITICAL][lane], given[GIVEN_SLOPE][lane], x->law};
+    }
+    c->history = (Histories){none, given[GIVEN_K], none, none + 1.0, none + 1.5, none, none, none};
+    c->scale = given[GIVEN_FACTOR], c->gain = r->gain / c->scale;
+    c->tip = none, c->velocity = -given[GIVEN_VELOCITY], c->acceleration = none;
+    c->indentation = c->force = c->push = c->w = c->dw = none;
+    c->deepest = c->highest = c->sharpest = c->lost = c->unconverged = none;
+    c->plate_work = c->contact_work = none;
+}
+
+/* The contact iteration and the step of the tip; see couple_step. */
+INLINE void NAME(couple)(const Sweep *x, Cases *cases, const half *w, const half *base) {
+    const half none = {0};
+    half drift[GROUPS], carried[GROUPS], trial[GROUPS], force[GROUPS], a[GROUPS];
+    mask iterating[GROUPS], turning[GROUPS];
+    for (int g = 0; g < GROUPS; g++) {
+        const Cases *c = cases + g;
+        drift[g] = c->tip + x->dt * c->velocity + x->weight_before * c->acceleration;
+        carried[g] = (1.0 - x->theta) * c->force;
+        trial[g] = drift[g] + x->weight * c->acceleration;
+        force[g] = c->force;
+        iterating[g] = none == none;
+    }
+    for (int pass = 0; pass < PASSES && NAME(any)(iterating); pass++) {
+        half tried[GROUPS];
+        for (int g = 0; g < GROUPS; g++) {
+            a[g] = -trial[g] - w[g];
+            turning[g] = iterating[g] & NAME(turns)(cases + g, cases[g].indentation, a[g]);
+        }
+        NAME(curves)(cases, a, tried);
+        if (NAME(any)(turning))
+            for (int g = 0; g < GROUPS; g++)
+                for (int lane = 0; lane < WIDTH; lane++) {
+                    if (!turning[g][lane]) continue;
+                    const Point last = {cases[g].indentation[lane], cases[g].force[lane]};
+                    const History new = NAME(turned)(cases + g, lane, last, a[g][lane]);
+                    tried[g][lane] = force_of(&new, a[g][lane]);
+                }
+        for (int g = 0; g < GROUPS; g++) {
+            force[g] = NAME(choose)(iterating[g], tried[g], force[g]);
+            const half before = trial[g];
+            trial[g] = drift[g] + x->weight * (base[g] + cases[g].gain * (carried[g] + x->theta * force[g]));
+            iterating[g] &= ~(NAME(size)(trial[g] - before) < TOLERANCE * NAME(size)(trial[g]));
+        }
+    }
+    for (int g = 0; g < GROUPS; g++) {
+        Cases *c = cases + g;
+        c->unconverged += NAME(choose)(iterating[g], none + 1.0, none);
+        c->push = carried[g] + x->theta * force[g];
+        const half now = base[g] + c->gain * c->push;
+        c->tip = drift[g] + x->weight * now;
+        c->velocity += x->dt / 2.0 * (c->acceleration + now);
+        c->acceleration = now;
+        a[g] = -c->tip - w[g];
+        turning[g] = NAME(turns)(c, c->indentation, a[g]);
+    }
+    if (NAME(any)(turning))
+        for (int g = 0; g < GROUPS; g++)
+            for (int lane = 0; lane < WIDTH; lane++) {
+                if (!turning[g][lane]) continue;
+                const Point last = {cases[g].indentation[lane], cases[g].force[lane]};
+                const History new = NAME(turned)(cases + g, lane, last, a[g][lane]);
+                Histories *m = &cases[g].history;
+                m->branch[lane] = new.branch, m->f[lane] = new.f, m->b[lane] = new.b, m->w[lane] = new.w;
+                m->p[lane] = new.p, m->peak[lane] = new.peak, m->peak_force[lane] = new.peak_force;
+                m->permanent[lane] = new.permanent;
+            }
+    for (int g = 0; g < GROUPS; g++) {
+        Cases *c = cases + g;
+        const half mean = 0.5 * (c->force + force[g]), before = c->dw;
+        c->contact_work += mean * (a[g] - c->indentation);
+        c->dw = w[g] - c->w, c->w = w[g];
+        c->plate_work += mean * c->dw;
+        const half bend = NAME(size)(c->dw - before);
+        c->force = force[g], c->indentation = a[g];
+        c->sharpest = NAME(choose)(bend > c->sharpest, bend, c->sharpest);
+        c->deepest = NAME(choose)(c->indentation > c->deepest, c->indentation, c->deepest);
+        c->highest = NAME(choose)(c->w > c->highest, c->w, c->highest);
+    }
+}
+
+/* Compare the energies of cases. */
+INLINE void NAME(balance)(const Sweep *x, const half *motion, Cases *c) {
+    half energy = {0};
+    for (int64_t i = 0; i < x->modes; i++, motion += 3 * GROUPS)
+        energy += motion[1] * motion[1] + x->stiffness[i] * motion[0] * motion[0];
+    const half error = NAME(size)(0.5 * c->scale * energy + c->contact_work + c->plate_work - c->initial);
+    c->lost = NAME(choose)(~(error <= c->lost), error, c->lost);
+}
+
+/* The impacts of eight cases. */
+TARGET void NAME(run_cases)(const Sweep *x, const Response *r, int64_t first) {
+    Cases cases[GROUPS];
+    half applied[GROUPS * CHECKED], near[GROUPS][2][2] = {{{{0}}}};
+    memset(r->motion, 0, sizeof(half) * 3 * GROUPS * x->modes);
+    for (int g = 0; g < GROUPS; g++) {
+        Cases *c = cases + g;
+        NAME(begin)(x, r, first + WIDTH * g, c);
+        half *rigid = r->motion + 3 * g + 1;
+        *rigid = c->velocity / x->tip_shape[0];
+        c->initial = 0.5 * c->scale * *rigid * *rigid;
+    }
     int64_t used = 0;
     int fresh = 0; /* whether forces of this block are not all 0 */
     for (int64_t step = 0; step < x->steps; step++) {
@@ -216,86 +386,47 @@ TARGET void NAME(run_cases)(const Sweep *x, const Response *r, int64_t first) {
             fresh = 0;
         }
         if (row & 1)
-            for (int part = 0; part < 2; part++) near[0][part] = near[1][part] + r->response[part] * r->force[row - 1];
+            for (int g = 0; g < GROUPS; g++)
+                for (int part = 0; part < 2; part++)
+                    near[g][0][part] = near[g][1][part] + r->response[part] * r->force[GROUPS * (row - 1) + g];
         else
             NAME(near_sums)(r, fresh ? row : 0, near);
-        const half moved = r->work[2 * row] + near[0][0], pushed = r->work[2 * row + 1] + near[0][1];
-        const half base = pushed * r->unit / scale;
-        /* The contact iteration; see couple_step. */
-        const half drift = tip + x->dt * velocity + x->weight_before * acceleration;
-        const half carried = (1.0 - x->theta) * force, last_force = force, last = indentation;
-        half trial = drift + x->weight * acceleration;
-        mask iterating = none == none;
-        for (int pass = 0; pass < PASSES && NAME(any)(iterating); pass++) {
-            const half a = -trial - moved;
-            half tried = NAME(curve)(m, a);
-            const mask turning = iterating & NAME(turns)(m, last, a);
-            if (NAME(any)(turning))
-                for (int lane = 0; lane < CASES; lane++) {
-                    if (!turning[lane]) continue;
-                    const History old = NAME(pick)(m, lane);
-                    const Point point = {last[lane], last_force[lane]};
-                    const History new = accepted(law + lane, &old, &point, a[lane]);
-                    tried[lane] = force_of(&new, a[lane]);
-                }
-            force = NAME(choose)(iterating, tried, force);
-            const half before = trial;
-            trial = drift + x->weight * (base + gain * (carried + x->theta * force));
-            iterating &= ~(NAME(size)(trial - before) < TOLERANCE * NAME(size)(trial));
+        half w[GROUPS], base[GROUPS];
+        for (int g = 0; g < GROUPS; g++) {
+            const half *far = r->work + 4 * FAR * g + 2 * row;
+            w[g] = far[0] + near[g][0][0];
+            const half pushed = far[1] + near[g][0][1];
+            base[g] = pushed * r->unit / cases[g].scale;
         }
-        unconverged += NAME(choose)(iterating, none + 1.0, none);
-        const half push = carried + x->theta * force, now = base + gain * push;
-        tip = drift + x->weight * now;
-        velocity += x->dt / 2.0 * (acceleration + now);
-        acceleration = now;
-        indentation = -tip - moved;
-        const mask turning = NAME(turns)(m, last, indentation);
-        if (NAME(any)(turning))
-            for (int lane = 0; lane < CASES; lane++) {
-                if (!turning[lane]) continue;
-                const History old = NAME(pick)(m, lane);
-                const Point point = {last[lane], last_force[lane]};
-                const History new = accepted(law + lane, &old, &point, indentation[lane]);
-                m[0][lane] = new.branch, m[1][lane] = new.f, m[2][lane] = new.b, m[3][lane] = new.w;
-                m[4][lane] = new.p, m[5][lane] = new.peak, m[6][lane] = new.peak_force;
-                m[7][lane] = new.permanent;
-            }
-        /* Records. */
-        r->force[row] = force;
-        applied[step % CHECKED] = push / scale;
-        if (NAME(any)(force != 0.0)) fresh = 1;
-        for (int lane = 0; lane < CASES; lane++) x->force[at[lane] * x->steps + step] = force[lane];
-        const half mean = 0.5 * (last_force + force), before = dw;
-        contact_work += mean * (indentation - last);
-        dw = moved - w, w = moved;
-        plate_work += mean * dw;
-        const half bend = NAME(size)(dw - before);
-        sharpest = NAME(choose)(bend > sharpest, bend, sharpest);
-        deepest = NAME(choose)(indentation > deepest, indentation, deepest);
-        highest = NAME(choose)(w > highest, w, highest);
+        NAME(couple)(x, cases, w, base);
+        for (int g = 0; g < GROUPS; g++) {
+            const Cases *c = cases + g;
+            r->force[GROUPS * row + g] = c->force;
+            applied[GROUPS * (step % CHECKED) + g] = c->push / c->scale;
+            if (ANY(c->force != 0.0)) fresh = 1;
+            for (int lane = 0; lane < WIDTH; lane++) x->force[c->at[lane] * x->steps + step] = c->force[lane];
+        }
         if ((step + 1) % CHECKED && step + 1 < x->steps) continue;
         NAME(move_modes)(x, r, applied, step % CHECKED + 1);
-        half energy = none;
-        for (int64_t i = 0; i < x->modes; i++) {
-            const half q = r->motion[3 * i], v = r->motion[3 * i + 1];
-            energy += v * v + x->stiffness[i] * q * q;
+        for (int g = 0; g < GROUPS; g++) NAME(balance)(x, r->motion + 3 * g, cases + g);
+    }
+    for (int g = 0; g < GROUPS; g++)
+        for (int lane = 0; lane < WIDTH; lane++) {
+            const Cases *c = cases + g;
+            const Histories *m = &c->history;
+            const double indentation = c->indentation[lane];
+            const double peak = m->branch[lane] == VIRGIN && indentation > m->peak[lane] ? indentation : m->peak[lane];
+            const double found[FOUND] = {
+                [FOUND_DEEPEST] = c->deepest[lane],
+                [FOUND_INDENTATION] = indentation,
+                [FOUND_PERMANENT] = permanent(c->law + lane, peak),
+                [FOUND_HIGHEST] = c->highest[lane],
+                [FOUND_W] = c->w[lane],
+                [FOUND_LARGEST_DDW] = c->sharpest[lane],
+                [FOUND_LOST] = c->lost[lane],
+                [FOUND_INITIAL] = c->initial[lane],
+                [FOUND_UNCONVERGED] = c->unconverged[lane],
+            };
+            for (int row = 0; row < FOUND; row++) x->found[row * x->stride + c->at[lane]] = found[row];
         }
-        const half error = NAME(size)(0.5 * scale * energy + contact_work + plate_work - initial);
-        lost = NAME(choose)(~(error <= lost), error, lost);
-    }
-    for (int lane = 0; lane < CASES; lane++) {
-        const double peak = m[0][lane] == VIRGIN && indentation[lane] > m[5][lane] ? indentation[lane] : m[5][lane];
-        const double found[FOUND] = {
-            [FOUND_DEEPEST] = deepest[lane],
-            [FOUND_INDENTATION] = indentation[lane],
-            [FOUND_PERMANENT] = permanent(law + lane, peak),
-            [FOUND_HIGHEST] = highest[lane],
-            [FOUND_W] = w[lane],
-            [FOUND_LARGEST_DDW] = sharpest[lane],
-            [FOUND_LOST] = lost[lane],
-            [FOUND_INITIAL] = initial[lane],
-            [FOUND_UNCONVERGED] = unconverged[lane],
-        };
-        for (int row = 0; row < FOUND; row++) x->found[row * x->stride + at[lane]] = found[row];
-    }
 }
