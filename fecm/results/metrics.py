@@ -186,36 +186,50 @@ class _OfForces(NamedTuple):
 
 def _from_forces(force: Floats, times: Floats, threshold: float | None) -> _OfForces:
     """Evaluate contact forces (steps, cases), so many cases at a time as stay in the cache."""
-    starts = range(0, force.shape[1], PART)
-    parts = [_of_part(force[:, n : n + PART], times, threshold) for n in starts]
+    dt = np.diff(times, prepend=0.0)
+    product = np.empty((min(PART, force.shape[1]), len(times)))
+    parts = [
+        _of_part(np.ascontiguousarray(force[:, n : n + PART].T), times, dt, threshold, product)
+        for n in range(0, force.shape[1], PART)
+    ]
     if len(parts) == 1:
         return parts[0]
     return _OfForces(*map(np.concatenate, zip(*parts, strict=True)))
 
 
-def _of_part(force: Floats, times: Floats, threshold: float | None) -> _OfForces:
-    force = np.ascontiguousarray(force.T)
-    dt = np.diff(times, prepend=0.0)
+def _durations(dt: Floats, chosen: Bools, product: Floats) -> Floats:
+    """Durations (cases,) of the chosen steps, (cases, steps); `product` is memory of that shape."""
+    np.copyto(product, chosen)
+    product *= dt
+    return np.asarray(product.sum(axis=1))
+
+
+def _of_part(
+    force: Floats, times: Floats, dt: Floats, threshold: float | None, product: Floats
+) -> _OfForces:
+    """Evaluate contact forces (cases, steps); `product` is memory for as many numbers."""
+    cases = len(force)
+    product = product[:cases]
     touching = force > 0.0
-    begins = touching.copy()
-    begins[:, 1:] &= ~touching[:, :-1]
+    rises = touching[:, 1:] > touching[:, :-1]
     last = len(times) - 1 - np.argmax(touching[:, ::-1], axis=1)
-    threshold_time = time_above = np.full(len(force), np.nan)
+    peak = np.argmax(force, axis=1)
+    threshold_time = time_above = np.full(cases, np.nan)
     if threshold is not None:
         above = force >= threshold
         first = times[np.argmax(above, axis=1)]
         threshold_time = np.where(above.any(axis=1), first, np.nan)
-        time_above = (dt * above).sum(axis=1)
+        time_above = _durations(dt, above, product)
     return _OfForces(
         # The force is linear between steps, and 0 before the first.  These sums are the same for a
         # case with any others.
-        impulse=(0.5 * (dt + np.append(dt[1:], 0.0)) * force).sum(axis=1),
-        reached=force.max(axis=1),
+        impulse=np.multiply(0.5 * (dt + np.append(dt[1:], 0.0)), force, out=product).sum(axis=1),
+        reached=force[np.arange(cases), peak],
         last=force[:, -1],
         met=np.asarray(touching.any(axis=1)),
-        time_of_peak=times[np.argmax(force, axis=1)],
-        contacts=begins.sum(axis=1).astype(float),
-        contact_time=(dt * touching).sum(axis=1),
+        time_of_peak=times[peak],
+        contacts=touching[:, 0] + np.array([np.count_nonzero(row) for row in rises], dtype=float),
+        contact_time=_durations(dt, touching, product),
         last_contact=times[last],
         threshold_time=threshold_time,
         time_above=time_above,

@@ -28,7 +28,7 @@ def check_memory(checked: Problem, made: Plan, workers: int, *, streamed: bool =
     if REFINE in made.cases[-1]:
         checked = check_deck(apply_case(settings.deck, made.cases[-1]))
     steps, cases = checked.work.steps, len(made.cases)
-    at_once = min(workers, len(tasks(checked, made)))
+    at_once = min(workers, len(tasks(checked, made))) if workers > 1 else workers
     plate = checked if settings.measure else without_output(checked, settings.measures)
     stored = 0
     if settings.history:

@@ -188,6 +188,8 @@ OF_PLATE = frozenset((*PLATE_NAMES, REFINE))  # which need another response of t
 
 def plate_values(case: Case) -> Case:
     """The values of a case that need another response of the plate."""
+    if OF_PLATE.isdisjoint(case):  # most cases, of which there may be many
+        return {}
     return {name: value for name, value in case.items() if name in OF_PLATE}
 
 
