@@ -127,8 +127,9 @@ INLINE void NAME(far_places)(const Response *r, int64_t block, int64_t used, int
         __builtin_prefetch(f + row), __builtin_prefetch(f + row + 2); /* those of the next place */
         for (int g = 0; g < GROUPS; g++, f += 2) { /* the spectrum of real numbers: f* at the other place */
             const half re = f[0], im = f[1];
-            sum[g][0] += at[0] * re, sum[g][1] += at[1] * re, opposite[g][0] += to[0] * re, opposite[g][1] += to[1] * re;
-            sum[g][0] -= at[1] * im, sum[g][1] += at[0] * im, opposite[g][0] += to[1] * im, opposite[g][1] -= to[0] * im;
+            half *u = sum[g], *v = opposite[g];
+            u[0] += at[0] * re, u[1] += at[1] * re, v[0] += to[0] * re, v[1] += to[1] * re;
+            u[0] -= at[1] * im, u[1] += at[0] * im, v[0] += to[1] * im, v[1] -= to[0] * im;
         }
     }
     for (int g = 0; g < GROUPS; g++) {
@@ -179,16 +180,18 @@ APART TARGET void NAME(near_sums)(const Response *r, int row, half near[GROUPS][
 }
 
 /* Cases whose indentation may leave the branch. */
-INLINE mask NAME(turns)(const Cases *c, half last, half a) {
+INLINE mask NAME(turns)(const Cases *c, half a) {
     const Histories *m = &c->history;
+    const half last = c->indentation;
     const mask falls = a < last, virgin = m->branch == (double)VIRGIN, unloading = m->branch == (double)UNLOADING;
     const mask back = (a >= m->peak) | (unloading & (a > last)) | (~unloading & falls);
     return (virgin & falls) | (~virgin & back);
 }
 
 /* History of a case after a step that ends at an indentation. */
-INLINE History NAME(turned)(const Cases *c, int lane, Point last, double a) {
+INLINE History NAME(turned)(const Cases *c, int lane, double a) {
     const Histories *m = &c->history;
+    const Point last = {c->indentation[lane], c->force[lane]};
     const History old = {m->branch[lane], m->f[lane], m->b[lane], m->w[lane],
                          m->p[lane], m->peak[lane], m->peak_force[lane], m->permanent[lane]};
     return accepted(c->law + lane, &old, &last, a);
@@ -222,9 +225,11 @@ INLINE void NAME(move_mode)(const Sweep *x, int64_t mode, const half *applied, i
     const double *T = x->T + mode, *h = x->h + mode;
     for (int step = 0; step < steps; step++)
         for (int g = 0; g < GROUPS; g++) {
-            const half q = motion[g][0], v = motion[g][1], a = motion[g][2];
-            for (int row = 0; row < 3; row++)
-                motion[g][row] = T[3 * row * n] * q + T[(3 * row + 1) * n] * v + T[(3 * row + 2) * n] * a + h[row * n] * applied[GROUPS * step + g];
+            const half q = motion[g][0], v = motion[g][1], a = motion[g][2], push = applied[GROUPS * step + g];
+            for (int row = 0; row < 3; row++) {
+                const double *at = T + 3 * row * n;
+                motion[g][row] = at[0] * q + at[n] * v + at[2 * n] * a + h[row * n] * push;
+            }
         }
 }
 
@@ -234,7 +239,8 @@ INLINE void NAME(reach_sums)(const double *reach, const half *applied, half tota
     for (int step = 0; step < CHECKED; step += 4, reach += 12, applied += 4 * GROUPS)
         for (int part = 0; part < 2; part++)
             for (int row = 0; row < 3; row++)
-                for (int g = 0; g < GROUPS; g++) sum[part][g][row] += reach[3 * part + row] * applied[GROUPS * part + g];
+                for (int g = 0; g < GROUPS; g++)
+                    sum[part][g][row] += reach[3 * part + row] * applied[GROUPS * part + g];
     for (int g = 0; g < GROUPS; g++)
         for (int row = 0; row < 3; row++) total[g][row] = sum[0][g][row] + sum[1][g][row];
 }
@@ -250,7 +256,8 @@ INLINE void NAME(leap_mode)(const Response *r, int64_t mode, const half *applied
     for (int g = 0; g < GROUPS; g++) {
         const half q = motion[g][0], v = motion[g][1], a = motion[g][2];
         for (int row = 0; row < 3; row++)
-            motion[g][row] = (sum[0][g][row] + sum[1][g][row]) + (P[3 * row] * q + P[3 * row + 1] * v + P[3 * row + 2] * a);
+            motion[g][row] = (sum[0][g][row] + sum[1][g][row]) +
+                             (P[3 * row] * q + P[3 * row + 1] * v + P[3 * row + 2] * a);
     }
 }
 
@@ -274,7 +281,8 @@ INLINE void NAME(begin)(const Sweep *x, const Response *r, int64_t first, Cases 
     for (int lane = 0; lane < WIDTH; lane++) {
         c->at[lane] = first + lane < x->cases ? first + lane : x->cases - 1;
         for (int row = 0; row < GIVEN; row++) given[row][lane] = x->given[row * x->stride + c->at[lane]];
-        c->law[lane] = (Law){given[GIVEN_K][lane], given[GIVEN_Q][lane], given[GIVEN_CRITICAL][lane], given[GIVEN_SLOPE][lane], x->law};
+        c->law[lane] = (Law){given[GIVEN_K][lane], given[GIVEN_Q][lane], given[GIVEN_CRITICAL][lane],
+                             given[GIVEN_SLOPE][lane], x->law};
     }
     c->history = (Histories){none, given[GIVEN_K], none, none + 1.0, none + 1.5, none, none, none};
     c->scale = given[GIVEN_FACTOR], c->gain = r->gain / c->scale;
@@ -282,6 +290,19 @@ INLINE void NAME(begin)(const Sweep *x, const Response *r, int64_t first, Cases 
     c->indentation = c->force = c->push = c->w = c->dw = none;
     c->deepest = c->highest = c->sharpest = c->lost = c->unconverged = none;
     c->plate_work = c->contact_work = none;
+}
+
+/* Records of a step that ends at a displacement of the plate, a force and an indentation. */
+INLINE void NAME(record)(Cases *c, half w, half force, half indentation) {
+    const half mean = 0.5 * (c->force + force), before = c->dw;
+    c->contact_work += mean * (indentation - c->indentation);
+    c->dw = w - c->w;
+    c->plate_work += mean * c->dw;
+    const half bend = NAME(size)(c->dw - before);
+    c->w = w, c->force = force, c->indentation = indentation;
+    c->sharpest = NAME(choose)(bend > c->sharpest, bend, c->sharpest);
+    c->deepest = NAME(choose)(indentation > c->deepest, indentation, c->deepest);
+    c->highest = NAME(choose)(w > c->highest, w, c->highest);
 }
 
 /* The contact iteration and the step of the tip; see couple_step. */
@@ -301,15 +322,14 @@ INLINE void NAME(couple)(const Sweep *x, Cases *cases, const half *w, const half
         half tried[GROUPS];
         for (int g = 0; g < GROUPS; g++) {
             a[g] = -trial[g] - w[g];
-            turning[g] = iterating[g] & NAME(turns)(cases + g, cases[g].indentation, a[g]);
+            turning[g] = iterating[g] & NAME(turns)(cases + g, a[g]);
         }
         NAME(curves)(cases, a, tried);
         if (NAME(any)(turning))
             for (int g = 0; g < GROUPS; g++)
                 for (int lane = 0; lane < WIDTH; lane++) {
                     if (!turning[g][lane]) continue;
-                    const Point last = {cases[g].indentation[lane], cases[g].force[lane]};
-                    const History new = NAME(turned)(cases + g, lane, last, a[g][lane]);
+                    const History new = NAME(turned)(cases + g, lane, a[g][lane]);
                     tried[g][lane] = force_of(&new, a[g][lane]);
                 }
         for (int g = 0; g < GROUPS; g++) {
@@ -328,31 +348,19 @@ INLINE void NAME(couple)(const Sweep *x, Cases *cases, const half *w, const half
         c->velocity += x->dt / 2.0 * (c->acceleration + now);
         c->acceleration = now;
         a[g] = -c->tip - w[g];
-        turning[g] = NAME(turns)(c, c->indentation, a[g]);
+        turning[g] = NAME(turns)(c, a[g]);
     }
     if (NAME(any)(turning))
         for (int g = 0; g < GROUPS; g++)
             for (int lane = 0; lane < WIDTH; lane++) {
                 if (!turning[g][lane]) continue;
-                const Point last = {cases[g].indentation[lane], cases[g].force[lane]};
-                const History new = NAME(turned)(cases + g, lane, last, a[g][lane]);
+                const History new = NAME(turned)(cases + g, lane, a[g][lane]);
                 Histories *m = &cases[g].history;
                 m->branch[lane] = new.branch, m->f[lane] = new.f, m->b[lane] = new.b, m->w[lane] = new.w;
                 m->p[lane] = new.p, m->peak[lane] = new.peak, m->peak_force[lane] = new.peak_force;
                 m->permanent[lane] = new.permanent;
             }
-    for (int g = 0; g < GROUPS; g++) {
-        Cases *c = cases + g;
-        const half mean = 0.5 * (c->force + force[g]), before = c->dw;
-        c->contact_work += mean * (a[g] - c->indentation);
-        c->dw = w[g] - c->w, c->w = w[g];
-        c->plate_work += mean * c->dw;
-        const half bend = NAME(size)(c->dw - before);
-        c->force = force[g], c->indentation = a[g];
-        c->sharpest = NAME(choose)(bend > c->sharpest, bend, c->sharpest);
-        c->deepest = NAME(choose)(c->indentation > c->deepest, c->indentation, c->deepest);
-        c->highest = NAME(choose)(c->w > c->highest, c->w, c->highest);
-    }
+    for (int g = 0; g < GROUPS; g++) NAME(record)(cases + g, w[g], force[g], a[g]);
 }
 
 /* Compare the energies of cases. */
@@ -362,6 +370,27 @@ INLINE void NAME(balance)(const Sweep *x, const half *motion, Cases *c) {
         energy += motion[1] * motion[1] + x->stiffness[i] * motion[0] * motion[0];
     const half error = NAME(size)(0.5 * c->scale * energy + c->contact_work + c->plate_work - c->initial);
     c->lost = NAME(choose)(~(error <= c->lost), error, c->lost);
+}
+
+/* Store what is found of cases. */
+INLINE void NAME(store_found)(const Sweep *x, const Cases *c) {
+    const Histories *m = &c->history;
+    for (int lane = 0; lane < WIDTH; lane++) {
+        const double indentation = c->indentation[lane];
+        const double peak = m->branch[lane] == VIRGIN && indentation > m->peak[lane] ? indentation : m->peak[lane];
+        const double found[FOUND] = {
+            [FOUND_DEEPEST] = c->deepest[lane],
+            [FOUND_INDENTATION] = indentation,
+            [FOUND_PERMANENT] = permanent(c->law + lane, peak),
+            [FOUND_HIGHEST] = c->highest[lane],
+            [FOUND_W] = c->w[lane],
+            [FOUND_LARGEST_DDW] = c->sharpest[lane],
+            [FOUND_LOST] = c->lost[lane],
+            [FOUND_INITIAL] = c->initial[lane],
+            [FOUND_UNCONVERGED] = c->unconverged[lane],
+        };
+        for (int row = 0; row < FOUND; row++) x->found[row * x->stride + c->at[lane]] = found[row];
+    }
 }
 
 /* The impacts of eight cases. */
@@ -410,23 +439,5 @@ TARGET void NAME(run_cases)(const Sweep *x, const Response *r, int64_t first) {
         NAME(move_modes)(x, r, applied, step % CHECKED + 1);
         for (int g = 0; g < GROUPS; g++) NAME(balance)(x, r->motion + 3 * g, cases + g);
     }
-    for (int g = 0; g < GROUPS; g++)
-        for (int lane = 0; lane < WIDTH; lane++) {
-            const Cases *c = cases + g;
-            const Histories *m = &c->history;
-            const double indentation = c->indentation[lane];
-            const double peak = m->branch[lane] == VIRGIN && indentation > m->peak[lane] ? indentation : m->peak[lane];
-            const double found[FOUND] = {
-                [FOUND_DEEPEST] = c->deepest[lane],
-                [FOUND_INDENTATION] = indentation,
-                [FOUND_PERMANENT] = permanent(c->law + lane, peak),
-                [FOUND_HIGHEST] = c->highest[lane],
-                [FOUND_W] = c->w[lane],
-                [FOUND_LARGEST_DDW] = c->sharpest[lane],
-                [FOUND_LOST] = c->lost[lane],
-                [FOUND_INITIAL] = c->initial[lane],
-                [FOUND_UNCONVERGED] = c->unconverged[lane],
-            };
-            for (int row = 0; row < FOUND; row++) x->found[row * x->stride + c->at[lane]] = found[row];
-        }
+    for (int g = 0; g < GROUPS; g++) NAME(store_found)(x, cases + g);
 }
