@@ -193,7 +193,8 @@ def equilibrium(
             moved = one + change * other
             factor += change
             field[free] += moved
-            if np.linalg.norm(moved) <= 1e-11 * np.linalg.norm(field[free]):
+            # The next correction would be about the square of this one.
+            if np.linalg.norm(moved) <= 1e-7 * np.linalg.norm(field[free]):
                 break
         else:
             raise ArithmeticError("no equilibrium")

@@ -52,7 +52,7 @@ def arch(deflection: float) -> float:
 
     critical = D * (np.pi / SPAN) ** 2
     # From above the second symmetric buckling load on; the first root is that of this arch.
-    forces = np.linspace(-8.0, 12.0, 2001) * critical
+    forces = np.linspace(-8.0, 12.0, 201) * critical
     missing = [state(N)[1] for N in forces]
     (at,) = np.flatnonzero(np.diff(np.sign(missing)))
     N = brentq(lambda N: state(N)[1], forces[at], forces[at + 1], xtol=1e-12)
@@ -81,13 +81,13 @@ def test_an_arch_snaps_through_along_the_exact_curve() -> None:
     load, weights = pressure(plate), np.zeros(len(plate.mesh.coordinates))
     weights[np.hypot(*plate.mesh.coordinates.T).argmin()] = 1.0
     field, found = None, []
-    deflections = np.arange(0.5, 6.1, 0.5)
+    deflections = np.arange(1.0, 6.1)
     for deflection in deflections:
         state = equilibrium(plate, load, weights, deflection, field)
         field = state.field
         found.append(state.load)
     wanted = [arch(deflection) for deflection in deflections]
-    largest = max(wanted[:5])
+    largest = max(wanted[:3])
     assert min(wanted) < -0.1 * largest  # it does snap through
     np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-5 * largest)
 
@@ -101,7 +101,7 @@ def test_a_hinged_roof_carries_the_published_load(thickness: float, limit: float
     modulus, nu = 3102.75, 0.3
     shear = modulus / 2.0 / (1.0 + nu)
     ply = model.Ply(1e-9, nu, modulus, modulus, shear, 5 / 6 * shear, 5 / 6 * shear)
-    coordinates, elements = quarter_mesh(508.0, 508.0, 6)
+    coordinates, elements = quarter_mesh(508.0, 508.0, 4)
     restrained = nothing(coordinates)
     for axis in (0, 1):
         restrained[np.isclose(coordinates[:, axis], 0.0)] |= np.arange(5) % 3 == axis
@@ -116,7 +116,7 @@ def test_a_hinged_roof_carries_the_published_load(thickness: float, limit: float
     weights = np.zeros(len(coordinates))
     weights[np.hypot(*coordinates.T).argmin()] = 1.0
     field, loads = None, []
-    for deflection in (4.0, 8.0, 10.0, 11.0, 12.0, 13.0, 14.0):
+    for deflection in (4.0, 8.0, 11.0, 13.0, 14.0):
         state = equilibrium(plate, weights / 4.0, weights, deflection, field)
         field = state.field
         loads.append(state.load)
@@ -129,12 +129,12 @@ def test_an_estimate_of_a_panel_that_snaps_through_ends_at_the_load_that_it_carr
         deck = struck((0.0, radius), mesh(6), 5e-7, 10, others=(NONL,), velocity=velocity)
         return estimate(load_deck(deck).problems[0])
 
-    snapped = found(-500.0, 60000.0)
+    snapped = found(-500.0, 15000.0)
     assert [one.name for one in snapped.models] == ["infinite plate", "static plate"]
     (limit,) = re.findall(r"the panel snaps through at the force ([\d.]+)", snapped.remark)
     slower = [found(-500.0, velocity).models[-1].impact.peak for velocity in (3000.0, 9000.0)]
     assert slower[0] < slower[1] < 1.001 * float(limit)
-    assert found(500.0, 60000.0).models[-1].name == "nonlinear static plate"
+    assert found(500.0, 15000.0).models[-1].name == "nonlinear static plate"
 
 
 # Impact ------------------------------------------------------------------------------------------

@@ -82,7 +82,7 @@ def assert_inside(seeds: Iterable[int]) -> Floats:
 @pytest.mark.filterwarnings("ignore:. of 240 points:fecm.FecmWarning")
 def test_humps_near_half_of_the_peak_are_neither_refused_nor_shifted() -> None:
     # With these, the first hump is above half of the largest force.
-    assert_inside([3, 4, 9])
+    assert_inside([3, 9])
 
 
 @pytest.mark.long
@@ -143,7 +143,7 @@ def heavy(k: float, mass: float, velocity: float, thickness: float = 0.18) -> fe
         fecm.Contact(k, 1.0, 0.0, 1.5),
         velocity=velocity,
         duration=3e-3,
-        dt=5e-7,
+        dt=7e-7,
         units="mm-N-s",
         patch="hertz:18",
     )

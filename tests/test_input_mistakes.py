@@ -139,8 +139,15 @@ def new_deck(
 PLIES = [name for name in MATERIALS if name != "Divinycell-H60"]
 
 
-@pytest.mark.parametrize("system", NAMES)
-@pytest.mark.parametrize("name", PLIES)
+# Each ply in one of the systems in turn; the long tests have all pairs.
+IN_UNITS = [
+    pytest.param(name, system, marks=() if n % len(NAMES) == m else pytest.mark.long)
+    for n, name in enumerate(PLIES)
+    for m, system in enumerate(NAMES)
+]
+
+
+@pytest.mark.parametrize(("name", "system"), IN_UNITS)
 def test_no_ply_of_the_catalogue_has_a_finding_in_any_units(name: str, system: str) -> None:
     has_damage = {"XT", "GIIc"} & MATERIALS[name].values.keys()
     text = new_deck(name, system, 0.25, damage=bool(has_damage))

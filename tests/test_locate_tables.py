@@ -12,13 +12,18 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.deck.units import unit_names
+from fecm.location.table import strain_table
 from fecm.results.errors import NotStoredError, ResultFileError
 from fecm.studies import StudyError
 from tests.calls import Done, call
 from tests.panels import OFF_AXIS, STRUCK, TIME, Floats, panel, scatter, struck, with_gages
 
 NEAR = (40.0, 30.0, 80.0, 65.0)
-OPTIONS = ("--region", "40,30,80,65", "--grid", "12")
+# Few candidates, and the width of hats that a search for it ends with.
+GRID, BASIS = 20.0, 9e-6
+WIDTHS = ("--grid", GRID, "--basis", BASIS)
+OPTIONS = ("--region", "40,30,80,65", *WIDTHS)
 
 
 @cache
@@ -35,7 +40,7 @@ def strains() -> Floats:
 
 def located(table: object, **options: object) -> fecm.Location:
     """An impact near its place on the small panel."""
-    near: dict[str, object] = {"region": NEAR, "grid": 12.0}
+    near: dict[str, object] = {"region": NEAR, "grid": GRID, "basis": BASIS}
     return fecm.locate(deck(), table, **(near | options))  # type: ignore[arg-type]
 
 
@@ -60,7 +65,6 @@ def written(folder: Path, head: str, values: Floats, time: Floats = TIME) -> Pat
     ("head", "order"),
     [
         ("time,gage1,gage2,gage3", [0, 1, 2]),
-        ("time (s),gage 3,gage 1,gage 2", [2, 0, 1]),
         ("Time [s],3,2,1", [2, 1, 0]),
         ("time,left,right,top", [0, 1, 2]),  # in the order of the deck
     ],
@@ -68,8 +72,15 @@ def written(folder: Path, head: str, values: Floats, time: Floats = TIME) -> Pat
 def test_columns_of_a_file_are_matched_by_the_numbers_of_gages(
     tmp_path: Path, head: str, order: list[int]
 ) -> None:
-    read = located(written(tmp_path, head, strains()[:, order]))
+    path = written(tmp_path, head, strains()[:, order])
+    read = strain_table(path, unit_names(deck()), [1, 2, 3])
     assert read.gages.tolist() == [n + 1 for n in order]
+    assert np.array_equal(read.strains, strains()[:, order].T)
+
+
+def test_the_order_of_columns_leaves_the_place_where_it_is(tmp_path: Path) -> None:
+    read = located(written(tmp_path, "time (s),gage 3,gage 1,gage 2", strains()[:, [2, 0, 1]]))
+    assert read.gages.tolist() == [3, 1, 2]
     assert (read.x, read.y) == pytest.approx((found().x, found().y), abs=1e-6)
 
 
@@ -88,9 +99,10 @@ def test_a_table_with_a_row_for_every_gage_and_time_is_read(tmp_path: Path) -> N
     ]
     path = tmp_path / "long.csv"
     path.write_text("\n".join(["step,time (s),gage,strain", *rows]), encoding="utf-8")
-    read = located(path)
+    read = strain_table(path, unit_names(deck()), [1, 2, 3])
+    assert read.gages.tolist() == [1, 2, 3]
     assert np.array_equal(read.strains, strains().T)
-    assert read.x == found().x
+    assert np.array_equal(read.time, TIME)
 
 
 @pytest.mark.parametrize(
@@ -279,7 +291,7 @@ def test_the_command_prints_what_python_finds(folder: Path) -> None:
 
 def test_the_exit_status_is_1_if_the_place_is_in_doubt(folder: Path) -> None:
     done = call(
-        "locate", "panel.inp", "strains.csv", "--region", "20,30,50,60", "--grid", "12", cwd=folder
+        "locate", "panel.inp", "strains.csv", "--region", "20,30,50,60", *WIDTHS, cwd=folder
     )
     assert done.exit_code == 1
     assert "note: the place is on the edge of the region" in done.stderr

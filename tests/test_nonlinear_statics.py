@@ -243,13 +243,20 @@ def test_a_strip_that_is_free_to_shorten_bends_without_membrane_locking(
 
 
 @cache
-def rectangles() -> list[tuple[str, list[Row]]]:
+def rectangles() -> dict[str, list[Row]]:
     """Rows of the rectangles by plate and load."""
     rows = table("nonlinear_rectangles.csv")
-    return [
-        (name, list(part))
+    return {
+        name: list(part)
         for name, part in groupby(rows, lambda row: f"{row['case']} {row['load']} {row['sign']}")
-    ]
+    }
+
+
+def at(rows: list[Row], column: str, *deflections: float) -> list[Row]:
+    """The rows at some deflections over the thickness."""
+    found = [row for row in rows if float(row[column]) in deflections]
+    assert len(found) == len(deflections)
+    return found
 
 
 def solved(name: str, rows: list[Row], n: int) -> list[tuple[float, float]]:
@@ -274,31 +281,33 @@ def solved(name: str, rows: list[Row], n: int) -> list[tuple[float, float]]:
     return errors
 
 
-@pytest.mark.parametrize("name", [name for name, _ in rectangles() if "uniform" in name])
+@pytest.mark.parametrize("name", [name for name in rectangles() if "uniform" in name])
 def test_rectangles_under_pressure_follow_the_spectral_solution_up_to_three_thicknesses(
     name: str,
 ) -> None:
-    assert np.abs(solved(name, dict(rectangles())[name], 8)).max() < 4e-4
+    rows = at(rectangles()[name], "control_over_h", 1.0, 3.0)
+    n = 8 if "_movable" in name else 6  # the membrane forces of movable edges vary more
+    assert np.abs(solved(name, rows, n)).max() < 4e-4
 
 
 @pytest.mark.parametrize("name", ["iso_100x100x2_clamped_immovable uniform 1"])
 def test_the_error_under_pressure_falls_with_more_than_the_third_order(name: str) -> None:
-    rows = dict(rectangles())[name][:3]
+    rows = at(rectangles()[name], "control_over_h", 1.0)
     coarse, fine = (np.array(solved(name, rows, n))[:, 1] for n in (4, 8))
     assert (np.log2(np.abs(coarse / fine)) > 3.5).all()
 
 
-@pytest.mark.parametrize("name", [name for name, _ in rectangles() if "hert" in name])
+@pytest.mark.parametrize("name", [name for name in rectangles() if "hert" in name])
 def test_rectangles_under_a_patch_follow_the_spectral_solution(name: str) -> None:
-    known = [row for row in dict(rectangles())[name] if float(row["rel_change_n"]) < 1e-3]
-    assert np.abs(solved(name, known, 8)).max() < 1e-3
+    known = [row for row in rectangles()[name] if float(row["rel_change_n"]) < 1e-3]
+    assert np.abs(solved(name, [known[2], known[-1]], 8)).max() < 1e-3
 
 
 @pytest.mark.parametrize("name", ["iso_100x100x2_clamped_immovable hert 1"])
 def test_an_isotropic_plate_under_a_patch_is_within_two_ten_thousandths_on_a_fine_mesh(
     name: str,
 ) -> None:
-    rows = [row for row in dict(rectangles())[name] if float(row["control_over_h"]) <= 2.0]
+    rows = at(rectangles()[name], "control_over_h", 2.0)
     assert np.abs(solved(name, rows, 12)).max() < 2e-4
 
 
@@ -306,7 +315,7 @@ def test_levys_clamped_plate_deflects_as_computed() -> None:
     E, h, a = 70000.0, 1.0, 100.0
     plate = rectangle(a, a, 8, isotropic(0.1**0.5, h), "clamped_immovable")
     load, weights, field = pressure(plate), centre(plate), None
-    for row in table("nonlinear_levy.csv"):
+    for row in table("nonlinear_levy.csv")[::4]:
         found = equilibrium(plate, load, weights, float(row["this_w_over_h"]) * h, field)
         field = found.field
         wanted = float(row["q_a4_over_E_h4"]) * E * h**4 / a**4
@@ -317,7 +326,9 @@ def test_levys_clamped_plate_deflects_as_computed() -> None:
 @pytest.mark.parametrize(
     "edge", ["clamped_immovable", "clamped_movable", "ss_immovable", "ss_movable"]
 )
-@pytest.mark.parametrize("load", ["uniform 0", "disc 10", "disc 30"])
+@pytest.mark.parametrize(
+    "load", ["uniform 0", "disc 10", pytest.param("disc 30", marks=pytest.mark.long)]
+)
 def test_circular_plates_follow_the_axisymmetric_solution(edge: str, load: str) -> None:
     kind, radius = load.split()
     rows = [
@@ -328,8 +339,7 @@ def test_circular_plates_follow_the_axisymmetric_solution(edge: str, load: str) 
     plate = disc(100.0, 5, isotropic(), edge)
     forces = pressure(plate) if kind == "uniform" else patch(plate, "DISC", float(radius))
     field, weights = None, centre(plate)
-    assert len(rows) == 4
-    for row in rows:
+    for row in at(rows, "w0_over_h", 1.0, 3.0):
         found = equilibrium(plate, forces, weights, float(row["w0_over_h"]) * H, field)
         field = found.field
         assert found.load == pytest.approx(float(row["load_value"]), rel=1e-3)
@@ -379,7 +389,7 @@ def test_a_plate_with_preload_stretches_as_the_spectral_solution(ratio: str) -> 
     N0 = float(rows[0]["N0_N_per_mm"])
     plate = with_preload(rectangle(100.0, 100.0, 8, isotropic(), "ss_immovable"), N0, N0)
     load, weights, field = pressure(plate), centre(plate), None
-    for row in rows:
+    for row in at(rows, "w_centre_over_h", 0.5, 3.0):
         found = equilibrium(plate, load, weights, float(row["w_centre_over_h"]) * H, field)
         field = found.field
         assert found.load == pytest.approx(float(row["q_N_per_mm2"]), rel=4e-4)

@@ -129,6 +129,7 @@ LOADED = """
 import os, sys
 import numpy
 numpys = set(sys.modules)  # of which NumPy 1 has more than NumPy 2
+import fecm.results.result  # of which every command makes use: imported once, not in each child
 from fecm.cli import main
 for arguments, names in %r.items():
     if not (child := os.fork()):
