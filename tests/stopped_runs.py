@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from pathlib import Path
 
 from fecm.api import load_deck
@@ -12,6 +13,13 @@ from fecm.results import hdf5_writer
 from fecm.simulation.checkpoint import Checkpointer
 from fecm.simulation.run import run as simulate_run
 from fecm.simulation.simulation import Simulation
+
+
+@cache
+def problem_of(text: str) -> Problem:
+    """The problem of a deck, checked once for all runs of it."""
+    (problem,) = load_deck(text).problems
+    return problem
 
 
 class StoppedError(Exception):
@@ -47,7 +55,7 @@ def run(
             checkpointer.write(simulation)
             raise StoppedError
 
-    problem = load_deck(text).problems[0]
+    problem = problem_of(text)
     names = frozenset(slips.split())
     with hdf5_writer.writing(path) as sink:
         checkpointer = Checkpointer(path, sink)

@@ -335,7 +335,7 @@ def test_the_documented_recipe_passes_rounding_and_fails_a_tenth_of_a_degree(
     deck, expected = tmp_path / run[1], tmp_path / compare[1]
     deck.parent.mkdir()
     expected.parent.mkdir()
-    deck.write_text(LONG.read_text().replace("LOOP       4000", "LOOP       1000"))
+    deck.write_text(LONG.read_text().replace("LOOP       4000", "LOOP        200"))
     assert call("run", deck, "-o", expected, "--solver", "csr").exit_code == 0
     assert call(*run, cwd=tmp_path).exit_code == 0
     assert call(*compare, cwd=tmp_path).exit_code == 0

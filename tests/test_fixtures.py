@@ -23,7 +23,7 @@ PLIES = {
     "IM7/8552 [45/0/-45/90]3s h=4.416, K=1": ("[45/0/-45/90]3s", ".184", IM7),
 }  # fmt: skip
 PLATE = ("--layup", "[45/0/-45/90]3s", "--ply-thickness", ".184", "--ply", IM7)
-QUICK = ("--mesh", "8x6", "--duration", "1e-4")
+QUICK = ("--mesh", "8x6", "--duration", "1e-4", "--dt", "1e-7")
 
 
 @pytest.mark.parametrize("plate", PLIES)
@@ -42,8 +42,12 @@ def test_the_static_stiffness_of_d7136_is_that_of_another_code(plate: str) -> No
         ply,
         "--patch",
         "disc:2",
+        "--law",
+        "5e4,0,0,1.5",
         "--duration",
         "1e-4",
+        "--dt",
+        "1e-7",
         "--mesh",
         "10x8",
     )

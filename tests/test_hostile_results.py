@@ -22,16 +22,16 @@ from tests.decks import PROGRAM as PROGRAM_CARDS
 from tests.decks import small
 
 PROGRAM = """
-import collections, itertools, os, signal, sys, time
+import collections, ctypes, itertools, os, signal, sys, time
 from pathlib import Path
 import click
 from fecm.cli import COMMANDS, LazyCommand, isolation, main
 from fecm._files import partial_of
 
-def spin(seconds):
-    end = time.process_time() + seconds
-    while time.process_time() < end:
-        pass
+def short_calls(seconds):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        time.sleep(0.01)
 
 COMMANDS["act"] = LazyCommand("__main__", "", isolated=True)
 
@@ -46,10 +46,8 @@ def act(file, what):
         os.kill(os.getpid(), signal.SIGSEGV)
     if what == "hang":  # in C, where no signal handler is carried out
         print("hanging", file=sys.stderr, flush=True)
-        collections.deque(itertools.repeat(0), maxlen=0)
+        collections.deque(map(ctypes.PyDLL(None).usleep, itertools.repeat(10_000)), maxlen=0)
     if what == "wait":  # in C, which takes a signal for nothing to stop at
-        import ctypes
-
         signal.setitimer(signal.ITIMER_REAL, 0.0)
         print("hanging", file=sys.stderr, flush=True)
         ctypes.PyDLL(None).sleep(600)
@@ -59,7 +57,7 @@ def act(file, what):
     if what == "swallow":
         bytearray(10**12)
     if what == "work":
-        spin(1.1)
+        short_calls(1.1)
     if what == "no":
         raise SystemExit(1)
     click.echo("done")
@@ -229,12 +227,19 @@ def complete(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.parametrize("value", ["text", b"\xff", [1.0, 2.0], True], ids=repr)
-@pytest.mark.parametrize(
-    "attribute",
-    ["threshold/force", "threshold/time", "threshold/margin", "patch/x", "patch/radius",
-     "failure/modes"],
-)  # fmt: skip
+OTHER_TYPES = ["text", b"\xff", [1.0, 2.0], True]
+# Each type in one attribute, and each attribute with one type; the long tests have all pairs.
+ATTRIBUTES = [
+    pytest.param(
+        name, value, marks=() if name == "threshold/force" or value == "text" else pytest.mark.long
+    )
+    for name in ("threshold/force", "threshold/time", "threshold/margin", "patch/x",
+                 "patch/radius", "failure/modes")
+    for value in OTHER_TYPES
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("attribute", "value"), ATTRIBUTES, ids=repr)
 def test_an_attribute_of_another_type_is_one_line(
     complete: Path, attribute: str, value: object, tmp_path: Path
 ) -> None:

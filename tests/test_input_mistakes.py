@@ -78,11 +78,18 @@ MISTAKES: dict[str, tuple[Edit, str, str]] = {  # change, code, and what the tex
 }  # fmt: skip
 
 
+without_units = replaced(r"^UNIT\n.*\n", "")
+
+
+def test_the_plate_without_mistakes_has_no_finding_with_units_and_without() -> None:
+    assert found(base()) == []
+    assert found(without_units(base())) == []
+
+
 @pytest.mark.parametrize(("edit", "code", "text"), MISTAKES.values(), ids=MISTAKES)
 def test_a_mistake_is_named_with_its_cause_and_likely_unit(
     edit: Edit, code: str, text: str
 ) -> None:
-    assert found(base()) == []
     named = [f for f in found(edit(base())) if f.code == code]
     assert any(text in f"{finding.message} {finding.hint}" for finding in named)
 
@@ -96,9 +103,7 @@ RELATIVE = ["strengths in Pa", "strengths in psi", "strengths in GPa", "G_IIc in
 @pytest.mark.parametrize("name", RELATIVE)
 def test_a_mistake_is_named_without_units_too(name: str) -> None:
     edit, code, _ = MISTAKES[name]
-    text = replaced(r"^UNIT\n.*\n", "")(base())
-    assert found(text) == []
-    assert code in {finding.code for finding in found(edit(text))}
+    assert code in {finding.code for finding in found(edit(without_units(base())))}
 
 
 DECKS = [*(ROOT / "decks").glob("*.inp"), *(ROOT / "fecm" / "examples").glob("*.inp"),
@@ -153,7 +158,7 @@ def test_no_ply_of_the_catalogue_has_a_finding_in_any_units(name: str, system: s
     text = new_deck(name, system, 0.25, damage=bool(has_damage))
     assert found(text) == []
     if system != "in-lbf-s":
-        assert found(replaced(r"^UNIT\n.*\n", "")(text)) == []
+        assert found(without_units(text)) == []
 
 
 # Density (t/mm^3), nu12, E1, E2, G (MPa); XT, XC, YT, YC, S (MPa); G_IIc (N/mm).
@@ -182,7 +187,7 @@ def test_other_materials_have_no_finding(
     cards = Allowables(xt, xc, yt, yc, s, s, s).cards(None)  # type: ignore[arg-type]
     text = text.replace("EXPE\n", "\n".join([*cards, f"DELA\n{toughness},", "EXPE\n"]))
     text = replaced(r"^NEXT$", "FAIL\nNEXT")(text)
-    assert found(text if units else replaced(r"^UNIT\n.*\n", "")(text)) == []
+    assert found(text if units else without_units(text)) == []
 
 
 def test_deliberate_values_have_no_finding() -> None:

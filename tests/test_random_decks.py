@@ -194,7 +194,7 @@ def test_every_solver_gives_the_same_result(seed: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "seed", [pytest.param(n, marks=() if n < 4 else pytest.mark.long) for n in range(40)]
+    "seed", [pytest.param(n, marks=() if n < 2 else pytest.mark.long) for n in range(40)]
 )
 def test_every_solver_gives_the_same_result_of_several_laminates(seed: int) -> None:
     agree(several_laminates(seed))
