@@ -38,6 +38,12 @@ def strains() -> Floats:
     return scatter(struck()[1], 0.02, seed=1)[0]
 
 
+@cache
+def run() -> fecm.Result:
+    """The impact on the panel as a run."""
+    return fecm.run_one(deck())
+
+
 def located(table: object, **options: object) -> fecm.Location:
     """An impact near its place on the small panel."""
     near: dict[str, object] = {"region": NEAR, "grid": GRID, "basis": BASIS}
@@ -246,7 +252,7 @@ def test_a_file_with_wrong_shapes_or_numbers_is_refused(tmp_path: Path) -> None:
             opened[path] = values
         with pytest.raises(ResultFileError, match="incomplete"):
             fecm.load_location(file)
-    fecm.run_one(panel()).save(file, overwrite=True)
+    run().save(file, overwrite=True)
     with pytest.raises(ResultFileError, match="the result of a run, not of a location"):
         fecm.load_location(file)
 
@@ -256,7 +262,7 @@ def test_two_locations_are_compared_and_one_with_a_run_is_not(tmp_path: Path) ->
     assert fecm.diff(found(), found()).same
     assert fecm.diff(found(), moved).different == ["locate/place"]
     with pytest.raises(ValueError, match="can't be compared"):
-        fecm.diff(found(), fecm.run_one(panel()))
+        fecm.diff(found(), run())
 
 
 # The command --------------------------------------------------------------------------------------

@@ -41,8 +41,10 @@ def test_the_page_shows_the_threshold_of_the_first_group_of_a_layup(layup: str, 
     deck = fecm.impact(
         fecm.Plate.on_fixture("D7136", (4, 4)),
         fecm.Laminate(layup, "T800S/M21", float(row["thickness mm"]) / int(row["plies"])),
-        contact=fecm.Contact.estimate(radius=8),
+        contact=fecm.Contact(4e4, 0.0, 0.0, 1.5),
         energy=1000.0,
+        duration=1e-4,
+        dt=1e-7,
         damage=True,
         units="mm-N-s",
     )
