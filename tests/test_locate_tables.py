@@ -91,7 +91,8 @@ def test_the_order_of_columns_leaves_the_place_where_it_is(tmp_path: Path) -> No
 
 
 def test_some_of_the_gages_are_enough() -> None:
-    read = located({"time": TIME, "gage 3": strains()[:, 2], "gage 1": strains()[:, 0]})
+    table = {"time": TIME, "gage 3": strains()[:, 2], "gage 1": strains()[:, 0]}
+    read = located(table, basis=None)  # the widths are searched for, too
     assert read.gages.tolist() == [3, 1]
     assert read.gage_places.tolist() == [[26.0, 64.0], [22.0, 18.0]]
     assert np.hypot(read.x - STRUCK[0], read.y - STRUCK[1]) < 1.0
