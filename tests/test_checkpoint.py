@@ -93,15 +93,19 @@ def test_a_run_stopped_anywhere_goes_on_to_the_same_bytes(
         path.unlink()
 
 
-@pytest.mark.parametrize("cure", ["", "CURE\n-9.,\n,1.E-6,2.E-5\n\n"], ids=["", "cure"])
+@pytest.mark.parametrize(
+    ("cure", "first"),
+    [("", 6), ("CURE\n-9.,\n,1.E-6,2.E-5\n\n", 1)],
+    ids=["", "cure"],
+)
 def test_a_stopped_run_with_a_patch_and_stresses_goes_on_to_the_same_bytes(
-    cure: str, tmp_path: Path
+    cure: str, first: int, tmp_path: Path
 ) -> None:
     words = f"PATC\nHERT,.3\nSHEA MITC\nALLO\n2e5,2e5,7e3,28e3,13e3\n\n{cure}"
     program = "LMAS\nDT,,.5E-6\nLOOP,,12\nTIME\nRODP,,4\nPLYS,,3,2\nFAIL,,2\nNEXT\n"
     text = small(program, data=DATA_CARDS + words)
     looks = run(text, tmp_path / "whole.h5")
-    for stop in range(1, looks + 1, 4):
+    for stop in range(first, looks + 1, 4):
         path = tmp_path / "stopped.h5"
         with pytest.raises(StoppedError):
             run(text, path, stop)

@@ -81,8 +81,8 @@ def assert_inside(seeds: Iterable[int]) -> Floats:
 
 @pytest.mark.filterwarnings("ignore:. of 240 points:fecm.FecmWarning")
 def test_humps_near_half_of_the_peak_are_neither_refused_nor_shifted() -> None:
-    # With these, the first hump is above half of the largest force.
-    assert_inside([3, 9])
+    # With it, the first hump is above half of the largest force; the long test has a hundred.
+    assert_inside([3])
 
 
 @pytest.mark.long
