@@ -25,6 +25,7 @@ from tests.breaks import (
     changed,
     doubled,
     halved,
+    in_numpy,
     instead,
     other_power,
     standing_plate,
@@ -48,7 +49,7 @@ BREAKS: Breaks = {
         {"indentation": ("F halfway down", "F at α₀", "work")},
     ),
     "permanent indentation of ACR halved": (
-        changed(YangSunPermanent, "permanent", halved),
+        in_numpy(changed(YangSunPermanent, "permanent", halved)),
         {"indentation": ("ACR: F halfway", "ACR: F at α₀"),
          "rigid-target": ("ACR: contact", "ACR: velocity")},
     ),
@@ -83,11 +84,12 @@ BREAKS: Breaks = {
          "report-impact": ("worst",)},
     ),
     "action without equal reaction": (
-        changed(ImpactSystem, "applied", lambda p: p._replace(force=1.01 * p.force)),
+        in_numpy(changed(ImpactSystem, "applied", lambda p: p._replace(force=1.01 * p.force))),
         {"report-impact": ("worst",)},
     ),
     "work of the new force alone": (
-        instead(impacts, "couple_step", work_of_the_new_force), {"report-impact": ("worst",)},
+        in_numpy(instead(impacts, "couple_step", work_of_the_new_force)),
+        {"report-impact": ("worst",)},
     ),
     "a patch of half the radius": (
         instead(points, "patch_weights",

@@ -11,7 +11,7 @@ import pytest
 from fecm.mechanics import membrane
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.membrane import Membrane, QuadraticStrains
-from tests.breaks import Breaks, changed, instead
+from tests.breaks import Breaks, changed, in_numpy, instead
 
 EVERY_STRIP = ("w in the middle",)
 
@@ -38,18 +38,18 @@ def untied(monkeypatch: pytest.MonkeyPatch) -> None:
 
 BREAKS: Breaks = {
     "quadratic strains where they are not tied": (
-        untied, {"cylindrical-bending": ("w over the linear",)},
+        in_numpy(untied), {"cylindrical-bending": ("w over the linear",)},
     ),
     "w,x^2/2 left out": (
-        without_component(0),
+        in_numpy(without_component(0)),
         {"stretching-plate": ("",), "cylindrical-bending": EVERY_STRIP, "stretching-disc": ("",),
          "stretching-impact": ("largest",)},
     ),
     "w,x w,y left out": (
-        without_component(2), {"stretching-plate": ("",), "stretching-disc": ("",)},
+        in_numpy(without_component(2)), {"stretching-plate": ("",), "stretching-disc": ("",)},
     ),
     "a strain energy without the quadratic strains' share": (
-        changed(Membrane, "forces", lambda found: (found[0], 0.0)),
+        in_numpy(changed(Membrane, "forces", lambda found: (found[0], 0.0))),
         {"stretching-impact": ("worst",)},
     ),
 }  # fmt: skip

@@ -15,6 +15,7 @@ from tests.breaks import (
     Breaks,
     changed,
     exchanged_matrices,
+    in_numpy,
     instead,
     partly_given,
     value,
@@ -22,7 +23,7 @@ from tests.breaks import (
 
 BREAKS: Breaks = {
     "a millionth of a step's force missing in the convolution": (
-        instead(Convolution, "give", partly_given), {"convolution": ("largest",)},
+        in_numpy(instead(Convolution, "give", partly_given)), {"convolution": ("largest",)},
     ),
     "the matrices A and B exchanged": (
         instead(random_values, "matrix", exchanged_matrices), {"random-values": ("first", "total")},
