@@ -24,10 +24,13 @@ from fecm.mechanics.own_projectile import OwnProjectile
 from fecm.problem.parts import build_law, build_projectile
 from fecm.sweeps.case import CasesError
 from tests.calls import assert_unusable, call
-from tests.decks import LONG, small
+from tests.decks import LONG, PROGRAM, small
+from tests.test_first_failure import failing
 
 Floats = NDArray[np.float64]
 Trial = Callable[[Any, fecm.ContactPoint, float], Any]
+# The small plate until the force has passed its peak.
+CONTACT = small(PROGRAM.replace("LOOP         10", "LOOP        240"))
 SOLVERS: list[Solver] = ["numpy"] if LIBRARY is None else ["numpy", "kernels"]
 
 
@@ -112,14 +115,14 @@ class Bodies:
 
 @pytest.fixture(scope="module")
 def deck() -> fecm.Deck:
-    """The first contact of an impact, 1000 steps."""
-    return fecm.read_one(LONG).with_(duration=2e-4)
+    """An impact past its peak force."""
+    return fecm.read_one(CONTACT)
 
 
 @pytest.fixture(scope="module")
 def damaged() -> fecm.Deck:
-    """A drop weight test with FAIL, in its first instants."""
-    return fecm.read_one(fecm.examples.path("drop-weight.inp")).with_(duration=6e-5)
+    """A small plate with FAIL."""
+    return fecm.read_one(failing())
 
 
 # Contact laws -------------------------------------------------------------------------------------
@@ -458,15 +461,16 @@ def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]
     (about / "entry_points.txt").write_text(ENTRY_POINTS)
     monkeypatch.syspath_prepend(site)
     invalidate_caches()
-    (tmp_path / "deck.inp").write_text(Path(LONG).read_text())
+    (tmp_path / "deck.inp").write_text(CONTACT)
+    (tmp_path / "damaged.inp").write_text(failing())
     yield tmp_path
     sys.modules.pop("installed_laws", None)
 
 
 @pytest.mark.parametrize("name", ["dented", "made"])
 def test_a_law_of_an_installed_package_has_a_name(installed: Path, name: str) -> None:
-    result = fecm.run_one(LONG, law=name)
-    np.testing.assert_array_equal(result.force, fecm.run_one(LONG, law=Dented()).force)
+    result = fecm.run_one(CONTACT, law=name)
+    np.testing.assert_array_equal(result.force, fecm.run_one(CONTACT, law=Dented()).force)
     assert result.attributes["law"] == name
 
 
@@ -479,10 +483,8 @@ def test_commands_take_laws_and_criteria_by_name(installed: Path) -> None:
     assert done.exit_code == 0
     peaks = fecm.load_sweep(installed / "s.h5")["peak_force"]
     assert peaks[1] == pytest.approx(fecm.load(installed / "deck.h5").force.max(), rel=1e-9)
-    (installed / "drop.inp").write_text(
-        fecm.read_one(fecm.examples.path("drop-weight.inp")).with_(duration=6e-5).to_text()
-    )
-    done = call("run", "drop.inp", "--criterion", "norris", "--fail-limit", "1e-9", cwd=installed)
+    given = ("--criterion", "norris", "--fail-limit", "1e-9")
+    done = call("run", "damaged.inp", *given, cwd=installed)
     assert done.exit_code == 1
     assert "of norris" in done.stderr
 
@@ -497,7 +499,7 @@ def test_commands_take_laws_and_criteria_by_name(installed: Path) -> None:
 )
 def test_a_name_without_a_law_is_refused(installed: Path, name: str, fault: str) -> None:
     with pytest.raises(ValueError, match=fault):
-        fecm.run_one(LONG, law=name)
+        fecm.run_one(CONTACT, law=name)
     done = call("run", "deck.inp", "--law", name, cwd=installed)
     assert_unusable(done)
     assert not (installed / "deck.h5").exists()
@@ -506,18 +508,15 @@ def test_a_name_without_a_law_is_refused(installed: Path, name: str, fault: str)
 def test_an_interrupted_run_with_a_law_and_criteria_resumes_to_the_same_bytes(
     installed: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    (installed / "drop.inp").write_text(
-        fecm.read_one(fecm.examples.path("drop-weight.inp")).with_(duration=1.2e-4).to_text()
-    )
     own = ("--law", "dented", "--criterion", "norris")
-    assert call("run", "drop.inp", *own, "-o", "whole.h5", cwd=installed).exit_code == 0
+    assert call("run", "damaged.inp", *own, "-o", "whole.h5", cwd=installed).exit_code == 0
     with monkeypatch.context() as patched:
         patched.setattr(signals, "received", signal.SIGINT)
-        stopped = call("run", "drop.inp", *own, "-o", "part.h5", cwd=installed)
+        stopped = call("run", "damaged.inp", *own, "-o", "part.h5", cwd=installed)
     assert stopped.exit_code == 130
-    other = call("run", "drop.inp", "-o", "part.h5", "--resume", cwd=installed)
+    other = call("run", "damaged.inp", "-o", "part.h5", "--resume", cwd=installed)
     assert "belongs to a run with another contact law" in other.stderr
-    done = call("run", "drop.inp", *own, "-o", "part.h5", "--resume", cwd=installed)
+    done = call("run", "damaged.inp", *own, "-o", "part.h5", "--resume", cwd=installed)
     assert done.exit_code == 0
     assert (installed / "part.h5").read_bytes() == (installed / "whole.h5").read_bytes()
 
@@ -534,7 +533,3 @@ def test_an_interrupted_run_with_a_law_and_criteria_resumes_to_the_same_bytes(
 def test_the_errors_survive_pickling(error: fecm.FecmError) -> None:
     again = pickle.loads(pickle.dumps(error))
     assert (type(again), again.args) == (type(error), error.args)
-
-
-def test_a_small_deck_takes_a_law(deck: fecm.Deck) -> None:
-    assert fecm.run_one(small(), law=Dented()).attributes["law"] == "Dented"
