@@ -7,6 +7,7 @@ import itertools
 import shutil
 import subprocess
 from dataclasses import replace
+from functools import lru_cache
 from pathlib import Path
 
 import h5py
@@ -57,6 +58,7 @@ SOURCES = Path(kernels.__file__).parent
 WARNINGS = ("-std=gnu11", "-Wall", "-Wextra", "-Werror", "-Wno-psabi")
 
 
+@lru_cache(maxsize=2)
 def problem(text: str) -> Problem:
     """The checked problem of a deck."""
     (found,) = load_deck(text).problems
@@ -85,9 +87,9 @@ def assert_same_product(text: str, dofs: int, slips: frozenset[str]) -> None:
 @pytest.mark.parametrize("kind", [3, 4, 8, 9, 10, 12])
 @pytest.mark.parametrize("coupled", [False, True])
 def test_the_product_is_numpys_for_every_family_and_rule(kind: int, coupled: bool) -> None:
-    meshes = square(8, 8, kind), distorted_square(5, 4, kind)
+    meshes = square(5, 4, kind), distorted_square(5, 4, kind)
     for mesh, orders, variant in itertools.product(
-        meshes, ((3, 3, 3), (4, 2, 3)), ("", "SHEA MITC", "jacobian", "SHEA MITC, jacobian")
+        meshes, ((3, 3, 3), (4, 2, 3)), ("", "jacobian", "SHEA MITC", "SHEA MITC, jacobian")
     ):
         assumed = "SHEA MITC" in variant
         if assumed and kind not in (4, 9):
@@ -145,9 +147,12 @@ def test_assumed_shear_strains_of_fields_are_numpys(
 
 @compiled
 def test_the_product_does_not_depend_on_the_number_of_threads() -> None:
-    motion = build_model(problem(element_deck(distorted_square(48, 48), (3, 2, 3)))).motion
-    u = np.random.default_rng(1).standard_normal(len(motion.mass))
-    products = [CompiledProduct(motion.plate, motion._reduction, threads) for threads in (1, 2, 3)]
+    coordinates, elements = distorted_square(48, 48)
+    mesh = with_restraints(coordinates, elements, boundary(coordinates, elements))
+    plate = PlateModel(mesh, isotropic_plate(0.1), rules(3, 2))
+    kept = symmetry_reduction(plate, None)
+    u = np.random.default_rng(1).standard_normal(kept.count)
+    products = [CompiledProduct(plate, kept, threads) for threads in (1, 2, 3)]
     assert products[0].plate.structure.chunks == 4
     one, *others = (product(u) for product in products)
     for other in others:
@@ -158,7 +163,7 @@ REPORT = Path("decks/impact-115.inp").read_text()
 FIRST = REPORT.replace("LOOP       4000", "LOOP       1500")  # of two contacts
 DECKS = {
     "small": small(),
-    "point": REPORT,
+    "point": FIRST,
     "patch and gage": FIRST.replace(
         "EXPE",
         "PATC\nDISC             0.2\n\nGAGE\n    1       2.5       2.0     0.053        0.\n\nEXPE",
@@ -208,7 +213,8 @@ def test_a_run_is_that_of_numpy(name: str) -> None:
 
 @compiled
 def test_a_run_does_not_depend_on_the_number_of_threads(tmp_path: Path) -> None:
-    deck = element_deck(square(40, 40), (3, 2, 3), steps=40).replace("2.0E-7", "5.0E-8")
+    # So many elements that the threads share them.
+    deck = element_deck(distorted_square(34, 34), (3, 2, 3), steps=40).replace("2.0E-7", "5.0E-8")
     for threads in (1, 3):
         fecm.run_one(deck, output=tmp_path / f"{threads}.h5", threads=threads)
     assert (tmp_path / "1.h5").read_bytes() == (tmp_path / "3.h5").read_bytes()
@@ -235,7 +241,7 @@ def test_rows_are_those_of_one_burst_if_memory_ends_it_earlier(
     assert_close(fecm.run_one(deck), wanted)
 
 
-@pytest.mark.parametrize("elements", [1, 2, 20, 100])
+@pytest.mark.parametrize("elements", [1, 2, 20, 60])
 @pytest.mark.parametrize("tapered", [False, True])
 def test_the_modes_of_a_rod_take_the_step_of_its_matrices(elements: int, tapered: bool) -> None:
     """To the rounding of the latter, which hold the rigid velocity."""
