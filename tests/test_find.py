@@ -66,7 +66,7 @@ def test_a_case_among_others_equals_a_search_of_its_own() -> None:
 
 def test_decks_that_are_run_in_full_are_searched_too() -> None:
     force = "FORC\n    8    0       0.0       0.0      1E-9\n\n"
-    plain, loaded = (fecm.sweep(deck(50, data + PLATE), until=400.0) for data in ("", force))
+    plain, loaded = (fecm.sweep(deck(200, data + PLATE), until=100.0) for data in ("", force))
     assert loaded["found_velocity"][0] == pytest.approx(plain["found_velocity"][0], rel=1e-5)
 
 

@@ -41,6 +41,7 @@ def thin_plate() -> Deck:
         velocity=2330,
         duration=WHOLE,
         units="mm-N-s",
+        patch=None,
         damage=True,
     )
 

@@ -283,7 +283,7 @@ def test_a_sweep_over_the_cure_of_several_materials_is_that_of_single_runs() -> 
     deck = deck_of("--layup", "[0C/90G]s", "--material", "C=T300/914", "--material",
                    "G=E-glass/MY750", "--ply-thickness", ".25", "--cure", ":20", "--damage",
                    "--zone", "10,10,30,20:[0C/90G]2s")  # fmt: skip
-    deck = deck.with_(mass=1e-6, duration=2e-4)
+    deck = deck.with_(mass=2e-7, duration=5e-5)
     changes = [-100.0, -50.0]
     found = fecm.sweep(deck, {"cure_dT": changes}, measure="failure")
     for row, change in enumerate(changes):

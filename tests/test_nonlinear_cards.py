@@ -29,7 +29,9 @@ from tests.decks import ROOT
 LAW = fecm.Contact(1e5, 0.0, 0.0, 1.5)
 MASS = fecm.RigidMass(1e-3)
 PLIES = fecm.Laminate("[0/90]2s", "IM7/8552", 0.184)
-QUICK: dict[str, Any] = {"velocity": 1000.0, "duration": 1e-5, "units": "mm-N-s"}
+QUICK: dict[str, Any] = {
+    "velocity": 1000.0, "duration": 1e-5, "units": "mm-N-s", "patch": None
+}  # fmt: skip
 HELD = "    1    1   -1   -1    0    0    0\n"
 
 
