@@ -37,7 +37,9 @@ SUPPORTED = (*OPTIONS, "--support", "simple")
 
 def panel(*, support: Any = "simple", edges: Any = None, **given: Any) -> Deck:
     """A small panel, struck softly."""
-    settings: dict[str, Any] = {"velocity": 1000.0, "duration": 2e-5, "every": 5, "units": "mm-N-s"}
+    settings: dict[str, Any] = {
+        "velocity": 1000.0, "duration": 2e-5, "every": 5, "units": "mm-N-s", "patch": None
+    }  # fmt: skip
     return fecm.impact(
         fecm.Plate.rectangle((30, 20), (4, 4), support=support, edges=edges),
         fecm.Laminate("[0/90]s", "IM7/8552", 0.1),
@@ -102,7 +104,7 @@ def test_the_command_writes_the_deck_of_the_function_and_says_what_the_edges_hol
         "edge (SS3); --support pinned holds both"
     ) in done.stderr
     made = fecm.read_one(path)
-    assert made == panel(radius_x=-100.0, radius_y=250.0)
+    assert made == panel(patch="auto", radius_x=-100.0, radius_y=250.0)
     assert made.require(Curvature).curvatures == (-0.01, 0.004, 0.0)
 
 
@@ -269,6 +271,7 @@ def test_the_mesh_says_that_it_is_a_panel_from_above(curved: fecm.Result) -> Non
 def test_a_report_names_the_radii(curved: fecm.Result, monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("jinja2")
     monkeypatch.setattr("fecm.report.figures.drawn", lambda *_, **__: iter(()))
+    monkeypatch.setattr("fecm.report.figures._bytes", lambda _, form: form.encode())
     html = render(page_of({"panel": curved}))
     for name, text in (("radius Rx", "100 mm"), ("radius Ry", "-200 mm")):
         assert text in html.split(name)[1][:120].replace("−", "-")

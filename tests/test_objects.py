@@ -37,7 +37,8 @@ SQUARE = [(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)]
 
 
 def deck_on(plate: fecm.Plate, **options: Any) -> fecm.Deck:
-    return fecm.impact(plate, METAL, MASS, LAW, **QUICK | options)
+    """A deck without a patch, unless asked for."""
+    return fecm.impact(plate, METAL, MASS, LAW, **QUICK | {"patch": None} | options)
 
 
 def mesh_of(plate: fecm.Plate) -> Mesh:
@@ -315,14 +316,14 @@ def test_a_plate_whose_groups_hold_nothing_is_warned_of() -> None:
 
 def test_the_patch_of_an_imported_mesh_lies_at_the_impact_point() -> None:
     plate = imported(CIRCLE, {"rim": "clamped"})
-    deck = deck_on(plate, at=(3.0, 4.0))
+    deck = deck_on(plate, at=(3.0, 4.0), patch="auto")
     patch = deck.require(Patch)
     assert (patch.x, patch.y) == (3.0, 4.0)
     assert plate.imported is not None
     distances = np.hypot(*(plate.imported.points - (3.0, 4.0)).T)
     assert deck.require(Impact).node == distances.argmin() + 1
     with pytest.warns(fecm.FecmWarning, match="the impact point is moved by"):
-        deck_on(plate, at=(3.0, 4.0), patch=None)
+        deck_on(plate, at=(3.0, 4.0))
 
 
 ABAQUS = """\
