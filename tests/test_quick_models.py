@@ -329,7 +329,7 @@ def test_a_laminate_whose_bending_twists_it_is_named_beside_its_threshold(
         "--duration",
         "1e-5",
         "--patch",
-        "disc:2",
+        "none",
     )
     deck = load_deck(made.stdout.replace("EXPE", "DELA\n0.5\nEXPE"))
     assert ("W461" in [finding.code for finding in deck.findings]) is warns

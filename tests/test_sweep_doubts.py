@@ -63,7 +63,7 @@ def damped() -> Problem:
 
 
 @pytest.mark.parametrize("name", sorted(JUDGED))
-@pytest.mark.parametrize("value", [0.0, -1.0, 1e300, 1e-300, 1.7e308, 5e-324])
+@pytest.mark.parametrize("value", [0.0, -1.0, 1.7e308, 5e-324])
 def test_an_impossible_value_is_left_to_its_case(name: str, value: float) -> None:
     assert all(note.startswith(name) for note in doubtful_values(damped(), [{name: value}]))
 
