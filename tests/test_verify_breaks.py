@@ -67,7 +67,7 @@ def shown(pairs: list[Seen]) -> set[Any]:
 def of_the_default_run() -> list[Seen]:
     """A case of every break and a break of every row, and none that shows nothing of its own."""
     kept = SEEN
-    for pair in SEEN:
+    for pair in reversed(SEEN):
         others = [other for other in kept if other is not pair]
         if shown([pair]) <= shown(others):
             kept = others

@@ -71,6 +71,7 @@ BREAKS: Breaks = {
             "wave-fronts": ("bending", "twisting"), "dispersion": ("ω, wavelength",),
             "cross-ply-plate": ("ω", "w"), "angle-ply-plate": ("ω", "w"),
             "forced-plate": ("w", "strain"), "supported-plate": ("",),
+            "stretching-impact": ("largest",),
         },
     ),
     "a shear correction of 5/6": (
