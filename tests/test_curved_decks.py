@@ -173,7 +173,7 @@ def test_a_deck_that_holds_its_plane_takes_no_radius_without_supports() -> None:
 
 def test_a_new_plate_of_a_curved_deck_has_the_supports_of_a_panel() -> None:
     other = fecm.Plate.rectangle((40, 20), (4, 4), support="simple")
-    assert held(panel(radius_x=100.0).with_(plate=other))["left"] == {"v"}
+    assert held(panel(radius_x=100.0, patch="auto").with_(plate=other))["left"] == {"v"}
 
 
 # Results ------------------------------------------------------------------------------------------
