@@ -81,7 +81,7 @@ INLINE half NAME(stored)(const double *exposure, int count) {
 }
 
 /* Where four states of `count` begin that are to begin at `first`, so that none is beyond the last. */
-INLINE int64_t NAME(begin)(int64_t first, int64_t count) {
+INLINE int64_t NAME(first_of_four)(int64_t first, int64_t count) {
     return first + 4 > count && count >= 4 ? count - 4 : first;
 }
 
@@ -153,7 +153,7 @@ INLINE void NAME(plies)(const Exposures *m, const Plies *f, int strains, double 
         const int64_t row = f->row ? f->row[point] : point;
         const double *e = m->strain + strains * row;
         for (int64_t four = 0; four < f->states; four += 4) {
-            const int64_t first = NAME(begin)(four, f->states);
+            const int64_t first = NAME(first_of_four)(four, f->states);
             half s[3];
             for (int c = 0; c < 3; c++) s[c] = NAME(load)(f->residual + c * width + first);
             const double *stress = f->stress + first;
@@ -172,7 +172,7 @@ INLINE void NAME(interfaces)(const Exposures *m, const Interfaces *f, int strain
         const int64_t row = f->row ? f->row[element] : element;
         const double *g = m->gradient + 2 * strains * row;
         for (int64_t four = 0; four < f->interfaces; four += 4) {
-            const int64_t first = NAME(begin)(four, f->interfaces), at = m->interfaces * row + first;
+            const int64_t first = NAME(first_of_four)(four, f->interfaces), at = m->interfaces * row + first;
             const half before = NAME(stored)(between->exposure + at, count);
             half t[4] = {{0}};
             const double *shear = f->shear + first;
