@@ -19,7 +19,7 @@ from tests.builders import DATA
 from tests.calls import assert_unusable, call, new, new_deck
 from tests.closed_forms_plies import equilibrium_shear
 
-LAW = ("--law", "5e4,0,0,1.5")  # which takes a third of the time of an estimate
+LAW = ("--law", "5e4,0,0,1.5")  # an estimate doubles the time of a call
 MM = ("--material", "IM7/8552", "--projectile", "mass:1e-3", *LAW)
 PLATE = (*MM, "--size", "100x80", "--mesh", "5x4")
 D7136 = ("--fixture", "D7136", "--mesh", "8x6", "--material", "IM7/8552", "--layup",
