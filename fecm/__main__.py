@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import gc
 import os
 import signal
+import sys
 from types import FrameType
 from typing import NoReturn
 
@@ -42,6 +44,11 @@ def main() -> NoReturn:
     # Matrix products are small; the threads of OpenBLAS would only wait for work, and busily.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(100_000)  # modules and arrays make little garbage in cycles
+    _run()
+
+
+def _run() -> NoReturn:
+    """Import the command line and run it."""
     try:
         from fecm.cli import main as run
     except (ImportError, MemoryError) as error:
@@ -49,8 +56,35 @@ def main() -> NoReturn:
         _refuse(f"a part of the program can't be loaded: {line}")
     try:
         run()
-    finally:
-        gc.freeze()  # the interpreter ends without a search for cycles
+    except SystemExit as left:
+        if isinstance(left.code, int) and not _is_watched():
+            _end(left.code)
+        raise
+
+
+def _is_watched() -> bool:
+    """Whether a debugger, a profiler or a thread waits for the end of the program."""
+    from threading import active_count  # which the command line has imported
+
+    if sys.gettrace() or sys.getprofile() or active_count() > 1:
+        return True
+    return sys.version_info >= (3, 12) and any(map(sys.monitoring.get_tool, range(6)))
+
+
+def _end(status: int) -> NoReturn:
+    """End the process as the interpreter does, but without freeing each object: 10 ms."""
+    atexit._run_exitfuncs()
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            stream.flush()
+    os._exit(status)
+
+
+# CPython keeps the frames of calls in blocks of 16 KB, and unmaps a block when its first frame
+# returns.  Imports nested so deeply that they cross the end of a block would map and unmap one
+# thousands of times: 7 ms of a short run, 90 ms where SciPy is imported.  All calls below a frame
+# of 256 KB share its block.
+_run.__code__ = _run.__code__.replace(co_stacksize=2**15)
 
 
 if __name__ == "__main__":

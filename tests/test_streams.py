@@ -245,6 +245,27 @@ def test_a_signal_while_the_program_ends_changes_no_exit_status(name: str) -> No
     assert done.stdout.startswith("fecm, version ")
 
 
+def test_a_profiler_sees_the_end_of_the_program() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "cProfile", "-m", "fecm", "--version"],
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    assert done.stdout.startswith("fecm, version ")
+    assert "function calls" in done.stdout
+
+
+def test_what_is_registered_for_the_end_of_the_program_is_called() -> None:
+    done = python(
+        "import atexit, sys, fecm.__main__\n"
+        "atexit.register(print, 'the end')\n"
+        "sys.argv = ['fecm', '--version']\n"
+        "fecm.__main__.main()"
+    )
+    assert done.stdout.splitlines()[1:] == ["the end"]
+
+
 @pytest.mark.posix
 def test_nohup_keeps_a_run_from_ending_at_a_hangup() -> None:
     code = (
