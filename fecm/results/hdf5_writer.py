@@ -6,6 +6,7 @@ import contextlib
 import io
 from collections.abc import Iterator, Mapping
 from enum import StrEnum
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,8 @@ class FileSink:
         self.arrays: dict[str, Any] = {}
         self.texts: dict[str, str] = {}
         self.groups: dict[str, dict[str, Any]] = {}
-        self._made: list[schema.Dataset] = []
+        # What was created, with its shape before `trim`: h5py takes 10 us to tell.
+        self._made: dict[str, tuple[schema.Dataset, tuple[int, ...]]] = {}
         self._groups: dict[str, h5py.Group] = {"": file}
         self._scales: dict[str, h5py.Dataset] = {}
         self.axis_names = dict(schema.AXIS_NAMES)
@@ -86,7 +88,7 @@ class FileSink:
         self._note(Operation.CREATE, path=dataset.path, shape=shape)
         # Low-level interface: create_dataset takes twice as long.
         place = h5py.h5s.create_simple(shape)
-        kind = h5py.h5t.py_create(np.dtype(dataset.dtype), logical=True)
+        kind = _type_of(dataset.dtype)
         name = dataset.name.encode()
         group = self._group(dataset.group).id
         made = h5py.Dataset(h5py.h5d.create(group, name, kind, place, PROPERTIES))
@@ -96,7 +98,7 @@ class FileSink:
             if unit := unit_of(dataset.dimension, self._units):
                 _set_text(made, unit, "unit", "units")  # xarray and pint read units
         self.arrays[dataset.path] = made
-        self._made.append(dataset)
+        self._made[dataset.path] = dataset, shape
 
     def label_axes(self) -> None:
         """Attach dimension scales (of the HDF5 specification) to the axes of datasets, for xarray.
@@ -105,15 +107,17 @@ class FileSink:
         the file, because a netCDF reader looks for dimensions in a group and its parents.  It needs
         all axes of a dataset labelled, or none.
         """
-        made_of = [(d, self.arrays[d.path]) for d in self._made if d.path in self.arrays]
-        clocks = {d.group: made for d, made in made_of if d.name == "time" and d.shape[0] == "rows"}
+        kept = [
+            (d, shape, self.arrays[p]) for p, (d, shape) in self._made.items() if p in self.arrays
+        ]
+        clocks = {d.group: made for d, _, made in kept if d.name == "time" and d.shape[0] == "rows"}
         for clock in clocks.values():
             clock.make_scale("time")
-        for dataset, made in made_of:
+        for dataset, shape, made in kept:
             clock = clocks.get(dataset.group)
-            if made == clock or not {*dataset.shape} <= {"rows", *schema.SCALES}:
+            if made is clock or not {*dataset.shape} <= {"rows", *schema.SCALES}:
                 continue
-            for axis, (size, length) in enumerate(zip(dataset.shape, made.shape, strict=True)):
+            for axis, (size, length) in enumerate(zip(dataset.shape, shape, strict=True)):
                 rows = size == "rows"
                 scale = clocks[dataset.group] if rows else self._scale(size, length)
                 h5py.h5ds.attach_scale(made.id, scale.id, axis)
@@ -138,7 +142,7 @@ class FileSink:
         self.check()
         dataset = self.arrays[path]
         # Low-level interface: slices of h5py take four times as long for a short block.
-        values = np.ascontiguousarray(rows, dataset.dtype)
+        values = np.ascontiguousarray(rows, self._made[path][0].dtype)
         place = dataset.id.get_space()
         place.select_hyperslab((start, *[0] * (values.ndim - 1)), values.shape)
         dataset.id.write(h5py.h5s.create_simple(values.shape), place, values)
@@ -173,8 +177,14 @@ class FileSink:
             self.texts[path] = value
         else:
             self.arrays[path] = made
-            self._made.append(schema.Dataset(path, axes, description))
+            self._made[path] = schema.Dataset(path, axes, description), (len(value),)
         made.attrs["description"] = description
+
+
+@cache
+def _type_of(dtype: str) -> h5py.h5t.TypeID:
+    """Type of the file for NumPy's name of a type."""
+    return h5py.h5t.py_create(np.dtype(dtype), logical=True)
 
 
 def _set_text(item: h5py.HLObject, text: str, *names: str) -> None:
