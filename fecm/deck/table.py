@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from array import array
 from collections.abc import Callable, Iterator, Sequence
-from functools import cache
+from functools import cache, cached_property
 from itertools import pairwise
 from typing import TypeVar, overload
 
@@ -114,7 +114,16 @@ class TableReader:
         self.fields = fields
         self.values = array("d")
         self.lines: list[Line] = []
-        self._in_columns, self._with_commas = _patterns(fields)
+
+    # Most decks need one of the two, which takes 1 ms.
+
+    @cached_property
+    def _in_columns(self) -> Match:
+        return _in_columns(self.fields).fullmatch
+
+    @cached_property
+    def _with_commas(self) -> Match:
+        return _with_commas(self.fields).fullmatch
 
     def take(self, lines: Sequence[Line], begin: int) -> int:
         """Take lines from `begin` on up to one that it can't read; return how many."""
@@ -150,26 +159,36 @@ class TableReader:
             yield number, (self.fields, row)
 
 
-@cache
-def _patterns(fields: Fields) -> tuple[Match, Match]:
-    """Matches of a line in columns and of one with commas; a group a field, none where blank.
+# Patterns of a line have a group for each field, without a match where the field is blank.  The
+# first field is not blank.
 
-    The first field is not blank.  In columns a number ends with its field, so that one that touches
-    the number before it fills its field.  What a match in columns takes for a number need not be
-    one; `float` decides.
+
+@cache
+def _in_columns(fields: Fields) -> re.Pattern[str]:
+    """Pattern of a line in columns.
+
+    A number ends with its field, so that one that touches the number before it fills its field.
+    What the pattern takes for a number need not be one; `float` decides.
     """
-    in_columns = with_commas = ""
+    rest = ""
     for before, field in reversed(list(pairwise(fields))):
         gap, blank = (f" {{{n}}}" for n in (field.first - 1 - before.last, field.width))
-        in_columns = f"(?:{gap}(?:{blank}|({_in_columns(field)})){in_columns})?"
-        with_commas = f"(?:, *(?:({_with_commas(field)}) *)?{with_commas})?"
+        rest = f"(?:{gap}(?:{blank}|({_number(field)})){rest})?"
     first = fields[0]
-    in_columns = " " * (first.first - 1) + f"({_in_columns(first)}){in_columns} *"
-    with_commas = f" *({_with_commas(first)}) *{with_commas}"
-    return re.compile(in_columns).fullmatch, re.compile(with_commas).fullmatch
+    return re.compile(" " * (first.first - 1) + f"({_number(first)}){rest} *")
 
 
-def _in_columns(field: Field) -> str:
+@cache
+def _with_commas(fields: Fields) -> re.Pattern[str]:
+    """Pattern of a line with commas."""
+    numbers = [_INTEGER if field.kind is FieldKind.INTEGER else _REAL for field in fields]
+    rest = ""
+    for number in reversed(numbers[1:]):
+        rest = f"(?:, *(?:({number}) *)?{rest})?"
+    return re.compile(f" *({numbers[0]}) *{rest}")
+
+
+def _number(field: Field) -> str:
     """Pattern of a field whose last column is not blank."""
     width = field.width
     if field.kind is FieldKind.INTEGER:
@@ -177,10 +196,6 @@ def _in_columns(field: Field) -> str:
     begin = "[ 0-9.+-]"
     exponents = f"{begin}{{{width - 4}}}[Ee][+-][0-9]{{2}}|{begin}{{{width - 3}}}[Ee][0-9+-][0-9]"
     return f"{begin}{{{width - 1}}}[0-9.]|{exponents}|{begin}{{{width - 2}}}[Ee][0-9]"
-
-
-def _with_commas(field: Field) -> str:
-    return _INTEGER if field.kind is FieldKind.INTEGER else _REAL
 
 
 # Writing ------------------------------------------------------------------------------------------
