@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
+from fecm._dataclasses import frozen
 from fecm._errors import StudyError
-from fecm._frozen import frozen
 from fecm._inputs import read_input
 from fecm._typing import Floats
 

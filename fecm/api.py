@@ -8,9 +8,9 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import BinaryIO, Literal
 
+from fecm._dataclasses import frozen
 from fecm._errors import warn
 from fecm._files import ARGUMENT, check_outputs
-from fecm._frozen import frozen
 from fecm._progress import once_a_minute
 from fecm.deck.findings import DeckError, Finding, Severity
 from fecm.deck.model import Deck

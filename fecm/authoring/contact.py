@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.authoring.laminate import Plies
 from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck.catalogue import (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.authoring.parameters import ObjectError
 
 CUSTOM = "window:LXxLY,WXxWY"

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
+from fecm._dataclasses import frozen
 from fecm._errors import warn
-from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.authoring.contact import AnyContact, Sphere, law_of
 from fecm.authoring.energy import doubts_of_energy, energy_note, with_energy

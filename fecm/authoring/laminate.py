@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
+from fecm._dataclasses import frozen
 from fecm._errors import did_you_mean
-from fecm._frozen import frozen
 from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck import catalogue
 from fecm.deck.catalogue import MATERIALS, NamedPly

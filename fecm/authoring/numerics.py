@@ -7,7 +7,7 @@ from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.api import load_deck
 from fecm.authoring.contact import parse_patch
 from fecm.authoring.parameters import ObjectError, check_positive

@@ -9,7 +9,7 @@ from typing import Literal, Self
 
 from numpy.typing import ArrayLike
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.authoring.fixtures import Fixture, parse_fixture
 from fecm.authoring.parameters import ObjectError, check_positive, pair
 from fecm.deck import grid as grids

@@ -10,7 +10,7 @@ from typing import Any
 import click
 from click import option
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._inputs import parsed_toml
 from fecm._text import printable
 from fecm.cli.common import FAILED, echo_json

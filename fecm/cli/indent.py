@@ -10,7 +10,7 @@ import click
 import numpy as np
 from click import option
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.cli.common import RefusedError, echo, note
 from fecm.cli.help import Group, typical
 from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options

@@ -10,7 +10,7 @@ from typing import NoReturn, TypeVar
 import click
 from click import option
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.authoring.laminate import Laminate as AuthoredLaminate
 from fecm.cli.options import (
     POSITIVE,

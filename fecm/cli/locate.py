@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 from click import option
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.cli.common import DASH, FAILED, echo, echo_json, every_minute, note
 from fecm.cli.decks import load_single
 from fecm.cli.help import typical

@@ -10,8 +10,8 @@ import click
 from click import option
 from click.core import ParameterSource
 
+from fecm._dataclasses import frozen
 from fecm._files import check_outputs
-from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.authoring.contact import Sphere, parse_patch
 from fecm.authoring.fixtures import CUSTOM, FIXTURES

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 from click import option
 
+from fecm._dataclasses import frozen
 from fecm._errors import FecmWarning
 from fecm._files import check_outputs
-from fecm._frozen import frozen
 from fecm._text import printable
 from fecm.cli.common import CheckFailedError, RefusedError, echo, note, progress
 from fecm.cli.help import typical

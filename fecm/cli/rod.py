@@ -9,7 +9,7 @@ import click
 import numpy as np
 from click import option
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._measured_tables import read_table
 from fecm.cli.common import DASH, RefusedError
 from fecm.cli.decks import load_valid

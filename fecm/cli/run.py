@@ -7,13 +7,12 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import click
 from click import option
 
+from fecm._dataclasses import frozen
 from fecm._files import check_outputs, writing
-from fecm._frozen import frozen
 from fecm._memory import format_bytes
 from fecm.api import numbered
 from fecm.cli.common import CheckFailedError, RefusedError, echo, echo_json, note, progress
@@ -105,7 +104,8 @@ class Options:
         )
 
 
-class Job(NamedTuple):
+@frozen
+class Job:
     """A problem of the deck, and its files."""
 
     problem: Problem

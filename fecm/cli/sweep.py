@@ -8,8 +8,8 @@ from pathlib import Path
 import click
 from click import option
 
+from fecm._dataclasses import frozen
 from fecm._files import check_outputs
-from fecm._frozen import frozen
 from fecm.api import load_deck
 from fecm.cli.common import FAILED, RefusedError, echo, every_minute, note, progress
 from fecm.cli.decks import count_findings

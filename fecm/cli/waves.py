@@ -11,7 +11,7 @@ import click
 import numpy as np
 from click import option
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.authoring.parameters import ObjectError
 from fecm.cli.common import RefusedError, note
 from fecm.cli.decks import load_valid

@@ -6,14 +6,12 @@ values separated by commas, in the same order; everything from ``!`` on is a com
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.deck.findings import Place
 from fecm.deck.numerals import format_real
 
@@ -75,17 +73,15 @@ def layout(*descriptors: str) -> Fields:
     return tuple(fields)
 
 
-@dataclass(frozen=True, slots=True)
 class Card:
     """One line of a deck."""
 
-    line: int  # line number in the file, from 1
-    text: str  # the line as written
-    # The text without its comment and trailing blanks.
-    data: str = dataclasses.field(init=False, compare=False, repr=False)
+    __slots__ = ("data", "line", "text")
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "data", self.text.partition("!")[0].rstrip())
+    def __init__(self, line: int, text: str) -> None:
+        self.line = line  # line number in the file, from 1
+        self.text = text  # the line as written
+        self.data = text.partition("!")[0].rstrip()  # without its comment and trailing blanks
 
     @property
     def is_blank(self) -> bool:
@@ -135,7 +131,7 @@ class Card:
         return pieces
 
 
-@dataclass(frozen=True, slots=True)
+@frozen
 class Source:
     """Source of a record: its card and the fields of the card."""
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 from importlib import resources
 from pathlib import Path
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._inputs import parsed_file, parsed_toml
 from fecm.deck.model import Allowables, Deck, Delamination, Expansion, Indentation, Ply
 from fecm.deck.unit_systems import UnitsError, convert, system_named

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import ClassVar, Self
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.deck.card import Card, Fields, layout
 from fecm.deck.record import Control, Record
 from fecm.deck.segment import Segment

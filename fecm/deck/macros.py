@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 from enum import Enum, auto
 from typing import ClassVar, NamedTuple
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.deck.card import Fields, Value, layout
 from fecm.deck.findings import Findings
 from fecm.deck.numerals import parse_real
@@ -92,7 +92,8 @@ class Number(Enum):
     TOLERANCE = auto()  # positive
 
 
-class Word(NamedTuple):
+@frozen
+class Word:
     """A word of the macro language."""
 
     name: str  # up to four letters

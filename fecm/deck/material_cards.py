@@ -7,7 +7,7 @@ from dataclasses import replace
 from itertools import compress
 from typing import ClassVar, Self
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.deck.card import BLANK, Card, Fields, Source, Value, layout, write_card
 from fecm.deck.record import Control, Record
 from fecm.deck.segment import Segment

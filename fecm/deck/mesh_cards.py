@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.deck.card import Fields, layout
 from fecm.deck.record import Control, Record
 from fecm.deck.segment import NumberedSegment

@@ -12,7 +12,7 @@ from dataclasses import field, replace
 from textwrap import shorten
 from typing import TYPE_CHECKING, TypeVar, Unpack
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._tables import html_table
 from fecm.deck.impact_cards import Impact, Indentation, Patch, Projectile, RodDiameter
 from fecm.deck.macros import LoadTable, Macro

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import ClassVar, Self
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.deck.card import Card, Fields, Source, layout
 from fecm.deck.record import Control, Record
 from fecm.deck.segment import NumberedSegment, Segment

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from numbers import Integral
 
+from fecm._dataclasses import frozen
 from fecm._errors import FecmError
-from fecm._frozen import frozen
 from fecm.deck.macros import STEPS, Macro
 from fecm.deck.macros import every as every_of
 

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import field
 from pathlib import Path
-from typing import NamedTuple
 
+from fecm._dataclasses import frozen, mutable
 from fecm.deck.card import Card, Source
 from fecm.deck.findings import DeckError, Place
 from fecm.deck.macros import LoadTable, Macro
@@ -28,7 +28,8 @@ MOST_SEGMENTS = 20_000
 MOST_MACRO_CARDS = 100_000
 
 
-class OtherFile(NamedTuple):
+@frozen
+class OtherFile:
     """A file of another program."""
 
     begins: str  # pattern of its first line
@@ -57,7 +58,7 @@ OTHER_FILES = (
 )
 
 
-@dataclass
+@mutable
 class ParsedProblem:
     """The readable part of a problem."""
 
@@ -93,11 +94,6 @@ class Reader:
         problems: list[ParsedProblem] = []
         stopped = False
         while (card := self.cards.take_filled()) is not None:
-            if not (problems or self.findings) and (other := _other_file(card)):
-                message = f"This is {other.what}, not a deck."
-                self.findings.add("E013", message, card.place, other.hint)
-                self.findings.closed = True
-                break
             if card.keyword == STOP:
                 stopped = True
                 break
@@ -106,6 +102,11 @@ class Reader:
                     self._end(f"The file contains more than {MOST_PROBLEMS} problems.", card)
                     break
                 problems.append(self._problem(card))
+            elif not (problems or self.findings) and (other := _other_file(card)):
+                message = f"This is {other.what}, not a deck."
+                self.findings.add("E013", message, card.place, other.hint)
+                self.findings.closed = True
+                break
             else:
                 self._stray(card, [TITLE, STOP])
 

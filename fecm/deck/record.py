@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import field
 from typing import Any, ClassVar, Self
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.deck.card import BLANK, Fields, Source, Value, layout, write_card
 from fecm.deck.findings import Place
 

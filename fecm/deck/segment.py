@@ -6,7 +6,7 @@ from array import array
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, cast
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.deck.card import Card, Fields, Source
 from fecm.deck.record import Control, Record
 from fecm.deck.stream import CardStream

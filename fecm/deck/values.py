@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 import sys
 from itertools import pairwise
-from typing import NamedTuple
 
+from fecm._dataclasses import frozen
 from fecm.deck.card import BLANK, Card, Field, FieldKind, Fields, Source, Value
 from fecm.deck.findings import Findings, Place
 from fecm.deck.numerals import LONGEST, parse_integer, parse_real
@@ -160,7 +160,8 @@ def _report_blank(
     findings.add("E104", message, source.place(field.name), hint)
 
 
-class _Misplaced(NamedTuple):
+@frozen
+class _Misplaced:
     """Text that is not within its field."""
 
     code: str

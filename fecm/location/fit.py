@@ -8,8 +8,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fecm._dataclasses import frozen
 from fecm._errors import FecmError
-from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.location.model import StrainModel
 from fecm.location.observation import triangular

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics.mesh import Mesh
 from fecm.mechanics.plate import PlateModel

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats, Indices
 from fecm.location.observation import Observation, interpolation
 from fecm.mechanics.elements import Quadrature

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 
 BLOCK = 128  # rows that are reduced together: small enough for BLAS to use one thread

@@ -8,8 +8,8 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
+from fecm._dataclasses import frozen
 from fecm._errors import FecmError, StudyError
-from fecm._frozen import frozen
 from fecm._typing import Floats, Indices
 from fecm.location.errors import LocateError
 from fecm.location.fit import Fit, Trial

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._dataclasses import frozen
 from fecm._errors import StudyError
-from fecm._frozen import frozen
 from fecm._measured_tables import Table, read_table, same_name
 from fecm._text import printable
 from fecm._typing import Floats

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.mechanics import assumed_shear
 from fecm.mechanics.curvature import FLAT, Curvature, strain_of_deflection

@@ -12,11 +12,11 @@ rectangle, and of the small square.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
+from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats
 
 # Corners, mid-sides from node 5 between corners 1 and 2, centre.
@@ -42,14 +42,17 @@ _LEGENDRE = (
 )
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class Quadrature:
-    """Points and weights of a quadrature rule."""
+    """Points and weights of a quadrature rule; equal to itself only."""
 
     # (n,): local coordinates.
     xi: Floats
     eta: Floats
     weights: Floats  # (n,): their sum is 4, the area of the square
+
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
 
 
 @cache
@@ -87,9 +90,9 @@ def _rule(order: int, *, equal: bool) -> Quadrature:
 # Shapes -------------------------------------------------------------------------------------------
 
 
-@dataclass(frozen=True, eq=False)
+@frozen
 class ElementShape:
-    """Shape of an element."""
+    """Shape of an element; equal to itself only."""
 
     name: str  # name in messages
     # (nodes,): local coordinates of the nodes.
@@ -99,6 +102,9 @@ class ElementShape:
     numbering: str  # order of the nodes, for messages
     # ``functions(xi, eta, present)`` returns values, d/dxi and d/deta at n points, (3, nodes, n).
     functions: Callable[[Floats, Floats, Bools], Floats]
+
+    __eq__ = object.__eq__
+    __hash__ = object.__hash__
 
     @property
     def nodes(self) -> int:

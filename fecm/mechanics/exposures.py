@@ -10,7 +10,7 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.mechanics.failure import CRITERIA, Codes
 

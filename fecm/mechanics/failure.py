@@ -13,11 +13,12 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import NamedTuple, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 
 MODES = (
@@ -145,7 +146,8 @@ CRITERIA: dict[str, Criterion] = {
 }
 
 
-class PlyExposure(NamedTuple):
+@frozen
+class PlyExposure:
     """Largest exposure of a criterion in the plies of a laminate."""
 
     criterion: str

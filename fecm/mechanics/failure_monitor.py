@@ -18,7 +18,7 @@ from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.mechanics import failure
 from fecm.mechanics.exposures import (

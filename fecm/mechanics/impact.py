@@ -10,12 +10,12 @@ the indentation is -u_tip - w.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
 from typing import Any, Generic
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen, mutable
 from fecm.mechanics.contact_law import ContactPoint, Law, Number, any_case, select
 from fecm.mechanics.plate_motion import AppliedForce, DivergenceError, Load, PlateMotion, PlateState
 from fecm.mechanics.projectile import Projectile, RodIntegrator, TipStep, WilsonStep, rigid_approach
@@ -25,7 +25,7 @@ PASSES = 5
 TOLERANCE = 1.0e-6
 
 
-@dataclass(slots=True)
+@mutable
 class ContactState(Generic[Number]):
     """State of projectile and contact after a step: floats, or arrays with an entry per case."""
 
@@ -38,7 +38,7 @@ class ContactState(Generic[Number]):
     unconverged_steps: Any
 
 
-@dataclass(slots=True)
+@mutable
 class ImpactState(ContactState[float]):
     """State of plate, projectile and contact after a step."""
 

@@ -14,7 +14,7 @@ from typing import Generic, NamedTuple, cast
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics.contact_law import (
     ContactParameters,
@@ -176,7 +176,8 @@ class Impact(Structure):
     )
 
 
-class Written(NamedTuple):
+@frozen
+class Written:
     """Arrays that the kernel writes; see :class:`Rod` and :class:`Impact`."""
 
     motion: Floats

@@ -9,7 +9,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Array, Bools, Floats
 from fecm.mechanics.elements import ElementShape, Quadrature
 from fecm.mechanics.mesh import ElementBlock

@@ -15,7 +15,7 @@ from typing import Protocol
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats
 
 # The slip ``small-stiffness`` sets entries of A, B and D below the first limit to 0, except

@@ -28,7 +28,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics import assumed_shear
 from fecm.mechanics.curvature import strain_of_deflection

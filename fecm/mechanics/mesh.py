@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.elements import CUBIC, QUADRILATERAL, TRIANGLE, ElementShape
 

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm._extensions import Group, installed
-from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, Law
 from fecm.mechanics.impact_steps import knows

@@ -13,8 +13,8 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
+from fecm._dataclasses import frozen
 from fecm._errors import FecmError
-from fecm._frozen import frozen
 from fecm._memory import require
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics import element_matrices

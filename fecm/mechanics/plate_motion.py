@@ -19,14 +19,14 @@ body slows down by (1 - b)/(1 + b) a step: the rate a is off by the factor 1 + (
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
+from fecm._dataclasses import frozen, mutable
 from fecm._errors import FecmError
-from fecm._frozen import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics.plate import PlateModel, pieces
 from fecm.mechanics.stiffness_product import (
@@ -69,7 +69,7 @@ class DivergenceError(FecmError, ArithmeticError):
         return DivergenceError, (self.step, self.reason), self.__dict__
 
 
-@dataclass(slots=True)
+@mutable
 class PlateState:
     """State of the plate after a step."""
 

@@ -11,8 +11,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._dataclasses import frozen
 from fecm._errors import FecmError
-from fecm._frozen import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics.curvature import FLAT, Curvature, strain_of_deflection
 from fecm.mechanics.elements import Quadrature

@@ -12,7 +12,7 @@ from typing import ClassVar, Literal, Protocol, TypeVar
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.mechanics.contact_law import Number
 from fecm.mechanics.own_projectile import LinearProjectile, OwnProjectile

@@ -15,7 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.mechanics.roots import root
 from fecm.mechanics.static_curve import StaticCurve
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.mechanics.contact_law import ContactPoint, Law
 from fecm.mechanics.reduced_plate import ReducedPlate

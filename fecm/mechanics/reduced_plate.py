@@ -38,8 +38,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fecm._dataclasses import frozen
 from fecm._errors import FecmError
-from fecm._frozen import frozen
 from fecm._memory import require
 from fecm._typing import Floats, Indices
 from fecm.mechanics.element_matrices import membrane_and_bending

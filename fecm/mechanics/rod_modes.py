@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.mechanics.projectile import RodIntegrator, RodState, rigid_dofs
 

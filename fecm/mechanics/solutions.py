@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fecm._dataclasses import frozen
 from fecm._errors import FecmError
-from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.mechanics.membrane import Membrane, tangent
 from fecm.mechanics.plate import PlateModel

@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.mechanics.membrane import Membrane
 from fecm.mechanics.plate import PlateModel

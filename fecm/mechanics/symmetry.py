@@ -14,7 +14,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics.mesh import ElementBlock, Ints, equation_numbers, extent
 from fecm.mechanics.plate import PlateModel

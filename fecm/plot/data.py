@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.deck.model import Deck, Impact
 from fecm.mechanics.elements import Quadrature

@@ -12,8 +12,8 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator
 
+from fecm._dataclasses import frozen
 from fecm._errors import warn
-from fecm._frozen import frozen
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Material
 from fecm.mechanics.elements import Quadrature

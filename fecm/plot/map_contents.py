@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
+from fecm._dataclasses import frozen
 from fecm._errors import warn
-from fecm._frozen import frozen
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.plot import style
 from fecm.plot.kinds import PlotError

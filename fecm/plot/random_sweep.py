@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Indices
 from fecm.plot.kinds import LackingError, Picture, PlotError, Width
 from fecm.plot.map_contents import LEVEL

@@ -22,7 +22,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import Formatter, Locator
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._text import printable
 from fecm._typing import Array
 from fecm.deck.units import PREFIXED, thousands, unit_of, with_prefix

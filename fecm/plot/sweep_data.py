@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
+from fecm._dataclasses import frozen
 from fecm._errors import did_you_mean, warn
-from fecm._frozen import frozen
 from fecm._typing import Array, Bools, Indices
 from fecm.plot import style
 from fecm.plot.kinds import PlotError

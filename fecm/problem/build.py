@@ -8,19 +8,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fecm._dataclasses import frozen
 from fecm._errors import FecmError
-from fecm._frozen import frozen
 from fecm._processors import free
 from fecm._typing import Bools, Indices
 from fecm.deck import model
 from fecm.deck.macros import flat, moves_only
 from fecm.mechanics import contact_law
-from fecm.mechanics.exposures import Places
-from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.impact_steps import ImpactSteps, supports
 from fecm.mechanics.kernels import LIBRARY
-from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.kernels.strains import CompiledStrains
 from fecm.mechanics.mesh import Ints, Mesh
 from fecm.mechanics.own_criterion import OwnCriterion
@@ -45,6 +42,9 @@ from fecm.problem.parts import (
 from fecm.problem.problem import ContactPatch, Problem
 
 if TYPE_CHECKING:
+    from fecm.mechanics.exposures import OutsideLoad
+    from fecm.mechanics.exposures import Places
+    from fecm.mechanics.failure_monitor import FailureMonitor
     from fecm.mechanics.residual_stresses import Residual
     from fecm.mechanics.stretching import Stretching
 
@@ -159,6 +159,8 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     stress_points = plate.strain_field(problem.rules[2])
     places = under_load = None
     if {"PLYS", "FAIL"} & {macro.word for macro in flat(problem.program)}:
+        from fecm.mechanics.exposures import Places  # 1 ms, for stresses of plies only
+
         places = Places(*stress_points.places(mesh.coordinates))
         under_load = problem.under_load(places.x, places.y)
     plies, failure = _stresses(problem, plate, motion, cure, chosen.criteria, under_load)
@@ -277,6 +279,10 @@ def _stresses(
         rows = np.sort(nearest[: int(words["PLYS"].second) or None])
         plies = made(rows)
     if "FAIL" in words:
+        # Modules for FAIL only, 1 ms.
+        from fecm.mechanics.failure_monitor import FailureMonitor
+        from fecm.mechanics.kernels.failure import CompiledMonitor
+
         kind = CompiledMonitor if motion.solver == KERNELS else FailureMonitor
         strengths = strengths_of_deck(problem.deck)
         first = next((ply for plies in strengths for ply in plies if ply is not None), None)

@@ -6,10 +6,11 @@ import bisect
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import NamedTuple, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
+from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 from fecm.deck.findings import Findings, Place
 from fecm.deck.model import (
@@ -114,7 +115,8 @@ def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floa
 _R = TypeVar("_R", NodeValues, NodeCodes, ElementNodes)
 
 
-class _Cards(NamedTuple):
+@frozen
+class _Cards:
     """Cards of nodes or elements as arrays, and their records, which know the places."""
 
     numbers: Indices  # of the nodes or elements

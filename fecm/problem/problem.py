@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from functools import cached_property
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats
 from fecm.deck import model
 from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, moves_only
@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from fecm.mechanics.residual_stresses import Residual
 
 
-class Threshold(NamedTuple):
+@frozen
+class Threshold:
     """Force at which delaminations grow, and what it is computed from."""
 
     force: float

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
+from fecm._dataclasses import frozen
 from fecm.deck import model
 from fecm.mechanics.mesh import longest_sides
 from fecm.problem.parts import build_projectile
@@ -17,7 +16,8 @@ MOST_ERROR = 0.5  # largest mesh error of the peak that is estimated
 FULL = 3  # shear order at which 9-node elements have no zero-energy modes
 
 
-class Resolution(NamedTuple):
+@frozen
+class Resolution:
     """Resolution of an impact by the mesh."""
 
     # Duration of a Hertz contact on a rigid target, 2.94 (5 m v^2/4 k)^(2/5)/v: S. P.

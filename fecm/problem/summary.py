@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._memory import format_bytes
 from fecm._typing import Floats
 from fecm.deck.macros import flat

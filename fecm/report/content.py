@@ -10,7 +10,7 @@ import math
 from collections.abc import Iterable, Sequence
 from enum import StrEnum
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.deck.units import quantity, thousands, with_prefix
 
 UNKNOWN = "–"  # of a value that is not known

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._text import printable, shown_apart
 
 MAX = "max"  # the usual scale of differences, in words

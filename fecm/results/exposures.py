@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Array
 from fecm.results.criteria import INTERLAMINAR, criteria_of, plies_of
 from fecm.results.errors import ResultFileError

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.results.criteria import criteria_of, where
 from fecm.results.exposures import AT_REST, LOAD_FACTOR, evaluations_in_contact

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from fecm._dataclasses import frozen
 
 
-class GroupInfo(NamedTuple):
+@frozen
+class GroupInfo:
     """What is known of a group before any run."""
 
     description: str

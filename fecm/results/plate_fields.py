@@ -8,7 +8,7 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Array
 from fecm.mechanics.strains import STRAINS
 from fecm.results.criteria import INTERLAMINAR, criteria_of

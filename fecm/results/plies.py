@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.deck.model import Deck, Layer, Material, Ply
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal

@@ -14,7 +14,7 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.deck.mesh_cards import AXES, DOF_NAMES
 from fecm.results.criteria import ALL_CRITERIA

@@ -19,8 +19,8 @@ from typing import Any
 
 import numpy as np
 
+from fecm._dataclasses import frozen
 from fecm._files import beside
-from fecm._frozen import frozen
 from fecm._typing import Array, Floats
 from fecm.results.errors import ResultFileError
 from fecm.results.result import Result

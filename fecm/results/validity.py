@@ -13,7 +13,7 @@ from itertools import compress
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats
 from fecm.results.end import Texts, peak_known
 from fecm.results.linear_plate import LIMITS, InPlane, softness

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import NamedTuple, TypeAlias
+from typing import TypeAlias
 
+from fecm._dataclasses import frozen
 from fecm.deck.macros import Body, Loop
 from fecm.deck.model import Macro
 
@@ -18,7 +19,8 @@ class EndedError(Exception):
     """The program ends before its last macro."""
 
 
-class _BoundLoop(NamedTuple):
+@frozen
+class _BoundLoop:
     """A loop whose macros are actions; the program itself is a loop of one pass."""
 
     items: list[_Item]

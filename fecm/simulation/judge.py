@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
 
 import numpy as np
 
+from fecm._dataclasses import frozen
 from fecm.mechanics.mesh import rigid_deflections
 from fecm.results.criteria import spelt
 from fecm.results.end import OPEN_ENDS, End
@@ -23,14 +23,16 @@ from fecm.simulation.simulation import Simulation
 ENERGY_WARNING = 0.01
 
 
-class Verdict(NamedTuple):
+@frozen
+class Verdict:
     """What speaks against a result."""
 
     notes: list[str]  # sentences; empty if there is no doubt
     validity: str  # ``"ok"`` or reasons; empty without impact steps
 
 
-class Doubt(NamedTuple):
+@frozen
+class Doubt:
     """A quantity beyond the range of the model."""
 
     reason: Reason

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fecm._typing import Array, Floats
 from fecm.deck.macros import WorkEstimate
 from fecm.mechanics.curvature import surface
-from fecm.mechanics.exposures import FailureEnvelope
 from fecm.mechanics.failure import CRITERIA
-from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.mechanics.strains import STRAINS
 from fecm.problem.build import ImpactModel
 from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR, OWN_CRITERIA
@@ -31,6 +29,10 @@ from fecm.results.schema import (
 from fecm.results.sinks import RowBuffer, Sink
 from fecm.simulation.saved import subset
 from fecm.simulation.step_recorder import EVERY_STEP, OnBlock, StepRecorder
+
+if TYPE_CHECKING:
+    from fecm.mechanics.exposures import FailureEnvelope
+    from fecm.mechanics.failure_monitor import FailureMonitor
 
 Steps = Sequence[int]  # of rows
 Times = Sequence[float]

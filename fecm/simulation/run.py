@@ -24,7 +24,6 @@ from fecm.results.metrics import MOBILITY, VALIDITY
 from fecm.results.result import Result
 from fecm.results.schema import FORMAT_VERSION, KINEMATICS, Form, Kinematics
 from fecm.results.sinks import ReadOnce, Sink
-from fecm.simulation.divergence import likely_cause
 from fecm.simulation.judge import judge
 from fecm.simulation.macros import STORING, bind, bind_loop
 from fecm.simulation.simulation import Observer, Simulation
@@ -69,6 +68,8 @@ def run(simulation: Simulation) -> Result:
                 simulation.recorder.failure(state.failure)
             simulation.recorder.finish()
     except DivergenceError as diverged:
+        from fecm.simulation.divergence import likely_cause  # only then
+
         cause = likely_cause(problem, simulation.model, state.dt, simulation.options.law)
         raise DivergenceError(diverged.step, f"{diverged.reason}; {cause}") from None
     return _write_footer(simulation)

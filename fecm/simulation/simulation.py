@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import field
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fecm._dataclasses import frozen, mutable
 from fecm._typing import Floats
 from fecm.deck.macros import load_factor
-from fecm.mechanics.exposures import FailureEnvelope
-from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.mechanics.solutions import Tangent
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.problem import Problem
@@ -23,8 +22,13 @@ from fecm.simulation.recorder import Recorder
 from fecm.simulation.saved import restore, save, subset
 from fecm.simulation.state import RunState
 
+if TYPE_CHECKING:
+    from fecm.mechanics.exposures import FailureEnvelope
+    from fecm.mechanics.failure_monitor import FailureMonitor
 
-class Pace(NamedTuple):
+
+@frozen
+class Pace:
     """How often the observers are called."""
 
     most: int  # steps between two calls
@@ -35,7 +39,8 @@ SINGLY = Pace(most=64, work=100_000)  # where each step is a call of Python
 TOGETHER = Pace(most=4096, work=20_000_000)  # where the kernels take many
 
 
-class Criteria(NamedTuple):
+@frozen
+class Criteria:
     """Failure criteria of plies with other residual stresses, and their largest exposures."""
 
     monitor: FailureMonitor
@@ -45,7 +50,7 @@ class Criteria(NamedTuple):
 Observer = Callable[["Simulation"], object]
 
 
-@dataclass
+@mutable
 class Simulation:
     """A run; building it writes nothing."""
 

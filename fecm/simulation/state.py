@@ -3,21 +3,25 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, field
+from dataclasses import field
+from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fecm._dataclasses import mutable
 from fecm._typing import Floats
-from fecm.mechanics.exposures import FailureEnvelope
 from fecm.mechanics.impact import ImpactState
 from fecm.mechanics.plate_motion import DivergenceError, PlateState
 from fecm.problem.problem import Threshold
 from fecm.simulation.step_recorder import Columns
 
+if TYPE_CHECKING:
+    from fecm.mechanics.exposures import FailureEnvelope
+
 TOLERANCE = 1.0e-9  # relative change of the displacement below which CONV leaves its loop
 
 
-@dataclass
+@mutable
 class Monitor:
     """Energy balance and largest contact force of the steps so far."""
 
@@ -76,7 +80,7 @@ class Monitor:
         self.last_work = float(work[-1])
 
 
-@dataclass
+@mutable
 class RunState:
     """State passed from one macro to the next; a checkpoint stores every field."""
 

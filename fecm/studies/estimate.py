@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.deck.model import Impact, Indentation
 from fecm.mechanics.laminate import SMALL_MASS, effective_rigidity
 from fecm.mechanics.quick_models import (

@@ -6,8 +6,8 @@ import math
 from dataclasses import asdict
 from pathlib import Path
 
+from fecm._dataclasses import frozen
 from fecm._errors import warn
-from fecm._frozen import frozen
 from fecm._tables import aligned
 from fecm.api import sole_problem
 from fecm.deck.model import Deck

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from fecm._dataclasses import frozen
 from fecm._errors import warn
-from fecm._frozen import frozen
 from fecm.authoring.contact import AnyContact, Sphere, law_of
 from fecm.authoring.impact import AnyProjectile, doubts_of_core
 from fecm.authoring.laminate import (

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats
 
 TABLES: dict[str, dict[str, Any]] = tomllib.loads(

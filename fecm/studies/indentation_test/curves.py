@@ -18,7 +18,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats
 from fecm.mechanics.contact_law import LOADING_POWER, power_curve
 from fecm.studies import StudyError

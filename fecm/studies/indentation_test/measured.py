@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._measured_tables import Table, read_table, same_name
 from fecm._typing import Floats
 from fecm.studies import StudyError

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics.contact_law import ACR_POWER, LOADING_POWER
 from fecm.studies.indentation_test.curves import Estimate

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fecm._dataclasses import frozen
 from fecm._errors import StudyError, warn
-from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.authoring.contact import Contact
 from fecm.authoring.parameters import check_positive

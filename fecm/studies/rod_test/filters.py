@@ -19,7 +19,7 @@ from enum import StrEnum
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.deck.units import KNOWN
 from fecm.studies import StudyError

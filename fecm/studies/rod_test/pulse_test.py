@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._measured_tables import read_table
 from fecm._typing import Floats
 from fecm.mechanics.projectile import STEPS, WILSON, Rod, RodState

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._inputs import open_input
 from fecm._measured_tables import read_table, same_name
 from fecm._typing import Floats

@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
+from fecm._dataclasses import frozen
 from fecm._errors import StudyError
-from fecm._frozen import frozen
 from fecm._typing import Floats
 from fecm.api import sole_problem
 from fecm.authoring.laminate import system_asked

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm.studies.waves.medium import Medium, first_largest
 from fecm.studies.waves.sheets import (
     FRONTS,

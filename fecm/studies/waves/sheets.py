@@ -12,7 +12,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from fecm._frozen import frozen
+from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 from fecm.studies import StudyError
 from fecm.studies.waves.medium import (
