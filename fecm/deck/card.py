@@ -79,9 +79,10 @@ class Card:
     __slots__ = ("data", "line", "text")
 
     def __init__(self, line: int, text: str) -> None:
-        self.line = line  # line number in the file, from 1
-        self.text = text  # the line as written
-        self.data = text.partition("!")[0].rstrip()  # without its comment and trailing blanks
+        self.line: int = line  # line number in the file, from 1
+        self.text: str = text  # the line as written
+        # The text without its comment and trailing blanks.
+        self.data: str = text.partition("!")[0].rstrip()
 
     @property
     def is_blank(self) -> bool:
