@@ -42,7 +42,6 @@ from fecm.problem.parts import (
 from fecm.problem.problem import ContactPatch, Problem
 
 if TYPE_CHECKING:
-    from fecm.mechanics.exposures import OutsideLoad
     from fecm.mechanics.exposures import Places
     from fecm.mechanics.failure_monitor import FailureMonitor
     from fecm.mechanics.residual_stresses import Residual
