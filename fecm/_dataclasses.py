@@ -108,11 +108,19 @@ def _create(self: Any, /, *args: object, **named: object) -> None:
     is_complete = len(given) == len(parameters.names)
     values = given if is_complete else parameters.completed(given)
     if len(given) < len(args) + len(named) or values.keys() != parameters.names:
-        _signature_of(cls).bind(*args, **named)  # raises the TypeError
+        _refuse(cls, args, named)
     for name in parameters.names:
         _assign(self, name, values[name])
     if parameters.is_checked:
         self.__post_init__()
+
+
+def _refuse(cls: type, args: tuple[object, ...], named: dict[str, object]) -> None:
+    """Raise the TypeError of arguments that do not fit."""
+    try:
+        _signature_of(cls).bind(*args, **named)
+    except TypeError as error:
+        raise TypeError(f"{cls.__qualname__}: {error}") from None
 
 
 def _set(self: object, name: str, value: object) -> None:

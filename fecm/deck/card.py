@@ -6,8 +6,10 @@ values separated by commas, in the same order; everything from ``!`` on is a com
 
 from __future__ import annotations
 
+import dataclasses
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache
 
@@ -73,16 +75,17 @@ def layout(*descriptors: str) -> Fields:
     return tuple(fields)
 
 
+@dataclass(frozen=True, slots=True)  # a large deck has many
 class Card:
     """One line of a deck."""
 
-    __slots__ = ("data", "line", "text")
+    line: int  # line number in the file, from 1
+    text: str  # the line as written
+    # The text without its comment and trailing blanks.
+    data: str = dataclasses.field(init=False, compare=False, repr=False)
 
-    def __init__(self, line: int, text: str) -> None:
-        self.line: int = line  # line number in the file, from 1
-        self.text: str = text  # the line as written
-        # The text without its comment and trailing blanks.
-        self.data: str = text.partition("!")[0].rstrip()
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "data", self.text.partition("!")[0].rstrip())
 
     @property
     def is_blank(self) -> bool:

@@ -135,7 +135,7 @@ def in_one_motion(
         run(simulation)
     except (CasesError, DivergenceError, LawError, ArithmeticError) as error:
         return [Outcome.failed({number: str(error)}) for number in numbers]
-    found = [{}, *(exposures_of(*other) for other in simulation.others)]
+    found = [{}, *(exposures_of(other.monitor, other.envelope) for other in simulation.others)]
     outcomes = []
     for number, case, one, arrays in zip(numbers, cases, problems, found, strict=True):
         own = {path: values.reshape(sink.arrays[path].shape) for path, values in arrays.items()}
