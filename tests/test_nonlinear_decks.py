@@ -136,7 +136,8 @@ def test_an_impact_on_displaced_edges_is_that_on_the_preload_of_the_card() -> No
         assert np.abs(found.energy.balance_error).max() < 1.05 * linear
 
 
-@pytest.mark.parametrize("each", [7, pytest.param(3, marks=pytest.mark.long)])
+# Macro 14 is the last FORM: its SOLV belongs to the resumed run.
+@pytest.mark.parametrize("each", [7, pytest.param(1, marks=pytest.mark.long)])
 @pytest.mark.parametrize("macros", [True, False])
 def test_a_stretched_plate_stopped_anywhere_goes_on_to_the_same_bytes(
     tmp_path: Path, macros: bool, each: int
@@ -148,7 +149,7 @@ def test_a_stretched_plate_stopped_anywhere_goes_on_to_the_same_bytes(
     whole, path = tmp_path / "whole.h5", tmp_path / "stopped.h5"
     looks = run_to(deck, whole, macros=macros)
     assert looks > 8
-    for stop in range(1, looks + 1, each):
+    for stop in range(each, looks + 1, each):
         with pytest.raises(StoppedError):
             run_to(deck, path, stop, macros=macros)
         run_to(deck, path, resume=True, macros=macros)

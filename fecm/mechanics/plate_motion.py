@@ -268,6 +268,7 @@ class PlateMotion:
         The prescribed displacements are those of the last :meth:`unbalanced` or step.
         """
         state.padded[: len(change)] += change
+        self.prescribe(state, state.prescribed)  # a resumed run may begin here
         self._update_forces(state)
 
     def _update_forces(self, state: PlateState) -> None:
