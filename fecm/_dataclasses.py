@@ -104,10 +104,12 @@ _assign = object.__setattr__
 def _create(self: Any, /, *args: object, **named: object) -> None:
     cls: type[DataclassInstance] = type(self)
     parameters = _parameters_of(cls)
-    given = dict(zip(parameters.positional, args, strict=False), **named)
-    is_complete = len(given) == len(parameters.names)
-    values = given if is_complete else parameters.completed(given)
-    if len(given) < len(args) + len(named) or values.keys() != parameters.names:
+    values = dict(zip(parameters.positional, args, strict=False))
+    values.update(named)
+    count = len(values)
+    if count != len(parameters.names):
+        values = parameters.completed(values)
+    if count != len(args) + len(named) or values.keys() != parameters.names:
         _refuse(cls, args, named)
     for name in parameters.names:
         _assign(self, name, values[name])
