@@ -36,6 +36,8 @@ LINKS = {
     h5py.h5l.TYPE_SOFT: "a soft link to another object",
     h5py.h5l.TYPE_EXTERNAL: "an external link to another file",
 }
+# References between datasets and the scales of their axes (HDF5's dimension scales, version 1.4).
+OF_SCALES = {"DIMENSION_LIST", "REFERENCE_LIST"}
 FIRST = 4096  # number of bytes that identify a deck
 DECK = re.compile(rb"\A[^\0]*^ *FECM\b", re.IGNORECASE | re.MULTILINE)
 PACKED = 2000  # upper bound of the compression of HDF5's filters; deflate reaches 1032
@@ -109,6 +111,8 @@ class Contents(Mapping[str, Array]):
 
     def attributes_of(self, path: str) -> dict[str, Any]:
         """Read the attributes of a dataset or group."""
+        if path in self.groups:
+            return dict(self.groups[path])
         with self._file() as file:
             return _attributes(file[path])
 
@@ -220,9 +224,11 @@ def _list(contents: Contents, file_size: int, name: str, item: Any) -> None:
 
 
 def _attributes(item: h5py.HLObject) -> dict[str, Any]:
-    """Attributes as Python values."""
+    """Attributes as Python values, without those that tie an axis to its scale."""
     values: dict[str, Any] = {}
     for name in item.attrs:
+        if name in OF_SCALES:
+            continue
         try:
             values[_text(name)] = _plain(item.attrs[name])
         except (TypeError, OSError, ValueError):  # a type without NumPy counterpart
