@@ -91,7 +91,13 @@ def test_100_noises_of_humps_are_fitted_within_four_standard_errors() -> None:
     assert np.std(assert_inside(range(100)), axis=0) == pytest.approx(np.ones(4), abs=0.25)
 
 
-@pytest.mark.parametrize("free", [["k", "mass", "velocity"], ["k", "mass", "velocity", "delay"]])
+@pytest.mark.parametrize(
+    "free",
+    [
+        pytest.param(["k", "mass", "velocity"], marks=pytest.mark.long),
+        ["k", "mass", "velocity", "delay"],
+    ],
+)
 def test_wrong_supports_are_called_a_wrong_model_and_not_a_delay(free: list[str]) -> None:
     with pytest.raises(IdentifyError, match="the model does not describe the data") as caught:
         fecm.identify(started("simple"), HUMPS, noisy(humps(), 0), free)
@@ -189,7 +195,7 @@ def test_an_offset_shows_before_the_contact_though_the_model_is_wrong() -> None:
         fecm.identify(started("simple"), time, noisy(force, 0), ["velocity"])
 
 
-@pytest.mark.parametrize("late", [LATE, -LATE])
+@pytest.mark.parametrize("late", [pytest.param(LATE, marks=pytest.mark.long), -LATE])
 def test_a_delay_is_fitted_or_proposed(late: float) -> None:
     force = recorded(delay=late)
     with pytest.warns(fecm.FecmWarning, match=rf"fit delay too: with delay {late:.1g}\d* s"):

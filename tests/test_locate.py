@@ -369,6 +369,7 @@ def test_a_gage_with_another_gain_is_found_out() -> None:
     assert (found.sd_gains > 0.0).all()
 
 
+@pytest.mark.long
 def test_fine_samples_give_the_place_of_coarse_ones() -> None:
     deck, run = struck_on_a_point()[0], run_of(radius=SMALL)
     found = fecm.locate(deck, (run.time, np.asarray(run.gages.strain)), region=CLOSE, grid=20.0)

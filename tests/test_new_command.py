@@ -285,7 +285,9 @@ def test_a_static_solution_pins_the_rigid_motion_in_the_plane_without_a_reaction
 # Time --------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("layup", ["[45/-45]8s", "[0_16/90_16]"])
+@pytest.mark.parametrize(
+    "layup", [pytest.param("[45/-45]8s", marks=pytest.mark.long), "[0_16/90_16]"]
+)
 def test_the_default_duration_of_a_fixture_ends_after_the_contact(layup: str) -> None:
     # Indentation makes the contact of a stiff plate longer at a low energy than half a period.
     deck = new_deck(

@@ -138,7 +138,7 @@ def test_an_impact_on_displaced_edges_is_that_on_the_preload_of_the_card() -> No
 
 # Macro 14 is the last FORM: its SOLV belongs to the resumed run.
 @pytest.mark.parametrize("each", [7, pytest.param(1, marks=pytest.mark.long)])
-@pytest.mark.parametrize("macros", [True, False])
+@pytest.mark.parametrize("macros", [True, pytest.param(False, marks=pytest.mark.long)])
 def test_a_stretched_plate_stopped_anywhere_goes_on_to_the_same_bytes(
     tmp_path: Path, macros: bool, each: int
 ) -> None:

@@ -129,9 +129,19 @@ def without_rows(file: h5py.File) -> None:
     [
         (zero, "strain line contour surface mesh thickness failure", "force"),
         (infinite, "force loop energy strain line contour surface thickness failure", "mesh"),
-        (huge, "force loop strain line contour surface mesh thickness failure", "energy"),
+        pytest.param(
+            huge,
+            "force loop strain line contour surface mesh thickness failure",
+            "energy",
+            marks=pytest.mark.long,
+        ),
         (tiny, "contour", "force strain surface failure"),
-        (without_rows, "force loop energy strain line contour surface thickness failure", "mesh"),
+        pytest.param(
+            without_rows,
+            "force loop energy strain line contour surface thickness failure",
+            "mesh",
+            marks=pytest.mark.long,
+        ),
     ],
 )
 def test_a_result_without_sense_is_drawn_or_is_one_line(

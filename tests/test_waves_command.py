@@ -214,9 +214,12 @@ def test_a_table_goes_to_a_file_whole(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     "command",
-    [("dispersion", "--wavelengths", "1:10:5"), ("speeds", "--step", "45"),
-     ("fronts", "--step", "45", "--time", "2e-6")],
-)  # fmt: skip
+    [
+        pytest.param(("dispersion", "--wavelengths", "1:10:5"), marks=pytest.mark.long),
+        ("speeds", "--step", "45"),
+        pytest.param(("fronts", "--step", "45", "--time", "2e-6"), marks=pytest.mark.long),
+    ],
+)
 def test_a_picture_is_drawn_beside_the_table(command: tuple[str, ...], tmp_path: Path) -> None:
     pytest.importorskip("matplotlib")
     path = tmp_path / "waves.png"
