@@ -136,12 +136,7 @@ def without_rows(file: h5py.File) -> None:
             marks=pytest.mark.long,
         ),
         (tiny, "contour", "force strain surface failure"),
-        pytest.param(
-            without_rows,
-            "force loop energy strain line contour surface thickness failure",
-            "mesh",
-            marks=pytest.mark.long,
-        ),
+        (without_rows, "force loop energy strain line contour surface thickness failure", "mesh"),
     ],
 )
 def test_a_result_without_sense_is_drawn_or_is_one_line(

@@ -124,13 +124,11 @@ def _history(stored: Stored) -> _History:
 
 
 def failure_metrics(stored: Stored) -> dict[str, Any]:
-    """Evaluations, largest exposures and first failures as plain values; empty without FAIL.
+    """Evaluations, largest exposures and first failures of a run with FAIL, as plain values.
 
     ``history`` has the largest exposures so far at every evaluation.  With CURE also the exposures
     at rest and the load factors.
     """
-    if "failure/x" not in stored:
-        return {}
     times: list[float] = []
     so_far: dict[str, list[float]] = {}
     if "exposures/exposure" in stored and "exposures/time" in stored:

@@ -354,8 +354,7 @@ def _metrics(result: Stored) -> dict[str, Any]:
         return metrics_of(result)
     from fecm.results.first_failure import failure_metrics  # 1 ms, for FAIL only
 
-    failure = failure_metrics(result)
-    return {**metrics_of(result), "failure": failure} if failure else metrics_of(result)
+    return {**metrics_of(result), "failure": failure_metrics(result)}
 
 
 def _missing(result: Stored) -> list[str]:
