@@ -240,6 +240,12 @@ def test_a_dataset_that_is_none_of_a_results_is_named(
         assert "steps             10" in done.stdout
 
 
+def test_a_name_that_is_not_utf_8_is_refused_in_words(changed: Callable[[Edit], Path]) -> None:
+    done = call("info", changed(lambda file: h5py.h5g.create(file.id, b"g\xff")))
+    assert_unusable(done)
+    assert "the name 'g\ufffd' is not UTF-8" in done.stderr
+
+
 def test_a_shape_beyond_the_files_size_is_refused_before_anything_is_read(
     changed: Callable[[Edit], Path],
 ) -> None:

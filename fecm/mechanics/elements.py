@@ -12,11 +12,11 @@ rectangle, and of the small square.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats
 
 # Corners, mid-sides from node 5 between corners 1 and 2, centre.
@@ -42,20 +42,14 @@ _LEGENDRE = (
 )
 
 
-@frozen
+@dataclass(frozen=True, eq=False)
 class Quadrature:
-    """Points and weights of a quadrature rule; equal to itself only."""
+    """Points and weights of a quadrature rule."""
 
     # (n,): local coordinates.
     xi: Floats
     eta: Floats
     weights: Floats  # (n,): their sum is 4, the area of the square
-
-    def __eq__(self, other: object) -> bool:
-        return self is other
-
-    def __hash__(self) -> int:
-        return id(self)
 
 
 @cache
@@ -93,9 +87,9 @@ def _rule(order: int, *, equal: bool) -> Quadrature:
 # Shapes -------------------------------------------------------------------------------------------
 
 
-@frozen
+@dataclass(frozen=True, eq=False)
 class ElementShape:
-    """Shape of an element; equal to itself only."""
+    """Shape of an element."""
 
     name: str  # name in messages
     # (nodes,): local coordinates of the nodes.
@@ -105,12 +99,6 @@ class ElementShape:
     numbering: str  # order of the nodes, for messages
     # ``functions(xi, eta, present)`` returns values, d/dxi and d/deta at n points, (3, nodes, n).
     functions: Callable[[Floats, Floats, Bools], Floats]
-
-    def __eq__(self, other: object) -> bool:
-        return self is other
-
-    def __hash__(self) -> int:
-        return id(self)
 
     @property
     def nodes(self) -> int:

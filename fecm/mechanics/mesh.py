@@ -130,7 +130,7 @@ class ElementBlock:
         spans = cells.max(axis=0) - low
         group = np.zeros(len(cells), dtype=np.intp)
         representatives = group[:1]
-        for i in np.flatnonzero(spans):  # in lexicographic order, until all are told apart
+        for i in np.flatnonzero(spans):  # in lexicographic order, until all differ
             keys = group * (spans[i] + 1) + cells[:, i] - low[i]
             _, representatives, group = np.unique(keys, return_index=True, return_inverse=True)
             if len(representatives) == len(cells):

@@ -165,10 +165,13 @@ def read(path: Path, *forms: str) -> Contents:
             raise ResultFileError(f"{path}: format version {version} is not {FORMAT_VERSION}")
         _check_links(path, file)
         contents = Contents(path, attributes)
-        names: list[str] = []
+        names: list[str | bytes] = []
         file.visit(names.append)
+        size = path.stat().st_size
         for name in names:
-            _list(contents, path.stat().st_size, name, h5py.h5o.open(file.id, name.encode()))
+            if isinstance(name, bytes):
+                raise ResultFileError(f"{path}: the name {_text(name)!r} is not UTF-8")
+            _list(contents, size, name, h5py.h5o.open(file.id, name.encode()))
     return contents
 
 
