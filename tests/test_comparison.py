@@ -86,12 +86,15 @@ def test_the_header_says_what_a_file_is_compared_with(
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("time (ms),force\n0,1\n1,2\n", "time is in ms, and the deck in s; convert the column"),
-        ("time,force\ns,kN\n0,1\n1,2\n", "force is in kN, and the deck in lbf"),
-        ("t (ms),load\n0,1\n1,2\n", "t is in ms, and the deck in s"),
+        ("time (parsec),force\n0,1\n1,2\n", "unknown unit of time `parsec`"),
+        ("time,force\ns,volts\n0,1\n1,2\n", "unknown unit of force `volts`"),
+        ("time,force,force\n0,1,1\n1,2,2\n", "one must be named force"),
         ("time,force\n10,1\n11,2\n", "measured from 10 to 11, computed from 0 to"),
         ("time,force\n0,1\n0,2\n", ":3: time must increase: 0 follows 0"),
-        ("time,load\n0,1\n1,2\n", "there is no column force"),
+        (
+            "time,displacement\n0,1\n1,2\n",
+            "the columns are time, displacement; one must be named force",
+        ),
         ("time,force\n0,nan\n1,2\n", "is 'nan', not a finite number"),
     ],
 )
@@ -104,6 +107,60 @@ def test_files_that_can_not_be_compared_are_refused_in_one_line(
     assert_unusable(done)
     assert words in done.stderr
     assert not list(tmp_path.glob("*.png"))
+
+
+RIGS = {
+    "milliseconds and kilonewtons": "Time (ms),Load (kN)\n{ms},{kN}\n",
+    "tabs and a line of units": "Time\tLoad\tEnergy\nms\tkN\tJ\n{ms}\t{kN}\t0\n",
+    "a preamble": "CEAST 9350\nSpecimen : A1\nMass,5.5,kg\nTime,Force\n(s),(N)\n{s},{N}\n",
+    "a preamble of pairs": 'Specimen : label,"A1"\n\nTime,Force\n(sec),(N)\n"{s}","{N}"\n',
+    "German words and decimal commas": "Zeit (µs);Weg (mm);Kraft (N)\n{us};0,0;{N}\n",
+    "a line that names the separator": "sep=;\nTime (s);Force (lbf)\n{s};{lbf}\n",
+    "two columns of force": "time (s),force (mV),force (lbf)\n{s},-7,{lbf}\n",
+}
+
+
+@pytest.mark.parametrize("form", RIGS.values(), ids=RIGS)
+def test_files_of_test_rigs_are_read_as_they_are(tmp_path: Path, form: str) -> None:
+    # The deck is in pounds; a newton is 1/4.4482216152605 of one.
+    head, row = form.rstrip("\n").rsplit("\n", 1)
+    time = np.linspace(0.0, 1.0, 101)
+    force = 10.0 * np.sin(np.pi * time)
+    newtons = 4.4482216152605 * force
+    columns = {"s": time, "ms": 1e3 * time, "us": 1e6 * time, "lbf": force}
+    columns |= {"N": newtons, "kN": 1e-3 * newtons}
+    rows = [
+        row.format(**{name: f"{values[n]:.9g}" for name, values in columns.items()})
+        for n in range(len(time))
+    ]
+    text = "\n".join([head, *rows])
+    (tmp_path / "rig.csv").write_text(text.replace(".", ",") if "Zeit" in head else text)
+    found = half_sine().compare(tmp_path / "rig.csv")
+    assert found.points == 101
+    assert found.measured_peak == pytest.approx(10.0)
+    assert found.rms == pytest.approx(0.0, abs=1e-4)
+
+
+def test_columns_and_units_of_a_measurement_are_chosen(tmp_path: Path) -> None:
+    time = np.linspace(0.0, 1.0, 101)
+    rows = "".join(
+        f"{0.0},{4.4482216152605e-3 * f!r},{1e3 * t!r}\n"
+        for t, f in zip(time.tolist(), (10.0 * np.sin(np.pi * time)).tolist(), strict=True)
+    )
+    file = tmp_path / "rig.csv"
+    file.write_text("a,channel 2,clock\n" + rows)
+    for columns in (("clock", "channel 2"), ("3", "2")):
+        found = half_sine().compare(file, columns=columns, units=("ms", "kN"))
+        assert found.rms == pytest.approx(0.0, abs=1e-4)
+    pair = (1e3 * time, 4.4482216152605e-3 * 10.0 * np.sin(np.pi * time))
+    assert half_sine().compare(pair, units=("ms", "kN")).rms == pytest.approx(0.0, abs=1e-4)
+    with pytest.raises(StudyError, match="`columns` of time and force selects others"):
+        half_sine().compare(file)
+    with pytest.raises(StudyError, match="not two names, of time and force"):
+        half_sine().compare(file, units="ms")
+    file.write_text("time (s),force\n0,1\n1,2\n")
+    with pytest.raises(StudyError, match="time is in s, and `units` says ms"):
+        half_sine().compare(file, units=("ms", "lbf"))
 
 
 @pytest.mark.parametrize(

@@ -239,11 +239,7 @@ def test_what_is_wrong_with_a_table_is_said_with_its_likely_cause(folder: Path) 
         "time in ms": ((1e3 * time, force), "time,force", "the column seems to be in ms"),
         "force in mN": ((time, 4448.2 * force), "time,force", "the column seems to be in mN"),
         "force in kip": ((time, 1e-3 * force), "time,force", "seems to be in kip"),
-        "a unit of its own": (
-            (time, force),
-            "time,force (N)",
-            "force is in N, and the deck in lbf",
-        ),
+        "an unknown unit": ((time, force), "time,force (volts)", "unknown unit of force"),
         "pulling": ((time, -force), "time,force", "positive in compression"),
         "short": ((time[::100], force[::100]), "time,force", "fewer than 3 points"),
         "late": ((time + 1.0, force), "time,force", "fit delay too"),

@@ -12,10 +12,12 @@ from fecm.cli.common import DASH, FAILED, echo, echo_json, every_minute, note
 from fecm.cli.decks import load_single
 from fecm.cli.help import typical
 from fecm.cli.options import (
+    COLUMNS_OPTION,
     DECK_PATH,
     FILE_PATH,
     FORMAT_OPTION,
     LAW_OPTION,
+    UNITS_OPTION,
     Format,
     OneOf,
     Parsed,
@@ -40,6 +42,8 @@ class Options:
     deck: Path
     measured: Path
     free: tuple[str, ...]
+    columns: tuple[str, ...] | None
+    units: tuple[str, ...] | None
     sensor: Filter | None
     output: Path | None
     picture: Path | None
@@ -63,6 +67,8 @@ class Options:
     required=True,
     help=f"Parameters to fit: {', '.join(FREE)}.",
 )
+@COLUMNS_OPTION
+@UNITS_OPTION
 @option(
     "--filter",
     "sensor",
@@ -97,10 +103,11 @@ class Options:
 def identify(options: Options) -> None:
     """Fit parameters of the impact of DECK to a measured contact force.
 
-    MEASURED.csv has the columns time and force, in the deck's units; time 0 is the first contact,
-    unless delay is fitted.  The deck's values are the start of the fit.  The exit status is 1 if
-    the measurement does not determine the parameters, the fit does not converge, the model does
-    not describe the data, or a delay or an offset should be fitted too.
+    MEASURED.csv has the columns time and force (or load), which are converted to the deck's units
+    if the file names its own.  Time 0 is the first contact, unless delay is fitted.  The deck's
+    values are the start of the fit.  The exit status is 1 if the measurement does not determine the
+    parameters, the fit does not converge, the model does not describe the data, or a delay or an
+    offset should be fitted too.
     """
     output, overwrite = options.output, options.overwrite
     targets = OutputPaths(
@@ -110,7 +117,7 @@ def identify(options: Options) -> None:
         check_page(options.page, overwrite, [options.deck, options.measured])
     problem = load_single(options.deck, "identify")
     units = unit_names(problem.deck)
-    measured = measurement_of(options.measured, units)
+    measured = measurement_of(options.measured, units, options.columns or (), options.units or ())
     found = _fit(problem.deck, measured, options)
     targets.draw("histories:fit_picture", found, units)
     if output is not None:

@@ -225,3 +225,17 @@ def format_option(*formats: Format, about: str) -> Callable[[Decorated], Decorat
 FORMAT_OPTION = format_option(
     Format.TEXT, Format.JSON, about="Text for people, or JSON for programs."
 )
+
+
+# Of measured forces.
+COLUMNS_OPTION = click.option(
+    "--columns",
+    type=list_of("TIME,FORCE", click.STRING, [2]),
+    help="Names or numbers (from 1) of the columns of the measurement.  [default: time; force, "
+    "load or another usual name]",
+)
+UNITS_OPTION = click.option(
+    "--units",
+    type=list_of("TIME,FORCE", click.STRING, [2]),
+    help="Units of a measurement that names none, such as ms,kN.  [default: the deck's]",
+)

@@ -18,8 +18,10 @@ from fecm.cli.common import CheckFailedError, RefusedError, echo, note, progress
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
 from fecm.cli.options import (
+    COLUMNS_OPTION,
     DECK_PATH,
     FILE_PATH,
+    UNITS_OPTION,
     Finite,
     OneOf,
     Parsed,
@@ -60,6 +62,8 @@ class PictureOptions:
     times: tuple[float, ...] | None
     against: str | None
     overlay: Path | None
+    columns: tuple[str, ...] | None
+    units: tuple[str, ...] | None
     delay: float | None
     offset: float | None
     along: str | None
@@ -135,8 +139,10 @@ class PictureOptions:
     type=DECK_PATH,
     metavar="FILE.csv",
     help="Measured force to draw over that of the kind force: columns time and force (or "
-    "transducer) in the deck's units.  Notes compare both.",
+    "transducer), converted to the deck's units.  Notes compare both.",
 )
+@COLUMNS_OPTION
+@UNITS_OPTION
 @option(
     "--delay",
     type=Finite(),

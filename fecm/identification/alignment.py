@@ -129,9 +129,9 @@ def check_measured(
 def _cause(dimension: str, ratio: float, units: Mapping[str, str]) -> str:
     """Likely cause of a measurement that is off by a factor, and the remedy."""
     known, own = KNOWN[dimension], units.get(dimension, "")
-    text = f"is the column in another unit of {dimension}?  Convert it"
+    text = f"is the column in another unit of {dimension}?  Name the unit in its header"
     if own in known:
         unit = min(known, key=lambda one: abs(math.log(ratio * known[one] / known[own])))
         if 0.2 < ratio * known[unit] / known[own] < 5.0:
-            text = f"the column seems to be in {unit}; convert it to {own}"
+            text = f"the column seems to be in {unit}; name the unit in its header"
     return f"{text}, or exchange time and force if they are swapped"

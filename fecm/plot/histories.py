@@ -75,6 +75,8 @@ def force(
     results: Results,
     *,
     overlay: Source | None = None,
+    columns: Sequence[str] = (),
+    units: Sequence[str] = (),
     delay: float = 0.0,
     offset: float = 0.0,
     width: Width = "column",
@@ -83,11 +85,15 @@ def force(
 
     The transducers of rigid masses show the contact force and are not drawn again.  A dashed line
     marks the delamination threshold of a result that has one.  `overlay` is a
-    measured force: a CSV file with the columns time and force (or transducer), or times and forces,
-    in the deck's units.  `delay` and `offset` are subtracted from its times and forces.
+    measured force: a CSV file with the columns time and force (or transducer), or times and forces.
+    It is converted to the deck's units if it names its own.  `columns` has the names or the numbers
+    (from 1) of the columns of time and force, and `units` their units, for a measurement that names
+    none.  `delay` and `offset`, in the deck's units, are subtracted from times and forces.
     """
-    if overlay is None and (delay or offset):
-        raise PlotError("delay and offset are those of a measured force; give an overlay too")
+    if overlay is None and (delay or offset or columns or units):
+        raise PlotError(
+            "delay, offset, columns and units describe a measured force; give an overlay too"
+        )
     style.limit_count(len(results), "forces")
     paths = ("history/time", "history/force", "history/transducer")
     drawn = {name: Forces(*data.require(result, name, *paths)) for name, result in results.items()}
@@ -98,8 +104,7 @@ def force(
     measured = None
     if overlay is not None:
         first = next(iter(results.values()))
-        units = first.units
-        measured = measurement_of(overlay, units).corrected(delay, offset)
+        measured = measurement_of(overlay, first.units, columns, units).corrected(delay, offset)
         sizes.append(measured.force)
     pound = style.scale_of(results, "force", sizes)
 

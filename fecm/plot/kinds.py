@@ -134,6 +134,8 @@ class Options(TypedDict, total=False):
     against: Against
     along: Direction
     overlay: Source | None
+    columns: Sequence[str]
+    units: Sequence[str]
     delay: float
     offset: float
     quantity: str

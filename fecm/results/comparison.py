@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,9 @@ import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm._errors import StudyError
-from fecm._measured_tables import read_table, same_name
+from fecm._measured_tables import DIMENSIONS, read_table, unit_size
 from fecm._text import printable
 from fecm._typing import Floats
-from fecm.deck.units import KNOWN
 from fecm.results.stored import Stored
 
 # A CSV file, or times and forces.
@@ -106,15 +105,27 @@ def _against(name: str, own: float, measured: float, unit: str) -> str:
     return f"{text} ({own / measured - 1.0:+.1%})" if measured else text
 
 
-def measurement_of(source: Source, units: Mapping[str, str]) -> Measurement:
-    """Measured force of a CSV file (time and force, or time and transducer), or of two arrays.
+def measurement_of(
+    source: Source,
+    units: Mapping[str, str],
+    columns: Sequence[str] = (),
+    stated: Sequence[str] = (),
+) -> Measurement:
+    """Measured force of a file (time and force, or time and transducer), or of two arrays.
 
-    `units` are the names of the deck's, which may be empty.  Raises StudyError if the file is
-    invalid, or names other units, or if times and forces are not finite numbers, equally many, at
-    increasing times.  Raises OSError if the file can't be read.
+    `units` are the names of the deck's, which may be empty; a file that names its units is
+    converted to them.  `columns` has the names or the numbers (from 1) of the columns of time and
+    force, `stated` the units of the measurement, for one that names none.  Raises StudyError if the
+    file is invalid, or a unit unknown, or if times and forces are not finite numbers, equally many,
+    at increasing times.  Raises OSError if the file can't be read.
     """
+    for what, pair in (("columns", columns), ("units", stated)):
+        if isinstance(pair, str) or len(pair) not in (0, 2) or not all(map(_is_text, pair)):
+            raise StudyError(f"`{what}` is {pair!r}, not two names, of time and force")
     if isinstance(source, str | Path):
-        return _from_file(Path(source), units)
+        return _from_file(Path(source), units, columns, stated)
+    if columns:
+        raise StudyError("`columns` selects columns of a file, and the measurement is arrays")
     try:
         time, force = (np.asarray(values, dtype=float) for values in source)
     except (TypeError, ValueError):
@@ -126,27 +137,42 @@ def measurement_of(source: Source, units: Mapping[str, str]) -> Measurement:
         )
     if not (np.isfinite([time, force]).all() and (np.diff(time) > 0.0).all()):
         raise StudyError("a measurement needs finite numbers at increasing times")
-    return Measurement("measured", "force", time, force)
+    factors = [
+        _factor("the measurement", unit, units.get(dimension, ""), dimension)
+        for unit, dimension in zip(stated, ("time", "force"), strict=False)
+    ] or [1.0, 1.0]
+    return Measurement("measured", "force", time * factors[0], force * factors[1])
 
 
-def _from_file(path: Path, units: Mapping[str, str]) -> Measurement:
+def _is_text(value: object) -> bool:
+    return isinstance(value, str)
+
+
+def _from_file(
+    path: Path, units: Mapping[str, str], columns: Sequence[str], stated: Sequence[str]
+) -> Measurement:
     table = read_table(path)
-    names = table.names
-    known = [n for n in ("force", "transducer") if any(same_name(n, name) for name in names)]
-    column = (known or ["force"])[0]
-    columns = table.columns(("time", column), increasing="time")
-    for place, (name, unit) in enumerate(zip(names, table.units, strict=True)):
-        for wanted, dimension in (("time", "time"), (column, "force")):
-            first = not any(same_name(wanted, one) for one in names)
-            if not same_name(name, wanted) and not (first and place == (wanted != "time")):
-                continue
-            deck, sizes = units.get(dimension, ""), KNOWN[dimension]
-            same = unit == deck or (unit in sizes and sizes[unit] == sizes.get(deck))
-            if unit and deck and not same:
-                raise StudyError(
-                    f"{path}: {name} is in {unit}, and the deck in {deck}; convert the column"
-                )
-    return Measurement(printable(path.name), column, *columns.values())
+    column = "transducer" if table.has("transducer") and not table.has("force") else "force"
+    names = ("time", column)
+    places = table.places(names, columns, units)
+    values = table.columns(names, increasing="time", places=places)
+    for name, place, unit in zip(names, places, stated or ("", ""), strict=True):
+        dimension = DIMENSIONS[name]
+        named = table.unit(place)
+        if unit and named and unit_size(path, unit, dimension) != unit_size(path, named, dimension):
+            raise StudyError(f"{path}: {name} is in {named}, and `units` says {unit}")
+        values[name] *= _factor(path, unit or named, units.get(dimension, ""), dimension)
+    return Measurement(printable(path.name), column, *values.values())
+
+
+def _factor(source: str | Path, unit: str, deck: str, dimension: str) -> float:
+    """Factor from a unit of a measurement to the deck's; 1 if one of them has no name.
+
+    Raises StudyError if one is unknown, unless they are the same.
+    """
+    if not unit or not deck or unit == deck:
+        return 1.0
+    return unit_size(source, unit, dimension) / unit_size(source, deck, dimension)
 
 
 def compare(stored: Stored, measured: Measurement) -> Comparison:

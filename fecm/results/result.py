@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -332,6 +333,8 @@ class Result(Stored, schema.Contact):
         self,
         measured: str | Path | tuple[Any, Any],
         *,
+        columns: Sequence[str] = (),
+        units: Sequence[str] = (),
         delay: float = 0.0,
         offset: float = 0.0,
     ) -> Comparison:
@@ -340,8 +343,14 @@ class Result(Stored, schema.Contact):
         Parameters
         ----------
         measured : str, Path or tuple
-            CSV file with the columns time and force (or transducer), or times and forces, in the
-            deck's units.
+            CSV file with the columns time and force (or transducer), or times and forces.  They are
+            converted to the deck's units if the file or `units` names those of the measurement.
+        columns : sequence of str, optional
+            Names or numbers (from 1) of the columns of time and force; by default the usual names,
+            such as ``"time"`` and ``"force"`` or ``"load"``.
+        units : sequence of str, optional
+            Units of time and force of a measurement that names none, such as ``("ms", "kN")``; by
+            default the deck's.
         delay, offset : float
             Measured time of the first contact, and measured force without a contact, which are
             subtracted; :func:`fecm.identify` fits them.
@@ -354,7 +363,7 @@ class Result(Stored, schema.Contact):
         Raises
         ------
         StudyError
-            If the file is invalid or in other units, the numbers are invalid, or no two of the
+            If the file is invalid, a unit is unknown, the numbers are invalid, or no two of the
             times are within those of the result.
 
         Examples
@@ -363,7 +372,7 @@ class Result(Stored, schema.Contact):
         """
         from fecm.results.comparison import compare, measurement_of  # 4 ms at start
 
-        given = measurement_of(measured, self.units)
+        given = measurement_of(measured, self.units, columns, units)
         return compare(self, given.corrected(delay, offset))
 
     if not TYPE_CHECKING:  # so that a misspelt name is a type error
