@@ -115,7 +115,9 @@ def test_a_table_with_a_row_for_every_gage_and_time_is_read(tmp_path: Path) -> N
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        ((TIME, 1e6 * np.ones((100, 3))), "looks like microstrain"),
+        ((TIME, 1e3 * np.ones((100, 3))), r"looks like microstrain \(0.001; divide by 1e\+06\)"),
+        ((TIME, 0.3 * np.ones((100, 3))), "divide by 100.* or per mille .*divide by 1000"),
+        ((TIME, 1e6 * np.ones((100, 3))), "strains are length over length"),
         ((TIME, np.full((100, 3), np.nan)), "finite numbers"),
         ((TIME[::-1], np.ones((100, 3))), "must increase"),
         ((TIME[:9], np.ones((9, 3))), "at least 10"),
@@ -135,6 +137,21 @@ def test_a_table_with_a_row_for_every_gage_and_time_is_read(tmp_path: Path) -> N
 def test_tables_that_are_no_strains_are_refused(table: object, message: str) -> None:
     with pytest.raises(StudyError, match=message):
         located(table)
+
+
+@pytest.mark.parametrize(
+    ("scale", "message"),
+    [
+        (1e3, r"name the unit in the header, as in `time \(ms\)`"),
+        (1e6, r"name the unit in the header, as in `time \(us\)`"),
+        (1e-3, "no wave reaches a gage in it"),
+    ],
+)
+def test_times_in_another_unit_are_refused_at_once_with_the_unit_that_fits(
+    scale: float, message: str
+) -> None:
+    with pytest.raises(StudyError, match=message):
+        fecm.locate(deck(), (scale * TIME, strains()))
 
 
 @pytest.mark.parametrize(
@@ -178,15 +195,28 @@ def test_decks_that_cant_be_located_on_are_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("head", "message"),
+    ("head", "clock", "sizes"),
     [
-        ("time (ms),gage1,gage2,gage3", "time is in ms, and the deck in s"),
-        ("time,gage1 (um/m),gage2,gage3", "gage1 is in um/m"),
+        ("Time (ms),gage 1 (µm/m),gage 2 (%),gage 3 (‰)", 1e3, (1e6, 1e2, 1e3)),
+        ("Rig 7\nRate: 1 MHz\ntime,1,2,3\nus,ue,-,mm/m", 1e6, (1e6, 1.0, 1e3)),
     ],
 )
-def test_columns_in_other_units_are_refused(tmp_path: Path, head: str, message: str) -> None:
-    with pytest.raises(StudyError, match=message):
-        located(written(tmp_path, head, strains()))
+def test_columns_in_other_units_are_converted(
+    tmp_path: Path, head: str, clock: float, sizes: tuple[float, ...]
+) -> None:
+    path = written(tmp_path, head, strains() * sizes, clock * TIME)
+    read = strain_table(path, unit_names(deck()), [1, 2, 3])
+    assert read.time == pytest.approx(TIME, rel=1e-12)
+    assert read.strains == pytest.approx(strains().T, rel=1e-12)
+
+
+def test_columns_in_units_of_something_else_are_refused(tmp_path: Path) -> None:
+    for head, message in (
+        ("time (mm),gage1,gage2,gage3", "unknown unit of time `mm`"),
+        ("time,gage1 (N),gage2,gage3", "unknown unit of strain `N`"),
+    ):
+        with pytest.raises(StudyError, match=message):
+            located(written(tmp_path, head, strains()))
 
 
 # Files --------------------------------------------------------------------------------------------

@@ -10,11 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._errors import StudyError
+from fecm._measured_tables import UNITS
 from fecm._memory import require
 from fecm._typing import Floats, Indices
 from fecm.deck import model
 from fecm.deck.macros import flat
 from fecm.deck.model import Deck, Gages
+from fecm.deck.units import unit_names
 from fecm.location.errors import LocateError
 from fecm.location.fit import Fit
 from fecm.location.mirrors import shared_symmetry
@@ -32,6 +34,9 @@ from fecm.mechanics.time_step import critical_time_step, taken_time_step
 from fecm.problem.problem import Problem
 from fecm.sweeps.api import problem_of
 
+FEWEST_STEPS, MOST_STEPS = 10.0, 1e5  # critical time steps in a record
+MOST_PERIODS = 50.0  # fundamental periods in a record
+LIKELY = math.log(30.0)  # of a record over the fundamental period
 HATS = 40  # of the force in the search, by default
 MOST_HATS = 400
 SAMPLES = 8  # fewest between the peaks of two hats
@@ -153,6 +158,7 @@ def _shared(
     rows = rows_of(read, len(mesh.coordinates))
     _refuse_mirrors(plate, rows, numbers, region)
     critical = critical_time_step(plate)
+    _refuse_records(problem, interval * count, critical)
     asked = [macro.value for macro in flat(problem.program) if macro.word == "DT"]
     stable = [dt for dt in asked if 0.0 < dt < critical]
     most = stable[0] if stable else taken_time_step(critical)
@@ -164,6 +170,49 @@ def _shared(
     require(stored + fields, f"the responses of {len(numbers)} gages at {len(nodes)} nodes")
     motion = PlateMotion(plate, damping=problem.damping)
     return nodes, responses(motion, rows, nodes, sampling)
+
+
+def _refuse_records(problem: Problem, record: float, critical: float) -> None:
+    """Raise StudyError if a record is far too long or too short for the waves of the plate."""
+    steps, period = record / critical, _period(problem)
+    if FEWEST_STEPS <= steps <= MOST_STEPS and record <= MOST_PERIODS * period:
+        return
+    units = unit_names(problem.deck)
+    clock, sizes = units.get("time", ""), UNITS["time"]
+    what = f"{record:.3g} {clock}".rstrip()
+    usual = f"{period:.2g} {clock}".rstrip()
+    times = record / period
+    text = (
+        f"the record lasts {what}, {times:.2g} times the fundamental period of the plate (about "
+        f"{usual})"
+    )
+    others = [u for u in ("s", "ms", "us") if clock in sizes and sizes[u] != sizes[clock]]
+    likely = [(abs(math.log(times * sizes[u] / sizes[clock])), u) for u in others]
+    scales = [1e-3, 1e-6, 1e3, 1e6] if clock not in sizes else []
+    factors = [(abs(math.log(times * scale)), f"{scale:g}") for scale in scales]
+    if likely and min(likely)[0] < LIKELY:
+        unit = min(likely)[1]
+        hint = f"the times seem to be in {unit}: name the unit in the header, as in `time ({unit})`"
+    elif factors and min(factors)[0] < LIKELY:
+        hint = f"the times seem to be in another unit than the deck's: times {min(factors)[1]}?"
+    elif steps < FEWEST_STEPS:
+        hint = "no wave reaches a gage in it: check the unit of time"
+    else:
+        hint = "no wave needs it: cut the record, or check the unit of time"
+    raise StudyError(f"{text}; {hint}")
+
+
+def _period(problem: Problem) -> float:
+    """Fundamental period of a simply supported plate with the sides of the mesh.
+
+    Navier's formula for an orthotropic plate without shear deformation.
+    """
+    places = problem.mesh.coordinates[problem.mesh.used]
+    a, b = np.ptp(places, axis=0).tolist()
+    laminate = problem.laminate
+    d = laminate.D
+    stiffness = d[0, 0] / a**4 + 2.0 * (d[0, 1] + 2.0 * d[2, 2]) / (a * b) ** 2 + d[1, 1] / b**4
+    return float(2.0 / math.pi * math.sqrt(laminate.mass / stiffness))
 
 
 def _refuse_mirrors(

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 from fecm._dataclasses import frozen
 from fecm._errors import StudyError
-from fecm._measured_tables import Table, read_table, same_name
+from fecm._measured_tables import Table, read_table, same_name, unit_size
 from fecm._text import printable
 from fecm._typing import Floats
-from fecm.deck.units import KNOWN
 
 # A CSV file; times and strains, (points, gages); or columns by name, as of a DataFrame.
 StrainSource = str | Path | tuple[Any, Any] | Mapping[str, Any]
 
-LARGEST = 0.1  # strain from which on a table looks like one of microstrain
+LARGEST = 0.1  # strain beyond which a table must be in another unit
+USUAL = (1e-5, 1e-2)  # largest strains of impacts that leave the plate linear
+DIVISORS = {"per cent": 100.0, "per mille": 1e3, "microstrain": 1e6}
 FEWEST = 10  # points
-RATIOS = {"", "-", "1", "m/m", "mm/mm", "in/in", "strain"}  # units of strain
 _NUMBER = re.compile(r"(?:gage|gauge|strain)?[ _-]?([0-9]+)")
 
 
@@ -68,12 +68,24 @@ def _check(made: StrainTable) -> None:
     if len(time) < FEWEST:
         raise StudyError(f"{name} has {len(time)} points; at least {FEWEST} are needed")
     if (largest := float(np.abs(strains).max())) > LARGEST:
-        raise StudyError(
-            f"{name}: the largest strain is {largest:.3g}, which looks like microstrain; divide "
-            "the columns by 1e6"
-        )
+        raise StudyError(f"{name}: the largest strain is {largest:.3g}{_likely_unit(largest)}")
     if not strains.any():
         raise StudyError(f"{name}: all strains are 0")
+
+
+def _likely_unit(largest: float) -> str:
+    """Units in which a strain that is too large would be a usual one, and the remedy."""
+    texts = [
+        f"{unit} ({largest / divisor:.2g}; divide by {divisor:g})"
+        for unit, divisor in DIVISORS.items()
+        if USUAL[0] <= largest / divisor <= USUAL[1]
+    ]
+    if not texts:
+        return "; strains are length over length"
+    return (
+        f", which looks like {' or '.join(texts)}; or name the unit in the header, as in "
+        "`gage 1 (µm/m)` or `gage 1 (%)`"
+    )
 
 
 def _numbered(name: str, heads: Sequence[str], numbers: Sequence[int]) -> list[int]:
@@ -146,39 +158,37 @@ def _from_file(path: Path, units: Mapping[str, str], numbers: Sequence[int]) -> 
     table = read_table(path)
     name, names = printable(path.name), table.names
     if all(any(same_name(one, known) for one in names) for known in ("time", "gage", "strain")):
-        return _from_long(table, name, numbers)
+        return _from_long(table, name, units, numbers)
     width = len(table.rows[0][1]) if table.rows else 0
     heads = names or [f"column {n}" for n in range(1, width + 1)]
-    clock = next((n for n, one in enumerate(heads) if same_name(one, "time")), 0)
+    clock = table.places(["time"])[0] if table.has("time") else 0
     places = [n for n in range(len(heads)) if n != clock]
     gages = _numbered(name, [heads[n] for n in places], numbers)
-    _check_units(table, name, clock, places, units)
     keys = ["time", *(f"gage {gage}" for gage in gages)]
     columns = table.columns(keys, increasing="time", places=[clock, *places])
     time, *strains = columns.values()
-    return _made(name, time, gages, strains)
+    sizes = [unit_size(name, table.unit(place), "strain") for place in places]
+    converted = [size * strain for size, strain in zip(sizes, strains, strict=True)]
+    return _made(name, time * _clock(table, name, clock, units), gages, converted)
 
 
-def _check_units(
-    table: Table, name: str, clock: int, places: Sequence[int], units: Mapping[str, str]
-) -> None:
-    """Refuse times in another unit than the deck's, and strains that are no ratios."""
-    given = dict(enumerate(table.units))
-    unit, deck, sizes = given.get(clock, ""), units.get("time", ""), KNOWN["time"]
-    same = unit == deck or (unit in sizes and sizes[unit] == sizes.get(deck))
-    if unit and deck and not same:
-        raise StudyError(f"{name}: time is in {unit}, and the deck in {deck}; convert the column")
-    for place in places:
-        if (unit := given.get(place, "")) not in RATIOS:
-            raise StudyError(
-                f"{name}: {table.names[place]} is in {unit}; strains are length over length: "
-                "convert the column"
-            )
+def _clock(table: Table, name: str, place: int, units: Mapping[str, str]) -> float:
+    """Factor from the unit of a column of times to the deck's; 1 if one of them has no name."""
+    unit, deck = table.unit(place), units.get("time", "")
+    if not unit or not deck or unit == deck:
+        return 1.0
+    return unit_size(name, unit, "time") / unit_size(name, deck, "time")
 
 
-def _from_long(table: Table, name: str, numbers: Sequence[int]) -> StrainTable:
+def _from_long(
+    table: Table, name: str, units: Mapping[str, str], numbers: Sequence[int]
+) -> StrainTable:
     """A row for every time and gage, as ``fecm export`` writes them."""
     columns = table.columns(("time", "gage", "strain"))
+    clock, strain = (
+        next(n for n, one in enumerate(table.names) if same_name(one, known))
+        for known in ("time", "strain")
+    )
     gages = [gage for gage in numbers if (columns["gage"] == gage).any()]
     if unknown := sorted(set(columns["gage"].tolist()) - set(gages)):
         known = ", ".join(map(str, numbers))
@@ -187,4 +197,6 @@ def _from_long(table: Table, name: str, numbers: Sequence[int]) -> StrainTable:
     times = [columns["time"][row] for row in rows]
     if any(not np.array_equal(time, times[0]) for time in times):
         raise StudyError(f"{name}: the gages have different times")
-    return _made(name, times[0], gages, [columns["strain"][row] for row in rows])
+    size = unit_size(name, table.unit(strain), "strain")
+    strains = [size * columns["strain"][row] for row in rows]
+    return _made(name, times[0] * _clock(table, name, clock, units), gages, strains)
