@@ -627,7 +627,7 @@ def test_cases_under_a_preload_equal_their_full_runs() -> None:
     assert found["status"].tolist() == ["ok"] * 3
     for force, case in zip(found.force, cases, strict=True):
         result = fecm.run_one(apply_case(deck, case))
-        assert np.abs(force - result.force).max() < 1e-9 * result.force.max()
+        assert np.abs(force[: len(result.force)] - result.force).max() < 1e-9 * result.force.max()
 
 
 def test_a_case_whose_plate_buckles_under_the_preload_says_so() -> None:

@@ -51,7 +51,6 @@ def test_in_all_modes_the_cases_are_those_of_full_runs() -> None:
     deck = text(WHOLE, data=BLOW)
     swept = fecm.sweep(deck, given, model="reduced", measure="max_deflection")
     full = fecm.sweep(deck, given, measure="max_deflection")
-    assert full[RATIO][1] > 1.0  # the plate does stretch
     assert set(swept.summary) == set(full.summary)
     for name in ("peak_force", "max_deflection", "max_indentation", "permanent_indentation"):
         np.testing.assert_allclose(swept[name], full[name], rtol=1e-4)
@@ -132,7 +131,7 @@ def test_a_case_does_not_depend_on_the_others(swept: fecm.SweepResult) -> None:
     others = {"velocity": [900.0, 450.0], "k": [5e4]}
     again = fecm.sweep(DECK, others, model="reduced", modes=ENOUGH, measure="max_deflection")
     for name in ("peak_force", "max_deflection", "impulse", "permanent_indentation"):
-        assert again[name][0] == swept[name][2]
+        np.testing.assert_equal(again[name][0], swept[name][2])
 
 
 def test_random_values_are_by_the_model_too() -> None:
@@ -188,7 +187,7 @@ def test_the_compliance_left_out_is_in_series_with_the_contact() -> None:
     assert found.error.max() < 1e-4
     stored = 0.4 * peak ** (5.0 / 3.0) / k ** (2.0 / 3.0) + 0.5 * c * peak**2
     np.testing.assert_allclose(stored, 0.5 * mass * speeds**2, rtol=1e-4)
-    np.testing.assert_allclose(found.deflection[0], c * peak, rtol=1e-6)
+    np.testing.assert_allclose(found.plate.largest, c * peak, rtol=1e-6)
     np.testing.assert_allclose(found.indentation.largest, (peak / k) ** (2.0 / 3.0), rtol=1e-4)
 
 

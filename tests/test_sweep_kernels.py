@@ -115,6 +115,9 @@ def test_errors_of_the_energy_balance_are_those_of_numpy(monkeypatch: pytest.Mon
     assert finite.tolist() == [True, True, True, False]
     np.testing.assert_allclose(found.error[finite], wanted.error[finite], rtol=1e-6, atol=1e-9)
     assert not found.error[3] < 1.0
+    for name, values in wanted.plate._asdict().items():
+        computed = getattr(found.plate, name)[finite]
+        np.testing.assert_allclose(computed, values[finite], rtol=1e-9, err_msg=name)
 
 
 @compiled

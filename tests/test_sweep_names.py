@@ -253,8 +253,8 @@ def test_measured_columns_are_those_of_full_runs(tmp_path: Path) -> None:
             zip(("gage_1", "gage_2"), np.abs(result.gages.strain).max(axis=0), strict=True)
         ) | {"max_deflection": result.metrics["max_deflection"]}
         for name, value in expected.items():
-            assert quick[name][case] == pytest.approx(value, rel=1e-9)
-            assert whole[name][case] == value
+            assert quick[name][case] == pytest.approx(value, rel=1e-9, nan_ok=True)
+            np.testing.assert_equal(whole[name][case], value)
         exposures = {one.criterion: one.exposure for one in largest_exposures(result)}
         assert set(exposures) == {"max_stress", "tsai_wu", "hashin", "puck", "interlaminar"}
         for name, value in exposures.items():

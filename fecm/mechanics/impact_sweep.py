@@ -40,6 +40,9 @@ class Found(IntEnum):
     LOST = 6  # largest difference of the energies from the initial one
     INITIAL = 7  # kinetic energy of the approach
     UNCONVERGED = 8  # steps whose contact iteration did not converge
+    LARGEST_DW = 9  # largest difference of the displacement in a step
+    PLATE_WORK = 10  # work of the contact force on the plate
+    COMPLIANCE = 11  # largest w^2/(2 E) of the plate; see :data:`~fecm.results.end.LEAST_WORK`
 
 
 class Sweep(Structure):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -108,8 +108,11 @@ def exceedance(
         for limit in limits:
             hits = np.array((values > limit).sum())
             p, low, high = map(float, bounds(hits, np.array(count), np.array(open_ends)))
-            interval = [[p - low], [high - p]]
-            axes.errorbar(limit, p, interval, fmt="o", color=colour, capsize=2.0, ms=3.0, lw=0.9)
+            centre = p if np.isfinite(p) else (low + high) / 2.0
+            interval = [[centre - low], [high - centre]]
+            marker = "o" if np.isfinite(p) else "none"  # draws are open: only the interval is known
+            style: dict[str, Any] = {"fmt": marker, "capsize": 2.0, "ms": 3.0, "lw": 0.9}
+            axes.errorbar(limit, centre, interval, color=colour, **style)
             case = f", {label}" if label else ""
             text = chance(p, low, high, open_ends, open_ends)
             notes.append(f"P({shown.name} > {limit:g}) = {text}{case}")

@@ -38,7 +38,14 @@ from fecm.results.exposures import largest_exposures
 from fecm.results.first_failure import first_failures, threshold_energy
 from fecm.results.metrics import INTEGERS, METRICS
 from fecm.results.result import Result
-from fecm.results.summary import LABEL_WIDTH, UNDECIDED, elastic_doubt, radii_of, summary
+from fecm.results.summary import (
+    LABEL_WIDTH,
+    UNDECIDED,
+    elastic_doubt,
+    later_contact,
+    radii_of,
+    summary,
+)
 
 WORDS = {
     Level.WITHIN: "All quantities are within the range of the model.",
@@ -167,6 +174,7 @@ def _sentence(result: Result, problem: Problem | None) -> str:
     if force[peak] > 0.0:
         at_least = "at least " if result.end in UNDECIDED else ""
         size = f"{at_least}{said(force[peak], 'force')} at {said(time[peak], 'time')}"
+        size += later_contact(result)
         doubt = elastic_doubt(result, float(force[peak]))
         parts.append(f"peak force {size} ({doubt})" if doubt else f"peak force {size}")
     else:

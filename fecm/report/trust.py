@@ -46,6 +46,11 @@ ENDS = {
         "between two contacts",
         "the projectile still approaches: the largest force is a lower bound; take more steps",
     ),
+    End.AGAIN: (
+        Level.OUTSIDE,
+        "may touch again",
+        "the projectile leaves slowly: the largest force is a lower bound; take more steps",
+    ),
 }
 
 

@@ -8,7 +8,17 @@ import numpy as np
 
 from fecm._typing import Bools, Floats
 from fecm.results.criteria import ALL_CRITERIA, spelt
-from fecm.results.end import Texts, decided, ends, over, peak_known
+from fecm.results.end import (
+    CLEAR,
+    Deflection,
+    LastContact,
+    Texts,
+    decided,
+    ends,
+    over,
+    peak_known,
+    settled_deflection,
+)
 
 
 class Quantity(NamedTuple):
@@ -22,6 +32,8 @@ class Quantity(NamedTuple):
 SUMMARY = {
     "peak_force": Quantity("largest contact force", "force"),
     "time_of_peak": Quantity("time of the largest contact force", "time"),
+    "peak_contact": Quantity("number of the contact with the largest force, from 1"),
+    "first_peak": Quantity("largest contact force of the first contact", "force"),
     "contacts": Quantity("number of contacts"),
     "contact_time": Quantity("time in contact", "time"),
     "last_contact": Quantity("time of the last step in contact", "time"),
@@ -53,7 +65,7 @@ METRICS = {
     "max_deflection": Quantity("largest displacement of the plate under the load", "length"),
     **THRESHOLD,
 }
-INTEGERS = ("contacts",)
+INTEGERS = ("contacts", "peak_contact")
 # Those of a search for velocities.
 FOUND = {
     "found_velocity": Quantity(
@@ -119,6 +131,14 @@ class Metrics(NamedTuple):
     columns: dict[str, Floats]  # (cases,) each; NaN where the end of the case has not decided them
     end: Texts  # (cases,): state of the contact at the end, :class:`~fecm.results.end.End`
     reached: Floats  # (cases,): largest contact force up to the end, a lower bound of the peak
+    last: LastContact
+    plate: Deflection
+    is_held: bool  # whether supports hold the plate
+
+    @property
+    def deflection(self) -> Floats:
+        """Largest displacement under the load, (cases,); NaN where it can still grow."""
+        return settled_deflection(self.end, self.plate, is_held=self.is_held)
 
 
 def summarise(
@@ -126,6 +146,7 @@ def summarise(
     times: Floats,
     indentation: Indentation,
     projectiles: Projectiles,
+    plate: Deflection,
     threshold: float | None = None,
     mobility: float = 0.0,
 ) -> Metrics:
@@ -133,8 +154,8 @@ def summarise(
 
     Contact forces are (steps, cases), times of the steps (steps,).  Returns the names of
     :data:`SUMMARY`, with a delamination threshold (force) also those of :data:`THRESHOLD`.
-    `mobility` (1/mass) is that of the plate's rigid motion; see
-    :class:`~fecm.results.validity.Judge`.
+    `plate` is the motion of the plate under the load, `mobility` (1/mass) the mobility of its rigid
+    motion; see :class:`~fecm.results.validity.Judge`.
 
     Values that the end of a case has not decided are NaN: if it ends in contact everything except
     the peaks, and the peaks too unless the projectile leaves and they have passed.
@@ -143,8 +164,22 @@ def summarise(
     mass, velocity = (np.broadcast_to(v, force.shape[1]) for v in projectiles)
     impulse, reached, met = found.impulse, found.reached, found.met
     rebound = impulse / mass - velocity
-    end = ends(found.last, reached, rebound + mobility * impulse, velocity)
+    leaving = rebound + mobility * impulse
+    # The velocity of the rigid motion belongs to both.
+    plate = plate._replace(speed=np.maximum(plate.speed - mobility * impulse, 0.0))
+    is_slow = leaving <= CLEAR * plate.speed
+    before, contact_peak = _present_contact(force, found.last)
+    last = LastContact(
+        found.last,
+        before,
+        reached,
+        contact_peak,
+        leaving=leaving,
+        position=_position(force, times, mass, velocity, (found.last <= 0.0) & is_slow),
+    )
+    end = ends(last, plate, is_held=mobility == 0.0)
     finished, known = over(end), peak_known(end)
+    is_first_over = known | (found.contacts > 1.0) | (found.last == 0.0)
 
     def where(mask: Bools, values: Floats) -> Floats:
         return np.where(mask, values, np.nan)
@@ -152,6 +187,8 @@ def summarise(
     columns = {
         "peak_force": where(known, reached),
         "time_of_peak": where(known & met, found.time_of_peak),
+        "peak_contact": where(known & met, found.peak_contact),
+        "first_peak": where(is_first_over, found.first_peak),
         "contacts": where(finished, found.contacts),
         "contact_time": where(finished, found.contact_time),
         "last_contact": where(finished & met, found.last_contact),
@@ -166,7 +203,35 @@ def summarise(
         columns["threshold_margin"] = where(known, 1.0 - reached / threshold)
         columns["threshold_time"] = found.threshold_time
         columns["time_above"] = where(finished, found.time_above)
-    return Metrics(columns, end, reached)
+    return Metrics(columns, end, reached, last, plate, is_held=mobility == 0.0)
+
+
+def _present_contact(force: Floats, last: Floats) -> tuple[Floats, Floats]:
+    """Force before the last step, and largest force of the contact at the end, (cases,) each.
+
+    Both are 0 where the case does not end in contact.
+    """
+    before, peak = np.zeros_like(last), np.zeros_like(last)
+    for case in np.flatnonzero(last > 0.0):
+        history = force[:, case]
+        gaps = np.flatnonzero(history <= 0.0)
+        contact = history[gaps[-1] + 1 if len(gaps) else 0 :]
+        before[case] = contact[-2] if len(contact) > 1 else 0.0
+        peak[case] = contact.max()
+    return before, peak
+
+
+def _position(
+    force: Floats, times: Floats, mass: Floats, velocity: Floats, chosen: Bools
+) -> Floats:
+    """Displacement of the projectiles at the end, (cases,), NaN where it is not chosen."""
+    position = np.full(len(chosen), np.nan)
+    dt = np.diff(times, prepend=0.0)
+    lever = 0.5 * (dt + np.append(dt[1:], 0.0)) * (times[-1] - times)
+    for case in np.flatnonzero(chosen):
+        push = float((lever * force[:, case]).sum())
+        position[case] = velocity[case] * times[-1] - push / mass[case]
+    return position
 
 
 class _OfForces(NamedTuple):
@@ -178,6 +243,8 @@ class _OfForces(NamedTuple):
     met: Bools  # whether there is a contact
     time_of_peak: Floats
     contacts: Floats
+    peak_contact: Floats  # number of the contact with the largest force, from 1
+    first_peak: Floats  # largest force of the first contact
     contact_time: Floats
     last_contact: Floats  # time; meaningless without a contact
     threshold_time: Floats  # NaN without a threshold, or where it is not reached
@@ -212,6 +279,9 @@ def _of_part(
     product = product[:cases]
     touching = force > 0.0
     rises = touching[:, 1:] > touching[:, :-1]
+    ends = touching.copy()  # last steps of contacts
+    ends[:, :-1] &= ~touching[:, 1:]
+    first_end = np.argmax(ends, axis=1) + 1
     last = len(times) - 1 - np.argmax(touching[:, ::-1], axis=1)
     peak = np.argmax(force, axis=1)
     threshold_time = time_above = np.full(cases, np.nan)
@@ -229,6 +299,9 @@ def _of_part(
         met=np.asarray(touching.any(axis=1)),
         time_of_peak=times[peak],
         contacts=touching[:, 0] + np.array([np.count_nonzero(row) for row in rises], dtype=float),
+        peak_contact=touching[:, 0]
+        + np.array([np.count_nonzero(rises[n, :row]) for n, row in enumerate(peak)], dtype=float),
+        first_peak=np.array([force[n, :row].max() for n, row in enumerate(first_end)]),
         contact_time=_durations(dt, touching, product),
         last_contact=times[last],
         threshold_time=threshold_time,

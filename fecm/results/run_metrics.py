@@ -8,7 +8,7 @@ import math
 import numpy as np
 
 from fecm.deck.model import Impact
-from fecm.results.end import End, decided
+from fecm.results.end import Deflection, End, time_to_decide
 from fecm.results.errors import ResultFileError
 from fecm.results.metrics import (
     INTEGERS,
@@ -32,8 +32,7 @@ def metrics_of(stored: Stored) -> dict[str, float]:
     """Impact metrics by their names; NaN where they are not known, empty without impact steps."""
     if (found := _summarised(stored)) is None:
         return {}
-    w = stored["history/plate_w"]
-    columns = found.columns | {"max_deflection": decided(w[[w.argmax()]], w[-1:], found.end)}
+    columns = found.columns | {"max_deflection": found.deflection}
     values: dict[str, float] = {name: columns[name].item() for name in METRICS if name in columns}
     return values | {name: int(values[name]) for name in INTEGERS if math.isfinite(values[name])}
 
@@ -59,9 +58,30 @@ def _summarised(stored: Stored) -> Metrics | None:
             time,
             depths,
             Projectiles(mass=2.0 * initial / velocity**2, velocity=velocity),
+            deflection_of(stored),
             threshold=_number(stored.threshold.get("force")) if stored.threshold else None,
             mobility=_number(history.get(MOBILITY, 0.0)),
         )
+
+
+def steps_to_decide(stored: Stored) -> int | None:
+    """Steps after which the plate of a run can't reach the projectile any more.
+
+    None if no number of steps is known to decide it.
+    """
+    summarised = _summarised(stored)
+    if summarised is None or not summarised.is_held:
+        return None
+    time = float(time_to_decide(summarised.last, summarised.plate)[0])
+    dt = float(np.diff(stored["history/time"][-2:], prepend=0.0)[-1])
+    return math.ceil(time / dt) if math.isfinite(time) else None
+
+
+def deflection_of(stored: Stored) -> Deflection:
+    """Motion of the plate under the load in a run with impact steps."""
+    energy = stored["energy/plate_kinetic"] + stored["energy/plate_strain"]
+    initial = _number(stored.attributes_of("energy").get("initial"))
+    return Deflection.of(stored["history/plate_w"], stored["history/time"], energy, initial)
 
 
 def _impact_velocity(stored: Stored) -> float:

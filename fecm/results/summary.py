@@ -30,6 +30,7 @@ OWN_PARTS = (("law", "contact law", "EXPE"), ("projectile", "projectile", "PROJ"
 UNDECIDED = {
     End.RISING: "in contact",
     End.BETWEEN: "between two contacts",
+    End.AGAIN: "before the plate is out of reach of the projectile",
 }
 
 
@@ -240,7 +241,7 @@ def _impact(result: Stored) -> list[str]:
         lines += [
             _line("contact", _contacts(result, intervals)),
             _line("largest indent", f"{_largest(result, indentation)}, permanent {_left(result)}"),
-            _line("largest w", _largest(result, w, " under the load")),
+            _line("largest w", f"{_at_least(result)}{_largest(result, w, ' under the load')}"),
         ]
         if not math.isnan(metrics_of(result)["rebound_velocity"]):
             lines.append(_line("rebound", _rebound(result)))
@@ -257,8 +258,23 @@ def _peak_force(result: Stored) -> str:
         text = f"{_quantity(result, force[peak], 'force')} at time {at} (step {peak + 1})"
         if (end := end_of(result)) in UNDECIDED:
             text = f"at least {text}, as the run ends {UNDECIDED[end]}"
+        text += later_contact(result)
     doubt = elastic_doubt(result, float(force[peak]))
     return f"{text} ({doubt})" if doubt else text
+
+
+def later_contact(result: Stored) -> str:
+    """The number of the contact of the peak force, and the first contact's peak, if it is later."""
+    metrics = metrics_of(result)
+    if not metrics["peak_contact"] > 1:
+        return ""
+    first = _quantity(result, metrics["first_peak"], "force")
+    return f", in contact {metrics['peak_contact']}; {first} in the first"
+
+
+def _at_least(result: Stored) -> str:
+    """Say that the largest deflection is a lower bound, where the plate can still exceed it."""
+    return "at least " if math.isnan(metrics_of(result)["max_deflection"]) else ""
 
 
 def _intervals(result: Stored) -> list[tuple[float, float]]:

@@ -15,7 +15,7 @@ import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats
-from fecm.results.end import Texts, peak_known
+from fecm.results.end import End, Texts
 from fecm.results.linear_plate import LIMITS, InPlane, softness
 
 STRAIN = 0.01  # largest strain for which plies are taken as linear
@@ -35,6 +35,7 @@ class Reason(StrEnum):
     """A reason to doubt a case."""
 
     OPEN = "peak not reached"
+    AGAIN = "may touch again"
     BENT_HELD = f"w > {LIMITS[InPlane.HELD]} h"
     BENT_FREE = f"w > {LIMITS[InPlane.FREE]} h"
     STEEP = f"slope > {SLOPE}"
@@ -54,6 +55,7 @@ BENT = {
 # What the reasons of a case mean, for the lines of a summary.
 MEANING: dict[str, str] = {
     Reason.OPEN: "with an open peak",
+    Reason.AGAIN: "that the plate may touch again (open peak)",
     Reason.BENT_HELD: f"beyond the linear plate ({Reason.BENT_HELD})",
     Reason.BENT_FREE: f"beyond the linear plate ({Reason.BENT_FREE})",
     Reason.STEEP: f"beyond moderate rotations ({Reason.STEEP})",
@@ -133,7 +135,8 @@ class Judge:
         h = self.thickness
         with np.errstate(invalid="ignore"):
             masks = {
-                Reason.OPEN: ~peak_known(extent.end),
+                Reason.OPEN: np.isin(extent.end, (End.RISING, End.BETWEEN)),
+                Reason.AGAIN: extent.end == End.AGAIN,
                 BENT[self.in_plane]: extent.deflection > self.limit * h,
                 Reason.SOFT: extent.indentation > INDENTATION * h,
                 Reason.BROKEN: np.broadcast_to(extent.exposure > CROSSED, extent.peak.shape),

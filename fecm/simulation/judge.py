@@ -10,10 +10,11 @@ import numpy as np
 from fecm._dataclasses import frozen
 from fecm.mechanics.mesh import rigid_deflections
 from fecm.results.criteria import spelt
-from fecm.results.end import OPEN_ENDS, End
+from fecm.results.end import LATE, OPEN_ENDS, OPEN_PEAKS, End
 from fecm.results.exposures import FEWEST, count_evaluations, largest_exposures
 from fecm.results.linear_plate import REMEDY, TOO_SOFT, unsafe
 from fecm.results.result import Result
+from fecm.results.run_metrics import steps_to_decide
 from fecm.results.validity import BENT, CROSSED, INDENTATION, SLOPE, STRAIN, Reason, joined
 from fecm.simulation import membrane, peaks
 from fecm.simulation.peaks import Peak
@@ -21,6 +22,7 @@ from fecm.simulation.simulation import Simulation
 
 # Error of the energy balance, relative to the supplied energy, that triggers a warning.
 ENERGY_WARNING = 0.01
+LATER = 1.1  # peak of a later contact over that of the first, above which a note says so
 
 
 @frozen
@@ -52,13 +54,54 @@ def judge(simulation: Simulation, result: Result) -> Verdict:
     if end is None:
         return Verdict(notes, "")
     if end in OPEN_ENDS:
-        notes.append(OPEN_ENDS[end])
-    reasons = [Reason.OPEN] if end in (End.RISING, End.BETWEEN) else []
+        notes.append(OPEN_ENDS[end] + _remedy(result, end))
+    notes += [*_later_peak(result), *_late_values(result, end)]
+    reasons = [Reason.AGAIN] if end is End.AGAIN else [Reason.OPEN] if end in OPEN_PEAKS else []
     reasons += [doubt.reason for doubt in beyond]
     peak_force = simulation.state.monitor.peak_force
     if peak_force > CROSSED * result.threshold.get("force", np.inf):
         reasons.append(Reason.DELAMINATED)
     return Verdict(notes, joined(reasons))
+
+
+def _remedy(result: Result, end: End) -> str:
+    """How many steps decide whether the plate touches the projectile again."""
+    if end is not End.AGAIN:
+        return ""
+    if (steps := steps_to_decide(result)) is None:
+        return "; take more steps"
+    return f"; about {steps} more steps decide it"
+
+
+def _later_peak(result: Result) -> Iterator[str]:
+    """Note of a peak force that a later contact has raised."""
+    metrics, unit = result.metrics, result.units.get("force", "")
+    if metrics["peak_force"] > LATER * metrics["first_peak"]:
+        first = f"{metrics['first_peak']:.4g} {unit}".rstrip()
+        yield (
+            f"the peak force is reached in contact {metrics['peak_contact']}, after reflections in "
+            f"the plate: it depends on damping; the peak of the first contact is {first}"
+        )
+
+
+def _late_values(result: Result, end: End) -> Iterator[str]:
+    """Note of deflections and exposures that are largest near the end of the run."""
+    if end is not End.OVER:
+        return
+    times, w = result["history/time"], result["history/plate_w"]
+    late = []
+    if times[w.argmax()] > LATE * times[-1]:
+        late.append("deflection")
+    late += [
+        f"exposure {spelt(one.criterion)}"
+        for one in largest_exposures(result)
+        if one.time > LATE * times[-1]
+    ]
+    if late:
+        yield (
+            f"the largest {', '.join(late)} came in the last fifth of the run, after the contact: "
+            "the plate vibrates on and may exceed it; take more steps"
+        )
 
 
 def _numerical(simulation: Simulation) -> Iterator[str]:

@@ -30,7 +30,7 @@ from fecm.results.metrics import GAGE, Projectiles, summarise
 from fecm.simulation.judge import ENERGY_WARNING
 from fecm.sweeps import find_in_full
 from fecm.sweeps.case import Case, CasesError, Value
-from fecm.sweeps.find import Runs, Sought, Strikes, found
+from fecm.sweeps.find import LONGER, Runs, Sought, Strikes, found
 from fecm.sweeps.in_full import (
     alone,
     in_one_motion,
@@ -39,9 +39,9 @@ from fecm.sweeps.in_full import (
     with_hit,
 )
 from fecm.sweeps.judge import Peak, judge, threshold_of
-from fecm.sweeps.limits import THRESHOLD
+from fecm.sweeps.limits import PEAK_FORCE, THRESHOLD
 from fecm.sweeps.memory import ADVANCED_BYTES
-from fecm.sweeps.outcome import Outcome, merge, outcome_of
+from fecm.sweeps.outcome import About, Outcome, Status, merge, outcome_of
 from fecm.sweeps.plan import Measure, Plan, Settings, Task, shares_plate
 from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
 from fecm.sweeps.responses import Hits, Impacts, impacts, largest_sums, plate_response
@@ -54,6 +54,8 @@ from fecm.sweeps.vary import apply_case, strike
 # Contact forces that are computed before they are evaluated, where none are stored: 16 MB, which
 # the C library keeps for the next ones and does not give back to the system.
 FORCES = 2_000_000
+# Returns what runs strikes for a multiple of the duration of the deck.
+Longer = Callable[[int], Runs]
 
 
 def run(task: Task) -> Outcome:
@@ -67,7 +69,7 @@ def run(task: Task) -> Outcome:
         return merge(parts, history=settings.history)
     of_plate = plate_values(task.cases[0])
     try:
-        checked, runs = _prepared(
+        checked, longer = _prepared(
             settings.deck,
             tuple(of_plate.items()),
             settings.clock,
@@ -80,7 +82,7 @@ def run(task: Task) -> Outcome:
     strikes, reasons = _strikes(task, checked)
     parts = [Outcome.failed(reasons)]
     if strikes:
-        parts.append(with_hit(_outcome(settings, checked, runs, strikes), checked, of_plate))
+        parts.append(with_hit(_outcome(settings, checked, longer, strikes), checked, of_plate))
     return merge(parts, history=settings.history)
 
 
@@ -103,26 +105,39 @@ def _strikes(task: Task, checked: Problem) -> tuple[Strikes, dict[int, str]]:
     return strikes, reasons
 
 
-def _outcome(settings: Settings, checked: Problem, runs: Runs, strikes: Strikes) -> Outcome:
+def _outcome(settings: Settings, checked: Problem, longer: Longer, strikes: Strikes) -> Outcome:
     """Run the strikes of a plate, or search their velocities."""
     if settings.search is None:
-        return runs(strikes, True)
+        outcome = longer(1)(strikes, True)
+        # Another response is cheap; full runs and the reduced model are not repeated.
+        can_lengthen = settings.modes is None and shares_plate(checked)
+        return _decided(outcome, longer, strikes, settings) if can_lengthen else outcome
     level = settings.search.level
     force = threshold_of(checked) if level == THRESHOLD else float(level)
     assert force is not None  # the plan requires DELA for the threshold
-
-    def longer(factor: int) -> Runs:
-        if factor == 1:
-            return runs
-        return runs_of(lengthened(checked, factor), settings.measures, history=settings.history)
-
     if checked.deck.has(Nonlinear):
         return merge([_found_in_full(checked, n, one, force, longer) for n, one in strikes.items()])
     return found(strikes, force, longer)
 
 
+def _decided(outcome: Outcome, longer: Longer, strikes: Strikes, settings: Settings) -> Outcome:
+    """Repeat cases that end between contacts, or may touch again, with a longer response."""
+    no_contact = outcome.columns[About.STATUS] == Status.OK
+    candidates = np.array(outcome.numbers)[no_contact]
+    for factor in LONGER[1:]:
+        is_open = np.isin(outcome.numbers, candidates) & np.isnan(outcome.columns[PEAK_FORCE])
+        if not is_open.any():
+            break
+        again = {
+            outcome.numbers[row]: strikes[outcome.numbers[row]] for row in np.flatnonzero(is_open)
+        }
+        parts = [outcome.select(np.flatnonzero(~is_open)), longer(factor)(again, True)]
+        outcome = merge(parts, history=settings.history)
+    return outcome
+
+
 def _found_in_full(
-    checked: Problem, number: int, strike: Strike, force: float, longer: Callable[[int], Runs]
+    checked: Problem, number: int, strike: Strike, force: float, longer: Longer
 ) -> Outcome:
     """Search the velocity of a strike of a nonlinear plate, from that of the quick models on."""
     from fecm.studies.estimate import velocity_at  # 0.1 s, which most sweeps don't need
@@ -147,13 +162,19 @@ def _prepared(
     *,
     modes: int | None,
     history: bool,
-) -> tuple[Problem, Runs]:
+) -> tuple[Problem, Longer]:
     """The problem of a plate, given by values of names, and what runs its strikes."""
     case: Case = dict(of_plate)
     checked = with_clock(apply_case(deck, case), clock, case)
-    if modes is not None:
-        return checked, _reduced_runs(checked, modes, measures, history=history)
-    return checked, runs_of(checked, measures, history=history)
+
+    @lru_cache(maxsize=len(LONGER))
+    def longer(factor: int) -> Runs:
+        if modes is not None and factor == 1:
+            return _reduced_runs(checked, modes, measures, history=history)
+        problem = checked if factor == 1 else lengthened(checked, factor)
+        return runs_of(problem, measures, history=history)
+
+    return checked, longer
 
 
 def _reduced_runs(
@@ -282,12 +303,12 @@ def _together(
             np.add.accumulate(np.full(steps, dt)),
             struck.indentation,
             ordered.projectiles,
+            struck.plate,
             threshold_of(checked),
             checked.judge.mobility,
         )
         strains = plate.strains if judged else {}
         peaks = {name: Peak(*largest_sums(r, struck.force)) for name, r in strains.items()}
-    peaks[Measure.DEFLECTION] = Peak(*struck.deflection)
     outcome = outcome_of(
         ordered.numbers,
         metrics,
@@ -298,7 +319,7 @@ def _together(
         force=struck.force.T if history else None,
     )
     largest = struck.indentation.largest
-    judge(outcome, checked, measures, end=metrics.end, peaks=peaks, indentation=largest)
+    judge(outcome, checked, measures, metrics, peaks=peaks, indentation=largest)
     outcome = outcome.select(ordered.back)
 
     settled = (struck.error < ENERGY_WARNING) & (struck.unconverged_steps == 0)

@@ -20,6 +20,7 @@ from fecm.problem.problem import Problem
 from fecm.results.exposures import count_evaluations
 from fecm.results.metrics import EVALUATIONS, HIT, Indentation, Projectiles, summarise
 from fecm.results.result import Result
+from fecm.results.run_metrics import deflection_of
 from fecm.results.sinks import MemorySink
 from fecm.simulation.recorder import exposures_of
 from fecm.simulation.run import run, simulate
@@ -170,6 +171,7 @@ def _outcome(
         times,
         indentation,
         Projectiles(own.projectile.total_mass, own.velocity),
+        deflection_of(result),
         threshold_of(checked),
         checked.judge.mobility,
     )
@@ -183,7 +185,7 @@ def _outcome(
         force=force[None],
     )
     peaks = peaks_of(measures, result)
-    judge(outcome, checked, measures, end=metrics.end, peaks=peaks, indentation=indentation.largest)
+    judge(outcome, checked, measures, metrics, peaks=peaks, indentation=indentation.largest)
     if Measure.FAILURE in measures:
         count = np.array([float(count_evaluations(result))])
         outcome.columns |= dict.fromkeys(EVALUATIONS, count)

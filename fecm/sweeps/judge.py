@@ -9,9 +9,9 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.problem.problem import Problem
-from fecm.results.end import Texts, decided
+from fecm.results.end import decided
 from fecm.results.exposures import largest_exposures
-from fecm.results.metrics import EXPOSURES, GAGE, RATIO
+from fecm.results.metrics import EXPOSURES, GAGE, RATIO, Metrics
 from fecm.results.result import Result
 from fecm.results.validity import Extent
 from fecm.sweeps.outcome import About, Outcome
@@ -34,18 +34,18 @@ def judge(
     outcome: Outcome,
     checked: Problem,
     measures: Sequence[Measure],
+    metrics: Metrics,
     *,
-    end: Texts,
     peaks: Mapping[str, Peak],
     indentation: Floats,
 ) -> None:
     """Add the validity of cases, and the columns of what was measured, with its open values.
 
-    `peaks` are those of the deflection and of other columns, `indentation` (cases,) the largest.
+    `peaks` has the strains of gages and the exposures, `indentation` (cases,) is the largest.
     """
-    rules = checked.judge
+    rules, end, plate = checked.judge, metrics.end, metrics.plate
     known = {name: decided(peak.largest, peak.last, end) for name, peak in peaks.items()}
-    deflection = peaks[Measure.DEFLECTION].largest
+    deflection = plate.largest
     if rules.mobility:  # the plate moves as a whole
         deflection = np.full(len(end), np.nan)
     exposures = [peak.largest for name, peak in peaks.items() if name in EXPOSURES]
@@ -58,23 +58,22 @@ def judge(
         exposure=np.nanmax(exposures, axis=0) if exposures else np.nan,
         threshold=np.nan if threshold is None else threshold,
     )
-    ratio = known.pop(Measure.DEFLECTION) / rules.thickness
+    ratio = metrics.deflection / rules.thickness
     if Measure.DEFLECTION in measures:
-        known[Measure.DEFLECTION] = ratio * rules.thickness
+        known[Measure.DEFLECTION] = metrics.deflection
     known[RATIO] = np.where(np.isnan(deflection), np.nan, ratio)
     outcome.columns |= {**known, About.VALIDITY: rules.validity(extent)}
 
 
 def peaks_of(measures: Sequence[Measure], result: Result) -> dict[str, Peak]:
-    """Peaks of the deflection of a run, and of the columns that are measured on request."""
-    histories = {str(Measure.DEFLECTION): result["history/plate_w"]}
+    """Peaks of the columns of a run that are measured on request."""
+    peaks: dict[str, Peak] = {}
     if Measure.GAGES in measures and "gages/number" in result:
         strains = np.abs(result["gages/strain"]).T
         numbers = result["gages/number"]
-        histories |= {f"{GAGE}{n}": own for n, own in zip(numbers, strains, strict=True)}
-    peaks = {name: Peak(v.max(keepdims=True), v[-1:]) for name, v in histories.items()}
+        for number, values in zip(numbers, strains, strict=True):
+            peaks[f"{GAGE}{number}"] = Peak(values.max(keepdims=True), values[-1:])
     for one in largest_exposures(result) if Measure.FAILURE in measures else ():
-        at_end = one.time >= result["history/time"][-1]
-        last = one.exposure if at_end else 0.0
+        last = one.exposure if one.time >= result["history/time"][-1] else 0.0
         peaks[f"exposure_{one.criterion}"] = Peak(np.array([one.exposure]), np.array([last]))
     return peaks

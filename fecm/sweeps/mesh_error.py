@@ -16,7 +16,7 @@ from fecm.problem.problem import Problem
 from fecm.problem.refine import RefineError, refined
 from fecm.problem.resolution import resolution
 from fecm.problem.slips import active_slips
-from fecm.results.end import End
+from fecm.results.end import OPEN_PEAKS
 from fecm.results.run_metrics import end_of
 from fecm.results.sinks import MemorySink
 from fecm.results.stored import Stored
@@ -158,7 +158,7 @@ def compare_peaks(
         elements=problem.deck.control.numel,
         refined_elements=fine.deck.control.numel,
         distance=_distance(problem),
-        undecided=any(end_of(one) in (End.RISING, End.BETWEEN) for one in (coarse, refined)),
+        undecided=any(end_of(one) in OPEN_PEAKS for one in (coarse, refined)),
     )
 
 

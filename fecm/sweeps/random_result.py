@@ -138,8 +138,9 @@ def _notes(design: Design, columns: Columns, fine: Bools) -> Iterator[str]:
 
 def open_ends(summary: Columns) -> Bools:
     """Cases that were run and ended before their contact was over, so that values are open."""
-    rising = np.char.find(summary.get(VALIDITY, summary["status"]), Reason.OPEN) >= 0
-    return np.asarray((summary["status"] == Status.STILL) | rising)
+    validity = summary.get(VALIDITY, summary["status"])
+    open_peaks = [np.char.find(validity, reason) >= 0 for reason in (Reason.OPEN, Reason.AGAIN)]
+    return np.asarray((summary["status"] == Status.STILL) | np.any(open_peaks, axis=0))
 
 
 def exceedances(draws: Columns, is_open: Bools, limits: Sequence[Limit]) -> Exceedance:

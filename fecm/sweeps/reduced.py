@@ -22,7 +22,15 @@ from fecm.results.metrics import Indentation
 from fecm.sweeps.case import CasesError
 from fecm.sweeps.convolution import BLOCK, Convolution
 from fecm.sweeps.find import Strikes
-from fecm.sweeps.responses import Hits, Impacts, TipState, TipSteps, Work, balance_errors
+from fecm.sweeps.responses import (
+    DeflectionRecord,
+    Hits,
+    Impacts,
+    TipState,
+    TipSteps,
+    Work,
+    balance_errors,
+)
 from fecm.sweeps.strike import Strike
 from fecm.sweeps.timing import duration_of
 
@@ -67,17 +75,20 @@ class ReducedImpacts:
             contact_work=np.zeros(cases),  # summed in place
             unconverged_steps=np.zeros(cases, dtype=np.int64),
         )
-        force, deepest, highest, w = np.empty((self.steps, cases)), none, none, none
+        force, deepest, w, work = np.empty((self.steps, cases)), none, none, none
+        record = DeflectionRecord(tips)
         done: list[Floats] = []
         for step in range(self.steps):
             moved = motion.advance(state.contact.force)
             (tips.sums,) = sums.next()
             couple_step(tips, law, state, moved)
             sums.give(state.contact.force)
+            last, before = force[step - 1] if step else none, w
             force[step] = state.contact.force
             w = moved + flexibility * state.contact.force
+            work = work + 0.5 * (last + force[step]) * (w - before)
             deepest = np.maximum(deepest, law.of_law(state.contact).indentation)
-            highest = np.maximum(highest, w)
+            record.add(w, work)
             if not (step + 1) % BLOCK or step + 1 == self.steps:
                 done.append(state.contact_work + motion.energy(state.contact.force))
         permanent = law.permanent(state.memory, state.contact)
@@ -86,7 +97,7 @@ class ReducedImpacts:
             force=force,
             indentation=Indentation(deepest, last, permanent),
             unconverged_steps=state.unconverged_steps,
-            deflection=(highest, w),
+            plate=record.deflection,
             error=balance_errors(force, Work(np.array(done), none), tips),
         )
 

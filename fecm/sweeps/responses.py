@@ -29,6 +29,7 @@ from fecm.mechanics.impact_sweep import Found, Given, sweep
 from fecm.mechanics.plate_motion import AppliedForce, DofSums, Load, PlateMotion
 from fecm.mechanics.projectile import Projectile, RigidMass, RodIntegrator, RodState, WilsonStep
 from fecm.mechanics.rod_modes import Modes
+from fecm.results.end import LEAST_WORK, Deflection
 from fecm.results.metrics import Indentation
 from fecm.sweeps.convolution import BLOCK, Convolution
 
@@ -177,7 +178,7 @@ class Impacts(NamedTuple):
     force: Floats  # (steps, cases): contact force after every step
     indentation: Indentation
     unconverged_steps: NDArray[np.int64]  # (cases,): steps whose contact iteration did not converge
-    deflection: tuple[Floats, Floats]  # (cases,): largest and last displacement of the plate
+    plate: Deflection
     error: Floats  # (cases,): error of the energy balance; see :func:`balance_errors`
 
 
@@ -216,7 +217,8 @@ def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Impact
         unconverged_steps=np.zeros(cases, dtype=np.int64),
     )
     force, deepest = np.empty((steps, cases)), none
-    plate_work, dw, largest_ddw, highest = none, none, none, none
+    plate_work, dw, largest_ddw = none, none, none
+    record = DeflectionRecord(tips)
     done: list[Floats] = []
     for step in range(steps):
         last, w = state.contact.force, state.plate_w
@@ -225,19 +227,43 @@ def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Impact
         sums.give(state.contact.force)
         force[step] = state.contact.force
         deepest = np.maximum(deepest, state.contact.indentation)
-        highest = np.maximum(highest, state.plate_w)
         # Central differences conserve the work 1/2 (F + F') (w' - w) on the plate.
         before, dw = dw, state.plate_w - w
         plate_work = plate_work + 0.5 * (last + state.contact.force) * dw
         largest_ddw = np.maximum(largest_ddw, np.abs(dw - before))
+        record.add(state.plate_w, plate_work)
         if not (step + 1) % BLOCK or step + 1 == steps:
             done.append(state.contact_work + plate_work)
     permanent = law.permanent(state.memory, state.contact)
     indentation = Indentation(deepest, state.contact.indentation, permanent)
     work = Work(np.array(done), node_mass * largest_ddw**2 / (8.0 * tips.dt**2))
     error = balance_errors(force, work, tips)
-    deflection = (highest, state.plate_w)
-    return Impacts(force, indentation, state.unconverged_steps, deflection, error), work
+    return Impacts(force, indentation, state.unconverged_steps, record.deflection, error), work
+
+
+class DeflectionRecord:
+    """Motion of the plate under the load in impacts that are computed step by step."""
+
+    def __init__(self, tips: TipSteps) -> None:
+        hits = tips.hits
+        masses = np.array([rod.total_mass for rod in hits.rods])[hits.kind] * hits.scale
+        self._least = LEAST_WORK * 0.5 * masses * hits.speed**2
+        self._dt = tips.dt
+        none = np.zeros(len(hits.kind))
+        self.deflection = Deflection(none, none, none, none, none)
+
+    def add(self, w: Floats, energy: Floats) -> None:
+        """Add a step: displacement and energy of the plate, (cases,) each."""
+        before = self.deflection
+        with np.errstate(all="ignore"):
+            compliance = w * np.abs(w) / (2.0 * np.maximum(energy, self._least))
+        self.deflection = Deflection(
+            np.maximum(before.largest, w),
+            w,
+            np.maximum(before.speed, np.abs(w - before.last) / self._dt),
+            energy,
+            np.fmax(before.compliance, compliance),
+        )
 
 
 def balance_errors(force: Floats, work: Work, tips: TipSteps) -> Floats:
@@ -304,6 +330,12 @@ def _by_kernels(
             found[Found.DEEPEST], found[Found.INDENTATION], found[Found.PERMANENT]
         ),
         unconverged_steps=found[Found.UNCONVERGED].astype(np.int64),
-        deflection=(found[Found.HIGHEST], found[Found.W]),
+        plate=Deflection(
+            largest=found[Found.HIGHEST],
+            last=found[Found.W],
+            speed=found[Found.LARGEST_DW] / dt,
+            energy=found[Found.PLATE_WORK],
+            compliance=found[Found.COMPLIANCE],
+        ),
         error=lost / np.where(initial > 0.0, initial, 1.0),
     )

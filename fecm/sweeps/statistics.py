@@ -113,13 +113,14 @@ def indices(values: Floats, seed: int) -> Indices:
 
 
 def bounds(hits: Counts, count: Counts, lacking: Counts) -> tuple[Floats, Floats, Floats]:
-    """Probability from draws with a value, and the ends of an interval that holds for all draws.
+    """Probability of exceeding a limit, and the ends of an interval that holds for all draws.
 
-    `hits` of `count` draws exceed a limit, and it is not known whether `lacking` more do.  The
+    `hits` of `count` draws exceed the limit, and it is not known whether `lacking` more do.  The
+    probability is NaN if there are any: the draws that are open are not a random choice.  The
     interval is Wilson's from its lower end, if none of them does, to its upper end, if all do.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
-        share = hits / count
+        share = np.where(lacking > 0, np.nan, hits / count)
     lower, _ = wilson(hits, count + lacking)
     _, upper = wilson(hits + lacking, count + lacking)
     return share, lower, upper

@@ -307,6 +307,9 @@ static const Entry CONSTANTS[] = {
     VALUE(Found, FOUND_, LOST),
     VALUE(Found, FOUND_, INITIAL),
     VALUE(Found, FOUND_, UNCONVERGED),
+    VALUE(Found, FOUND_, LARGEST_DW),
+    VALUE(Found, FOUND_, PLATE_WORK),
+    VALUE(Found, FOUND_, COMPLIANCE),
     VALUE(Count, , FOUND),
 
     VALUE(Count, , LANES),

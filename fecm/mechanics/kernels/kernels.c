@@ -59,6 +59,7 @@
 #define LANES 8
 #define APART __attribute__((noinline)) /* loops that need all registers, which compilers find only there */
 #define PASSES 5 /* of the contact iteration */
+#define LEAST_WORK 1.0e-3 /* see fecm/results/end.py */
 #define TOLERANCE 1.0e-6
 #define MOST_THREADS 64
 #define MOST_SPINS 2000 /* of a waiting thread, before it sleeps: some ten microseconds, as waking takes */
@@ -113,6 +114,7 @@ typedef struct {
     half tip, velocity, acceleration, indentation, force, push, w, dw;
     half initial, contact_work, plate_work; /* energies */
     half deepest, highest, sharpest, lost, unconverged; /* see FOUND_DEEPEST and so on */
+    half fastest, compliance; /* see FOUND_LARGEST_DW and so on */
 } Cases;
 
 /* Inner products of a state: d M d, d f, u f, f s with the internal force f = K u; and the work of the

@@ -148,10 +148,11 @@ enum { GIVEN_K, GIVEN_Q, GIVEN_CRITICAL, GIVEN_SLOPE, GIVEN_VELOCITY, GIVEN_FACT
 
 /* Rows of `found`: the largest and the last indentation, the permanent one, the largest and the last
  * displacement of the plate and its largest second difference; the largest error of the energies, the
- * initial energy, and the number of steps whose contact iteration did not converge. */
+ * initial energy, and the number of steps whose contact iteration did not converge; the largest
+ * difference of the displacement, the work on the plate, and the largest compliance. */
 enum {
     FOUND_DEEPEST, FOUND_INDENTATION, FOUND_PERMANENT, FOUND_HIGHEST, FOUND_W, FOUND_LARGEST_DDW, FOUND_LOST,
-    FOUND_INITIAL, FOUND_UNCONVERGED, FOUND
+    FOUND_INITIAL, FOUND_UNCONVERGED, FOUND_LARGEST_DW, FOUND_PLATE_WORK, FOUND_COMPLIANCE, FOUND
 };
 
 /* Strains of elements with the same nodes present; `width` is that of `points` in fours.  `tying` are the

@@ -289,6 +289,7 @@ INLINE void NAME(begin)(const Sweep *x, const Response *r, int64_t first, Cases 
     c->tip = none, c->velocity = -given[GIVEN_VELOCITY], c->acceleration = none;
     c->indentation = c->force = c->push = c->w = c->dw = none;
     c->deepest = c->highest = c->sharpest = c->lost = c->unconverged = none;
+    c->fastest = c->compliance = none;
     c->plate_work = c->contact_work = none;
 }
 
@@ -300,6 +301,11 @@ INLINE void NAME(record)(Cases *c, half w, half force, half indentation) {
     c->plate_work += mean * c->dw;
     const half bend = NAME(size)(c->dw - before);
     c->w = w, c->force = force, c->indentation = indentation;
+    const half fast = NAME(size)(c->dw), least = LEAST_WORK * c->initial;
+    c->fastest = NAME(choose)(fast > c->fastest, fast, c->fastest);
+    const half energy = NAME(choose)(c->plate_work > least, c->plate_work, least);
+    const half compliance = w * NAME(size)(w) / (2.0 * energy);
+    c->compliance = NAME(choose)(compliance > c->compliance, compliance, c->compliance);
     c->sharpest = NAME(choose)(bend > c->sharpest, bend, c->sharpest);
     c->deepest = NAME(choose)(indentation > c->deepest, indentation, c->deepest);
     c->highest = NAME(choose)(w > c->highest, w, c->highest);
@@ -388,6 +394,9 @@ INLINE void NAME(store_found)(const Sweep *x, const Cases *c) {
             [FOUND_LOST] = c->lost[lane],
             [FOUND_INITIAL] = c->initial[lane],
             [FOUND_UNCONVERGED] = c->unconverged[lane],
+            [FOUND_LARGEST_DW] = c->fastest[lane],
+            [FOUND_PLATE_WORK] = c->plate_work[lane],
+            [FOUND_COMPLIANCE] = c->compliance[lane],
         };
         for (int row = 0; row < FOUND; row++) x->found[row * x->stride + c->at[lane]] = found[row];
     }
