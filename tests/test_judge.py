@@ -319,8 +319,8 @@ def test_a_run_says_that_the_plate_may_touch_the_projectile_again() -> None:
     steps = int(re.search(r"about (\d+) more steps", note)[1])  # type: ignore[index]
     decided_by = cut.time[-1] * (1.0 + steps / len(cut.time))
     assert decided_by > whole.metrics["last_contact"]
-    assert any("reached in contact 2" in note for note in whole.notes)
-    assert whole.metrics["peak_contact"] == 2
+    assert any("reached in contact 3" in note for note in whole.notes)
+    assert whole.metrics["peak_contact"] == 3
     first = whole.force[: int(np.flatnonzero(np.diff((whole.force > 0.0).astype(int)) < 0)[0]) + 1]
     assert whole.metrics["first_peak"] == first.max()
     assert cut.metrics["first_peak"] == first.max()
