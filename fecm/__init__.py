@@ -16,6 +16,7 @@ from fecm._errors import FecmError, FecmWarning
 from fecm._version import __version__
 
 if TYPE_CHECKING:
+    from fecm import errors
     from fecm._extensions import ExtensionError
     from fecm.api import DeckCheck, check, read_one, run, run_one
     from fecm.authoring.contact import Contact
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from fecm.mechanics.own_projectile import LinearProjectile, ProjectileError
     from fecm.mechanics.plate_motion import DivergenceError
     from fecm.mechanics.projectile import RigidMass, Rod
+    from fecm.problem.plate_mesh import MeshError
     from fecm.results.diff import assert_same, diff
     from fecm.results.difference import Difference
     from fecm.results.result import Result, load
@@ -46,7 +48,7 @@ if TYPE_CHECKING:
     from fecm.studies.waves.study import waves
     from fecm.sweeps.api import sweep
     from fecm.sweeps.estimate import estimate
-    from fecm.sweeps.mesh_error import MeshError, mesh_error
+    from fecm.sweeps.mesh_error import MeshErrorEstimate, mesh_error
     from fecm.sweeps.result import SweepResult
     from fecm.sweeps.result_file import load as load_sweep
     from fecm.verification import verify
@@ -72,6 +74,7 @@ __all__ = [
     "LocateError",
     "Location",
     "MeshError",
+    "MeshErrorEstimate",
     "Plate",
     "Ply",
     "ProjectileError",
@@ -85,6 +88,7 @@ __all__ = [
     "check",
     "contacts",
     "diff",
+    "errors",
     "estimate",
     "examples",
     "fit_indentation",
@@ -127,7 +131,8 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "LinearProjectile": ("fecm.mechanics.own_projectile", "LinearProjectile"),
         "LocateError": ("fecm.location.errors", "LocateError"),
         "Location": ("fecm.location.location", "Location"),
-        "MeshError": ("fecm.sweeps.mesh_error", "MeshError"),
+        "MeshError": ("fecm.problem.plate_mesh", "MeshError"),
+        "MeshErrorEstimate": ("fecm.sweeps.mesh_error", "MeshErrorEstimate"),
         "Plate": ("fecm.authoring.plate", "Plate"),
         "Ply": ("fecm.deck.model", "Ply"),
         "ProjectileError": ("fecm.mechanics.own_projectile", "ProjectileError"),
@@ -162,6 +167,8 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
 
     def __getattr__(name):
         """Import a public name on first access."""
+        if name == "errors":
+            return _import_module("fecm.errors")
         if name not in _HOMES:
             raise AttributeError(f"module 'fecm' has no attribute {name!r}")
         module, own = _HOMES[name]

@@ -21,6 +21,10 @@ class FecmError(Exception):
     exit_code = 2
 
 
+class OptionsError(FecmError, ValueError):
+    """An option has a value that is not possible, or not with this deck."""
+
+
 class StudyError(FecmError, ValueError):
     """A study can't be computed from these numbers, or their table is invalid."""
 

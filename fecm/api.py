@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import BinaryIO, Literal
 
 from fecm._dataclasses import frozen
-from fecm._errors import warn
+from fecm._errors import OptionsError, warn
 from fecm._files import ARGUMENT, check_outputs
 from fecm._progress import once_a_minute
 from fecm.deck.findings import DeckError, Finding, Severity
@@ -172,7 +172,7 @@ def check(deck: str | Path | Deck, mode: Mode = "report") -> DeckCheck:
 
     Raises
     ------
-    ValueError
+    OptionsError
         If the mode is unknown.
     OSError
         If the file can't be read.
@@ -198,7 +198,7 @@ def read_one(path_or_text: str | Path) -> Deck:
     ------
     DeckError
         If the deck has errors.
-    ValueError
+    OptionsError
         If it has several problems, or none.
     """
     found = read_deck(path_or_text)
@@ -229,7 +229,7 @@ def run_one(
 
     Raises
     ------
-    ValueError
+    OptionsError
         Also if the deck has several problems.
 
     Examples
@@ -324,7 +324,7 @@ def run(
         If the deck has errors.
     DivergenceError
         If the motion grows without bound, or the energy balance exceeds its limit.
-    ValueError
+    OptionsError
         If the mode, a slip, the solver, the rod's mass or its integrator is unknown, a number is
         invalid, or the solver or a slip is not for a nonlinear plate.
     LawError
@@ -365,14 +365,14 @@ def run(
 def _check_one(found: Sequence[object]) -> None:
     """Refuse a deck that does not have exactly one problem."""
     if len(found) != 1:
-        raise ValueError(f"the deck has {len(found)} problems, not one")
+        raise OptionsError(f"the deck has {len(found)} problems, not one")
 
 
 def sole_problem(deck: str | Path | Deck, *, warns: bool = True) -> Problem:
     """Checked problem of a deck that has one; with `warns`, warnings about it are FecmWarnings.
 
-    Raises DeckError if the deck has errors, apart from unstable motions, and ValueError if it does
-    not have exactly one problem.
+    Raises DeckError if the deck has errors, apart from unstable motions.  Raises OptionsError if
+    the deck does not have exactly one problem.
     """
     prepared = load_deck(deck)
     if prepared.errors(force=True):

@@ -30,7 +30,7 @@ checked: fecm.DeckCheck = fecm.check(deck, "listing")
 codes: list[str] = [finding.code for finding in checked.errors]
 critical: list[float] = [problem.critical_time_step for problem in checked.problems]
 stiffness: NDArray[np.float64] = checked.problems[0].D
-of_mesh: fecm.MeshError = fecm.mesh_error(deck, progress=lambda step, steps: None)
+of_mesh: fecm.MeshErrorEstimate = fecm.mesh_error(deck, progress=lambda step, steps: None)
 apart: fecm.Difference = fecm.diff("a.h5", result, 1e-6, tol={"tape8": 1e-5, "energy": (0, 1)})
 where: int | None = apart.datasets[0].at.step if apart.datasets[0].at else None
 fecm.assert_same(result, Path("trusted.h5"), rtol=1e-6, only="history")

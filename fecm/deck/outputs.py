@@ -23,7 +23,7 @@ Rows = int | bool
 RowsOfPlies = Rows | tuple[int, int]
 
 
-class OutputError(FecmError, ValueError):
+class RowsError(FecmError, ValueError):
     """A program can't store what it is asked for."""
 
 
@@ -62,7 +62,7 @@ def with_outputs(
     program without such a loop.  True stores failure with the rows of RODP, and about
     :data:`PLY_ROWS` rows of ply stresses; a macro that is there keeps its number.
 
-    Raises OutputError if a number is not positive and whole.
+    Raises RowsError if a number is not positive and whole.
     """
     made = list(macros)
     if every is not None:
@@ -81,7 +81,7 @@ def _of_plies(given: RowsOfPlies | None) -> _Output | None:
     if not isinstance(given, tuple):
         return _Output(PLIES, _rows("plies", given))
     if len(given) != 2:
-        raise OutputError(f"`plies` is {given!r}, not a number of steps and one of elements")
+        raise RowsError(f"`plies` is {given!r}, not a number of steps and one of elements")
     return _Output(PLIES, _rows("plies", given[0]), _count("plies", given[1]))
 
 
@@ -97,7 +97,7 @@ def _count(name: str, value: object) -> int:
     """A number of steps or elements."""
     if isinstance(value, Integral) and not isinstance(value, bool) and (count := int(value)) > 0:
         return count
-    raise OutputError(f"`{name}` is {value!r}, not a whole number above 0")
+    raise RowsError(f"`{name}` is {value!r}, not a whole number above 0")
 
 
 def _with_output(macros: Sequence[Macro], output: _Output) -> list[Macro]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import BinaryIO
 
+from fecm._inputs import InputError
 from fecm._memory import NotEnoughMemoryError, available, format_bytes, require
 
 LARGEST_FILE = 1_000_000_000  # no deck needs more bytes
@@ -35,9 +36,9 @@ def _text(file: BinaryIO, path: str) -> str:
     most = LARGEST_FILE if free is None else min(LARGEST_FILE, free // BYTES_A_BYTE)
     begin = file.read(FIRST)
     if begin.startswith(HDF5):
-        raise OSError(f"{path} is an HDF5 file, not a deck; `fecm info {path}` shows a result")
+        raise InputError(f"{path} is an HDF5 file, not a deck; `fecm info {path}` shows a result")
     if b"\0" in begin:
-        raise OSError(f"{path} is a binary file or UTF-16 text, not a deck in UTF-8 or Latin-1")
+        raise InputError(f"{path} is a binary file or UTF-16 text, not a deck in UTF-8 or Latin-1")
     data = begin + file.read(max(0, most + 1 - len(begin)))
     if len(data) > most:
         raise NotEnoughMemoryError(f"{path}: a deck of more than {format_bytes(most)} is not read")

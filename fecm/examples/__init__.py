@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from fecm._errors import did_you_mean
+from fecm._errors import OptionsError, did_you_mean
 
 __all__ = ["names", "path"]
 
@@ -45,7 +45,7 @@ def path(name: str) -> Path:
 
     Raises
     ------
-    ValueError
+    OptionsError
         If there is no such example.
 
     Examples
@@ -58,7 +58,7 @@ def path(name: str) -> Path:
             return Path(__file__).parent / known
     stems = [Path(known).stem for known in CONTENTS]
     others = did_you_mean(name, [*CONTENTS, *stems]) or f"; there are {', '.join(CONTENTS)}"
-    raise ValueError(f"there is no example {name!r}{others}")
+    raise OptionsError(f"there is no example {name!r}{others}")
 
 
 def __dir__() -> list[str]:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._errors import OptionsError
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Deck
 from fecm.deck.units import unit_names, unit_of
@@ -193,11 +194,11 @@ class Location:
 
         Raises
         ------
-        ValueError
+        OptionsError
             If `level` is not between 0 and 1.
         """
         if not 0.0 < level < 1.0:
-            raise ValueError(f"level is {level:g}; it must be between 0 and 1")
+            raise OptionsError(f"level is {level:g}; it must be between 0 and 1")
         squares, axes = np.linalg.eigh(self.covariance)
         # The square of the distance in standard deviations is exponential with the mean 2.
         reach = np.sqrt(-2.0 * math.log1p(-level) * np.maximum(squares, 0.0))

@@ -15,7 +15,17 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import field, fields, replace
-from typing import TYPE_CHECKING, Any, Generic, NamedTuple, Protocol, TypeVar, cast, overload
+from typing import (
+    TYPE_CHECKING,
+    Any,
+    Generic,
+    NamedTuple,
+    Protocol,
+    TypeVar,
+    cast,
+    overload,
+    runtime_checkable,
+)
 
 import numpy as np
 
@@ -210,6 +220,7 @@ def branch_force(history: LoadingHistory[Number], indentation: Number) -> Number
     return power_curve(history.f, history.b, history.w, history.p, indentation)
 
 
+@runtime_checkable
 class Law(Protocol[Number]):
     """A contact law: a force for each trial indentation, and a memory of the loading history.
 

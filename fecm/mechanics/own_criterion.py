@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 
@@ -20,6 +20,7 @@ class CriterionError(FecmError, ValueError):
     """A user's failure criterion raises an exception, or does not return exposures."""
 
 
+@runtime_checkable
 class FailureCriterion(Protocol):
     """A failure criterion of plies, for FAIL to evaluate beside its own.
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
@@ -18,6 +18,7 @@ class ProjectileError(FecmError, ValueError):
     """The matrices of a user's projectile are not those of one free elastic body."""
 
 
+@runtime_checkable
 class LinearProjectile(Protocol):
     """A free, linear projectile, by its matrices.
 

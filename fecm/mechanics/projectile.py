@@ -13,6 +13,7 @@ from typing import ClassVar, Literal, Protocol, TypeVar
 import numpy as np
 
 from fecm._dataclasses import frozen
+from fecm._errors import OptionsError
 from fecm._typing import Floats
 from fecm.mechanics.contact_law import Number
 from fecm.mechanics.own_projectile import LinearProjectile, OwnProjectile
@@ -39,7 +40,7 @@ INTEGRATORS = (WILSON, AVERAGE)
 
 @frozen
 class RodMethod:
-    """Mass matrix and integrator, the report program's by default; ValueError if unknown."""
+    """Mass matrix and integrator, the report program's by default; OptionsError if unknown."""
 
     mass: str = LUMPED  # one of `MASSES`
     integrator: str = WILSON  # one of `INTEGRATORS`
@@ -47,7 +48,7 @@ class RodMethod:
     def __post_init__(self) -> None:
         for name, known in (("mass", MASSES), ("integrator", INTEGRATORS)):
             if (value := getattr(self, name)) not in known:
-                raise ValueError(f"unknown rod {name} {value!r}; known are {', '.join(known)}")
+                raise OptionsError(f"unknown rod {name} {value!r}; known are {', '.join(known)}")
 
     @property
     def attributes(self) -> dict[str, str]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fecm._dataclasses import frozen
-from fecm._errors import FecmError
+from fecm._errors import OptionsError
 from fecm._processors import free
 from fecm._typing import Bools, Indices
 from fecm.deck import model
@@ -55,7 +55,7 @@ PLATE_SLIPS = {"g12", "small-stiffness", "shear-order", "tapes", "jacobian", "ro
 
 @frozen
 class RunOptions:
-    """Options of a run, by default the report's.  Raises ValueError if a value is not valid."""
+    """Options of a run, by default the report's.  Raises OptionsError if a value is not valid."""
 
     # Slips of the printed program that are on: see :func:`~fecm.problem.slips.active_slips`.
     slips: frozenset[str] = frozenset()
@@ -75,17 +75,13 @@ class RunOptions:
 
     def __post_init__(self) -> None:
         if self.solver not in SOLVERS:
-            raise ValueError(f"unknown solver {self.solver!r}; known are {', '.join(SOLVERS)}")
+            raise OptionsError(f"unknown solver {self.solver!r}; known are {', '.join(SOLVERS)}")
         if self.solver == KERNELS and LIBRARY is None:
-            raise ValueError("this installation has no compiled kernels; take the solver numpy")
+            raise OptionsError("this installation has no compiled kernels; take the solver numpy")
         if self.threads < 0:
-            raise ValueError(f"threads is {self.threads}; it must be 0 or more")
+            raise OptionsError(f"threads is {self.threads}; it must be 0 or more")
         if not self.energy_limit > 0.0:
-            raise ValueError(f"energy_limit is {self.energy_limit:g}; it must be positive")
-
-
-class OptionsError(FecmError, ValueError):
-    """A problem can't be run with the options."""
+            raise OptionsError(f"energy_limit is {self.energy_limit:g}; it must be positive")
 
 
 def check_options(problem: Problem, options: RunOptions) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+from fecm._errors import OptionsError
+
 REPORT = "report"
 LISTING = "listing"
 MODES = (REPORT, LISTING)
@@ -18,16 +20,16 @@ NAMES = (
 def active_slips(mode: str = REPORT, single: Iterable[str] = ()) -> frozenset[str]:
     """Names of the slips that are on: single ones in report mode, all of them in listing mode.
 
-    Raises ValueError if the mode or a slip is unknown, or single slips are given in listing mode.
+    Raises OptionsError if the mode or a slip is unknown, or single slips are given in listing mode.
     """
     names = frozenset(single)
     if mode not in MODES:
-        raise ValueError(f"unknown mode {mode!r}; known are {', '.join(MODES)}")
+        raise OptionsError(f"unknown mode {mode!r}; known are {', '.join(MODES)}")
     if unknown := sorted(names - set(NAMES)):
-        raise ValueError(f"unknown slip {unknown[0]!r}; known are {', '.join(NAMES)}")
+        raise OptionsError(f"unknown slip {unknown[0]!r}; known are {', '.join(NAMES)}")
     if mode == LISTING:
         if names:
-            raise ValueError("listing mode has every slip; single slips go with report mode")
+            raise OptionsError("listing mode has every slip; single slips go with report mode")
         return frozenset(NAMES)
     return names
 

@@ -28,7 +28,7 @@ def dataframe(stored: Stored) -> pandas.DataFrame:
         raise ImportError("a DataFrame needs pandas: pip install pandas") from None
     members = [path for path in stored if path.startswith("history/")]
     if not members:
-        raise KeyError("the result has no history: no impact step was taken")
+        raise NotStoredError("the result has no history: no impact step was taken")
     known = [path for path in DATASETS if path in members]
     columns = {path.partition("/")[2]: stored[path] for path in dict.fromkeys(known + members)}
     index = pandas.Index(columns.pop("time"), name="time")

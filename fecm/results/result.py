@@ -125,8 +125,8 @@ class Result(Stored, schema.Contact):
         ------
         ImportError
             If pandas is not installed.
-        KeyError
-            If the run has no impact step.
+        NotStoredError
+            If the run has no impact step; a KeyError.
         """
         from fecm.results.conversions import dataframe  # 1 ms, which a run does not need
 

@@ -29,7 +29,7 @@ from fecm.sweeps.timing import stable_time_step, with_time_step
 
 
 @dataclass(frozen=True)
-class MeshError:
+class MeshErrorEstimate:
     """Peak force on a mesh and on one with bisected elements around the load.
 
     Attributes
@@ -64,7 +64,7 @@ class MeshError:
 
 def mesh_error(
     deck: str | Path | Deck, mode: Mode = "report", *, progress: Progress | None = None
-) -> MeshError:
+) -> MeshErrorEstimate:
     """Run a deck on its mesh and on one with bisected elements around the load.
 
     Parameters
@@ -78,7 +78,7 @@ def mesh_error(
 
     Returns
     -------
-    MeshError
+    MeshErrorEstimate
         Both peak forces; their change estimates the error of the deck's mesh.
 
     Raises
@@ -145,14 +145,14 @@ def _distance(problem: Problem) -> float:
 
 def compare_peaks(
     problem: Problem, fine: Problem, options: RunOptions, advance: Callable[[int], object]
-) -> MeshError:
+) -> MeshErrorEstimate:
     """Run a problem and its :func:`bisected` one, and compare their peak forces.
 
     `advance` is called with numbers of steps that were taken.  Raises DivergenceError if a motion
     grows without bound.  Raises NotEnoughMemoryError if a run needs more memory than is free.
     """
     coarse, refined = (_run(one, options, advance) for one in (problem, fine))
-    return MeshError(
+    return MeshErrorEstimate(
         peak_force=float(coarse["history/force"].max()),
         refined_peak_force=float(refined["history/force"].max()),
         elements=problem.deck.control.numel,

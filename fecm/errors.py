@@ -1,0 +1,88 @@
+"""Errors that public functions raise, by name: ``except fecm.errors.CasesError``.
+
+All of them are :class:`FecmError`.
+"""
+
+from __future__ import annotations
+
+from fecm._errors import FecmError, OptionsError, StudyError
+from fecm._extensions import ExtensionError
+from fecm._files import NoFolderError, OutputError, OutputExistsError
+from fecm._inputs import ContentError, InputError
+from fecm._memory import NotEnoughMemoryError
+from fecm.authoring.parameters import ObjectError
+from fecm.deck.findings import DeckError
+from fecm.deck.layup import LayupError
+from fecm.deck.outputs import RowsError
+from fecm.deck.unit_systems import UnitsError
+from fecm.identification.alignment import IdentifyError
+from fecm.location.errors import LocateError
+from fecm.mechanics.half_space import PlyError
+from fecm.mechanics.own_criterion import CriterionError
+from fecm.mechanics.own_law import LawError
+from fecm.mechanics.own_projectile import ProjectileError
+from fecm.mechanics.plate import UnsoundPlateError
+from fecm.mechanics.plate_motion import DivergenceError
+from fecm.mechanics.points import OutsideError, PatchError
+from fecm.mechanics.reduced_plate import ReductionError
+from fecm.mechanics.solutions import ConvergenceError, SingularStiffnessError
+from fecm.plot.kinds import LackingError, MatplotlibError, PlotError
+from fecm.problem.plate_mesh import MeshError
+from fecm.problem.refine import RefineError
+from fecm.report.page import Jinja2Error, ReportError
+from fecm.results.diff import IncomparableError
+from fecm.results.errors import ExportError, NotStoredError, ResultFileError, ResultWriteError
+from fecm.simulation.checkpoint import CheckpointError
+from fecm.sweeps.case import CasesError
+from fecm.sweeps.parts import DamagedPartError, OtherSweepError
+from fecm.sweeps.schedule import SchedulerError
+from fecm.verification import UnknownCaseError
+
+__all__ = [
+    "CasesError",
+    "CheckpointError",
+    "ContentError",
+    "ConvergenceError",
+    "CriterionError",
+    "DamagedPartError",
+    "DeckError",
+    "DivergenceError",
+    "ExportError",
+    "ExtensionError",
+    "FecmError",
+    "IdentifyError",
+    "IncomparableError",
+    "InputError",
+    "Jinja2Error",
+    "LackingError",
+    "LawError",
+    "LayupError",
+    "LocateError",
+    "MatplotlibError",
+    "MeshError",
+    "NoFolderError",
+    "NotEnoughMemoryError",
+    "NotStoredError",
+    "ObjectError",
+    "OptionsError",
+    "OtherSweepError",
+    "OutputError",
+    "OutputExistsError",
+    "OutsideError",
+    "PatchError",
+    "PlotError",
+    "PlyError",
+    "ProjectileError",
+    "ReductionError",
+    "RefineError",
+    "ReportError",
+    "ResultFileError",
+    "ResultWriteError",
+    "RowsError",
+    "SchedulerError",
+    "SingularStiffnessError",
+    "StudyError",
+    "UnitsError",
+    "UnknownCaseError",
+    "UnsoundPlateError",
+]
