@@ -267,9 +267,10 @@ def test_results_groups_and_sweeps_are_read_by_name_as_mappings_are(runs: Path) 
                 asked("forse")
     assert list(swept) == list(swept.to_dataframe())
     assert len(swept) == 2
-    assert result["force"] is result["history/force"]
-    assert result.history["force"] is result.force
-    assert result.failure.puck["exposure"] is result["failure/puck/exposure"]
+    assert np.shares_memory(result["force"], result["history/force"])
+    assert np.shares_memory(result.history["force"], result.force)
+    exposure = result.failure.puck["exposure"]
+    assert np.shares_memory(exposure, result["failure/puck/exposure"])
     assert "w" in result.tape3
     assert "w" not in result
 
@@ -284,6 +285,31 @@ def test_results_groups_and_sweeps_survive_pickle(runs: Path) -> None:
         assert list(again) == list(one)
         for name in one:
             np.testing.assert_array_equal(again[name], one[name])
+
+
+def test_arrays_of_results_can_not_be_changed_by_accident(runs: Path, tmp_path: Path) -> None:
+    swept = fecm.sweep(
+        small(), random={"velocity": "uniform:50,60"}, samples=16, exceed={"peak_force": 1.0}
+    )
+    assert swept.random is not None
+    for result in (fecm.run_one(small()), fecm.load(runs / "small.h5")):
+        before = result.force.copy()
+        for array in (result.force, result["force"], result.history.force, result.tape3.w):
+            with pytest.raises(ValueError, match="read-only"):
+                array *= 4.448
+        result.save(tmp_path / "again.h5", overwrite=True)
+        np.testing.assert_array_equal(fecm.load(tmp_path / "again.h5").force, before)
+    for array in (
+        swept["velocity"],
+        swept["peak_force"],
+        swept.dt,
+        swept.random.exceedance.probability,
+        swept.random.statistics["peak_force"].quantiles,
+    ):
+        with pytest.raises(ValueError, match="read-only"):
+            array[...] = 0.0
+    mine = swept["peak_force"].copy()
+    mine *= 4.448  # a copy is the user's
 
 
 def test_units_are_asked_for_by_the_names_of_datasets_and_columns() -> None:

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._arrays import read_only
 from fecm._errors import OptionsError
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Deck
@@ -142,6 +143,11 @@ class Location:
     notes: tuple[str, ...]
     accepted: bool
     deck: Deck = field(repr=False)
+
+    def __post_init__(self) -> None:
+        for name, values in vars(self).items():
+            if isinstance(values, np.ndarray):
+                object.__setattr__(self, name, read_only(values))
 
     @property
     def sd_x(self) -> float:

@@ -381,7 +381,7 @@ class Result(Stored, schema.Contact):
             if name.startswith("_"):
                 raise AttributeError(name)
             if f"history/{name}" in self._arrays:
-                return self._arrays[f"history/{name}"]
+                return self[f"history/{name}"]
             if any(path.startswith(f"{name}/") for path in self._arrays):
                 return schema.GROUP_TYPES.get(name, Group)(name, self)
             raise NotStoredError(not_stored(name, self._arrays))

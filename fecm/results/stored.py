@@ -9,8 +9,7 @@ import functools
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-import numpy as np
-
+from fecm._arrays import read_only
 from fecm._typing import Array
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader
@@ -155,8 +154,8 @@ class Stored:
         """Rows of a dataset; those of a file are not kept in memory."""
         read = getattr(self._arrays, "rows", None)
         if read is None:
-            return np.asarray(self._arrays[path.strip("/")][start:stop])
-        return np.asarray(read(path, start, stop))
+            return read_only(self._arrays[path.strip("/")][start:stop])
+        return read_only(read(path, start, stop))
 
     def _path(self, name: str) -> str:
         """Path of a dataset, or of a column of the history by its name alone."""
@@ -172,8 +171,11 @@ class Stored:
         return path
 
     def __getitem__(self, name: str) -> Array:
-        """A dataset by its path; a column of the history also by its name alone."""
-        return np.asarray(self._arrays[self._stored(name)])
+        """A dataset by its path; a column of the history also by its name alone.
+
+        The array is read-only: a change of it would be a change of the result.
+        """
+        return read_only(self._arrays[self._stored(name)])
 
     def __contains__(self, name: str) -> bool:
         return self._path(name) in self._arrays

@@ -84,6 +84,12 @@ class RandomResult:
     combinations: dict[str, Column] = field(default_factory=dict)
     notes: tuple[str, ...] = ()
 
+    def __post_init__(self) -> None:
+        tables = *self.statistics.values(), *self.sensitivity.values(), self.exceedance
+        for values in (*self.combinations.values(), *(one for table in tables for one in table)):
+            if isinstance(values, np.ndarray):
+                values.flags.writeable = False
+
     def label(self, combination: int) -> str:
         """Varied values of a combination, in words."""
         return ", ".join(f"{n} {values[combination]}" for n, values in self.combinations.items())

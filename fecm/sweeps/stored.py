@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from fecm._arrays import read_only
 from fecm._errors import did_you_mean
 from fecm._typing import Bools
 from fecm.deck.model import Deck
@@ -28,6 +29,7 @@ OWN_DIMENSIONS = {
     "dt": "time",
     "steps": "",
 }  # of arrays that are not in the tables
+OWN_ARRAYS = (*OWN_DIMENSIONS, "unsettled_steps")
 
 
 @dataclass(repr=False)
@@ -46,6 +48,13 @@ class StoredSweep:
     random: RandomResult | None = None
     reduced: ReducedModel | None = None
     law: str = ""
+
+    def __post_init__(self) -> None:
+        self.cases = {name: read_only(values) for name, values in self.cases.items()}
+        self.summary = {name: read_only(values) for name, values in self.summary.items()}
+        for name in OWN_ARRAYS:
+            if (values := getattr(self, name)) is not None:
+                setattr(self, name, read_only(values))
 
     def __len__(self) -> int:
         return len(self.dt)
