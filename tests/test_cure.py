@@ -346,14 +346,15 @@ def test_cases_that_differ_in_the_cure_alone_share_their_motion(
     options = ("--random", "cure_dT=normal:-3,1", "--samples", "16", "--measure", "failure")
     done = call("sweep", "d.inp", *options, "-o", "s.h5", cwd=tmp_path)
     assert done.exit_code == 0, done.stderr
-    told = "16 draws are run in full; those that differ in cure_dT alone, together"
+    told = "16 draws are run in full; those that differ only in cure_dT, together"
     assert told in done.stderr
     assert len(runs) == 1
     found = fecm.load_sweep(tmp_path / "s.h5")
     assert len(set(found["exposure_tsai_wu"])) == 16
     assert len(set(found["peak_force"])) == 1
     # Without exposures all cases are that of the plate.
-    forces = fecm.sweep(struck(0.0), {"cure_dT": [-3.0, 0.0]})["peak_force"]
+    with pytest.warns(fecm.FecmWarning, match="cure_dT changes only exposures"):
+        forces = fecm.sweep(struck(0.0), {"cure_dT": [-3.0, 0.0]})["peak_force"]
     assert forces[0] == forces[1]
 
 

@@ -371,7 +371,7 @@ def test_a_support_of_an_unsymmetric_laminate_frees_the_plane_without_a_note(
 
 # The table of values ------------------------------------------------------------------------------
 
-SHARING = (Changes.RESIDUAL, Changes.STRIKE)  # what cases of one plate differ in
+SHARING = (Changes.FAILURE, Changes.STRIKE)  # what cases of one plate differ in
 
 
 def test_the_table_of_the_page_on_sweeps_is_that_of_the_values() -> None:

@@ -31,7 +31,7 @@ from fecm.sweeps.cases import read_cases
 from fecm.sweeps.convergence import table as table_of
 from fecm.sweeps.copula import Pair, correlation_of, parse_correlation
 from fecm.sweeps.distributions import FORMS, Law, parse_random
-from fecm.sweeps.doubts import doubtful_values, freed
+from fecm.sweeps.doubts import doubtful_values, freed, unused_values
 from fecm.sweeps.expected import expected
 from fecm.sweeps.find import Until, parse_until
 from fecm.sweeps.grid import grid, parse_vary
@@ -327,7 +327,7 @@ def sweep(options: Options) -> None:
     )
     check_draws(planned)
     if not options.refine:
-        note(*doubtful_values(problem, cases))
+        note(*unused_values(planned), *doubtful_values(problem, cases))
     if design is not None:
         reduced = planned.settings.modes is not None
         shared = reduced or (shares_plate(problem) and not planned.settings.in_full)

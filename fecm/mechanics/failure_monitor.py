@@ -155,9 +155,15 @@ class ZoneCriteria:
         )
         self.weaker = np.minimum(own[:-1], own[1:])
 
-    def with_residual(self, residual: Floats) -> ZoneCriteria:
-        """The same with residual stresses, (plies, 2, 3), of which every state is evaluated."""
-        return ZoneCriteria(self._zone, self.points, self.strengths, self._initial, residual)
+    def with_residual(
+        self, residual: Floats | None, strengths: Sequence[failure.Strengths | None] | None = None
+    ) -> ZoneCriteria:
+        """Return criteria with other residual stresses and strengths, at every state.
+
+        `residual` is (plies, 2, 3).  The strengths stay if none are passed.
+        """
+        own = self.strengths if strengths is None else strengths
+        return ZoneCriteria(self._zone, self.points, own, self._initial, residual)
 
     def between_plies(self, gradients: Floats) -> Floats:
         """Exposures of the interfaces, (elements, interfaces), of derivatives of the strains."""
@@ -213,15 +219,26 @@ class FailureMonitor:
         """Number of evaluated states of a point, of the zone with the most of them."""
         return max(len(zone.represent.states) for zone in self.zones)
 
-    def with_residual(self, residual: Sequence[Floats]) -> Self:
-        """The same criteria for plies with residual stresses in their axes.
+    def with_residual(
+        self,
+        residual: Sequence[Floats] | None,
+        strengths: Sequence[Sequence[failure.Strengths | None]] | None = None,
+    ) -> Self:
+        """Return the same criteria with other residual stresses and strengths of the plies.
 
-        Those of each laminate are (plies, 2, 3).  The interlaminar criterion does not depend on
-        them.
+        The residual stresses of each laminate are (plies, 2, 3), in the axes of the plies; None if
+        there are none.  The interlaminar criterion does not depend on them.  The strengths stay if
+        none are passed.
         """
-        made = copy(self)
+        made, count = copy(self), len(self.zones)
         made.zones = [
-            zone.with_residual(own) for zone, own in zip(self.zones, residual, strict=True)
+            zone.with_residual(stresses, own)
+            for zone, stresses, own in zip(
+                self.zones,
+                [None] * count if residual is None else residual,
+                [None] * count if strengths is None else strengths,
+                strict=True,
+            )
         ]
         return made
 

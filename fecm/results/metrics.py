@@ -50,9 +50,10 @@ SUMMARY = {
         "force*length",
     ),
 }
+THRESHOLD_FORCE = "threshold_force"
 # Those of decks with a delamination threshold.
 THRESHOLD = {
-    "threshold_force": Quantity("delamination threshold", "force"),
+    THRESHOLD_FORCE: Quantity("delamination threshold", "force"),
     "threshold_margin": Quantity("1 less the largest contact force over the threshold"),
     "threshold_time": Quantity(
         "time at which the contact force first reaches the threshold", "time"
@@ -147,20 +148,21 @@ def summarise(
     indentation: Indentation,
     projectiles: Projectiles,
     plate: Deflection,
-    threshold: float | None = None,
+    threshold: float | Floats | None = None,
     mobility: float = 0.0,
 ) -> Metrics:
     """Summarise many cases from their contact forces.
 
     Contact forces are (steps, cases), times of the steps (steps,).  Returns the names of
-    :data:`SUMMARY`, with a delamination threshold (force) also those of :data:`THRESHOLD`.
-    `plate` is the motion of the plate under the load, `mobility` (1/mass) the mobility of its rigid
-    motion; see :class:`~fecm.results.validity.Judge`.
+    :data:`SUMMARY`, with a delamination threshold (force, or (cases,)) also those of
+    :data:`THRESHOLD`.  `plate` is the motion of the plate under the load, `mobility` (1/mass) the
+    mobility of its rigid motion; see :class:`~fecm.results.validity.Judge`.
 
     Values that the end of a case has not decided are NaN: if it ends in contact everything except
     the peaks, and the peaks too unless the projectile leaves and they have passed.
     """
-    found = _from_forces(force, times, threshold)
+    limit = None if threshold is None else np.broadcast_to(threshold, force.shape[1])
+    found = _from_forces(force, times, limit)
     mass, velocity = (np.broadcast_to(v, force.shape[1]) for v in projectiles)
     impulse, reached, met = found.impulse, found.reached, found.met
     rebound = impulse / mass - velocity
@@ -198,9 +200,9 @@ def summarise(
         "rebound_velocity": where(finished, rebound),
         "energy_absorbed": where(finished, 0.5 * mass * (velocity**2 - rebound**2)),
     }
-    if threshold is not None:
-        columns["threshold_force"] = np.full(len(reached), threshold)
-        columns["threshold_margin"] = where(known, 1.0 - reached / threshold)
+    if limit is not None:
+        columns[THRESHOLD_FORCE] = limit.copy()
+        columns["threshold_margin"] = where(known, 1.0 - reached / limit)
         columns["threshold_time"] = found.threshold_time
         columns["time_above"] = where(finished, found.time_above)
     return Metrics(columns, end, reached, last, plate, is_held=mobility == 0.0)
@@ -251,12 +253,18 @@ class _OfForces(NamedTuple):
     time_above: Floats
 
 
-def _from_forces(force: Floats, times: Floats, threshold: float | None) -> _OfForces:
+def _from_forces(force: Floats, times: Floats, threshold: Floats | None) -> _OfForces:
     """Evaluate contact forces (steps, cases), so many cases at a time as stay in the cache."""
     dt = np.diff(times, prepend=0.0)
     product = np.empty((min(PART, force.shape[1]), len(times)))
     parts = [
-        _of_part(np.ascontiguousarray(force[:, n : n + PART].T), times, dt, threshold, product)
+        _of_part(
+            np.ascontiguousarray(force[:, n : n + PART].T),
+            times,
+            dt,
+            None if threshold is None else threshold[n : n + PART],
+            product,
+        )
         for n in range(0, force.shape[1], PART)
     ]
     if len(parts) == 1:
@@ -272,7 +280,7 @@ def _durations(dt: Floats, chosen: Bools, product: Floats) -> Floats:
 
 
 def _of_part(
-    force: Floats, times: Floats, dt: Floats, threshold: float | None, product: Floats
+    force: Floats, times: Floats, dt: Floats, threshold: Floats | None, product: Floats
 ) -> _OfForces:
     """Evaluate contact forces (cases, steps); `product` is memory for as many numbers."""
     cases = len(force)
@@ -286,7 +294,7 @@ def _of_part(
     peak = np.argmax(force, axis=1)
     threshold_time = time_above = np.full(cases, np.nan)
     if threshold is not None:
-        above = force >= threshold
+        above = force >= threshold[:, None]
         first = times[np.argmax(above, axis=1)]
         threshold_time = np.where(above.any(axis=1), first, np.nan)
         time_above = _durations(dt, above, product)

@@ -102,7 +102,7 @@ class Extent:
     indentation: Floats
     deflection: Floats  # under the load; NaN of a plate that its supports let move
     exposure: Floats | float = np.nan
-    threshold: float = np.nan
+    threshold: Floats | float = np.nan
 
 
 @frozen

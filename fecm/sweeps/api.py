@@ -31,7 +31,7 @@ from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.cases import Table, checked
 from fecm.sweeps.copula import Pair, correlation_of
 from fecm.sweeps.distributions import HasQuantiles, law_of
-from fecm.sweeps.doubts import doubtful_values
+from fecm.sweeps.doubts import doubtful_values, unused_values
 from fecm.sweeps.grid import combined
 from fecm.sweeps.in_full import built
 from fecm.sweeps.limits import Limit, parse_exceed
@@ -413,7 +413,8 @@ def sweep(
         law=own_contact,
     )
     check_draws(planned)
-    for text in doubtful_values(problem, made) if build is None else ():
+    doubts = (*unused_values(planned), *doubtful_values(problem, made)) if build is None else ()
+    for text in doubts:
         warn(text)
     here = workers or 1 if executor is None else getattr(executor, "_max_workers", 0)
     check_memory(problem, planned, 0 if scheduler is not None else here)

@@ -38,7 +38,7 @@ from fecm.sweeps.in_full import (
     run_in_full,
     with_hit,
 )
-from fecm.sweeps.judge import Peak, judge, threshold_of
+from fecm.sweeps.judge import Peak, judge, thresholds_of
 from fecm.sweeps.limits import PEAK_FORCE, THRESHOLD
 from fecm.sweeps.memory import ADVANCED_BYTES
 from fecm.sweeps.outcome import About, Outcome, Status, merge, outcome_of
@@ -61,7 +61,7 @@ Longer = Callable[[int], Runs]
 def run(task: Task) -> Outcome:
     """Run the cases of a task; a case that cannot be run becomes a row with the reason."""
     settings = task.settings
-    if settings.in_full and len(task.cases) > 1:
+    if settings.shares_motion and len(task.cases) > 1:
         return merge(in_one_motion(settings, task.numbers, task.cases), history=settings.history)
     if settings.in_full:
         cases = zip(task.numbers, task.cases, strict=True)
@@ -112,12 +112,17 @@ def _outcome(settings: Settings, checked: Problem, longer: Longer, strikes: Stri
         # Another response is cheap; full runs and the reduced model are not repeated.
         can_lengthen = settings.modes is None and shares_plate(checked)
         return _decided(outcome, longer, strikes, settings) if can_lengthen else outcome
-    level = settings.search.level
-    force = threshold_of(checked) if level == THRESHOLD else float(level)
-    assert force is not None  # the plan requires DELA for the threshold
+    level, numbers = settings.search.level, list(strikes)
+    levels = dict.fromkeys(numbers, 0.0 if level == THRESHOLD else float(level))
+    if level == THRESHOLD:
+        thresholds = thresholds_of(checked, columns_of(strikes).toughness)
+        assert thresholds is not None  # the plan requires DELA
+        levels = dict(zip(numbers, thresholds.tolist(), strict=True))
     if checked.deck.has(Nonlinear):
-        return merge([_found_in_full(checked, n, one, force, longer) for n, one in strikes.items()])
-    return found(strikes, force, longer)
+        return merge(
+            [_found_in_full(checked, n, one, levels[n], longer) for n, one in strikes.items()]
+        )
+    return found(strikes, levels, longer)
 
 
 def _decided(outcome: Outcome, longer: Longer, strikes: Strikes, settings: Settings) -> Outcome:
@@ -254,6 +259,7 @@ class _Ordered(NamedTuple):
     numbers: list[int]
     hits: Hits
     projectiles: Projectiles
+    toughness: Floats
     back: NDArray[np.intp]  # rows in the order of the cases
 
 
@@ -269,6 +275,7 @@ def _ordered(strikes: Strikes) -> _Ordered:
         numbers=[numbers[row] for row in order.tolist()],
         hits=Hits(made.kinds, made.kind, made.scale, law, made.velocity),
         projectiles=Projectiles(made.mass, made.velocity),
+        toughness=made.toughness,
         back=np.argsort(order),
     )
 
@@ -304,7 +311,7 @@ def _together(
             struck.indentation,
             ordered.projectiles,
             struck.plate,
-            threshold_of(checked),
+            thresholds_of(checked, ordered.toughness),
             checked.judge.mobility,
         )
         strains = plate.strains if judged else {}

@@ -72,6 +72,14 @@ class Values(TypedDict, total=False):
     preload_xy: Number
     radius_x: Number
     radius_y: Number
+    giic: Number
+    xt: Number
+    xc: Number
+    yt: Number
+    yc: Number
+    s12: Number
+    s13: Number
+    s23: Number
     cure_dT: Number
     size: str | Iterable[float]
     support: Support

@@ -12,13 +12,13 @@ from fecm.deck.findings import Finding, Findings
 from fecm.problem.check import check_segments, check_values
 from fecm.problem.problem import Problem
 from fecm.sweeps.case import Case, CasesError
-from fecm.sweeps.plan import Task
-from fecm.sweeps.values import Changes, Kind, kind_of, names_of
+from fecm.sweeps.plan import Plan, Task
+from fecm.sweeps.values import EXPOSURE_NAMES, Changes, Kind, kind_of, names_of
 from fecm.sweeps.vary import apply_case
 
 THICKNESS = "thickness"
 LAMINATE = names_of(Changes.LAMINATE)
-_CHANGES = (Changes.RESIDUAL, Changes.STRIKE, Changes.LAMINATE)
+_CHANGES = (Changes.FAILURE, Changes.STRIKE, Changes.LAMINATE)
 _NUMBERS = (n for n in names_of(*_CHANGES) if kind_of(n) is Kind.NUMBER)
 JUDGED = {"patch", *_NUMBERS} - {"angle"}
 FEW = 4  # plies below which a laminate as thin as two of them is possible
@@ -52,6 +52,17 @@ def doubtful_values(checked: Problem, cases: Sequence[Case]) -> list[str]:
                 told.add(best.code)
                 notes.append(f"{name} = {value:g}: {best.message} [{best.code}]")
     return notes
+
+
+def unused_values(planned: Plan) -> list[str]:
+    """Say which values change nothing, because the sweep leaves out the exposures."""
+    if planned.settings.in_full:
+        return []
+    if not (names := [name for name in EXPOSURE_NAMES if name in planned.cases[0]]):
+        return []
+    verb = "changes" if len(names) == 1 else "change"
+    text = "only exposures, which this sweep leaves out; --measure failure computes them"
+    return [f"{' and '.join(names)} {verb} {text}"]
 
 
 def _thickness_notes(deck: model.Deck, name: str, least: float) -> Iterator[str]:

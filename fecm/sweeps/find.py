@@ -77,8 +77,8 @@ def search_of(until: Until | None) -> Search | None:
     return Search(Sought(name), level)
 
 
-def found(strikes: Strikes, force: float, longer: Callable[[int], Runs]) -> Outcome:
-    """Run cases at the velocities at which their peaks reach a force.
+def found(strikes: Strikes, forces: Mapping[int, float], longer: Callable[[int], Runs]) -> Outcome:
+    """Run cases at the velocities at which the peak of each reaches its force.
 
     Cases whose peak there is open are searched again in longer runs: `longer` returns what runs
     strikes so many times as long.
@@ -89,13 +89,14 @@ def found(strikes: Strikes, force: float, longer: Callable[[int], Runs]) -> Outc
         together = -(-len(numbers) // factor)  # as many forces in memory as at first
         for start in range(0, len(numbers), together):
             some = {number: left[number] for number in numbers[start : start + together]}
-            outcome, still_open = _searched(some, force, runs)
+            outcome, still_open = _searched(some, forces, runs)
             parts.append(outcome)
             left = {n: one for n, one in left.items() if n not in some or n in still_open}
         if not left:
             return merge(parts)
-    text = f"no peak force of {force:.6g}: it is open even in a run {LONGER[-1]} times as long"
-    return merge([*parts, Outcome.failed(dict.fromkeys(left, text))])
+    text = f"it is open even in a run {LONGER[-1]} times as long"
+    reasons = {n: f"no peak force of {forces[n]:.6g}: {text}" for n in left}
+    return merge([*parts, Outcome.failed(reasons)])
 
 
 def with_found(outcome: Outcome, strikes: Strikes) -> Outcome:
@@ -106,7 +107,9 @@ def with_found(outcome: Outcome, strikes: Strikes) -> Outcome:
     return outcome
 
 
-def _searched(strikes: Strikes, force: float, runs: Runs) -> tuple[Outcome, set[int]]:
+def _searched(
+    strikes: Strikes, forces: Mapping[int, float], runs: Runs
+) -> tuple[Outcome, set[int]]:
     """Search the velocities of cases: outcome of those that are decided, and the open ones."""
 
     def tried(pairs: list[tuple[int, float]]) -> Outcome:
@@ -114,7 +117,7 @@ def _searched(strikes: Strikes, force: float, runs: Runs) -> tuple[Outcome, set[
         return runs(dict(enumerate(trials)), False)
 
     starts = {case: one.velocity for case, one in strikes.items()}
-    searched = search(starts, force, lambda pairs: tried(pairs).columns[About.REACHED])
+    searched = search(starts, forces, lambda pairs: tried(pairs).columns[About.REACHED])
     reasons = {case: v for case, v in searched.items() if isinstance(v, str)}
     still_open: set[int] = set()
     # What is not reached in a run that is too short may be reached in a longer one.
@@ -130,12 +133,13 @@ def _searched(strikes: Strikes, force: float, runs: Runs) -> tuple[Outcome, set[
         outcome = with_found(runs(hit, True), hit)
         is_open = outcome.fine & np.isnan(outcome.columns[PEAK_FORCE])
         still_open |= {outcome.numbers[row] for row in np.flatnonzero(is_open)}
-        parts += _decided(outcome, force, ~is_open)
+        parts += _decided(outcome, forces, ~is_open)
     return merge(parts), still_open
 
 
-def _decided(outcome: Outcome, force: float, known: Bools) -> list[Outcome]:
+def _decided(outcome: Outcome, forces: Mapping[int, float], known: Bools) -> list[Outcome]:
     """Outcomes of the cases whose peak is known; those whose peak is not the force have failed."""
+    force = np.array([forces[number] for number in outcome.numbers])
     reached, velocity = outcome.columns[About.REACHED], outcome.columns["found_velocity"]
     right = outcome.fine & known & (np.abs(reached - force) <= ROUGH * force)
     reasons = {}
@@ -143,15 +147,17 @@ def _decided(outcome: Outcome, force: float, known: Bools) -> list[Outcome]:
         text = f"at velocity {velocity[row]:.6g}: {outcome.status[row]}"
         if outcome.fine[row]:
             jump = f"from velocity {velocity[row]:.6g} on it is {reached[row]:.6g}"
-            text = f"no peak force of {force:.6g}: {jump}, and below it jumps"
+            text = f"no peak force of {force[row]:.6g}: {jump}, and below it jumps"
         reasons[outcome.numbers[row]] = text
     return [outcome.select(np.flatnonzero(right)), Outcome.failed(reasons)]
 
 
 def search(
-    starts: Mapping[int, float], force: float, peaks: Callable[[list[tuple[int, float]]], Floats]
+    starts: Mapping[int, float],
+    forces: Mapping[int, float],
+    peaks: Callable[[list[tuple[int, float]]], Floats],
 ) -> dict[int, float | str]:
-    """Find the lowest velocity of each case at which the contact force reaches a value.
+    """Find the lowest velocity of each case at which the contact force reaches its value.
 
     The range from 1/100 to 100 times the start is searched, by rounds of velocities.  Later rounds
     gather around the interpolated velocity of the bracket, whose upper end is the result.  `peaks`
@@ -166,6 +172,7 @@ def search(
         ends = np.cumsum([len(values) for values in trials.values()])[:-1]
         left: dict[int, Floats] = {}
         for (n, values), own in zip(trials.items(), np.split(given, ends), strict=True):
+            force = forces[n]
             if not first:  # the ends of a bracket, whatever rounding makes of them
                 own[0], own[-1] = min(own[0], np.nextafter(force, 0.0)), np.fmax(own[-1], force)
             (above,) = np.nonzero(own >= force)

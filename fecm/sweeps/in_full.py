@@ -16,6 +16,7 @@ from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import LawError
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.problem.build import RunOptions
+from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
 from fecm.results.exposures import count_evaluations
 from fecm.results.metrics import EVALUATIONS, HIT, Indentation, Projectiles, summarise
@@ -28,7 +29,7 @@ from fecm.simulation.simulation import Criteria, Simulation
 from fecm.sweeps import find_in_full
 from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.find import Sought
-from fecm.sweeps.judge import judge, peaks_of, threshold_of
+from fecm.sweeps.judge import judge, peaks_of
 from fecm.sweeps.outcome import Outcome, outcome_of
 from fecm.sweeps.plan import BuildFunction, Measure, MeasureFunction, Settings
 from fecm.sweeps.strike import Strike, strike_of
@@ -123,22 +124,35 @@ def alone(
 def in_one_motion(
     settings: Settings, numbers: Sequence[int], cases: Sequence[Case]
 ) -> list[Outcome]:
-    """Run cases that differ in the residual stresses of their plies alone.
+    """Run cases that differ only in residual stresses, strengths or toughness.
 
-    FAIL evaluates them together at every step of one run.
+    One run has the motion of all cases, and its FAIL evaluates the exposures of each.
     """
     measures, sink = settings.measures, MemorySink()
+    made: dict[int, tuple[Problem, Case]] = {}
+    reasons: dict[int, str] = {}
+    for number, case in zip(numbers, cases, strict=True):
+        try:
+            made[number] = problem_of_case(settings, case), case
+        except CasesError as error:
+            reasons[number] = str(error)
+    invalid = [Outcome.failed(reasons)] if reasons else []
+    if not made:
+        return invalid
+    problems = [problem for problem, _ in made.values()]
     try:
-        problems = [problem_of_case(settings, case) for case in cases]
         options = RunOptions(law=settings.law)
         simulation = Simulation(without_output(problems[0], measures), sink, options)
-        simulation.others = [_criteria(simulation, one) for one in problems[1:]]
+        if Measure.FAILURE in measures:
+            simulation.others = [_criteria(simulation, one) for one in problems[1:]]
         run(simulation)
     except (CasesError, DivergenceError, LawError, ArithmeticError) as error:
-        return [Outcome.failed({number: str(error)}) for number in numbers]
-    found = [{}, *(exposures_of(other.monitor, other.envelope) for other in simulation.others)]
-    outcomes = []
-    for number, case, one, arrays in zip(numbers, cases, problems, found, strict=True):
+        return [*invalid, Outcome.failed(dict.fromkeys(made, str(error)))]
+    found: list[dict[str, Floats]] = [{} for _ in problems]
+    for number, other in enumerate(simulation.others, start=1):
+        found[number] = exposures_of(other.monitor, other.envelope)
+    outcomes = invalid
+    for (number, (one, case)), arrays in zip(made.items(), found, strict=True):
         own = {path: values.reshape(sink.arrays[path].shape) for path, values in arrays.items()}
         result = Result({**sink.arrays, **own}, sink.texts, sink.groups)
         outcome = _outcome(number, one, measures, result, simulation.state.dt)
@@ -147,13 +161,16 @@ def in_one_motion(
 
 
 def _criteria(simulation: Simulation, checked: Problem) -> Criteria:
-    """Failure criteria of plies with the residual stresses of another case."""
+    """Failure criteria of plies with the residual stresses and strengths of another case."""
     monitor, residuals = simulation.model.failure, checked.residuals
     assert monitor is not None
-    assert residuals is not None
-    made = monitor.with_residual([one.stresses for one in residuals])
+    made = monitor.with_residual(
+        None if residuals is None else [one.stresses for one in residuals],
+        strengths_of_deck(checked.deck),
+    )
     envelope = made.start()
-    made.update(envelope, np.zeros((1, *checked.mesh.equations.shape)), [0.0])
+    if simulation.model.is_stressed_at_rest:
+        made.update(envelope, np.zeros((1, *checked.mesh.equations.shape)), [0.0])
     return Criteria(made, envelope)
 
 
@@ -172,7 +189,7 @@ def _outcome(
         indentation,
         Projectiles(own.projectile.total_mass, own.velocity),
         deflection_of(result),
-        threshold_of(checked),
+        None if checked.threshold is None else checked.threshold.force,
         checked.judge.mobility,
     )
     outcome = outcome_of(

@@ -8,10 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.mechanics.laminate import threshold_force
 from fecm.problem.problem import Problem
 from fecm.results.end import decided
 from fecm.results.exposures import largest_exposures
-from fecm.results.metrics import EXPOSURES, GAGE, RATIO, Metrics
+from fecm.results.metrics import EXPOSURES, GAGE, RATIO, THRESHOLD_FORCE, Metrics
 from fecm.results.result import Result
 from fecm.results.validity import Extent
 from fecm.sweeps.outcome import About, Outcome
@@ -25,9 +26,15 @@ class Peak(NamedTuple):
     last: Floats
 
 
-def threshold_of(checked: Problem) -> float | None:
-    """Delamination threshold of a plate, force; None without a DELA segment."""
-    return None if checked.threshold is None else checked.threshold.force
+def thresholds_of(checked: Problem, toughness: Floats) -> Floats | None:
+    """Return the delamination thresholds (force) of cases; None without a DELA segment.
+
+    `toughness` (force/length) is (cases,).
+    """
+    if (own := checked.threshold) is None:
+        return None
+    values = {g: threshold_force(own.rigidity, g, own.number) for g in set(toughness.tolist())}
+    return np.array([values[g] for g in toughness.tolist()])
 
 
 def judge(
@@ -49,14 +56,13 @@ def judge(
     if rules.mobility:  # the plate moves as a whole
         deflection = np.full(len(end), np.nan)
     exposures = [peak.largest for name, peak in peaks.items() if name in EXPOSURES]
-    threshold = threshold_of(checked)
     extent = Extent(
         end=end,
         peak=outcome.columns[About.REACHED],
         indentation=indentation,
         deflection=deflection,
         exposure=np.nanmax(exposures, axis=0) if exposures else np.nan,
-        threshold=np.nan if threshold is None else threshold,
+        threshold=metrics.columns.get(THRESHOLD_FORCE, np.nan),
     )
     ratio = metrics.deflection / rules.thickness
     if Measure.DEFLECTION in measures:

@@ -29,6 +29,7 @@ from fecm.sweeps.limits import Limit, check_limits
 from fecm.sweeps.random import Design
 from fecm.sweeps.timing import Clock, clock_of
 from fecm.sweeps.values import (
+    FAILURE_NAMES,
     LAW_VALUES,
     REFINE,
     Changes,
@@ -37,6 +38,7 @@ from fecm.sweeps.values import (
     names_of,
     plate_values,
 )
+from fecm.sweeps.vary import apply_case
 
 BuildFunction = Callable[[dict[str, Any]], Deck]  # of a case, whose values are any
 MeasureFunction = Callable[[Result], Mapping[str, float]]
@@ -47,7 +49,7 @@ MODES = 21  # bending modes of the reduced model
 MOST_MODES = 40
 MOST_IN_MOTION = 16  # full runs in one motion
 # Names that keep the critical time step of the deck.
-_KEEPING = {*names_of(Changes.RESIDUAL, Changes.STRIKE, Changes.PLACE), "duration"}
+_KEEPING = {*names_of(Changes.FAILURE, Changes.STRIKE, Changes.PLACE), "duration"}
 
 
 class Measure(StrEnum):
@@ -77,9 +79,10 @@ class Settings:
 
     @property
     def shares_motion(self) -> bool:
-        """Whether full runs that differ in residual stresses alone are one motion."""
-        others = self.build, self.measure, self.search
-        return Measure.FAILURE in self.measures and all(other is None for other in others)
+        """Whether full runs that differ only in values of failure are one motion."""
+        others = self.build, self.measure, self.search, self.modes
+        in_full = Measure.FAILURE in self.measures or self.deck.has(Nonlinear)
+        return in_full and all(other is None for other in others)
 
     @property
     def in_full(self) -> bool:
@@ -145,6 +148,8 @@ def plan(
         raise CasesError("the deck has no impact step (RODP); there is nothing to sweep")
     if build is None:
         check_names(cases[0])
+        # Values of segments that the deck lacks are invalid in every case.
+        apply_case(deck, {name: cases[0][name] for name in FAILURE_NAMES if name in cases[0]})
     measures = _measures(extra, deck)
     if search is not None:
         by_force = search.quantity is Sought.PEAK_FORCE

@@ -14,6 +14,7 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.layup import LayupError, parse_layup
+from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Layer, NodeCodes, NodeValues
 from fecm.mechanics.mesh import element_blocks, holds_the_plane
 from fecm.mechanics.points import locate
@@ -154,6 +155,25 @@ def set_cure(deck: model.Deck, value: Value) -> model.Deck:
     if (old := deck.last(model.Cure)) is None:
         raise CasesError("cure_dT: the deck has no CURE, which has the coefficients of expansion")
     return swapped(deck, old, replace(old, delta_t=float(value), source=None))
+
+
+def strength(name: str) -> PlateSetter:
+    """Return the setter of a strength of the ply of MATE."""
+
+    def changed(deck: model.Deck, value: Value) -> model.Deck:
+        old = deck.last(model.Allowables)
+        if old is None or (ply := old.of(MATERIAL)) is None:
+            raise CasesError(
+                f"{name}: the deck has no strengths of the ply of MATE; add an ALLO segment"
+            )
+        fields: dict[str, Any] = {name: float(value)}  # mypy compares each with every field
+        new = replace(ply, **fields, source=None)
+        if ply is old:
+            return swapped(deck, old, new)
+        others = tuple(new if one is ply else one for one in old.others)
+        return swapped(deck, old, replace(old, others=others, source=None))
+
+    return changed
 
 
 def _common_thickness(name: str, deck: model.Deck) -> float:

@@ -13,7 +13,7 @@ from fecm._typing import Floats
 from fecm.sweeps.case import Case, CasesError, check_count
 from fecm.sweeps.copula import Correlation, correlated
 from fecm.sweeps.distributions import Law, OwnLaw
-from fecm.sweeps.values import PLATE_NAMES, RESIDUAL_NAMES, plate_values
+from fecm.sweeps.values import FAILURE_NAMES, PLATE_NAMES, plate_values
 
 DesignKind = Literal["lhs", "sobol", "mc"]
 DESIGNS: tuple[DesignKind, ...] = get_args(DesignKind)
@@ -131,15 +131,15 @@ def random_cases(design: Design, varied: Sequence[Case]) -> list[Case]:
 def cost(cases: Sequence[Case], design: Design, *, shared: bool, motions: bool) -> str:
     """Say how many plates a random sweep needs, and which names cause them.
 
-    Cases may share the response of a plate, or motions that do not depend on residual stresses.
+    Cases may share the response of a plate, or a motion if only failure differs.
     """
     given = f"{design.draws} draws"
     if len(cases) != design.draws:
         given = f"{len(cases)} cases of {given}"
     if not shared:
-        residual = [name for name in cases[0] if motions and name in RESIDUAL_NAMES]
+        names = [name for name in cases[0] if motions and name in FAILURE_NAMES]
         how = (
-            f"; those that differ in {residual[0]} alone, together" if residual else ", one by one"
+            f"; those that differ only in {', '.join(names)}, together" if names else ", one by one"
         )
         return f"{given} are run in full{how}"
     plates = len({frozenset(plate_values(case).items()) for case in cases})

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
-from fecm.results.metrics import VALIDITY, VERDICTS
+from fecm.results.metrics import THRESHOLD_FORCE, VALIDITY, VERDICTS
 from fecm.results.validity import Reason
 from fecm.sweeps.limits import THRESHOLD, Limit, check_limits
 from fecm.sweeps.outcome import Column, Status, was_run
@@ -19,7 +19,6 @@ from fecm.sweeps.statistics import Counts, Indices, Statistics, bounds, indices,
 
 Columns = Mapping[str, Column]
 MANY_FAILED = 0.01  # share of failed draws above which the results are doubtful
-THRESHOLD_FORCE = "threshold_force"
 
 
 class Exceedance(NamedTuple):

@@ -13,6 +13,8 @@ from fecm.sweeps.random_result import RandomResult
 from fecm.sweeps.statistics import QUANTILES
 
 MOST_PRINTED = 4  # quantities of :data:`MAIN`, and combinations
+TOUGHNESS = "giic"
+MARGIN = ("threshold_margin",)  # the quantity that toughness affects
 MAIN = (
     "found_velocity",
     "found_energy",
@@ -54,7 +56,8 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
             if any(row)
         ]
         if random.sensitivity:
-            lines += ["", *_index_lines(random, chosen[0], place)]
+            for name in (chosen[0], *(MARGIN if TOUGHNESS in design.laws else ())):
+                lines += ["", *_index_lines(random, name, place)]
         for row, (name, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
             p, low, high, n, lacking = (values[(*place, row)] for values in found[2:])
             value = THRESHOLD if np.isnan(limit) else f"{limit:.6g}"

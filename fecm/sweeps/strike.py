@@ -1,4 +1,4 @@
-"""What strikes the plate in a case: the cards of ROD and EXPE and the projectile.
+"""What strikes the plate in a case: ROD, EXPE, the projectile, and DELA, which judges the force.
 
 The values of a case that change nothing else need no deck of their own: cases of one plate differ
 in their strikes.
@@ -27,13 +27,14 @@ from fecm.problem.parts import build_constants, build_projectile, projectile_seg
 from fecm.problem.problem import Problem
 from fecm.sweeps.case import CasesError, Value
 from fecm.sweeps.checks import raise_first
+from fecm.sweeps.limits import NO_THRESHOLD
 from fecm.sweeps.plates import swapped
 
 _S = TypeVar("_S", bound=model.Segment)
 
 
 class Strike(NamedTuple):
-    """Velocity, contact law and projectile of a case."""
+    """Velocity, contact law, projectile and toughness of a case."""
 
     plate: model.Deck  # deck whose plate is struck; its own strike is not that of the case
     impact: model.Impact | None
@@ -41,6 +42,7 @@ class Strike(NamedTuple):
     card: model.Projectile | None  # None if the deck has the report's rod
     projectile: DeckProjectile
     own_law: Law | None = None  # a user's, instead of that of EXPE
+    delamination: model.Delamination | None = None  # toughness, whose threshold the force may reach
 
     @property
     def velocity(self) -> float:
@@ -83,6 +85,7 @@ class Strike(NamedTuple):
             (model.Impact, self.impact),
             (model.Indentation, self.indentation),
             (model.Projectile, self.card),
+            (model.Delamination, self.delamination),
         ):
             old = deck.last(kind)
             if segment is not None and segment is not old:
@@ -95,7 +98,7 @@ class Strike(NamedTuple):
         if self.impact is not None:
             deck = swapped(plate.deck, plate.deck.last(model.Impact), self.impact)
             check_impact(Problem(deck, plate.mesh, plate.program), findings)
-        for segment in (self.indentation, self.card):
+        for segment in (self.indentation, self.card, self.delamination):
             if segment is not None:
                 check_segment(segment, findings)
         raise_first(findings)
@@ -112,6 +115,7 @@ def strike_of(deck: model.Deck) -> Strike:
         indentation=deck.last(model.Indentation),
         card=deck.last(model.Projectile),
         projectile=build_projectile(deck),
+        delamination=deck.last(model.Delamination),
     )
 
 
@@ -173,6 +177,13 @@ def _indentation_modulus(layers: tuple[model.Layer, ...], plies: tuple[model.Ply
     angles = [layer.angle for layer in layers]
     thicknesses = [layer.thickness for layer in layers]
     return indentation_modulus(effective_stiffness(plies, angles, thicknesses, NU23))
+
+
+def set_toughness(strike: Strike, value: Value) -> Strike:
+    """Change the toughness of DELA."""
+    if (old := strike.delamination) is None:
+        raise CasesError(f"giic: {NO_THRESHOLD}")
+    return strike._replace(delamination=replace(old, toughness=float(value), source=None))
 
 
 def set_mass(strike: Strike, value: Value) -> Strike:

@@ -7,6 +7,7 @@ their strike, or the reason why they have none, one by one from :mod:`fecm.sweep
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
@@ -22,13 +23,13 @@ from fecm.problem.problem import Problem
 from fecm.problem.rules.contact import limits_of
 from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.strike import Strike, strike_of
-from fecm.sweeps.values import RESIDUAL_NAMES, plate_values
+from fecm.sweeps.values import FAILURE_NAMES, plate_values
 from fecm.sweeps.vary import strike
 
 UNIT = RigidMass(1.0)
 CONSTANTS = ("k", "alpha_p", "s_p", "q")
 MASSES = ("mass", "rod_mass")
-TABLED = {"velocity", "energy", *CONSTANTS, *MASSES, *RESIDUAL_NAMES}
+TABLED = {"velocity", "energy", *CONSTANTS, *MASSES, *FAILURE_NAMES}
 
 
 class StrikeColumns(NamedTuple):
@@ -40,6 +41,7 @@ class StrikeColumns(NamedTuple):
     kind: NDArray[np.intp]  # places in them
     mass: Floats
     scale: Floats  # mass and stiffness over those of the kind
+    toughness: Floats  # G_IIc, force/length; NaN without a DELA segment
 
     def of_cases(self, rows: NDArray[np.intp]) -> StrikeColumns:
         """Select some cases."""
@@ -50,6 +52,7 @@ class StrikeColumns(NamedTuple):
             kind=self.kind[rows],
             mass=self.mass[rows],
             scale=self.scale[rows],
+            toughness=self.toughness[rows],
         )
 
 
@@ -133,6 +136,9 @@ def _columns(
     ]
     for within, _ in limits_of(law.word, *given):
         valid &= within
+    toughness = np.array(np.broadcast_to(values.get("giic", _toughness(own)), count))
+    if "giic" in values:
+        valid &= toughness > 0.0
     columns = StrikeColumns(
         velocity=velocity,
         constants=constants_of(law.word, *given),
@@ -140,8 +146,14 @@ def _columns(
         kind=np.zeros(count, dtype=np.intp),
         mass=mass,
         scale=mass if rigid else np.ones(count),
+        toughness=toughness,
     )
     return columns, valid
+
+
+def _toughness(one: Strike) -> float:
+    """Toughness of a strike; NaN without a DELA segment."""
+    return math.nan if one.delamination is None else one.delamination.toughness
 
 
 def columns_of(strikes: Mapping[int, Strike]) -> StrikeColumns:
@@ -159,6 +171,7 @@ def columns_of(strikes: Mapping[int, Strike]) -> StrikeColumns:
         kind=np.array([kinds[unit] for unit in units], dtype=np.intp),
         mass=mass,
         scale=np.where([unit is UNIT for unit in units], mass, 1.0),
+        toughness=np.array([_toughness(one) for one in made]),
     )
 
 

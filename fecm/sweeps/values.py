@@ -12,6 +12,7 @@ import numpy as np
 
 from fecm._errors import did_you_mean
 from fecm.deck.grid import SUPPORTS
+from fecm.deck.units import TOUGHNESS
 from fecm.results.metrics import COLUMNS, VERDICTS
 from fecm.sweeps import plates, strike
 from fecm.sweeps.case import PAIRS, Case, CasesError, Value, normal_pair, number
@@ -32,10 +33,10 @@ class Kind(Enum):
 class Changes(IntEnum):
     """What a value changes, in the order in which the values of a case are applied.
 
-    All but residual stresses and a strike need a run of the plate for each value.
+    Values of failure and of a strike share a run of the plate; each other value needs its own.
     """
 
-    RESIDUAL = auto()  # stresses of the plies, on which the motion does not depend
+    FAILURE = auto()  # exposures or the threshold, which do not affect the motion
     LAMINATE = auto()
     PLATE = auto()  # mesh and supports
     PLACE = auto()  # where the force acts
@@ -59,6 +60,16 @@ _MASS = "force*time^2/length"
 _DENSITY = "force*time^2/length^4"
 _STRESS = "force/length^2"
 _SPEED = "length/time"
+
+STRENGTHS = {
+    "xt": "tensile strength along the fibres",
+    "xc": "compressive strength along the fibres, positive,",
+    "yt": "tensile strength across the fibres",
+    "yc": "compressive strength across the fibres, positive,",
+    "s12": "in-plane shear strength",
+    "s13": "interlaminar shear strength along the fibres",
+    "s23": "interlaminar shear strength across the fibres",
+}
 
 # fmt: off
 STRIKE_VALUES: tuple[Variable[StrikeSetter], ...] = (
@@ -87,6 +98,8 @@ STRIKE_VALUES: tuple[Variable[StrikeSetter], ...] = (
              meaning="Young's modulus of the rod"),
     Variable("rod_density", Changes.STRIKE, _DENSITY, strike.rod_property("rod_density", "density"),
              meaning="density of the rod"),
+    Variable("giic", Changes.FAILURE, TOUGHNESS, strike.set_toughness,
+             meaning="toughness G_IIc of `DELA`; only the delamination threshold depends on it"),
 )
 PLATE_VALUES: tuple[Variable[PlateSetter], ...] = (
     Variable("at", Changes.PLACE, "", plates.set_place, Kind.TEXT,
@@ -138,7 +151,10 @@ PLATE_VALUES: tuple[Variable[PlateSetter], ...] = (
                      "and v free"),
     Variable("radius_y", Changes.LAMINATE, "length", plates.curvature_radius("radius_y"),
              meaning="the same for Ry"),
-    Variable("cure_dT", Changes.RESIDUAL, "", plates.set_cure,
+    *(Variable(name, Changes.FAILURE, _STRESS, plates.strength(name),
+               meaning=f"{text} of the ply of `MATE` (`ALLO`); only exposures depend on it")
+      for name, text in STRENGTHS.items()),
+    Variable("cure_dT", Changes.FAILURE, "", plates.set_cure,
              meaning="change of temperature of `CURE`, K; only exposures depend on it"),
     Variable("size", Changes.PLATE, "", plates.set_size, Kind.TEXT,
              meaning="`AxB`: sides of the plate; coordinates are scaled along x and y, and with "
@@ -181,7 +197,8 @@ def names_of(*changes: Changes) -> tuple[str, ...]:
 
 
 PLATE_NAMES = names_of(Changes.PLACE, Changes.LAMINATE, Changes.PLATE, Changes.TIME)
-RESIDUAL_NAMES = names_of(Changes.RESIDUAL)
+FAILURE_NAMES = names_of(Changes.FAILURE)
+EXPOSURE_NAMES = ("cure_dT", *STRENGTHS)  # names that change nothing but exposures
 LAW_VALUES = ("k", "radius", "alpha_p", "s_p", "q")  # of EXPE
 OF_PLATE = frozenset((*PLATE_NAMES, REFINE))  # which need another response of the plate
 
@@ -195,7 +212,7 @@ def plate_values(case: Case) -> Case:
 
 def motion_values(case: Case) -> Case:
     """The values of a case that change its motion."""
-    return {name: value for name, value in case.items() if name not in RESIDUAL_NAMES}
+    return {name: value for name, value in case.items() if name not in FAILURE_NAMES}
 
 
 def kind_of(name: str) -> Kind:
