@@ -62,6 +62,8 @@ def check_outputs(
     writes, such as checkpoints, whose names no output may have.  `allowed_by` is what the messages
     tell the caller to use to replace a file.
     """
+    if Path("-") in (*paths, *own):
+        raise OutputError("- is a standard stream, and this needs a file; give its name")
     read = {key for path in inputs for key in _keys(path)}
     taken = {key for path in own for key in _keys(path)}
     for path in paths:

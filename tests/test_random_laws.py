@@ -144,6 +144,33 @@ def test_an_object_with_quantiles_is_a_law(tmp_path: Path) -> None:
         matrix(loaded.design)
 
 
+def test_a_new_distribution_of_scipy_is_a_law() -> None:
+    from scipy import stats
+
+    class Inverse:
+        """A law with the quantiles of N(2e6, 1e5) under the new name of scipy.stats."""
+
+        icdf = staticmethod(stats.norm(2e6, 1e5).ppf)
+
+    laws: list[Any] = [Inverse()]
+    if hasattr(stats, "Normal"):  # since scipy 1.15
+        laws.append(stats.Normal(mu=2e6, sigma=1e5))
+    wanted = fecm.sweep(small(), random={"k": "normal:2e6,1e5"}, samples=16)
+    for law in laws:
+        found = fecm.sweep(small(), random={"k": law}, samples=16)
+        np.testing.assert_allclose(found["k"], wanted["k"], rtol=1e-12)
+
+
+def test_a_distribution_without_parameters_is_refused() -> None:
+    from scipy import stats
+
+    # Its mean 0 and deviation 1 made half of all stiffnesses negative.
+    with pytest.raises(CasesError, match="k: norm has no parameters; call it with them first"):
+        fecm.sweep(small(), random={"k": stats.norm}, samples=16)
+    with pytest.raises(CasesError, match="k: Measured has no parameters"):
+        fecm.sweep(small(), random={"k": Measured}, samples=16)  # type: ignore[dict-item]
+
+
 @pytest.mark.parametrize(
     ("ppf", "message"),
     [

@@ -12,6 +12,7 @@ from pathlib import Path
 import h5py
 import pytest
 
+import fecm
 from fecm.cli import COMMANDS
 from tests.calls import call, program
 from tests.decks import small
@@ -34,6 +35,40 @@ def shell(command: str, folder: Path, **environment: str) -> subprocess.Complete
         check=False,
         env={**os.environ, **environment},
     )
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        "run d.inp -o -",
+        "run -",
+        "run d.inp --print -",
+        "sweep d.inp -o -",
+        "estimate -",
+        "info -",
+        "diff d.inp -",
+        "plot d.h5 --kind force -o -",
+        "tapes d.h5 -d -",
+        "report d.h5 -o -",
+        "locate d.inp d.inp -o -",
+    ],
+)
+def test_a_dash_is_a_stream_and_never_a_file(arguments: str, tmp_path: Path) -> None:
+    for name in ("d.inp", "d.h5"):
+        (tmp_path / name).write_text(small())
+    done = call(*arguments.split(), cwd=tmp_path)
+    assert done.exit_code == 2
+    assert "- is a standard stream, and this needs a file; give its name" in done.stderr
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["d.h5", "d.inp"]
+
+
+def test_python_writes_no_file_of_the_name_dash(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(fecm.errors.OutputError, match="- is a standard stream"):
+        fecm.run(small(), output="-")
+    assert list(tmp_path.iterdir()) == []
 
 
 def python(code: str, *arguments: str, cwd: Path | None = None) -> subprocess.CompletedProcess[str]:

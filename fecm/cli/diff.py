@@ -17,8 +17,8 @@ from fecm.cli.common import FAILED, echo_json
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
 from fecm.cli.options import (
-    FILE_PATH,
     FORMAT_OPTION,
+    NAMED_PATH,
     NOT_NEGATIVE,
     Format,
     Parsed,
@@ -108,8 +108,8 @@ def _tolerances(text: str) -> Tolerances:
         "fecm diff a.h5 tapes --only tape9/force",
     )
 )
-@click.argument("a", type=FILE_PATH)
-@click.argument("b", type=FILE_PATH)
+@click.argument("a", type=NAMED_PATH)
+@click.argument("b", type=NAMED_PATH)
 @option(
     "--rtol",
     type=NOT_NEGATIVE,

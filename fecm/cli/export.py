@@ -10,7 +10,7 @@ from fecm._files import check_outputs
 from fecm.cli.common import DASH, RefusedError, echo, note
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
-from fecm.cli.options import DECK_PATH, FILE_PATH
+from fecm.cli.options import DECK_PATH, FILE_PATH, NAMED_PATH
 from fecm.cli.outputs import write_lines
 from fecm.results import csv
 from fecm.results.errors import ExportError
@@ -32,7 +32,7 @@ from fecm.results.tapes import tape_texts, write_tapes
 @click.option(
     "-d",
     "--directory",
-    type=FILE_PATH,
+    type=NAMED_PATH,
     default=Path(),
     metavar="DIR",
     help="Folder for the tapes.  [default: this folder]",

@@ -14,9 +14,9 @@ from fecm.cli.help import typical
 from fecm.cli.options import (
     COLUMNS_OPTION,
     DECK_PATH,
-    FILE_PATH,
     FORMAT_OPTION,
     LAW_OPTION,
+    NAMED_PATH,
     UNITS_OPTION,
     Format,
     OneOf,
@@ -79,21 +79,21 @@ class Options:
 @option(
     "-o",
     "--output",
-    type=FILE_PATH,
+    type=NAMED_PATH,
     metavar="FITTED.inp",
     help="Also write the deck with the fitted values.",
 )
 @option(
     "--plot",
     "picture",
-    type=FILE_PATH,
+    type=NAMED_PATH,
     metavar="FILE",
     help="Also draw measured and fitted force and the residual: .png, .svg or .pdf.",
 )
 @option(
     "--report",
     "page",
-    type=FILE_PATH,
+    type=NAMED_PATH,
     metavar="FILE.html",
     help="Also write an HTML page about the fit.",
 )

@@ -17,7 +17,7 @@ from fecm._version import __version__
 from fecm.cli.common import echo_json
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
-from fecm.cli.options import FILE_PATH, FORMAT_OPTION, Format
+from fecm.cli.options import FORMAT_OPTION, NAMED_PATH, Format
 from fecm.deck.units import declared_units
 from fecm.results.description import describe_groups
 from fecm.results.hdf5_reader import Contents, read
@@ -65,7 +65,7 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
         "fecm info impact-115.h5 --format json",
     ),
 )
-@click.argument("result", type=FILE_PATH)
+@click.argument("result", type=NAMED_PATH)
 @click.option(
     "--system",
     is_flag=True,

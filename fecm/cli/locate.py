@@ -13,8 +13,8 @@ from fecm.cli.decks import load_single
 from fecm.cli.help import typical
 from fecm.cli.options import (
     DECK_PATH,
-    FILE_PATH,
     FORMAT_OPTION,
+    NAMED_PATH,
     POSITIVE,
     Finite,
     Format,
@@ -89,14 +89,14 @@ class LocateOptions:
 @option(
     "-o",
     "--output",
-    type=FILE_PATH,
+    type=NAMED_PATH,
     metavar="FILE.h5",
     help="Also write place, force and strains, for fecm info and fecm plot.",
 )
 @option(
     "--plot",
     "picture",
-    type=FILE_PATH,
+    type=NAMED_PATH,
     metavar="FILE",
     help="Also draw misfit, force and strains: .png, .svg or .pdf.",
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import math
+import os
 import re
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
@@ -15,6 +16,7 @@ import click
 
 from fecm._errors import did_you_mean
 from fecm._inputs import InputError, parsed_file
+from fecm.cli.common import DASH
 from fecm.deck.unit_systems import NAMES, system_named
 from fecm.problem.slips import MODES, REPORT
 
@@ -54,8 +56,19 @@ def collected(kind: type, name: str = "options") -> Callable[[Decorated], Decora
     return decorate
 
 
-DECK_PATH = click.Path(exists=True, dir_okay=False, path_type=Path)
-FILE_PATH = click.Path(path_type=Path, allow_dash=True)
+class NamedFile(click.Path):
+    """Path of a file or folder, which is no standard stream."""
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Refuse -, and convert any other path."""
+        if os.fspath(value) == os.fspath(DASH):
+            self.fail("- is a standard stream, and this needs a file; give its name", param, ctx)
+        return super().convert(value, param, ctx)
+
+
+DECK_PATH = NamedFile(exists=True, dir_okay=False, path_type=Path)
+NAMED_PATH = NamedFile(path_type=Path)
+FILE_PATH = click.Path(path_type=Path, allow_dash=True)  # - is standard input or output
 
 
 class Finite(click.FloatRange):

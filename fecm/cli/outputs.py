@@ -14,7 +14,7 @@ import click
 from fecm._files import check_outputs, writing
 from fecm._tables import csv_line
 from fecm.cli.common import DASH, RefusedError, note
-from fecm.cli.options import FILE_PATH, Decorated, stacked
+from fecm.cli.options import FILE_PATH, NAMED_PATH, Decorated, stacked
 from fecm.deck.units import column_name, unit_of
 from fecm.plot.kinds import SUFFIXES
 from fecm.plot.pictures import imported, require_matplotlib, save
@@ -30,7 +30,7 @@ _OUTPUT = click.option(
 _PLOT = click.option(
     "--plot",
     "picture",
-    type=FILE_PATH,
+    type=NAMED_PATH,
     metavar="FILE",
     help="Also draw a picture: .png, .svg or .pdf.",
 )

@@ -20,7 +20,7 @@ from fecm.cli.isolation import reads
 from fecm.cli.options import (
     COLUMNS_OPTION,
     DECK_PATH,
-    FILE_PATH,
+    NAMED_PATH,
     UNITS_OPTION,
     Finite,
     OneOf,
@@ -98,7 +98,7 @@ class PictureOptions:
 @option(
     "-o",
     "--output",
-    type=FILE_PATH,
+    type=NAMED_PATH,
     metavar="PATH",
     help="Picture (.png, .svg, .pdf; .gif for animation), or folder for several.  [default: "
     "RESULT-KIND.png in this folder]",

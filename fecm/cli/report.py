@@ -10,7 +10,7 @@ from click import option
 from fecm.cli.common import RefusedError, echo
 from fecm.cli.help import typical
 from fecm.cli.isolation import reads
-from fecm.cli.options import FILE_PATH
+from fecm.cli.options import NAMED_PATH
 from fecm.cli.plot import named, run_or_sweep
 from fecm.report.page import check_page
 from fecm.results.hdf5_reader import read
@@ -23,11 +23,11 @@ from fecm.results.schema import Form
         "fecm report thin.h5 thick.h5 -o comparison.html",
     ),
 )
-@click.argument("results", type=FILE_PATH, nargs=-1, required=True, metavar="RESULT...")
+@click.argument("results", type=NAMED_PATH, nargs=-1, required=True, metavar="RESULT...")
 @option(
     "-o",
     "--output",
-    type=FILE_PATH,
+    type=NAMED_PATH,
     metavar="FILE.html",
     help="Page to write.  [default: RESULT.html in this folder]",
 )

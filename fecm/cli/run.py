@@ -21,10 +21,10 @@ from fecm.cli.help import GroupedCommand, typical
 from fecm.cli.interrupts import signals
 from fecm.cli.options import (
     DECK_PATH,
-    FILE_PATH,
     FORMAT_OPTION,
     LAW_OPTION,
     MODE_OPTION,
+    NAMED_PATH,
     POSITIVE,
     Finite,
     Format,
@@ -128,7 +128,7 @@ class Job:
 @option(
     "-o",
     "--output",
-    type=FILE_PATH,
+    type=NAMED_PATH,
     metavar="OUT.h5",
     help="Result file.  [default: the deck's name with .h5, in this folder]",
 )
@@ -216,7 +216,7 @@ class Job:
 @option(
     "--print",
     "printed",
-    type=FILE_PATH,
+    type=NAMED_PATH,
     metavar="OUT.txt",
     help="Also write the printed output of the original program.",
 )

@@ -15,7 +15,7 @@ from fecm.cli.common import FAILED, RefusedError, echo, every_minute, note, prog
 from fecm.cli.decks import count_findings
 from fecm.cli.help import GroupedCommand, typical
 from fecm.cli.interrupts import signals
-from fecm.cli.options import DECK_PATH, FILE_PATH, LAW_OPTION, OneOf, Parsed, collected, list_of
+from fecm.cli.options import DECK_PATH, LAW_OPTION, NAMED_PATH, OneOf, Parsed, collected, list_of
 from fecm.deck.findings import DeckError
 from fecm.mechanics.own_law import LawError, own_law
 from fecm.problem.build import RunOptions
@@ -241,7 +241,7 @@ class Options:
 @option(
     "-o",
     "--output",
-    type=FILE_PATH,
+    type=NAMED_PATH,
     metavar="SWEEP.h5",
     help="Result file.  [default: the deck's name with -sweep.h5, in this folder]",
 )

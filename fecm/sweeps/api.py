@@ -30,7 +30,7 @@ from fecm.sweeps.batch import deck_of
 from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.cases import Table, checked
 from fecm.sweeps.copula import Pair, correlation_of
-from fecm.sweeps.distributions import HasQuantiles, law_of
+from fecm.sweeps.distributions import OwnDistribution, law_of
 from fecm.sweeps.doubts import doubtful_values, unused_values
 from fecm.sweeps.grid import combined
 from fecm.sweeps.in_full import built
@@ -223,7 +223,7 @@ def sweep(
     cases: Iterable[Mapping[str, Any]] | Table | None = None,
     *,
     refine: Sequence[int] | None = None,
-    random: Mapping[str, str | HasQuantiles] | None = None,
+    random: Mapping[str, str | OwnDistribution] | None = None,
     correlation: Mapping[Pair, float] | ArrayLike | Table | None = None,
     samples: int | None = None,
     seed: int = 0,
@@ -266,8 +266,9 @@ def sweep(
     random : mapping of str to str or distribution, optional
         Laws of random values by name: ``"normal:MEAN,SD"``, ``"truncnormal:MEAN,SD,A,B"``,
         ``"lognormal:MEDIAN,SIGMA"``, ``"weibull:SCALE,SHAPE"``, ``"uniform:A,B"`` or
-        ``"triangular:A,MODE,B"``; or an object whose method ``ppf`` gives its quantiles, such as a
-        frozen distribution of :mod:`scipy.stats`.  With `vary` all combinations get the same draws.
+        ``"triangular:A,MODE,B"``; or an object whose method ``ppf`` or ``icdf`` gives its
+        quantiles, such as a distribution of :mod:`scipy.stats` with its parameters.  With `vary`
+        all combinations get the same draws.
     correlation : mapping of pair to float, array_like or DataFrame, optional
         Correlations of the random values by pairs of names, or as a matrix in the order of
         `random`; those of the normal scores of values with other laws.

@@ -29,6 +29,16 @@ class HasQuantiles(Protocol):
         """Return the values (n,) at which the distribution function is `probabilities` (n,)."""
 
 
+class HasInverse(Protocol):
+    """A distribution that gives its quantiles as the new ones of :mod:`scipy.stats` do."""
+
+    def icdf(self, probabilities: Any, /) -> Any:
+        """Return the values (n,) at which the distribution function is `probabilities` (n,)."""
+
+
+OwnDistribution = HasQuantiles | HasInverse
+
+
 class Distribution(NamedTuple):
     """A distribution with the parameters of its text."""
 
@@ -162,7 +172,7 @@ class OwnLaw:
     """Distribution of a value that is an object of the caller."""
 
     text: str  # that describes it
-    source: HasQuantiles | None = field(default=None, compare=False)  # None if it was read
+    source: OwnDistribution | None = field(default=None, compare=False)  # None if it was read
 
     def __str__(self) -> str:
         return self.text
@@ -175,15 +185,17 @@ class OwnLaw:
         """Values at which the distribution function takes these values, between 0 and 1."""
         if self.source is None:
             raise CasesError(f"a stored result has the draws of {self}, not the law")
+        name = _quantile_method(self.source)
+        assert name is not None  # checked by law_of
         try:
-            values = np.asarray(self.source.ppf(unit.ravel()), dtype=float)
+            values = np.asarray(getattr(self.source, name)(unit.ravel()), dtype=float)
         except Exception as error:  # of the caller's function
-            raise CasesError(f"ppf of {self} failed: {error}") from error
+            raise CasesError(f"{name} of {self} failed: {error}") from error
         if values.shape != (unit.size,):
             shape = f"{values.shape} for probabilities {(unit.size,)}"
-            raise CasesError(f"ppf of {self} gives values of the shape {shape}")
+            raise CasesError(f"{name} of {self} gives values of the shape {shape}")
         if not np.isfinite(values).all():
-            raise CasesError(f"ppf of {self} gives values that are not finite")
+            raise CasesError(f"{name} of {self} gives values that are not finite")
         return values.reshape(unit.shape)
 
     def doubt(self) -> str:
@@ -191,25 +203,35 @@ class OwnLaw:
         return ""
 
 
-def law_of(name: str, given: str | HasQuantiles, *, free: bool = False) -> Law | OwnLaw:
-    """The law of a name (any with `free`): a text, or an object with a method ``ppf``.
+def _quantile_method(law: object) -> str | None:
+    """Name of the method that gives the quantiles of a distribution; None without one."""
+    names = ("ppf", "icdf")
+    return next((name for name in names if callable(getattr(law, name, None))), None)
 
-    Raises CasesError if it is neither, or a parameter is invalid.
+
+def law_of(name: str, given: str | OwnDistribution, *, free: bool = False) -> Law | OwnLaw:
+    """The law of a name (any with `free`): a text, or an object with a method ``ppf`` or ``icdf``.
+
+    Raises CasesError if it is neither, if it has no parameters yet, or if one is invalid.
     """
     if isinstance(given, str):
         return parse_law(name, given, free=free)
     _check_random(name, free=free)
-    if not callable(getattr(given, "ppf", None)):
+    if _quantile_method(given) is None:
         raise CasesError(
             f"{name}: {given!r} is not a law; write a text such as 'normal:115,10', or an object "
-            "with the method ppf, as the distributions of scipy.stats are"
+            "with the method ppf or icdf, as the distributions of scipy.stats are"
         )
+    # A distribution of scipy.stats before it is called has the mean 0 and the deviation 1.
+    if isinstance(given, type) or callable(getattr(given, "freeze", None)):
+        what = getattr(given, "name", None) or getattr(given, "__name__", type(given).__name__)
+        raise CasesError(f"{name}: {what} has no parameters; call it with them first")
     return OwnLaw(_text_of(given), given)
 
 
-def _text_of(law: HasQuantiles) -> str:
+def _text_of(law: OwnDistribution) -> str:
     """An object in words: of a frozen distribution its name and parameters, or else the repr."""
-    text = type(law).__name__ if type(law).__repr__ is object.__repr__ else repr(law)
+    text = type(law).__name__ if type(law).__repr__ is object.__repr__ else str(law)
     if isinstance(name := getattr(getattr(law, "dist", None), "name", None), str):
         named = [f"{key}={value}" for key, value in getattr(law, "kwds", {}).items()]
         text = f"{name}({', '.join([*map(str, getattr(law, 'args', ())), *named])})"
