@@ -159,7 +159,7 @@ def test_the_public_case_is_located_within_four_standard_deviations(mesh: tuple[
     assert 6e-4 < found.determined_until < 7.8e-4
     assert not found.determined[-1]
     assert found.force[~found.determined].max() == 0.0
-    assert found.force_sd[~found.determined].min() > 5.0 * np.median(found.force_sd)
+    assert found.force_sd[~found.determined].min() > 4.0 * np.median(found.force_sd)
     assert found.accepted
 
 
@@ -287,7 +287,8 @@ def test_the_noise_is_that_of_the_residual_unless_it_is_given() -> None:
     assert found.noise == pytest.approx(noise, rel=0.15)
     assert found.misfit == 1.0
     assert not found.noise_given
-    assert found.sd_x == pytest.approx(noisy().sd_x * found.noise / noise)
+    # The mesh is in both.
+    assert found.sd_x == pytest.approx(noisy().sd_x, rel=0.15)
 
 
 # The force ----------------------------------------------------------------------------------------
@@ -414,6 +415,83 @@ def test_a_wrong_plate_does_not_describe_the_strains() -> None:
     assert found.misfit > 3.0
     assert not found.accepted
     assert "does not describe these signals" in found.notes[0]
+
+
+def wrong(strains: Floats, name: str) -> Floats:
+    """Strains of three gages with a mistake of the measurement."""
+    match name:
+        case "exchanged":
+            return strains[:, [1, 0, 2]]
+        case "one sign":
+            return strains * [1.0, -1.0, 1.0]
+        case "all signs":
+            return -strains
+        case "scaled":
+            return strains * [1.0, 1.0, 1e-2]
+        case _:
+            return np.add(strains, [0.0, 0.0, 2.0 * np.abs(strains).max()])
+
+
+@pytest.mark.parametrize("given", [True, False], ids=["noise", "no noise"])
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [
+        ("exchanged", "gages 1 and 2 exchanged explain the strains"),
+        ("one sign", "gage 2 with the other sign explains the strains"),
+        ("all signs", "the other sign of all gages explains the strains"),
+        ("scaled", "gage 3, divided by 0.01, explains the strains"),
+        ("zero", "gage 3 less"),
+    ],
+)
+def test_a_mistake_of_the_measurement_is_named(name: str, words: str, given: bool) -> None:
+    strains, noise = scatter(struck_on_a_point()[1], NOISE, seed=1)
+    options: dict[str, object] = {"noise": noise} if given else {}
+    found = located(wrong(strains, name), region=NEAR, grid=12.0, **options)
+    assert not found.accepted
+    (cause,) = [note for note in found.notes if "times better" in note]
+    assert words in cause
+
+
+def test_right_strains_have_no_likely_mistake_and_are_accepted() -> None:
+    strains, noise = scatter(struck_on_a_point()[1], NOISE, seed=1)
+    found = located(strains, noise=noise, region=NEAR, grid=12.0)
+    assert found.accepted
+    assert not any("times better" in note for note in found.notes)
+    assert found.misfit < 1.0 + 3.0 / np.sqrt(2.0 * strains.size) + 0.05
+
+
+def test_strains_of_a_late_trigger_are_named_as_late() -> None:
+    late = 10  # points
+    strains, _ = scatter(struck_on_a_point()[1], NOISE, seed=2)
+    table = TIME[late:] - TIME[late - 1], strains[late:]
+    found = fecm.locate(struck_on_a_point()[0], table, region=CLOSE, grid=20.0)
+    assert not found.accepted
+    (cause,) = [note for note in found.notes if "times better" in note]
+    assert "before the record explains the strains" in cause
+    assert "--shift" in cause
+
+
+def test_a_misfit_that_noise_does_not_explain_is_said_and_widens_the_errors() -> None:
+    # The noise is a quarter above what was said of it.
+    strains, noise = scatter(struck_on_a_point()[1], NOISE, seed=1)
+    whole, small = located(strains, noise=noise), located(strains, noise=noise / 1.25)
+    assert small.misfit == pytest.approx(1.25 * whole.misfit)
+    assert small.accepted
+    assert any("which chance does not explain" in note for note in small.notes)
+    assert not any("which chance does not explain" in note for note in whole.notes)
+    # Errors are those of the residual, not of the noise that was given.
+    assert small.force_sd[small.determined] == pytest.approx(
+        whole.force_sd[whole.determined] * max(1.0, small.misfit / 1.25) / max(1.0, whole.misfit),
+        rel=0.2,
+    )
+    large = located(strains, noise=noise / 2.0)
+    assert not large.accepted
+
+
+def test_strains_at_which_plies_fail_are_not_accepted() -> None:
+    found = located(struck_on_a_point()[1] * (0.02 / np.abs(struck_on_a_point()[1]).max()))
+    assert not found.accepted
+    assert any("the largest strain is 2 %, at which plies fail" in note for note in found.notes)
 
 
 def test_a_place_outside_the_region_is_doubted() -> None:

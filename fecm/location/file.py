@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fecm._typing import Array
-from fecm.location.location import OF_FORCE, Candidate, Location
+from fecm.location.location import OF_FORCE, OPTIONAL, Candidate, Location
 from fecm.location.writer import BY_TIME, DATASETS
 from fecm.results import schema
 from fecm.results.errors import ResultFileError
@@ -52,9 +52,9 @@ def location_of(contents: Contents) -> Location:
             **{name: values for name, values in arrays.items() if name != "place"},
             x=float(arrays["place"][0]),
             y=float(arrays["place"][1]),
-            **{name: _number(force, name) for name in OF_FORCE if name != "contact_end"},
-            contact_end=_number(force, "contact_end") if "contact_end" in force else None,
-            mass=_number(place, "mass") if "mass" in place else None,
+            **{name: _number(force, name) for name in OF_FORCE},
+            **_optional(force, OPTIONAL),
+            **_optional(place, ("mass", "mesh_error")),
             second=second,
             **{name: _number(place, name) for name in ("noise", "misfit", "shift", "sd_shift")},
             noise_given=bool(place["noise_given"]),
@@ -86,6 +86,11 @@ def _arrays(contents: Contents) -> dict[str, Any]:
         arrays[name] = values.T if name in BY_TIME else values
     arrays["determined"] = arrays["determined"] != 0
     return arrays
+
+
+def _optional(attributes: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:
+    """Finite floats among attributes by name, None for those that are missing."""
+    return {name: _number(attributes, name) if name in attributes else None for name in names}
 
 
 def _number(attributes: Mapping[str, Any], name: str) -> Any:

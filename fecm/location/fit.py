@@ -54,6 +54,11 @@ class Errors(NamedTuple):
     gains: Floats  # (gages,)
     # (hats,): of the force; of a hat that it has not, those with this hat added.
     force: Floats
+    covariance: Floats  # (hats, hats): of the force; 0 for hats that it has not
+    # Changes of place, (2,), and force, (hats,), with the strains of another model; that of the
+    # place is in its covariance.
+    place_change: Floats
+    force_change: Floats
 
 
 @frozen
@@ -167,19 +172,25 @@ class Fit:
                 return found
         return None
 
-    def errors(self, trial: Trial, noise: float) -> Errors:
-        """Standard errors by the Cramer-Rao bound, with a standard deviation of the strains."""
+    def errors(self, trial: Trial, noise: float, change: Floats | None = None) -> Errors:
+        """Standard errors by the Cramer-Rao bound, with a standard deviation of the strains.
+
+        `change` are the strains by which another model of the plate, with less error, differs,
+        (gages, rows).  The place that would be fitted to them is added as an error.
+        """
         jacobian = self.jacobian(trial)
         idle = trial.basis[:, ~trial.active]
         size = scales(jacobian)
-        factor = triangular(np.hstack([jacobian / size, idle]))
+        extra = np.zeros((len(jacobian), 1)) if change is None else change.reshape(-1, 1)
+        factor = triangular(np.hstack([jacobian / size, idle, extra]))
         count, others = jacobian.shape[1], self._others(trial)
         left, singular, right = np.linalg.svd(factor[:, :count], full_matrices=False)
         root = right.T / np.maximum(singular, SINGULAR * singular[0]) / size[:, None]
         covariance = noise**2 * root @ root.T
+        moved = root @ (left.T @ factor[:, -1])
         force = np.empty(len(trial.force))
         force[trial.active] = np.sqrt(np.diagonal(covariance)[others:])
-        rest = factor[:, count:] - left @ (left.T @ factor[:, count:])
+        rest = factor[:, count:-1] - left @ (left.T @ factor[:, count:-1])
         least = SINGULAR * float(scales(trial.basis).max())
         force[~trial.active] = noise / np.maximum(np.linalg.norm(rest, axis=0), least)
         gains = np.zeros(len(trial.gains))
@@ -188,7 +199,12 @@ class Fit:
             block = covariance[others - len(turns) : others, others - len(turns) : others]
             gains = trial.gains * np.sqrt(np.diagonal(turns.T @ block @ turns))
         shift = float(np.sqrt(covariance[2, 2])) if self.shift else 0.0
-        return Errors(covariance[:2, :2], shift, gains, force)
+        full = np.zeros((len(trial.force), len(trial.force)))
+        full[np.ix_(trial.active, trial.active)] = covariance[others:, others:]
+        force_change = np.zeros(len(trial.force))
+        force_change[trial.active] = moved[others:]
+        place = covariance[:2, :2] + np.outer(moved[:2], moved[:2])
+        return Errors(place, shift, gains, force, full, moved[:2], force_change)
 
 
 def scales(matrix: Floats) -> Floats:

@@ -4,23 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from fecm._errors import StudyError, warn
+from fecm._errors import FecmError, StudyError, warn
+from fecm._typing import Floats
 from fecm.deck.model import Deck, Gages, Nonlinear
 from fecm.deck.units import unit_names
-from fecm.location.fit import Fit
+from fecm.location.causes import BETTER, Cause, likely_cause
+from fecm.location.finer_mesh import EXTRAPOLATED, finer_strains
+from fecm.location.fit import Fit, Trial
 from fecm.location.force import judged_force
 from fecm.location.location import Location
 from fecm.location.observation import interpolation
 from fecm.location.prepare import Options, Timing, prepared
-from fecm.location.search import Found, best_fits, is_wide, narrowed
+from fecm.location.search import Found, Region, best_fits, is_wide, narrowed
 from fecm.location.table import StrainSource, StrainTable, strain_table
-from fecm.location.verdict import judged
+from fecm.location.verdict import is_doubtful, judged
 from fecm.problem.problem import Problem
 from fecm.sweeps.api import problem_of
+
+CERTAIN = 2.0  # fall of the misfit by which no other cause is tried
 
 
 def locate(
@@ -121,13 +126,44 @@ def located(problem: Problem, strains: StrainSource, options: Options) -> Locati
         raise StudyError("gains needs the strains of three gages at least")
     fit, region, times = prepared(problem, table, options)
     found = best_fits(fit, region, options.grid)
+    searched = Searched(fit, found.best, region)
     wide = False
     if options.basis is None:
         fit, found = narrowed(fit, found, region, options.noise)
     else:
         wide = is_wide(fit, found.best, options.noise)
     made = _location(problem, table, options, (fit, times), found)
-    return judged(made, region, wide)
+    cause = _cause(problem, table, options, searched) if is_doubtful(made) else None
+    return judged(made, region, wide, cause)
+
+
+class Searched(NamedTuple):
+    """Fit and best trial of the search, before hats are narrowed."""
+
+    fit: Fit
+    best: Trial
+    region: Region
+
+
+def _cause(
+    problem: Problem, table: StrainTable, options: Options, searched: Searched
+) -> Cause | None:
+    """What may be wrong with strains that the model does not describe."""
+    fit, best, region = searched
+    cause = likely_cause(fit, best, region, options.grid, table.gages.tolist())
+    if options.shift or (cause is not None and cause.ratio > CERTAIN):
+        return cause
+    try:
+        late, *_ = prepared(problem, table, options._replace(shift=True))
+        shifted = best_fits(late, region, options.grid).best
+    except FecmError:  # the record is too short for it
+        return cause
+    ratio = fit.deviation(best) / max(late.deviation(shifted), np.finfo(float).tiny)
+    if ratio < max(BETTER, 0.0 if cause is None else cause.ratio) or shifted.shift >= 0.0:
+        return cause
+    clock = unit_names(problem.deck).get("time", "")
+    text = f"a force that begins {-shifted.shift:.2g} {clock}".rstrip()
+    return Cause(f"{text} before the record explains", "take --shift", ratio)
 
 
 def _location(
@@ -143,9 +179,11 @@ def _location(
     noise = options.noise or rms
     if noise == 0.0:
         noise = float(np.finfo(np.float32).eps) * float(np.abs(table.strains).max())
-    errors = fit.errors(found, noise)
+    misfit = rms / noise if options.noise is not None else 1.0
+    finer = _finer_mesh(problem, table, (fit, times), found)
+    errors = fit.errors(found, noise * max(1.0, misfit), finer)
     knots = times.origin + fit.model.knots(found.shift)
-    force = judged_force(knots, found.force, errors.force, fit.model.basis)
+    force = judged_force(knots, found.force, errors, fit.model.basis)
     cards = {card.number: card for card in problem.deck.require(Gages).records}
     places = [(cards[number].x, cards[number].y) for number in table.gages.tolist()]
     samples = fit.model.strains(found.x, found.y, found.shift, found.force)
@@ -156,20 +194,24 @@ def _location(
         covariance=errors.place,
         time=knots,
         force=np.where(force.determined, found.force, 0.0),
-        force_sd=errors.force,
+        force_sd=force.sd,
         determined=force.determined,
         determined_until=force.determined_until,
         peak_force=force.peak,
+        sd_peak_force=force.peak_sd,
+        peak_bias=force.peak_bias,
         time_of_peak=force.time_of_peak,
         contact_end=force.end,
         impulse=force.impulse,
+        sd_impulse=force.impulse_sd,
+        mesh_error=None if finer is None else float(np.hypot(*errors.place_change)),
         mass=options.mass,
         candidates=minima.candidates,
         candidate_misfit=minima.misfit,
         second=minima.second,
         noise=noise,
         noise_given=options.noise is not None,
-        misfit=rms / noise if options.noise is not None else 1.0,
+        misfit=misfit,
         gages=table.gages,
         gage_places=np.array(places),
         strain_time=table.time,
@@ -183,3 +225,24 @@ def _location(
         accepted=True,
         deck=problem.deck,
     )
+
+
+def _finer_mesh(
+    problem: Problem, table: StrainTable, fitted: tuple[Fit, Timing], found: Trial
+) -> Floats | None:
+    """Error of the strains by the deck's mesh, (gages, rows); None if it is unknown."""
+    fit, times = fitted
+    history = (
+        np.append(0.0, fit.model.knots(0.0)),
+        np.append(0.0, found.force),
+    )
+    place, numbers = (found.x, found.y), table.gages.tolist()
+    finer = finer_strains(problem, numbers, place, history, fit.model.footprint, times)
+    if finer is None:
+        return None
+    count = finer.shape[1]
+    if found.shift:
+        shifted = np.arange(float(count)) - found.shift / times.interval
+        finer = finer @ interpolation(shifted, count).T
+    change = finer - fit.model.strains(found.x, found.y, found.shift, found.force)
+    return EXTRAPOLATED * found.gains[:, None] * fit.model.observation.of(change)

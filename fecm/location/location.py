@@ -26,19 +26,22 @@ if TYPE_CHECKING:
 DIMENSIONS = {
     **dict.fromkeys(("x", "y", "sd_x", "sd_y", "candidates", "gage_places"), "length"),
     "covariance": "length^2",
-    **dict.fromkeys(("force", "force_sd", "peak_force"), "force"),
+    **dict.fromkeys(("force", "force_sd", "peak_force", "sd_peak_force", "peak_bias"), "force"),
+    **dict.fromkeys(("impulse", "sd_impulse"), "force*time"),
+    "mesh_error": "length",
     **dict.fromkeys(("time", "time_of_peak", "contact_end", "determined_until"), "time"),
     **dict.fromkeys(("strain_time", "shift", "sd_shift"), "time"),
-    "impulse": "force*time",
     "energy_bound": "force*length",
     "mass": "force*time^2/length",
 }
 POINTS = 181  # of an ellipse
 # Numbers that are attributes of the group of the force, or of the place.
-OF_FORCE = ("determined_until", "peak_force", "time_of_peak", "contact_end", "impulse")
+OF_FORCE = ("determined_until", "peak_force", "time_of_peak", "impulse")
+# Those that may be missing: of the contact if it has not ended, of the errors in files of fecm 1.
+OPTIONAL = ("contact_end", "sd_peak_force", "peak_bias", "sd_impulse")
 OF_PLACE = (
     *("x", "y", "sd_x", "sd_y", "correlation", "noise", "misfit", "shift", "sd_shift"),
-    *("mass", "energy_bound"),
+    *("mass", "energy_bound", "mesh_error"),
 )
 
 
@@ -55,7 +58,8 @@ class Location:
     """Place and force history of an impact, located from strain gages.
 
     Standard deviations are those of independent errors of the strains with the standard deviation
-    `noise` (Cramér-Rao bound); errors of the model come in addition.
+    `noise` times `misfit`, if that is above 1 (Cramér-Rao bound), and of the mesh, by the strains
+    of elements half as long.  Other errors of the model come in addition.
 
     Attributes
     ----------
@@ -73,11 +77,19 @@ class Location:
         Last time at which they do.
     peak_force, time_of_peak : float
         Largest force among the determined ones, and its time.
+    sd_peak_force, peak_bias : float or None
+        Standard deviation of the peak force, and how much the largest of values with noise is too
+        high on average; None in files of older versions.
     contact_end : float or None
-        Time after the peak from which on the force stays below three standard deviations; None if
-        it does not.
-    impulse : float
-        Time integral of the force until the end of the contact, or as far as it is determined.
+        Time after the peak until which the contact lasts at least: for a third of the time of the
+        contact, no impulse that follows is beyond three standard deviations.  None if the record
+        does not show it.
+    impulse, sd_impulse : float
+        Time integral of the force until the end of the contact, or as far as it is determined, and
+        its standard deviation (None in files of older versions).
+    mesh_error : float or None
+        How far the place moves with the strains of a mesh of elements half as long; None if it is
+        unknown.
     mass : float or None
         Mass of the projectile, if given.
     candidates : ndarray (k, 2)
@@ -143,6 +155,10 @@ class Location:
     notes: tuple[str, ...]
     accepted: bool
     deck: Deck = field(repr=False)
+    sd_peak_force: float | None = None
+    peak_bias: float | None = None
+    sd_impulse: float | None = None
+    mesh_error: float | None = None
 
     def __post_init__(self) -> None:
         for name, values in vars(self).items():
@@ -262,7 +278,7 @@ class Location:
             {
                 "": self._about(),
                 "locate": self._of_place(),
-                "locate/force": self._present(*OF_FORCE),
+                "locate/force": self._present(*OF_FORCE, *OPTIONAL),
             },
             self.deck.to_text(),
             overwrite=overwrite,

@@ -24,9 +24,15 @@ def lines(found: Location) -> list[str]:
         ("correlation", f"{found.correlation:.2f}"),
         (
             "peak force",
-            f"{shown('peak_force', found.peak_force)} at {shown('time', found.time_of_peak)}",
+            f"{_with_error(found, 'peak_force')} at {shown('time', found.time_of_peak)}",
         ),
-        ("impulse", f"{shown('impulse', found.impulse)} until {shown('time', _end(found))}"),
+    ]
+    if found.peak_bias:
+        bias = quantity(found.peak_bias, found.unit("peak_bias"), 2)
+        rows.append(("", f"the largest of noisy values, too high by about {bias}"))
+    rows += [
+        ("impulse", f"{_with_error(found, 'impulse')} until {shown('time', _end(found))}"),
+        ("contact", f"until {shown('time', _end(found))} at least"),
     ]
     if found.energy_bound is not None:
         bound = shown("energy_bound", found.energy_bound)
@@ -42,6 +48,7 @@ def lines(found: Location) -> list[str]:
         ("noise", f"strain {found.noise:.3g}, {noise}"),
         ("misfit", misfit),
         ("second place", _rival(found)),
+        ("mesh", _mesh(found)),
         ("determined until", shown("time", found.determined_until)),
     ]
     if found.sd_shift:
@@ -51,6 +58,21 @@ def lines(found: Location) -> list[str]:
         rows += [(f"gain of gage {n}", f"{gain:.4f} ± {sd:.2g}") for n, gain, sd in gains]
     rows.append(("accepted", "yes" if found.accepted else "no"))
     return [f"{name:{LABEL_WIDTH}}{text}".rstrip() for name, text in rows]
+
+
+def _mesh(found: Location) -> str:
+    """How far a finer mesh moves the place."""
+    if found.mesh_error is None:
+        return "its error is unknown"
+    moved = quantity(found.mesh_error, found.unit("mesh_error"), 2)
+    return f"elements half as long move the place by {moved}"
+
+
+def _with_error(found: Location, name: str) -> str:
+    """A value with its standard deviation, if that is known."""
+    error = getattr(found, f"sd_{name}")
+    spread = "" if error is None else f" ± {error:.2g}"
+    return f"{getattr(found, name):.5g}{spread} {found.unit(name)}".rstrip()
 
 
 def _end(found: Location) -> float:
@@ -69,7 +91,8 @@ def values(found: Location) -> dict[str, Any]:
     """Values of a location under the names of its attributes, without its notes."""
     names = (
         *("x", "y", "sd_x", "sd_y", "correlation", "peak_force", "time_of_peak", "contact_end"),
-        *("impulse", "mass", "energy_bound", "determined_until", "noise", "noise_given", "misfit"),
+        *("sd_peak_force", "peak_bias", "impulse", "sd_impulse", "mesh_error", "mass"),
+        *("energy_bound", "determined_until", "noise", "noise_given", "misfit"),
         *("shift", "sd_shift", "accepted"),
     )
     second = found.second
