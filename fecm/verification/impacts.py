@@ -18,6 +18,7 @@ from fecm.mechanics.solutions import static_stiffness
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
+from fecm.results.end import Deflection, LastContact, ends, peak_known
 from fecm.results.result import Result
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.plan import plan
@@ -42,6 +43,22 @@ def _rigid_target() -> Sequence[Value]:
         return [found.indentation.max(), found.force.max(), touching[-1], found.velocity[-1]]
 
     return values(decks.elastic(1.0e6)) + values(Indentation(1.0e6, ALPHA_CR, 0.0, 2.5, "ACR"))
+
+
+@case
+def _end_of_contact() -> Sequence[Value]:
+    """A run that is cut at every phase of a half-sine contact."""
+    phase, one = np.linspace(0.0, np.pi, 20001)[1:-1], np.ones(19999)
+    force = np.sin(phase)
+    peak = np.maximum.accumulate(force)
+    last = LastContact(force, np.append(0.0, force[:-1]), peak, peak, -np.cos(phase), 0.0 * one)
+
+    def known(speed: float) -> float:
+        """Share of the contact that knows its peak, of a plate with a largest velocity."""
+        plate = Deflection(one, 0.0 * one, speed * one, one, one)
+        return float(peak_known(ends(last, plate)).mean())
+
+    return [known(1.0), known(3.0)]
 
 
 @case
