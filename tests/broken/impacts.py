@@ -20,6 +20,7 @@ from fecm.mechanics.contact_law import (
 from fecm.mechanics.impact import ImpactSystem
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.problem import parts
+from fecm.results import end
 from tests.breaks import (
     Breaks,
     changed,
@@ -43,6 +44,12 @@ BREAKS: Breaks = {
             "rigid-target": ("deepest", "largest", "contact", "ACR"), "supported-plate": ("",),
             "curved-impact": ("peak", "time"), "small-mass": ("largest force of",),
         },
+    ),
+    "a peak passes at 0.8 of the force": (
+        value(end, "FALLEN", 0.8), {"end-of-contact": ("plate as fast",)},
+    ),
+    "a projectile leaves clearly at half of the plate's velocity": (
+        value(end, "CLEAR", 0.5), {"end-of-contact": ("plate three times",)},
     ),
     "permanent indentation halved": (
         changed(LinearPermanent, "permanent", halved),
