@@ -11,6 +11,7 @@ from __future__ import annotations
 import csv
 import math
 import re
+import sys
 from collections.abc import Mapping, Sequence
 from itertools import chain, repeat
 from pathlib import Path
@@ -21,9 +22,15 @@ import numpy as np
 from fecm._dataclasses import frozen
 from fecm._errors import StudyError
 from fecm._inputs import read_input
+from fecm._memory import require
 from fecm._typing import Floats
 
 Row = tuple[int, list[str]]
+
+# Memory of a table: bytes of a line and of a field as objects, and copies of the text.
+LINE_BYTES = 400
+FIELD_BYTES = 80
+COPIES = 4
 
 # Units that tables may name: in m, N, s and m/m.  The pound-force is 0.45359237 kg times
 # 9.80665 m/s^2.  Both spellings of the letter for micro are in use.
@@ -264,9 +271,17 @@ def _has_number(row: Row) -> bool:
     return any(_number(field) is not None for field in row[1])
 
 
-def read_rows(path: Path) -> list[Row]:
-    """Read the number and the fields of every line with content; raises as :func:`read_table`."""
+def read_rows(path: Path, most: int = sys.maxsize) -> list[Row]:
+    """Read the number and the fields of every line with content.
+
+    Raises StudyError if there are more than `most` such lines, NotEnoughMemoryError if their fields
+    take more memory than is free, and other errors as :func:`read_table`.
+    """
     data = read_input(path)
+    line_count = 1 + max(data.count(b"\n"), data.count(b"\r"))
+    field_count = line_count + sum(data.count(mark) for mark in (b",", b";", b"\t"))
+    needed = LINE_BYTES * line_count + FIELD_BYTES * field_count + COPIES * len(data)
+    require(needed, f"{path}: a table of {line_count} lines")
     if b"\0" in data:
         raise StudyError(f"{path} is not a text file")
     try:
@@ -278,6 +293,8 @@ def read_rows(path: Path) -> list[Row]:
         for number, line in enumerate(text.splitlines(), start=1)
         if line.strip() and not line.lstrip().startswith("#")
     ]
+    if len(lines) > most:
+        raise StudyError(f"{path} has {len(lines)} lines; at most {most} are allowed")
     last = lines[-1][1] if lines else ""
     separator = next((mark for mark in "\t;" if mark in last), ",")
     found = []

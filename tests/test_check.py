@@ -170,6 +170,7 @@ def test_a_sound_deck_has_no_findings_but_the_projectile() -> None:
         ("  1912000.", "       -1.", "E412"),
         ("     0.094", "     1.094", "E412"),
         (" 17500000.", "   1.E+308", "E417"),
+        ("   800000.\n", "   1.E-300\n", "E534"),
         ("EXPE", "EXPE\n  1912000. 0.0006564     0.094       2.0\nEXPE", "W204"),
     ],
 )
@@ -343,6 +344,11 @@ def test_impact_steps_beside_central_differences_are_warned_of() -> None:
 def test_an_impact_deck_that_computes_only_modes_is_told_that_nothing_hits() -> None:
     assert codes(small("LMAS\nEIGE          2\n")) == ["W520"]
     assert codes(small("LMAS\nDT        .5E-6\nLOOP          3\nTIME\nDISP\nNEXT\n")) == ["E519"]
+
+
+def test_a_thickness_whose_cube_is_beyond_the_range_of_numbers_is_found() -> None:
+    thick = DATA_CARDS.replace("      .106", "   2.E+110").replace("    0.053", "  1.E+110")
+    assert "E417" in codes(small(data=thick))
 
 
 def test_a_stiffness_beyond_all_range_is_found_where_the_time_step_is_left_to_the_run() -> None:

@@ -179,6 +179,7 @@ def test_a_sweep_asks_no_more_trials_of_a_case_than_its_own_run(deck: fecm.Deck)
         (object(), "law object has no method start, trial, accept, permanent"),
         (Dented, "law Dented is a class; pass an object of it: law=Dented()"),
         (Faulty(lambda a: np.nan), "law Faulty: the force is nan at the indentation"),
+        (Faulty(lambda a: 10**400), "law Faulty: the force is inf at the indentation"),
         (Faulty(lambda a: (-a) ** 1.5), r"the force is \(.*j\), not a real number at"),
         (Faulty(lambda a: 1.0 / 0.0), "trial failed with ZeroDivisionError: .* at the indentation"),
         (Faulty(lambda a: np.zeros(2)), r"the force is array\(\[0., 0.\]\), not a real number"),
@@ -302,12 +303,56 @@ def _raising(ply: fecm.Strengths, s1: Floats, s2: Floats, tau: Floats) -> Any:
     raise KeyError("xt")
 
 
+def _complex(ply: fecm.Strengths, s1: Floats, s2: Floats, tau: Floats) -> Any:
+    return np.abs(s1) / ply.xt + 1j
+
+
+def _boolean(ply: fecm.Strengths, s1: Floats, s2: Floats, tau: Floats) -> Any:
+    return s1 > ply.xt
+
+
+def _huge(ply: fecm.Strengths, s1: Floats, s2: Floats, tau: Floats) -> Any:
+    return np.full(s1.shape, 10**400, dtype=object)
+
+
+def _negative(ply: fecm.Strengths, s1: Floats, s2: Floats, tau: Floats) -> Any:
+    return {"fibre": s1 / ply.xt - 1.0, "matrix": s2 / ply.yt - 2.0}
+
+
+def _many_modes(ply: fecm.Strengths, s1: Floats, s2: Floats, tau: Floats) -> Any:
+    return {f"mode {number}": np.abs(s1) for number in range(300)}
+
+
+def _with_nul(ply: fecm.Strengths, s1: Floats, s2: Floats, tau: Floats) -> Any:
+    return {"a\0b": np.abs(s1)}
+
+
+def _five() -> list[Any]:
+    """Criteria that together have more modes than codes."""
+
+    def named(name: str) -> Any:
+        def criterion(ply: fecm.Strengths, s1: Floats, s2: Floats, tau: Floats) -> Any:
+            return {f"{name} {number}": np.abs(s1) for number in range(32)}
+
+        criterion.__name__ = name
+        return criterion
+
+    return [named(f"own_{number}") for number in range(5)]
+
+
 @pytest.mark.parametrize(
     ("given", "fault"),
     [
         ([_zero], "_zero returned nan for sigma_1 = 0, sigma_2 = 0, tau_12 = 0"),
         ([_scalar], r"_scalar returned an array of the shape \(\) for stresses of \(1, 1\)"),
         ([_other_modes], "returned the mode 'late', and without stress early"),
+        ([_complex], r"_complex returned array\(\[\[0.\+1.j\]\]\), not real numbers"),
+        ([_boolean], r"_boolean returned array\(\[\[False\]\]\), not real numbers"),
+        ([_huge], "_huge returned .*, not real numbers"),
+        ([_negative], "returned -1 for sigma_1 = 0, .*; return 0 where the criterion does not"),
+        ([_many_modes], "_many_modes returned 300 modes; at most 32 are allowed"),
+        ([_with_nul], r"returned the mode 'a\\x00b'; the names of modes are printable texts"),
+        (_five(), "the failure criteria have 171 modes; at most 127 are allowed"),
         ([_raising], "_raising failed with KeyError: 'xt'"),
         ([lambda *a: 1.0], "a function with a name is needed"),
         ([norris, norris], "norris: there is another one of this name"),
@@ -423,6 +468,12 @@ def test_matrices_of_no_free_body_are_refused(
 ) -> None:
     with pytest.raises(fecm.ProjectileError, match=f"projectile Bodies: .*{fault}"):
         fecm.run_one(deck, projectile=Bodies(mass, stiffness))
+
+
+def test_a_mass_that_is_lost_beside_the_stiffness_is_refused(deck: fecm.Deck) -> None:
+    fault = "the mass of the projectile is lost beside its stiffness in a time step of"
+    with pytest.raises(fecm.ProjectileError, match=fault):
+        fecm.run_one(deck, projectile=Bodies([1e-300, 1e-300], _chain(2)))
 
 
 def test_a_projectile_that_is_none_is_refused(deck: fecm.Deck) -> None:

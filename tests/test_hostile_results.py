@@ -233,7 +233,8 @@ ATTRIBUTES = [
     pytest.param(
         name, value, marks=() if name == "threshold/force" or value == "text" else pytest.mark.long
     )
-    for name in ("threshold/force", "threshold/time", "threshold/margin", "patch/x",
+    for name in ("history/unsettled_steps", "energy/initial", "threshold/force",
+                 "threshold/time", "threshold/margin", "patch/x",
                  "patch/radius", "failure/modes")
     for value in OTHER_TYPES
 ]  # fmt: skip

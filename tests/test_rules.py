@@ -208,6 +208,7 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "E402": data("    3    3   -3", "    3    3    0"),
     "E403": data("  1150000.", "       0.0"),
     "E404": wrong("not-positive-definite"),
+    "E534": data("   800000.\n", "   1.E-300\n"),
     "E405": data("    1   0.     0.053", "    1   0.     -.053"),
     "E406": data("      .106", "       0.0"),
     "E407": wrong("layers-do-not-add-up"),

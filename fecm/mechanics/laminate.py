@@ -159,17 +159,18 @@ def laminate(
     layers = list(zip(plies, angles, strict=True))
     bars = np.array([transformed_stiffness(reduced_stiffness(p), angle) for p, angle in layers])
     shears = np.array([transformed_shear(p.g13, p.g23, angle) for p, angle in layers])
-    h = float(faces[-1] - faces[0]) if total is None else total
+    h = np.float64(faces[-1] - faces[0] if total is None else total)
     mean, second, first = _mean_densities(plies, faces)
     return Laminate(
         A=(bars * (upper - lower)).sum(axis=0),
         B=(bars * (upper**2 - lower**2)).sum(axis=0) / 2.0,
         D=(bars * (upper**3 - lower**3)).sum(axis=0) / 3.0,
         shear=(shears * (upper - lower)).sum(axis=0),
-        mass=mean * h,
-        rotary_inertia=second * h**3 / 12.0,
-        coupling_inertia=first * h**2,
-        thickness=h,
+        mass=float(mean * h),
+        # Powers of a float raise an OverflowError; powers of NumPy's are infinite.
+        rotary_inertia=float(second * h**3 / 12.0),
+        coupling_inertia=float(first * h**2),
+        thickness=float(h),
         plies=Plies(np.array(angles, dtype=float), faces, bars, shears, plies),
     )
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import reprlib
 from collections.abc import Iterable, Mapping
 from typing import Protocol, runtime_checkable
 
@@ -9,9 +10,12 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._extensions import Group, installed
-from fecm._typing import Floats
-from fecm.mechanics.failure import CRITERIA, MODES, Candidates, Criterion, Strengths
+from fecm._typing import Bools, Floats
+from fecm.mechanics.failure import CRITERIA, MODES, Candidates, Criterion, Strengths, exposure_of
 
+MOST_MODES = 32  # of one criterion
+MOST_CODES = 127  # codes of the modes of all criteria are stored as int8
+ROUNDING = 1e-9  # size of a negative exposure that is rounding
 # Other names of a result's group `failure`, and of the criterion of the interfaces.
 RESERVED = ("x", "y", "under_load", "interlaminar")
 
@@ -76,19 +80,41 @@ class OwnCriterion:
         by_mode = found if isinstance(found, Mapping) else {self.name.replace("_", " "): found}
         if not by_mode or not all(isinstance(mode, str) for mode in by_mode):
             raise self._error(f"returned {found!r}, not exposures by the names of modes")
+        if len(by_mode) > MOST_MODES:
+            raise self._error(f"returned {len(by_mode)} modes; at most {MOST_MODES} are allowed")
+        if names := [mode for mode in by_mode if not mode.isprintable()]:
+            raise self._error(
+                f"returned the mode {names[0]!r}; the names of modes are printable texts"
+            )
         if self.modes and (new := [mode for mode in by_mode if mode not in self.modes]):
             raise self._error(
                 f"returned the mode {new[0]!r}, and without stress {', '.join(self.modes)}: "
                 "return all modes, 0 where one does not apply"
             )
-        return tuple((mode, self._checked(values, s1, s2, tau)) for mode, values in by_mode.items())
+        made = tuple((mode, self._checked(v, s1, s2, tau)) for mode, v in by_mode.items())
+        largest = exposure_of(made)
+        if (wrong := largest < -ROUNDING).any():
+            text = "return 0 where the criterion does not apply"
+            raise self._wrong_value(largest, wrong, s1, s2, tau, f"; {text}")
+        return made
+
+    def _wrong_value(
+        self, exposure: Floats, wrong: Bools, s1: Floats, s2: Floats, tau: Floats, hint: str = ""
+    ) -> CriterionError:
+        """Error that names the first wrong exposure and its stresses."""
+        first = tuple(np.argwhere(wrong)[0].tolist())
+        where = f"sigma_1 = {s1[first]:.6g}, sigma_2 = {s2[first]:.6g}, tau_12 = {tau[first]:.6g}"
+        return self._error(f"returned {exposure[first]:g} for {where}{hint}")
 
     def _checked(self, values: object, s1: Floats, s2: Floats, tau: Floats) -> Floats:
         """Exposures of one mode as numbers."""
         try:
-            exposure = np.asarray(values, dtype=float)
-        except (TypeError, ValueError):
-            raise self._error(f"returned {values!r}, not numbers") from None
+            given = np.asarray(values)
+            if given.dtype.kind not in "fiu":  # neither complex numbers nor booleans
+                raise TypeError
+            exposure = given.astype(float)
+        except (TypeError, ValueError, OverflowError):
+            raise self._error(f"returned {reprlib.repr(values)}, not real numbers") from None
         if exposure.shape != s1.shape:
             raise self._error(
                 f"returned an array of the shape {exposure.shape} for stresses of {s1.shape}"
@@ -97,9 +123,7 @@ class OwnCriterion:
         # Stresses that are not finite are those of a diverging motion.
         wrong &= np.isfinite(s1) & np.isfinite(s2) & np.isfinite(tau)
         if wrong.any():
-            at = tuple(np.argwhere(wrong)[0].tolist())
-            where = f"sigma_1 = {s1[at]:.6g}, sigma_2 = {s2[at]:.6g}, tau_12 = {tau[at]:.6g}"
-            raise self._error(f"returned {exposure[at]:g} for {where}")
+            raise self._wrong_value(exposure, wrong, s1, s2, tau)
         return exposure
 
     def _error(self, fault: str) -> CriterionError:
@@ -138,4 +162,8 @@ def with_own(own: Iterable[OwnCriterion]) -> tuple[dict[str, Criterion], tuple[s
     for one in own:
         criteria[one.name] = one
         modes |= dict.fromkeys(one.modes)
+    if len(modes) > MOST_CODES:
+        raise CriterionError(
+            f"the failure criteria have {len(modes)} modes; at most {MOST_CODES} are allowed"
+        )
     return criteria, tuple(modes)

@@ -84,7 +84,10 @@ class OwnLaw:
             value = value.item()
         if not isinstance(value, Real):
             raise self._error(f"the {what} is {value!r}, not a real number", indentation)
-        number = float(value)
+        try:
+            number = float(value)
+        except OverflowError:  # an integer of hundreds of digits
+            number = math.inf
         if not math.isfinite(number):
             if abs(indentation) > FAR:
                 raise OverflowError

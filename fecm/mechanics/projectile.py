@@ -16,7 +16,7 @@ from fecm._dataclasses import frozen
 from fecm._errors import OptionsError
 from fecm._typing import Floats
 from fecm.mechanics.contact_law import Number
-from fecm.mechanics.own_projectile import LinearProjectile, OwnProjectile
+from fecm.mechanics.own_projectile import LinearProjectile, OwnProjectile, ProjectileError
 
 # The report's steel rod, in lb, in and s: a spherical cap of five steps, then the cylinder.
 REPORT_CAP = (0.22, 0.36, 0.43, 0.48, 0.50)
@@ -323,7 +323,12 @@ class RodIntegrator:
         a4 = a0 / theta
         one, none = np.eye(n), np.zeros((n, n))
         lumped = m.ndim == 1
-        effective = np.linalg.inv(K + a0 * (np.diag(m) if lumped else m))
+        try:
+            effective = np.linalg.inv(K + a0 * (np.diag(m) if lumped else m))
+        except np.linalg.LinAlgError:
+            raise ProjectileError(
+                f"the mass of the projectile is lost beside its stiffness in a time step of {dt:g}"
+            ) from None
 
         def on_mass(factor: float) -> Floats:
             weighed = factor * effective

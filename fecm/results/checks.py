@@ -8,6 +8,7 @@ from typing import Any
 from fecm._text import shown
 from fecm.results.criteria import OWN_CRITERIA, criteria_of
 from fecm.results.exposures import AT_REST, LOAD_FACTOR
+from fecm.results.metrics import MOBILITY
 from fecm.results.schema import FIXED, dataset_of
 
 
@@ -37,9 +38,11 @@ def shape_error(
     return ""
 
 
-# Attributes that are numbers, and lists of texts, by group.  Without those of history and energy
-# a result only lacks its summary.
+# Attributes that are numbers, and lists of texts, by group.  A result without those of history and
+# energy only lacks its summary.
 NUMBERS = {
+    "energy": ("initial",),
+    "history": ("permanent_indentation", "unsettled_steps", MOBILITY),
     "threshold": ("force", "time", "margin"),
     "patch": ("x", "y", "radius"),
 }

@@ -8,14 +8,14 @@ from typing import Any, Protocol, runtime_checkable
 
 from fecm._measured_tables import read_rows
 from fecm.studies import StudyError
-from fecm.sweeps.case import Case, CasesError, check_count
+from fecm.sweeps.case import MOST_CASES, Case, CasesError, check_count
 from fecm.sweeps.values import check_free, check_known, free_value_of, parse_value, value_of
 
 
 def read_cases(path: Path) -> list[Case]:
     """Read a CSV table, a header of names and one row per case; CasesError states a line."""
     try:
-        rows = [(line, row) for line, row in read_rows(path) if any(row)]
+        rows = [(line, row) for line, row in read_rows(path, MOST_CASES + 1) if any(row)]
     except StudyError as error:
         raise CasesError(str(error)) from None
     if len(rows) < 2:

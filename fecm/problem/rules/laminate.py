@@ -13,6 +13,7 @@ from fecm.mechanics.elements import HIGHEST_ORDER
 from fecm.problem.problem import Problem
 
 THICKNESS_TOLERANCE = 1.0e-6  # difference of thicknesses that is rounding
+LARGEST_RATIO = 1e12  # of the transverse shear moduli of a ply
 THINNEST = 1.0e-4  # thickness over the longer side of the plate
 # Thickness over the distance between supports, above which plate theory is off, and fails.
 THICK = 0.1
@@ -87,6 +88,25 @@ def invalid_constant(segment: Plies) -> Reports:
     for ply in _plies_of(segment):
         for name, value in _invalid_constants(ply):
             yield Report(f"The {name} is {value:g}; it must be positive.", ply.place(name))
+
+
+@rule(
+    "E534",
+    Subject.LAMINATE,
+    "G13 and G23 of a ply differ by a factor of more than 1e12.",
+    cause="Their stiffness can't be inverted within the precision of numbers.",
+    remedy="Correct MATE or MATS.",
+)
+def unequal_shear_moduli(segment: Plies) -> Reports:
+    """Find transverse shear moduli of which one is lost in rounding."""
+    for ply in _plies_of(segment):
+        small, large = sorted((ply.g13, ply.g23))
+        if not _invalid_constants(ply) and small < large / LARGEST_RATIO:
+            message = (
+                f"G13 = {ply.g13:g} and G23 = {ply.g23:g} differ by a factor of more than "
+                f"{LARGEST_RATIO:g}."
+            )
+            yield Report(message, ply.place("shear modulus G13"))
 
 
 @rule(
@@ -311,13 +331,14 @@ OF_MATERIAL = (
     unknown_order,
     unknown_stress_points,
     invalid_constant,
+    unequal_shear_moduli,
     impossible_poissons_ratio,
     invalid_layer_thickness,
     layer_out_of_order,
     invalid_thickness,
     layers_do_not_add_up,
 )
-OF_MATERIALS = (invalid_constant, impossible_poissons_ratio)
+OF_MATERIALS = (invalid_constant, unequal_shear_moduli, impossible_poissons_ratio)
 OF_LAYERS = (invalid_layer_thickness, layer_out_of_order)
 VALUES = (
     moduli_exchanged,
