@@ -310,8 +310,8 @@ def test_an_exported_force_is_a_measurement_in_the_units_of_the_deck(tmp_path: P
     assert compared.rms == 0.0
     assert compared.correlation == pytest.approx(1.0)
     other = run(small(data=DATA_CARDS + "UNIT\nin lbf s\n"))
-    with pytest.raises(fecm.FecmError, match="force is in N, and the deck in lbf"):
-        other.compare(tmp_path / "history.csv")
+    converted = other.compare(tmp_path / "history.csv")  # from N; 1 lbf is 4.4482216152605 N
+    assert converted.measured_peak * 4.4482216152605 == pytest.approx(compared.peak, rel=1e-12)
 
 
 def test_a_unit_with_a_comma_stays_in_its_column(result: Result) -> None:
