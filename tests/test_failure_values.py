@@ -158,6 +158,24 @@ def test_a_deck_without_the_segment_of_a_value_is_refused(name: str, reason: str
         fecm.sweep(bare, {name: [1.0, 2.0]})
 
 
+@pytest.mark.parametrize(("exposure", "is_broken"), [(1.00005, False), (1.001, True)])
+def test_a_run_and_a_sweep_agree_whether_an_exposure_is_above_1(
+    exposure: float, is_broken: bool
+) -> None:
+    deck = weak()
+    ply = deck.require(Allowables)
+    factor = max(one.exposure for one in largest_exposures(fecm.run_one(deck))) / exposure
+    scaled: dict[str, Any] = {name: factor * getattr(ply, name) for name in STRENGTHS}
+    single = fecm.run_one(deck.with_(**scaled))
+    (validity,) = fecm.sweep(deck, {name: [v] for name, v in scaled.items()}, measure="failure")[
+        "validity"
+    ]
+    assert max(one.exposure for one in largest_exposures(single)) == pytest.approx(exposure)
+    assert validity == single.validity
+    assert ("exposure > 1" in single.validity) is is_broken
+    assert any("exposure above 1" in note for note in single.notes) is is_broken
+
+
 def test_a_sweep_without_exposures_says_that_strengths_change_nothing() -> None:
     with pytest.warns(fecm.FecmWarning, match="yt and s12 change only exposures"):
         fecm.sweep(weak(), {"yt": [0.5], "s12": [0.5, 0.6]})

@@ -135,7 +135,7 @@ def _failure(result: Result) -> Iterator[Judgement]:
         yield Judgement(Level.UNJUDGED, "failure of plies", UNKNOWN, "the deck has no FAIL")
         return
     top = max(largest, key=lambda one: one.exposure)
-    broken = top.exposure > 1.0
+    broken = top.exposure > CROSSED
     words = f"{spelt(top.criterion)}; " + (
         "the run is elastic beyond the first failure" if broken else "1 is failure"
     )

@@ -337,7 +337,7 @@ def elastic_doubt(result: Stored, peak: float) -> str:
     beyond = []
     if result.threshold and peak > CROSSED * (force := float(result.threshold["force"])):
         beyond.append(f"delamination at {_quantity(result, force, 'force')}")
-    if any(found.exposure > 1.0 for found in largest_exposures(result)):
+    if any(found.exposure > CROSSED for found in largest_exposures(result)):
         beyond.append("the first failure")
     return f"elastic: beyond {' and '.join(beyond)}" if beyond else ""
 

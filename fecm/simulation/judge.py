@@ -155,7 +155,7 @@ def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:
         size = _size(result, indentation.value, h)
         reached = _reached(result, "indentation", size, indentation)
         yield Doubt(Reason.SOFT, f"{reached} h/4 the contact law of a half-space is doubtful")
-    broken = [spelt(one.criterion) for one in largest_exposures(result) if one.exposure > 1.0]
+    broken = [spelt(one.criterion) for one in largest_exposures(result) if one.exposure > CROSSED]
     if broken:
         yield Doubt(
             Reason.BROKEN,
