@@ -2,18 +2,21 @@
 
     python benchmarks/location.py models
     python benchmarks/location.py seeds [NUMBER]
+    python benchmarks/location.py mesh [NUMBER]
 
 The strains are those of a run of examples/panel-with-gages.inp struck at 112.5, 81 mm, every 2 us,
 with a normal scatter of 2 % of the largest strain of each gage.  `models` locates the impact with
 decks that are wrong by some per cent and prints the table of docs/locate.md.  `seeds` repeats the
 scatter 100 times and prints how often the 95 % ellipse covers the place, for strains of the same
-deck and for those of a series solution (examples/panel-strains.csv is one of them).
+deck and for those of a series solution (examples/panel-strains.csv is one of them).  `mesh` does so
+for a small panel of 10 x 8 elements and strains of 20 x 16 elements.
 """
 
 from __future__ import annotations
 
 import sys
 import warnings
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -21,11 +24,13 @@ import numpy as np
 
 import fecm
 from fecm._typing import Floats
+from fecm.deck.model import Patch
 
 ROOT = Path(__file__).parent.parent
 SERIES = ROOT / "tests" / "data" / "locate_public.csv"
 DECK = fecm.read_one(fecm.examples.path("panel-with-gages.inp"))
 PLACE = np.array([112.5, 81.0])
+SMALL_PLACE = (61.0, 47.0)
 NEAR = (90.0, 60.0, 135.0, 100.0)  # where seeds are located: no other place is a rival
 INTERVAL, LAST = 2e-6, 8e-4
 NOISE = 0.02  # standard deviation over the largest strain
@@ -132,6 +137,42 @@ def seeds(number: int) -> None:
         print(f"  peak force                          {peak.mean():+.1%} ± {peak.std():.1%}")
 
 
+def small_panel(nx: int, ny: int) -> fecm.Deck:
+    """A panel of 100 x 80 mm that a ball of 2 g hits at 2 m/s."""
+    gages = [(22.0, 18.0, 0.72, 0.0), (80.0, 24.0, 0.72, 45.0), (26.0, 64.0, 0.72, 90.0)]
+    deck = fecm.impact(
+        fecm.Plate.rectangle((100.0, 80.0), (nx, ny), support="simple"),
+        fecm.Laminate("[45/0/-45/90]s", "AS4/8552", 0.18),
+        fecm.RigidMass(2e-6),
+        fecm.Contact(2e4, 0.0, 0.0, 1.5),
+        velocity=2000.0,
+        duration=3e-4,
+        units="mm-N-s",
+        patch=None,
+        gages=gages,
+    )
+    disc = Patch("DISC", 5.0, *SMALL_PLACE)  # on the mesh that the deck has
+    return replace(deck, segments=(*deck.segments, disc), text="")
+
+
+def mesh(number: int) -> None:
+    """Print how often the ellipse covers the place if the strains are those of a finer mesh."""
+    with warnings.catch_warnings(action="ignore", category=fecm.FecmWarning):
+        run = fecm.run_one(small_panel(20, 16))
+    time = np.asarray(3e-6 * np.arange(1.0, 101.0))
+    strains = np.column_stack([np.interp(time, run.time, one) for one in run.gages.strain.T])
+    impulse = float(np.trapezoid(run.force, run.time))
+    true, deck = Strains(time, strains, float(run.force.max()), impulse), small_panel(10, 8)
+    x, y = SMALL_PLACE
+    near = (x - 15.0, y - 12.0, x + 15.0, y + 12.0)
+    inside = 0
+    for seed in range(number):
+        found = located(deck, (time, true.measured(seed)), true.noise, region=near, grid=10.0)
+        off = np.array([found.x, found.y]) - SMALL_PLACE
+        inside += bool(off @ np.linalg.solve(found.covariance, off) <= COVERED)
+    print(f"strains of elements half as long: {inside} of {number} inside the 95 % ellipse")
+
+
 if __name__ == "__main__":
     match sys.argv[1:]:
         case ["models"]:
@@ -140,5 +181,9 @@ if __name__ == "__main__":
             seeds(100)
         case ["seeds", text]:
             seeds(int(text))
+        case ["mesh"]:
+            mesh(100)
+        case ["mesh", text]:
+            mesh(int(text))
         case _:
             sys.exit(__doc__)

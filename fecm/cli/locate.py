@@ -41,6 +41,7 @@ class LocateOptions:
     shift: bool
     gains: bool
     mass: float | None
+    mesh_error: bool
     output: Path | None
     picture: Path | None
     overwrite: bool
@@ -87,6 +88,12 @@ class LocateOptions:
 @option("--gains", is_flag=True, help="Fit the gains of the gages over their geometric mean.")
 @option("--mass", type=POSITIVE, help="Mass of the projectile, for a bound of its energy.")
 @option(
+    "--mesh-error/--no-mesh-error",
+    default=True,
+    help="Add the error of the mesh to the standard deviations, by a run of elements half as long; "
+    "it takes longer than all the rest.  [default: mesh-error]",
+)
+@option(
     "-o",
     "--output",
     type=NAMED_PATH,
@@ -123,6 +130,7 @@ def locate(options: LocateOptions) -> None:
         options.shift,
         options.gains,
         options.mass,
+        options.mesh_error,
     )
     with every_minute(lambda minutes: f"fecm: locating for {minutes} min"):
         found = located(problem, options.strains, wanted)

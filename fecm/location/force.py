@@ -100,4 +100,4 @@ def _bias(force: Floats, covariance: Floats) -> float:
     squares, axes = np.linalg.eigh(covariance)
     root = axes * np.sqrt(np.maximum(squares, 0.0))
     draws = np.random.default_rng(0).normal(size=(DRAWS, len(force))) @ root.T
-    return float((force + draws).max(axis=1).mean() - force.max())
+    return max(0.0, float((force + draws).max(axis=1).mean() - force.max()))

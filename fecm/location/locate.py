@@ -39,6 +39,7 @@ def locate(
     shift: bool = False,
     gains: bool = False,
     mass: float | None = None,
+    mesh_error: bool = True,
 ) -> Location:
     """Locate an impact, and find its force history, from the strains of gages.
 
@@ -75,6 +76,9 @@ def locate(
         Fit the gains of three gages or more, over their geometric mean.
     mass : float, optional
         Mass of the projectile, for :attr:`Location.energy_bound`.
+    mesh_error : bool
+        Add the error of the mesh to the standard deviations, by a run of a mesh of elements half as
+        long; it takes longer than all the rest.
 
     Returns
     -------
@@ -101,7 +105,7 @@ def locate(
     box = None if region is None else tuple(map(float, region))
     if box is not None and len(box) != 4:
         raise StudyError(f"region has {len(box)} numbers; it takes x0, y0, x1, y1")
-    options = Options(box, grid, basis, noise, shift, gains, mass)
+    options = Options(box, grid, basis, noise, shift, gains, mass, mesh_error)
     found = located(problem_of(deck), strains, options)
     for text in found.notes:
         warn(text)
@@ -180,7 +184,7 @@ def _location(
     if noise == 0.0:
         noise = float(np.finfo(np.float32).eps) * float(np.abs(table.strains).max())
     misfit = rms / noise if options.noise is not None else 1.0
-    finer = _finer_mesh(problem, table, (fit, times), found)
+    finer = _finer_mesh(problem, table, (fit, times), found) if options.mesh_error else None
     errors = fit.errors(found, noise * max(1.0, misfit), finer)
     knots = times.origin + fit.model.knots(found.shift)
     force = judged_force(knots, found.force, errors, fit.model.basis)

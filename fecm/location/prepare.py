@@ -56,6 +56,7 @@ class Options(NamedTuple):
     shift: bool = False
     gains: bool = False
     mass: float | None = None
+    mesh_error: bool = True
 
     def check(self) -> None:
         """Refuse values that make no sense, by a StudyError."""

@@ -9,6 +9,7 @@ from fecm.location.location import Location
 
 LABEL_WIDTH = 18
 DIGITS = 5
+BIASED = 0.1  # bias of a peak over its standard deviation, from which on it is shown
 
 
 def lines(found: Location) -> list[str]:
@@ -27,7 +28,7 @@ def lines(found: Location) -> list[str]:
             f"{_with_error(found, 'peak_force')} at {shown('time', found.time_of_peak)}",
         ),
     ]
-    if found.peak_bias:
+    if found.peak_bias is not None and found.peak_bias > BIASED * (found.sd_peak_force or 0.0):
         bias = quantity(found.peak_bias, found.unit("peak_bias"), 2)
         rows.append(("", f"the largest of noisy values, too high by about {bias}"))
     rows += [

@@ -20,7 +20,7 @@ NOT_DESCRIBED = 1.5  # misfit over the noise
 UNLIKELY = 3.0  # standard deviations of a misfit that noise explains
 LARGE = 0.01  # strain: plies fail at one to two per cent
 LEFT = 0.5  # share of the squares of a gage that is not described
-OF_MESH = 0.5  # share of a standard deviation that a finer mesh would lower
+OF_MESH = 0.8  # share of the mesh in the standard deviation of the place
 VAGUE = 0.25  # standard deviation of a place over the side of the region
 
 
