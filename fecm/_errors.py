@@ -30,11 +30,15 @@ class StudyError(FecmError, ValueError):
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """End of a message about an unknown name: the most similar known one; empty if none is."""
+    """End of a message about an unknown name: the most similar known one; empty if none is.
+
+    Upper and lower case are alike.
+    """
     import difflib  # 1 ms, only after a mistake
 
-    close = difflib.get_close_matches(name, known, n=1)
-    return f"; did you mean {close[0]}?" if close else ""
+    folded = {one.casefold(): one for one in known}
+    close = difflib.get_close_matches(name.casefold(), folded, n=1)
+    return f"; did you mean {folded[close[0]]}?" if close else ""
 
 
 class FecmWarning(UserWarning):

@@ -196,3 +196,11 @@ def test_the_scatter_of_toughness_has_its_share_in_the_scatter_of_the_margin(
     np.testing.assert_allclose(first, [1.0, 0.0], atol=0.05)
     table = done.stdout.split("threshold_margin")[1].splitlines()
     assert table[1].split()[0] == "giic"
+
+
+@pytest.mark.parametrize("options", [("--vary", "GIIc=.1,.2"), ("--random", "GIIc=normal:1,.1")])
+def test_a_name_in_other_letters_is_suggested(options: tuple[str, ...], tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(tough(400))
+    done = call("sweep", "d.inp", *options, "-o", "s.h5", cwd=tmp_path)
+    assert done.exit_code == 2
+    assert "did you mean giic?" in done.stderr

@@ -32,6 +32,8 @@ LABELS = {
     "angle": "Angle added (°)", "nu12": r"$\nu_{12}$", "e1": "$E_1$", "e2": "$E_2$",
     "g12": "$G_{12}$", "g13": "$G_{13}$", "g23": "$G_{23}$", "dt": "Time step",
     "patch": "Radius of the patch", "x0": "$x_0$", "y0": "$y_0$",
+    "giic": r"Toughness $G_\mathrm{IIc}$", "xt": "$X_T$", "xc": "$X_C$", "yt": "$Y_T$",
+    "yc": "$Y_C$", "s12": "$S_{12}$", "s13": "$S_{13}$", "s23": "$S_{23}$",
     "max_indentation": "Largest indentation",
 }  # fmt: skip
 _NUMBERS_OF_NODES = (name for name, one in VARIABLES.items() if one.kind is Kind.INTEGER)

@@ -10,6 +10,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from fecm._errors import did_you_mean
 from fecm._text import shown
 from fecm._typing import Floats
 from fecm.sweeps.case import CasesError
@@ -266,7 +267,8 @@ def _check_random(name: str, *, free: bool) -> None:
         return
     numbers = [known for known in NAMES if kind_of(known) is Kind.NUMBER]
     if name not in numbers:
-        raise CasesError(f"`{name}` cannot be random; the names are {', '.join(numbers)}")
+        others = did_you_mean(name, numbers) or f"; the names are {', '.join(numbers)}"
+        raise CasesError(f"`{name}` cannot be random{others}")
 
 
 def _of_logarithm(law: Law) -> str:
