@@ -435,7 +435,7 @@ def test_the_cost_is_told_beforehand(folder: Path) -> None:
         ((*UNIFORM, "--correlation", "k,q=0.5"), "is not a pair of random names (k)"),
         (("--vary", "k=1e6", "--correlation", "k,q=0.5"), "--correlation needs --random"),
         (("--random", "k", "--samples", 16), "NAME=LAW"),
-        (("--random", "layup=uniform:1,2", "--samples", 16), "did you mean k?"),
+        (("--random", "layup=uniform:1,2", "--samples", 16), "the names are velocity"),
         (("--random", "kk=uniform:1,2", "--samples", 16), "did you mean k?"),
         (("--random", "k=uniform:1e6,2e6", "--samples", 15), "at least 16"),
         (("--random", "k=uniform:1e6,2e6"), "needs --samples"),
