@@ -91,7 +91,7 @@ def test_the_summary_names_criterion_mode_ply_place_and_time(tmp_path: Path) -> 
     for words in ("interactive", "ply", "at (", "time"):
         assert words in line
     # The four elements share the node under the load.
-    assert "4 points are left out of these exposures" in done.stdout
+    assert "left out          4 points under the load" in done.stdout
 
 
 def test_an_exposure_beyond_the_limit_exits_1_and_keeps_the_result(tmp_path: Path) -> None:

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm._typing import Array, Bools
+from fecm._typing import Bools
 from fecm.api import load_deck
 from fecm.deck.model import Allowables
-from fecm.mechanics.exposures import Evaluations, FailureEnvelope, Largest, Maxima, Places
+from fecm.mechanics.exposures import FailureEnvelope, Largest, Maxima
 from fecm.mechanics.failure import CRITERIA, exposure_of
 from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.results.exposures import evaluations_in_contact
@@ -152,7 +152,7 @@ def test_summary_and_json_have_the_first_failure(tmp_path: Path, every_step: Res
     (line,) = (line for line in lines if line.startswith("first failure"))
     for words in (
         f"{first.mode} ({first.criterion})",
-        f"ply {first.ply} at ({first.x:.6g}, {first.y:.6g})",
+        f"{first.where} at ({first.x:.6g}, {first.y:.6g})",
         f"time {float(f'{first.time:.4g}'):.6g}",
         f"force {float(f'{first.force:.4g}'):.6g}",
     ):
@@ -187,7 +187,6 @@ def test_points_under_the_load_do_not_count_and_keep_their_exposures() -> None:
     elements, points, plies = 3, 4, 5
     near = np.zeros((elements, points), dtype=bool)
     near[1, 2:] = near[2, 0] = True
-    x, y = generator.random((2, elements, points))
     states = Maxima.none(len(CRITERIA), elements * points * plies * 2)
     states.exposure[:] = generator.random(states.exposure.shape)
     each = states.exposure.reshape(len(CRITERIA), elements, points, plies, 2)
@@ -196,25 +195,18 @@ def test_points_under_the_load_do_not_count_and_keep_their_exposures() -> None:
     interfaces.exposure[:] = [[3.0] * 4, [9.0] * 4, [1.0, 2.0, 8.0, 2.0]]
     before = states.exposure.copy()
 
-    def largest(counts: Bools) -> dict[str, Array]:
+    def largest(counts: Bools) -> Largest:
         envelope = FailureEnvelope(states, interfaces, Largest.none(len(CRITERIA) + 1))
-        envelope.find_largest(counts)
-        one = envelope.largest
-        found = Evaluations(one.exposure[None], one.state[None], one.mode[None])
-        place, own = np.divmod(found.state[:, :-1], plies * 2)
-        columns = Places(x, y).columns(found, place, own // 2 + 1, plies - 1)
-        return {name: values[0] for name, values in columns.items()}
+        envelope.find_largest(counts, counts.all(axis=1))
+        return envelope.largest
 
     found = largest(~near)
     np.testing.assert_array_equal(states.exposure, before)
     for number in range(len(CRITERIA)):
         outside = np.where(near[:, :, None, None], 0.0, each[number])
-        element, point, ply, _ = np.unravel_index(outside.argmax(), outside.shape)
-        assert found["exposure"][number] == outside.max() < 1.0
-        assert found["ply"][number] == ply + 1
-        assert (found["x"][number], found["y"][number]) == (x[element, point], y[element, point])
+        assert found.exposure[number] == outside.max() < 1.0
+        assert found.state[number] == outside.argmax()
     # Elements 2 and 3 have a point under the load.
-    assert (found["exposure"][-1], found["ply"][-1]) == (3.0, 1)
-    assert found["x"][-1] == pytest.approx(x[0].mean())
+    assert (found.exposure[-1], found.state[-1]) == (3.0, 0)
     nothing = largest(np.zeros_like(near))
-    assert np.isnan(nothing["exposure"]).all()
+    assert np.isnan(nothing.exposure).all()

@@ -11,11 +11,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._dataclasses import frozen
-from fecm._typing import Array, Bools, Floats, Indices
-from fecm.mechanics.failure import CRITERIA, Codes
+from fecm._typing import Bools, Floats, Indices
+from fecm.mechanics.failure import Codes
 
 Numbers = NDArray[np.int64]
 NOWHERE = -1  # number of the state of a criterion none of whose exposures counts
+# Exposures that differ by less than this share are equal: rounding does not decide which is the
+# largest, nor when.  kernels.c has it too.
+TIE = 1.0e-9
 
 
 @dataclass
@@ -34,9 +37,9 @@ class Maxima:
 
 @dataclass
 class Largest:
-    """Of each criterion the largest exposure so far that counts; the interlaminar one is the last.
+    """Largest exposure so far of each criterion, of those that count.
 
-    Of equal ones it is that with the lowest number.
+    The interlaminar criterion comes last.  Ties go to the lowest number.
     """
 
     exposure: Floats  # (criteria,); NaN where none counts
@@ -64,9 +67,11 @@ class FailureEnvelope:
     largest: Largest
     # Structures of the kernels that point to these arrays; no checkpoint has it.
     kept: object = field(default=None, init=False, repr=False, compare=False)
+    # Exposures on the circle around the load; None without a load.
+    circle: FailureEnvelope | None = None
 
-    def find_largest(self, counts: Bools, strains: Floats | None = None) -> None:
-        """Find the largest exposures of the points that count, (elements, points).
+    def find_largest(self, counts: Bools, far: Bools, strains: Floats | None = None) -> None:
+        """Find the largest exposures of the points, (elements, points), and elements that count.
 
         The strains, (elements, points, 6), are those of the exposures that have just risen.
         """
@@ -80,7 +85,7 @@ class FailureEnvelope:
             largest.exposure[number], largest.state[number] = exposure, state
             largest.mode[number] = 0 if state == NOWHERE else plies.mode[number, state]
         between = self.interfaces
-        largest.state[-1] = state = _of_interfaces(between.exposure, counts)
+        largest.state[-1] = state = _of_interfaces(between.exposure, far)
         largest.exposure[-1] = np.nan if state == NOWHERE else between.exposure.flat[state]
         largest.mode[-1] = 0 if state == NOWHERE else between.mode.flat[state]
 
@@ -91,21 +96,26 @@ def _of_plies(exposure: Floats, counts: Bools) -> Indices:
     if not at.any():
         return np.full(len(exposure), NOWHERE)
     of_point = exposure.reshape(len(exposure), at.size, -1)
-    points = np.where(at, of_point.max(axis=2), -np.inf).argmax(axis=1)
+    points = first_of_largest(np.where(at, of_point.max(axis=2), -np.inf))
     criteria = np.arange(len(exposure))
-    states = of_point[criteria, points].argmax(axis=1)
+    states = first_of_largest(of_point[criteria, points])
     found = points * of_point.shape[2] + states
     # Below 0 where no ply has strengths.
     return np.where(exposure[criteria, found] < 0.0, NOWHERE, found)
 
 
-def _of_interfaces(exposure: Floats, counts: Bools) -> int:
-    """Number of the interface with the largest exposure, of elements all of whose points count."""
-    far = counts.all(axis=1, keepdims=True)
-    known = np.where(far & np.isfinite(exposure), exposure, -1.0)
+def _of_interfaces(exposure: Floats, far: Bools) -> int:
+    """Number of the interface with the largest exposure, of elements that count."""
+    known = np.where(far[:, None] & np.isfinite(exposure), exposure, -1.0)
     if not (known >= 0.0).any():
         return NOWHERE
-    return int(known.argmax())
+    return int(first_of_largest(known.ravel()))
+
+
+def first_of_largest(exposures: Floats) -> Indices:
+    """Position along the last axis of the first exposure that is the largest, but for a tie."""
+    largest = exposures.max(axis=-1, keepdims=True)
+    return np.asarray((exposures >= largest - TIE * np.abs(largest)).argmax(axis=-1))
 
 
 class Evaluations(NamedTuple):
@@ -134,31 +144,6 @@ class Places:
     y: Floats
 
     @cached_property
-    def _means(self) -> tuple[Floats, Floats]:
+    def centres(self) -> tuple[Floats, Floats]:
         """Means of the points of each element, (elements,): x and y."""
         return self.x.mean(axis=1), self.y.mean(axis=1)
-
-    def columns(
-        self, found: Evaluations, points: Indices, plies: Indices, interfaces: int
-    ) -> dict[str, Array]:
-        """Columns of evaluations, the interlaminar criterion before those of users.
-
-        `points` and `plies`, from 1, are those of the states of the plies, and `interfaces` is the
-        number of an element's.  The ply of an interface is the one above it, its place the mean of
-        its element's points.
-        """
-        element, interface = np.divmod(found.state[:, -1:], max(interfaces, 1))
-        x, y = self._means
-        numbers = {"mode": found.mode, "ply": np.concatenate([plies, interface + 1], axis=1)}
-        floats = {
-            "exposure": found.exposure,
-            "x": np.concatenate([self.x.ravel()[points], x[element]], axis=1),
-            "y": np.concatenate([self.y.ravel()[points], y[element]], axis=1),
-        }
-        columns = {
-            **{name: np.where(found.state == NOWHERE, 0, of) for name, of in numbers.items()},
-            **{name: np.where(found.state == NOWHERE, np.nan, of) for name, of in floats.items()},
-        }
-        known, count = len(CRITERIA), found.state.shape[1]
-        order = [*range(known), count - 1, *range(known, count - 1)]
-        return {name: values[:, order] for name, values in columns.items()}

@@ -23,12 +23,15 @@ from fecm._typing import Array, Bools, Floats, Indices
 from fecm.mechanics import failure
 from fecm.mechanics.exposures import (
     NOWHERE,
+    TIE,
     Evaluations,
     FailureEnvelope,
     Largest,
     Maxima,
     Places,
+    first_of_largest,
 )
+from fecm.mechanics.load_circle import CircleStresses
 from fecm.mechanics.own_criterion import OwnCriterion, with_own
 from fecm.mechanics.ply_stresses import PlyStresses, Zone
 from fecm.mechanics.strains import Rows
@@ -174,11 +177,34 @@ class ZoneCriteria:
         return np.asarray(exposures.max(axis=2))
 
 
+class Around(NamedTuple):
+    """The circle around the load on which exposures are evaluated too."""
+
+    circle: CircleStresses
+    centre: tuple[float, float]
+    # (elements,): r / R of the elements next to the circle, by which interlaminar stresses, which
+    # fall as 1 / r, are larger on the circle than at the centre of the element; 0 of the others.
+    factor: Floats
+    coarseness: float  # longest side of the elements on the circle over R
+
+
 class FailureMonitor:
     """Evaluates the failure criteria of all plies.
 
-    `counts` says at which points, (elements, points), exposures count among the largest, by default
-    at all.
+    Parameters
+    ----------
+    stresses : PlyStresses
+        Stresses of the plies per displacement.
+    strengths : AllStrengths
+        Strengths of the plies.
+    criteria : sequence of OwnCriterion
+        Criteria of users, after the known ones.
+    counts : ndarray of bool (elements, points), optional
+        Points whose exposures count among the largest; by default all.
+    far : ndarray of bool (elements,), optional
+        Elements whose interlaminar exposures count; by default those whose points all do.
+    around : Around, optional
+        Exposures on the circle around the load.
     """
 
     represents: ClassVar[bool] = False  # whether it evaluates representatives where it can
@@ -189,12 +215,20 @@ class FailureMonitor:
         strengths: AllStrengths,
         criteria: Sequence[OwnCriterion] = (),
         counts: Bools | None = None,
+        far: Bools | None = None,
+        around: Around | None = None,
     ) -> None:
         self.stresses = stresses
         # By name, those of users last, and the modes that their codes mean.
         self.criteria, self.modes = with_own(criteria)
         elements, points, _ = stresses.shape
         self.counts = np.ones((elements, points), dtype=bool) if counts is None else counts
+        self.far = np.asarray(self.counts.all(axis=1)) if far is None else far
+        self.has_interfaces = not isinstance(stresses, CircleStresses)
+        self.around = around
+        self.circle: FailureMonitor | None = None
+        if around is not None:
+            self.circle = type(self)(around.circle, strengths, criteria)
         # Users' criteria may not be proportional to the stresses.
         outermost = self.represents and not stresses.stretches and not criteria
         self.zones: list[ZoneCriteria] = []
@@ -240,6 +274,8 @@ class FailureMonitor:
                 strict=True,
             )
         ]
+        if self.circle is not None:
+            made.circle = self.circle.with_residual(residual)
         return made
 
     def start(self) -> FailureEnvelope:
@@ -259,7 +295,9 @@ class FailureMonitor:
                 interfaces.exposure[family.rows] = np.nan
         states.exposure[:, ~known.ravel()] = UNKNOWN
         envelope = FailureEnvelope(states, interfaces, Largest.none(len(self.criteria) + 1))
-        envelope.find_largest(self.counts)
+        envelope.find_largest(self.counts, self.far)
+        if self.circle is not None:
+            envelope.circle = self.circle.start()
         return envelope
 
     def update(
@@ -272,17 +310,95 @@ class FailureMonitor:
         rows = []
         for displacement, time in zip(fields, times, strict=True):
             self._evaluate(envelope, displacement, time)
-            rows.append(deepcopy(envelope.largest))
+            if self.circle is not None and envelope.circle is not None:
+                self.circle._evaluate(envelope.circle, displacement, time)
+            rows.append(self.largest(envelope))
         return Evaluations.of(rows)
+
+    def largest(self, envelope: FailureEnvelope) -> Largest:
+        """Largest exposures so far, those on the circle included.
+
+        Numbers of states on the circle follow the others: of plies by their numbers on the circle,
+        of interfaces by those of the elements next to it.
+        """
+        largest = deepcopy(envelope.largest)
+        on_circle = self._on_circle(envelope)
+        if on_circle is None:
+            return largest
+        before = np.nan_to_num(largest.exposure, nan=-1.0)
+        higher = np.nan_to_num(on_circle.exposure, nan=-1.0) > before * (1.0 + TIE)
+        for name, values in vars(on_circle).items():
+            getattr(largest, name)[higher] = values[higher]
+        return largest
+
+    def _on_circle(self, envelope: FailureEnvelope) -> Largest | None:
+        """Largest exposures on the circle, numbered as by :meth:`largest`; None without one."""
+        if envelope.circle is None or self.around is None:
+            return None
+        on_circle = deepcopy(envelope.circle.largest)
+        between = envelope.interfaces.exposure
+        on_circle.state[:-1] += np.where(on_circle.state[:-1] == NOWHERE, 0, self._all_states)
+        scaled = np.where(np.isfinite(between), between, -1.0) * self.around.factor[:, None]
+        number = int(first_of_largest(scaled.ravel())) if scaled.size else NOWHERE
+        on_circle.exposure[-1], on_circle.state[-1] = np.nan, NOWHERE
+        if number != NOWHERE and scaled.flat[number] > 0.0:
+            on_circle.exposure[-1] = scaled.flat[number]
+            on_circle.state[-1] = between.size + number
+            on_circle.mode[-1] = envelope.interfaces.mode.flat[number]
+        return on_circle
+
+    def circle_columns(self, envelope: FailureEnvelope, places: Places) -> dict[str, Array]:
+        """Largest exposures on the circle, (criteria,) each; empty without a circle.
+
+        With their times, and the number of points of the circle that have them.
+        """
+        on_circle = self._on_circle(envelope)
+        if on_circle is None or envelope.circle is None or self.circle is None:
+            return {}
+        located = self.located(Evaluations.of([on_circle]), places)
+        columns = {name: values[0] for name, values in located.items()}
+        plies, interfaces = envelope.circle.plies, envelope.interfaces
+        count = len(on_circle.state)
+        times, points = np.full(count, np.nan), np.zeros(count, dtype=np.int64)
+        for number, state in enumerate(on_circle.state.tolist()):
+            if state == NOWHERE:
+                continue
+            tied = on_circle.exposure[number] * (1.0 - TIE)
+            if number == count - 1:
+                times[-1] = interfaces.time.flat[state - interfaces.exposure.size]
+                factor = self._factors[:, None]
+                points[-1] = np.count_nonzero((interfaces.exposure * factor >= tied).any(axis=1))
+            else:
+                times[number] = plies.time[number, state - self._all_states]
+                of_points = plies.exposure[number].reshape(-1, self.circle.states)
+                points[number] = np.count_nonzero((of_points >= tied).any(axis=1))
+        order = self._order
+        return columns | {"time": times[order], "points": points[order]}
+
+    @property
+    def _factors(self) -> Floats:
+        """Factors of elements next to the circle, (elements,); 0 without one."""
+        return np.zeros(len(self.far)) if self.around is None else self.around.factor
+
+    @property
+    def _order(self) -> list[int]:
+        """Criteria as columns have them: the interlaminar one before those of users."""
+        known, count = len(failure.CRITERIA), len(self.criteria) + 1
+        return [*range(known), count - 1, *range(known, count - 1)]
+
+    @property
+    def _all_states(self) -> int:
+        """Number of states of a criterion in the arrays of an envelope."""
+        return self.counts.size * self.states
 
     def _evaluate(self, envelope: FailureEnvelope, displacement: Floats, time: float) -> None:
         """Raise the exposures to those of a displacement field."""
         strains, gradients = self.stresses.strains(displacement)
         every = range(len(self.criteria))
         self._raise_plies(every, envelope.plies, strains, time)
-        for zone in self.zones:
+        for zone in self.zones if self.has_interfaces else ():
             self._raise_interfaces(zone, envelope.interfaces, gradients, time)
-        envelope.find_largest(self.counts, strains)
+        envelope.find_largest(self.counts, self.far, strains)
 
     def every_state(self, envelope: FailureEnvelope) -> Maxima:
         """Largest exposures of all states, (criteria, states).
@@ -316,42 +432,85 @@ class FailureMonitor:
         worst = zone.between_plies(gradients[zone.elements])
         # Elements without nine nodes have no interlaminar stresses.
         before = np.where(np.isnan(worst), np.nan, interfaces.exposure[place])
-        higher = worst > before
+        higher = worst > before * (1.0 + TIE)
         interfaces.exposure[place] = np.where(higher, worst, before)
         interfaces.time[place] = np.where(higher, time, interfaces.time[place])
         mode = failure.MODES.index("interlaminar shear")
         interfaces.mode[place] = np.where(higher, mode, interfaces.mode[place])
 
     def located(self, found: Evaluations, places: Places) -> dict[str, Array]:
-        """Columns of evaluations with the plies and places of the largest exposures."""
-        _, of_element, most = self.stresses.shape
-        points, own = np.divmod(found.state[:, :-1], self.states)
+        """Columns of evaluations with the plies and places of the largest exposures.
+
+        The ply of an interface is the one above it, its place the centre of its element, or the
+        point of the circle towards that centre.  The interlaminar criterion comes before those of
+        users.
+        """
+        state = found.state
+        ply, x, y = (np.zeros(state.shape) for _ in range(3))
+        ply[:, :-1], points = self._plies_of(state[:, :-1] % self._all_states)
+        x[:, :-1], y[:, :-1] = places.x.ravel()[points], places.y.ravel()[points]
+        interfaces = max(self.stresses.shape[2] - 1, 1)
+        element, interface = np.divmod(state[:, -1] % (len(self.far) * interfaces), interfaces)
+        x_centre, y_centre = places.centres
+        ply[:, -1], x[:, -1], y[:, -1] = interface + 1, x_centre[element], y_centre[element]
+        if self.circle is not None and self.around is not None:
+            on_circle = state[:, :-1] >= self._all_states
+            number = np.where(on_circle, state[:, :-1] - self._all_states, 0)
+            plies, points = self.circle._plies_of(number)
+            ply[:, :-1] = np.where(on_circle, plies, ply[:, :-1])
+            for values, at in zip((x, y), self.around.circle.points.T, strict=True):
+                values[:, :-1] = np.where(on_circle, at[points], values[:, :-1])
+            near = state[:, -1] >= len(self.far) * interfaces
+            factor = np.where(near, self.around.factor[element], 1.0)
+            for values, origin in zip((x, y), self.around.centre, strict=True):
+                towards = origin + (values[:, -1] - origin) / factor
+                values[:, -1] = np.where(near, towards, values[:, -1])
+        nowhere = state == NOWHERE
+        columns = {
+            "mode": np.where(nowhere, 0, found.mode),
+            "ply": np.where(nowhere, 0, ply).astype(np.int64),
+            **{
+                name: np.where(nowhere, np.nan, values)
+                for name, values in {"exposure": found.exposure, "x": x, "y": y}.items()
+            },
+        }
+        return {name: values[:, self._order] for name, values in columns.items()}
+
+    def _plies_of(self, state: Array) -> tuple[Array, Indices]:
+        """Plies, from 1, and rows of the points of states."""
+        points, number = np.divmod(np.maximum(state, 0), self.states)
         plies = np.zeros((len(self.zones), self.states), dtype=np.intp)
         for row, zone in zip(plies, self.zones, strict=True):
             row[: len(zone.represent.states)] = zone.represent.states // 2 + 1
-        at = plies[self._zone_of[points // of_element], own]
-        return places.columns(found, points, at, most - 1)
+        return plies[self._zone_of[points // self.stresses.shape[1]], number], points
 
-    def load_factors(self, largest: Largest) -> dict[str, float]:
+    def load_factors(self, envelope: FailureEnvelope) -> dict[str, float]:
         """Factors on the stresses less those at rest at which the largest exposures are 1.
 
         NaN where no exposure was found.
         """
         factors = dict.fromkeys(self.criteria, np.nan)
+        largest = self.largest(envelope)
         for (name, criterion), state, strain in zip(
             self.criteria.items(), largest.state[:-1].tolist(), largest.strain, strict=False
         ):
             if state == NOWHERE:
                 continue
-            point, own = divmod(state, self.states)
-            zone = self.zones[self._zone_of[point // self.stresses.shape[1]]]
-            strengths = zone.strengths[zone.represent.states[own] // 2]
-            added = strain @ zone.in_plane[:, :, own]
-            added -= zone.at_rest[:, own] - zone.residual[:, own]
+            monitor = self if state < self._all_states else self.circle
+            assert monitor is not None  # only a monitor with a circle has states beyond its own
+            zone, number = monitor._state(state % self._all_states)
+            strengths = zone.strengths[zone.represent.states[number] // 2]
+            added = strain @ zone.in_plane[:, :, number]
+            added -= zone.at_rest[:, number] - zone.residual[:, number]
             if strengths is not None:
-                at_rest = zone.at_rest[:, own]
+                at_rest = zone.at_rest[:, number]
                 factors[name] = failure.load_factor(strengths, criterion, at_rest, added)
         return factors
+
+    def _state(self, state: int) -> tuple[ZoneCriteria, int]:
+        """The zone of a state, and its number among the states of its point."""
+        point, number = divmod(state, self.states)
+        return self.zones[self._zone_of[point // self.stresses.shape[1]]], number
 
     def _raise_plies(
         self, numbers: Sequence[int], plies: Maxima, strains: Floats, time: float
@@ -388,7 +547,8 @@ class FailureMonitor:
             for number in numbers:
                 candidates = criteria[number](run.strengths, s1, s2, tau)
                 exposure = failure.exposure_of(candidates)
-                larger = exposure > exposures[number, block, run.states]
+                before = exposures[number, block, run.states]
+                larger = exposure > before * (1.0 + TIE)
                 if not larger.any():
                     continue
                 point, state = np.nonzero(larger)

@@ -8,7 +8,7 @@ node or element n.  An absent node of an element and the equation of a restraine
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Any
@@ -28,6 +28,7 @@ SHAPES = (TRIANGLE, QUADRILATERAL, CUBIC)
 MOST_NODES = SHAPES[-1].nodes
 # Tolerance of the relative node positions of congruent elements, relative to the largest element.
 TOLERANCE = 1.0e-9
+PARALLEL = 1.0e-2  # sides whose directions differ by less form no corner
 
 
 @frozen
@@ -195,6 +196,41 @@ def longest_sides(elements: Ints, coordinates: Floats) -> Floats:
         sides = np.hypot(*np.moveaxis(corners - np.roll(corners, 1, axis=1), 2, 0))
         longest[block.rows] = sides.max(axis=1)
     return longest
+
+
+def inner_corners(blocks: Sequence[ElementBlock], coordinates: Floats, held: Bools) -> Floats:
+    """Corners inside the plate of lines whose nodes are held, (n, 2).
+
+    Parameters
+    ----------
+    blocks : sequence of ElementBlock
+        All elements.
+    coordinates : ndarray (numnp, 2)
+        Coordinates of the nodes, length.
+    held : ndarray of bool (numnp,)
+        Nodes whose deflection is restrained.
+    """
+    ends = np.concatenate(
+        [
+            block.nodes[:, [side, (side + 1) % block.shape.corners]]
+            for block in blocks
+            for side in range(block.shape.corners)
+        ]
+    )
+    ends = np.sort(ends[held[ends].any(axis=1)], axis=1)
+    keys, counts = np.unique(ends @ [len(coordinates), 1], return_counts=True)
+    sides = np.column_stack(np.divmod(keys, len(coordinates)))
+    rim = distinct(sides[counts == 1])
+    sides = sides[held[sides].all(axis=1)]
+    way = coordinates[sides[:, 1]] - coordinates[sides[:, 0]]
+    double = 2.0 * np.arctan2(way[:, 1], way[:, 0])  # the same for both senses of a direction
+    total, number = np.zeros((len(coordinates), 2)), np.zeros(len(coordinates))
+    for end in sides.T:
+        np.add.at(total, end, np.column_stack([np.cos(double), np.sin(double)]))
+        np.add.at(number, end, 1.0)
+    is_corner = np.hypot(*total.T) < (1.0 - PARALLEL) * number
+    is_corner[rim] = False
+    return np.asarray(coordinates[is_corner])
 
 
 def extent(places: Floats) -> tuple[Floats, Floats]:

@@ -275,15 +275,35 @@ def _stresses(
         plies = made(rows)
     if "FAIL" in words:
         # Modules for FAIL only, 1 ms.
-        from fecm.mechanics.failure_monitor import FailureMonitor
+        from fecm.mechanics.failure_monitor import Around, FailureMonitor
         from fecm.mechanics.kernels.failure import CompiledMonitor
+        from fecm.mechanics.load_circle import CircleStresses
 
         kind = CompiledMonitor if motion.solver == KERNELS else FailureMonitor
         strengths = strengths_of_deck(problem.deck)
         first = next((ply for plies in strengths for ply in plies if ply is not None), None)
         own = [] if first is None else [one.with_modes(first) for one in criteria]
         counts = None if under_load is None else ~under_load
-        failure = kind(made(None), strengths, own, counts)
+        around = None
+        if problem.load_place is not None:
+            circle = CircleStresses(
+                problem.families,
+                problem.load_place,
+                problem.reach_of_load,
+                zones,
+                initial,
+                curvature=plate.curvature,
+                nonlinear=plate.nonlinear,
+                stretches=stretches,
+            )
+            around = Around(
+                circle,
+                problem.load_place,
+                problem.factors_to_circle,
+                problem.coarseness(circle.elements),
+            )
+        far = ~problem.under_load_by_centre
+        failure = kind(made(None), strengths, own, counts, far, around)
         if cure is not None:
             failure = failure.with_residual([one.stresses for one in cure])
     return plies, failure

@@ -9,14 +9,22 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from fecm._dataclasses import frozen
-from fecm._typing import Bools, Floats
+from fecm._typing import Bools, Floats, Indices
 from fecm.deck import model
 from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, moves_only
 from fecm.deck.model import Deck
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import CRITERIA, PlyExposure, largest_in_plies
 from fecm.mechanics.laminate import Laminate, effective_rigidity, threshold_force
-from fecm.mechanics.mesh import ElementBlock, Mesh, element_blocks, element_centres, extent
+from fecm.mechanics.mesh import (
+    ElementBlock,
+    Mesh,
+    element_blocks,
+    element_centres,
+    extent,
+    inner_corners,
+    longest_sides,
+)
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import uniform_stresses
 from fecm.mechanics.points import RADIUS_PER_THICKNESS, locate, patch_weights
@@ -211,11 +219,52 @@ class Problem:
         return self.laminate.thickness / 2.0 + (0.0 if self.patch is None else self.patch.radius)
 
     def under_load(self, x: Floats, y: Floats) -> Bools:
-        """Whether plate theory does not hold at points."""
-        if self.load_place is None:
-            return np.zeros(x.shape, dtype=bool)
-        distance = np.hypot(x - self.load_place[0], y - self.load_place[1])
-        return np.asarray(distance < self.reach_of_load)
+        """Whether plate theory does not hold at points: under the load, at corners of supports.
+
+        A support along a line pulls with a single force where the line turns inside the plate, and
+        the moments beside it grow without bound on finer meshes.
+        """
+        wrong = np.zeros(x.shape, dtype=bool)
+        if self.load_place is not None:
+            distance = np.hypot(x - self.load_place[0], y - self.load_place[1])
+            wrong |= distance < self.reach_of_load
+        for corner in self.inner_corners:
+            wrong |= np.hypot(x - corner[0], y - corner[1]) < self.laminate.thickness / 2.0
+        return wrong
+
+    @cached_property
+    def under_load_by_centre(self) -> Bools:
+        """Whether plate theory does not hold at the centre of each element, (numel,)."""
+        centres = element_centres(self.mesh.elements, self.mesh.coordinates)
+        return self.under_load(*centres.T)
+
+    @cached_property
+    def inner_corners(self) -> Floats:
+        """Corners of lines of supported nodes inside the plate, (n, 2).
+
+        At such a node the sides of elements whose ends are held in w run in two directions.
+        """
+        return inner_corners(self.families, self.mesh.coordinates, self.mesh.equations[:, W] == 0)
+
+    def coarseness(self, elements: Indices) -> float:
+        """Longest side of some elements over the reach of the load."""
+        return float(self._longest_sides[elements].max(initial=0.0)) / self.reach_of_load
+
+    @cached_property
+    def _longest_sides(self) -> Floats:
+        """Longest side of every element, (numel,), length."""
+        return longest_sides(self.mesh.elements, self.mesh.coordinates)
+
+    @cached_property
+    def factors_to_circle(self) -> Floats:
+        """Distance from the load over the reach of the load, of elements next to it, (numel,).
+
+        Of elements whose centre is farther away than the reach, by at most their longest side; 0 of
+        the others.
+        """
+        reach, distances = self.reach_of_load, self.distances
+        is_next = (distances >= reach) & (distances <= reach + self._longest_sides)
+        return np.where(is_next & ~self.under_load_by_centre, distances / reach, 0.0)
 
     @cached_property
     def contact(self) -> Floats | None:

@@ -34,7 +34,7 @@ from fecm.report.content import (
 from fecm.report.model import extent, impactor, of_problem
 from fecm.report.trust import judgements, problem_of
 from fecm.results.criteria import spelt, where
-from fecm.results.exposures import largest_exposures
+from fecm.results.exposures import Failure, largest_exposures, verdict
 from fecm.results.first_failure import first_failures, threshold_energy
 from fecm.results.metrics import INTEGERS, METRICS
 from fecm.results.result import Result
@@ -193,8 +193,10 @@ def _sentence(result: Result, problem: Problem | None) -> str:
         if not math.isnan(one.force):
             text = f"{text}, at {said(one.force, 'force')} and {said(one.energy, 'force*length')}"
         parts.append(text)
-    elif largest_exposures(result):
-        parts.append("no ply reaches an exposure of 1")
+    elif largest := largest_exposures(result):
+        is_open = verdict(largest) is Failure.OPEN
+        open_words = "; finer meshes may (open)" if is_open else ""
+        parts.append(f"no ply reaches an exposure of 1 on this mesh{open_words}")
     if problem is None:
         text = "; ".join(parts)
         return f"{text[0].upper()}{text[1:]}."

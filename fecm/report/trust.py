@@ -17,7 +17,13 @@ from fecm.report.content import UNKNOWN, Cell, Judgement, Level, Number, number,
 from fecm.results.criteria import spelt
 from fecm.results.end import End
 from fecm.results.errors import ResultFileError
-from fecm.results.exposures import FEWEST, evaluations_in_contact, largest_exposures
+from fecm.results.exposures import (
+    FEWEST,
+    Failure,
+    evaluations_in_contact,
+    largest_exposures,
+    verdict,
+)
 from fecm.results.linear_plate import CURVED
 from fecm.results.metrics import MOBILITY
 from fecm.results.result import Result
@@ -141,7 +147,10 @@ def _failure(result: Result) -> Iterator[Judgement]:
     )
     if is_open := result.end in UNDECIDED and not broken:
         words = f"{words}; {SO_FAR}"
-    level = Level.DOUBTFUL if broken or is_open else Level.WITHIN
+    decided = verdict(largest) is not Failure.OPEN
+    if not decided:
+        words = f"{words}; finer meshes may decide otherwise: open"
+    level = Level.DOUBTFUL if broken or is_open or not decided else Level.WITHIN
     yield Judgement(level, "largest exposure", number(top.exposure, digits=4), words)
     count = evaluations_in_contact(result)
     if count is not None and "history/force" in result:

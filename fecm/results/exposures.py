@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+from enum import StrEnum
+
 import numpy as np
 
 from fecm._dataclasses import frozen
@@ -11,7 +15,16 @@ from fecm.results.errors import ResultFileError
 from fecm.results.stored import Stored
 
 LOWER_BOUNDS = "the run ends in contact: exposures are lower bounds"
+TIE = 1e-9  # relative difference of equal exposures; see fecm/mechanics/exposures.py
 FEWEST = 20  # evaluations of FAIL during contact below which maxima may be missed
+# Longest side of the elements on the circle around the load, over the radius R of the circle.
+COARSENESS = "coarseness"  # attribute of the group circle
+RESOLVED = 2.6  # up to which the errors of the largest exposures were measured to be within a band
+# Share by which largest exposures are below those of the finest mesh at a coarseness, of four
+# plates on up to eight meshes; beyond the last it is not known.
+COARSE = (RESOLVED, 3.8, 7.5, 15.0)
+TOO_LOW = {"plies": (0.015, 0.08, 0.25, 0.44), INTERLAMINAR: (0.12, 0.23, 0.37, 0.55)}
+TOO_HIGH = {"plies": 0.04, INTERLAMINAR: 0.12}
 # Attributes of a criterion's group, with CURE.
 AT_REST = "at_rest"
 LOAD_FACTOR = "load_factor"
@@ -19,7 +32,7 @@ LOAD_FACTOR = "load_factor"
 
 @frozen
 class LargestExposure:
-    """Largest exposure of a criterion outside the elements under the load."""
+    """Largest exposure of a criterion outside the load and on the circle around it."""
 
     criterion: str
     exposure: float
@@ -28,6 +41,9 @@ class LargestExposure:
     x: float
     y: float
     time: float
+    mirrors: int = 0  # other points that have the same exposure
+    # Lowest and highest exposure that finer meshes may give; None where it is not known.
+    band: tuple[float, float] | None = None
     # With CURE; None without it.
     at_rest: float | None = None  # largest exposure of the residual stresses alone
     # Factor on all other stresses at the place at which the exposure is 1.
@@ -38,45 +54,142 @@ class LargestExposure:
         """The ply, or the plies of the interface, in words."""
         return plies_of(self.criterion, self.ply)
 
+    @property
+    def is_open(self) -> bool:
+        """Whether finer meshes may decide otherwise whether the exposure reaches 1."""
+        return self.band is not None and self.band[0] < 1.0 <= self.band[1]
+
+
+class Failure(StrEnum):
+    """Whether an exposure reaches 1, as far as the mesh decides it."""
+
+    REACHED = "reached"
+    NOT_REACHED = "not reached"
+    OPEN = "open"
+
+
+def verdict(largest: Sequence[LargestExposure]) -> Failure:
+    """Whether any of the largest exposures reaches 1 on every finer mesh, on none, or on some."""
+    if any(one.exposure >= 1.0 and not one.is_open for one in largest):
+        return Failure.REACHED
+    return Failure.OPEN if any(one.is_open for one in largest) else Failure.NOT_REACHED
+
+
+def mesh_band(exposure: float, criterion: str, coarseness: float) -> tuple[float, float]:
+    """Lowest and highest exposure that finer meshes may give.
+
+    Parameters
+    ----------
+    exposure : float
+        Largest exposure of this mesh.
+    criterion : str
+        Its criterion.
+    coarseness : float
+        Longest side of the elements at the load over c + h/2.
+
+    Examples
+    --------
+    >>> [round(value, 3) for value in mesh_band(1.0, "puck", 2.0)]
+    [0.962, 1.015]
+    >>> [round(value, 3) for value in mesh_band(1.0, "puck", 7.5)]
+    [0.962, 1.333]
+    """
+    kind = INTERLAMINAR if criterion == INTERLAMINAR else "plies"
+    low = float(np.interp(coarseness, COARSE, TOO_LOW[kind], right=1.0))
+    highest = exposure / (1.0 - low) if low < 1.0 else math.inf
+    return exposure / (1.0 + TOO_HIGH[kind]), highest
+
 
 def largest_exposures(stored: Stored) -> list[LargestExposure]:
-    """Largest exposure of each criterion; empty without FAIL.
+    """Largest exposure of each criterion, outside the load and on the circle around it.
 
-    Raises ResultFileError if the result names no such mode.
+    Ties go to the lowest element, point and ply.  Empty without FAIL.  Raises ResultFileError if
+    the result names no such mode.
     """
     if "failure/x" not in stored:
         return []
+    largest = []
+    for number, criterion in enumerate(criteria_of(stored.attributes_of("failure"))):
+        candidates = [_outside(stored, criterion), _on_circle(stored, criterion, number)]
+        known = [one for one in candidates if one is not None]
+        if known:
+            largest.append(max(known, key=lambda one: one.exposure))
+    return largest
+
+
+def _outside(stored: Stored, criterion: str) -> LargestExposure | None:
+    """Largest exposure of a criterion at points outside the load; None if there is none."""
+    exposure = stored[f"failure/{criterion}/exposure"]
+    outside = np.where(near_load(stored, criterion), -1.0, exposure)
+    if not outside.size or not (outside >= 0.0).any():
+        return None
+    limit = np.nanmax(outside) * (1.0 - TIE)
+    place = np.unravel_index(int((outside >= limit).argmax()), outside.shape)
+    # (element, point, ply, face), or (element, interface)
+    points = 2 if exposure.ndim > 2 else 1
+    at, ply = place[:points], place[points]
     x, y = stored["failure/x"], stored["failure/y"]
+    tied = (outside >= limit).reshape(*outside.shape[:points], -1).any(axis=-1)
+    return _largest(
+        stored,
+        criterion,
+        float(exposure[place]),
+        int(stored[f"failure/{criterion}/mode"][place]),
+        int(ply) + 1,
+        float(x[at].mean()),
+        float(y[at].mean()),
+        float(stored[f"failure/{criterion}/time"][place]),
+        int(np.count_nonzero(tied)) - 1,
+    )
+
+
+def _on_circle(stored: Stored, criterion: str, number: int) -> LargestExposure | None:
+    """Largest exposure of a criterion on the circle around the load; None if there is none."""
+    path = "failure/circle"
+    if f"{path}/exposure" not in stored:
+        return None
+    exposure, mode, ply, x, y, time, points = (
+        stored[f"{path}/{name}"][number].item()
+        for name in ("exposure", "mode", "ply", "x", "y", "time", "points")
+    )
+    if not exposure >= 0.0:
+        return None
+    return _largest(stored, criterion, exposure, mode, ply, x, y, time, points - 1)
+
+
+def _largest(
+    stored: Stored,
+    criterion: str,
+    exposure: float,
+    code: int,
+    ply: int,
+    x: float,
+    y: float,
+    time: float,
+    mirrors: int,
+) -> LargestExposure:
+    """The exposure with the name of its mode and what CURE adds."""
     modes = stored.attributes_of("failure").get("modes", ())
-    found = []
-    for criterion in criteria_of(stored.attributes_of("failure")):
-        exposure = stored[f"failure/{criterion}/exposure"]
-        outside = np.where(near_load(stored, criterion), -1.0, exposure)
-        if not outside.size or not (outside >= 0.0).any():
-            continue
-        place = np.unravel_index(int(np.nanargmax(outside)), outside.shape)
-        # (element, point, ply, face), or (element, interface)
-        at, ply = (place[:2], place[2]) if exposure.ndim > 2 else (place[:1], place[1])
-        code = int(stored[f"failure/{criterion}/mode"][place])
-        if not 0 <= code < len(modes):
-            raise ResultFileError(
-                f"failure/{criterion}/mode has the mode {code}, which has no name"
-            )
-        about = stored.attributes_of(f"failure/{criterion}")
-        found.append(
-            LargestExposure(
-                criterion,
-                exposure=float(exposure[place]),
-                mode=modes[code],
-                ply=int(ply) + 1,
-                x=float(x[at].mean()),
-                y=float(y[at].mean()),
-                time=float(stored[f"failure/{criterion}/time"][place]),
-                at_rest=_number(about.get(AT_REST)),
-                load_factor=_number(about.get(LOAD_FACTOR)),
-            )
-        )
-    return found
+    if not 0 <= code < len(modes):
+        raise ResultFileError(f"failure/{criterion}/mode has the mode {code}, which has no name")
+    about = stored.attributes_of(f"failure/{criterion}")
+    coarseness = stored.attributes_of("failure/circle").get(COARSENESS)
+    band = None
+    if isinstance(coarseness, float):
+        band = mesh_band(exposure, criterion, coarseness)
+    return LargestExposure(
+        criterion,
+        exposure=exposure,
+        mode=modes[code],
+        ply=ply,
+        x=x,
+        y=y,
+        time=time,
+        mirrors=mirrors,
+        band=band,
+        at_rest=_number(about.get(AT_REST)),
+        load_factor=_number(about.get(LOAD_FACTOR)),
+    )
 
 
 def _number(value: object) -> float | None:
@@ -86,10 +199,11 @@ def _number(value: object) -> float | None:
 
 def near_load(stored: Stored, criterion: str) -> Array:
     """Mask of the exposures of a criterion under the load, of a shape that fits theirs."""
+    if criterion == INTERLAMINAR and "failure/centre_under_load" in stored:
+        return np.asarray(stored["failure/centre_under_load"] != 0)[:, None]
     under = stored["failure/under_load"] != 0
-    if criterion == INTERLAMINAR:  # whose exposures belong to the element
-        under = under.any(axis=1)
-        return np.asarray(under[:, None])
+    if criterion == INTERLAMINAR:  # of older versions
+        return np.asarray(under.any(axis=1))[:, None]
     return np.asarray(under[:, :, None, None])
 
 

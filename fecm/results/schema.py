@@ -293,6 +293,18 @@ class Exposure(Group):
 _PlyExposure = Annotated[Exposure, "numel npp layers faces"]
 
 
+class CircleExposures(Group):
+    """Largest exposures on the circle of the patch's radius + h/2 around the load."""
+
+    exposure: Annotated[Floats, "", "largest exposure on the circle over time"]
+    time: Annotated[Floats, "", "its time", "time"]
+    mode: Annotated[Int8s, "", "its mode: index into the attribute modes of failure"]
+    ply: Annotated[Int32s, "", "its ply, from 1 at z = -h/2; of an interface the one above it"]
+    x: Annotated[Floats, "", "x of its place", "length"]
+    y: Annotated[Floats, "", "y of its place", "length"]
+    points: Annotated[Int32s, "", "number of points on the circle that have it"]
+
+
 class Failure(Group):
     """Largest exposures over time, found by FAIL."""
 
@@ -301,13 +313,18 @@ class Failure(Group):
     under_load: Annotated[
         Int32s,
         "numel npp",
-        "1 where plate theory does not hold: nearer than the patch's radius + h/2 to the load",
+        "1 where plate theory does not hold: nearer than the patch's radius + h/2 to the load, or "
+        "than h/2 to a corner of supports inside the plate",
     ]
     max_stress: _PlyExposure
     tsai_wu: _PlyExposure
     hashin: _PlyExposure
     puck: _PlyExposure
     interlaminar: Annotated[Exposure, "numel interfaces"]
+    centre_under_load: Annotated[
+        Int32s, "numel", "1 where plate theory does not hold at the centre of the element"
+    ]
+    circle: Annotated[CircleExposures, "criteria"]
 
 
 class Exposures(Rows):
@@ -368,8 +385,8 @@ def _datasets(group: str, kind: type[Group], outer: str = "") -> Iterator[Datase
         for name, column in getattr(base, "__annotations__", {}).items():
             path = f"{group}/{name}"
             sizes, *about = column.__metadata__
-            if column.__origin__ is Exposure:
-                yield from _datasets(path, Exposure, sizes)
+            if column.__origin__ in (Exposure, CircleExposures):
+                yield from _datasets(path, column.__origin__, sizes)
             else:
                 shape = tuple(int(n) if n.isdigit() else n for n in (sizes or outer).split())
                 description, dimension = (*about, "")[:2]

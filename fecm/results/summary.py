@@ -13,7 +13,13 @@ from fecm.deck.units import quantity as shown_quantity
 from fecm.deck.units import unit_of
 from fecm.results.criteria import spelt, where
 from fecm.results.end import End
-from fecm.results.exposures import LargestExposure, evaluations_in_contact, largest_exposures
+from fecm.results.exposures import (
+    Failure,
+    LargestExposure,
+    evaluations_in_contact,
+    largest_exposures,
+    verdict,
+)
 from fecm.results.run_metrics import end_of, metrics_of
 from fecm.results.stored import Stored
 from fecm.results.validity import CROSSED
@@ -66,7 +72,7 @@ def summary(result: Stored) -> list[str]:
         lines.append(_line("delamination", f"{_delamination(result)}{_delaminations(result)}"))
     lines += _exposures(result)
     if "failure/x" in result and (count := np.count_nonzero(result["failure/under_load"])):
-        lines.append(_line("under the load", f"{count} points are left out of these exposures"))
+        lines.append(_line("left out", f"{count} points under the load or at corners of supports"))
     if "modes/angular_frequency" in result:
         found = result["modes/angular_frequency"]
         texts = ", ".join(f"{omega:.6g}" for omega in found[:LISTED])
@@ -160,11 +166,14 @@ def _exposures(result: Stored) -> list[str]:
     count = evaluations_in_contact(result)
     if count is not None and "history/force" in result:
         lines.append(_line("evaluations", f"{count} of FAIL during contact"))
+    is_open = "open, as finer meshes may decide otherwise; on this mesh "
+    is_open = is_open if verdict(largest) is Failure.OPEN else ""
     if first:
-        lines.append(_line("first failure", _first_failure(result, first[0])))
+        lines.append(_line("first failure", f"{is_open}{_first_failure(result, first[0])}"))
     elif largest and count:
         ends = " by the end of the run, which is in contact: open"
-        lines.append(_line("first failure", f"none{ends if result.still_in_contact else ''}"))
+        ends = ends if result.still_in_contact else ""
+        lines.append(_line("first failure", f"{is_open}none{ends}"))
     return lines
 
 
@@ -198,8 +207,25 @@ def _exposure(result: Stored, largest: LargestExposure) -> str:
         spelt(largest.criterion),
         f"{least}{largest.exposure:.4g}: {largest.mode}, "
         f"{where(largest.criterion, largest.ply)} at ({largest.x:.6g}, {largest.y:.6g}), "
-        f"time {_quantity(result, largest.time, 'time')}",
+        f"time {_quantity(result, largest.time, 'time')}{_mirrors(largest)}{_band(largest)}",
     )
+
+
+def _mirrors(largest: LargestExposure) -> str:
+    """How many other points have the same exposure."""
+    count = largest.mirrors
+    return f", and {count} point{'s' if count > 1 else ''} that mirror{'s' * (count == 1)} it" * (
+        count > 0
+    )
+
+
+def _band(largest: LargestExposure) -> str:
+    """The exposures that finer meshes may give."""
+    if largest.band is None:
+        return ""
+    low, high = largest.band
+    above = f"to {high:.3g}" if math.isfinite(high) else "or more"
+    return f"; finer meshes {low:.3g} {above}"
 
 
 def _at_rest(largest: LargestExposure) -> str:

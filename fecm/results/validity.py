@@ -19,7 +19,7 @@ from fecm.results.end import End, Texts
 from fecm.results.linear_plate import LIMITS, InPlane, softness
 
 STRAIN = 0.01  # largest strain for which plies are taken as linear
-# Exposure, or force relative to the delamination threshold, from which on a case is beyond it.  A
+# Exposure, or force relative to the delamination threshold, above which a case is beyond it.  A
 # search for the velocity that reaches 1 ends a hair above.
 CROSSED = 1.0001
 SLOPE = 0.25  # of a nonlinear plate, up to which its rotations are moderate

@@ -11,7 +11,12 @@ from fecm._dataclasses import frozen
 from fecm.mechanics.mesh import rigid_deflections
 from fecm.results.criteria import spelt
 from fecm.results.end import LATE, OPEN_ENDS, OPEN_PEAKS, End
-from fecm.results.exposures import FEWEST, count_evaluations, largest_exposures
+from fecm.results.exposures import (
+    FEWEST,
+    RESOLVED,
+    count_evaluations,
+    largest_exposures,
+)
 from fecm.results.linear_plate import REMEDY, TOO_SOFT, unsafe
 from fecm.results.result import Result
 from fecm.results.run_metrics import steps_to_decide
@@ -121,6 +126,7 @@ def _few_evaluations(simulation: Simulation, result: Result) -> Iterator[str]:
     """Note of a contact in which FAIL is evaluated so rarely that maxima are missed."""
     if simulation.state.failure is None:
         return
+    yield from _coarse_elements(simulation, result)
     count = count_evaluations(result)
     if "history/force" in result and count < FEWEST and result["history/force"].any():
         yield (
@@ -128,6 +134,22 @@ def _few_evaluations(simulation: Simulation, result: Result) -> Iterator[str]:
             "exposures and the first failure may be missed; evaluate more often, in the loop of "
             "the steps"
         )
+
+
+def _coarse_elements(simulation: Simulation, result: Result) -> Iterator[str]:
+    """Note of elements so large that exposures at the load are lower bounds."""
+    monitor = simulation.model.failure
+    if monitor is None or monitor.around is None or monitor.around.coarseness <= RESOLVED:
+        return
+    reach, unit = simulation.problem.reach_of_load, result.units.get("length", "")
+    side, radius, wanted = (
+        f"{factor * reach:.3g} {unit}".rstrip()
+        for factor in (monitor.around.coarseness, 1.0, RESOLVED)
+    )
+    yield (
+        f"exposures at the load are lower bounds: the elements there have sides of {side}, and "
+        f"c + h/2 is {radius}; refine the mesh at the load to sides of {wanted}"
+    )
 
 
 def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:

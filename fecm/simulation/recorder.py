@@ -15,7 +15,7 @@ from fecm.mechanics.failure import CRITERIA
 from fecm.mechanics.strains import STRAINS
 from fecm.problem.build import ImpactModel
 from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR, OWN_CRITERIA
-from fecm.results.exposures import LOAD_FACTOR
+from fecm.results.exposures import COARSENESS, LOAD_FACTOR
 from fecm.results.groups import STORED_BY
 from fecm.results.schema import (
     BY_LAMINATE,
@@ -31,7 +31,7 @@ from fecm.simulation.saved import subset
 from fecm.simulation.step_recorder import EVERY_STEP, OnBlock, StepRecorder
 
 if TYPE_CHECKING:
-    from fecm.mechanics.exposures import FailureEnvelope
+    from fecm.mechanics.exposures import FailureEnvelope, Places
     from fecm.mechanics.failure_monitor import FailureMonitor
 
 Steps = Sequence[int]  # of rows
@@ -85,7 +85,9 @@ def _padded(parts: Sequence[Floats]) -> Floats:
     return found
 
 
-def exposures_of(monitor: FailureMonitor, found: FailureEnvelope) -> dict[str, Array]:
+def exposures_of(
+    monitor: FailureMonitor, found: FailureEnvelope, places: Places
+) -> dict[str, Array]:
     """Datasets of the largest exposures of criteria, those of plies as (states,)."""
     arrays, plies = {}, monitor.every_state(found)
     for part in ("exposure", "time", "mode"):
@@ -94,7 +96,8 @@ def exposures_of(monitor: FailureMonitor, found: FailureEnvelope) -> dict[str, A
                 values = np.where(values < 0.0, np.nan, values)
             arrays[f"failure/{name}/{part}"] = values
         arrays[f"failure/{INTERLAMINAR}/{part}"] = getattr(found.interfaces, part)
-    return arrays
+    on_circle = monitor.circle_columns(found, places)
+    return arrays | {f"failure/circle/{name}": values for name, values in on_circle.items()}
 
 
 class Recorder:
@@ -125,6 +128,7 @@ class Recorder:
             MEMBRANE: 0,
             "failure": int(model.failure is not None),
             **{f"failure/{name}": int(model.failure is not None) for name in (*ALL_CRITERIA, *own)},
+            "failure/circle": int(model.failure is not None and model.failure.circle is not None),
             "patch": int(model.patch is not None),
         }
         if model.stretching is not None:
@@ -196,6 +200,10 @@ class Recorder:
             self._sink.attributes("failure", {"modes": list(model.failure.modes)})
             if self._own:
                 self._sink.attributes("failure", {OWN_CRITERIA: list(self._own)})
+            if model.failure.around is not None:
+                self._sink.attributes(
+                    "failure/circle", {COARSENESS: model.failure.around.coarseness}
+                )
         for path, array in self._constants().items():
             self._sink.write(path, 0, array)
         if self._room["tape8"]:
@@ -236,6 +244,7 @@ class Recorder:
             found["failure/x"] = x
             found["failure/y"] = y
             found["failure/under_load"] = near.astype(int)
+            found["failure/centre_under_load"] = (~model.failure.far).astype(int)
         if self._room["stresses"]:
             x, y = model.stress_points.places(mesh.coordinates)
             found["stresses/x"] = x
@@ -283,14 +292,14 @@ class Recorder:
 
     def failure(self, found: FailureEnvelope) -> None:
         """Store the largest exposures of FAIL."""
-        monitor = self._model.failure
-        if monitor is None:
+        monitor, places = self._model.failure, self._model.stress_places
+        if monitor is None or places is None:
             return
         shapes = {dataset.path: shape for dataset, shape in self._datasets}
-        for path, values in exposures_of(monitor, found).items():
+        for path, values in exposures_of(monitor, found, places).items():
             self._sink.write(path, 0, values.reshape(shapes[path]))
         if monitor.has_residual:
-            for name, factor in monitor.load_factors(found.largest).items():
+            for name, factor in monitor.load_factors(found).items():
                 self._sink.attributes(f"failure/{name}", {LOAD_FACTOR: factor})
 
     def finish(self) -> None:

@@ -149,8 +149,10 @@ def in_one_motion(
     except (CasesError, DivergenceError, LawError, ArithmeticError) as error:
         return [*invalid, Outcome.failed(dict.fromkeys(made, str(error)))]
     found: list[dict[str, Floats]] = [{} for _ in problems]
+    places = simulation.model.stress_places
     for number, other in enumerate(simulation.others, start=1):
-        found[number] = exposures_of(other.monitor, other.envelope)
+        assert places is not None  # the program has FAIL
+        found[number] = exposures_of(other.monitor, other.envelope, places)
     outcomes = invalid
     for (number, (one, case)), arrays in zip(made.items(), found, strict=True):
         own = {path: values.reshape(sink.arrays[path].shape) for path, values in arrays.items()}

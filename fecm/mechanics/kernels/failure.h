@@ -85,10 +85,11 @@ INLINE int64_t NAME(first_of_four)(int64_t first, int64_t count) {
     return first + 4 > count && count >= 4 ? count - 4 : first;
 }
 
-/* Make an exposure the largest of a criterion if it is that, or equals it and has a lower number. */
+/* Make an exposure the largest of a criterion if it is that, or ties with it and has a lower number. */
 INLINE void NAME(follow)(const Largest *largest, int64_t criterion, double exposure, int64_t state, int8_t mode, const double *strain, int64_t strains) {
     const double before = largest->exposure[criterion];
-    if (!(exposure > before || (exposure == before && state < largest->state[criterion]))) return;
+    const int higher = !(exposure <= before * (1.0 + TIE));
+    if (!(higher || (exposure >= before * (1.0 - TIE) && state <= largest->state[criterion]))) return;
     largest->exposure[criterion] = exposure;
     largest->state[criterion] = state;
     largest->mode[criterion] = mode;
@@ -134,7 +135,8 @@ INLINE void NAME(four_states)(const Exposures *m, const Limits *limits, int prun
     NAME(exposures)(v, candidate, exposure);
 #pragma GCC unroll 4
     for (int i = 0; i < CRITERIA; i++) {
-        const mask higher = exposure[i] > before[i], largest = higher & (exposure[i] >= m->largest.exposure[i]);
+        const mask higher = exposure[i] > before[i] * (1.0 + TIE);
+        const mask largest = higher & ~(exposure[i] < m->largest.exposure[i] * (1.0 - TIE));
         const int which = SIGNS(higher);
         if (!which) continue;
         NAME(raise)(plies, i * all + at, which, i, v, candidate[i], exposure[i], now);
@@ -186,7 +188,7 @@ INLINE void NAME(interfaces)(const Exposures *m, const Interfaces *f, int strain
             for (int lane = 0; lane < count; lane++) {
                 if (isnan(above[lane]) || isnan(below[lane]))
                     between->exposure[at + lane] = NAN;
-                else if (larger[lane] > before[lane]) {
+                else if (larger[lane] > before[lane] * (1.0 + TIE)) {
                     between->exposure[at + lane] = larger[lane], between->time[at + lane] = now;
                     between->mode[at + lane] = (int8_t)f->code;
                     if (m->far[row])

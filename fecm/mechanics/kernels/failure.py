@@ -190,18 +190,24 @@ class CompiledMonitor(FailureMonitor):
         self, envelope: FailureEnvelope, fields: Floats, times: Sequence[float]
     ) -> Evaluations:
         """Raise the exposures; see :meth:`FailureMonitor.update`."""
-        if len(self.criteria) > len(CRITERIA):
+        if len(self.criteria) > len(CRITERIA) or self.circle is not None:
             return super().update(envelope, fields, times)
         return self._known(envelope, fields, times)
 
     def _evaluate(self, envelope: FailureEnvelope, displacement: Floats, time: float) -> None:
         """Raise the exposures, and after the criteria that the kernel has those of users."""
+        if not self.has_interfaces:  # on the circle, which the kernel does not know
+            strains, _ = self.stresses.strains(displacement)
+            kept = self._kept(envelope).strain
+            kept[...] = strains[..., 6 - kept.shape[2] :]
         self._known(envelope, displacement[None], [time])
+        if len(self.criteria) == len(CRITERIA):
+            return
         strains = self._kept(envelope).strain
         if not self.stresses.stretches:
             strains = np.concatenate([np.zeros(strains.shape), strains], axis=2)
         self._raise_plies(range(len(CRITERIA), len(self.criteria)), envelope.plies, strains, time)
-        envelope.find_largest(self.counts, strains)
+        envelope.find_largest(self.counts, self.far, strains)
 
     def _known(
         self, envelope: FailureEnvelope, fields: Floats, times: Sequence[float]
@@ -233,7 +239,11 @@ class CompiledMonitor(FailureMonitor):
         count = 6 if self.stresses.stretches else 3
         families = midplanes(self.stresses)
         runs = [self._run(zone, run, count) for zone in self.zones for run in zone.runs]
-        zones = [self._interfaces(zone, count) for zone in self.zones if zone.interfaces]
+        zones = [
+            self._interfaces(zone, count)
+            for zone in self.zones
+            if zone.interfaces and self.has_interfaces
+        ]
         strain = np.empty((elements, points, count))
         structure = Exposures(
             elements=elements,
@@ -249,7 +259,7 @@ class CompiledMonitor(FailureMonitor):
             run=(Plies * len(runs))(*runs),
             zone=(Interfaces * len(zones))(*zones),
             counts=self.counts.astype(np.int8),
-            far=self.counts.all(axis=1).astype(np.int8),
+            far=self.far.astype(np.int8),
             plies=Maxima(**vars(envelope.plies)),
             between=Maxima(**vars(envelope.interfaces)),
             largest=Largest(**vars(envelope.largest)),

@@ -59,6 +59,7 @@
 #define LANES 8
 #define APART __attribute__((noinline)) /* loops that need all registers, which compilers find only there */
 #define PASSES 5 /* of the contact iteration */
+#define TIE 1.0e-9 /* see fecm/mechanics/exposures.py */
 #define LEAST_WORK 1.0e-3 /* see fecm/results/end.py */
 #define TOLERANCE 1.0e-6
 #define MOST_THREADS 64
