@@ -275,7 +275,7 @@ class FailureMonitor:
             )
         ]
         if self.circle is not None:
-            made.circle = self.circle.with_residual(residual)
+            made.circle = self.circle.with_residual(residual, strengths)
         return made
 
     def start(self) -> FailureEnvelope:
