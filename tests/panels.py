@@ -66,6 +66,8 @@ def panel(layup: str = "[45/0/-45/90]s", at: Place = STRUCK, radius: float = 5.0
         duration=TIME[-1],
         units="mm-N-s",
         patch=None,
+        kinematics="linear",
+        shear_factor=1.0,
         gages=OFF_AXIS,
     )
     return with_patch(deck, radius, at)
@@ -83,6 +85,8 @@ def public_panel(nx: int, ny: int, at: Place = (150.0, 100.0), e1: float = 17142
         duration=8.02e-4,
         units="mm-N-s",
         patch=None,
+        kinematics="linear",
+        shear_factor=1.0,
         gages=PUBLIC_GAGES,
     )
     return with_patch(deck, 4.0, at)

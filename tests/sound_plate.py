@@ -30,6 +30,8 @@ def base() -> str:
         duration=8e-3,
         units="mm-N-s",
         damage=True,
+        kinematics="linear",
+        shear_factor=1.0,
     )
     return deck.to_text()
 

@@ -95,14 +95,18 @@ def test_a_new_deck_is_sound_and_declares_its_units() -> None:
     assert 0.8 < ratio <= 0.9
 
 
+EQUI = Shear(assumed=True, equilibrium=True)
+
+
 @pytest.mark.parametrize(
     ("options", "patch", "shear", "note"),
     [
-        ([], Patch(), Shear(assumed=True), "a uniform pressure of radius 0.000327 (0.327 of the "),
-        (["--patch", "hertz"], Patch("HERT"), Shear(assumed=True),
+        ([], Patch(), EQUI, "a uniform pressure of radius 0.000327 (0.327 of the "),
+        (["--patch", "hertz"], Patch("HERT"), EQUI,
          "Hertz's pressure of radius 0.000377 (0.377 of the thickness) instead of a point force"),
-        (["--patch", "disc:0.04"], Patch("DISC", 0.04), Shear(assumed=True), "of radius 0.04 ins"),
-        (["--patch", "none"], None, Shear(assumed=True), "note: the deck has assumed shear strai"),
+        (["--patch", "disc:0.04"], Patch("DISC", 0.04), EQUI, "of radius 0.04 ins"),
+        (["--patch", "none"], None, EQUI, "note: the deck has assumed shear strai"),
+        (["--patch", "none", "--shear-factor", "1"], None, Shear(assumed=True), "(SHEA MITC)"),
         (["--shear", "full"], Patch(), None, "point force (PATC); omit them with --patch none"),
         (["--patch", "none", "--shear", "full"], None, None, ""),
     ],
@@ -169,7 +173,8 @@ def test_a_named_ply_is_converted_between_systems_of_units() -> None:
 def test_supports_hold_what_their_names_say(
     support: str, w: int, theta_x: int, theta_y: int
 ) -> None:
-    deck = fecm.read_one(new(*PLATE, "--edge", f"left={support}").stdout)
+    linear = ("--kinematics", "linear")
+    deck = fecm.read_one(new(*PLATE, "--edge", f"left={support}", *linear).stdout)
     mesh = generate(deck)
     left = np.flatnonzero(mesh.coordinates[:, 0] == 0.0)
     inside = np.setdiff1d(np.arange(117), left)

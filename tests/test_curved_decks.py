@@ -110,7 +110,7 @@ def test_the_command_writes_the_deck_of_the_function_and_says_what_the_edges_hol
 
 def test_a_flat_deck_is_that_of_before(tmp_path: Path) -> None:
     path = tmp_path / "flat.inp"
-    assert "curved" not in call("new", path, *SUPPORTED).stderr
+    assert "curved" not in call("new", path, *SUPPORTED, "--kinematics", "linear").stderr
     assert "CURV" not in path.read_text()
     assert held(fecm.read_one(path))["inside"] == {"u", "v"}
 
@@ -164,7 +164,7 @@ def test_each_radius_of_a_sweep_is_its_own_panel() -> None:
 
 
 def test_a_deck_that_holds_its_plane_takes_no_radius_without_supports() -> None:
-    flat = panel()
+    flat = panel(kinematics="linear")
     with pytest.raises(CasesError, match="holds u and v at every node"):
         flat.with_(radius_x=100.0)
     assert held(flat.with_(radius_x=100.0, support="pinned"))["left"] == {"u", "v"}

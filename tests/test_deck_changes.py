@@ -35,7 +35,8 @@ MASS = fecm.RigidMass(1e-3)
 ROD = fecm.Rod.cylinder(20.0, 16.0, 2e5, 8e-9)
 SPHERE = fecm.Contact.estimate(radius=8)
 FIRM = fecm.Contact(4e4, 0.0, 0.0, 1.5)  # an estimate takes longer than the rest of a deck
-QUICK: dict[str, Any] = {"velocity": 1000.0, "duration": 2e-5, "units": "mm-N-s"}
+QUICK: dict[str, Any] = {"velocity": 1000.0, "duration": 2e-5, "units": "mm-N-s",
+                         "kinematics": "linear"}  # fmt: skip
 DAMAGED: dict[str, Any] = QUICK | {"damage": True}
 DECK = fecm.impact(PLATE, PLIES, MASS, SPHERE, plies=False, **DAMAGED)
 

@@ -50,6 +50,8 @@ def test_the_static_stiffness_of_d7136_is_that_of_another_code(plate: str) -> No
         "1e-7",
         "--mesh",
         "10x8",
+        "--shear-factor",
+        "1",
     )
     (problem,) = load_deck(made.stdout).problems
     assert problem.contact is not None

@@ -40,6 +40,8 @@ def clamped(k: float, mass: float, velocity: float, support: Support = "clamped"
         dt=4e-7,
         units="mm-N-s",
         patch="disc:12",
+        kinematics="linear",
+        shear_factor=1.0,
     )
 
 
@@ -152,6 +154,8 @@ def heavy(k: float, mass: float, velocity: float, thickness: float = 0.18) -> fe
         dt=7e-7,
         units="mm-N-s",
         patch="hertz:18",
+        kinematics="linear",
+        shear_factor=1.0,
     )
 
 

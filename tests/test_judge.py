@@ -44,6 +44,8 @@ def thin_plate() -> Deck:
         units="mm-N-s",
         patch=None,
         damage=True,
+        kinematics="linear",
+        shear_factor=1.0,
     )
 
 
@@ -306,6 +308,8 @@ def followed(duration: float) -> fecm.Deck:
         velocity=5230.0,
         duration=duration,
         units="mm-N-s",
+        shear_factor=1.0,
+        kinematics="linear",
     )
 
 

@@ -28,6 +28,8 @@ def impact_on(elements: int, **options: Any) -> fecm.Deck:
         units="mm-N-s",
         damage=True,
         plies=False,
+        shear_factor=1.0,
+        kinematics="linear",
         **options,
     )
 

@@ -200,6 +200,8 @@ def test_strains_on_the_mesh_of_fecm_new_are_those_of_the_series_within_a_hundre
         duration=8.02e-4,
         units="mm-N-s",
         patch="disc:4",
+        kinematics="linear",
+        shear_factor=1.0,
         gages=[(g.x, g.y, g.z, g.direction) for g in plain.require(model.Gages).records],
     )
     run = fecm.run_one(made)

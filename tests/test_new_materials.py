@@ -248,7 +248,9 @@ def test_a_sweep_over_materials_of_layers_is_that_of_single_runs() -> None:
     largest = float(swept.force.max())
     for force, one in zip(swept.force, (deck, other), strict=True):
         single = fecm.run_one(one.with_(dt=1e-7)).history.force
-        assert force[: len(single)] == pytest.approx(single, abs=1e-9 * largest)
+        steps = min(len(force), len(single))
+        assert steps > 0.9 * len(force)
+        assert force[:steps] == pytest.approx(single[:steps], abs=1e-9 * largest)
     assert abs(swept.force[0] - swept.force[1]).max() > 0.1 * largest
 
 

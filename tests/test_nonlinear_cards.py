@@ -68,7 +68,7 @@ def test_a_nonlinear_deck_of_new_has_no_findings_of_its_words() -> None:
 
 
 def test_a_plane_that_is_held_everywhere_is_an_error_at_the_card_of_nodes_inside() -> None:
-    linear = fecm.impact(plate(), PLIES, MASS, LAW, **QUICK).to_text()
+    linear = fecm.impact(plate(), PLIES, MASS, LAW, kinematics="linear", **QUICK).to_text()
     found = findings(linear.replace("EXPE\n", "NONL\nEXPE\n"))
     assert found.keys() == {"E490"}
     assert found["E490"].place is not None
@@ -171,8 +171,8 @@ def test_a_preload_bends_an_unsymmetric_laminate_unless_it_is_zero() -> None:
 # What new writes ---------------------------------------------------------------------------------
 
 
-def test_without_the_options_new_writes_none_of_the_words() -> None:
-    linear = fecm.impact(plate(), PLIES, MASS, LAW, **QUICK)
+def test_a_linear_deck_of_new_writes_none_of_the_words() -> None:
+    linear = fecm.impact(plate(), PLIES, MASS, LAW, kinematics="linear", **QUICK)
     assert not linear.has(Nonlinear)
     assert not linear.has(Preload)
     assert (generate(linear).codes[:, :2] != 0).all()
@@ -222,7 +222,7 @@ def test_a_preload_takes_units_and_a_missing_shear_is_zero() -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--nonlinear", "--shear", "full"], "--nonlinear needs assumed shear strains"),
+        (["--nonlinear", "--shear", "full"], "--kinematics von-karman needs assumed shear strains"),
         (["--preload", "5"], "NX,NY[,NXY]"),
         (["--preload", "5J,3"], "as in 50N/mm"),
         (["--preload", "inf,3"], "--preload"),
@@ -320,6 +320,6 @@ def test_a_support_of_a_nonlinear_plate_leaves_it_free_inside() -> None:
 
 
 def test_nonlinear_plates_share_no_impulse_response() -> None:
-    linear = fecm.impact(plate(), PLIES, MASS, LAW, **QUICK)
+    linear = fecm.impact(plate(), PLIES, MASS, LAW, kinematics="linear", **QUICK)
     assert shares_plate(problem_of(linear))
     assert not shares_plate(problem_of(deck()))

@@ -15,8 +15,8 @@ import fecm
 from fecm.api import load_deck
 from fecm.deck.model import Impact
 from fecm.problem.problem import Problem
-from fecm.studies import StudyError
-from fecm.studies.estimate import estimate, nonlinear_curve, velocity_at
+from fecm.problem.static_plate import NoCurveError, nonlinear_curve
+from fecm.studies.estimate import estimate, velocity_at
 from fecm.sweeps import batch, expected, in_full
 from fecm.sweeps.case import Case
 from fecm.sweeps.outcome import Outcome
@@ -210,7 +210,7 @@ def test_both_static_rows_of_a_small_deflection_agree_and_apply() -> None:
 
 def test_a_loaded_plate_has_no_static_curve() -> None:
     loaded = problem_of(text(PROGRAM, data=BLOW + forces(1.0)))
-    with pytest.raises(StudyError, match="no nonlinear static plate: the deck has FORC"):
+    with pytest.raises(NoCurveError, match="no nonlinear static plate: the deck has FORC"):
         nonlinear_curve(loaded, 1.0, np.nan)
     found = estimate(loaded)
     assert "FORC" in found.remark

@@ -29,7 +29,7 @@ PLATE = {
     "--size": "100x100", "--mesh": "2x2", "--layup": "[0]8", "--ply-thickness": ".25",
     "--material": "T300/5208", "--units": "mm-N-s", "--velocity": "3000",
     "--law": "45000,.016,.094,2.5", "--projectile": "mass:2e-5", "--duration": "5e-5",
-    "--support": "simple",
+    "--support": "simple", "--kinematics": "linear", "--shear-factor": "1",
 }  # fmt: skip
 ESTIMATE = ("--layup", "[0]8", "--ply-thickness", ".25", "--material", "T300/5208")
 

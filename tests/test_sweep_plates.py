@@ -46,6 +46,8 @@ def new(layup: str, *options: str) -> str:
         "mass:2e-5",
         "--duration",
         "2e-4",
+        "--kinematics",
+        "linear",
         *options,
     )
     assert made.exit_code == 0

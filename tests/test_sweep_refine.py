@@ -40,6 +40,8 @@ def plate(mass: float = 0.000181, duration: float = 3e-5) -> Deck:
             velocity=115.0,
             duration=duration,
             patch=Patch(radius=RADIUS),
+            kinematics="linear",
+            shear_factor=1.0,
         )
 
 

@@ -20,12 +20,18 @@ def _energy_of(deck: model.Deck) -> float:
     return 0.5 * mass * velocity**2
 
 
+def said_energy(deck: model.Deck, plies: Plies) -> str:
+    """Kinetic energy of the projectile, in joule where the units are known."""
+    energy = _energy_of(deck)
+    joule = in_si("force*length", units_of(plies.system) if plies.system else {})
+    return f"{energy * joule:.4g} J" if joule else f"{energy:.4g}"
+
+
 def energy_note(deck: model.Deck, plies: Plies, *, per_thickness: bool) -> str:
     """Say energy and velocity of the projectile."""
     energy, velocity = _energy_of(deck), deck.require(model.Impact).velocity
     names = units_of(plies.system) if plies.system else {}
-    joule = in_si("force*length", names)
-    said = f"{energy * joule:.4g} J" if joule else f"{energy:.4g}"
+    said = said_energy(deck, plies)
     if per_thickness:
         share = energy / plies.thickness
         said += f" ({share / 1e3:.3g} J per mm of thickness)"

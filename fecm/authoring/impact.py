@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 from fecm._dataclasses import frozen
 from fecm._errors import warn
@@ -12,6 +12,15 @@ from fecm.api import load_deck
 from fecm.authoring.contact import AnyContact, Sphere, law_of
 from fecm.authoring.energy import doubts_of_energy, energy_note, with_energy
 from fecm.authoring.fixtures import DropWeight
+from fecm.authoring.kinematics import (
+    AUTO as AUTO_KINEMATICS,
+)
+from fecm.authoring.kinematics import (
+    Formed,
+    Kinematics,
+    kinematics_of,
+    with_kinematics,
+)
 from fecm.authoring.laminate import (
     Laminate,
     Layup,
@@ -23,10 +32,11 @@ from fecm.authoring.laminate import (
     system_asked,
     toughness,
 )
-from fecm.authoring.mesh import InPlane, Membrane, curvature_of, placed, supported
+from fecm.authoring.mesh import AnyMesh, InPlane, Membrane, curvature_of, placed, supported
 from fecm.authoring.numerics import AUTO, FULL, MITC, Numerics, Quadrature
 from fecm.authoring.parameters import ObjectError, check_kind, check_positive, in_units, is_finite
 from fecm.authoring.plate import Plate
+from fecm.authoring.title import default_title
 from fecm.authoring.zones import Zone, laminates_of, placed_zones
 from fecm.deck import model
 from fecm.deck.catalogue import STANDARD, SYSTEM, NamedContact
@@ -66,12 +76,12 @@ class Request:
     in_plane: InPlane | None = None
     radius_x: float | None = None
     radius_y: float | None = None
-    nonlinear: bool = False
+    kinematics: Kinematics = AUTO_KINEMATICS
     preload: Sequence[float | str] | None = None
     gages: Iterable[GagePlace] = ()
     giic: float | None = None
     cure: float | str | None = None
-    title: str = ""
+    title: str | None = None  # by default of plate, layup, ply and energy
     zones: Sequence[Zone] = ()
 
     @property
@@ -92,7 +102,8 @@ class Request:
             check_kind("contact", strike.contact, AnyContact)
         _check_choice("shear", numerics.shear, (MITC, FULL))
         _check_choice("in_plane", self.in_plane, (None, *IN_PLANE))
-        if "\n" in self.title:
+        _check_choice("kinematics", self.kinematics, get_args(Kinematics))
+        if "\n" in (self.title or ""):
             raise ObjectError("`title` has more than one line")
 
 
@@ -132,17 +143,18 @@ def impact(
     units: str | None = None,
     patch: str | model.Patch | None = AUTO,
     shear: Quadrature = "mitc",
-    shear_factor: float | Literal["equi"] = 1.0,
+    shear_factor: float | Literal["equi"] | None = None,
     in_plane: InPlane | None = None,
     radius_x: float | None = None,
     radius_y: float | None = None,
-    nonlinear: bool = False,
+    kinematics: Kinematics | None = None,
+    nonlinear: bool | None = None,
     preload: Sequence[float | str] | None = None,
     gages: Iterable[tuple[float, float, float, float]] = (),
     damage: bool = False,
     giic: float | None = None,
     cure: float | str | None = None,
-    title: str = "",
+    title: str | None = None,
     zones: Sequence[tuple[str | Sequence[float], Layup | Laminate]] = (),
 ) -> model.Deck:
     """Deck of an impact, as `fecm new` writes it.
@@ -192,8 +204,9 @@ def impact(
         of a rectangle is then refined; None is a point force.  By default a disc.
     shear : str
         Transverse shear: assumed strains, ``"mitc"``, or full quadrature, ``"full"``.
-    shear_factor : float or str
-        Factor of the transverse shear stiffness, or ``"equi"``, the stiffness from equilibrium.
+    shear_factor : float or str, optional
+        Factor of the transverse shear stiffness, or ``"equi"``, the stiffness from equilibrium.  By
+        default ``"equi"``, and 1 with full quadrature.
     in_plane : str, optional
         Displacements u and v of a curved or nonlinear plate, or a coupled laminate, where it is
         supported: ``"held"``, the default of edges; ``"free"``, that of fixtures; ``"normal"``,
@@ -202,9 +215,12 @@ def impact(
     radius_x, radius_y : float, optional
         Radii of a shallow curved panel (length), positive if the struck face is the hollow one;
         without them it is flat.
-    nonlinear : bool
-        The plate stretches as it bends (von Kármán), which matters from a deflection of about half
-        the thickness on; `shear` must be ``"mitc"``.
+    kinematics : str, optional
+        ``"von-karman"`` is a plate that stretches as it bends; `shear` must be ``"mitc"``.
+        ``"linear"`` is one that does not.  ``"auto"``, the default, takes the former where the
+        static estimate of the deflection exceeds 0.3 times the thickness.
+    nonlinear : bool, optional
+        Older name: True is the same as `kinematics` ``"von-karman"``, False as ``"linear"``.
     preload : sequence of float or str, optional
         Uniform membrane force N0x, N0y and, by default 0, N0xy in the plate before the impact
         (force/length, tension positive), also with a unit, ``"50N/mm"``.
@@ -220,7 +236,7 @@ def impact(
         use minus stress-free temperature, K; or both, ``"177:20"``.  ``":20"`` takes the
         stress-free temperature of the ply.
     title : str, optional
-        Title of the deck.
+        Title of the deck; by default plate, layup, ply and energy.
     zones : sequence of tuple, optional
         Place and layup of parts of the plate, the later over the earlier.  A place is a rectangle
         ``(x0, y0, x1, y1)``, which has the elements whose centres lie in it, or the name of a group
@@ -262,7 +278,7 @@ def impact(
             in_plane=in_plane,
             radius_x=radius_x,
             radius_y=radius_y,
-            nonlinear=nonlinear,
+            kinematics=kinematics_of(kinematics, nonlinear),
             preload=preload,
             gages=gages,
             giic=giic,
@@ -311,16 +327,10 @@ def author(asked: Request) -> Authored:
     damage = damages(plies, asked.giic, notes) if asked.numerics.damage else toughness(asked.giic)
     if asked.numerics.failure and not any(isinstance(s, model.Allowables) for s in damage):
         damage = [strengths_of(plies), *damage]
-    curvature = curvature_of(asked.radius_x, asked.radius_y)
-    membrane = Membrane.of(
-        curved=curvature is not None, stretches=asked.nonlinear or plies.is_coupled
-    )
-    boundary, slides = supported(asked.plate, mesh, asked.in_plane, notes, membrane)
     segments = (
         _units(asked, plies),
         mesh.coordinates(),
         mesh.element_cards(),
-        boundary,
         _projectile(strike.projectile),
         model.Impact(node, 3, 1.0 if motion.velocity is None else motion.velocity),
         patch,
@@ -328,23 +338,53 @@ def author(asked: Request) -> Authored:
         *damage,
         cured(plies, asked.cure),
         law,
-        asked.numerics.shear_segment(nonlinear=asked.nonlinear),
-        curvature,
-        model.Nonlinear() if asked.nonlinear else None,
+        asked.numerics.shear_segment(),
+        curvature_of(asked.radius_x, asked.radius_y),
         _preload(asked, plies),
         *plies.segments(),
         zones.card,
     )
     control = Control(mesh.nodes, mesh.elements, len(plies.layups[0]), 2, 5, mesh.most_nodes)
-    deck = model.Deck(asked.title, control, tuple(s for s in segments if s is not None), ())
-    dt = asked.numerics.time_step(deck)
+    plain = model.Deck("", control, tuple(s for s in segments if s is not None), ())
     if motion.energy is not None:
-        deck = with_energy(deck, motion.energy)
-    notes.append(energy_note(deck, plies, per_thickness=asked.test is not None))
-    doubts += doubts_of_energy(deck, fixture, plies)
-    deck = asked.numerics.with_program(deck, dt, motion.duration)
-    comments = (fixture.comment if fixture else "") + slides + comment
-    return Authored(deck, comments, notes, doubts)
+        plain = with_energy(plain, motion.energy)
+    notes.append(energy_note(plain, plies, per_thickness=asked.test is not None))
+    doubts += doubts_of_energy(plain, fixture, plies)
+    title = (
+        default_title(asked.plate, asked.laminate, plain, plies)
+        if asked.title is None
+        else asked.title
+    )
+    plain = replace(plain, title=title)
+
+    formed = with_kinematics(
+        asked.kinematics, lambda nonlinear: _formed(asked, plain, mesh, plies, nonlinear=nonlinear)
+    )
+    dt = asked.numerics.time_step(formed.deck)
+    deck = asked.numerics.with_program(formed.deck, dt, motion.duration)
+    comments = (fixture.comment if fixture else "") + formed.comment + comment
+    return Authored(deck, comments, [*notes, *formed.notes], doubts)
+
+
+def _formed(
+    asked: Request, plain: model.Deck, mesh: AnyMesh, plies: Plies, *, nonlinear: bool
+) -> Formed:
+    """The deck with its supports, and with NONL for a nonlinear plate."""
+    notes: list[str] = []
+    membrane = Membrane.of(
+        curved=plain.has(model.Curvature), stretches=nonlinear or plies.is_coupled
+    )
+    boundary, comment = supported(asked.plate, mesh, asked.in_plane, notes, membrane)
+    segments: list[model.Segment] = []
+    for segment in plain.segments:
+        segments.append(segment)
+        if isinstance(segment, model.Elements) and boundary is not None:
+            segments.append(boundary)
+    if nonlinear:  # before the preload and the laminate
+        later = (model.Preload, model.Material)
+        place = next(n for n, one in enumerate(segments) if isinstance(one, later))
+        segments.insert(place, model.Nonlinear())
+    return Formed(replace(plain, segments=tuple(segments)), comment, notes)
 
 
 def doubts_of_core(plies: Plies, layers: Sequence[model.Layer]) -> list[str]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from contextlib import suppress
 from dataclasses import replace
 from typing import Literal
 
@@ -11,22 +10,16 @@ from fecm._dataclasses import frozen
 from fecm.api import load_deck
 from fecm.authoring.contact import parse_patch
 from fecm.authoring.parameters import ObjectError, check_positive
-from fecm.deck.model import Allowables, Deck, Impact, Indentation, Macro, Patch, Shear
+from fecm.deck.model import Allowables, Deck, Macro, Patch, Shear
 from fecm.deck.outputs import PLY_ROWS, Rows, RowsOfPlies, with_outputs
 from fecm.mechanics.points import HERTZ
-from fecm.mechanics.quick_models import contact_time
-from fecm.mechanics.solutions import static_stiffness
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
-from fecm.problem.parts import build_plate, build_projectile
+from fecm.problem.parts import build_plate
 from fecm.problem.problem import Problem
+from fecm.problem.static_plate import contact_duration
 
 ROWS = 200  # default number of stored rows of strains and displacements
-# Simulated time over half a period of the projectile on the plate's static stiffness, and least
-# simulated time over the contact of the two with the indentation in series: a plate that vibrates
-# ends it up to 2 % later.
-HALF_PERIODS = 1.25
-CONTACT_TIMES = 1.1
 
 # Elements whose ply stresses are stored with `damage`: those nearer to the load than so many times
 # the distance within which plate theory does not hold, and at least so many.
@@ -46,7 +39,8 @@ class Numerics:
 
     patch: str | Patch | None = AUTO
     shear: Quadrature = MITC
-    shear_factor: float | Literal["equi"] = 1.0
+    # Of the shear stiffness; by default EQUI with assumed strains, and the report's 1 without.
+    shear_factor: float | Literal["equi"] | None = None
     duration: float | str | None = None
     dt: float | None = None
     every: int | None = None  # steps between stored rows
@@ -60,11 +54,11 @@ class Numerics:
             return Patch(HERTZ) if prescribed else Patch()
         return parse_patch(self.patch) if isinstance(self.patch, str) else self.patch
 
-    def shear_segment(self, *, nonlinear: bool = False) -> Shear | None:
+    def shear_segment(self) -> Shear | None:
         """SHEA segment; None for the report's shear stiffness and quadrature."""
         factor, assumed = self.shear_factor, self.shear == MITC
-        if nonlinear and not assumed:
-            raise ObjectError(f"`nonlinear` needs assumed shear strains: `shear` {MITC}")
+        if factor is None:
+            factor = EQUI if assumed else 1.0
         if factor == EQUI:
             return Shear(assumed=assumed, equilibrium=True)
         if isinstance(factor, str):
@@ -114,17 +108,3 @@ def elements_around_load(problem: Problem) -> int:
     """Number of elements about the load in which the plies are most stressed, and those beside."""
     near = int((problem.distances < AROUND_LOAD * problem.reach_of_load).sum())
     return min(max(near, FEWEST_ELEMENTS), problem.deck.control.numel)
-
-
-def contact_duration(problem: Problem) -> float:
-    """Simulated time: longer than the contact of the projectile with the static plate."""
-    deck = problem.deck
-    assert problem.contact is not None
-    stiffness = static_stiffness(problem.moving_plate, problem.contact)
-    mass, velocity = build_projectile(deck).total_mass, deck.require(Impact).velocity
-    duration = HALF_PERIODS * math.pi * math.sqrt(mass / stiffness)
-    if velocity > 0.0:
-        with suppress(OverflowError):  # of a k that the checks doubt
-            k = deck.require(Indentation).k
-            duration = max(duration, CONTACT_TIMES * contact_time(mass, velocity, k, stiffness))
-    return float(f"{duration:.2g}")

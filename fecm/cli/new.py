@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import click
 from click import option
@@ -16,6 +16,7 @@ from fecm.api import load_deck
 from fecm.authoring.contact import Sphere, parse_patch
 from fecm.authoring.fixtures import CUSTOM, FIXTURES
 from fecm.authoring.impact import Authored, Request, Strike, author
+from fecm.authoring.kinematics import LIMIT, Kinematics, kinematics_of
 from fecm.authoring.mesh import InPlane
 from fecm.authoring.numerics import AUTO, FULL, MITC, Numerics, Quadrature
 from fecm.authoring.parameters import ObjectError
@@ -57,6 +58,7 @@ GROUPS = {
         "rows",
         "radius_x",
         "radius_y",
+        "kinematics",
         "nonlinear",
         "preload",
     ),
@@ -86,7 +88,7 @@ class Options:
 
     output: Path
     overwrite: bool
-    title: str
+    title: str | None
     size: tuple[float, float] | None
     mesh: tuple[int, int] | Path | None
     grading: float
@@ -94,6 +96,7 @@ class Options:
     rows: str
     radius_x: float | None
     radius_y: float | None
+    kinematics: Kinematics | None
     nonlinear: bool
     preload: tuple[str, ...] | None
     laminate: LaminateOptions
@@ -115,7 +118,7 @@ class Options:
     projectile: Rod | RigidMass | None
     patch: Patch | None
     shear: Quadrature
-    shear_factor: float | Literal["equi"]
+    shear_factor: float | Literal["equi"] | None
     duration: str | None
     dt: float | None
     every: int | None
@@ -166,7 +169,7 @@ class Options:
     ),
 )
 @click.argument("output", type=FILE_PATH, metavar="DECK")
-@option("--title", default="", help="Title of the deck.")
+@option("--title", help="Title of the deck.  [default: plate, layup, ply and energy]")
 @option(
     "--size",
     type=list_of("6x4", POSITIVE, [2], "[xX×]"),
@@ -202,11 +205,13 @@ class Options:
 )
 @option("--radius-y", type=Finite(), metavar="R", help="The same along y.")
 @option(
-    "--nonlinear",
-    is_flag=True,
-    help="The plate stretches as it bends (NONL), which matters from a deflection of about half "
-    "its thickness on.",
+    "--kinematics",
+    type=click.Choice(list(get_args(Kinematics))),
+    help="Linear plate, or one that stretches as it bends (von-karman: NONL); auto takes the "
+    f"latter where the static estimate of the deflection exceeds {LIMIT:g} of the thickness.  "
+    "[default: auto]",
 )
+@option("--nonlinear", is_flag=True, help="The same as --kinematics von-karman.")
 @option(
     "--preload",
     type=list_of("NX,NY[,NXY]", str, [2, 3]),
@@ -279,7 +284,7 @@ class Options:
 @option(
     "--in-plane",
     type=click.Choice(list(IN_PLANE)),
-    help="In-plane displacements on the supports of a curved or --nonlinear plate, or a coupled "
+    help="In-plane displacements on the supports of a curved or von-karman plate, or a coupled "
     "laminate: held, normal (held across the edge only), tangential (held along it only) or free.  "
     "[default: held; with --radius-x or --radius-y tangential on simple edges; with --fixture "
     "free]",
@@ -333,10 +338,8 @@ class Options:
 @option(
     "--shear-factor",
     type=Parsed(new_values.shear_factor, "K|equi"),
-    default="1",
-    show_default=True,
     help="Factor of the transverse shear stiffness, or equi, the stiffness from equilibrium "
-    "(SHEA EQUI).",
+    "(SHEA EQUI).  [default: equi; with --shear full 1]",
 )
 @option(
     "--duration",
@@ -431,7 +434,7 @@ def _author(options: Options, given: Collection[str]) -> Authored:
             in_plane=options.in_plane,
             radius_x=options.radius_x,
             radius_y=options.radius_y,
-            nonlinear=options.nonlinear,
+            kinematics=kinematics_of(options.kinematics, options.nonlinear or None),
             preload=options.preload,
             giic=options.giic,
             cure=options.cure,

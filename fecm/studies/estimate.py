@@ -6,8 +6,6 @@ import math
 from collections.abc import Callable
 from dataclasses import replace
 
-import numpy as np
-
 from fecm._dataclasses import frozen
 from fecm.deck.model import Impact, Indentation
 from fecm.mechanics.laminate import SMALL_MASS, effective_rigidity
@@ -21,22 +19,19 @@ from fecm.mechanics.quick_models import (
     stored_at,
 )
 from fecm.mechanics.roots import root
-from fecm.mechanics.solutions import ConvergenceError, SingularStiffnessError, static_stiffness
-from fecm.mechanics.static_curve import StaticCurve, static_curve
+from fecm.mechanics.solutions import static_stiffness
+from fecm.mechanics.static_curve import StaticCurve
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
+from fecm.problem.static_plate import NoCurveError, nonlinear_curve
 from fecm.results.linear_plate import LIMITS
 from fecm.studies import StudyError
 
 # Masses over the plate's.
 SMALL = 0.1  # below, waves control the impact
 LARGE = 50.0  # above, the impact is quasi-static
-# First step of a static curve: of the deflection of the linear plate, at most of the thickness.
-CURVE_STEPS = 20
-LONGEST_STEP = 0.25
 # Of the static model of a nonlinear plate; isotropic circular plates, clamped and simply supported.
 LOW = "the nonlinear static plate is 9 to 26 % low in force at M/M_plate = 24"
-NO_CURVE = "there is no nonlinear static plate"
 
 
 @frozen
@@ -105,7 +100,7 @@ def estimate(problem: Problem) -> Estimate:
             curve = nonlinear_curve(problem, 0.5 * mass * velocity**2, force)
             models.append(_nonlinear_model(curve, mass, velocity, k, force, applies=ratio > LARGE))
             remark = LOW
-        except StudyError as error:
+        except NoCurveError as error:
             remark = str(error)
     return Estimate(mass, ratio, parameter, stiffness, tuple(models), remark)
 
@@ -124,39 +119,11 @@ def velocity_at(problem: Problem, force: float) -> float:
         return _velocity(_peaks_on_infinite_plate(problem, mass), velocity, force)
     try:
         return _static_velocity(nonlinear_curve(problem, 0.0, force), mass, k, force)
-    except StudyError:
+    except NoCurveError:
         stiffness = static_stiffness(problem.moving_plate, contact)
     if math.isnan(stiffness):
         return velocity
     return _velocity(lambda v: static_plate(mass, v, k, stiffness).peak, velocity, force)
-
-
-def nonlinear_curve(problem: Problem, energy: float, force: float) -> StaticCurve:
-    """Static curve of a nonlinear plate up to an energy, and up to a force unless it is NaN.
-
-    Raises StudyError if the plate has none.
-    """
-    contact = problem.contact
-    assert contact is not None  # the program has impact steps
-    if problem.mesh.forces.any():
-        raise StudyError(f"{NO_CURVE}: the deck has FORC")
-    stiffness = static_stiffness(problem.moving_plate, contact)
-    if math.isnan(stiffness):
-        raise StudyError(f"{NO_CURVE}: the plate is free")
-    linear = max(math.sqrt(2.0 * energy / stiffness), np.nan_to_num(force) / stiffness)
-    step = min(linear / CURVE_STEPS, LONGEST_STEP * problem.laminate.thickness)
-
-    def enough(_: float, reached: float, work: float) -> bool:
-        return work >= energy and not reached < force
-
-    try:
-        curve = static_curve(problem.moving_plate, contact, step, enough)
-    except (SingularStiffnessError, ConvergenceError) as error:
-        raise StudyError(f"{NO_CURVE}: {error}") from None
-    if (falls := np.diff(curve.force) < 0.0).any():
-        limit = float(curve.force[np.argmax(falls)])
-        raise StudyError(f"{NO_CURVE}: the panel snaps through at the force {limit:.4g}")
-    return curve
 
 
 def _nonlinear_model(
