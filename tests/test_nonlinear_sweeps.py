@@ -218,3 +218,12 @@ def test_a_loaded_plate_has_no_static_curve() -> None:
     heavy = problem_of(text(PROGRAM, data=BLOW.replace("2e-5", "2e-2") + forces(1.0)))
     static = estimate(heavy).models[1]
     assert velocity_at(heavy, static.threshold) == pytest.approx(static.velocity, rel=1e-8)
+
+
+def test_a_case_that_is_run_in_full_is_judged_as_the_run_of_its_deck() -> None:
+    """Slope and strain need the rows of RODP, which the case keeps for its judge."""
+    deck = problem_of(DECK).deck
+    ran = fecm.run(deck.with_(velocity=12000.0))
+    assert {"slope > 0.25", "strain > 1 %"} <= {*ran.validity.split("; ")}
+    swept = fecm.sweep(deck, {"velocity": [300.0, 12000.0]})
+    assert swept.validity.tolist() == [fecm.run(deck.with_(velocity=300.0)).validity, ran.validity]

@@ -7,7 +7,7 @@ many cases at once: arrays (cases,).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from enum import StrEnum
 from itertools import compress
 
@@ -103,6 +103,8 @@ class Extent:
     deflection: Floats  # under the load; NaN of a plate that its supports let move
     exposure: Floats | float = np.nan
     threshold: Floats | float = np.nan
+    # Reasons that the stored rows of a run gave: slope and strain.
+    of_rows: Collection[str] = ()
 
 
 @frozen
@@ -138,6 +140,8 @@ class Judge:
                 Reason.OPEN: np.isin(extent.end, (End.RISING, End.BETWEEN)),
                 Reason.AGAIN: extent.end == End.AGAIN,
                 BENT[self.in_plane]: extent.deflection > self.limit * h,
+                Reason.STEEP: np.full(extent.peak.shape, Reason.STEEP in extent.of_rows),
+                Reason.STRAINED: np.full(extent.peak.shape, Reason.STRAINED in extent.of_rows),
                 Reason.SOFT: extent.indentation > INDENTATION * h,
                 Reason.BROKEN: np.broadcast_to(extent.exposure > CROSSED, extent.peak.shape),
                 Reason.DELAMINATED: extent.peak > CROSSED * extent.threshold,

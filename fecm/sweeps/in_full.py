@@ -23,6 +23,7 @@ from fecm.results.metrics import EVALUATIONS, HIT, Indentation, Projectiles, sum
 from fecm.results.result import Result
 from fecm.results.run_metrics import deflection_of
 from fecm.results.sinks import MemorySink
+from fecm.results.validity import reasons_of
 from fecm.simulation.recorder import exposures_of
 from fecm.simulation.run import run, simulate
 from fecm.simulation.simulation import Criteria, Simulation
@@ -204,7 +205,15 @@ def _outcome(
         force=force[None],
     )
     peaks = peaks_of(measures, result)
-    judge(outcome, checked, measures, metrics, peaks=peaks, indentation=indentation.largest)
+    judge(
+        outcome,
+        checked,
+        measures,
+        metrics,
+        peaks=peaks,
+        indentation=indentation.largest,
+        of_rows=reasons_of(result.validity),
+    )
     if Measure.FAILURE in measures:
         count = np.array([float(count_evaluations(result))])
         outcome.columns |= dict.fromkeys(EVALUATIONS, count)
@@ -231,16 +240,26 @@ def _measured(measure: MeasureFunction, result: Result, case: Case) -> dict[str,
     return {name: value.astype(float)[None] for name, value in values.items()}
 
 
+def stores_rows(checked: Problem, measures: Sequence[Measure] = ()) -> bool:
+    """Whether full runs keep the rows of RODP: cases that share no response of a linear plate."""
+    return checked.plate.nonlinear or Measure.FAILURE in measures
+
+
 def without_output(checked: Problem, measures: Sequence[Measure] = ()) -> Problem:
-    """Return a problem whose program stores no fields, but those of what is measured."""
+    """Return a problem whose program stores no fields, except for what is measured.
+
+    The rows of RODP stay where the run judges slope and strain by them.
+    """
     dropped = {*FIELDS} if Measure.FAILURE in measures else {*FIELDS, "FAIL"}
+    keeps_rows = stores_rows(checked, measures)
 
     def kept(body: Body) -> Iterator[Macro | Loop]:
         for item in body:
             if isinstance(item, Loop):
                 yield replace(item, body=tuple(kept(item.body)))
             elif item.word not in dropped:
-                yield replace(item, value=NEVER) if item.word == "RODP" else item
+                is_silent = item.word == "RODP" and not keeps_rows
+                yield replace(item, value=NEVER) if is_silent else item
 
     return replace(checked, program=tuple(kept(checked.program)))
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -45,10 +45,12 @@ def judge(
     *,
     peaks: Mapping[str, Peak],
     indentation: Floats,
+    of_rows: Collection[str] = (),
 ) -> None:
     """Add the validity of cases, and the columns of what was measured, with its open values.
 
     `peaks` has the strains of gages and the exposures, `indentation` (cases,) is the largest.
+    `of_rows` has the reasons that the stored rows of a full run gave.
     """
     rules, end, plate = checked.judge, metrics.end, metrics.plate
     known = {name: decided(peak.largest, peak.last, end) for name, peak in peaks.items()}
@@ -63,6 +65,7 @@ def judge(
         deflection=deflection,
         exposure=np.nanmax(exposures, axis=0) if exposures else np.nan,
         threshold=metrics.columns.get(THRESHOLD_FORCE, np.nan),
+        of_rows=of_rows,
     )
     ratio = metrics.deflection / rules.thickness
     if Measure.DEFLECTION in measures:

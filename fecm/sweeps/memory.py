@@ -7,7 +7,7 @@ from fecm.mechanics.kernels import LIBRARY
 from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
 from fecm.sweeps.checks import check_deck
-from fecm.sweeps.in_full import without_output
+from fecm.sweeps.in_full import stores_rows, without_output
 from fecm.sweeps.plan import MOST_TOGETHER, Plan, runs_together, tasks
 from fecm.sweeps.values import REFINE
 from fecm.sweeps.vary import apply_case
@@ -30,6 +30,9 @@ def check_memory(checked: Problem, made: Plan, workers: int, *, streamed: bool =
     steps, cases = checked.work.steps, len(made.cases)
     at_once = min(workers, len(tasks(checked, made))) if workers > 1 else workers
     plate = checked if settings.measure else without_output(checked, settings.measures)
+    in_memory = settings.measure is not None or (
+        settings.modes is None and stores_rows(checked, settings.measures)
+    )
     stored = 0
     if settings.history:
         stored = HISTORY_BYTES * steps * (min(cases, MOST_TOGETHER) if streamed else cases)
@@ -37,7 +40,7 @@ def check_memory(checked: Problem, made: Plan, workers: int, *, streamed: bool =
     def needed(exact: bool) -> int:
         if not at_once:
             return stored
-        one = needed_bytes(plate, in_memory=settings.measure is not None, exact=exact)
+        one = needed_bytes(plate, in_memory=in_memory, exact=exact)
         one += ADVANCED_BYTES * steps * runs_together(checked, made)
         return stored + at_once * one
 

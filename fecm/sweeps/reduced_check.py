@@ -65,6 +65,7 @@ class ReducedModel:
         )
         for case, peak, w in rows:
             yield f"{'':18}peak {peak:+.2%}, w {w:+.3%} (case {case})"
+        yield f"{'':18}slopes and strains are not judged"
 
     def check(self) -> None:
         """Raise CasesError if a peak differs by more than the limit."""
