@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import fecm
+from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.layup import parse_plies
@@ -292,3 +294,16 @@ def test_a_sweep_over_the_cure_of_several_materials_is_that_of_single_runs() -> 
         single = fecm.run_one(deck.with_(cure_dT=change))
         for one in largest_exposures(single):
             assert found[f"exposure_{one.criterion}"][row] == pytest.approx(one.exposure, rel=1e-9)
+
+
+def test_a_sandwich_has_no_delamination_threshold() -> None:
+    options = (*SANDWICH, "--units", "mm-N-s", "--damage")
+    made = new(*LAW, *options)
+    assert "no delamination threshold (DELA): it is that of a solid laminate" in made.stderr
+    deck = deck_of(*options)
+    assert deck.last(Delamination) is None
+    with_threshold = replace(deck, segments=(Delamination(0.3), *deck.segments), text="")
+    (problem,) = load_deck(with_threshold).problems
+    assert problem.threshold is None
+    with pytest.raises(fecm.FecmError, match="a plate without a core"):
+        fecm.sweep(with_threshold, {"velocity": [2000.0]}, until="threshold")

@@ -312,6 +312,12 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     ),
     "W461": plate(replaced(r"^(.{5}).{5}(     0\.184)$", r"\1 45.0\2")),
     "W462": plate(with_card("CURE", "-600.,", ",.02E-6,22.5E-6", "")),
+    "W540": plate(with_card("CURE", "155.,", ",.02E-6,22.5E-6", "")),
+    "W541": lambda: small(
+        data="DELA\n.5\n"
+        + MATS
+        + DATA_CARDS.replace("    2  90.     0.053", "    2  90.     0.053    2")
+    ),
     "W463": plate(with_card("CURE", "-400.,", ",.02E-6,22.5E-6", "")),
     "W464": more("CURE\n-200.,\n,.02E-6,22.5E-6\n\n"),
     "W496": plate(with_card("CURE", ",.5", ",.02E-6,22.5E-6,,.6", "")),

@@ -325,6 +325,12 @@ def author(asked: Request) -> Authored:
         )
         doubts += doubts_of_core(plies, struck)
     damage = damages(plies, asked.giic, notes) if asked.numerics.damage else toughness(asked.giic)
+    if is_sandwich(plies, struck) and any(isinstance(s, model.Delamination) for s in damage):
+        damage = [s for s in damage if not isinstance(s, model.Delamination)]
+        notes.append(
+            "the deck has no delamination threshold (DELA): it is that of a solid laminate, and "
+            "the faces of a sandwich delaminate or leave the core far below it"
+        )
     if asked.numerics.failure and not any(isinstance(s, model.Allowables) for s in damage):
         damage = [strengths_of(plies), *damage]
     segments = (
@@ -387,10 +393,15 @@ def _formed(
     return Formed(replace(plain, segments=tuple(segments)), comment, notes)
 
 
+def is_sandwich(plies: Plies, layers: Sequence[model.Layer]) -> bool:
+    """Whether a layer is so soft in shear that it is the core of a sandwich."""
+    moduli = [plies.of(layer).ply.g13 for layer in layers]
+    return min(moduli) < SOFT_CORE * max(moduli)
+
+
 def doubts_of_core(plies: Plies, layers: Sequence[model.Layer]) -> list[str]:
     """Doubt an estimated k of a sandwich."""
-    moduli = [plies.of(layer).ply.g13 for layer in layers]
-    if min(moduli) >= SOFT_CORE * max(moduli):
+    if not is_sandwich(plies, layers):
         return []
     return [
         "k is estimated of a sandwich, as if its core were spread over the thickness; its face "

@@ -84,6 +84,12 @@ class Laminate:
         return int(np.count_nonzero((turns != 0.0) | np.array(changes, dtype=bool)))
 
     @property
+    def has_core(self) -> bool:
+        """Whether a ply is so soft in shear that the others are the faces of a sandwich."""
+        moduli = [ply.g13 for ply in self.plies.constants]
+        return min(moduli) < SOFT_CORE * max(moduli)
+
+    @property
     def is_coupled(self) -> bool:
         """Whether stretching and bending are coupled (B is not zero beyond rounding)."""
         scale = np.abs(self.A).max() * self.thickness

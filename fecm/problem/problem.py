@@ -281,8 +281,13 @@ class Problem:
 
     @cached_property
     def threshold(self) -> Threshold | None:
-        """Delamination threshold; None without a DELA segment."""
-        if (card := self.deck.last(model.Delamination)) is None:
+        """Delamination threshold; None without a DELA segment, and of a sandwich.
+
+        The threshold is that of a solid laminate: the faces of a sandwich delaminate, or leave the
+        core, at a small part of it.
+        """
+        card = self.deck.last(model.Delamination)
+        if card is None or self.laminate.has_core:
             return None
         rigidity, interfaces = effective_rigidity(self.laminate), self.laminate.unlike_interfaces
         number = int(card.number)

@@ -39,7 +39,7 @@ from fecm.sweeps.in_full import (
     with_hit,
 )
 from fecm.sweeps.judge import Peak, judge, thresholds_of
-from fecm.sweeps.limits import PEAK_FORCE, THRESHOLD
+from fecm.sweeps.limits import NO_THRESHOLD, PEAK_FORCE, THRESHOLD
 from fecm.sweeps.memory import ADVANCED_BYTES
 from fecm.sweeps.outcome import About, Outcome, Status, merge, outcome_of
 from fecm.sweeps.plan import Measure, Plan, Settings, Task, shares_plate
@@ -116,7 +116,8 @@ def _outcome(settings: Settings, checked: Problem, longer: Longer, strikes: Stri
     levels = dict.fromkeys(numbers, 0.0 if level == THRESHOLD else float(level))
     if level == THRESHOLD:
         thresholds = thresholds_of(checked, columns_of(strikes).toughness)
-        assert thresholds is not None  # the plan requires DELA
+        if thresholds is None:
+            raise CasesError(NO_THRESHOLD)
         levels = dict(zip(numbers, thresholds.tolist(), strict=True))
     if checked.deck.has(Nonlinear):
         return merge(

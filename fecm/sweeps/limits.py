@@ -9,7 +9,9 @@ from fecm.sweeps.case import CasesError, number
 
 THRESHOLD = "threshold"  # instead of a number: the delamination threshold
 PEAK_FORCE = "peak_force"
-NO_THRESHOLD = "the threshold needs a DELA segment, which the deck does not have"
+NO_THRESHOLD = (
+    "the threshold needs a DELA segment and a plate without a core, which the deck does not have"
+)
 
 
 class Limit(NamedTuple):

@@ -16,7 +16,7 @@ from typing import Any
 
 from fecm._version import __version__
 from fecm.deck.macros import flat
-from fecm.deck.model import Deck, Delamination, Gages, Nonlinear
+from fecm.deck.model import Deck, Gages, Nonlinear
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import name_of
 from fecm.problem.problem import Problem
@@ -25,7 +25,7 @@ from fecm.results.metrics import THRESHOLD as OF_THRESHOLD
 from fecm.results.result import Result
 from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.find import FIRST_VELOCITIES, Search, Sought, Until, search_of
-from fecm.sweeps.limits import Limit, check_limits
+from fecm.sweeps.limits import NO_THRESHOLD, THRESHOLD, Limit, check_limits
 from fecm.sweeps.random import Design
 from fecm.sweeps.timing import Clock, clock_of
 from fecm.sweeps.values import (
@@ -156,8 +156,11 @@ def plan(
         if build or measure or (by_force and Measure.FAILURE in measures):
             raise CasesError("until can't be given together with build, measure or failure")
         search.check(deck, cases[0])
+        if search.level == THRESHOLD and checked.threshold is None:
+            raise CasesError(NO_THRESHOLD)
     if measure is None:
-        _check_limits(limits, deck, search, measures)
+        has_threshold = checked.threshold is not None
+        _check_limits(limits, search, measures, has_threshold=has_threshold)
     own_clock = build is None and "dt" not in cases[0] and not _KEEPING.issuperset(cases[0])
     settings = Settings(
         deck=deck,
@@ -198,7 +201,11 @@ def _measures(names: Sequence[str], deck: Deck) -> tuple[Measure, ...]:
 
 
 def _check_limits(
-    limits: Sequence[Limit], deck: Deck, search: Search | None, measures: Sequence[Measure]
+    limits: Sequence[Limit],
+    search: Search | None,
+    measures: Sequence[Measure],
+    *,
+    has_threshold: bool,
 ) -> None:
     """Raise CasesError if the summary of the sweep will not have the quantity of a limit."""
     known = [*SUMMARY]
@@ -207,7 +214,6 @@ def _check_limits(
     if measures:
         names = (limit.quantity for limit in limits)
         known += [name for name in names if name in COLUMNS or name.startswith(GAGE)]
-    has_threshold = deck.last(Delamination) is not None
     if has_threshold:
         known += OF_THRESHOLD
     check_limits(limits, known, threshold=has_threshold)

@@ -105,6 +105,28 @@ def large_change(problem: Problem) -> Reports:
 
 
 @rule(
+    "W540",
+    Subject.LAMINATE,
+    "The change of temperature on CURE is positive.",
+    cause=(
+        "The plies have been heated since they were free of stress. After a cure the change is "
+        "negative, and residual stresses of the wrong sign hide the first failure."
+    ),
+    remedy="The temperature of use minus that of the cure: -155 from 177 to 22.",
+)
+def heated_since_the_cure(problem: Problem) -> Reports:
+    """Find a change of temperature of the wrong sign."""
+    card = problem.deck.last(model.Cure)
+    if card is not None and card.delta_t > 0.0:
+        message = (
+            f"CURE {card.delta_t:+g} K: the plies have been heated since they were free of stress; "
+            "after a cure the change is negative."
+        )
+        hint = f"write {-card.delta_t:g} if the plate has cooled by {card.delta_t:g} K"
+        yield Report(message, card.place("change of temperature"), hint)
+
+
+@rule(
     "W463",
     Subject.DAMAGE,
     "The laminate cracks before any load.",
@@ -184,6 +206,7 @@ OF_CURE = (missing_expansion, implausible_expansion)
 VALUES = (
     implausible_moisture,
     large_change,
+    heated_since_the_cure,
     cracks_at_rest,
     warped_plate,
     cure_without_stresses,

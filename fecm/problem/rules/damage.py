@@ -360,12 +360,34 @@ def preload_beyond_strength(problem: Problem) -> Reports:
         yield Report(message, card.place(), "PREL is a force per length, tension positive")
 
 
+@rule(
+    "W541",
+    Subject.DAMAGE,
+    "DELA is of no use: the plate is a sandwich.",
+    cause=(
+        "The threshold is that of a solid laminate. The faces of a sandwich delaminate, or leave "
+        "the core, at a small part of it. No threshold is computed."
+    ),
+    remedy="Remove DELA; FAIL has the exposures of faces and core.",
+)
+def threshold_of_a_sandwich(problem: Problem) -> Reports:
+    """Find a delamination threshold of a plate with a core."""
+    card = problem.deck.last(model.Delamination)
+    if card is not None and problem.laminate.has_core:
+        message = (
+            "The plate has a core: the threshold of DELA is that of a solid laminate and is not "
+            "computed. The faces delaminate, or leave the core, far below it."
+        )
+        yield Report(message, card.place(), "remove DELA; FAIL has the exposures of the core")
+
+
 OF_STRENGTHS = (invalid_strength, invalid_constant_of_criterion)
 OF_DELAMINATION = (invalid_delamination,)
 OF_THRESHOLD = (coupled_threshold, twisted_threshold)
 # One of these is enough.
 STRENGTHS = (strengths_in_another_unit, strengths_in_another_order)
 VALUES = (
+    threshold_of_a_sandwich,
     strengths_without_criteria,
     few_evaluations,
     preload_beyond_strength,

@@ -10,7 +10,7 @@ from fecm.deck.macros import flat
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.record import Record
 from fecm.deck.rules import Report, Reports, Subject, reports, rule
-from fecm.mechanics.laminate import SOFT_CORE, Laminate
+from fecm.mechanics.laminate import Laminate
 from fecm.problem.problem import Problem
 from fecm.problem.rules.cure import FIELDS
 
@@ -199,7 +199,7 @@ def soft_core(problem: Problem) -> Reports:
         return
     for number, laminate in _used(problem):
         moduli = [ply.g13 for ply in laminate.plies.constants]
-        if min(moduli) < SOFT_CORE * max(moduli):
+        if laminate.has_core:
             ratio = max(moduli) / min(moduli)
             message = (
                 f"Laminate {number} has a core whose G13 is {ratio:.3g} times below that of the "
