@@ -19,6 +19,7 @@ from fecm.sweeps import api
 from fecm.sweeps.case import CasesError
 from fecm.sweeps.plan import Task, plan, tasks
 from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
+from fecm.sweeps.reduced_check import ReducedModel
 from fecm.sweeps.responses import Hits
 from fecm.sweeps.strike import strike_of
 from tests.builders import table
@@ -122,9 +123,16 @@ def test_too_few_modes_are_refused_before_the_sweep(monkeypatch: pytest.MonkeyPa
         return own(whole, **more)
 
     monkeypatch.setattr(api, "_outcomes", counted)
-    with pytest.raises(CasesError, match=r"1 mode differs by \+.* case \d.*2%.*more modes"):
+    with pytest.raises(CasesError, match=r"1 mode differs by \+.* case 3; .*2%.*more modes"):
         fecm.sweep(DECK, {"velocity": [100.0, *SPEEDS]}, model="reduced", modes=1)
-    assert [task.numbers for task in ran] == [(0,), (2,), (3,)] * 2
+    assert [task.numbers for task in ran] == [(3,)] * 2  # the largest energy, in full and reduced
+
+
+def test_a_model_with_all_its_modes_is_not_told_to_take_more() -> None:
+    row = {"case": np.array([4]), "peak_force": np.array([0.9]), RATIO: np.ones(1)}
+    full = {"full_peak_force": np.ones(1), f"full_{RATIO}": np.ones(1)}
+    with pytest.raises(CasesError, match="these are all its modes; take full runs"):
+        ReducedModel(40, {**row, **full}).check()
 
 
 def test_a_case_does_not_depend_on_the_others(swept: fecm.SweepResult) -> None:

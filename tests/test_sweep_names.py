@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -415,3 +416,32 @@ def test_cases_that_differ_in_their_strikes_share_one_deck(monkeypatch: pytest.M
     assert len(found) == 8
     assert len(set(found["peak_force"].tolist())) == 8
     assert decks == [{"angle": 30.0}]
+
+
+def test_values_with_a_unit_are_those_of_the_deck() -> None:
+    """5 J are 5000 N*mm in a deck of mm, N and s, whose mass unit is the tonne."""
+    assert parse_vary("energy=5J:30J:6", "mm-N-s")[1] == [5e3, 1e4, 1.5e4, 2e4, 2.5e4, 3e4]
+    assert parse_vary("energy=500mJ,1 J", "mm-N-s")[1] == [500.0, 1000.0]
+    assert parse_vary("duration=12ms", "mm-N-ms")[1] == [12.0]
+    assert parse_vary("mass=5.5kg,2000", "mm-N-s")[1] == pytest.approx([5.5e-3, 2000.0])
+    assert parse_vary("xt=2.3GPa", "mm-N-s")[1] == [2300.0]
+    assert parse_vary("giic=0.8kJ/m^2", "mm-N-s")[1] == pytest.approx([0.8])
+    assert parse_vary("k=1e6,2E+5", "mm-N-s")[1] == [1e6, 2e5]
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("energy=5m", "energy must be a finite number, or one with a unit as in 10J, not `5m`"),
+        ("nu12=0.3J", "nu12 must be a finite number, not `0.3J`"),
+        ("energy=5J:3s:6", "as in 10J, not `3s`"),
+    ],
+)
+def test_another_unit_is_refused_with_an_example(text: str, message: str) -> None:
+    with pytest.raises(CasesError, match=re.escape(message)):
+        parse_vary(text, "mm-N-s")
+
+
+def test_a_unit_needs_a_deck_that_names_its_units() -> None:
+    with pytest.raises(CasesError, match=re.escape("the deck names no units; add UNIT")):
+        parse_vary("energy=5J")

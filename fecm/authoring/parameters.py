@@ -11,7 +11,7 @@ from typing import TypeGuard
 
 from fecm._errors import FecmError
 from fecm.deck.unit_systems import units_of
-from fecm.deck.units import in_si, unit_in_si
+from fecm.deck.units import MASS, MODULUS, in_si, unit_in_si
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 
@@ -21,6 +21,9 @@ EXAMPLES = {
     "length/time": "3m/s",
     "time": "4ms",
     "force/length": "50N/mm",
+    "length": "6mm",
+    MASS: "5kg",
+    MODULUS: "60MPa",
 }
 
 

@@ -16,6 +16,7 @@ from fecm.cli.decks import count_findings
 from fecm.cli.help import GroupedCommand, typical
 from fecm.cli.interrupts import signals
 from fecm.cli.options import DECK_PATH, LAW_OPTION, NAMED_PATH, OneOf, Parsed, collected, list_of
+from fecm.deck.catalogue import system_of
 from fecm.deck.findings import DeckError
 from fecm.mechanics.own_law import LawError, own_law
 from fecm.problem.build import RunOptions
@@ -26,7 +27,7 @@ from fecm.results.result import result_of
 from fecm.simulation.run import simulate
 from fecm.sweeps.api import carry_out, check_draws, modes_of, problem_of
 from fecm.sweeps.batch import deck_of
-from fecm.sweeps.case import Case, CasesError, Value
+from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.cases import read_cases
 from fecm.sweeps.convergence import table as table_of
 from fecm.sweeps.copula import Pair, correlation_of, parse_correlation
@@ -93,7 +94,7 @@ class Options:
     """Argument and options of ``fecm sweep``; those of :func:`fecm.sweep` have its names."""
 
     deck: Path
-    vary: tuple[tuple[str, list[Value]], ...]
+    vary: tuple[str, ...]
     cases: Path | None  # table of the cases
     refine: tuple[int, ...] | None
     random: tuple[tuple[str, Law], ...]
@@ -163,6 +164,12 @@ class Options:
             raise click.UsageError("--correlation: a pair is given twice")
 
 
+def _checked_vary(text: str) -> str:
+    """Check a text of --vary before its deck is read, whose units its values then get."""
+    parse_vary(text, "m-N-s")
+    return text
+
+
 @click.command(
     cls=GroupedCommand,
     groups=GROUPS,
@@ -176,9 +183,10 @@ class Options:
 @click.argument("deck", type=DECK_PATH)
 @option(
     "--vary",
-    type=Parsed(parse_vary, "NAME=VALUES", NAMED),
+    type=Parsed(_checked_vary, "NAME=VALUES", NAMED),
     multiple=True,
-    help=f"FROM:TO:N or A,B,C; may be repeated, for a full grid.  Names: {', '.join(NAMES)}.",
+    help="FROM:TO:N or A,B,C, also with a unit, as in energy=5J:30J:6; may be repeated, for a full "
+    f"grid.  Names: {', '.join(NAMES)}.",
 )
 @option(
     "--cases",
@@ -379,9 +387,11 @@ def _cases(problem: Problem, options: Options) -> tuple[list[Case], Design | Non
     """Cases of the sweep, and the design of random ones."""
     if options.refine:
         return refined_cases(problem, options.refine), None
-    given = grid(options.vary)
+    system = system_of(problem.deck)
     if options.cases is not None:
-        given = read_cases(options.cases)
+        given = read_cases(options.cases, system)
+    else:
+        given = grid([parse_vary(text, system) for text in options.vary])
     if not options.random:
         return given, None
     laws = dict(options.random)

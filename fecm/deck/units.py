@@ -36,7 +36,6 @@ PREFIXED = {
 }  # fmt: skip
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
 # Units of products and quotients that have a name of their own, in m, N and s.
-NAMED = {"force*length": {"J": 1.0, "mJ": 1e-3, "kJ": 1e3}}
 # Dimensions.
 MASS = "force*time^2/length"
 MODULUS = "force/length^2"
@@ -44,6 +43,13 @@ TOUGHNESS = "force/length"
 DENSITY = "force*time^2/length^4"
 VELOCITY = "length/time"
 COEFFICIENT = "force/length^1.5"  # of Hertz's law
+# Named units of dimensions, in m, N and s.
+NAMED = {
+    "force*length": {"J": 1.0, "mJ": 1e-3, "kJ": 1e3},
+    MASS: {"kg": 1.0, "g": 1e-3, "t": 1e3},
+    MODULUS: {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9},
+    TOUGHNESS: {"J/m^2": 1.0, "kJ/m^2": 1e3},
+}
 
 
 def unit_names(deck: Deck) -> dict[str, str]:

@@ -20,6 +20,7 @@ from fecm._memory import NotEnoughMemoryError
 from fecm._processors import free
 from fecm._progress import once_a_minute
 from fecm.api import LOGGER, LoadedDeck, Progress, load_deck
+from fecm.deck.catalogue import system_of
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
 from fecm.mechanics.contact_law import Law
@@ -56,7 +57,7 @@ from fecm.sweeps.random import (
     doubt,
     random_cases,
 )
-from fecm.sweeps.reduced_check import compared, trials
+from fecm.sweeps.reduced_check import ReducedModel, compared, trials
 from fecm.sweeps.refine import refined_cases
 from fecm.sweeps.result import SweepResult, result_of
 from fecm.sweeps.result_writer import save
@@ -151,14 +152,29 @@ def carry_out(
     whole = tasks(problem, made)
     model = None
     if made.settings.modes is not None:
-        fulls, models = trials(made, len(whole))
-        found = run([*fulls, *models], done=lambda task, outcome: None)
-        in_full = [outcome for task, outcome in found if task.settings.modes is None]
-        by_model = [outcome for task, outcome in found if task.settings.modes is not None]
-        model = compared(made.settings.modes, in_full, by_model)
+        model = _checked_model(made, made.settings.modes, len(whole), run)
     outcomes = [outcome for _, outcome in run(whole, done=done)]
     history = made.settings.history and parts is None
     return result_of(made, merge(outcomes, history=history), model)
+
+
+def _checked_model(
+    made: Plan, modes: int, first: int, run: Callable[..., list[tuple[Task, Outcome]]]
+) -> ReducedModel:
+    """Compare the reduced model with full runs; the largest energy first, which fits worst.
+
+    The tasks are numbered from `first`.  Raises CasesError if the model differs too much.
+    """
+    fulls, models = trials(made, first)
+    in_full: list[Outcome] = []
+    by_model: list[Outcome] = []
+    for some in (slice(-1, None), slice(None, -1)):
+        pairs = [*fulls[some], *models[some]]
+        for task, outcome in run(pairs, done=lambda task, outcome: None) if pairs else ():
+            (in_full if task.settings.modes is None else by_model).append(outcome)
+        if all(outcome.fine.all() for outcome in (*in_full, *by_model)):
+            compared(modes, in_full, by_model)
+    return compared(modes, in_full, by_model)
 
 
 def _outcomes(
@@ -229,7 +245,7 @@ def sweep(
     seed: int = 0,
     design: DesignKind = "lhs",
     sensitivity: bool = False,
-    exceed: Mapping[str, float | Literal["threshold"] | Sequence[float]] | None = None,
+    exceed: str | Mapping[str, float | Literal["threshold"] | Sequence[float]] | None = None,
     until: float | Literal["threshold"] | Mapping[str, float | str] | None = None,
     history: bool = False,
     build: BuildFunction | None = None,
@@ -257,7 +273,8 @@ def sweep(
     deck : str, Path or Deck
         Deck with a single problem; not with `build`.
     vary : mapping of str to sequence
-        Values by name; all combinations are run.
+        Values by name; all combinations are run.  A text has a unit, as in ``"5J"``, and is
+        converted to the units of the deck.
     cases : iterable of mapping or DataFrame, optional
         Cases instead: one mapping each, or a table with a column per name.
     refine : sequence of int, optional
@@ -280,9 +297,9 @@ def sweep(
         Latin hypercube, scrambled Sobol' sequence, or independent draws.
     sensitivity : bool
         Estimate Sobol' indices, from `samples` times (number of random names + 2) cases.
-    exceed : mapping of str to float, str or sequence of float, optional
+    exceed : str or mapping of str to float, str or sequence of float, optional
         Limits of quantities, whose probability of exceedance is estimated; ``"threshold"`` for
-        the peak force: the delamination threshold.
+        the peak force: the delamination threshold.  Also a text: ``"peak_force=threshold"``.
     until : float, str or mapping of str to float, optional
         Search in every case for the velocity at which the peak force reaches this value;
         ``"threshold"``: the delamination threshold.  ``{"exposure": 1.0}``: at which the largest
@@ -382,7 +399,13 @@ def sweep(
     own_contact = own_law(law)
     free = build is not None
     grid = {} if vary is None else vary
-    made = combined(grid, free=free) if cases is None else checked(cases, free=free)
+    loaded = None if deck is None or free else _loaded(deck)
+    system = None if loaded is None else system_of(loaded.problems[0].deck)
+    made = (
+        combined(grid, free=free, system=system)
+        if cases is None
+        else checked(cases, free=free, system=system)
+    )
     drawn = None
     if random is not None:
         laws = {name: law_of(name, law, free=free) for name, law in random.items()}
@@ -394,7 +417,7 @@ def sweep(
     spawns = (workers is None and scheduler is None and executor is None) or (workers or 1) > 1
     if spawns or isinstance(executor, ProcessPoolExecutor):
         _check_sendable(spawns, build=build, measure=own, law=own_contact)
-    prepared = _prepared(deck, build, made)
+    prepared = _prepared(deck, loaded, build, made)
     if output is not None:
         check_outputs([Path(output)], overwrite, [Path(prepared.source)], allowed_by=ARGUMENT)
     (problem,) = prepared.problems
@@ -493,8 +516,10 @@ def _measures(
     return None, names
 
 
-def _limits(exceed: Mapping[str, float | str | Sequence[float]] | None) -> tuple[Limit, ...]:
-    """Limits of quantities that were given by name."""
+def _limits(exceed: str | Mapping[str, float | str | Sequence[float]] | None) -> tuple[Limit, ...]:
+    """Limits of quantities, from a text or from values by name."""
+    if isinstance(exceed, str):
+        return (parse_exceed(exceed),)
     if not isinstance(exceed or {}, Mapping):
         raise CasesError(f'exceed is {exceed!r}; write {{"peak_force": [100.0]}} or the like')
     return tuple(
@@ -505,11 +530,14 @@ def _limits(exceed: Mapping[str, float | str | Sequence[float]] | None) -> tuple
 
 
 def _prepared(
-    deck: str | Path | Deck | None, build: BuildFunction | None, cases: Sequence[Case]
+    deck: str | Path | Deck | None,
+    loaded: LoadedDeck | None,
+    build: BuildFunction | None,
+    cases: Sequence[Case],
 ) -> LoadedDeck:
     """The deck, or the first that is built; its warnings are issued."""
-    if deck is not None and build is None:
-        prepared = _loaded(deck)
+    if loaded is not None:
+        prepared = loaded
     elif deck is None and build is not None:
         prepared = _first_built(build, cases)
     else:

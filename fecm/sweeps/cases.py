@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
@@ -12,8 +13,11 @@ from fecm.sweeps.case import MOST_CASES, Case, CasesError, check_count
 from fecm.sweeps.values import check_free, check_known, free_value_of, parse_value, value_of
 
 
-def read_cases(path: Path) -> list[Case]:
-    """Read a CSV table, a header of names and one row per case; CasesError states a line."""
+def read_cases(path: Path, system: str | None = None) -> list[Case]:
+    """Read a CSV table, a header of names and one row per case; CasesError states a line.
+
+    Values with a unit are converted to a system of units.
+    """
     try:
         rows = [(line, row) for line, row in read_rows(path, MOST_CASES + 1) if any(row)]
     except StudyError as error:
@@ -30,7 +34,8 @@ def read_cases(path: Path) -> list[Case]:
         if len(row) != len(header):
             raise CasesError(f"{path}:{line}: {len(row)} values, but {len(header)} names")
         try:
-            cases.append({n: parse_value(n, text) for n, text in zip(header, row, strict=True)})
+            values = zip(header, row, strict=True)
+            cases.append({name: parse_value(name, text, system) for name, text in values})
         except CasesError as error:
             raise CasesError(f"{path}:{line}: {error}") from None
     check_count(len(cases), f"{path} has {len(cases)} cases")
@@ -60,14 +65,21 @@ def _rows(table: Table) -> list[dict[Any, Any]]:
 
 
 def checked(
-    cases: Iterable[Mapping[str, Any]] | Table, source: str = "", *, free: bool = False
+    cases: Iterable[Mapping[str, Any]] | Table,
+    source: str = "",
+    *,
+    free: bool = False,
+    system: str | None = None,
 ) -> list[Case]:
     """Validate cases given as mappings, which must all have the same names, or as a table.
 
-    With `free`, the names are any but those of results, and a value is a number or a text.  Raises
+    With `free`, the names are any but those of results, and a value is a number or a text;
+    otherwise texts with a unit are converted to a system of units.  Raises
     CasesError if a case is invalid; the message states the source, or else the case's number.
     """
-    check_name, read = (check_free, free_value_of) if free else (check_known, value_of)
+    check_name, read = (
+        (check_free, free_value_of) if free else (check_known, partial(value_of, system=system))
+    )
     made: list[Case] = []
     remedy = 'write a list of mappings such as [{"velocity": 50.0}]'
     if isinstance(cases, Table):

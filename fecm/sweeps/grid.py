@@ -13,11 +13,14 @@ import numpy as np
 
 from fecm.sweeps.case import MOST_CASES, Case, CasesError, Value, check_count, number
 from fecm.sweeps.cases import checked
-from fecm.sweeps.values import Kind, check_known, kind_of, parse_value
+from fecm.sweeps.values import Kind, check_known, kind_of, parse_value, without_unit
 
 
-def parse_vary(text: str) -> tuple[str, list[Value]]:
-    """Read ``NAME=FROM:TO:N`` (N values with both ends) or ``NAME=a,b,c``; else CasesError."""
+def parse_vary(text: str, system: str | None = None) -> tuple[str, list[Value]]:
+    """Read ``NAME=FROM:TO:N`` (N values with both ends) or ``NAME=a,b,c``; else CasesError.
+
+    Values with a unit, as in ``energy=5J:30J:6``, are converted to a system of units.
+    """
     name, equals, text_of_values = (part.strip() for part in text.partition("="))
     check_known(name, text)
     if not equals or not text_of_values:
@@ -26,11 +29,12 @@ def parse_vary(text: str) -> tuple[str, list[Value]]:
         parts = re.split(r",(?![^\[]*\]|[^(]*\))", text_of_values)
         if name == "at" and not re.search("[(; ]", text_of_values):
             parts = _points(parts)
-        return name, [parse_value(name, part) for part in parts if part.strip()]
+        return name, [parse_value(name, part, system) for part in parts if part.strip()]
     parts = text_of_values.split(":")
     if len(parts) != 3 or not re.fullmatch(r"\d+", parts[2].strip()) or not int(parts[2]):
         raise CasesError(f"`{text}`: a range is FROM:TO:N with N of at least 1")
-    begin, end, count = number(name, parts[0]), number(name, parts[1]), int(parts[2])
+    begin, end = (number(name, without_unit(name, part, system)) for part in parts[:2])
+    count = int(parts[2])
     if count > MOST_CASES:
         raise CasesError(f"`{text}`: {count} values; at most {MOST_CASES} are allowed")
     with np.errstate(all="ignore"):
@@ -61,8 +65,12 @@ def grid(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
     return [dict(zip(names, values, strict=True)) for values in combinations]
 
 
-def combined(vary: Mapping[str, Iterable[Any]], *, free: bool = False) -> list[Case]:
+def combined(
+    vary: Mapping[str, Iterable[Any]], *, free: bool = False, system: str | None = None
+) -> list[Case]:
     """Return every combination of lists of values, given by name; with `free` both are any.
+
+    Texts with a unit are converted to a system of units.
 
     Raises CasesError if a name is unknown, a value is invalid, or values are not in a list.
     """
@@ -77,6 +85,6 @@ def combined(vary: Mapping[str, Iterable[Any]], *, free: bool = False) -> list[C
             raise CasesError(f'vary: {name} is one value; write a list: {{"{name}": [{given!r}]}}')
         if not values:
             raise CasesError(f"vary: {name} has no values")
-        cases = checked(({name: value} for value in values), "vary", free=free)
+        cases = checked(({name: value} for value in values), "vary", free=free, system=system)
         lists.append((name, [case[name] for case in cases]))
     return grid(lists)

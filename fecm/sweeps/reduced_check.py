@@ -13,7 +13,7 @@ from fecm.results.errors import ResultFileError
 from fecm.results.metrics import RATIO
 from fecm.sweeps.case import CasesError
 from fecm.sweeps.outcome import About, Column, Outcome, merge
-from fecm.sweeps.plan import Plan, Task
+from fecm.sweeps.plan import MOST_MODES, Plan, Task
 from fecm.sweeps.vary import strike
 
 if TYPE_CHECKING:
@@ -72,11 +72,13 @@ class ReducedModel:
         peaks = self.difference("peak_force")
         worst = int(np.abs(peaks).argmax())
         if not abs(peaks[worst]) <= LIMIT:
+            remedy = "take more modes, or full runs (leave out the reduced model)"
+            if self.modes >= MOST_MODES:
+                remedy = "these are all its modes; take full runs: leave out the reduced model"
             raise CasesError(
-                f"the peak by the reduced model with {self._modes} differs by "
-                f"{peaks[worst]:+.1%} from that of the full run in case "
-                f"{self.columns['case'][worst]}, and at most {LIMIT:.0%} is allowed: take more "
-                "modes, or full runs"
+                f"the peak force of the reduced model with {self._modes} differs by "
+                f"{peaks[worst]:+.1%} from the full run of case {self.columns['case'][worst]}; "
+                f"at most {LIMIT:.0%} is allowed: {remedy}"
             )
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from enum import Enum, IntEnum, auto
@@ -11,6 +12,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from fecm._errors import did_you_mean
+from fecm.authoring.parameters import EXAMPLES, NUMBER, ObjectError, in_units
 from fecm.deck.grid import SUPPORTS
 from fecm.deck.units import TOUGHNESS
 from fecm.results.metrics import COLUMNS, VERDICTS
@@ -252,15 +254,45 @@ def name_fault(name: object) -> str:
     return f"`{name}` is a name of the results; choose another" if name in RESERVED else ""
 
 
-def parse_value(name: str, text: str) -> Value:
-    """Read the value of a name; CasesError if it is invalid."""
+def without_unit(name: str, text: str, system: str | None) -> str:
+    """A number in a system of units, from a text that may have a unit, as in ``10J``.
+
+    Other texts stay as they are.  Raises CasesError if the unit is not one of the name's dimension,
+    or the system, which is the deck's, is unknown.
+    """
+    match = re.fullmatch(rf"\s*{NUMBER}\s*(\S.*)?", text)
+    if match is None or match[1] is None:
+        return text
+    dimension = dimension_of(name)
+    if dimension not in EXAMPLES:
+        raise CasesError(f"{name} must be a finite number, not `{text.strip()}`")
+    if system is None:
+        raise CasesError(
+            f"{name}: `{text.strip()}` has a unit, but the deck names no units; add UNIT to it, or "
+            "leave out the unit"
+        )
+    try:
+        return repr(in_units(name, text, dimension, system))
+    except ObjectError:
+        raise CasesError(
+            f"{name} must be a finite number, or one with a unit as in {EXAMPLES[dimension]}, not "
+            f"`{text.strip()}`"
+        ) from None
+
+
+def parse_value(name: str, text: str, system: str | None = None) -> Value:
+    """Read the value of a name; CasesError if it is invalid.
+
+    A value with a unit is converted to a system of units.
+    """
     if name in PAIRS:
         return normal_pair(name, text)
     if name == "support" and text.strip() not in SUPPORTS:
         raise CasesError(f"support must be {', '.join(SUPPORTS)}, not `{text.strip()}`")
     if kind_of(name) is Kind.TEXT:
         return text.strip()
-    value = 0.0 if name == "dt" and text.strip() == "auto" else number(name, text)
+    is_auto = name == "dt" and text.strip() == "auto"
+    value = 0.0 if is_auto else number(name, without_unit(name, text, system))
     if kind_of(name) is Kind.NUMBER:
         return value
     if not value.is_integer():
@@ -268,8 +300,11 @@ def parse_value(name: str, text: str) -> Value:
     return int(value)
 
 
-def value_of(name: str, given: object, where: str) -> Value:
-    """The value of a name that a caller of Python has given; CasesError if it is invalid."""
+def value_of(name: str, given: object, where: str, system: str | None = None) -> Value:
+    """The value of a name that a caller of Python has given; CasesError if it is invalid.
+
+    A text with a unit is converted to a system of units.
+    """
     if isinstance(given, np.generic):
         given = given.item()
     if kind_of(name) is Kind.TEXT and isinstance(given, Iterable) and not isinstance(given, str):
@@ -278,7 +313,7 @@ def value_of(name: str, given: object, where: str) -> Value:
     try:
         # float() reports what is not a number
         text = given if isinstance(given, str) else repr(float(given))  # type: ignore[arg-type]
-        return parse_value(name, text)
+        return parse_value(name, text, system)
     except (TypeError, ValueError) as error:
         text = str(error) if isinstance(error, CasesError) else f"{name} can't be {given!r}"
         raise CasesError(f"{where}: {text}") from None
