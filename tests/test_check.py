@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import fecm
 from fecm.api import load_deck
 from fecm.problem import parts, problem
 from fecm.problem.summary import summarise
@@ -378,3 +379,28 @@ def test_a_run_says_how_many_fewer_steps_the_time_step_of_dt_0_takes(tmp_path: P
     assert 0.9 * share < 0.5e-7 / critical < share
     assert 0.8 * critical < taken < 0.9 * critical
     assert fewer == pytest.approx(taken / 0.5e-7, rel=0.02)
+
+
+def test_the_summary_has_impact_kinematics_cure_and_threshold() -> None:
+    deck = fecm.impact(
+        fecm.Plate.rectangle((100, 100), (4, 4), support="simple"),
+        fecm.Laminate("[0/90]2s", "T300/5208", 0.25),
+        fecm.RigidMass(2e-3),
+        fecm.Contact(5e4),
+        velocity=1000.0,
+        duration=1e-4,
+        units="mm-N-s",
+        cure=-155.0,
+        giic=0.5,
+    )
+    view = summarise(load_deck(deck).problems[0])
+    assert (view.velocity, view.cure) == (1000.0, -155.0)
+    assert view.energy == pytest.approx(1000.0, rel=1e-12)  # N*mm: 1 J
+    lines = "\n".join(view.lines())
+    for line in (
+        "impact              1000 mm/s, 1 J",
+        "cure                -155 K",
+        "kinematics  ",
+    ):
+        assert line in lines
+    assert "delamination        from " in lines

@@ -306,4 +306,4 @@ def test_a_sandwich_has_no_delamination_threshold() -> None:
     (problem,) = load_deck(with_threshold).problems
     assert problem.threshold is None
     with pytest.raises(fecm.FecmError, match="a plate without a core"):
-        fecm.sweep(with_threshold, {"velocity": [2000.0]}, until="threshold")
+        fecm.sweep(with_threshold, {"k": [5e4]}, until="threshold")

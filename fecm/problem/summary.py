@@ -12,8 +12,9 @@ from fecm._dataclasses import frozen
 from fecm._memory import format_bytes
 from fecm._typing import Floats
 from fecm.deck.macros import flat
-from fecm.deck.model import Shear
+from fecm.deck.model import Cure, Impact, Shear
 from fecm.deck.units import MASS, mass_in_si, unit_names, unit_of
+from fecm.deck.units import quantity as said_quantity
 from fecm.mechanics.curvature import surface
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
@@ -120,6 +121,12 @@ class ProblemSummary:
         Number of the laminate under the load, where there are several.
     leaves_out_equilibrium : bool
         Whether SHEA EQUI would apply: an impact with SHEA MITC and the shear factor 1.
+    velocity, energy : float or None
+        Impact velocity and kinetic energy of the projectile; None without impact.
+    cure : float or None
+        Change of temperature of CURE, kelvin; None without CURE.
+    threshold : float or None
+        Delamination threshold, force; None without one.
     """
 
     title: str
@@ -149,6 +156,10 @@ class ProblemSummary:
     units: dict[str, str]
     laminate: int | None
     leaves_out_equilibrium: bool
+    velocity: float | None
+    energy: float | None
+    cure: float | None
+    threshold: float | None
 
     def to_dict(self) -> dict[str, object]:
         """Plain values, for JSON."""
@@ -175,6 +186,8 @@ class ProblemSummary:
         if self.nonlinear:
             of_all = f"{self.free_in_plane} of {self.nodes} nodes"
             lines.append(f"  kinematics          von Kármán plate, u and v free at {of_all}")
+        elif self.energy is not None:
+            lines.append("  kinematics          linear plate")
         if any(self.preload):
             named = zip(("N0x", "N0y", "N0xy"), self.preload, strict=True)
             forces = ", ".join(f"{name} {quantity(n, 'force/length')}" for name, n in named)
@@ -186,6 +199,11 @@ class ProblemSummary:
             shape = ", ".join([*radii, f"rise {quantity(self.rise, 'length')}"])
             lines.append(f"  curved panel        {shape}")
 
+        if self.cure is not None:
+            lines.append(f"  cure                {self.cure:+g} K")
+        if self.threshold is not None:
+            lines.append(f"  delamination        from {quantity(self.threshold, 'force')}")
+
         def mass(value: float) -> str:
             known = mass_in_si(value, self.units)
             return quantity(value, MASS) + (f" ({known})" if known else "")
@@ -195,6 +213,10 @@ class ProblemSummary:
             f"  projectile mass     {mass(self.projectile_mass)}",
             f"  critical time step  {quantity(self.critical_time_step, 'time')}",
         ]
+        if self.velocity is not None and self.energy is not None:
+            energy = said_quantity(self.energy, unit_of("force*length", self.units), 4)
+            velocity = quantity(self.velocity, "length/time")
+            lines.insert(-1, f"  impact              {velocity}, {energy}")
         if self.buckling_factor is not None:
             from fecm.mechanics.buckling import FAR  # 0.3 ms, for PREL only
 
@@ -232,6 +254,9 @@ def summarise(problem: Problem) -> ProblemSummary:
     with suppress(UnsoundPlateError):  # the check reports it if the program takes steps
         critical = problem.critical_time_step
     without_equilibrium = leaves_out_equilibrium(problem)
+    mass = build_projectile(deck).total_mass
+    velocity = deck.require(Impact).velocity if problem.has_impact else None
+    cure = deck.last(Cure)
     return ProblemSummary(
         title=deck.title,
         nodes=deck.control.numnp,
@@ -249,7 +274,7 @@ def summarise(problem: Problem) -> ProblemSummary:
         D=laminate.D,
         shear=laminate.shear,
         plate_mass=plate.total_mass(),
-        projectile_mass=build_projectile(deck).total_mass,  # even without impact
+        projectile_mass=mass,  # even without impact
         critical_time_step=critical,
         buckling_factor=problem.buckling_factor if plate.is_compressed else None,
         time_steps=tuple(macro.value for macro in flat(problem.program) if macro.word == "DT"),
@@ -260,6 +285,10 @@ def summarise(problem: Problem) -> ProblemSummary:
         units=unit_names(deck),
         laminate=list(deck.layers)[problem.laminate_number] if plate.others else None,
         leaves_out_equilibrium=without_equilibrium,
+        velocity=velocity,
+        energy=None if velocity is None else 0.5 * mass * velocity**2,
+        cure=None if cure is None else cure.delta_t,
+        threshold=None if problem.threshold is None else problem.threshold.force,
     )
 
 
