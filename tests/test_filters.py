@@ -72,7 +72,7 @@ def test_a_first_order_filter_weakens_a_wave_by_its_transfer_function() -> None:
                                   "moving-average:-1", "moving-average:nan", "second:1"],
                          )  # fmt: skip
 def test_what_is_no_filter_is_refused_with_what_one_is(text: str) -> None:
-    with pytest.raises(ValueError, match="first-order:RISE, moving-average:RISE or cfc:CLASS"):
+    with pytest.raises(ValueError, match="use first-order:RISE, moving-average:RISE, butterworth:"):
         filter_of(text)
 
 
@@ -122,6 +122,46 @@ def test_a_class_is_the_recursion_of_the_standard_forward_and_backward() -> None
 def test_a_class_refuses_samples_that_it_is_not_made_for(time: list[float], told: str) -> None:
     with pytest.raises(ValueError, match=told):
         filter_of("cfc:180")(np.array(time), np.ones(4))
+
+
+@pytest.mark.parametrize("order", [1, 2, 4])
+@pytest.mark.parametrize(("suffix", "passes"), [("", 1), (",zero-phase", 2)])
+def test_a_butterworth_filter_has_the_gain_of_its_poles(
+    order: int, suffix: str, passes: int
+) -> None:
+    filtered = filter_of(f"butterworth:{order},1e4{suffix}").in_unit("ms")
+    time = np.arange(0.0, 8.0, 5e-4)  # in ms
+    for ratio in (0.5, 1.0, 2.0):
+        answer = filtered(time, np.sin(2.0 * np.pi * 10.0 * ratio * time))
+        inner = answer[len(time) // 2 : -len(time) // 4]
+        gain = (1.0 + ratio ** (2 * order)) ** (-0.5 * passes)
+        assert np.ptp(inner) / 2.0 == pytest.approx(gain, rel=0.01)
+
+
+def test_a_causal_butterworth_filter_is_late_and_a_zero_phase_one_is_not() -> None:
+    time = 1e-6 * np.arange(4000.0)
+    pulse = np.where(np.abs(time - 2e-3) < 5e-4, np.cos(1e3 * np.pi * (time - 2e-3)), 0.0)
+    late, even = (
+        filter_of(f"butterworth:4,5e3{suffix}")(time, pulse) for suffix in ("", ",zero-phase")
+    )
+    # The delay of slow waves: the sum of the poles' real parts, 2.613, over the angular frequency.
+    assert time[late.argmax()] - 2e-3 == pytest.approx(2.613 / (2.0 * np.pi * 5e3), rel=0.05)
+    assert time[even.argmax()] == pytest.approx(2e-3, abs=2e-6)
+    assert filter_of("butterworth:2,1e3")(time, np.full(4000, 7.0)) == pytest.approx(7.0)
+
+
+@pytest.mark.parametrize(
+    "text", ["butterworth:4", "butterworth:0,1e4", "butterworth:4,-1", "butterworth:4,1e4,late",
+             "butterworth:2.5,1e4", "butterworth:4,1e4,zero-phase,1"],
+)  # fmt: skip
+def test_what_is_no_butterworth_filter_is_refused(text: str) -> None:
+    with pytest.raises(ValueError, match="1 to 10 poles and a positive frequency in Hz"):
+        filter_of(text)
+
+
+def test_a_butterworth_filter_refuses_steps_that_are_too_long() -> None:
+    with pytest.raises(ValueError, match="4 samples or more in a period"):
+        filter_of("butterworth:4,3e5")(1e-6 * np.arange(100.0), np.ones(100))
 
 
 def test_a_class_refuses_a_unit_of_time_that_it_does_not_know() -> None:

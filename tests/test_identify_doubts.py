@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.identification.alignment import IdentifyError, level, noise, onset
+from fecm.identification.misfit import runs
 from fecm.studies import StudyError
+from fecm.studies.rod_test.filters import filter_of
 from tests.calls import call
 
 Floats = NDArray[np.float64]
@@ -263,3 +265,33 @@ def test_the_command_fails_where_values_are_not_to_be_used(tmp_path: Path) -> No
     done = call("identify", "d.inp", "offset.csv", "--free", f"{free},offset", cwd=tmp_path)
     assert done.exit_code == 0
     assert "1 % more in the deck   thickness          e1" in done.stdout
+
+
+# A filter that nobody named ----------------------------------------------------------------------
+
+
+def test_a_filter_that_was_not_named_is_named_with_its_rise_time() -> None:
+    clock = np.concatenate([[-1e-4], 1e-7 * np.arange(2401.0)])
+    run = fecm.run_one(clamped(TRUE["k"], TRUE["mass"], TRUE["velocity"]))
+    force = np.interp(clock, run.time, run.force, left=0.0)
+    rise = 1e-5
+    measured = np.interp(HUMPS, clock, filter_of(f"first-order:{rise}")(clock, force))
+    measured += 0.005 * measured.max() * np.random.default_rng(0).normal(size=len(HUMPS))
+    free = ["k", "mass", "velocity"]
+    found = fecm.identify(started(), HUMPS, measured, free)
+    assert not found.accepted
+    (named,) = [note for note in found.notes if "seems to be filtered" in note]
+    text = named.partition("--filter ")[2].partition(" ")[0]
+    assert float(text.partition(":")[2]) == pytest.approx(rise, rel=0.1)
+    right = fecm.identify(started(), HUMPS, measured, free, filter=f"first-order:{rise}")
+    assert right.accepted
+    assert not any("filter" in note for note in right.notes)
+    assert abs(right.values["k"] / TRUE["k"] - 1.0) < 0.5 * abs(found.values["k"] / TRUE["k"] - 1.0)
+
+
+def test_runs_of_equal_signs_are_counted_in_standard_deviations() -> None:
+    # Ten signs of each kind have 11 runs on average, with the variance 90/19.
+    alternating = np.array([1.0, -1.0] * 10)
+    assert runs(alternating) == pytest.approx(9.0 / np.sqrt(90.0 / 19.0))
+    assert runs(np.sort(alternating)) == pytest.approx(-9.0 / np.sqrt(90.0 / 19.0))
+    assert runs(np.ones(20)) == 0.0

@@ -45,7 +45,8 @@ from fecm.studies.rod_test.study import Struck, rod_of, strike, uniform
 
 FILTER_HELP = (
     "first-order:RISE or moving-average:RISE, with the time RISE from 10 to 90 % of the "
-    "step response; or cfc:60, 180, 600 or 1000 of SAE J211."
+    "step response; butterworth:ORDER,FREQUENCY in Hz, with ,zero-phase if it filters forward and "
+    "backward; or cfc:60, 180, 600 or 1000 of SAE J211."
 )
 
 

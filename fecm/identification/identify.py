@@ -36,9 +36,11 @@ from fecm.identification.fitting import (
 )
 from fecm.identification.misfit import (
     coloured,
+    is_runs_few,
     neighbours,
     plate_errors,
     proposal,
+    runs,
     undescribed,
     wrong_model,
 )
@@ -214,7 +216,8 @@ def identify(
         ``"offset"``, the measured force without a contact.
     filter : str, optional
         Filter of the measurement, which the computed force passes too: ``"first-order:RISE"``,
-        ``"moving-average:RISE"`` or ``"cfc:CLASS"``.
+        ``"moving-average:RISE"``, ``"butterworth:ORDER,FREQUENCY[,zero-phase]"`` in Hz, or
+        ``"cfc:CLASS"``.
     law : Law or str, optional
         Contact law instead of that of EXPE, as in :func:`run`; the constants of EXPE can't be
         fitted then.
@@ -304,16 +307,16 @@ def fit(
     depth = (own.max() / deck.require(Indentation).k) ** (2.0 / 3.0)
     sizes = {DELAY: width, OFFSET: UNIT_OFFSET * float(own.max()), "alpha_p": depth}
 
-    def best(names: Sequence[str]) -> Solution | None:
+    def best(names: Sequence[str], by: Model = model) -> Solution | None:
         """The best fit of all starts of the delay; None if the run of the deck is too short."""
         known = {name: _start(deck, name) for name in names}
         trials = [{**known, DELAY: lag} for lag in starts] if DELAY in names else [known]
         scalings, x = [_scaling(one, sizes) for one in trials], np.zeros(len(names))
         chosen = 0
         if len(scalings) > 1:
-            short = [solve(model, measured, one, x, FIRST_EVALUATIONS) for one in scalings]
+            short = [solve(by, measured, one, x, FIRST_EVALUATIONS) for one in scalings]
             chosen = min(range(len(short)), key=lambda n: _rank(short[n]))
-        found = solve(model, measured, scalings[chosen], x, MOST_EVALUATIONS)
+        found = solve(by, measured, scalings[chosen], x, MOST_EVALUATIONS)
         return None if found is None or found.lost > LOST else found
 
     found = best(free)
@@ -323,12 +326,18 @@ def fit(
             raise IdentifyError(wrong_model("the fit shifts the run away from the contact"))
         raise StudyError(f"{measured.name}: {_outside(free, starts[0], width, units)}")
 
-    fault = proposal(model, found, lambda: best([*free, DELAY]), units) or undescribed(found, units)
+    def filtered(filter: Filter) -> Solution | None:
+        """The best fit of a run behind a filter."""
+        return best(free, model._replace(sensor=filter))
+
+    fault, suspicion = proposal(model, found, lambda: best([*free, DELAY]), filtered, units)
+    fault = fault or undescribed(found, units)
     try:
         cov = covariance(found)
     except IdentifyError as error:
         raise IdentifyError(f"{fault}; besides, {error}" if fault else str(error)) from None
-    return _identification(model, measured, found, cov, fault)
+    made = _identification(model, measured, found, cov, fault)
+    return replace(made, notes=(*made.notes, suspicion)) if suspicion else made
 
 
 def _identification(
@@ -421,6 +430,13 @@ def _notes(
         text = "the model does not describe the measurement down to its noise"
         text = f"{text}, and the standard errors are too small"
         yield f"neighbouring residuals have the correlation {near:.2f}: {text}"
+    elif is_runs_few(solution):
+        far = -runs(found.residual)
+        yield (
+            f"the residual changes its sign too seldom for independent errors ({far:.1f} standard "
+            "deviations of a runs test): the model does not describe the measurement down to its "
+            "noise; is a filter of the measurement not named by --filter?"
+        )
     fitted = model.runs({0: strike_of(found.deck)._replace(own_law=model.law)}, True)
     if not fitted.fine[0]:
         yield f"the run of the fitted deck fails: {fitted.status[0]}"

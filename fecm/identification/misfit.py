@@ -1,4 +1,4 @@
-"""What speaks against a fit: a delay or an offset left out, another model, errors of the plate."""
+"""What speaks against a fit: a delay, an offset or a filter left out, another model, the plate."""
 
 from __future__ import annotations
 
@@ -13,14 +13,20 @@ from fecm._typing import Floats
 from fecm.deck.model import Deck, Material
 from fecm.deck.units import unit_of
 from fecm.identification.fitting import DELAY, OF_RECORD, OFFSET, Model, Solution, listed
+from fecm.studies.rod_test.filters import Filter, FilterKind
 from fecm.sweeps.vary import apply_case
 
+FEW_RUNS = -4.0  # standard deviations of the number of runs of equal signs in a residual
+RISES = np.geomspace(3e-3, 0.3, 14)  # of filters that are tried, over the time of the contact
+FINER = 7  # rise times around the best of them
+CLEARLY = 0.9  # rms of the residual with a filter over that with a delay or an offset
 COLOURED = 0.5  # a finding reports a larger correlation of neighbouring residuals
 FAINT = 1e-3  # share of the peak up to which residuals are the errors of arithmetic
 # Share of the variance of the force in a residual with a shape, above which the model does not
 # describe it.
 UNDESCRIBED = 0.05
 CERTAIN = 5.0  # standard errors from 0, beyond which a delay or an offset is not noise
+LIKELY = 4.0  # the same of a filter, for a note
 HALF = 0.5  # of the systematic part of the residual, which a proposal must remove
 QUIET = 1e-3  # share of the peak up to which there is no contact
 LEAST_QUIET = 10  # fewest points without contact
@@ -35,6 +41,25 @@ PROPERTIES = ("thickness", "e1")
 def neighbours(residual: Floats) -> float:
     """Correlation of neighbouring residuals."""
     return float(residual[1:] @ residual[:-1] / (residual @ residual))
+
+
+def runs(residual: Floats) -> float:
+    """Number of runs of equal signs, in standard deviations from that of independent errors.
+
+    Wald and Wolfowitz 1940; 0 if all signs are equal.
+
+    >>> bool(abs(runs(np.random.default_rng(0).normal(size=4000))) < 3.0)
+    True
+    """
+    signs = residual > 0.0
+    above = float(np.count_nonzero(signs))
+    count = float(len(signs))
+    product = 2.0 * above * (count - above)
+    if not product or product <= count:
+        return 0.0
+    number = 1.0 + np.count_nonzero(signs[1:] != signs[:-1])
+    mean, variance = product / count + 1.0, product * (product - count) / count**2 / (count - 1.0)
+    return float((number - mean) / math.sqrt(variance))
 
 
 def coloured(found: Solution) -> bool:
@@ -96,30 +121,97 @@ def proposal(
     model: Model,
     found: Solution,
     refit: Callable[[], Solution | None],
+    filtered: Callable[[Filter], Solution | None],
     units: dict[str, str],
-) -> str:
-    """Propose to fit a delay or an offset too; empty if neither explains the residual.
+) -> tuple[str, str]:
+    """Propose to fit a delay or an offset too, or to name a filter; and a note of a likely filter.
 
-    Linearised fits with one or both come first; if the residual has a shape, `refit` fits the delay
-    too, from several starts.
+    Both are empty if nothing explains the residual.  Linearised fits come first; if the residual
+    has a shape, `refit` fits the delay too, from several starts, and `filtered` fits with the most
+    likely filter of first order.  A filter that lowers the residual by more than chance, but does
+    not explain half of its shape, is a note.
     """
+    trial, text = _of_record(model, found, refit, units)
+    other, sensor = _filter(model, found, filtered)
+    if other is None or (trial and _rms(other.residual) > CLEARLY * _rms(trial.residual)):
+        return text, ""
+    seems = (
+        f"the measurement seems to be filtered: with --filter first-order:{sensor.size:.2g} "
+        f"{_fall(other, found.residual, units)}"
+    )
+    if other.explains(found.residual, found.force):
+        return f"{seems}; the values given here are biased", ""
+    return text, f"{seems}, which is more than chance; the values may be biased"
+
+
+def _rms(residual: Floats) -> float:
+    return float(np.sqrt(np.mean(residual**2)))
+
+
+def _of_record(
+    model: Model,
+    found: Solution,
+    refit: Callable[[], Solution | None],
+    units: dict[str, str],
+) -> tuple[Trial | None, str]:
+    """A delay or an offset that explains the residual, and the proposal; empty without."""
     before = found.residual
     missing = [name for name in (OFFSET, DELAY) if name not in found.scaling.start]
     choices = [[name] for name in missing] + ([missing] if len(missing) > 1 else [])
     if _faint(found):
-        return ""
+        return None, ""
     for names in choices:
         trial = _linear(model, found, names)
         if trial.explains(before, found.force):
-            return _told(trial, before, units)
+            return trial, _told(trial, before, units)
     if DELAY in missing and coloured(found) and (other := refit()) is not None:
         trial = Trial({DELAY: other.values[DELAY]}, other.residual, certain=True)
         if trial.explains(before, other.force):
-            return _told(trial, before, units)
+            return trial, _told(trial, before, units)
     if OFFSET in missing and (level := _out_of_contact(model, found)):
         force = f"{level:.3g} {unit_of('force', units)}".rstrip()
-        return f"fit {OFFSET} too: without contact the measured force is {force}, beyond its noise"
-    return ""
+        text = f"fit {OFFSET} too: without contact the measured force is {force}, beyond its noise"
+        return None, text
+    return None, ""
+
+
+def _filter(
+    model: Model, found: Solution, filtered: Callable[[Filter], Solution | None]
+) -> tuple[Trial | None, Filter]:
+    """The fit with the likeliest filter of first order; None if it is no better than by chance."""
+    none = Filter(FilterKind.FIRST_ORDER, 0.0)
+    if model.sensor is not None or _faint(found):
+        return None, none
+    top = found.time[found.model > 0.5 * found.model.max()]
+    width = float(np.ptp(top)) if len(top) else 0.0
+
+    def rest(rise: float) -> float:
+        """Squares that are left if the linearised fit has a filter."""
+        own = model._replace(sensor=Filter(FilterKind.FIRST_ORDER, rise))
+        residual = found.force - own.at(found.time, [found.values])[:, 0]
+        x = np.linalg.lstsq(found.jacobian, residual, rcond=None)[0]
+        return float(((residual - found.jacobian @ x) ** 2).sum())
+
+    if width <= 0.0:
+        return None, none
+    rises = width * RISES
+    best = min(rises.tolist(), key=rest)
+    step = float(RISES[1] / RISES[0])
+    best = min((best * np.geomspace(1.0 / step, step, FINER)).tolist(), key=rest)
+    sensor, left = Filter(FilterKind.FIRST_ORDER, best), rest(best)
+    before = float(found.residual @ found.residual)
+    fall = (before - left) / left * max(1, len(found.residual) - len(found.x) - 1)
+    if fall < LIKELY**2:
+        return None, sensor
+    other = filtered(sensor)
+    if other is None or _rms(other.residual) >= _rms(found.residual):
+        return None, sensor
+    return Trial({}, other.residual, certain=fall > CERTAIN**2), sensor
+
+
+def is_runs_few(found: Solution) -> bool:
+    """Whether the residual changes its sign less often than chance explains."""
+    return not _faint(found) and runs(found.residual) < FEW_RUNS
 
 
 def _linear(model: Model, found: Solution, names: Sequence[str]) -> Trial:
@@ -149,10 +241,14 @@ def _told(trial: Trial, before: Floats, units: dict[str, str]) -> str:
         f"{name} {value:.3g} {unit_of(OF_RECORD[name], units)}".rstrip()
         for name, value in trial.added.items()
     ]
-    rms = [float(np.sqrt(np.mean(e**2))) for e in (before, trial.residual)]
-    force = f"{rms[1]:.3g} {unit_of('force', units)}".rstrip()
-    effect = f"with {listed(values)} the rms of the residual falls from {rms[0]:.3g} to {force}"
+    effect = f"with {listed(values)} {_fall(trial, before, units)}"
     return f"fit {listed(list(trial.added))} too: {effect}; the values given here are biased"
+
+
+def _fall(trial: Trial, before: Floats, units: dict[str, str]) -> str:
+    """How much smaller the residual of a trial is."""
+    force = f"{_rms(trial.residual):.3g} {unit_of('force', units)}".rstrip()
+    return f"the rms of the residual falls from {_rms(before):.3g} to {force}"
 
 
 def _out_of_contact(model: Model, found: Solution) -> float:

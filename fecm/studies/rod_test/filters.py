@@ -7,8 +7,9 @@ take the history as linear between samples at any spacing, and as constant befor
 their response at the samples is exact.
 
 Channel frequency classes (CFC) are those of SAE J211-1: two poles forward and two backward, so
-that nothing is delayed.  They need equal time steps, and take the history as constant before the
-first and after the last sample.
+that nothing is delayed.  Butterworth filters are those of amplifiers and of test software: causal,
+or forward and backward (zero-phase), which delays nothing and weakens twice.  Both kinds need equal
+time steps, and take the history as constant before the first and after the last sample.
 """
 
 from __future__ import annotations
@@ -25,10 +26,17 @@ from fecm.deck.units import KNOWN
 from fecm.studies import StudyError
 
 CLASSES = ("60", "180", "600", "1000")
-USAGE = f"first-order:RISE, moving-average:RISE or cfc:CLASS with the class {', '.join(CLASSES)}"
+ZERO_PHASE = "zero-phase"
+USAGE = (
+    "first-order:RISE, moving-average:RISE, butterworth:ORDER,FREQUENCY[,zero-phase] or cfc:CLASS "
+    f"with the class {', '.join(CLASSES)}"
+)
+HIGHEST_ORDER = 10  # poles
 # Numbers of SAE J211-1.
 CUT_OFF = 2.0775  # cut-off frequency of the two poles over the class
 SAMPLES = 10  # fewest samples in the time 1/class
+FEWEST = 4.0  # samples in a period of the cut-off frequency of a Butterworth filter
+SETTLED = 4.0  # of these periods, times the order: until a step has decayed
 UNEQUAL = 0.05  # relative difference of time steps that count as equal: of rounded times
 
 
@@ -37,6 +45,7 @@ class FilterKind(StrEnum):
 
     FIRST_ORDER = "first-order"  # T y' + y = x, whose rise time is T ln 9
     MOVING_AVERAGE = "moving-average"  # the mean of x over the last W, whose rise time is 0.8 W
+    BUTTERWORTH = "butterworth"  # which weakens sines of the cut-off frequency by 3 dB a pass
     CFC = "cfc"  # a channel frequency class, which weakens sines by 3 dB at 5/3 of the class
 
 
@@ -45,18 +54,21 @@ class Filter:
     """A filter of unit static gain."""
 
     kind: str  # a :class:`FilterKind` or its text
-    # Time from 10 to 90 % of the step response (10 us in Table 4.1); or the class, 1/time.
+    # Time from 10 to 90 % of the step response (10 us in Table 4.1); the class or the cut-off
+    # frequency, 1/time.
     size: float
+    order: int = 0  # poles of a Butterworth filter
+    is_zero_phase: bool = False
 
     def in_unit(self, time: str) -> Filter:
-        """The same filter for times in a unit; a class is in Hz.
+        """The same filter for times in a unit; a class and a frequency are in Hz.
 
-        Raises StudyError if the filter has a class, and the unit is unknown.
+        Raises StudyError if the filter has one of them, and the unit is unknown.
         """
-        if self.kind != FilterKind.CFC or not time:
+        if self.kind not in (FilterKind.CFC, FilterKind.BUTTERWORTH) or not time:
             return self
         if time not in KNOWN["time"]:
-            message = f"a class is in Hz, but the unit of time is {time}; s, ms, us are known"
+            message = f"the filter is in Hz, but the unit of time is {time}; s, ms, us are known"
             raise StudyError(message)
         return replace(self, size=self.size * KNOWN["time"][time])
 
@@ -72,6 +84,8 @@ class Filter:
                 return self._first_order(time, x)
             case FilterKind.MOVING_AVERAGE:
                 return self._moving_average(time, x)
+            case FilterKind.BUTTERWORTH:
+                return self._butterworth(time, x)
             case _:
                 return self._cfc(time, x)
 
@@ -97,12 +111,28 @@ class Filter:
         part = inside * (x[first] - slope[first] * inside / 2.0)
         return np.asarray((integral - integral[first] + part) / window)
 
+    def _butterworth(self, time: Floats, x: Floats) -> Floats:
+        from scipy.signal import butter, sosfilt, sosfilt_zi  # takes 0.7 s
+
+        dt = _equal_step(time, "butterworth")
+        if FEWEST * self.size * dt > 1.0:
+            raise StudyError(
+                f"a butterworth filter needs {FEWEST:g} samples or more in a period of its "
+                f"frequency, {1 / self.size:g}, and the time step is {dt:g}"
+            )
+        sections = butter(self.order, 2.0 * self.size * dt, output="sos")
+        rest = sosfilt_zi(sections)
+        pad = math.ceil(SETTLED * self.order / (self.size * dt)) if self.is_zero_phase else 0
+        y = np.pad(x, pad, "edge")
+        for _ in range(1 + self.is_zero_phase):
+            y = sosfilt(sections, y, zi=rest * y[0])[0]
+            y = y[::-1] if self.is_zero_phase else y
+        return np.asarray(y[pad : len(y) - pad])
+
     def _cfc(self, time: Floats, x: Floats) -> Floats:
         from scipy.signal import filtfilt  # takes 0.7 s, and few filters have a class
 
-        dt = float(time[-1] - time[0]) / (len(time) - 1)
-        if np.abs(np.diff(time) - dt).max() > UNEQUAL * dt:
-            raise StudyError("a cfc filter needs equal time steps; resample the history")
+        dt = _equal_step(time, "cfc")
         if SAMPLES * self.size * dt > 1.0:
             raise StudyError(
                 f"a cfc filter needs {SAMPLES} samples or more in the time 1/class, "
@@ -116,14 +146,25 @@ class Filter:
         return np.asarray(filtfilt(zeros, poles, np.pad(x, pad, "edge"), padlen=0)[pad:-pad])
 
 
-def filter_of(text: str) -> Filter:
-    """Parse ``first-order:10e-6``, ``moving-average:10e-6`` or ``cfc:600``, a class in Hz.
+def _equal_step(time: Floats, kind: str) -> float:
+    """Time step of a history; StudyError if the steps differ."""
+    dt = float(time[-1] - time[0]) / (len(time) - 1)
+    if np.abs(np.diff(time) - dt).max() > UNEQUAL * dt:
+        raise StudyError(f"a {kind} filter needs equal time steps; resample the history")
+    return dt
 
-    Anything else is a StudyError.
+
+def filter_of(text: str) -> Filter:
+    """Parse ``first-order:10e-6``, ``moving-average:10e-6``, ``butterworth:4,10e3`` or ``cfc:600``.
+
+    A class and a frequency are in Hz; ``butterworth:4,10e3,zero-phase`` filters forward and
+    backward.  Anything else is a StudyError.
     """
     kind, _, rise = text.partition(":")
     if kind == FilterKind.CFC and rise in CLASSES:
         return Filter(kind, float(rise))
+    if kind == FilterKind.BUTTERWORTH:
+        return _butterworth_of(text, rise)
     if kind not in (FilterKind.FIRST_ORDER, FilterKind.MOVING_AVERAGE):
         raise StudyError(f"unknown filter {text}; use {USAGE}")
     try:
@@ -133,3 +174,19 @@ def filter_of(text: str) -> Filter:
     if not 0.0 < value < math.inf:
         raise StudyError(f"{text}: the rise time must be positive; use {USAGE}")
     return Filter(kind, value)
+
+
+def _butterworth_of(text: str, numbers: str) -> Filter:
+    order, frequency, phase, *_ = [*numbers.split(","), "", ""]
+    is_zero_phase = phase.strip() == ZERO_PHASE
+    try:
+        poles, value = int(order), float(frequency)
+    except ValueError:
+        poles, value = 0, math.nan
+    sound = 1 <= poles <= HIGHEST_ORDER and 0.0 < value < math.inf
+    if not sound or numbers.count(",") != 1 + is_zero_phase:
+        raise StudyError(
+            f"{text}: a butterworth filter has 1 to {HIGHEST_ORDER} poles and a positive frequency "
+            "in Hz, as in butterworth:4,10e3 or butterworth:4,10e3,zero-phase"
+        )
+    return Filter(FilterKind.BUTTERWORTH, value, poles, is_zero_phase)
