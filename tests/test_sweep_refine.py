@@ -174,3 +174,15 @@ def test_a_refinement_that_is_none_is_refused(
 def test_a_refinement_varies_nothing_else() -> None:
     with pytest.raises(CasesError, match="refine"):
         fecm.sweep(small(), {"k": [1e6]}, refine=[1, 2])
+
+
+def test_there_is_no_limit_while_the_elements_are_larger_than_the_patch() -> None:
+    # Peaks of a disc of 0.96 mm on elements of 12.5, 6.25 and 3.125 mm; the finest meshes: 2105.8.
+    peaks = {"peak_force": np.array([2122.33, 2111.56, 2109.87])}
+    factors = {"refine": np.array([1, 2, 4])}
+    plain = convergence(factors, peaks, 9)["peak_force"]
+    assert abs(plain.limit - 2105.8) > 5.0 * plain.band
+    unresolved = convergence(factors, peaks, 9, patch_ratio=12.5 / 0.96)["peak_force"]
+    assert np.isnan([unresolved.limit, unresolved.band]).all()
+    assert unresolved.remark == "no limit: the elements are larger than the patch"
+    assert convergence(factors, peaks, 9, patch_ratio=3.9)["peak_force"] == plain

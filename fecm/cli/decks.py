@@ -186,9 +186,9 @@ def _compare_meshes(prepared: LoadedDeck, mode: str, form: Format) -> None:
         near = f"within {found.distance:.3g} {length}".rstrip()
         change = f"{found.change:+.3g} {force}".rstrip()
         label = "largest force so far" if found.undecided else "peak force"
-        echo(f"  {label:20}{coarse} on {found.elements} elements")
-        echo(f"    bisected          {refined} on {found.refined_elements}, {near} of the load")
-        echo(f"    change            {change} ({about})")
+        echo(f"  {label:22}{coarse} on {found.elements} elements")
+        echo(f"    bisected            {refined} on {found.refined_elements}, {near} of the load")
+        echo(f"    change              {change} ({about})")
         if found.undecided:
             note("a run ends before its peak: these forces are lower bounds; take more steps")
 

@@ -251,6 +251,15 @@ class Problem:
         return float(self._longest_sides[elements].max(initial=0.0)) / self.reach_of_load
 
     @cached_property
+    def patch_side(self) -> float:
+        """Longest side of the elements with the centre of the patch, length; 0 without a patch."""
+        if self.patch is None:
+            return 0.0
+        place = np.array([[self.patch.x, self.patch.y]])
+        rows = [block.rows[locate(block, place)[0]] for block in self.families]
+        return float(self._longest_sides[np.concatenate(rows)].max(initial=0.0))
+
+    @cached_property
     def _longest_sides(self) -> Floats:
         """Longest side of every element, (numel,), length."""
         return longest_sides(self.mesh.elements, self.mesh.coordinates)

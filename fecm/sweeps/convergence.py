@@ -46,16 +46,32 @@ class Convergence:
 
 
 def convergence(
-    cases: Mapping[str, Column], summary: Mapping[str, Column], nodes: int
+    cases: Mapping[str, Column],
+    summary: Mapping[str, Column],
+    nodes: int,
+    patch_ratio: float = 0.0,
 ) -> dict[str, Convergence]:
     """Order, limit and error band of every quantity of a refined sweep; empty for other sweeps.
 
-    `nodes` are those of an element, which decide the order of the scheme.
+    Parameters
+    ----------
+    cases, summary : mapping
+        Columns of the sweep.
+    nodes : int
+        Nodes of an element, which decide the order of the scheme.
+    patch_ratio : float
+        Side of the elements at the patch over its radius, of the factor 1.  While the finest mesh
+        does not resolve the patch, the values approach those of another load: there is no limit.
     """
     if REFINE not in cases:
         return {}
     numbers = {n: values for n, values in summary.items() if n not in (*VERDICTS, *INTEGERS)}
     highest = NINE_NODE_ORDER if nodes == 9 else SCHEME_ORDER
+    if patch_ratio > float(np.max(cases[REFINE])):
+        unresolved = Convergence(
+            UNKNOWN, UNKNOWN, UNKNOWN, "no limit: the elements are larger than the patch"
+        )
+        return dict.fromkeys(numbers, unresolved)
     return {name: _limit(values[-3:], highest) for name, values in numbers.items()}
 
 

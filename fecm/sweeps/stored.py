@@ -6,13 +6,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from fecm._arrays import read_only
-from fecm._errors import did_you_mean
+from fecm._errors import FecmError, did_you_mean
 from fecm._typing import Bools
+from fecm.api import load_deck
 from fecm.deck.model import Deck
 from fecm.deck.units import unit_of
 from fecm.results.errors import NotStoredError, ResultFileError
@@ -122,7 +124,16 @@ class StoredSweep:
             nodes = self.deck.control.nen
         except ResultFileError:  # of a damaged file
             nodes = 0
-        return convergence(self.cases, self.summary, nodes)
+        return convergence(self.cases, self.summary, nodes, self._patch_ratio)
+
+    @property
+    def _patch_ratio(self) -> float:
+        """Side of the elements at the patch over its radius; 0 if it is not known."""
+        with suppress(FecmError, ValueError):
+            (problem,) = load_deck(self.deck).problems
+            if problem.patch is not None:
+                return problem.patch_side / problem.patch.radius
+        return 0.0
 
     def unit(self, name: str) -> str:
         """Unit of a column; empty for texts and pure numbers, or if the deck names no units.

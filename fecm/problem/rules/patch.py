@@ -11,15 +11,13 @@ from fecm.deck import model
 from fecm.deck.macros import flat
 from fecm.deck.rules import Report, Reports, Subject, reports, rule
 from fecm.mechanics.mesh import Mesh, longest_sides
-from fecm.mechanics.points import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError, locate
+from fecm.mechanics.points import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError
 from fecm.problem.contact_estimates import expected_peak
 from fecm.problem.parts import W
 from fecm.problem.problem import ContactPatch, Problem
 from fecm.problem.rules.contact import sphere_radius
+from fecm.results.exposures import RESOLVED
 
-# Side of the element under the load over R = c + h/2, up to which the largest exposures at R and
-# beyond are within 4 % (in-plane) and 12 % (interlaminar) of the finest of eight meshes.
-RESOLVED = 2.6
 LARGE = 2.0  # radius of a patch over the thickness, and over that of the contact
 
 
@@ -155,9 +153,7 @@ def unresolved_patch(problem: Problem) -> Reports:
     card, patch = problem.deck.require(model.Patch), problem.patch
     if patch is None:
         return
-    at = np.array([[patch.x, patch.y]])
-    here = np.concatenate([block.rows[locate(block, at)[0]] for block in problem.families])
-    side = _longest_side(problem.mesh, here) * (1.0 - 1e-9)
+    side = problem.patch_side * (1.0 - 1e-9)
     reach = problem.reach_of_load
     if card.radius is not None and patch.radius < side:
         limit = f"the radius of the patch, {patch.radius:.4g}"
