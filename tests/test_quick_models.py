@@ -281,7 +281,7 @@ def test_the_threshold_is_printed_with_the_number_of_delaminations_it_assumes() 
     assert (values["number"], values["interfaces"]) == (7, 1)
     assert list(values["band"]) == pytest.approx([values["force"] * math.sqrt(3.0)] * 2, rel=1e-12)
     (line,) = [line for line in summary(found) if line.startswith("delamination")]
-    assert line.endswith(f"(for 7 delaminations; {values['band'][1]:.6g} with 1)")
+    assert line.endswith(f"(for 7 delaminations, as in DELA; {values['band'][1]:.4g} for one)")
 
 
 def test_the_band_ends_with_a_delamination_in_each_interface_of_unlike_plies() -> None:

@@ -82,7 +82,7 @@ def test_a_reader_of_the_page_alone_learns_what_happened(failed: Result, shown: 
     text = shown.text
     for said in (
         f"peak force {failed.force.max():.4g}",
-        "(elastic: beyond delamination at 26.5655 and the first failure)",
+        "(elastic prediction; delamination is expected from 26.57, and the first ply fails before)",
         "passes the delamination threshold of",
         f"first failure: {first.mode} ({first.criterion.replace('_', ' ')}), {first.where}",
         "doubtful",
@@ -297,7 +297,7 @@ def test_the_page_of_a_sweep_has_its_extremes(sweep: fecm.SweepResult) -> None:
     assert "6 cases" in found.text
     assert all(agrees(cell) for cell in found.numbers())
     beyond = "indentation > h/4"
-    assert found.row("valid cases")[0].value == (sweep.validity == "ok").sum()
+    assert found.row("cases without a doubt")[0].value == (sweep.validity == "ok").sum()
     assert beyond not in found.text
 
 

@@ -183,7 +183,11 @@ def _sentence(result: Result, problem: Problem | None) -> str:
         limit = float(result.threshold["force"])
         if math.isfinite(float(result.threshold["time"])):
             energy = said(threshold_energy(result), "force*length")
-            parts.append(f"passes the delamination threshold of {said(limit, 'force')} at {energy}")
+            parts.append(
+                f"passes the delamination threshold of {said(limit, 'force')} when the projectile "
+                f"has given up {energy} (fecm sweep DECK --find velocity --until "
+                "peak_force=threshold finds the impact energy that reaches it)"
+            )
         else:
             ends = " by the end of the run" if result.end in UNDECIDED else ""
             parts.append(f"stays below the delamination threshold of {said(limit, 'force')}{ends}")
@@ -191,7 +195,10 @@ def _sentence(result: Result, problem: Problem | None) -> str:
         one = first[0]
         text = f"first failure: {one.mode} ({spelt(one.criterion)}), {one.where}"
         if not math.isnan(one.force):
-            text = f"{text}, at {said(one.force, 'force')} and {said(one.energy, 'force*length')}"
+            energy = said(one.energy, "force*length")
+            text = (
+                f"{text}, at {said(one.force, 'force')}, when the projectile has given up {energy}"
+            )
         parts.append(text)
     elif largest := largest_exposures(result):
         is_open = verdict(largest) is Failure.OPEN
@@ -293,7 +300,10 @@ def _threshold(result: Result) -> list[Block]:
     if math.isfinite(reached):
         rows.append(("reached at time", number(reached, unit_of("time", result.units))))
         rows.append(
-            ("energy then", number(threshold_energy(result), unit_of("force*length", result.units)))
+            (
+                "given up by then",
+                number(threshold_energy(result), unit_of("force*length", result.units)),
+            )
         )
     return table(rows, caption="Delamination threshold")
 

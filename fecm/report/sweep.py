@@ -96,7 +96,8 @@ def _judgements(sweep: SweepResult) -> Iterator[Judgement]:
     failed = int((~sweep.completed).sum())
     valid = int((sweep.validity == "ok").sum())
     level = Level.WITHIN if valid == count else Level.DOUBTFUL
-    yield Judgement(level, "valid cases", Number(valid, f"{valid} of {count}"))
+    words = "" if valid == count else f"{count - valid} doubtful or failed; the reasons follow"
+    yield Judgement(level, "cases without a doubt", Number(valid, f"{valid} of {count}"), words)
     if failed:
         reasons = Counter(sweep["status"][~sweep.completed].tolist()).most_common(3)
         words = "; ".join(f"{times}: {reason}" for reason, times in reasons)

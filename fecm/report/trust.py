@@ -34,6 +34,7 @@ from fecm.results.validity import BENT, CROSSED, INDENTATION, SLOPE, STRAIN, Rea
 BALANCED = 1e-3
 # Change of the static deflection by the shear stiffness from equilibrium that is worth a doubt.
 NOTABLE_SHEAR = 0.02
+SLOPES = "membrane/largest_slope"  # of a nonlinear plate, at the stored rows
 SO_FAR = "so far: the run ends before its peak"
 ENDS = {
     End.OVER: (Level.WITHIN, "contact over", ""),
@@ -126,8 +127,14 @@ def _reached(result: Result, problem: Problem, reasons: list[str]) -> Iterator[J
             continue
         beyond = reason in reasons
         level = Level.OUTSIDE if beyond else Level.WITHIN
-        place = "beyond the limit" if beyond else "below the limit"
-        yield Judgement(level, name, place, f"{what} {limit}")
+        place: Cell = "beyond the limit" if beyond else "below the limit"
+        words = f"{what} {limit}"
+        if reason == Reason.STEEP and SLOPES in result:
+            largest = float(result[SLOPES].max(initial=0.0))
+            place = Number(largest, f"{largest:.3g}")
+        elif beyond:
+            words = f"{words}; the notes of the run have its size"
+        yield Judgement(level, name, place, words)
     depth = float(result["history/indentation"].max(initial=0.0)) / limits.thickness
     level = Level.OUTSIDE if Reason.SOFT in reasons else Level.WITHIN
     words = f"the contact law of a half-space holds up to {INDENTATION:g} h"
@@ -173,7 +180,7 @@ def _threshold(result: Result) -> Iterator[Judgement]:
     ratio = float(result["history/force"].max(initial=0.0)) / float(result.threshold["force"])
     crossed = ratio > CROSSED
     is_open = result.end in UNDECIDED and not crossed
-    words = "the run is elastic beyond delamination" if crossed else SO_FAR if is_open else ""
+    words = "the run is elastic above the threshold" if crossed else SO_FAR if is_open else ""
     level = Level.DOUBTFUL if crossed or is_open else Level.WITHIN
     yield Judgement(level, "largest force over the threshold", number(ratio, digits=3), words)
 

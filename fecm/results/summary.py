@@ -146,12 +146,12 @@ def _delaminations(result: Stored) -> str:
     kinds = [(array.dtype.kind, array.shape) for array in (band, number, interfaces)]
     if kinds != [("f", (2,)), ("i", ()), ("i", ())]:
         return ""  # a result of an older version
-    least, most = (_quantity(result, force, "force") for force in band.tolist())
+    least, most = (_rounded(result, force, "force") for force in band.tolist())
     others = {1: most, max(1, int(interfaces)): least}
     others.pop(int(number), None)
     count = "one delamination" if number == 1 else f"{number} delaminations"
-    texts = [f"{force} with {n}" for n, force in others.items()]
-    return f" (for {'; '.join([count, *texts])})"
+    texts = [f"{force} for {'one' if n == 1 else n}" for n, force in others.items()]
+    return f" ({'; '.join([f'for {count}, as in DELA', *texts])})"
 
 
 def _exposures(result: Stored) -> list[str]:
@@ -196,7 +196,7 @@ def _first_failure(result: Stored, first: FirstFailure) -> str:
     ]
     if not math.isnan(first.force):
         texts.append(f"force {rounded(first.force, 'force')}")
-        texts.append(f"energy {rounded(first.energy, 'force*length')}")
+        texts.append(f"the projectile has given up {rounded(first.energy, 'force*length')}")
     return ", ".join(texts)
 
 
@@ -240,10 +240,10 @@ def _at_rest(largest: LargestExposure) -> str:
 
 def _delamination(result: Stored) -> str:
     """The threshold of delamination, and whether it is reached."""
-    quantity, known = partial(_quantity, result), result.threshold
-    force, crossing = quantity(float(known["force"]), "force"), float(known["time"])
+    known = result.threshold
+    force, crossing = _rounded(result, float(known["force"]), "force"), float(known["time"])
     if math.isfinite(crossing):
-        return f"{force} reached at time {quantity(crossing, 'time')}"
+        return f"{force} reached at time {_quantity(result, crossing, 'time')}"
     if (end := end_of(result)) in UNDECIDED:
         return f"{force} not reached by the end of the run, which is {UNDECIDED[end]}: open"
     margin = metrics_of(result).get("threshold_margin", 1.0)
@@ -362,10 +362,10 @@ def elastic_doubt(result: Stored, peak: float) -> str:
     """Why a peak force is that of an elastic plate only; empty if it may be real."""
     beyond = []
     if result.threshold and peak > CROSSED * (force := float(result.threshold["force"])):
-        beyond.append(f"delamination at {_quantity(result, force, 'force')}")
+        beyond.append(f"delamination is expected from {_rounded(result, force, 'force')}")
     if any(found.exposure > CROSSED for found in largest_exposures(result)):
-        beyond.append("the first failure")
-    return f"elastic: beyond {' and '.join(beyond)}" if beyond else ""
+        beyond.append("the first ply fails before")
+    return f"elastic prediction; {', and '.join(beyond)}" if beyond else ""
 
 
 def page(result: Stored) -> list[str]:

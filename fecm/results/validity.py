@@ -61,8 +61,10 @@ MEANING: dict[str, str] = {
     Reason.STEEP: f"beyond moderate rotations ({Reason.STEEP})",
     Reason.STRAINED: f"beyond linear plies ({Reason.STRAINED})",
     Reason.SOFT: f"beyond the contact law ({Reason.SOFT})",
-    Reason.BROKEN: f"elastic beyond the first failure ({Reason.BROKEN})",
-    Reason.DELAMINATED: f"elastic beyond delamination ({Reason.DELAMINATED})",
+    Reason.BROKEN: f"beyond the first failure: elastic predictions ({Reason.BROKEN})",
+    Reason.DELAMINATED: (
+        f"above the delamination threshold: elastic predictions ({Reason.DELAMINATED})"
+    ),
     Reason.OTHER: "doubtful for other reasons",
 }
 

@@ -64,7 +64,8 @@ class ReducedModel:
             self.columns["case"], self.difference("peak_force"), self.difference(RATIO), strict=True
         )
         for case, peak, w in rows:
-            yield f"{'':18}peak {peak:+.2%}, w {w:+.3%} (case {case})"
+            of_w = "open" if np.isnan(w) else f"{w:+.3%}"
+            yield f"{'':18}peak {peak:+.2%}, w {of_w} (case {case})"
         yield f"{'':18}slopes and strains are not judged"
 
     def check(self) -> None:
