@@ -35,6 +35,27 @@ MISTAKES: dict[str, tuple[Edit, str, str]] = {  # change, code, and what the tex
     "tension and compression": (
         strengths(XC, XT, YC, YT, *S), "W468", "tension and compression exchanged"),
     "YT above XT": (strengths(400.0, XC, 450.0, 500.0, *S), "W468", "YT = 450 is not below XT"),
+    "XT and XC": (strengths(XC, XT, YT, YC, *S), "W468", "typed with XT and XC exchanged"),
+    "YT and YC": (strengths(XT, XC, YC, YT, *S), "W468", "typed with YT and YC exchanged"),
+    "S12 in ksi": (
+        strengths(XT, XC, YT, YC, 13.4, *S[1:]), "W553", "looks like ksi; mm, N and s need MPa"),
+    "S12 and S13 in ksi": (
+        strengths(XT, XC, YT, YC, 13.4, 13.4, S[2]), "W553", "YT = 62.3 (S13 too)"),
+    "q = 1": (with_card("EXPE", "42000.,0.,0.,1."), "W437", "the power of loading is 1.5"),
+    "alpha_p and s_p": (
+        with_card("EXPE", "42000.,.094,.017,2.5"), "W550", "look exchanged"),
+    "alpha1 and alpha2": (
+        with_card("CURE", "-100.,", ",25.8E-6,-.5E-6", ""), "W551", "alpha1 = 2.58e-05 is above"),
+    "beta1 and beta2": (
+        with_card("CURE", "-100.,1.", ",-.5E-6,25.8E-6,.006,0.", ""), "W551", "beta1 = 0.006"),
+    "expansions per deg F": (
+        with_card("CURE", "-100.,", ",-.28E-6,14.3E-6", ""), "W552",
+        "per kelvin alpha1 and alpha2 would be -5.04e-07 and 2.574e-05"),
+    "rod's length and diameter": (
+        replaced(r"^PROJ\n.*", "PROJ\n2,0,16.,210000.,7.85E-9\n1,1,25.\n2,0,25.\n"), "W554",
+        "its diameter is 25, its length 16"),
+    "10 kJ for 10 J": (
+        replaced(r"^(ROD\n.{10}).*", r"\g<1>      1.E5"), "W555", "1e+04 J"),
     "G_IIc in J/m^2": (
         with_card("DELA", "787.9,"), "W469", "looks like J/m^2; mm, N and s need kJ/m^2"),
     "G_IIc in J/mm^2": (with_card("DELA", "7.879E-4,"), "W469", "0.788 J/m^2"),

@@ -151,6 +151,17 @@ def test_a_spring_far_stiffer_than_the_plate_leaves_a_mass_on_a_spring() -> None
     assert critical_time_step(plate, (node, 1e9)) == pytest.approx(2.0 * (mass / 1e9) ** 0.5, 1e-3)
 
 
+@pytest.mark.parametrize("order", [0, 1, 2])
+def test_assumed_shear_strains_need_no_order_l2(order: int) -> None:
+    text = changed(("    3    3   -3", f"    3    {order}   -3"))
+    orders = {"W316", "W322", "E321"}
+    assert orders & codes(text)
+    assumed = text.replace("EXPE\n", "SHEA MITC\nEXPE\n", 1)
+    assert not orders & codes(assumed)
+    free = restrained("   13    0    0    0    0    0    0")
+    assert not orders & codes(free.replace("EXPE\n", "SHEA MITC\nEXPE\n", 1))
+
+
 def half_laminate() -> str:
     """The deck with the first half of its symmetric laminate."""
     cut = BASE.index("    9 90.0     0.125")

@@ -117,6 +117,64 @@ def test_a_fixtures_energy_in_millijoules_is_doubted() -> None:
     assert 0.5 * 5.5 * (deck.require(Impact).velocity / 1e3) ** 2 == pytest.approx(10.0, rel=1e-5)
 
 
+# Mistakes ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ((*PLATE, *QUICK, "--layup", "[0/90]s", "--velocity", "3m/s"),
+         "nothing supports the plate (--support is free): it flies away"),
+        ((*PLATE, *QUICK, "--layup", "[0/90]2", "--velocity", "3m/s", "--support", "simple"),
+         "not symmetric, B is not zero: 4 plies of --ply-thickness 0.131 are 0.524 thick"),
+        ((*D7136[:-2], "--duration", "4", "--contact", "estimate:8"),
+         '--duration is in the deck\'s unit of time unless it has a unit, as in "4ms"'),
+        ((*D7136[:-2], *QUICK, "--contact", "estimate:16"),
+         "takes the sphere's radius; 16 is the diameter of the standard's indenter"),
+        ((*D7136[:-2], *QUICK, "--contact", "estimate:8,210,.3"),
+         "modulus 210 in the --contact estimate looks like GPa; mm, N and s need MPa"),
+        ((*D7136, *QUICK, "--energy", "10kJ"), "W555"),
+        ((*D7136, *QUICK, "--at", "5,50"), "W556"),
+    ],
+    ids=["no support", "no s", "duration in ms", "diameter", "modulus in GPa", "10 kJ", "rim"],
+)  # fmt: skip
+def test_a_likely_mistake_of_an_option_is_named(options: tuple[str, ...], message: str) -> None:
+    made = new(*options)
+    assert made.exit_code == 0
+    assert message in made.stderr
+
+
+def test_sound_options_are_not_doubted() -> None:
+    rubber = new(*D7136[:-2], *QUICK, "--contact", "estimate:8,20,.49")
+    assert "looks like" not in rubber.stderr
+    titanium = new(*D7136[:-2], *QUICK, "--contact", "estimate:8,110000,.3")
+    assert "estimate looks" not in titanium.stderr
+    assert "W555" not in new(*D7136, *QUICK, "--energy", "150J").stderr
+    assert "W556" not in new(*D7136, *QUICK, "--at", "14,50").stderr  # 1.5 mm inside the window
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ((*D7136, "--ply-thickness", ".000184"), "--ply-thickness is 0.000184 mm, thinner than"),
+        ((*PLATE[2:-4], *PLATE[-4:], *QUICK, "--layup", "[0/90]s", "--ply-thickness", ".2",
+          "--units", "mm-N-s", "--velocity", "3m/s", "--support", "simple", "--ply",
+          "1.6e-9,.3,9000,171000,5000,5000,3000"), "E1 and E2 look exchanged"),
+        ((*PLATE[2:4], *PLATE[-4:], *QUICK, "--layup", "[0/90]s", "--ply-thickness", ".2",
+          "--units", "mm-N-s", "--velocity", "3m/s", "--support", "simple", "--ply",
+          "1.6e-9,.3,9000,171000,5000,5000,3000", "--contact", "estimate:8"),
+         "E2 = 171000 is 19 times E1 = 9000"),
+    ],
+    ids=["plies in m", "E1 and E2", "E1 and E2 with an estimate"],
+)  # fmt: skip
+def test_a_mistake_that_gives_no_deck_is_named_with_its_cause(
+    options: tuple[str, ...], message: str
+) -> None:
+    made = new(*options)
+    assert made.exit_code == 2
+    assert message in made.stderr
+
+
 # Plies -------------------------------------------------------------------------------------------
 
 

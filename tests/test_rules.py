@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
+from typing import Any
 
 import numpy as np
 import pytest
 
+import fecm
 from fecm.api import load_deck
 from fecm.deck.rules import Rule, Subject, declare
 from fecm.problem.findings_page import all_rules, page
@@ -24,6 +26,9 @@ STATIC = "TANG\nFORM\nSOLV\nCONV\n"
 IMPACT = "ROD\n   13    3     115.0\n"
 ENDLESS = PROGRAM.replace("         10", "      99999").replace("          5", "")
 ROD_CARDS = "PROJ\n3,0,1.,30.E6,.0006875\n1,1,.22\n3,0,.625\n\n"
+
+
+RING = [n for n in range(9) if n != 4]  # elements of 3 x 3 around a hole
 
 
 # Decks -------------------------------------------------------------------------------------------
@@ -150,6 +155,38 @@ def pad(*cards: str) -> Deck:
 
 CLAMPED = "11111"
 SYMMETRIC = "01010"  # v, theta_x: u is missing
+
+
+def on_window() -> str:
+    """A plate on the edges of a window, hit beside the window."""
+    return impact(fecm.Plate.on_fixture("window:40x30,20x10", (2, 2)), at=(5.0, 15.0)).to_text()
+
+
+def with_hole() -> str:
+    """A preloaded plate with a hole in its middle."""
+    places = [(10.0 * x, 10.0 * y) for y in range(4) for x in range(4)]
+    corners = [(n + n // 3) for n in RING]
+    cells = [(n, n + 1, n + 5, n + 4) for n in corners]
+    left = {"left": np.array([0, 4, 8, 12])}
+    plate = fecm.Plate.from_mesh((places, cells), {"left": "simple"}, groups=left)
+    return impact(plate, at=(10.0, 10.0), preload=(1.0, 0.0)).to_text()
+
+
+def impact(plate: fecm.Plate, **options: Any) -> fecm.Deck:
+    """Deck of a small impact."""
+    return fecm.impact(
+        plate,
+        fecm.Laminate("[0/90]s", "IM7/8552"),
+        fecm.RigidMass(1e-5),
+        fecm.Contact(1000.0),
+        velocity=1000.0,
+        patch=None,
+        duration=1e-7,
+        dt=1e-8,
+        units="mm-N-s",
+        **options,
+    )
+
 
 DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values()} | {
     "E000": macros("XXXX\n" * 1001),
@@ -284,6 +321,8 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "W458": lambda: decks.small(data="DELA\n.8,\n" + decks.DATA_CARDS),
     "E459": more("DAMP\n-1.,\n"),
     "W460": more("DAMP\n1.E6,\n"),
+    "W556": on_window,
+    "W557": with_hole,
     "E483": more("PREL\n1.,2.,3.\n"),
     "W484": plate(with_card("PREL", "0.,2.E3,0.")),
     "W485": plate(with_card("PREL", ",,")),

@@ -6,6 +6,7 @@ import re
 import warnings
 from functools import cache
 
+import numpy as np
 import pytest
 
 import fecm
@@ -53,6 +54,39 @@ def test_a_swept_value_in_another_unit_is_told_once(
 )  # fmt: skip
 def test_sound_swept_values_are_not_remarked(name: str, values: list[float]) -> None:
     assert not [note for note in sweep_notes(**{name: values}) if f"{name} =" in note]
+
+
+@pytest.mark.parametrize(
+    ("name", "inside", "outside"),
+    [("at", "(15,12)", "(20,2)"), ("impact_node", 0, 1), ("y0", 12.0, 2.0)],
+)
+def test_an_impact_beside_the_window_of_a_fixture_is_named_once(
+    name: str, inside: float | str, outside: float | str
+) -> None:
+    plate = fecm.Plate.on_fixture("window:40x30,20x20", (4, 4))
+    (problem,) = load_deck(window_deck(plate).to_text()).problems
+    if name == "impact_node":
+        inside, outside = (
+            int(np.hypot(*(problem.mesh.coordinates - place).T).argmin()) + 1
+            for place in ((15.0, 15.0), (0.0, 0.0))
+        )
+    assert doubtful_values(problem, [{name: inside}]) == []
+    (note,) = doubtful_values(problem, [{name: inside}, {name: outside}, {name: outside}])
+    assert note.startswith("2 cases hit the free rim outside the supports")
+
+
+def window_deck(plate: fecm.Plate) -> fecm.Deck:
+    """Deck of a small impact on a window."""
+    return fecm.impact(
+        plate,
+        fecm.Laminate("[0/90]s", "IM7/8552"),
+        fecm.RigidMass(1e-5),
+        fecm.Contact(1000.0),
+        velocity=1000.0,
+        duration=1e-7,
+        dt=1e-8,
+        units="mm-N-s",
+    )
 
 
 @cache

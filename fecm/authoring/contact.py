@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from fecm._dataclasses import frozen
+from fecm.authoring.fixtures import DropWeight
 from fecm.authoring.laminate import Plies
 from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck.catalogue import (
@@ -15,12 +16,17 @@ from fecm.deck.catalogue import (
     NamedContact,
 )
 from fecm.deck.model import Indentation, Layer, Patch
-from fecm.deck.unit_systems import convert
-from fecm.deck.units import MODULUS
+from fecm.deck.unit_systems import convert, units_of
+from fecm.deck.units import MODULUS, in_si
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
 from fecm.mechanics.points import DISC, HERTZ
+from fecm.problem.rules.units import USED, likely_unit, needed_unit
 
+# Moduli of solid spheres, Pa: range without a doubt, and metals and ceramics.
+SOFTEST, HARDEST = 1e9, 2e12
+SOLID = (5e10, 1e12)
+STEEL_IN_SI = 2e11
 ELASTIC_POWER = 1.5  # of unloading as of loading
 # Shapes of the contact patch.
 PATCHES = {"disc": DISC, "hertz": HERTZ}
@@ -72,6 +78,27 @@ class Sphere:
             f"! E {modulus:g} and nu {poisson:g}; nu23 of the ply {ratios}.  "
             "A measured k may be larger; the law is elastic.\n"
         )
+
+
+def doubts_of_sphere(sphere: Sphere, system: str | None, test: DropWeight | None) -> list[str]:
+    """Doubt a modulus in another unit, and a diameter in the place of a standard's radius."""
+    doubts: list[str] = []
+    names = units_of(system) if system else {}
+    own, modulus = in_si(MODULUS, names), sphere.modulus
+    if modulus is not None and own is not None and not SOFTEST <= modulus * own <= HARDEST:
+        unit = likely_unit(modulus, MODULUS, STEEL_IN_SI)
+        least, greatest = SOLID
+        if unit and least <= modulus * USED[MODULUS][unit] <= greatest:
+            doubts.append(
+                f"the sphere's modulus {modulus:g} in the `contact` estimate looks like {unit}; "
+                f"{needed_unit(MODULUS, names)}"
+            )
+    if test is not None and sphere.radius == 2.0 * test.radius:
+        doubts.append(
+            f"the `contact` estimate takes the sphere's radius; {sphere.radius:g} is the diameter "
+            f"of the standard's indenter, whose radius is {test.radius:g}"
+        )
+    return doubts
 
 
 @frozen

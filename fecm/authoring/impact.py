@@ -9,7 +9,7 @@ from typing import Literal, NamedTuple, get_args
 from fecm._dataclasses import frozen
 from fecm._errors import warn
 from fecm.api import load_deck
-from fecm.authoring.contact import AnyContact, Sphere, law_of
+from fecm.authoring.contact import AnyContact, Sphere, doubts_of_sphere, law_of
 from fecm.authoring.energy import doubts_of_energy, energy_note, with_energy
 from fecm.authoring.fixtures import DropWeight
 from fecm.authoring.kinematics import (
@@ -25,6 +25,7 @@ from fecm.authoring.laminate import (
     Laminate,
     Layup,
     Plies,
+    check_thickness,
     cured,
     damages,
     plies_of,
@@ -49,6 +50,8 @@ from fecm.mechanics.laminate import SOFT_CORE
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.parts import projectile_segment
 
+MOST_STEPS = 1e6  # steps of a run above which the unit of its duration is doubted
+IMPOSSIBLE_STEPS = 1e8  # which a plate of very thin plies needs
 AnyProjectile = Rod | RigidMass | model.Projectile
 GagePlace = tuple[float, float, float, float]  # x, y, z and degrees
 
@@ -311,6 +314,15 @@ def author(asked: Request) -> Authored:
         strike, motion = _prescribed(test, strike, motion, plies.thickness)
         if not test.allows(plies.thickness):
             doubts.append(_doubt_of_thickness(fixture.name, test, plies.thickness))
+    if plies.is_coupled:
+        notes.append(
+            f"the laminate is not symmetric, B is not zero: {plies.said} (an s after the bracket "
+            "of a layup adds the mirrored plies)"
+        )
+    if fixture is None and set(asked.plate.supports.values()) <= {"free"}:
+        notes.append(
+            "nothing supports the plate (`support` is free): it flies away with the projectile"
+        )
     patch = asked.numerics.contact_patch(prescribed=test is not None)
     _check_complete(asked, strike, motion, plies.system)
 
@@ -324,6 +336,8 @@ def author(asked: Request) -> Authored:
             "elastic law; prefer a measured law"
         )
         doubts += doubts_of_core(plies, struck)
+    if isinstance(strike.contact, Sphere):
+        doubts += doubts_of_sphere(strike.contact, plies.system, test)
     damage = damages(plies, asked.giic, notes) if asked.numerics.damage else toughness(asked.giic)
     if is_sandwich(plies, struck) and any(isinstance(s, model.Delamination) for s in damage):
         damage = [s for s in damage if not isinstance(s, model.Delamination)]
@@ -367,7 +381,10 @@ def author(asked: Request) -> Authored:
         asked.kinematics, lambda nonlinear: _formed(asked, plain, mesh, plies, nonlinear=nonlinear)
     )
     dt = asked.numerics.time_step(formed.deck)
+    doubts += _doubts_of_duration(motion.duration, dt, plies.system)
     deck = asked.numerics.with_program(formed.deck, dt, motion.duration)
+    if any(macro.word == "LOOP" and macro.value > IMPOSSIBLE_STEPS for macro in deck.macros):
+        check_thickness(plies)
     comments = (fixture.comment if fixture else "") + formed.comment + comment
     return Authored(deck, comments, [*notes, *formed.notes], doubts)
 
@@ -406,6 +423,18 @@ def doubts_of_core(plies: Plies, layers: Sequence[model.Layer]) -> list[str]:
     return [
         "k is estimated of a sandwich, as if its core were spread over the thickness; its face "
         "indents into the core, and the core is crushed: measure the law (`law`)"
+    ]
+
+
+def _doubts_of_duration(duration: float | None, dt: float, system: str | None) -> list[str]:
+    """Doubt a simulated time of very many steps."""
+    if duration is None or duration / dt <= MOST_STEPS:
+        return []
+    unit = units_of(system)["time"] if system else ""
+    return [
+        f"the duration {duration:g} {unit}".rstrip()
+        + f" takes {duration / dt:.2g} steps: `duration` is in the deck's unit of time unless it "
+        'has a unit, as in "4ms"'
     ]
 
 

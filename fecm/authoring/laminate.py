@@ -35,11 +35,15 @@ from fecm.deck.model import (
     Segment,
 )
 from fecm.deck.unit_systems import UnitsError, system_named, units_of
+from fecm.deck.units import in_si
 from fecm.mechanics.laminate import Laminate as Stiffness
 from fecm.mechanics.laminate import laminate as stiffness_of
 from fecm.problem.check import check_segment
 from fecm.problem.parts import laminates_of_deck
+from fecm.problem.rules.units import looks_like
 
+THINNEST = 1e-6  # m; thin plies have 15e-6
+USUAL_THICKNESS = 2e-4  # m
 ORDER = 3  # integration order of stiffness and mass
 NODAL_POINTS = -3  # where stresses are computed
 
@@ -351,6 +355,19 @@ def _note_of_thickness(own: float, named: NamedPly, system: str | None) -> str:
     """Say the thickness that the name of a ply gives."""
     unit = units_of(system or named.system)["length"]
     return f"the plies are {own:g} {unit} thick, as {named.name} is listed"
+
+
+def check_thickness(plies: Plies) -> None:
+    """Raise ObjectError if plies are thinner than any, and say in which unit they seem to be."""
+    names = units_of(plies.system) if plies.system else {}
+    unit = in_si("length", names)
+    thinnest = min(layer.thickness for layers in plies.layups for layer in layers)
+    if unit is not None and thinnest * unit < THINNEST:
+        looks = looks_like(thinnest, "length", USUAL_THICKNESS, names)
+        said = f"; it {looks}" if looks else ""
+        raise ObjectError(
+            f"`ply_thickness` is {thinnest:g} {names['length']}, thinner than any ply{said}"
+        )
 
 
 def toughness(giic: float | None) -> list[Segment]:

@@ -19,6 +19,7 @@ from fecm.mechanics.laminate import PlyConstants
 # Directions in the surface, and around each of them.
 SURFACE = 72
 AROUND = 180
+ACROSS = 2.0  # E2/E1 above which the fibres are along direction 2; a fabric has 0.8 to 1.2
 # In-plane and out-of-plane components.
 _A = [0, 1, 5]
 _B = [2, 4, 3]
@@ -32,9 +33,15 @@ class PlyError(FecmError, ValueError):
 def ply_stiffness(ply: PlyConstants, nu23: float) -> Floats:
     """Three-dimensional stiffness of a transversely isotropic ply in its own axes, (6, 6).
 
-    A fabric, or a compliance that is not positive definite, is a PlyError.
+    A fabric, fibres along direction 2, or a compliance that is not positive definite are a
+    PlyError.
     """
     nu12, e1, e2 = ply.nu12, ply.e1, ply.e2
+    if e2 > ACROSS * e1:
+        raise PlyError(
+            f"E2 = {e2:g} is {e2 / e1:.3g} times E1 = {e1:g}, which is along the fibres: they look "
+            "exchanged"
+        )
     if e2 > 0.5 * e1 and ply.g12 < 0.25 * e2:
         raise PlyError("the ply is a fabric (E2 near E1, G12 far below): its E3 is not its E2")
     compliance = np.zeros((6, 6))

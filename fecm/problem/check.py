@@ -17,7 +17,7 @@ from fecm.deck.macros import Body, compile_program
 from fecm.deck.reader import ParsedProblem
 from fecm.deck.rules import apply, apply_first
 from fecm.problem.generate import generate, rod_diameters
-from fecm.problem.parts import W, is_curved
+from fecm.problem.parts import W, has_assumed_shear, is_curved
 from fecm.problem.problem import Problem
 from fecm.problem.rules import (
     buckling,
@@ -109,13 +109,13 @@ def _element_errors(findings: Findings) -> int:
 def _check_shapes(checked: Problem, findings: Findings, *, listing: bool) -> None:
     """Check Jacobians, lumped masses and zero-energy modes where the orders are valid.
 
-    Listing mode takes L1 for L2, so that nothing is wrong with L2.
+    Listing mode takes L1 for L2, so that nothing is wrong with L2; assumed strains need no L2.
     """
     material = checked.deck.last(model.Material)
     if material is None or laminate.unknown_stress_points(material):
         return
     apply(quadrature.OF_SHAPES, findings, checked)
-    if not listing:
+    if not listing and not has_assumed_shear(checked.deck):
         apply(quadrature.OF_SHEAR_ORDER, findings, checked)
 
 

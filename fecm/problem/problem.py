@@ -32,6 +32,7 @@ from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.symmetry import half_turn_images, restrain_resting_dofs
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.contact_estimates import ContactStep, contact_step
+from fecm.problem.outline import outside_supports
 from fecm.problem.parts import W, build_plate, residuals_of_deck, rules, strengths_of_deck
 from fecm.problem.span import Span, unsupported
 from fecm.results.linear_plate import in_plane_of
@@ -96,6 +97,11 @@ class Problem:
     def span(self) -> Span:
         """Distance between supports that counts for bending."""
         return unsupported(self.mesh, self.load_place)
+
+    @cached_property
+    def outside_supports(self) -> Bools:
+        """Whether every element lies on a free rim outside the supports, (numel,)."""
+        return outside_supports(self.mesh)
 
     @cached_property
     def plate(self) -> PlateModel:

@@ -9,9 +9,10 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.findings import Finding, Findings
+from fecm.mechanics.mesh import element_centres
 from fecm.problem.check import check_segments, check_values
 from fecm.problem.problem import Problem
-from fecm.sweeps.case import Case, CasesError
+from fecm.sweeps.case import Case, CasesError, pair
 from fecm.sweeps.plan import Plan, Task
 from fecm.sweeps.values import EXPOSURE_NAMES, Changes, Kind, kind_of, names_of
 from fecm.sweeps.vary import apply_case
@@ -21,6 +22,7 @@ LAMINATE = names_of(Changes.LAMINATE)
 _CHANGES = (Changes.FAILURE, Changes.STRIKE, Changes.LAMINATE)
 _NUMBERS = (n for n in names_of(*_CHANGES) if kind_of(n) is Kind.NUMBER)
 JUDGED = {"patch", *_NUMBERS} - {"angle"}
+OTHER_PLATE = {"size", "support"}  # names that change the mesh or its supports
 FEW = 4  # plies below which a laminate as thin as two of them is possible
 
 
@@ -30,7 +32,7 @@ def doubtful_values(checked: Problem, cases: Sequence[Case]) -> list[str]:
     The rules are those of a deck's values.  They are limits, so that only the smallest and the
     largest value of every name are judged, each alone in the deck.
     """
-    notes: list[str] = []
+    notes = list(_notes_of_places(checked, cases))
     known = {(finding.code, finding.message) for finding in _findings(checked)}
     for name in cases[0]:
         if name not in JUDGED:
@@ -63,6 +65,38 @@ def unused_values(planned: Plan) -> list[str]:
     verb = "changes" if len(names) == 1 else "change"
     text = "only exposures, which this sweep leaves out; --measure failure computes them"
     return [f"{' and '.join(names)} {verb} {text}"]
+
+
+def _notes_of_places(checked: Problem, cases: Sequence[Case]) -> Iterator[str]:
+    """Name the impact points that lie outside the supports of the deck's plate."""
+    if not checked.outside_supports.any() or not cases[0].keys().isdisjoint(OTHER_PLATE):
+        return
+    places = [place for case in cases if (place := _place_of(checked, case)) is not None]
+    if not places:
+        return
+    centres = element_centres(checked.mesh.elements, checked.mesh.coordinates)
+    nearest = [int(np.hypot(*(centres - place).T).argmin()) for place in places]
+    outside = [p for p, row in zip(places, nearest, strict=True) if checked.outside_supports[row]]
+    if outside:
+        (x, y), count = outside[0], len(outside)
+        which = "1 case hits" if count == 1 else f"{count} cases hit"
+        yield (
+            f"{which} the free rim outside the supports, the first at ({x:g}, {y:g}): a fixture is "
+            "solid there [W556]"
+        )
+
+
+def _place_of(checked: Problem, case: Case) -> tuple[float, float] | None:
+    """Impact point of a case; None if the case does not move it."""
+    if "at" in case:
+        return pair("at", str(case["at"]))
+    if "impact_node" in case:
+        row = int(case["impact_node"]) - 1
+        rows = checked.mesh.coordinates
+        return (float(rows[row, 0]), float(rows[row, 1])) if 0 <= row < len(rows) else None
+    if (place := checked.load_place) is None or case.keys().isdisjoint({"x0", "y0"}):
+        return None
+    return float(case.get("x0", place[0])), float(case.get("y0", place[1]))
 
 
 def _thickness_notes(deck: model.Deck, name: str, least: float) -> Iterator[str]:

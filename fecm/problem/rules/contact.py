@@ -15,8 +15,11 @@ from fecm.problem.problem import Problem
 from fecm.problem.rules.units import REAL, USED, has_real_moduli, needed_unit
 
 # Powers of measured unloading curves lie between 1.5 and 2.5.
-LEAST_POWER = 1.0
+LEAST_POWER = 1.5
 GREATEST_POWER = 5.0
+# Slopes s_p of permanent indentations: measured ones are near 0.1.
+SMALLEST_SLOPE = 0.02
+USUAL_SLOPES = (0.03, 0.5)
 # Radii of a rigid sphere whose k the law has: in m where UNIT tells, otherwise over the thickness
 # and over the longer side of the plate.  The report's laws, and those of isotropic plates, give
 # radii from a third to 25 times that of the indenter.
@@ -85,8 +88,9 @@ def large_indentation(problem: Problem) -> Reports:
 @rule(
     "W437",
     Subject.IMPACT,
-    "q is outside 1 to 5.",
-    remedy="Measured powers are 1.5 to 2.5.",
+    "q is outside 1.5 to 5.",
+    cause="q is the power of unloading. The power of loading is 1.5 whatever q is.",
+    remedy="Measured powers are 1.5 to 2.5; an elastic law has 1.5.",
 )
 def doubtful_power(problem: Problem) -> Reports:
     """Find powers of unloading that nobody measured."""
@@ -94,7 +98,25 @@ def doubtful_power(problem: Problem) -> Reports:
     if law.word != model.Indentation.ACR and not LEAST_POWER <= law.q <= GREATEST_POWER:
         limits = f"{LEAST_POWER:g} to {GREATEST_POWER:g}"
         message = f"The unloading power q = {law.q:g} is outside {limits}."
-        yield Report(message, law.place(law.names()[3]), "measured powers are 1.5 to 2.5")
+        hint = "measured powers are 1.5 to 2.5; the power of loading is 1.5, for which k holds"
+        yield Report(message, law.place(law.names()[3]), hint)
+
+
+@rule(
+    "W550",
+    Subject.IMPACT,
+    "alpha_p and s_p look exchanged.",
+    cause="s_p is below 0.02, and alpha_p has a size that is usual for s_p (0.03 to 0.5).",
+    remedy="k, alpha_p (a length), s_p (the permanent over the largest indentation), q.",
+)
+def exchanged_constants(problem: Problem) -> Reports:
+    """Find a slope of the permanent indentation in the place of the critical indentation."""
+    law = problem.deck.require(model.Indentation)
+    least, greatest = USUAL_SLOPES
+    if 0.0 < law.s_p < SMALLEST_SLOPE and least <= law.alpha_p <= greatest:
+        message = f"alpha_p = {law.alpha_p:g} and s_p = {law.s_p:g} look exchanged."
+        hint = f"alpha_p is a length; measured slopes s_p are {least:g} to {greatest:g}"
+        yield Report(message, law.place(law.names()[1]), hint)
 
 
 def sphere_radius(deck: model.Deck) -> float:
@@ -155,6 +177,8 @@ def _misread(deck: model.Deck, radius: float, unit: float, names: dict[str, str]
             found[text] = radius * unit * (factor / own) ** 2
     for known, factor in USED["length"].items():
         text = f"the radius that it was estimated from looks like {known}"
+        if known == "m":  # E of the sphere in GPa gives as small a k
+            text += " or the sphere's modulus like GPa"
         found[f"{text}; {needed_unit('length', names)}"] = radius * factor
     if not all(0.0 < value < math.inf for value in found.values()):
         return ""
@@ -164,5 +188,5 @@ def _misread(deck: model.Deck, radius: float, unit: float, names: dict[str, str]
 
 
 OF_LAW = (invalid_parameter,)
-VALUES = (large_indentation, doubtful_power)
+VALUES = (large_indentation, doubtful_power, exchanged_constants)
 OF_COEFFICIENT = (doubtful_coefficient,)

@@ -13,10 +13,13 @@ from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.mechanics.failure import largest_in_plies
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
+from fecm.problem.rules.damage import FIBROUS
 from fecm.results.criteria import spelt
 
 LARGEST_BETA = 0.1  # strain per per cent of weight
 LARGEST_CHANGE = 500.0  # K
+# alpha2 of resin plies per degree Fahrenheit; per kelvin it is 19e-6 and more.
+PER_FAHRENHEIT = (8e-6, 18e-6)
 LARGEST_WARP = 0.1  # rise of the free plate over its thickness without a warning
 FIELDS = "its fields are the material (columns 1-5, blank: 1), alpha1 (11-20) and alpha2 (21-30)"
 
@@ -154,6 +157,59 @@ def cracks_at_rest(problem: Problem) -> Reports:
         yield Report(message, card.place(), "strengths and moduli must be in the same unit")
 
 
+@rule(
+    "W551",
+    Subject.LAMINATE,
+    "A ply of parallel fibres expands more along the fibres than across them.",
+    cause="alpha1 is above alpha2, or beta1 above beta2, in a ply with E1 > 2 E2.",
+    remedy="alpha1, along the fibres, before alpha2.",
+)
+def exchanged_expansions(problem: Problem) -> Reports:
+    """Find coefficients of expansion along and across the fibres that look exchanged."""
+    for one in _expansions_of_fibrous_plies(problem):
+        for along, across in (one.THERMAL, one.MOISTURE):
+            first, second = getattr(one, along), getattr(one, across)
+            if first > second:
+                message = (
+                    f"{along} = {first:g} is above {across} = {second:g}, unlike in any ply of "
+                    "parallel fibres: they look exchanged."
+                )
+                hint = f"{along} is along the fibres, {across} across them"
+                yield Report(message, one.place(along), hint)
+
+
+@rule(
+    "W552",
+    Subject.LAMINATE,
+    "alpha2 on CURE looks like a coefficient per degree Fahrenheit.",
+    cause="It is 8·10⁻⁶ to 18·10⁻⁶ in a ply with E1 > 2 E2; resins have 19·10⁻⁶ and more.",
+    remedy="Coefficients per kelvin: 1.8 times those per degree Fahrenheit.",
+)
+def expansion_per_fahrenheit(problem: Problem) -> Reports:
+    """Find an expansion across the fibres that is too small for a resin."""
+    for one in _expansions_of_fibrous_plies(problem):
+        least, greatest = PER_FAHRENHEIT
+        if one.alpha1 <= one.alpha2 and least < one.alpha2 < greatest:
+            message = (
+                f"alpha2 = {one.alpha2:g} is small for a resin and looks like a coefficient per "
+                "degree Fahrenheit; CURE takes coefficients per kelvin."
+            )
+            converted = f"{1.8 * one.alpha1:.4g} and {1.8 * one.alpha2:.4g}"
+            hint = f"per kelvin alpha1 and alpha2 would be {converted}"
+            yield Report(message, one.place("alpha2"), hint)
+
+
+def _expansions_of_fibrous_plies(problem: Problem) -> list[model.Expansion]:
+    """Coefficients of expansion of the plies with parallel fibres."""
+    card, plies = problem.deck.last(model.Cure), problem.deck.plies
+    given = () if card is None else card.expansions
+    return [
+        one
+        for one in given
+        if (ply := plies.get(one.material)) is not None and ply.e1 > FIBROUS * ply.e2
+    ]
+
+
 def _largest_curvature(curvature: Floats) -> float:
     """Largest principal curvature in size of kappa_x, kappa_y and the twist kappa_xy."""
     x, y, xy = curvature
@@ -207,6 +263,8 @@ VALUES = (
     implausible_moisture,
     large_change,
     heated_since_the_cure,
+    exchanged_expansions,
+    expansion_per_fahrenheit,
     cracks_at_rest,
     warped_plate,
     cure_without_stresses,

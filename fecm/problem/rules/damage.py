@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -32,11 +33,18 @@ SHARES = (
     ("S23", "G23", 0.02),
 )
 FIBROUS = 2.0  # E1/E2 above which a ply has fibres in one direction
+# Of fibrous plies only those of boron are stronger in compression than in tension.
+BORON_ANISOTROPY = 5.0  # least E1/E2 of boron plies
+BORON_SHEAR = 0.35  # greatest G12/E2 of boron plies
+NEARLY = 1.1  # XC/XT that scatter of tests explains
+WEAKEST_SHEAR = 0.25  # least shear strength over YT
 USUAL_MODULUS = 1e11  # Pa, along fibres; with it the unit of a deck without UNIT is guessed
 # Other orders of XT, XC, YT and YC on a card, and where the values belong.
 ORDERS = {
     "in the order XT, YT, XC, YC": (0, 2, 1, 3),
     "with X and Y exchanged": (2, 3, 0, 1),
+    "with XT and XC exchanged": (1, 0, 2, 3),
+    "with YT and YC exchanged": (0, 1, 3, 2),
     "with tension and compression exchanged": (1, 0, 3, 2),
 }
 # G_IIc, J/m^2.
@@ -197,8 +205,11 @@ def _strengths_in_another_unit(
 @rule(
     "W468",
     Subject.DAMAGE,
-    "YT is above XT, YC above XC, or YC below YT in a ply with E1 > 2 E2.",
-    cause="The order that the values seem to be in is named.",
+    "YT or XC is above XT, YC above XC, or YC below YT in a ply with E1 > 2 E2.",
+    cause=(
+        "The order that the values seem to be in is named. Plies of boron fibres, whose XC is "
+        "above XT, are known by E1 > 5 E2 and G12 < 0.35 E2."
+    ),
     remedy="XT, XC, YT, YC, S12, S13, S23.",
 )
 def strengths_in_another_order(problem: Problem) -> Reports:
@@ -209,21 +220,25 @@ def strengths_in_another_order(problem: Problem) -> Reports:
 
 def _strengths_in_another_order(card: model.Allowables, ply: model.Ply) -> Reports:
     given = card.xt, card.xc, card.yt, card.yc
-    faults = _faults(*given)
+    faults = _faults(given, ply)
     if ply.e1 <= FIBROUS * ply.e2 or not faults or max(given) > ENDLESS * ply.e1:
         return
     message = f"{' and '.join(faults.values())}, unlike in any ply of parallel fibres"
     for order, places in ORDERS.items():
-        if not _faults(*(given[place] for place in places)):
+        if not _faults([given[place] for place in places], ply):
             message += f": the strengths look typed {order}"
             break
     hint = "the card's order is XT, XC, YT, YC, S12, S13, S23: X along the fibres, T in tension"
     yield Report(f"{message}.", card.place(next(iter(faults))), hint)
 
 
-def _faults(xt: float, xc: float, yt: float, yc: float) -> dict[str, str]:
-    """What is wrong with strengths of a ply with fibres in one direction, by the field."""
+def _faults(strengths: Sequence[float], ply: model.Ply) -> dict[str, str]:
+    """What is wrong with XT, XC, YT, YC of a ply with fibres in one direction, by the field."""
+    xt, xc, yt, yc = strengths
     faults = {}
+    has_boron = ply.e1 > BORON_ANISOTROPY * ply.e2 and ply.g12 < BORON_SHEAR * ply.e2
+    if xc > NEARLY * xt and not has_boron:
+        faults["XC"] = f"XC = {xc:g} is above XT = {xt:g}"
     if yt >= xt:
         faults["YT"] = f"YT = {yt:g} is not below XT = {xt:g}"
     if yc >= xc:
@@ -231,6 +246,33 @@ def _faults(xt: float, xc: float, yt: float, yc: float) -> dict[str, str]:
     if yc < yt:
         faults["YC"] = f"YC = {yc:g} is below YT = {yt:g}"
     return faults
+
+
+@rule(
+    "W553",
+    Subject.DAMAGE,
+    "A shear strength is below a quarter of YT in a ply with E1 > 2 E2.",
+    cause="The unit that the value seems to be in is named.",
+    remedy="S12, S13 and S23 in the unit of the other strengths.",
+)
+def weak_in_shear(problem: Problem) -> Reports:
+    """Find shear strengths of a fibrous ply that are in another unit than YT."""
+    names = unit_names(problem.deck)
+    for card, ply in _strengths(problem):
+        if ply.e1 <= FIBROUS * ply.e2 or card.yt > ENDLESS * ply.e2:
+            continue
+        shear = {"S12": card.s12, "S13": card.s13, "S23": card.s23}
+        weak = {name: s for name, s in shear.items() if s < WEAKEST_SHEAR * card.yt}
+        if not weak:
+            continue
+        first, value = next(iter(weak.items()))
+        others = f" ({' and '.join([*weak][1:])} too)" if len(weak) > 1 else ""
+        message = f"{first} = {value:g} is below a quarter of YT = {card.yt:g}{others}"
+        factor = in_si(MODULUS, names)
+        if factor is not None and (looks := looks_like(value, MODULUS, card.yt * factor, names)):
+            message += f": it {looks}"
+        hint = "no ply of parallel fibres is so weak in shear; all strengths have one unit"
+        yield Report(f"{message}.", card.place(first), hint)
 
 
 @rule(
@@ -385,7 +427,7 @@ OF_STRENGTHS = (invalid_strength, invalid_constant_of_criterion)
 OF_DELAMINATION = (invalid_delamination,)
 OF_THRESHOLD = (coupled_threshold, twisted_threshold)
 # One of these is enough.
-STRENGTHS = (strengths_in_another_unit, strengths_in_another_order)
+STRENGTHS = (strengths_in_another_unit, strengths_in_another_order, weak_in_shear)
 VALUES = (
     threshold_of_a_sandwich,
     strengths_without_criteria,

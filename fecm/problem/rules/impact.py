@@ -186,10 +186,33 @@ def coarse_mesh(problem: Problem) -> Reports:
     yield Report(f"{what}: {sides} per {wave}{about}.", place, hint)
 
 
+@rule(
+    "W556",
+    Subject.IMPACT,
+    "The impact point lies outside the supports.",
+    cause=(
+        "A closed line of supports, such as the edges of a window, holds the plate, and the plate "
+        "is hit on the free rim around it. A fixture is solid there: the rim can't move."
+    ),
+    remedy="A point inside the window. The origin is a corner of the plate.",
+)
+def impact_outside_supports(problem: Problem) -> Reports:
+    """Find an impact on the rim of a plate that lies on the edges of a window."""
+    if not problem.outside_supports[problem.distances.argmin()]:
+        return
+    impact = problem.deck.require(model.Impact)
+    x, y = problem.load_place or problem.mesh.coordinates[impact.node - 1]
+    message = (
+        f"The impact point ({x:g}, {y:g}) lies outside the supports, on the free rim of the plate."
+    )
+    hint = "hit the plate inside its window; a fixture is solid below the rim"
+    yield Report(message, impact.place("impact node"), hint)
+
+
 OF_NODE = (unknown_impact_node,)
 # One of these is enough.
 OF_DOF = (unknown_impact_dof, restrained_impact_dof, impact_on_rotation, impact_in_plane)
 OF_VELOCITY = (negative_velocity, projectile_at_rest)
 NEIGHBOURS = (held_around_impact,)
-VALUES = (doubtful_velocity,)
+VALUES = (doubtful_velocity, impact_outside_supports)
 OF_MESH = (coarse_mesh,)

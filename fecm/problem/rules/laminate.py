@@ -122,7 +122,9 @@ def impossible_poissons_ratio(segment: Plies) -> Reports:
         if not _invalid_constants(ply) and abs(ply.nu12) >= (ply.e1 / ply.e2) ** 0.5:
             why = f"its square must stay below E1/E2 = {ply.e1 / ply.e2:g}"
             message = f"Poisson's ratio NU12 = {ply.nu12:g} is too large: {why}."
-            yield Report(message, ply.place(POISSONS_RATIO))
+            exchanged = ply.e1 / ply.e2 < LOWEST_RATIO
+            hint = "E1 is along the fibres: E1 and E2 look exchanged" if exchanged else ""
+            yield Report(message, ply.place(POISSONS_RATIO), hint)
 
 
 @rule(

@@ -8,6 +8,7 @@ from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import in_si, unit_names
 from fecm.mechanics.laminate import ROUNDING
+from fecm.problem.outline import holes
 from fecm.problem.problem import Problem
 
 FORCE = "force/length"
@@ -82,6 +83,24 @@ def preload_of_unlike_laminates(problem: Problem) -> Reports:
         yield Report(message, card.place(), hint)
 
 
+@rule(
+    "W557",
+    Subject.LAMINATE,
+    "PREL is with a plate that has a hole.",
+    cause="PREL is uniform over the plate; around a hole the force in the plane is not.",
+    remedy="A static solution under that force before the impact, with `NONL`.",
+)
+def preload_around_hole(problem: Problem) -> Reports:
+    """Find a preload of a plate whose outline has more than one closed part."""
+    card = problem.deck.last(model.Preload)
+    if card is None or not any(card.forces) or not (count := holes(problem.mesh)) > 0:
+        return
+    has = "a hole" if count == 1 else f"{count} holes"
+    message = f"The plate has {has}: a force in the plane is not uniform, as PREL says."
+    hint = "preload it by a static solution before the impact, with NONL: FORC, TANG to CONV"
+    yield Report(message, card.place(), hint)
+
+
 ALONE = (no_preload,)
 OF_PRELOAD = (preload_of_coupled_laminate, preload_of_unlike_laminates)
-VALUES = (large_preload,)
+VALUES = (large_preload, preload_around_hole)

@@ -24,6 +24,7 @@ REPORT_UNITS = [KNOWN["length"]["in"], KNOWN["force"]["lbf"], KNOWN["time"]["s"]
 LIGHTEST = 1.0e-4
 HEAVIEST = 2.0e3
 USUAL_MASS_RATIO = 10.0
+MOST_ENERGY = 2e5  # per thickness, N; 200 J per mm
 # Wave speed in the rod over that along the fibres: lead and polythene are above 1/30.
 SLOWEST = 1.0 / 30.0
 FASTEST = 30.0
@@ -176,6 +177,55 @@ def doubtful_rod(problem: Problem) -> Reports:
         yield Report(message, card.place("rod's Young's modulus"), hint)
 
 
+@rule(
+    "W554",
+    Subject.IMPACT,
+    "The rod is thicker than long.",
+    cause="Its largest diameter is above its length. Waves run along a slender rod only.",
+    remedy="The length on PROJ's card, the diameters on the cards below; or a rigid mass.",
+)
+def rod_thicker_than_long(problem: Problem) -> Reports:
+    """Find a rod whose length and diameter look exchanged."""
+    card, projectile = problem.deck.last(model.Projectile), build_projectile(problem.deck)
+    if card is None or not isinstance(projectile, Rod):
+        return
+    thickest = max(projectile.diameters)
+    if thickest > projectile.length:
+        message = (
+            f"The rod is thicker than long: its diameter is {thickest:g}, its length "
+            f"{projectile.length:g}. They look exchanged."
+        )
+        hint = "a body that is not slender is a rigid mass (0 elements)"
+        yield Report(message, card.place("length or mass"), hint)
+
+
+@rule(
+    "W555",
+    Subject.IMPACT,
+    "The impact energy is above 200 J per mm of thickness.",
+    cause="Drop-weight tests have 1 to 10 J per mm. Judged where UNIT names the units.",
+    remedy="Velocity and mass in the deck's units: 10 J are 10 000 mJ in mm, N and s.",
+)
+def large_energy(problem: Problem) -> Reports:
+    """Find an energy that no plate withstands."""
+    names = unit_names(problem.deck)
+    force = in_si("force", names)
+    if force is None:
+        return
+    impact = problem.deck.require(model.Impact)
+    mass = build_projectile(problem.deck).total_mass
+    energy = 0.5 * mass * impact.velocity**2
+    share = energy / problem.laminate.thickness * force  # J/m, which is N
+    if share > MOST_ENERGY:
+        joule = energy * (in_si("force*length", names) or 1.0)
+        message = (
+            f"The impact energy is {joule:.3g} J, {share / 1e3:.3g} J per mm of thickness, far "
+            "beyond what an elastic plate withstands."
+        )
+        hint = "a drop-weight test has 1 to 10 J per mm; check velocity and mass for their units"
+        yield Report(message, impact.place("impact velocity"), hint)
+
+
 def _takes_the_reports_rod(problem: Problem) -> bool:
     return not problem.deck.has(model.Projectile)
 
@@ -224,5 +274,5 @@ OF_NUMBER = (invalid_number_of_elements,)
 OF_PROJECTILE = (invalid_projectile, unknown_transducer)
 # Of diameters without other errors; one of these is enough.
 OF_DIAMETERS = (invalid_diameter, rod_out_of_range)
-VALUES = (doubtful_mass, doubtful_rod)
+VALUES = (doubtful_mass, doubtful_rod, rod_thicker_than_long, large_energy)
 WITHOUT_PROJECTILE = (reports_rod, reports_rod_in_other_units)

@@ -166,7 +166,7 @@ def _only_supports_resist(problem: Problem) -> bool:
 )
 def locking(problem: Problem) -> Reports:
     """Find 4-node elements with full integration of their shear strains."""
-    if has_assumed_shear(problem.deck) or _shear_order(problem) < FOUR_NODES.free:
+    if _shear_order(problem) < FOUR_NODES.free:
         return
     card = problem.deck.require(model.Material).integration
     if any(_orders(family) is FOUR_NODES for family in problem.families):

@@ -1,0 +1,112 @@
+"""Sides of a plate's elements: its outline, its holes, and what lies outside its supports."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fecm._dataclasses import frozen
+from fecm._typing import Bools, Indices
+from fecm.mechanics.mesh import Ints, Mesh, element_blocks
+from fecm.problem.parts import W
+
+MID_SIDES = 4  # column of the node between the first two corners
+
+
+@frozen
+class Sides:
+    """Sides of all elements, each once for every element that has it.
+
+    Attributes
+    ----------
+    corners : ndarray of int, shape (n, 2)
+        Rows of the nodes at the ends, ascending.
+    elements : ndarray of int, shape (n,)
+        Row of the element.
+    numbers : ndarray of int, shape (n,)
+        Number of the side; equal for the elements that share it.
+    is_outline : ndarray of bool, shape (n,)
+        Whether the side belongs to a single element.
+    is_held : ndarray of bool, shape (n,)
+        Whether supports hold the deflection w along it.
+    """
+
+    corners: Ints
+    elements: Indices
+    numbers: Indices
+    is_outline: Bools
+    is_held: Bools
+
+
+def element_sides(mesh: Mesh) -> Sides:
+    """Sides of the elements of a mesh."""
+    corners, rows, held = [], [], []
+    # Node 0 stands for an absent one, which does not decide.
+    holds = np.concatenate([[True], mesh.codes[:, W] != 0])
+    for block in element_blocks(mesh.elements, mesh.coordinates):
+        count = block.shape.corners
+        nodes = mesh.elements[block.rows]
+        for side in range(count):
+            ends = nodes[:, [side, (side + 1) % count]]
+            between = nodes[:, MID_SIDES + side] if nodes.shape[1] > MID_SIDES + side else 0
+            corners.append(np.sort(ends, axis=1) - 1)
+            rows.append(block.rows)
+            held.append(holds[ends].all(axis=1) & holds[between])
+    ends, elements = np.concatenate(corners), np.concatenate(rows)
+    keys = ends[:, 0].astype(np.int64) * (len(mesh.coordinates) + 1) + ends[:, 1]
+    _, numbers, counts = np.unique(keys, return_inverse=True, return_counts=True)
+    return Sides(ends, elements, numbers, counts[numbers] == 1, np.concatenate(held))
+
+
+def holes(mesh: Mesh) -> int:
+    """Count the holes of a plate: closed parts of its outline beyond one for each piece."""
+    sides = element_sides(mesh)
+    pieces, _ = _parts(len(mesh.elements), *_neighbours(sides, np.ones_like(sides.is_held)))
+    ends = sides.corners[sides.is_outline]
+    nodes, places = np.unique(ends, return_inverse=True)
+    loops, _ = _parts(len(nodes), *places.reshape(ends.shape).T)
+    return loops - pieces
+
+
+def outside_supports(mesh: Mesh) -> Bools:
+    """Which elements lie outside the supports, as the rim of a plate on a window does.
+
+    Lines of supports divide a plate into parts.  A part lies outside if no support holds its
+    outline, and supports hold all of another part's border.
+    """
+    outside = np.zeros(len(mesh.elements), dtype=bool)
+    held = mesh.codes[:, W] != 0
+    if not held.any() or held[mesh.used].all():
+        return outside
+    sides = element_sides(mesh)
+    if not (sides.is_held & ~sides.is_outline).any():
+        return outside
+    count, part = _parts(len(mesh.elements), *_neighbours(sides, ~sides.is_held))
+    has_free_outline, has_held_outline = np.zeros((2, count), dtype=bool)
+    of_side = part[sides.elements]
+    has_free_outline[of_side[sides.is_outline & ~sides.is_held]] = True
+    has_held_outline[of_side[sides.is_outline & sides.is_held]] = True
+    # Elements whose nodes are all held, such as those on a boss, are no part of the plate's span.
+    nodes_held = np.concatenate([[True], held])[mesh.elements].all(axis=1)
+    moves = np.zeros(count, dtype=bool)
+    moves[part[~nodes_held]] = True
+    if not (moves & ~has_free_outline).any():
+        return outside
+    return np.asarray((has_free_outline & ~has_held_outline)[part])
+
+
+def _neighbours(sides: Sides, passable: Bools) -> tuple[Indices, Indices]:
+    """Rows of the two elements at every shared side that is passable."""
+    shared = np.flatnonzero(passable & ~sides.is_outline)
+    shared = shared[np.argsort(sides.numbers[shared], kind="stable")]
+    same = sides.numbers[shared[1:]] == sides.numbers[shared[:-1]]
+    return sides.elements[shared[:-1][same]], sides.elements[shared[1:][same]]
+
+
+def _parts(count: int, first: Indices, second: Indices) -> tuple[int, Indices]:
+    """Number of connected parts of a graph, and the part of each of its vertices."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    edges = coo_array((np.ones(len(first)), (first, second)), shape=(count, count))
+    parts, part = connected_components(edges, directed=False)
+    return int(parts), part
