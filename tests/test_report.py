@@ -321,6 +321,16 @@ def test_the_page_of_a_random_sweep_has_its_probabilities() -> None:
     assert len(shown.pictures) >= 2
 
 
+@pytest.mark.usefixtures("_undrawn", "_unrendered")
+def test_the_page_of_a_sensitivity_study_tells_samples_draws_and_cases() -> None:
+    """Saltelli's design of two names: 16 samples, two draws of each, and 16 (2 + 2) cases."""
+    laws = {"velocity": "normal:115,5", "k": "lognormal:1.9e6,0.1"}
+    found = fecm.sweep(LONG, random=laws, samples=16, sensitivity=True)
+    shown = page(random=found)
+    counts = [shown.row(name)[0].text.split(",")[0] for name in ("draws", "cases")]
+    assert counts == ["32", "64"]
+
+
 @pytest.mark.usefixtures("_undrawn")
 def test_a_fit_has_a_page(tmp_path: Path) -> None:
     output = tmp_path / "fit.html"

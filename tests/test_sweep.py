@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -566,3 +567,23 @@ def test_a_run_and_a_sweep_are_not_taken_for_one_another(tmp_path: Path) -> None
     with pytest.raises(ValueError, match="run"):
         fecm.load_sweep(tmp_path / "r.h5")
     assert build_law(model(deck)).constants.k == 1912000.0
+
+
+@pytest.mark.skipif(not Path("/proc/self/status").exists(), reason="reads /proc")
+def test_a_closing_terminal_does_not_end_the_resource_tracker() -> None:
+    """Without its first tracker, multiprocessing prints tracebacks about semaphores."""
+    script = (
+        "from multiprocessing import resource_tracker\n"
+        "from fecm.sweeps.schedule import start_resource_tracker\n"
+        "start_resource_tracker()\n"
+        "pid = resource_tracker._resource_tracker._pid\n"
+        "print(open(f'/proc/{pid}/status').read())\n"
+        "print(open('/proc/self/status').read())\n"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, check=True
+    )
+    tracker, own = (int(mask, 16) for mask in re.findall(r"SigBlk:\s*(\w+)", done.stdout))
+    hangup = 1 << signal.SIGHUP - 1
+    assert tracker & hangup
+    assert not own & hangup

@@ -8,7 +8,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from fecm.deck.units import short_name, unit_of
+from fecm.deck.units import quantity, short_name, unit_of
 from fecm.plot.kinds import Kind
 from fecm.report import figures
 from fecm.report.content import (
@@ -31,6 +31,7 @@ from fecm.report.content import (
 )
 from fecm.results.metrics import RATIO, VERDICTS, described
 from fecm.results.validity import MEANING, Reason, counted
+from fecm.sweeps.random import Design
 from fecm.sweeps.random_result import RandomResult
 from fecm.sweeps.random_tables import MAIN, chance
 from fecm.sweeps.result import SweepResult
@@ -183,8 +184,21 @@ def _case(sweep: SweepResult, case: int) -> str:
     if len(sweep.cases) > MOST_NAMED:
         return f"{case}"
     values = {name: column[case].item() for name, column in sweep.cases.items()}
-    texts = [f"{n} {v:.5g}" if isinstance(v, float) else f"{n} {v}" for n, v in values.items()]
+    texts = [
+        f"{name} {quantity(value, sweep.unit(name), 5)}"
+        if isinstance(value, float)
+        else f"{name} {value}"
+        for name, value in values.items()
+    ]
     return f"{case}: {', '.join(texts)}"
+
+
+def _drawn(sweep: SweepResult, design: Design) -> Iterator[tuple[str, str]]:
+    """Rows that tell draws and cases from the samples, where their numbers differ."""
+    if design.sensitivity:
+        yield "draws", f"{design.draws}, two per sample; statistics and probabilities use them"
+    if len(sweep) != design.draws:
+        yield "cases", f"{len(sweep)}, all runs, also for indices and combinations"
 
 
 def _random(sweep: SweepResult, random: RandomResult) -> Iterator[Block]:
@@ -194,6 +208,7 @@ def _random(sweep: SweepResult, random: RandomResult) -> Iterator[Block]:
         [
             ("design", str(design.kind)),
             ("samples", Number(design.samples, str(design.samples))),
+            *_drawn(sweep, design),
             ("seed", Number(design.seed, str(design.seed))),
         ],
         caption="Random sweep",

@@ -10,12 +10,14 @@ import json
 import multiprocessing
 import os
 import pickle
+import signal
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent import futures
 from contextlib import nullcontext
+from multiprocessing import resource_tracker
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -115,10 +117,26 @@ def _can_be_sent(task: Task) -> bool:
     return True
 
 
+def start_resource_tracker() -> None:
+    """Start the process with which multiprocessing cleans up, such that SIGHUP does not end it.
+
+    A closing terminal sends SIGHUP to all processes.  Without its first tracker, multiprocessing
+    starts another one, which prints a traceback for each semaphore that it does not know.
+    """
+    if not hasattr(signal, "SIGHUP"):  # Windows, which has no tracker
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGHUP})  # which a child inherits
+    try:
+        resource_tracker.ensure_running()
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
 def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> None:
     """Run tasks in worker processes; rerun the tasks of a worker that died."""
     left = {task.number: task for task in tasks}
     deaths = 0
+    start_resource_tracker()
     while left and deaths < DEATHS:
         before = len(left)
         context = multiprocessing.get_context("spawn")
