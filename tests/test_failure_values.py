@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from pathlib import Path
+from statistics import NormalDist
 from typing import Any
 
 import numpy as np
@@ -204,3 +206,21 @@ def test_a_name_in_other_letters_is_suggested(options: tuple[str, ...], tmp_path
     done = call("sweep", "d.inp", *options, "-o", "s.h5", cwd=tmp_path)
     assert done.exit_code == 2
     assert "did you mean giic?" in done.stderr
+
+
+def test_the_probability_of_delamination_follows_from_the_law_of_the_toughness() -> None:
+    """The threshold goes with the root of G_IIc, and the peak force does not scatter.
+
+    With a lognormal G_IIc, P = Phi(ln(G (F/F_G)^2/median)/sigma), where F_G is the threshold of G.
+    """
+    deck, sigma = fecm.read_one(tough(400)), 0.2
+    single = fecm.run_one(deck)
+    peak, threshold = single.metrics["peak_force"], single.metrics["threshold_force"]
+    toughness = deck.require(Delamination).toughness
+    median = 1.1 * toughness * (peak / threshold) ** 2  # P is less than a half
+    expected = NormalDist().cdf(math.log(1.0 / 1.1) / sigma)
+    laws = {"giic": f"lognormal:{median!r},{sigma}"}
+    swept = fecm.sweep(deck, random=laws, samples=256, exceed="peak_force=threshold")
+    assert swept.random is not None
+    (found,) = swept.random.exceedance.probability
+    assert found == pytest.approx(expected, abs=1.0 / 256)  # one draw in each of 256 strata

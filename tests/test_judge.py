@@ -272,7 +272,7 @@ def test_a_run_says_what_is_open_and_what_is_elastic_only() -> None:
     threshold = float(whole.threshold["force"])
     told = "\n".join(summary(whole))
     assert f"(elastic prediction; delamination is expected from {threshold:.4g} N" in told
-    assert " left in plate, indentation and projectile" in told
+    assert " absorbed (left in plate, indentation and projectile)" in told
     assert {"w > 0.3 h", "peak force > threshold"} <= set(whole.validity.split("; "))
 
 

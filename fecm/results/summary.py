@@ -346,7 +346,7 @@ def _rebound(result: Stored) -> str:
         f"{_quantity(result, metrics['rebound_velocity'], 'length/time')}, "
         f"impulse {_quantity(result, metrics['impulse'], 'force*time')}, "
         f"{_quantity(result, metrics['energy_absorbed'], 'force*length')} "
-        "left in plate, indentation and projectile"
+        "absorbed (left in plate, indentation and projectile)"
     )
 
 
