@@ -61,10 +61,8 @@ MEANING: dict[str, str] = {
     Reason.STEEP: f"beyond moderate rotations ({Reason.STEEP})",
     Reason.STRAINED: f"beyond linear plies ({Reason.STRAINED})",
     Reason.SOFT: f"beyond the contact law ({Reason.SOFT})",
-    Reason.BROKEN: f"beyond the first failure: elastic predictions ({Reason.BROKEN})",
-    Reason.DELAMINATED: (
-        f"above the delamination threshold: elastic predictions ({Reason.DELAMINATED})"
-    ),
+    Reason.BROKEN: f"elastic predictions ({Reason.BROKEN})",
+    Reason.DELAMINATED: (f"elastic predictions ({Reason.DELAMINATED})"),
     Reason.OTHER: "doubtful for other reasons",
 }
 
