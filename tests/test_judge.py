@@ -407,3 +407,26 @@ def test_the_json_of_a_run_has_its_end_and_its_validity(tmp_path: Path) -> None:
     assert said["end"] == "in contact, peak not reached"
     assert said["validity"].startswith("peak not reached")
     assert said["metrics"]["threshold_margin"] == "NaN"
+
+
+# Linear against nonlinear runs of D7136 with 2.096 mm of [45/0/-45/90]2s IM7/8552 (w/h of the
+# linear plate, per cent that its force is too low), and with 4.416 mm of [45/0/-45/90]3s.
+ON_THE_WINDOW = [(1.88, 24.0), (2.66, 33.0), (3.76, 42.0), (4.61, 47.0)]
+
+
+@pytest.mark.parametrize(("ratio", "low"), ON_THE_WINDOW)
+def test_a_plate_on_a_window_is_told_one_error_which_is_that_of_nonlinear_runs(
+    ratio: float, low: float
+) -> None:
+    deck = fecm.impact(
+        fecm.Plate.on_fixture("D7136", (4, 4)),
+        fecm.Laminate("[45/0/-45/90]2s", "IM7/8552", 0.131),
+        energy="10J",
+        duration=1e-5,
+        kinematics="linear",
+    )
+    (problem,) = load_deck(deck.to_text()).problems
+    words = problem.judge.softness(ratio)
+    (said,) = re.findall(r"about (\d+) % too low", words)
+    assert abs(float(said) - low) <= 2.0
+    assert "window" in words

@@ -437,6 +437,11 @@ def damages(plies: Plies, giic: float | None, notes: list[str]) -> list[Segment]
     return made
 
 
+def _expanding() -> list[str]:
+    """Names of the plies that have expansions."""
+    return [name for name, ply in MATERIALS.items() if ply.expansion is not None]
+
+
 def cured(plies: Plies, cure: float | str | None) -> Cure | None:
     """CURE segment of named plies for a change of temperature, or for ``"177:20"``."""
     if cure is None:
@@ -446,8 +451,9 @@ def cured(plies: Plies, cure: float | str | None) -> Cure | None:
         if one.named is None or (expansion := one.named.expansion) is None:
             lacks = f"{one.named.name} has no" if one.named else "it needs a named ply with"
             raise ObjectError(
-                f"`cure`: {lacks} alpha1 and alpha2; a file of your own plies may have them (fecm "
-                "new --materials)"
+                f"`cure`: {lacks} alpha1 and alpha2, which "
+                f"{', '.join(_expanding())} have; a file of your own plies may have them (fecm new "
+                "--materials)"
             )
         expansions.append(replace(expansion, material=number))
     named = [ply for _, ply in plies.named]

@@ -345,7 +345,7 @@ class Problem:
             mobility = self.moving_plate.rigid_mobility(self.contact[:, W])
         return Judge(
             self.laminate.thickness,
-            in_plane_of(self.mesh.codes),
+            in_plane_of(self.mesh.codes, self.mesh.coordinates),
             mobility,
             preloaded=self.plate.is_preloaded,
             curved=self.plate.is_curved,

@@ -51,6 +51,7 @@ BENT = {
     InPlane.HELD: Reason.BENT_HELD,
     InPlane.FREE: Reason.BENT_FREE,
     InPlane.UNKNOWN: Reason.BENT_HELD,
+    InPlane.WINDOW: Reason.BENT_HELD,
 }
 # What the reasons of a case mean, for the lines of a summary.
 MEANING: dict[str, str] = {

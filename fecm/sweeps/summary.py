@@ -11,8 +11,9 @@ import numpy as np
 from fecm._typing import Bools
 from fecm.deck.model import Curvature, Preload, Segment
 from fecm.deck.units import quantity
+from fecm.problem.generate import generate
 from fecm.results.errors import ResultFileError
-from fecm.results.linear_plate import TOO_SOFT, InPlane, softness, unsafe
+from fecm.results.linear_plate import TOO_SOFT, InPlane, in_plane_of, softness, unsafe
 from fecm.results.metrics import RATIO
 from fecm.results.validity import BENT, MEANING, counted
 from fecm.sweeps.case import pair
@@ -138,11 +139,21 @@ def remarks(result: StoredSweep) -> Iterator[str]:
         size = ""
         if np.isfinite(ratio).any():
             largest = float(np.nanmax(ratio))
-            in_plane = InPlane.UNKNOWN if held else InPlane.FREE
+            in_plane = _in_plane(result) if held else InPlane.FREE
             error = softness(largest, in_plane, preloaded=_has(result, Preload))
             size = f" (at w = {largest:.3g} h {error})"
         curved = _has(result, Curvature) or any(name in result for name in ("radius_x", "radius_y"))
         yield f"beyond its range {TOO_SOFT}{size}; {unsafe(curved=curved)}"
+
+
+def _in_plane(result: StoredSweep) -> InPlane:
+    """Support of the plate in its plane; unknown where the deck can't be read or meshed."""
+    try:
+        mesh = generate(result.deck)
+    except (ResultFileError, ValueError, LookupError):  # of a damaged file
+        return InPlane.UNKNOWN
+    in_plane = in_plane_of(mesh.codes, mesh.coordinates)
+    return in_plane if in_plane is InPlane.WINDOW else InPlane.UNKNOWN
 
 
 def _has(result: StoredSweep, kind: type[Segment]) -> bool:
