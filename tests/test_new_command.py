@@ -11,7 +11,7 @@ import fecm
 from fecm.api import load_deck
 from fecm.cli.new import new as command
 from fecm.deck.catalogue import MATERIALS
-from fecm.deck.model import Delamination, Impact, Material, Shear
+from fecm.deck.model import Delamination, Impact, Material, Nonlinear, Shear
 from fecm.mechanics.solutions import Tangent, in_plane_pins, static_stiffness
 from fecm.problem.summary import summarise
 from tests import closed_forms
@@ -474,3 +474,52 @@ def test_help_has_every_option_once_in_groups_and_typical_calls_at_the_end() -> 
     options = [option.opts[0] for option in command.params if option.opts[0].startswith("-")]
     assert sorted(shown) == sorted([*options, "-h"])
     assert "Typical calls:" in text[text.index("--overwrite") :]
+
+
+# Kinematics and title ----------------------------------------------------------------------------
+
+THIN = ("--fixture", "D7136", "--mesh", "6x4", "--layup", "[45/0/-45/90]2s", "--ply-thickness",
+        ".131", "--material", "IM7/8552")  # fmt: skip
+
+
+def test_a_plate_that_deflects_beyond_0_3_h_stretches_and_the_note_says_so() -> None:
+    soft, stiff = new(*THIN, "--energy", "10J"), new(*THIN, "--energy", "0.02J")
+    assert fecm.read_one(soft.stdout).has(Nonlinear)
+    # The linear run deflects by 2.66 h.
+    assert "the static estimate of the deflection is 2.7 h, beyond 0.3 h" in soft.stderr
+    assert not fecm.read_one(stiff.stdout).has(Nonlinear)
+    assert "static estimate" not in stiff.stderr
+
+
+def test_the_older_name_and_full_quadrature_decide_the_kinematics() -> None:
+    named = new(*THIN, "--energy", "0.02J", "--kinematics", "von-karman").stdout
+    assert named == new(*THIN, "--energy", "0.02J", "--nonlinear").stdout
+    assert fecm.read_one(named).has(Nonlinear)
+    full = new(*THIN, "--energy", "10J", "--shear", "full")
+    assert not fecm.read_one(full.stdout).has(Nonlinear)
+    assert "the plate stays linear, too soft there: NONL needs assumed shear" in full.stderr
+    both = new(*THIN, "--energy", "10J", "--nonlinear", "--kinematics", "linear")
+    assert both.exit_code == 2
+    assert "give one" in both.stderr
+
+
+def test_a_plate_that_stretches_is_run_for_the_shorter_contact_of_its_static_curve() -> None:
+    times = []
+    for kinematics in ("linear", "von-karman"):
+        made = new(*THIN, "--energy", "30J", "--kinematics", kinematics)
+        words = {macro.word: macro.value for macro in fecm.read_one(made.stdout).macros}
+        times.append(words["DT"] * words["LOOP"])
+    assert times[0] == pytest.approx(12e-3, rel=0.01)
+    assert 6.3e-3 < times[1] < 8.5e-3  # the contact of a run is over at 6.3 ms
+
+
+@pytest.mark.parametrize(
+    ("options", "title"),
+    [
+        ((), "D7136 [45/0/-45/90]2s IM7/8552, 10 J"),
+        (("--layup", "[0/90/0]"), "D7136 [0/90/0] IM7/8552, 10 J"),
+        (("--title", "mine"), "mine"),
+    ],
+)
+def test_a_title_names_plate_layup_ply_and_energy(options: tuple[str, ...], title: str) -> None:
+    assert fecm.read_one(new(*THIN, "--energy", "10J", *options).stdout).title == title
