@@ -5,8 +5,8 @@ transcript: lines that begin with ``$ `` are commands, and the output of each fo
 ``...`` stands for any number of lines.  Times of computing, sizes of files and memory, versions and
 paths differ from machine to machine: :data:`MASKED` are not compared.
 
-``python -m tests.printed --write docs/tutorial.md`` runs the commands of a page and writes the lines
-anew whose numbers have changed.
+``python -m tests.printed --write docs/tutorial.md`` runs the commands of a page and writes the
+lines anew whose numbers have changed.
 """
 
 from __future__ import annotations
