@@ -16,6 +16,7 @@ import pytest
 
 from tests.calls import call
 from tests.decks import ROOT
+from tests.printed import differences, outputs
 
 BLOCK = re.compile(r"^( *)```(sh|python)\n(.*?)^ *```$", re.M | re.S)
 PAGES = [
@@ -71,3 +72,21 @@ def test_the_commands_and_snippets_of_the_readme_run(tmp_path: Path) -> None:
 @pytest.mark.parametrize("page", PAGES)
 def test_the_commands_and_snippets_of_a_page_run(page: str, tmp_path: Path) -> None:
     run_page(ROOT / "docs" / page, tmp_path)
+
+
+# Pages whose printed outputs are those of their commands.
+PRINTED = ["README.md", "docs/tutorial.md"]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("page", PRINTED)
+def test_a_page_shows_what_its_commands_print(page: str, tmp_path: Path) -> None:
+    for shown, output in outputs(ROOT / page, tmp_path):
+        assert differences(shown, output) == []
+
+
+def test_a_number_that_a_command_does_not_print_is_a_difference() -> None:
+    output = ["peak  85.0 N", "contact 1 s", "result  a.h5, 3.2 MB"]
+    assert differences("peak 85.0 N\n...\nresult a.h5, 9 MB", output) == []
+    assert differences("peak 85.1 N\ncontact 1 s", output) == ["peak 85.1 N"]
+    assert differences("contact 1 s\npeak 85.0 N", output) == ["peak 85.0 N"]
