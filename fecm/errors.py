@@ -29,6 +29,7 @@ from fecm.mechanics.solutions import ConvergenceError, SingularStiffnessError
 from fecm.plot.kinds import LackingError, MatplotlibError, PlotError
 from fecm.problem.plate_mesh import MeshError
 from fecm.problem.refine import RefineError
+from fecm.problem.static_plate import NoCurveError
 from fecm.report.page import Jinja2Error, ReportError
 from fecm.results.diff import IncomparableError
 from fecm.results.errors import ExportError, NotStoredError, ResultFileError, ResultWriteError
@@ -60,6 +61,7 @@ __all__ = [
     "LocateError",
     "MatplotlibError",
     "MeshError",
+    "NoCurveError",
     "NoFolderError",
     "NotEnoughMemoryError",
     "NotStoredError",

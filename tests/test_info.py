@@ -180,10 +180,6 @@ def without_attributes(file: h5py.File) -> None:
         del file["energy"].attrs[name]
 
 
-def foreign_initial(file: h5py.File) -> None:
-    file["energy"].attrs["initial"] = "much"
-
-
 def foreign_items(file: h5py.File) -> None:
     file["tape3/again"] = file["/"]  # a loop of groups
     file["type"] = np.dtype("f8")
@@ -191,7 +187,7 @@ def foreign_items(file: h5py.File) -> None:
 
 @pytest.mark.parametrize(
     "edit",
-    [foreign_attributes, without_energy, without_attributes, foreign_initial, foreign_items],
+    [foreign_attributes, without_energy, without_attributes, foreign_items],
 )  # fmt: skip
 def test_a_result_with_foreign_or_missing_parts_is_still_told(
     changed: Callable[[Edit], Path], edit: Edit

@@ -286,7 +286,7 @@ def summarise(problem: Problem) -> ProblemSummary:
         laminate=list(deck.layers)[problem.laminate_number] if plate.others else None,
         leaves_out_equilibrium=without_equilibrium,
         velocity=velocity,
-        energy=None if velocity is None else 0.5 * mass * velocity**2,
+        energy=None if velocity is None else 0.5 * mass * velocity * velocity,
         cure=None if cure is None else cure.delta_t,
         threshold=None if problem.threshold is None else problem.threshold.force,
     )
