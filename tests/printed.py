@@ -52,7 +52,7 @@ def outputs(page: Path, folder: Path) -> Iterator[Printed]:
             for line in commands:
                 if line.startswith("$ fecm "):
                     printed += [line, *output_of(line[2:], folder)]
-            yield Printed(text.replace("\\\n", " "), printed)
+            yield Printed(text, printed)
         elif language == "text" and last:
             yield Printed(text, last)
             last = []
@@ -68,7 +68,7 @@ def differences(shown: str, printed: list[str]) -> list[str]:
     """Lines of a block that the output does not have in this order."""
     wrong, place = [], 0
     masked = [MASKED.sub("#", " ".join(line.split())) for line in printed]
-    for line in filter(str.strip, shown.split("\n")):
+    for line in filter(str.strip, shown.replace("\\\n", " ").split("\n")):
         if line.strip() == GAP:
             continue
         text = MASKED.sub("#", " ".join(line.split()))
@@ -80,12 +80,16 @@ def differences(shown: str, printed: list[str]) -> list[str]:
 
 
 def updated(shown: str, printed: list[str]) -> str:
-    """The block with the lines of the output that begin as its own do."""
-    lines = []
+    """The block with the lines of the output that begin as its own do, in their order."""
+    lines, place = [], 0
     for line in shown.split("\n"):
-        start = re.split(r"[\d(]", line, maxsplit=1)[0]
-        same = [one for one in printed if start.strip() and one.startswith(start.rstrip())]
-        lines.append(same[0] if same and line.strip() != GAP and not line.startswith("$") else line)
+        start = re.split(r"[\d(]", line, maxsplit=1)[0].rstrip()
+        rows = [n for n, one in enumerate(printed) if n >= place and one.startswith(start)]
+        if start.strip() and rows and line.strip() != GAP and not line.startswith("$"):
+            lines.append(printed[rows[0]])
+            place = rows[0] + 1
+        else:
+            lines.append(line)
     return "\n".join(lines)
 
 
