@@ -75,7 +75,7 @@ def test_the_commands_and_snippets_of_a_page_run(page: str, tmp_path: Path) -> N
 
 
 # Pages whose printed outputs are those of their commands.
-PRINTED = ["README.md", "docs/tutorial.md"]
+PRINTED = ["README.md", "docs/damage-energy.md", "docs/tutorial.md"]
 
 
 @pytest.mark.long
