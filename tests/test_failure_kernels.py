@@ -266,7 +266,7 @@ def with_counts(monitor: CompiledMonitor, share: float) -> CompiledMonitor:
     """The same criteria, of which about this share of the points count."""
     counts = np.random.default_rng(5).random(monitor.counts.shape) < share
     made = copy(monitor)
-    made.counts, made.far = counts, counts.all(axis=1)
+    made.counts, made.far = counts, np.asarray(counts.all(axis=1))
     return made
 
 

@@ -197,7 +197,7 @@ def test_points_under_the_load_do_not_count_and_keep_their_exposures() -> None:
 
     def largest(counts: Bools) -> Largest:
         envelope = FailureEnvelope(states, interfaces, Largest.none(len(CRITERIA) + 1))
-        envelope.find_largest(counts, counts.all(axis=1))
+        envelope.find_largest(counts, np.asarray(counts.all(axis=1)))
         return envelope.largest
 
     found = largest(~near)
