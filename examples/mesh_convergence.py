@@ -17,7 +17,7 @@ def deck_of(case):
         fecm.RigidMass(1e-6),  # t
         fecm.Contact.estimate(radius=6),
         velocity=3000,
-        duration=2e-4,
+        duration=3e-4,
         every=50,
         patch="disc:6",
         units="mm-N-s",
@@ -30,5 +30,5 @@ for elements, force in zip(found["elements"], peak, strict=True):
     print(f"{elements:3.0f} elements a side: {force:.2f} N ({force / peak[-1] - 1:+.2%})")
 
 ax = found.plot(quantity="peak_force")
-ax.set(xlabel="Elements a side", ylim=(179, 180))
+ax.set(xlabel="Elements a side", ylim=(177, 178))
 ax.figure.savefig("convergence.png")
