@@ -56,7 +56,7 @@ BENT = {
 # What the reasons of a case mean, for the lines of a summary.
 MEANING: dict[str, str] = {
     Reason.OPEN: "with an open peak",
-    Reason.AGAIN: "that the plate may touch again (open peak)",
+    Reason.AGAIN: "in which the plate may touch again (open peak)",
     Reason.BENT_HELD: f"beyond the linear plate ({Reason.BENT_HELD})",
     Reason.BENT_FREE: f"beyond the linear plate ({Reason.BENT_FREE})",
     Reason.STEEP: f"beyond moderate rotations ({Reason.STEEP})",
