@@ -14,6 +14,7 @@ from typing import Any
 import h5py
 import pytest
 
+from fecm import FecmWarning
 from fecm.mechanics import kernels
 
 ROOT = Path(__file__).parent.parent
@@ -171,7 +172,15 @@ def loaded_from(path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 def test_a_library_without_a_stamp_is_not_used(monkeypatch: pytest.MonkeyPatch) -> None:
-    assert loaded_from(Path(h5py.h5.__file__), monkeypatch) is None
+    with pytest.warns(FecmWarning, match="it is another library; NumPy is used"):
+        assert loaded_from(Path(h5py.h5.__file__), monkeypatch) is None
+
+
+def test_without_a_library_there_is_no_warning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, recwarn: pytest.WarningsRecorder
+) -> None:
+    assert loaded_from(tmp_path / "libfecm.so", monkeypatch) is None
+    assert not recwarn
 
 
 @pytest.mark.parametrize("content", [b"", b"no library", b"\x7fELF\x02\x01\x01" + bytes(57)])
@@ -180,7 +189,8 @@ def test_a_file_that_is_no_library_is_not_used(
 ) -> None:
     path = tmp_path / "libfecm.so"
     path.write_bytes(content)
-    assert loaded_from(path, monkeypatch) is None
+    with pytest.warns(FecmWarning, match="this system can't load it"):
+        assert loaded_from(path, monkeypatch) is None
 
 
 @compiled
@@ -192,4 +202,34 @@ def test_a_library_cut_short_is_not_loaded(
     whole = Path(kernels.LIBRARY._name).read_bytes()
     path = tmp_path / "libfecm.so"
     path.write_bytes(whole[: max(100, len(whole) * eighths // 8)])
-    assert loaded_from(path, monkeypatch) is None
+    with pytest.warns(FecmWarning, match="it is incomplete"):
+        assert loaded_from(path, monkeypatch) is None
+
+
+@compiled
+def test_a_library_of_other_sources_is_not_used_and_every_command_says_so(tmp_path: Path) -> None:
+    package = tmp_path / "fecm"
+    shutil.copytree(SOURCE.parents[2], package)
+    assert "note" not in system(tmp_path)[1]
+    with (package / "mechanics" / "kernels" / "plate.h").open("a") as header:
+        header.write("\n")
+    shown, said = system(tmp_path)
+    assert "kernels   not compiled; NumPy is used" in shown
+    assert said.startswith(f"fecm: note: the compiled kernels {package}")
+    assert said.count("\n") == 1
+    assert "compiled from other sources; NumPy is used instead and is slower" in said
+    assert said.endswith("from its sources with `pip install -e .`\n")
+
+
+def system(folder: Path) -> tuple[str, str]:
+    """What ``fecm info --system`` of the package in a folder prints."""
+    command = [sys.executable, "-m", "fecm", "info", "--system"]
+    done = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=True)
+    return done.stdout, done.stderr
+
+
+@needs_compiler
+def test_a_library_that_is_there_is_used() -> None:
+    """A library of other sources would skip every test of the kernels."""
+    remedy = "compile it again: pip install -e ."
+    assert kernels.LIBRARY is not None or not kernels.PATH.exists(), remedy

@@ -8,6 +8,7 @@ imported when the command is called.
 from __future__ import annotations
 
 import errno
+import warnings
 from collections.abc import Sequence
 from importlib import import_module
 from typing import TYPE_CHECKING, NamedTuple, NoReturn
@@ -18,7 +19,7 @@ from fecm._errors import FecmError, did_you_mean
 from fecm._text import printable
 from fecm._version import __version__
 from fecm.cli import isolation, streams
-from fecm.cli.common import INTERRUPTED, UNUSABLE, echo
+from fecm.cli.common import INTERRUPTED, UNUSABLE, echo, note
 from fecm.cli.interrupts import SIGNALLED, signals
 
 if TYPE_CHECKING:
@@ -114,6 +115,7 @@ def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoR
     signals.install()
     streams.guard_streams()
     isolation.switch.on = arguments is None
+    warnings.showwarning = _show_warning
     status = _status(arguments, prog_name)
     if (error := streams.output_error()) is not None and status not in SIGNALLED:
         status = UNUSABLE
@@ -121,6 +123,11 @@ def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoR
             echo(f"fecm: error: standard output: {error.strerror}", err=True)
     signals.ignore()
     raise SystemExit(status)
+
+
+def _show_warning(message: Warning | str, *place: object) -> None:
+    """Print a warning as a note, without the line of the program that warns."""
+    note(message)
 
 
 def _status(arguments: Sequence[str] | None, prog_name: str) -> int:

@@ -26,6 +26,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fecm._errors import warn
 from fecm._typing import Floats
 
 if TYPE_CHECKING:
@@ -73,20 +74,35 @@ SEGMENT = Struct("<8x Q 16x Q 16x")
 def _load() -> ctypes.CDLL | None:
     """Compiled library of these sources, None without one.
 
-    One of other sources, left by an earlier installation in place, is not used.
+    A library that is there and can't be used is a warning: NumPy takes its place, and is slower.
     """
+    if not PATH.exists():
+        return None
     try:
         if not _is_whole(PATH):
-            return None
+            return _unused("it is incomplete")
         library = ctypes.CDLL(str(PATH))
         if library.fecm_stamp() != stamp(Path(__file__).parent):
-            return None
-    except (OSError, AttributeError):  # no library, or one without a stamp
-        return None
+            return _unused("it was compiled from other sources")
+    except OSError:
+        return _unused("this system can't load it")
+    except AttributeError:
+        return _unused("it is another library")
     for name, (result, arguments) in FUNCTIONS.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments
     return library
+
+
+def _unused(why: str) -> None:
+    """Warn that the library is not used; in the main process, not in each worker of a sweep."""
+    from multiprocessing import current_process  # 5 ms, only for the warning
+
+    if current_process().name == "MainProcess":
+        warn(
+            f"the compiled kernels {PATH} are not used, as {why}; NumPy is used instead and is "
+            "slower.  Install fecm again, from its sources with `pip install -e .`"
+        )
 
 
 def _is_whole(path: Path) -> bool:
