@@ -11,7 +11,7 @@ import errno
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING, NamedTuple, NoReturn
+from typing import TYPE_CHECKING, NamedTuple, NoReturn, TextIO
 
 import click
 
@@ -125,7 +125,14 @@ def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoR
     raise SystemExit(status)
 
 
-def _show_warning(message: Warning | str, *place: object) -> None:
+def _show_warning(
+    message: Warning | str,
+    category: type[Warning],
+    filename: str,
+    lineno: int,
+    file: TextIO | None = None,
+    line: str | None = None,
+) -> None:
     """Print a warning as a note, without the line of the program that warns."""
     note(message)
 

@@ -78,31 +78,33 @@ def _load() -> ctypes.CDLL | None:
     """
     if not PATH.exists():
         return None
+    why = "it is incomplete"
     try:
-        if not _is_whole(PATH):
-            return _unused("it is incomplete")
-        library = ctypes.CDLL(str(PATH))
-        if library.fecm_stamp() != stamp(Path(__file__).parent):
-            return _unused("it was compiled from other sources")
+        if _is_whole(PATH):
+            library = ctypes.CDLL(str(PATH))
+            if library.fecm_stamp() == stamp(Path(__file__).parent):
+                return _with_types(library)
+            why = "it was compiled from other sources"
     except OSError:
-        return _unused("this system can't load it")
+        why = "this system can't load it"
     except AttributeError:
-        return _unused("it is another library")
-    for name, (result, arguments) in FUNCTIONS.items():
-        function = getattr(library, name)
-        function.restype, function.argtypes = result, arguments
-    return library
-
-
-def _unused(why: str) -> None:
-    """Warn that the library is not used; in the main process, not in each worker of a sweep."""
+        why = "it is another library"
     from multiprocessing import current_process  # 5 ms, only for the warning
 
-    if current_process().name == "MainProcess":
+    if current_process().name == "MainProcess":  # not in each worker of a sweep
         warn(
             f"the compiled kernels {PATH} are not used, as {why}; NumPy is used instead and is "
             "slower.  Install fecm again, from its sources with `pip install -e .`"
         )
+    return None
+
+
+def _with_types(library: ctypes.CDLL) -> ctypes.CDLL:
+    """The library, its functions with the types of their results and arguments."""
+    for name, (result, arguments) in FUNCTIONS.items():
+        function = getattr(library, name)
+        function.restype, function.argtypes = result, arguments
+    return library
 
 
 def _is_whole(path: Path) -> bool:
