@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import csv
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+import fecm
 from fecm.api import load_deck
 from fecm.deck.model import Impact, Patch
-from fecm.mechanics.solutions import static_stiffness
+from fecm.mechanics.solutions import static_stiffness, static_support
 from fecm.problem.parts import build_projectile
 from tests.calls import assert_unusable, call, new, new_deck
 
@@ -77,6 +79,51 @@ def test_w_is_held_along_the_window_and_nowhere_else() -> None:
     assert (held == on).all()
     assert on.any()
     assert (problem.mesh.equations[:, 3:] > 0).all()
+
+
+def test_supports_pull_at_the_corners_with_what_kirchhoff_gives() -> None:
+    # Timoshenko and Woinowsky-Krieger, table 23: a square under a central force P, simply supported
+    # (nu = .3), is held down by 0.1219 P in each corner.
+    text = new(
+        *("--size", "100x100", "--mesh", "16x16", "--units", "mm-N-s", "--support", "simple"),
+        *("--layup", "[0]", "--ply-thickness", "1", "--ply", ISOTROPIC, "--patch", "none"),
+        *("--projectile", "mass:2e-3", "--law", "5e4,0,0,1.5", "--velocity", "100"),
+        *("--duration", "1e-4", "--dt", "1e-7", "--kinematics", "linear"),
+    ).stdout
+    (hard,) = load_deck(text).problems
+    assert hard.contact is not None
+    assert static_support(hard.moving_plate, hard.contact) is None
+    free_rotations = re.sub(r"(?m)^(( +\d+){2}( +-?1){3})( +-?[01]){2}$", r"\1    0    0", text)
+    (soft,) = load_deck(free_rotations).problems
+    assert soft.contact is not None
+    support = static_support(soft.moving_plate, soft.contact)
+    assert support is not None
+    assert support.pull == pytest.approx(4 * 0.1219, rel=0.03)
+
+
+@pytest.mark.parametrize(
+    ("layup", "mass", "velocity", "duration", "pulls"),
+    [
+        ("[45/0/-45/90]3s", 5.5e-3, 1000.0, 5e-3, True),
+        ("[45/0/-45/90]3s", 1e-6, 20000.0, 5e-5, False),  # gone before the supports know of it
+    ],
+)
+def test_a_run_on_a_window_says_with_how_much_its_supports_pull(
+    layup: str, mass: float, velocity: float, duration: float, pulls: bool
+) -> None:
+    deck = fecm.impact(
+        fecm.Plate.on_fixture("D7136", (4, 4)),
+        fecm.Laminate(layup, "IM7/8552", 0.18333),
+        fecm.RigidMass(mass),
+        velocity=velocity,
+        duration=duration,
+        kinematics="linear",
+    )
+    result = fecm.run_one(deck)
+    notes = [note for note in result.notes if "supports pull" in note]
+    assert bool(notes) == pulls
+    # An independent code gives 56 % for the first plate on a finer mesh.
+    assert not pulls or "with 5" in notes[0]
 
 
 def test_energy_gives_the_velocity_of_the_mass() -> None:

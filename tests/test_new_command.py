@@ -487,6 +487,7 @@ def test_a_plate_that_deflects_beyond_0_3_h_stretches_and_the_note_says_so() -> 
     assert fecm.read_one(soft.stdout).has(Nonlinear)
     # The linear run deflects by 2.66 h.
     assert "the static estimate of the deflection is 2.7 h, beyond 0.3 h" in soft.stderr
+    assert "(NONL), on a window on which the plate slides; --kinematics linear" in soft.stderr
     assert not fecm.read_one(stiff.stdout).has(Nonlinear)
     assert "static estimate" not in stiff.stderr
 

@@ -12,7 +12,7 @@ from fecm.deck import model
 from fecm.deck.macros import Macro
 from fecm.problem.parts import has_assumed_shear
 from fecm.problem.static_plate import static_deflection
-from fecm.results.linear_plate import LIMITS, InPlane
+from fecm.results.linear_plate import IN_PLANE_WORDS, LIMITS, InPlane
 
 Kinematics = Literal["auto", "linear", "von-karman"]
 AUTO: Kinematics = "auto"  # von Kármán where the static estimate of the deflection asks for it
@@ -76,14 +76,16 @@ def with_kinematics(asked: Kinematics, form: Callable[[bool], Formed]) -> Formed
         return linear
     estimate = f"the static estimate of the deflection is {ratio:.2g} h, beyond {LIMIT:g} h"
     nonlinear = form(True)
-    if reason := _obstacle(nonlinear.deck):
-        return _noted(
-            linear,
-            f"{estimate}, but the plate stays linear, too soft there: {reason}",
-        )
+    loaded = load_deck(replace(nonlinear.deck, macros=BRIEF))
+    if errors := loaded.errors():
+        reason = errors[0].message.rstrip(".")
+        return _noted(linear, f"{estimate}, but the plate stays linear, too soft there: {reason}")
+    (problem,) = loaded.problems
+    edges = IN_PLANE_WORDS.get(problem.judge.in_plane, "u and v held at every node")
     return _noted(
         nonlinear,
-        f"{estimate}: the plate stretches as it bends (NONL); `kinematics` linear leaves it out",
+        f"{estimate}: the plate stretches as it bends (NONL), {edges}; `kinematics` linear leaves "
+        "it out",
     )
 
 
@@ -98,9 +100,3 @@ def _deflection(deck: model.Deck) -> float:
         return 0.0
     (problem,) = loaded.problems
     return static_deflection(problem) / problem.judge.thickness
-
-
-def _obstacle(deck: model.Deck) -> str:
-    """Why a deck can't have NONL; empty if it can."""
-    errors = load_deck(replace(deck, macros=BRIEF)).errors()
-    return errors[0].message.rstrip(".") if errors else ""

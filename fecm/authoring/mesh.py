@@ -23,7 +23,7 @@ FREE: InPlane = "free"
 HELD: InPlane = "held"
 TANGENTIAL: InPlane = "tangential"
 # What edges of a curved panel hold in its plane, for a note.
-IN_PLANE_WORDS = {
+HELD_WORDS = {
     "free": "neither u nor v",
     "held": "u and v",
     "normal": "the displacement across the edge",
@@ -204,7 +204,7 @@ def _note_of_curved(plate: Plate, in_plane: InPlane) -> str:
     kinds: dict[str, str] = {"window": in_plane} if plate.fixture else {}
     for support in sorted(set(plate.supports.values()) - {"free"}):
         kinds[support] = held_in_plane(support, in_plane)
-    held = ", ".join(f"{name} edges hold {IN_PLANE_WORDS[word]}" for name, word in kinds.items())
+    held = ", ".join(f"{name} edges hold {HELD_WORDS[word]}" for name, word in kinds.items())
     note = f"the panel is curved (CURV): in its plane {held or 'no edge holds u or v'}"
     simple = kinds.get("simple") == TANGENTIAL
     return f"{note}; `support` pinned holds both" if simple else note

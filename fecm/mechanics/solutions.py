@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from scipy import sparse
     from scipy.sparse.linalg import SuperLU
 
+W = 2  # column of w in a field; the rotations follow
+
 # Residual relative to the load above which the stiffness is considered singular.
 SINGULAR = 1.0e-6
 # Rounding error of the forces in balance, relative to the sum of their parts.
@@ -166,6 +168,35 @@ def static_stiffness(plate: PlateModel, contact: Floats) -> float:
         return 1.0 / compliance(plate, contact[plate.mesh.equations > 0])
     except SingularStiffnessError:
         return math.nan
+
+
+@frozen
+class Support:
+    """How the supports carry a static unit load."""
+
+    stiffness: float  # force per displacement under the load
+    pull: float  # sum of the forces that hold the plate down, at nodes free to rotate
+
+
+def static_support(plate: PlateModel, contact: Floats) -> Support | None:
+    """Solve for a unit load on the nodes (numnp, 5) and sum up where the supports pull.
+
+    Only nodes whose w is held and whose rotations are free count: a support of this kind stands for
+    a ring, a window or a knife edge, which can only push.  None for a plate without such nodes, and
+    for one that its supports do not hold.
+    """
+    free = plate.mesh.equations > 0
+    rests = ~free[:, W] & free[:, W + 1 :].all(axis=1)
+    if not rests.any():
+        return None
+    field, load = np.zeros(free.shape), contact[free]
+    try:
+        field[free] = Tangent(plate).solve(load)
+    except SingularStiffnessError:
+        return None
+    # The supports push against the load, and pull in its direction.
+    forces = plate.internal_forces(field)[rests, W] * np.sign(contact[:, W].sum())
+    return Support(1.0 / float(load @ field[free]), float(forces[forces > 0.0].sum()))
 
 
 def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:

@@ -20,6 +20,7 @@ from fecm.problem.contact_estimates import wave_impedance
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
 
+MOST_SOLVED = 1000  # elements up to which checks and notes take static solutions
 # First step of a static curve: a fraction of the linear plate's deflection, and of the thickness.
 CURVE_STEPS = 20
 LONGEST_STEP = 0.25

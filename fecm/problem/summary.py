@@ -24,10 +24,9 @@ from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.parts import W, build_projectile
 from fecm.problem.problem import Problem
 from fecm.problem.resolution import resolution, said_error
+from fecm.problem.static_plate import MOST_SOLVED
 
 ROOM = 0.6  # share of the critical time step below which the step that DT 0 takes is shown
-
-MOST_SOLVED = 1000  # elements up to which a summary takes static solutions
 
 
 def leaves_out_equilibrium(problem: Problem) -> bool:

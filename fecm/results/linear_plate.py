@@ -28,6 +28,11 @@ class InPlane(StrEnum):
     UNKNOWN = "unknown"  # u and v are restrained at every node, as B = 0 allows for any support
 
 
+IN_PLANE_WORDS = {
+    InPlane.HELD: "edges held in the plane",
+    InPlane.FREE: "edges free in the plane",
+    InPlane.WINDOW: "on a window on which the plate slides",
+}
 # Deflection over the thickness up to which the plate is taken as linear.
 LIMITS = {
     InPlane.HELD: 0.3,
@@ -96,12 +101,11 @@ def softness(ratio: float, in_plane: InPlane, *, preloaded: bool = False) -> str
     low, high = (round(np.interp(ratio, DEFLECTIONS, error)) for error in ERRORS[in_plane])
     more = "at least" if ratio > DEFLECTIONS[-1] else "about"
     if in_plane is InPlane.WINDOW:
-        size, edges = f"{low} %", " (on a window on which the plate slides)"
+        size = f"{low} %"
     elif in_plane is InPlane.UNKNOWN:
         size = f"{low} % (edges free in the plane) to {high} % (held)"
-        edges = ""
     else:
         size = f"{low} to {high} %"
-        edges = f" (edges {in_plane} in the plane)"
+    edges = f" ({IN_PLANE_WORDS[in_plane]})" if in_plane in IN_PLANE_WORDS else ""
     preload = f"; {PRELOADED}" if preloaded else ""
     return f"the force is {more} {size} too low at the same energy{edges}{preload}"

@@ -9,6 +9,8 @@ import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm.mechanics.mesh import rigid_deflections
+from fecm.mechanics.solutions import static_support
+from fecm.problem.static_plate import MOST_SOLVED
 from fecm.results.criteria import spelt
 from fecm.results.end import LATE, OPEN_ENDS, OPEN_PEAKS, End
 from fecm.results.exposures import (
@@ -27,6 +29,10 @@ from fecm.simulation.simulation import Simulation
 
 # Error of the energy balance, relative to the supplied energy, that triggers a warning.
 ENERGY_WARNING = 0.01
+# Share of the force above which a note says that supports pull, and least share of the static
+# deflection at the peak force at which they are taken to carry it.
+PULL = 0.1
+STATIC = 0.5
 LATER = 1.1  # peak of a later contact over that of the first, above which a note says so
 
 
@@ -60,7 +66,7 @@ def judge(simulation: Simulation, result: Result) -> Verdict:
         return Verdict(notes, "")
     if end in OPEN_ENDS:
         notes.append(OPEN_ENDS[end] + _remedy(result, end))
-    notes += [*_later_peak(result), *_late_values(result, end)]
+    notes += [*_later_peak(result), *_late_values(result, end), *_pull(simulation, result)]
     reasons = [Reason.AGAIN] if end is End.AGAIN else [Reason.OPEN] if end in OPEN_PEAKS else []
     reasons += [doubt.reason for doubt in beyond]
     peak_force = simulation.state.monitor.peak_force
@@ -106,6 +112,28 @@ def _late_values(result: Result, end: End) -> Iterator[str]:
         yield (
             f"the largest {', '.join(late)} came in the last fifth of the run, after the contact: "
             "the plate vibrates on and may exceed it; take more steps"
+        )
+
+
+def _pull(simulation: Simulation, result: Result) -> Iterator[str]:
+    """Note of supports that pull where they can only push.
+
+    The pull is computed for a static load. A light projectile is gone before its wave reaches the
+    supports: the note needs a deflection at the peak that is near to the static one.
+    """
+    problem = simulation.problem
+    contact, force = problem.contact, result["history/force"]
+    if contact is None or not force.any() or problem.deck.control.numel > MOST_SOLVED:
+        return
+    support = static_support(problem.moving_plate, contact)
+    if support is None or support.pull <= PULL:
+        return
+    peak = int(force.argmax())
+    if result["history/plate_w"][peak] * support.stiffness > STATIC * force[peak]:
+        yield (
+            f"the supports pull the plate down with {support.pull:.0%} of a static load at the "
+            "impact; a window or a ring can only push: the plate lifts off there, is softer, and "
+            "its peak force is lower"
         )
 
 
