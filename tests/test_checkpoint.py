@@ -301,6 +301,18 @@ def test_a_planted_link_leads_no_checkpoint_elsewhere(tmp_path: Path, name: str)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["run.h5", "victim"]
 
 
+def test_a_spool_without_a_checkpoint_is_gone_once_the_next_run_begins(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    with pytest.raises(StoppedError):
+        run(deck(), path, 5)
+    with hdf5_writer.writing(path, overwrite=True) as sink:
+        Checkpointer(path, sink)
+        assert spool_of(path).exists()  # its checkpoint may be resumed
+        checkpoint_of(path).unlink()
+        Checkpointer(path, sink)
+        assert not spool_of(path).exists()
+
+
 @pytest.mark.links
 def test_a_spool_that_became_a_link_is_not_followed(tmp_path: Path) -> None:
     with pytest.raises(StoppedError):

@@ -93,7 +93,9 @@ def _difference(what: str, theirs: object, own: object) -> str:
 class Checkpointer:
     """Writes and reads the checkpoints of a run, beside the final path of its result.
 
-    Rows are not kept in memory: they are read back from the result when they are spooled.
+    Rows are not kept in memory: they are read back from the result when they are spooled.  A spool
+    without a checkpoint, which a killed run has left, is removed; the lock of `sink` shows that no
+    other run is writing it.
     """
 
     def __init__(self, result: Path, sink: FileSink) -> None:
@@ -103,6 +105,8 @@ class Checkpointer:
         self._new = sink.operations = []
         self._spooled = SpoolPart()
         self._written = time.monotonic()
+        if not self._checkpoint.exists():
+            self._spool.unlink(missing_ok=True)
 
     @property
     def age(self) -> float:
