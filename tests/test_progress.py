@@ -6,6 +6,7 @@ import logging
 import re
 import sys
 import threading
+from collections.abc import Callable
 from pathlib import Path
 from queue import Queue
 from types import SimpleNamespace
@@ -85,27 +86,54 @@ def test_a_command_goes_on_without_lines_if_it_gets_no_thread(
     assert minutes.lines.empty()
 
 
-def test_a_sweep_a_search_and_a_run_in_full_say_how_far_they_are(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(common, "MINUTE", 1e-4)
+class OneMinute:
+    """An event: one minute passes, then the wait ends."""
+
+    is_over = False
+
+    def wait(self, seconds: float) -> bool:
+        """Return whether the wait has ended, in turns False and True."""
+        assert seconds == 60.0
+        self.is_over = not self.is_over
+        return not self.is_over
+
+    def set(self) -> None:
+        """End the wait, which ends in any case."""
+
+
+class AtBeginAndEnd:
+    """A thread that does its work at once: when it starts, and again when it is joined."""
+
+    ident = 1
+
+    def __init__(self, target: Callable[[], None], *, daemon: bool) -> None:
+        assert daemon
+        self.start = self.join = target
+
+
+@pytest.fixture
+def _line_at_begin_and_end(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let each block print its line when it begins and when it ends, and no thread run."""
+    monkeypatch.setattr(common, "threading", SimpleNamespace(Event=OneMinute, Thread=AtBeginAndEnd))
+
+
+@pytest.mark.usefixtures("_line_at_begin_and_end")
+def test_a_sweep_a_search_and_a_run_in_full_say_how_far_they_are(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(small())
     swept = call("sweep", "d.inp", "--vary", "k=1e6,2e6", "--full", 1, "-o", "s.h5", cwd=tmp_path)
-    assert re.search(r"^fecm: 0 of 2 done after 1 min$", swept.stderr, re.M)
+    assert re.findall(r"^fecm: (\d) of 2 done after 1 min", swept.stderr, re.M) == ["0", "2"]
     assert re.search(r"^fecm: case 1 is run in full, 1 min so far$", swept.stderr, re.M)
     find = ("--find", "velocity", "--until", "peak_force=1")
     found = call("sweep", "d.inp", *find, "-o", "f.h5", cwd=tmp_path)
-    assert re.search(r"^fecm: 0 of 1 done after 1 min$", found.stderr, re.M)
+    assert re.findall(r"^fecm: (\d) of 1 done after 1 min", found.stderr, re.M) == ["0", "1"]
 
 
-def test_a_fit_says_how_many_forces_it_has_computed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(common, "MINUTE", 1e-3)
+@pytest.mark.usefixtures("_line_at_begin_and_end")
+def test_a_fit_says_how_many_forces_it_has_computed(tmp_path: Path) -> None:
     for name in ("impact-115.inp", "measured-force.csv"):
         call("example", name, cwd=tmp_path)
     done = call("identify", "impact-115.inp", "measured-force.csv", "--free", "k", cwd=tmp_path)
-    told = re.findall(r"^fecm: (\d+) trial forces after \d+ min$", done.stderr, re.M)
+    told = re.findall(r"^fecm: (\d+) trial forces after 1 min$", done.stderr, re.M)
     numbers = list(map(int, told))
     assert numbers == sorted(numbers)
     assert numbers[0] == 0
