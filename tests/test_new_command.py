@@ -117,6 +117,41 @@ def test_a_fixtures_energy_in_millijoules_is_doubted() -> None:
     assert 0.5 * 5.5 * (deck.require(Impact).velocity / 1e3) ** 2 == pytest.approx(10.0, rel=1e-5)
 
 
+def test_a_bare_number_that_is_small_for_an_energy_is_doubted() -> None:
+    plate = (
+        *(
+            "--size",
+            "150x100",
+            "--mesh",
+            "6x4",
+            "--support",
+            "simple",
+            "--layup",
+            "[45/0/-45/90]3s",
+        ),
+        *("--ply-thickness", ".184", "--material", "IM7/8552", "--units", "mm-N-s"),
+        *("--projectile", "mass:5.5e-3", "--law", "4e4,0,0,1.5", "--duration", "1e-4"),
+    )
+    doubt = "where drop-weight tests have 1 to 10: --energy is in mJ unless it has a unit"
+    bare = new(*plate, "--energy", "10")
+    assert "note: the energy is 0.01 J, 0.0023 J per mm of thickness, " + doubt in bare.stderr
+    for meant in ("10mJ", "10J", "10000"):
+        assert "unless it has a unit" not in new(*plate, "--energy", meant).stderr
+
+
+def test_a_core_that_is_thinner_than_a_ply_is_doubted() -> None:
+    plate = (
+        *("--size", "150x100", "--mesh", "6x4", "--support", "simple", "--layup", "[0/90/K/90/0]"),
+        *("--ply-thickness", ".13", "--material", "AS4/8552", "--shear-factor", "equi"),
+        *("--projectile", "mass:2e-3", "--law", "4e4,0,0,1.5", "--duration", "1e-4"),
+        *("--velocity", "1000"),
+    )
+    typed = new(*plate, "--core", "Divinycell-H60:0.012")
+    assert "W558" in typed.stderr
+    assert "The core is 0.012 thick, less than the thinnest ply of the faces, 0.13." in typed.stderr
+    assert "W558" not in new(*plate, "--core", "Divinycell-H60:12").stderr
+
+
 # Mistakes ----------------------------------------------------------------------------------------
 
 

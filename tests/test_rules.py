@@ -339,6 +339,12 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "W466": lambda: small(
         data=MATS + DATA_CARDS.replace("    2  90.     0.053", "    2  90.     0.053    2")
     ),
+    "W558": lambda: small(
+        data=MATS
+        + DATA_CARDS.replace("    1   0.     0.053", "    1   0.     0.096").replace(
+            "    2  90.     0.053", "    2  90.     0.010    2"
+        )
+    ),
     "W500": more(MATS),
     "W497": lambda: small(
         data=MATS + DATA_CARDS.replace("    2  90.     0.053", "    2  90.     0.053    2")

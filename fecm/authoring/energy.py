@@ -13,6 +13,10 @@ from fecm.deck.unit_systems import units_of
 from fecm.deck.units import in_si, unit_of
 from fecm.problem.parts import build_projectile
 
+# Energy per thickness in J/mm below which a number without a unit is doubted.
+LEAST_ENERGY = 0.02
+ENERGY_UNITS = {1.0: "J", 1e-3: "mJ"}
+
 
 def _energy_of(deck: model.Deck) -> float:
     """Kinetic energy of the projectile."""
@@ -39,18 +43,35 @@ def energy_note(deck: model.Deck, plies: Plies, *, per_thickness: bool) -> str:
     return f"energy {said}, {speed}"
 
 
-def doubts_of_energy(deck: model.Deck, fixture: Fixture | None, plies: Plies) -> list[str]:
-    """Doubt an energy that is far below a standard's."""
-    if fixture is None or fixture.test is None:
+def doubts_of_energy(
+    deck: model.Deck, fixture: Fixture | None, plies: Plies, *, is_bare: bool
+) -> list[str]:
+    """Doubt an energy that is far below a standard's, or a bare number that is small for one.
+
+    Parameters
+    ----------
+    is_bare : bool
+        Whether the energy is asked for as a number without a unit.
+    """
+    standard = fixture.test if fixture else None
+    names = units_of(plies.system) if plies.system else {}
+    joule, length = in_si("force*length", names), in_si("length", names)
+    if joule is None or length is None or not (standard or is_bare):
         return []
-    energy = _energy_of(deck)
-    share = energy / plies.thickness
-    if share >= fixture.test.least_energy:
+    energy = _energy_of(deck) * joule
+    share = energy / (plies.thickness * length * 1e3)  # J/mm
+    least = 1e-3 * standard.least_energy if standard else LEAST_ENERGY
+    if share >= least:
         return []
+    usual = (
+        f"where {fixture.name} has {standard.energy / 1e3:g}"
+        if fixture and standard
+        else "where drop-weight tests have 1 to 10"
+    )
+    unit = ENERGY_UNITS.get(joule, unit_of("force*length", names))
     return [
-        f"the energy is {energy / 1e3:.3g} J, {share / 1e3:.2g} J per mm of thickness, "
-        f"where {fixture.name} has {fixture.test.energy / 1e3:g}: `energy` is in mJ unless it has "
-        'a unit, as in "10J"'
+        f"the energy is {energy:.3g} J, {share:.2g} J per mm of thickness, {usual}: `energy` is in "
+        f'{unit} unless it has a unit, as in "10J"'
     ]
 
 

@@ -369,7 +369,8 @@ def author(asked: Request) -> Authored:
     if motion.energy is not None:
         plain = with_energy(plain, motion.energy)
     notes.append(energy_note(plain, plies, per_thickness=asked.test is not None))
-    doubts += doubts_of_energy(plain, fixture, plies)
+    is_bare = strike.energy is not None and not str(strike.energy).strip()[-1:].isalpha()
+    doubts += doubts_of_energy(plain, fixture, plies, is_bare=is_bare)
     title = (
         default_title(asked.plate, asked.laminate, plain, plies)
         if asked.title is None

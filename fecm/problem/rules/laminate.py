@@ -10,6 +10,7 @@ import numpy as np
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.mechanics.elements import HIGHEST_ORDER
+from fecm.mechanics.laminate import SOFT_CORE
 from fecm.problem.problem import Problem
 
 THICKNESS_TOLERANCE = 1.0e-6  # difference of thicknesses that is rounding
@@ -24,6 +25,9 @@ ERRORS = (
     "stress 12 %, at 0.25 they are 22 % and 44 %; isotropic plates are closer"
 )
 LOWEST_RATIO = 0.5  # E1/E2 of a ply whose fibres are along 1
+# E1/E2 above which a ply has parallel fibres, and the least and largest NU12 of such plies.
+FIBROUS = 3.0
+LEAST_NU12, MOST_NU12 = 0.1, 0.6
 LARGEST_ANGLE = 180.0
 SHOWN_ANGLES = 8
 POISSONS_RATIO = "Poisson's ratio NU12"
@@ -206,8 +210,9 @@ def moduli_exchanged(problem: Problem) -> Reports:
 @rule(
     "W434",
     Subject.LAMINATE,
-    "NU12 is beyond 1, or as small as NU21.",
-    remedy="NU12 = NU21 E1/E2.",
+    "NU12 is beyond 1, or outside 0.1 to 0.6 in a ply with E1 > 3 E2.",
+    cause="The value may be NU21, or its decimal point is misplaced.",
+    remedy="NU12 of fibre composites is 0.2 to 0.4; NU12 = NU21 E1/E2.",
 )
 def doubtful_poissons_ratio(problem: Problem) -> Reports:
     """Find a ratio that no ply has, or that is the other one."""
@@ -216,11 +221,40 @@ def doubtful_poissons_ratio(problem: Problem) -> Reports:
         if abs(nu) > 1.0:
             message = f"Poisson's ratio NU12 = {nu:g} is beyond 1: no ply has such a value."
             yield Report(message, place, "NU12 of fibre composites is 0.2 to 0.4")
-        elif 0.0 < nu < 0.1 and ratio > 3.0 and 0.2 <= nu * ratio <= 0.45:
+        elif ratio <= FIBROUS or nu == 0.0 or LEAST_NU12 <= nu <= MOST_NU12:
+            continue
+        elif 0.0 < nu < LEAST_NU12 and 0.2 <= nu * ratio <= 0.45:
             why = f"NU12 would be NU21 E1/E2 = {nu * ratio:.3g}"
             message = f"Poisson's ratio NU12 = {nu:g} looks like NU21: {why}."
             hint = "NU12 is the contraction across the fibres under a stress along them"
             yield Report(message, place, hint)
+        else:
+            message = f"Poisson's ratio NU12 = {nu:g} is unlike that of any ply of parallel fibres."
+            yield Report(message, place, "NU12 of fibre composites is 0.2 to 0.4")
+
+
+@rule(
+    "W558",
+    Subject.LAMINATE,
+    "The core of a sandwich is thinner than its thinnest ply.",
+    cause="The thickness of the core is likely in another unit, as in 0.012 for 12 mm.",
+    remedy="The thickness of the core in the deck's unit of length.",
+)
+def thin_core(problem: Problem) -> Reports:
+    """Find a soft layer that is thinner than the plies of the faces."""
+    plies = problem.deck.plies
+    for layers in problem.deck.layers.values():
+        stiffest = max(plies[layer.material].g13 for layer in layers)
+        cores = [one for one in layers if plies[one.material].g13 < SOFT_CORE * stiffest]
+        faces = [one.thickness for one in layers if one not in cores]
+        for core in cores:
+            if core.thickness < min(faces):
+                message = (
+                    f"The core is {core.thickness:g} thick, less than the thinnest ply of the "
+                    f"faces, {min(faces):g}."
+                )
+                hint = "the thickness of a core is in the deck's unit of length, as for plies"
+                yield Report(message, core.place("layer thickness"), hint)
 
 
 @rule(
@@ -345,6 +379,7 @@ OF_LAYERS = (invalid_layer_thickness, layer_out_of_order)
 VALUES = (
     moduli_exchanged,
     doubtful_poissons_ratio,
+    thin_core,
     large_angle,
     angles_in_radians,
     impossible_thickness,
