@@ -462,8 +462,9 @@ def test_the_picture_of_energies_has_the_membrane_at_its_rows(tmp_path: Path) ->
     ax = stretched().plot("energy")
     last = ax.lines[-1]
     np.testing.assert_array_equal(last.get_ydata(), stretched().membrane.energy)
+    assert last.get_color() not in [line.get_color() for line in ax.lines[:-1]]
     picture = draw("energy", {"a": stretched(), "b": fecm.run_one(struck(steps=5))})
-    assert len(picture.figure.axes[0].lines) == 12
+    assert len(picture.figure.axes[0].lines) == 10
 
 
 def test_a_result_without_rows_of_the_membrane_has_no_line_about_it() -> None:

@@ -87,6 +87,24 @@ def test_the_sum_of_the_energies_is_what_there_was_at_first(result: Result) -> N
     assert axes.get_ylabel() == "Energy (lbf·in)"
 
 
+def test_only_a_rod_has_strain_energy_and_only_a_mass_shows_its_displacement(
+    result: Result,
+) -> None:
+    mass = run(NAMED.replace("EXPE", "PROJ\n    0    0    2.0E-4\n\nEXPE"))
+    assert "projectile, strain" in legend_of(plot(result, "energy"))
+    figure = plot(mass, "energy")
+    names = ["plate, kinetic", "plate, strain", "projectile", "indentation", "sum"]
+    assert legend_of(figure) == names
+    drawn = figure.axes[0].get_lines()
+    total = np.asarray(drawn[-1].get_ydata())
+    np.testing.assert_allclose(total, np.sum([one.get_ydata() for one in drawn[:-1]], axis=0))
+    (axes,) = plot(mass, "loop").axes
+    assert axes.get_xlabel() == "Displacement of the projectile (10⁻⁶ in)"
+    assert plot(result, "loop").axes[0].get_xlabel() == "Indentation (10⁻⁶ in)"
+    both = draw("loop", {"rod": result, "mass": mass}).figure
+    assert both.axes[0].get_xlabel() == "Indentation (10⁻⁶ in)"
+
+
 def test_results_in_different_units_share_no_axes(result: Result) -> None:
     metric = run(small(data=DATA_CARDS + "UNIT\nm N s\n"))
     with pytest.raises(PlotError, match="lbf in first and N in second"):
@@ -282,6 +300,22 @@ def test_plans_of_the_plate_draw_the_circle_of_the_patch(kind: str) -> None:
     assert np.ptp(x) == pytest.approx(0.4) == np.ptp(y)
     cross = axes.get_lines()[-2].get_data()
     assert [float(value[0]) for value in cross] == [1.5, 1.5]
+
+
+@pytest.mark.parametrize(("kind", "count"), [("line", 6), ("contour", 4)])
+def test_times_are_chosen_before_the_contact_ends_and_at_equal_distances(
+    result: Result, kind: str, count: int
+) -> None:
+    closed = run(small(program=LONG_PROGRAM.replace("330", "600")))
+    touching = closed.time[closed.force > 0.0]
+    assert touching[-1] < 0.9 * closed.time[-1]
+    figure = plot(closed, kind)
+    texts = legend_of(figure) if kind == "line" else [a.get_title("left") for a in figure.axes[:-1]]
+    shown = 1e-6 * np.array([float(text.split()[1 if kind == "contour" else 0]) for text in texts])
+    expected = touching[-1] * np.arange(1, count + 1) / (count + 1)
+    np.testing.assert_allclose(shown, expected, atol=1.01 * 5 * 0.5e-6)  # a row every 5 steps
+    texts = [a.get_title("left") for a in plot(result, "contour").axes[:-1]]
+    assert texts == ["time 2.5 µs", "time 5 µs"]  # both rows, as the contact goes on
 
 
 def test_the_animation_has_a_frame_for_each_stored_row(result: Result, tmp_path: Path) -> None:

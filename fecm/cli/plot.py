@@ -126,13 +126,14 @@ class PictureOptions:
     "--time",
     "times",
     type=list_of("T,T,...", Finite()),
-    help="Times, in the deck's unit; the nearest stored rows are drawn.",
+    help="Times, in the deck's unit; the nearest stored rows are drawn.  [default: some during "
+    "the contact; of surface the largest deflection]",
 )
 @option(
     "--against",
     type=click.Choice(["indentation", "deflection", "displacement"]),
     help="Horizontal axis of loop: indentation, displacement of the plate under the load, or "
-    "of the projectile (the sum).  [default: indentation]",
+    "of the projectile (the sum).  [default: displacement of a rigid mass, indentation of others]",
 )
 @option(
     "--overlay",

@@ -106,15 +106,30 @@ def impact_point(result: Result, name: str) -> Floats:
 
 
 def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -> Indices:
-    """Rows of tape3 nearest to the given times; by default `count` rows at equal distances."""
+    """Rows of tape3 nearest to the given times; by default `count` rows at equal distances.
+
+    If the contact ends within the run, these lie before its end.
+    """
     (stored,) = require(result, name, "tape3/time")
     if not times:
-        count = min(count, len(stored))
-        return (np.arange(1, count + 1) / count * len(stored)).round().astype(np.intp) - 1
+        end = contact_end(result)
+        rows = int(np.searchsorted(stored, end)) or len(stored)
+        if rows <= count:
+            return np.arange(rows)
+        parts = count if end == np.inf else count + 1
+        return (np.arange(1, count + 1) / parts * rows).round().astype(np.intp) - 1
     try:
         return rows_at(stored, times, "displacements")
     except NotStoredError as error:
         raise PlotError(f"{name} has {error}") from None
+
+
+def contact_end(result: Result) -> float:
+    """Time at which the last contact ends, (time); infinite if it does not, or without impact."""
+    if "history/force" not in result or result.still_in_contact:
+        return np.inf
+    touching = result["history/time"][result["history/force"] > 0.0]
+    return float(touching[-1]) if len(touching) else np.inf
 
 
 @frozen

@@ -206,13 +206,16 @@ def _thresholds(results: Results) -> dict[str, float]:
     return values
 
 
-def loop(results: Results, *, against: Against = "indentation", width: Width = "column") -> Picture:
+def loop(results: Results, *, against: Against | None = None, width: Width = "column") -> Picture:
     """Contact force against indentation or displacement, beginning at rest.
 
     ``"deflection"`` is the displacement of the plate under the load, ``"displacement"`` that of the
-    projectile's impacted end towards the plate, in contact the sum of both others.
+    projectile's impacted end towards the plate, in contact the sum of both others.  The default is
+    the displacement if every projectile is a rigid mass, else the indentation.
     """
     style.limit_count(len(results), "loops")
+    if against is None:
+        against = "displacement" if all(map(_is_rigid, results.values())) else "indentation"
     if against not in AGAINST:
         raise PlotError(f"unknown against {against}; a loop is drawn against {', '.join(AGAINST)}")
     column, sign, label = AGAINST[against]
@@ -244,6 +247,9 @@ def energy(results: Results, *, width: Width = "column") -> Picture:
     energies = dict(ENERGIES)
     if not all("energy/damping_work" in result for result in results.values()):
         del energies["damping_work"]
+    if all(map(_is_rigid, results.values())):
+        del energies["projectile_strain"]
+        energies["projectile_kinetic"] = "projectile"
     paths = ("energy/time", *(f"energy/{column}" for column in energies))
     drawn = {name: data.require(result, name, *paths) for name, result in results.items()}
     times = [columns[0] for columns in drawn.values()]
@@ -251,7 +257,7 @@ def energy(results: Results, *, width: Width = "column") -> Picture:
     parts = [values for columns in drawn.values() for values in columns[1:]]
     work = style.scale_of(results, "force*length", parts)
     figure, (axes,) = style.panels(width, tall=1.1)
-    shades = [*style.colours()[: len(energies)], "0.5"]
+    shades = [style.colours()[list(ENERGIES).index(column)] for column in energies] + ["0.5"]
     for (time, *columns), look in zip(drawn.values(), style.STYLES, strict=False):
         for values, colour in zip((*columns, np.sum(columns, axis=0)), shades, strict=True):
             axes.plot(time, values, color=colour, ls=look)
@@ -264,18 +270,25 @@ def energy(results: Results, *, width: Width = "column") -> Picture:
     if len(drawn) > 1:
         handles += [Line2D([], [], color="0.3", ls=look) for look in style.STYLES[: len(drawn)]]
         labels += list(drawn)
-    elif points := _membrane(axes, results, shades[1]):
+    elif points := _membrane(axes, results):
         handles.append(points)
         labels.append("plate, membrane")
     style.legend(figure, handles, labels)
     return Picture(figure)
 
 
-def _membrane(axes: Axes, results: Results, colour: str) -> Line2D | None:
+def _is_rigid(result: Result) -> bool:
+    """Whether the projectile is a rigid mass, which has no strain energy."""
+    path = "energy/projectile_strain"
+    return path in result and not result[path].any()
+
+
+def _membrane(axes: Axes, results: Results) -> Line2D | None:
     """Draw the membrane's part of the strain energy at its rows; None where it is not stored."""
     ((name, result),) = results.items()
     if "membrane/energy" not in result:
         return None
     time, values = data.require(result, name, "membrane/time", "membrane/energy")
+    colour = style.colours()[len(ENERGIES)]
     (points,) = axes.plot(time, values, color=colour, ls="none", marker=".", ms=3.0)
     return points

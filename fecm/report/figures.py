@@ -65,7 +65,7 @@ def of_runs(results: Mapping[str, Result]) -> Iterator[Block]:
     """Histories of one or more runs in the same pictures."""
     histories: tuple[tuple[Kind, str, dict[str, Any]], ...] = (
         (Kind.FORCE, "Contact force against time.", {}),
-        (Kind.LOOP, "Contact force against indentation.", {}),
+        (Kind.LOOP, "Contact force against indentation.", {"against": "indentation"}),
         (
             Kind.LOOP,
             "Contact force against the displacement of the projectile.",
