@@ -68,8 +68,6 @@ MISTAKES: dict[str, tuple[Edit, str, str]] = {  # change, code, and what the tex
     "ALLO without FAIL": (replaced(r"^FAIL .*\n", ""), "W471", "no exposure is computed"),
     "PATC with a blank field": (
         with_card("PATC", "DISC,,1.,50.,50."), "W474", "the card is `DISC,1.,50.,50.`"),
-    "NU12 with a slip of the decimal point": (
-        replaced(r"^(   1.57E-9      )0.32", r"\g<1> 3.2"), "W434", "beyond 1"),
     "NU12 a tenth": (
         replaced(r"^(   1.57E-9      )0.32", r"\g<1>.008"), "W434", "unlike that of any ply"),
     "patch away from ROD's node": (
