@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,8 +14,20 @@ from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.layup import parse_plies
-from fecm.deck.model import Allowables, Cure, Delamination, Indentation, Material, Zones
+from fecm.deck.model import (
+    Allowables,
+    Cure,
+    Delamination,
+    Expansion,
+    Indentation,
+    Material,
+    Ply,
+    Preload,
+    Zones,
+)
+from fecm.deck.segment import Segment
 from fecm.problem.plate_mesh import plate_mesh
+from fecm.results.criteria import is_isotropic
 from fecm.results.exposures import largest_exposures
 from tests.calls import Done, call
 
@@ -307,3 +320,118 @@ def test_a_sandwich_has_no_delamination_threshold() -> None:
     assert problem.threshold is None
     with pytest.raises(fecm.FecmError, match="a plate without a core"):
         fecm.sweep(with_threshold, {"k": [5e4]}, until="threshold")
+
+
+METAL = MATERIALS["2024-T3"].ply
+GLARE = (
+    "--layup", "[0M/0G/0M]", "--material", "M=2024-T3", "--material", "G=E-glass/MY750",
+    "--ply-thickness", "M=.4", "--ply-thickness", "G=.25", "--units", "mm-N-s", "--damage",
+)  # fmt: skip
+
+
+def test_a_metal_yields_and_a_ply_is_named_with_its_material() -> None:
+    result = fecm.run_one(deck_of(*GLARE))
+    materials = {1: "2024-T3", 2: "E-glass/MY750", 3: "2024-T3"}
+    plies = [one for one in largest_exposures(result) if one.criterion != "interlaminar"]
+    assert len(plies) == 4
+    for one in plies:
+        assert one.materials == (materials[one.ply],)
+        assert (one.mode == "yield") == (one.ply != 2)
+        assert one.where == f"ply {one.ply} ({materials[one.ply]})"
+    (between,) = [one for one in largest_exposures(result) if one.criterion == "interlaminar"]
+    assert between.mode == "interlaminar shear"
+    assert between.materials == (materials[between.ply], materials[between.ply + 1])
+
+
+def test_plies_of_glass_keep_the_modes_of_fibre_and_matrix() -> None:
+    deck = deck_of(*GLARE)
+    card = deck.require(Allowables)
+    strong = replace(card, xt=1e6, xc=1e6, yt=1e6, yc=1e6, s12=1e6)
+    segments = tuple(strong if one is card else one for one in deck.segments)
+    result = fecm.run_one(replace(deck, segments=segments, text=""))
+    (one,) = [one for one in largest_exposures(result) if one.criterion == "max_stress"]
+    assert (one.ply, one.materials) == (2, ("E-glass/MY750",))
+    assert one.mode in {"matrix tension", "matrix compression", "fibre tension", "shear"}
+
+
+def test_summary_json_page_and_picture_name_the_metal_that_yields(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    soft = new(*LAW, *GLARE).stdout.replace("345.0", " 34.5").replace("199.0", " 19.9")
+    (tmp_path / "g.inp").write_text(soft)
+    done = call("run", "g.inp", cwd=tmp_path)
+    first = fecm.load(tmp_path / "g.h5").first_failures[0]
+    assert (first.mode, first.materials) == ("yield", ("2024-T3",))
+    lines = [line.strip() for line in done.stdout.splitlines()]
+    (line,) = (line for line in lines if line.startswith("first failure"))
+    place = f"ply {first.ply} (2024-T3)"
+    assert f"yield ({first.criterion.replace('_', ' ')}), {place} at " in line
+    given = json.loads(call("info", "g.h5", "--format", "json", cwd=tmp_path).stdout)
+    failure = given.get("run", given)["metrics"]["failure"]["first"][0]
+    assert (failure["mode"], failure["materials"]) == ("yield", ["2024-T3"])
+    call("report", "g.h5", "-o", "g.html", cwd=tmp_path)
+    page = (tmp_path / "g.html").read_text()
+    assert f"yield ({first.criterion.replace('_', ' ')}), {place}" in page
+    assert "1: 2024-T3" in page
+    call("plot", "g.h5", "--kind", "failure", "-o", "g.svg", cwd=tmp_path)
+    picture = (tmp_path / "g.svg").read_text()
+    assert ": yield," in picture
+    assert "(2024-T3)" in picture
+
+
+def test_the_material_of_a_ply_is_that_of_the_laminate_where_it_is() -> None:
+    deck = deck_of(*GLARE[:-1], "--layup", "[0G/0G/0G]", "--zone", "10,10,30,20:[0M/0G/0M]",
+                   "--damage")  # fmt: skip
+    found = {one.criterion: one for one in largest_exposures(fecm.run_one(deck))}
+    one = found["max_stress"]
+    is_inside = 10.0 < one.x < 30.0 and 10.0 < one.y < 20.0
+    assert one.materials == (("2024-T3" if is_inside and one.ply != 2 else "E-glass/MY750"),)
+
+
+def test_a_plate_of_one_metal_yields_and_needs_no_name() -> None:
+    deck = deck_of("--layup", "[0]", "--material", "2024-T3", "--ply-thickness", "2",
+                   "--units", "mm-N-s", "--damage")  # fmt: skip
+    exposures = largest_exposures(fecm.run_one(deck))
+    assert {(one.mode, one.where) for one in exposures} == {("yield", "ply 1")}
+
+
+@pytest.mark.parametrize("name", MATERIALS)
+def test_metals_and_foams_alone_are_isotropic(name: str) -> None:
+    deck = deck_of("--layup", "[0]", "--material", name, "--ply-thickness", "2", "--units",
+                   "mm-N-s")  # fmt: skip
+    assert is_isotropic(deck, 1) == (name in {"2024-T3", "Divinycell-H60"})
+
+
+@pytest.mark.parametrize(
+    ("ply", "expected"),
+    [
+        (METAL, True),
+        (replace(METAL, e2=75e3), False),
+        (replace(METAL, g12=6.5e3), False),  # a fabric whose moduli along and across are the same
+        (replace(METAL, g23=6.5e3), False),
+    ],
+)
+def test_a_fabric_with_equal_moduli_is_not_isotropic(ply: Ply, expected: bool) -> None:
+    deck = deck_of("--layup", "[0]", "--material", "2024-T3", "--ply-thickness", "2", "--units",
+                   "mm-N-s")  # fmt: skip
+    card = deck.require(Material)
+    other = replace(card, ply=ply)
+    segments = tuple(other if one is card else one for one in deck.segments)
+    assert is_isotropic(replace(deck, segments=segments), 1) is expected
+
+
+@pytest.mark.parametrize(
+    ("segment", "code"),
+    [(Preload(5000.0), "W489"), (Cure(-1500.0, expansions=(
+        Expansion(1, 23.2e-6, 23.2e-6), Expansion(2, 8.6e-6, 26.4e-6),
+    )), "W463")],
+)  # fmt: skip
+def test_findings_of_stresses_at_rest_name_the_metal_that_yields(
+    segment: Segment, code: str
+) -> None:
+    deck = deck_of(*GLARE)
+    weak = replace(deck.require(Allowables), xt=1.0, xc=1.0, yt=1.0, yc=1.0, s12=0.58)
+    segments = [weak if isinstance(one, Allowables) else one for one in deck.segments]
+    own = replace(deck, segments=(*segments, segment), text="")
+    (finding,) = [one for one in load_deck(own).findings if one.code == code]
+    assert "yield" in finding.message
+    assert "(2024-T3)" in finding.message

@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from importlib import resources
 from pathlib import Path
 
@@ -225,6 +226,24 @@ def _text(file: str) -> str:
 
 
 MATERIALS = read_plies(_text("materials.toml"))
+
+
+def named_ply(ply: Ply, system: str | None) -> NamedPly | None:
+    """The named ply that has these constants in a system of units; None if there is none."""
+    return None if system is None else _by_constants(system).get(ply)
+
+
+@cache
+def _by_constants(system: str) -> dict[Ply, NamedPly]:
+    """Named plies by their constants; the first one of equals."""
+    return {named.converted(system): named for named in reversed(MATERIALS.values())}
+
+
+def material_names(deck: Deck) -> dict[int, str]:
+    """Names of the materials of a deck, by number: those of named plies with the same constants."""
+    system = system_of(deck)
+    named = {number: named_ply(ply, system) for number, ply in deck.plies.items()}
+    return {n: f"material {n}" if one is None else one.name for n, one in named.items()}
 
 
 def materials(file: str | Path | None = None) -> dict[str, NamedPly]:

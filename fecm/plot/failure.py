@@ -24,6 +24,7 @@ from fecm.plot.data import deck_of, mesh_of, require
 from fecm.plot.kinds import Picture, PlotError, Width
 from fecm.plot.plate import aspect, mark_impact
 from fecm.problem.parts import rules
+from fecm.results.criteria import spelt
 from fecm.results.exposures import LargestExposure, largest_exposures
 from fecm.results.plies import places
 from fecm.results.result import Result
@@ -83,9 +84,8 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: Width =
     mark_impact(plate, result, name)
     worst = found.worst
     plate.plot(worst.x, worst.y, clip_on=False, **LARGEST)
-    title = (
-        f"{worst.exposure:.4g} ({worst.criterion.replace('_', ' ')}): {worst.mode}, {worst.plies}"
-    )
+    title = f"{worst.exposure:.4g} ({spelt(worst.criterion)}): {worst.mode},"
+    title += f"\n{worst.plies}" if worst.materials else f" {worst.plies}"
     if result.still_in_contact:
         title += "\nstill in contact at the end: exposures may grow"
     plate.set_title(title, loc="left")

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm.deck import model
+from fecm.deck.catalogue import material_names
 from fecm.deck.layup import layup_text
 from fecm.deck.macros import flat
 from fecm.deck.units import (
@@ -52,8 +53,7 @@ def of_problem(result: Result, problem: Problem) -> Iterator[Block]:
         layup = layup_text([layer.angle for layer in layers])
         name = f"Laminate {number_of}: {layup}" if len(deck.layers) > 1 else f"Laminate {layup}"
         words = f"{name}, {len(layers)} plies, the struck face on top."
-        names = {material: f"material {material}" for material in deck.plies}
-        yield Picture(inside(stack(layers, names)), words, words)
+        yield Picture(inside(stack(layers, material_names(deck))), words, words)
     yield from _materials(deck)
     yield from table(_impact(result, deck), caption="Projectile and contact")
     yield from table(_program(problem), caption="Program")
@@ -109,7 +109,8 @@ def _rounded(matrix: np.ndarray) -> np.ndarray:
 def _materials(deck: model.Deck) -> Iterator[Block]:
     """Constants and strengths of the plies of every material."""
     plies = dict(sorted(deck.plies.items()))
-    header = ["constant", *(f"material {number}" for number in plies)]
+    names = _headings(deck)
+    header = ["constant", *(names[number] for number in plies)]
     if len(plies) == 1:
         header = ["constant", "ply"]
     rows = [
@@ -120,7 +121,7 @@ def _materials(deck: model.Deck) -> Iterator[Block]:
     if (strengths := deck.last(model.Allowables)) is None:
         return
     given = {one.material: one for one in (strengths, *strengths.others)}
-    header = ["strength", *(f"material {number}" for number in given)]
+    header = ["strength", *(names[number] for number in given)]
     if len(given) == 1:
         header = ["strength", "ply"]
     rows = [
@@ -128,6 +129,13 @@ def _materials(deck: model.Deck) -> Iterator[Block]:
         for name in STRENGTHS
     ]
     yield from table(rows, header, "Ply strengths")
+
+
+def _headings(deck: model.Deck) -> dict[int, str]:
+    """Numbers and names of the materials, by number."""
+    names = {number: f"material {number}" for number in deck.plies}
+    named = material_names(deck)
+    return {n: name if named[n] == name else f"{n}: {named[n]}" for n, name in names.items()}
 
 
 class Impactor(NamedTuple):

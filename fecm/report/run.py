@@ -33,7 +33,7 @@ from fecm.report.content import (
 )
 from fecm.report.model import extent, impactor, of_problem
 from fecm.report.trust import judgements, problem_of
-from fecm.results.criteria import spelt, where
+from fecm.results.criteria import spelt
 from fecm.results.exposures import Failure, largest_exposures, verdict
 from fecm.results.first_failure import first_failures, threshold_energy
 from fecm.results.metrics import INTEGERS, METRICS
@@ -320,7 +320,7 @@ def _criteria(result: Result) -> list[Block]:
                 spelt(one.criterion),
                 number(one.exposure),
                 one.mode,
-                where(one.criterion, one.ply),
+                one.where,
                 number(one.x, length),
                 number(one.y, length),
                 number(one.time, time),

@@ -1,14 +1,20 @@
-"""Failure criteria of a result, and the plies or interfaces that they belong to, in words."""
+"""Failure criteria, modes and the plies or interfaces that they belong to, in words."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fecm.mechanics.failure import CRITERIA
+from fecm.deck.catalogue import material_names
+from fecm.deck.model import Allowables, Deck
+from fecm.mechanics.failure import CRITERIA, PlyExposure
 
 INTERLAMINAR = "interlaminar"  # criterion of the interfaces; the others belong to plies
 ALL_CRITERIA = (*CRITERIA, INTERLAMINAR)
+YIELD = "yield"  # mode of all criteria of plies in an isotropic material
+# Largest relative difference of a shear modulus from E/(2 (1 + nu)) of an isotropic material, as
+# moduli are measured: 2 % in a named metal and 25 % in a named foam; more than half in fabrics.
+SHEAR_SHARE = 0.3
 
 
 OWN_CRITERIA = "own_criteria"  # attribute of failure: names of users' criteria of the plies
@@ -25,13 +31,65 @@ def spelt(criterion: str) -> str:
     return criterion.replace("_", " ")
 
 
-def where(criterion: str, ply: int) -> str:
-    """A ply, or of the interlaminar criterion an interface, in words."""
-    if criterion == INTERLAMINAR:
-        return f"interface of plies {ply} and {ply + 1}"
-    return f"ply {ply}"
+def where(criterion: str, ply: int, materials: Sequence[str] = ()) -> str:
+    """A ply, or of the interlaminar criterion an interface, in words.
+
+    Examples
+    --------
+    >>> where("puck", 3), where("puck", 3, ["2024-T3"])
+    ('ply 3', 'ply 3 (2024-T3)')
+    >>> where("interlaminar", 3, ["2024-T3", "E-glass/MY750"])
+    'interface of plies 3 (2024-T3) and 4 (E-glass/MY750)'
+    """
+    words = plies_of(criterion, ply, materials)
+    return f"interface of {words}" if criterion == INTERLAMINAR else words
 
 
-def plies_of(criterion: str, ply: int) -> str:
+def plies_of(criterion: str, ply: int, materials: Sequence[str] = ()) -> str:
     """The ply, or the plies of the interface, in words."""
-    return f"plies {ply} and {ply + 1}" if criterion == INTERLAMINAR else f"ply {ply}"
+    numbers = [ply, ply + 1] if criterion == INTERLAMINAR else [ply]
+    names = [f" ({name})" for name in materials] or [""] * len(numbers)
+    texts = [f"{number}{name}" for number, name in zip(numbers, names, strict=True)]
+    return f"{'ply' if len(texts) == 1 else 'plies'} {' and '.join(texts)}"
+
+
+def materials_at(deck: Deck, laminate: int, criterion: str, ply: int) -> tuple[str, ...]:
+    """Names of the materials of a ply, or of the plies of an interface, of a numbered laminate.
+
+    Empty if all plies of the deck have the same material, or the laminate has no such ply.
+    """
+    layers = deck.layers.get(laminate, ())
+    count = 2 if criterion == INTERLAMINAR else 1
+    numbers = [layer.material for layer in layers[ply - 1 : ply - 1 + count]]
+    used = {layer.material for layers in deck.layers.values() for layer in layers}
+    if len(used) < 2 or len(numbers) < count:
+        return ()
+    names = material_names(deck)
+    return tuple(names.get(number, f"material {number}") for number in numbers)
+
+
+def mode_at(deck: Deck, laminate: int, criterion: str, ply: int, mode: str) -> str:
+    """Name of a mode in a ply of a numbered laminate: :data:`YIELD` in an isotropic material."""
+    layer = next(iter(deck.layers.get(laminate, ())[ply - 1 : ply]), None)
+    if criterion in CRITERIA and layer is not None and is_isotropic(deck, layer.material):
+        return YIELD
+    return mode
+
+
+def exposed(deck: Deck, laminate: int, one: PlyExposure) -> str:
+    """Mode, criterion and ply of an exposure in a numbered laminate, in words."""
+    mode = mode_at(deck, laminate, one.criterion, one.ply, one.mode)
+    materials = materials_at(deck, laminate, one.criterion, one.ply)
+    return f"{mode}, {spelt(one.criterion)}, {where(one.criterion, one.ply, materials)}"
+
+
+def is_isotropic(deck: Deck, material: int) -> bool:
+    """Whether a material has the same constants and strengths in all directions."""
+    if (ply := deck.plies.get(material)) is None or ply.e1 != ply.e2:
+        return False
+    shear = ply.e1 / (2.0 * (1.0 + ply.nu12))
+    if any(abs(one - shear) > SHEAR_SHARE * shear for one in (ply.g12, ply.g13, ply.g23)):
+        return False
+    card = deck.last(Allowables)
+    given = None if card is None else card.of(material)
+    return given is None or (given.xt, given.xc) == (given.yt, given.yc)

@@ -10,7 +10,15 @@ import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm._typing import Array
-from fecm.results.criteria import INTERLAMINAR, criteria_of, plies_of
+from fecm.deck.material_cards import MATERIAL
+from fecm.results.criteria import (
+    INTERLAMINAR,
+    criteria_of,
+    materials_at,
+    mode_at,
+    plies_of,
+    where,
+)
 from fecm.results.errors import ResultFileError
 from fecm.results.stored import Stored
 
@@ -48,11 +56,18 @@ class LargestExposure:
     at_rest: float | None = None  # largest exposure of the residual stresses alone
     # Factor on all other stresses at the place at which the exposure is 1.
     load_factor: float | None = None
+    # Names of the material of the ply, or of both plies; empty if all plies are of one.
+    materials: tuple[str, ...] = ()
 
     @property
     def plies(self) -> str:
         """The ply, or the plies of the interface, in words."""
-        return plies_of(self.criterion, self.ply)
+        return plies_of(self.criterion, self.ply, self.materials)
+
+    @property
+    def where(self) -> str:
+        """The ply, or the interface, in words."""
+        return where(self.criterion, self.ply, self.materials)
 
     @property
     def is_open(self) -> bool:
@@ -177,10 +192,11 @@ def _largest(
     band = None
     if isinstance(coarseness, float):
         band = mesh_band(exposure, criterion, coarseness)
+    mode, materials = of_material(stored, criterion, ply, (x, y), modes[code])
     return LargestExposure(
         criterion,
         exposure=exposure,
-        mode=modes[code],
+        mode=mode,
         ply=ply,
         x=x,
         y=y,
@@ -189,7 +205,34 @@ def _largest(
         band=band,
         at_rest=_number(about.get(AT_REST)),
         load_factor=_number(about.get(LOAD_FACTOR)),
+        materials=materials,
     )
+
+
+def of_material(
+    stored: Stored, criterion: str, ply: int, place: tuple[float, float], mode: str
+) -> tuple[str, tuple[str, ...]]:
+    """Name of a mode in a ply at a place, and the materials of the ply or of the interface.
+
+    The mode remains as it is, without materials, if the result's deck does not have the ply.
+    """
+    try:
+        deck, laminate = stored.deck, _laminate_at(stored, place)
+        return (
+            mode_at(deck, laminate, criterion, ply, mode),
+            materials_at(deck, laminate, criterion, ply),
+        )
+    except (ResultFileError, LookupError):
+        return mode, ()
+
+
+def _laminate_at(stored: Stored, place: tuple[float, float]) -> int:
+    """Number of the laminate of the element whose points are nearest to a place."""
+    if "mesh/laminate" not in stored:
+        return MATERIAL
+    x, y = stored["failure/x"], stored["failure/y"]
+    element = int(np.hypot(x - place[0], y - place[1]).argmin()) // x.shape[1]
+    return int(stored["mesh/laminate"][element])
 
 
 def _number(value: object) -> float | None:

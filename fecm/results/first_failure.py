@@ -11,7 +11,7 @@ import numpy as np
 from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.results.criteria import criteria_of, where
-from fecm.results.exposures import AT_REST, LOAD_FACTOR, evaluations_in_contact
+from fecm.results.exposures import AT_REST, LOAD_FACTOR, evaluations_in_contact, of_material
 from fecm.results.stored import Stored
 
 NEEDED = tuple(f"exposures/{name}" for name in ("time", "exposure", "mode", "ply", "x", "y"))
@@ -40,11 +40,13 @@ class FirstFailure:
     # Work of the contact force so far on plate and indentation: what the projectile has given up of
     # its kinetic energy (force*length); NaN without impact.
     energy: float
+    # Names of the material of the ply, or of both plies; empty if all plies are of one.
+    materials: tuple[str, ...] = ()
 
     @property
     def where(self) -> str:
         """The ply, or the interface, in words."""
-        return where(self.criterion, self.ply)
+        return where(self.criterion, self.ply, self.materials)
 
 
 def first_failures(stored: Stored, level: float = 1.0) -> list[FirstFailure]:
@@ -72,10 +74,11 @@ def first_failures(stored: Stored, level: float = 1.0) -> list[FirstFailure]:
         mode, ply, x, y = (
             stored[f"exposures/{name}"][row, number].item() for name in ("mode", "ply", "x", "y")
         )
+        name, materials = of_material(stored, criterion, ply, (x, y), modes.get(mode, "unknown"))
         found.append(
             FirstFailure(
                 criterion,
-                mode=modes.get(mode, "unknown"),
+                mode=name,
                 ply=ply,
                 x=x,
                 y=y,
@@ -84,6 +87,7 @@ def first_failures(stored: Stored, level: float = 1.0) -> list[FirstFailure]:
                 latest=float(times[row]),
                 force=float(np.interp(time, history.time, history.force)),
                 energy=float(np.interp(time, history.time, history.work)),
+                materials=materials,
             )
         )
     return sorted(found, key=lambda one: one.time)

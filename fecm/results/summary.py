@@ -11,7 +11,7 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.deck.units import quantity as shown_quantity
 from fecm.deck.units import unit_of
-from fecm.results.criteria import spelt, where
+from fecm.results.criteria import spelt
 from fecm.results.end import End
 from fecm.results.exposures import (
     Failure,
@@ -206,7 +206,7 @@ def _exposure(result: Stored, largest: LargestExposure) -> str:
     return _line(
         spelt(largest.criterion),
         f"{least}{largest.exposure:.4g}: {largest.mode}, "
-        f"{where(largest.criterion, largest.ply)} at ({largest.x:.6g}, {largest.y:.6g}), "
+        f"{largest.where} at ({largest.x:.6g}, {largest.y:.6g}), "
         f"time {_quantity(result, largest.time, 'time')}{_mirrors(largest)}{_band(largest)}",
     )
 

@@ -21,7 +21,7 @@ from fecm.authoring.mesh import Membrane, placed, supported
 from fecm.authoring.parameters import ObjectError, check_kind
 from fecm.authoring.plate import Plate
 from fecm.deck import model
-from fecm.deck.catalogue import MATERIALS, STANDARD, NamedPly, system_of
+from fecm.deck.catalogue import STANDARD, named_ply, system_of
 from fecm.deck.material_cards import MATERIAL
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.parts import is_coupled, is_curved
@@ -178,12 +178,5 @@ def plies_of_deck(deck: model.Deck) -> Plies:
     first = plies[MATERIAL]
     numbers = range(MATERIAL, max(plies) + 1)
     materials = [plies.get(number, first) for number in numbers]
-    bound = tuple(Bound(ply, _name_of(ply, system)) for ply in materials)
+    bound = tuple(Bound(ply, named_ply(ply, system)) for ply in materials)
     return Plies(tuple(deck.layers.values()), bound, system)
-
-
-def _name_of(ply: model.Ply, system: str | None) -> NamedPly | None:
-    """The named ply that has these constants in a system of units."""
-    if system is None:
-        return None
-    return next((named for named in MATERIALS.values() if named.converted(system) == ply), None)

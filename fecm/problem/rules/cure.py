@@ -14,7 +14,7 @@ from fecm.mechanics.failure import largest_in_plies
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
 from fecm.problem.rules.damage import FIBROUS
-from fecm.results.criteria import spelt
+from fecm.results.criteria import exposed
 
 LARGEST_BETA = 0.1  # strain per per cent of weight
 LARGEST_CHANGE = 500.0  # K
@@ -142,14 +142,15 @@ def cracks_at_rest(problem: Problem) -> Reports:
     if not problem.deck.has(model.Allowables) or card is None or residuals is None:
         return
     strengths = strengths_of_deck(problem.deck)
+    laminates = list(problem.deck.layers)
     exposures = [
-        one
+        (one, laminates[number])
         for number in problem.used_laminates
         for one in largest_in_plies(strengths[number], residuals[number].stresses)
     ]
-    worst = max(exposures, key=lambda one: one.exposure, default=None)
+    worst, laminate = max(exposures, key=lambda pair: pair[0].exposure, default=(None, 0))
     if worst is not None and worst.exposure >= 1.0:
-        where = f"{worst.mode}, {spelt(worst.criterion)}, ply {worst.ply}"
+        where = exposed(problem.deck, laminate, worst)
         message = (
             f"The laminate cracks before any load: the residual stresses of CURE reach exposure "
             f"{worst.exposure:.3g} ({where})."

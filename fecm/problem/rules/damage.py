@@ -16,7 +16,7 @@ from fecm.mechanics.ply_stresses import uniform_stresses
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
 from fecm.problem.rules.units import USED, has_real_moduli, likely_unit, looks_like, needed_unit
-from fecm.results.criteria import spelt
+from fecm.results.criteria import exposed
 
 # Strengths over the modulus of their direction.  Annealed glass has 1e-4, soft matrices 0.1.
 WEAKEST = 5e-5
@@ -388,16 +388,17 @@ def preload_beyond_strength(problem: Problem) -> Reports:
     if not problem.deck.has(model.Allowables) or card is None:
         return
     strengths, strain = strengths_of_deck(problem.deck), problem.plate.preload_strain
+    laminates = list(problem.deck.layers)
     exposures = [
-        one
+        (one, laminates[number])
         for number in problem.used_laminates
         for one in largest_in_plies(
             strengths[number], uniform_stresses(problem.plate.laminates[number], strain)
         )
     ]
-    worst = max(exposures, key=lambda one: one.exposure, default=None)
+    worst, laminate = max(exposures, key=lambda pair: pair[0].exposure, default=(None, 0))
     if worst is not None and worst.exposure >= 1.0:
-        what = f"{worst.mode}, {spelt(worst.criterion)}, ply {worst.ply}"
+        what = exposed(problem.deck, laminate, worst)
         message = f"The preload alone reaches exposure {worst.exposure:.3g} ({what})."
         yield Report(message, card.place(), "PREL is a force per length, tension positive")
 
