@@ -141,6 +141,7 @@ def test_findings_as_sarif_are_valid_and_have_their_place(folder: Path) -> None:
     assert place["region"]["snippet"]["text"] == line
     columns = slice(place["region"]["startColumn"] - 1, place["region"]["endColumn"] - 1)
     assert line[columns].strip() == "1l5.0"
+    assert first["message"]["text"].endswith("Hint: it has a letter in place of a digit.")
     uris = {
         r["locations"][0]["physicalLocation"]["artifactLocation"]["uri"] for r in run["results"][1:]
     }
@@ -151,6 +152,13 @@ def test_findings_as_sarif_are_valid_and_have_their_place(folder: Path) -> None:
     broken = call("check", "sound.inp", "/dev/null", "--format", "sarif")
     Draft202012Validator(schema).validate(json.loads(broken.stdout))
     assert_unusable(call("check", "sound.inp", "--mesh-error", "--format", "sarif"))
+
+
+def test_a_hint_that_is_a_question_has_no_full_stop_in_sarif(folder: Path) -> None:
+    Path("wrong.inp").write_text(small().replace("EXPE", "EXPR"))
+    (run,) = json.loads(call("check", "wrong.inp", "--format", "sarif").stdout)["runs"]
+    texts = [result["message"]["text"] for result in run["results"]]
+    assert "`EXPR` is not a keyword here. Hint: did you mean EXPE?" in texts
 
 
 def test_outputs_of_check_run_info_and_diff_are_as_their_schemas_say(folder: Path) -> None:
@@ -193,24 +201,60 @@ FECM = f'exec "{sys.executable}" -m fecm "$@"'
 def shell_step(
     number: int, folder: Path, *, program: str = FECM, **inputs: str
 ) -> subprocess.CompletedProcess[str]:
-    """Run a shell step of the action as a runner does, with `program` as ``fecm`` on the path."""
+    """Run a shell step of the action as a runner does, with `program` as ``fecm`` of its venv."""
     steps = [
         s for s in yaml.safe_load((ROOT / "action.yml").read_text())["runs"]["steps"] if "run" in s
     ]
-    tool = folder / "bin" / "fecm"
-    tool.parent.mkdir(exist_ok=True)
+    tool = folder / "fecm-venv" / "bin" / "fecm"
+    tool.parent.mkdir(parents=True, exist_ok=True)
     tool.write_text(f"#!/bin/sh\n{program}\n")
     tool.chmod(0o755)
-    path = {"PATH": f"{tool.parent}:{os.environ['PATH']}", "RUNNER_TEMP": str(folder)}
+    (tool.parent / "activate").write_text(f'PATH="{tool.parent}:$PATH"\n')
     assert inputs.keys() == steps[number]["env"].keys()
     return subprocess.run(
         ["bash", "-e", "-o", "pipefail", "-c", steps[number]["run"]],
         cwd=folder,
         text=True,
-        env=os.environ | path | inputs,
+        env=os.environ | {"RUNNER_TEMP": str(folder)} | inputs,
         capture_output=True,
         check=False,
     )
+
+
+def commands_in(log: str) -> list[str]:
+    """Workflow commands of a log that a runner would obey."""
+    obeyed, token = [], ""
+    for line in log.splitlines():
+        stop = re.fullmatch("::stop-commands::([0-9a-f]{32})", line)
+        if stop and not token:
+            token = stop[1]
+        elif token and line == f"::{token}::":
+            token = ""
+        elif not token and re.match(r"\s*::|.*##\[", line):
+            obeyed.append(line)
+    assert not token
+    return obeyed
+
+
+@pytest.mark.posix
+def test_no_name_and_no_title_of_a_deck_is_a_command_to_the_runner_of_the_action(
+    folder: Path,
+) -> None:
+    text = small().replace(small().splitlines()[0], "FECM ::error::title")
+    for name, deck in (("::error::x.inp", text), ("##[error]y.inp", WRONG)):
+        Path(name).write_text(deck)
+    names = "::error::x.inp ##[error]y.inp"
+    done = shell_step(1, folder, DECKS=names, STRICT="true", SARIF="f.sarif")
+    assert done.returncode == 1
+    assert "\n::error::x.inp:" in done.stdout
+    assert done.stderr == ""
+    assert commands_in(done.stdout) == []
+    expected = {"EXPECTED": "::error::missing.h5", "OPTIONS": ""}
+    done = shell_step(2, folder, RESULT="::error::x.inp", **expected)
+    assert done.returncode == 2
+    assert "\n::error::title\n" in done.stdout
+    assert done.stderr == ""
+    assert commands_in(done.stdout) == []
 
 
 @pytest.mark.long
@@ -228,7 +272,7 @@ def test_the_steps_of_the_action_fail_for_a_wrong_deck_and_for_another_result(fo
     Path("slow.inp").write_text(APPENDIX.read_text().replace("     115.0", "     114.9"))
     for result, status in (("trusted.h5", 0), ("plate.inp", 0), ("slow.inp", 1)):
         done = shell_step(2, folder, EXPECTED="trusted.h5", RESULT=result, OPTIONS="--rtol 1e-6")
-        assert done.returncode == status, done.stderr
+        assert done.returncode == status, done.stdout
 
 
 CRASH = "echo 'Traceback: a crash' >&2; exit 1"
@@ -253,8 +297,8 @@ def test_a_crash_while_the_action_writes_sarif_is_shown_and_leaves_no_file(
     assert done.returncode == status
     whole = "'{}'" in program
     assert (tmp_path / "f.sarif").exists() == whole
-    assert ("::error::" in done.stdout) != whole
-    assert ("Traceback" in done.stderr) == ("Traceback" in program)
+    assert len(commands_in(done.stdout)) == (not whole)
+    assert ("Traceback" in done.stdout) == ("Traceback" in program)
 
 
 def test_hooks_and_action_call_commands_with_options_that_exist() -> None:

@@ -221,7 +221,7 @@ def _sarif(checked: Mapping[Path, Sequence[Finding]], failures: Sequence[str]) -
             "ruleId": f.code,
             "ruleIndex": codes.index(f.code),
             "level": f.severity,
-            "message": {"text": f.message + (f.hint and f" Hint: {f.hint}.")},
+            "message": {"text": _text(f)},
             "locations": [{"physicalLocation": _location(deck, f)}],
         }
         for deck, findings in checked.items()
@@ -234,6 +234,14 @@ def _sarif(checked: Mapping[Path, Sequence[Finding]], failures: Sequence[str]) -
         "results": results,
     }
     return {"$schema": SCHEMA, "version": "2.1.0", "runs": [run]}
+
+
+def _text(finding: Finding) -> str:
+    """Message and hint in sentences; a hint has a full stop unless it is a question."""
+    if not finding.hint:
+        return finding.message
+    stop = "" if finding.hint.endswith((".", "?")) else "."
+    return f"{finding.message} Hint: {finding.hint}{stop}"
 
 
 def _location(deck: Path, finding: Finding) -> dict[str, Any]:
