@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import re
+import shutil
+import subprocess
 import tomllib
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -39,6 +42,38 @@ def test_workflows_may_only_read_can_be_started_by_hand_and_end(path: Any) -> No
     assert all("timeout-minutes" in job for job in workflow["jobs"].values())
     for script in re.findall(r"bash (\.ci/\w+)", path.read_text()):
         assert (ROOT / script).is_file()
+
+
+def test_every_tool_that_ci_installs_by_name_has_a_version_that_dependabot_watches() -> None:
+    installing = [*WORKFLOWS, *(path for path in (ROOT / ".ci").iterdir() if not path.suffix)]
+    calls = [
+        call
+        for path in installing
+        for call in re.findall(r"(?<!uv )pip\"? install ([^&\n]+)", path.read_text())
+    ]
+    assert len(calls) > 5
+    folders = loaded(".github/dependabot.yml")["updates"][0]["directories"]
+    for call in calls:
+        (versions,) = re.findall(r"-[cr] (\S+)", call) or [""]
+        names = [word for word in call.split() if re.fullmatch(r"\w[\w-]*", word)]
+        text = (ROOT / versions).read_text() if versions else ""
+        assert [name for name in names if f"\n{name}==" not in text] == [], call
+        assert not versions or f"/{Path(versions).parent}" in folders
+
+
+@pytest.mark.posix
+def test_a_tag_without_a_section_of_the_changelog_is_not_released(tmp_path: Path) -> None:
+    (tmp_path / ".ci").mkdir()
+    shutil.copy(ROOT / ".ci" / "release", tmp_path / ".ci" / "release")
+    (tmp_path / "CHANGELOG.md").write_text("## [Unreleased]\n\n## [0.1.0] - 2026-11-22\n")
+    git = ["git", "-c", "user.name=x", "-c", "user.email=x@example.org"]
+    for words in (["init", "-q"], ["commit", "-q", "--allow-empty", "-m", "x"], ["tag", "v0.2.0"]):
+        subprocess.run([*git, *words], cwd=tmp_path, check=True)
+    release = ["bash", ".ci/release", "dist"]
+    done = subprocess.run(release, cwd=tmp_path, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert done.stderr == "CHANGELOG.md has no section [0.2.0] for the tag v0.2.0\n"
+    assert not (tmp_path / "dist").exists()
 
 
 def test_the_site_is_built_of_files_and_extras_that_exist() -> None:
