@@ -46,6 +46,18 @@ def legend_of(figure: Any) -> list[str]:
     return [text.get_text() for text in figure.legends[0].get_texts()]
 
 
+def footer_of(figure: Any) -> str:
+    """Text below a figure, which ends within it; empty if there is none."""
+    text = figure._supxlabel
+    if text is None:
+        return ""
+    figure.draw_without_rendering()
+    box = text.get_window_extent()
+    assert box.x0 >= 0.0
+    assert box.x1 <= figure.bbox.x1
+    return str(text.get_text())
+
+
 def legend_of_axes(axes: Any) -> list[str]:
     """Texts of the legend in an axes."""
     return [text.get_text() for text in axes.get_legend().get_texts()]

@@ -157,6 +157,19 @@ def test_a_page_asks_for_nothing_complains_of_nothing_and_fits_the_window(
     assert dark == (scheme == "dark")
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_reasons_of_judgements_are_in_sight_on_a_telephone(
+    pages: dict[str, Path], browser: Browser, kind: str
+) -> None:
+    browser.open(pages[kind], width=390)
+    ends = browser.value(
+        '[...document.querySelectorAll(".judgements td.words")].map(one => '
+        "one.getBoundingClientRect().right)"
+    )
+    assert all(end <= 390 for end in ends)
+    assert ends or kind == "fit"
+
+
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_text_has_the_contrast_of_wcag_aa(

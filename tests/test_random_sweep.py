@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import re
 import warnings
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from fecm.sweeps.random import DESIGNS, Design, DesignKind, matrix, random_cases
 from fecm.sweeps.statistics import QUANTILES, Indices, indices, wilson
 from tests.calls import Done, assert_unusable, call
 from tests.decks import DATA, DATA_CARDS, small
+from tests.pictures import footer_of
 
 Floats = NDArray[np.float64]
 
@@ -513,6 +515,25 @@ def test_pictures_need_a_random_sweep(folder: Path, tmp_path: Path) -> None:
         done = call("plot", "plain.h5", "--kind", kind, cwd=tmp_path)
         assert_unusable(done)
         assert "no random values" in done.stderr
+
+
+@pytest.mark.parametrize("kind", ["exceedance", "sensitivity", "scatter"])
+@pytest.mark.parametrize("width", ["column", "full"])
+def test_the_line_of_doubtful_draws_is_not_cut(
+    folder: Path, kind: str, width: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("matplotlib")
+    from fecm.plot.pictures import draw
+
+    words = "beyond the linear plate and a few other limits of the model (w > 0.3 h)"
+    monkeypatch.setattr(
+        "fecm.plot.random_sweep.beyond", lambda _, rows: {words: np.ones(len(rows), bool)}
+    )
+    options: Any = {"width": width}
+    loaded = fecm.load_sweep(folder / "one.h5")
+    figure = draw(kind, {"one": loaded}, **options).figure
+    text = " ".join(footer_of(figure).split())
+    assert re.fullmatch(rf"{re.escape(words)}: (\d+) of \1 cases", text)
 
 
 def test_the_picture_of_exceedance_goes_through_the_probabilities(folder: Path) -> None:

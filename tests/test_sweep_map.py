@@ -19,7 +19,7 @@ from fecm.sweeps.result import SweepResult
 from fecm.sweeps.result_writer import save
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small
-from tests.pictures import OF_RUNS
+from tests.pictures import OF_RUNS, footer_of
 
 Floats = NDArray[np.float64]
 
@@ -319,9 +319,36 @@ def test_cases_still_in_contact_are_crossed_and_counted(vary: dict[str, list[flo
     assert cross.get_marker() == "x"
     assert data_of(cross)[0].tolist() == sweep["velocity"][sweep.still_in_contact].tolist()
     told = f"still in contact at the end: {count} of {len(sweep)} cases"
-    assert figure.axes[0].get_xlabel().endswith(f"\n\N{MULTIPLICATION SIGN} {told}")
+    assert footer_of(figure) == f"\N{MULTIPLICATION SIGN} {told}"
     with pytest.warns(FecmWarning, match="they have no value in the picture"):
         plot(sweep, "impulse")
+
+
+@pytest.mark.parametrize(
+    ("over", "where", "sign", "marker"),
+    [
+        (("velocity",), {"k": 1e6}, "\N{WHITE CIRCLE}", "o"),
+        (("velocity", "k"), None, "/", "$/$"),
+    ],
+)
+def test_the_line_of_doubtful_cases_begins_with_their_mark_and_is_not_cut(
+    plane: SweepResult,
+    over: tuple[str, ...],
+    where: dict[str, float] | None,
+    sign: str,
+    marker: str,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    doubtful = plane["velocity"] > 60.0
+    words = "beyond the linear plate and a few other limits of the model (w > 0.3 h)"
+    monkeypatch.setattr("fecm.plot.map_contents.beyond", lambda _, rows: {words: doubtful[rows]})
+    figure = plot(plane, over=over, where=where)
+    *_, marks = (line for line in figure.axes[0].get_lines() if line.get_marker() == marker)
+    count = len(data_of(marks)[0])
+    assert count == (2 if where else 8)
+    cases = 3 if where else 12
+    line = " ".join(footer_of(figure).split())
+    assert line == f"{sign} {words}: {count} of {cases} cases"
 
 
 def test_a_quantity_that_no_case_has_yet_is_refused() -> None:

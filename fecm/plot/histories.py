@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 Results = Mapping[str, Result]
 
 POINTS = 200  # measured points drawn one by one at most
-LETTERS = 16  # of small text per inch
 
 
 class Forces(NamedTuple):
@@ -67,8 +66,8 @@ def time_axis(axes: Axes, clock: style.Scale, times: Iterable[Array]) -> None:
 def _mark_open_ends(axes: Axes, results: Results, width: Width) -> None:
     """Say above a graph that contacts last to the end; name the results unless all do."""
     if text := style.open_ends(results):
-        text = textwrap.fill(text, int(LETTERS * style.WIDTHS[width]))
-        axes.set_title(text, loc="right", fontsize=7.0).set_parse_math(False)
+        text = textwrap.fill(text, int(style.LETTERS * style.WIDTHS[width]))
+        axes.set_title(text, loc="right", fontsize=style.FOOTER).set_parse_math(False)
 
 
 def force(

@@ -21,6 +21,9 @@ AROUND = 0.75
 BAR = 0.45
 FEWEST_ROWS = 4  # that the height has room for
 MARK: style.Look = {"color": "0.25", "ms": 3.5, "ls": "none", "zorder": 4, "clip_on": False}
+# Marks of cases beyond the range of the model, on colours and around the points of a graph.
+HATCHING = MARK | {"marker": "$/$", "mew": 0.0}
+AROUND_POINT = MARK | {"marker": "o", "mfc": "none", "mew": 0.6, "ms": 5.5}
 
 
 def parameter_map(
@@ -45,10 +48,13 @@ def parameter_map(
     ((name, sweep),) = results.items()
     contents = choose(sweep, name, quantity=quantity, over=over, where=where or {}, level=level)
     graph = _draw(contents, width)
-    _mark_cases(graph, contents.ended, MARK | {"marker": "x"}, "\N{MULTIPLICATION SIGN} ")
-    hatching = MARK | {"marker": "$/$", "mew": 0.0}
-    _mark_cases(graph, contents.beyond, hatching, "/ ")
     by_colours = contents.shown is not graph.x and contents.shown is not graph.y
+    beyond, sign = (HATCHING, "/") if by_colours else (AROUND_POINT, "\N{WHITE CIRCLE}")
+    lines = [
+        *_mark_cases(graph, contents.ended, MARK | {"marker": "x"}, "\N{MULTIPLICATION SIGN}"),
+        *_mark_cases(graph, contents.beyond, beyond, sign),
+    ]
+    style.footer(graph.axes, lines)
     if len(contents.thresholds):
         (map_fields if by_colours else map_graphs).mark_thresholds(graph, contents)
     notes = map_fields.name_levels(graph, contents) if by_colours else []
@@ -86,9 +92,9 @@ def _draw(contents: Contents, width: Width) -> Graph:
     return graph
 
 
-def _mark_cases(graph: Graph, masks: Mapping[str, Bools], look: style.Look, sign: str) -> None:
-    """Mark cases that are something, and count them below the graph; `sign` is the mark as text."""
+def _mark_cases(graph: Graph, masks: Mapping[str, Bools], look: style.Look, sign: str) -> list[str]:
+    """Mark cases that are something; return lines that count them, `sign` is the mark as text."""
     if masks:
         some = np.logical_or.reduce(list(masks.values()))
         graph.axes.plot(graph.x.values[some], graph.y.values[some], **look)
-        graph.axes.set_xlabel(f"{graph.axes.get_xlabel()}{counts(masks, sign)}")
+    return counts(masks, f"{sign} ")

@@ -11,7 +11,7 @@ from fecm._dataclasses import frozen
 from fecm._typing import Indices
 from fecm.plot.kinds import LackingError, Picture, PlotError, Width
 from fecm.plot.map_contents import LEVEL
-from fecm.plot.style import WIDTHS, Look, colours, legend, limit_count, lines_legend, panels
+from fecm.plot.style import WIDTHS, Look, colours, footer, legend, limit_count, lines_legend, panels
 from fecm.plot.sweep_data import Where, beyond, case_rows, counts, quantity_of, variable_of
 from fecm.sweeps.random_result import RandomResult
 from fecm.sweeps.random_tables import chance
@@ -27,7 +27,8 @@ BESIDE: dict[Width, int] = {"column": 2, "full": 4}  # scatter plots side by sid
 # Heights of a pair of bars, and of what is around the pairs (in).
 PAIR = 0.3
 AROUND = 0.75
-POINT: Look = {"ms": 1.5, "alpha": 0.5, "mew": 0.0, "rasterized": True}
+POINT: Look = {"alpha": 0.5, "mew": 0.0, "rasterized": True}
+POINT_SIZES = (2.2, 5.0)  # of many points and of few (points)
 
 
 @frozen
@@ -56,8 +57,7 @@ class Draws:
 
     def say_doubts(self, axes: Axes) -> None:
         """Count the draws beyond the range of the model below a graph."""
-        text = counts(beyond(self.sweep, np.concatenate(list(self.rows.values()))))
-        axes.set_xlabel(f"{axes.get_xlabel()}{text}")
+        footer(axes, counts(beyond(self.sweep, np.concatenate(list(self.rows.values())))))
 
 
 def _draws(results: Sweeps, where: Where | None) -> Draws:
@@ -196,9 +196,10 @@ def scatter(
     figure, every = panels(width, lines, columns, ratio=0.85, sharey=True)
     for axes in every[len(laws) :]:
         axes.set_visible(False)
+    size = np.clip(60.0 / np.sqrt(len(rows)), *POINT_SIZES)  # as much ink for any number
     for place, (axes, law) in enumerate(zip(every, laws, strict=False)):
         over = variable_of(drawn.sweep, law, drawn.sweep[law][rows])
-        axes.plot(over.values, shown.values, ".", color=colours()[0], **POINT)
+        axes.plot(over.values, shown.values, ".", ms=size, color=colours()[0], **POINT)
         for limit in limits:
             axes.axhline(limit, label=f"limit {shown.scale.show(limit)}", **LEVEL)
         over.scale.name(axes.xaxis, over.label)

@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import math
 import re
+import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ContextDecorator
 from contextvars import ContextVar
@@ -40,6 +41,8 @@ Look = dict[str, Any]
 
 WIDTHS: dict[Width, float] = {"column": 3.5, "full": 7.2}  # inches
 RATIO: dict[Width, float] = {"column": 0.68, "full": 0.45}  # height over width of a graph
+LETTERS = 16  # of small text per inch
+FOOTER = 7.0  # size of small text (points)
 COLOUR_BAR_HEIGHT = 0.32  # with its labels (in)
 # Dots per inch in print and on a screen.
 RESOLUTION = 300
@@ -334,6 +337,21 @@ def legend(
         )
     for text in drawn.get_texts():
         text.set_parse_math(False)
+
+
+def footer(axes: Axes, lines: Sequence[str]) -> None:
+    """Write lines below a picture, wrapped to its width, or below given axes."""
+    if not lines:
+        return
+    on_given = isinstance(TARGET.get(), Axes)
+    figure = cast(Figure, axes.figure)
+    share = axes.get_position().width if on_given else 1.0
+    wide = max(20, int(LETTERS * share * figure.get_figwidth()))
+    text = "\n".join(textwrap.fill(line, wide) for line in lines)
+    if on_given:
+        axes.set_xlabel(f"{axes.get_xlabel()}\n{text}")
+    else:
+        figure.supxlabel(text, fontsize=FOOTER)
 
 
 def lines_legend(figure: Figure, axes: Axes, title: str = "") -> None:

@@ -195,8 +195,6 @@ def ended(sweep: SweepResult, rows: Indices) -> dict[str, Bools]:
     return {what: mask} if mask.any() else {}
 
 
-def counts(masks: Mapping[str, Bools], sign: str = "") -> str:
+def counts(masks: Mapping[str, Bools], sign: str = "") -> list[str]:
     """Lines for below a picture: how many cases are what."""
-    return "".join(
-        f"\n{sign}{what}: {mask.sum()} of {len(mask)} cases" for what, mask in masks.items()
-    )
+    return [f"{sign}{what}: {mask.sum()} of {len(mask)} cases" for what, mask in masks.items()]
