@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import fecm
 from fecm.deck.model import Ply
 from fecm.mechanics.failure import (
     CRITERIA,
@@ -19,13 +20,14 @@ from fecm.mechanics.failure import (
     Strengths,
     exposure_of,
     interlaminar,
+    is_evaluated,
     max_stress,
     modes_of,
     puck,
     puck_limits,
     tsai_wu,
 )
-from fecm.mechanics.laminate import laminate
+from fecm.mechanics.laminate import is_fabric, laminate
 from fecm.mechanics.ply_stresses import in_plane_stresses
 from tests.builders import Floats, table
 
@@ -66,6 +68,7 @@ def puck_angle(ply: Strengths, s2: Floats, exposure: Floats) -> Floats:
 
 
 ROWS = table("failure_vectors.csv")
+MATERIALS = fecm.materials()
 KAW = {row["quantity"]: float(row["computed here"]) for row in table("failure_textbook.csv")}
 COLUMNS = {
     "max_stress": "max stress f", "tsai_wu": "Tsai-Wu exposure 1/R", "hashin": "Hashin exposure",
@@ -151,6 +154,32 @@ def test_pucks_modes_meet_without_a_jump() -> None:
         )
         assert below[0][0] == pytest.approx(above[0][0], rel=1e-7)
         assert below[1][0] != above[1][0]
+
+
+@pytest.mark.parametrize(
+    "ply", [name for name, one in MATERIALS.items() if one.allowables("mm-N-s")]
+)
+def test_at_a_single_strength_every_criterion_that_holds_has_exposure_1(ply: str) -> None:
+    named = MATERIALS[ply]
+    known = named.allowables("mm-N-s")
+    assert known is not None
+    s1 = np.array([known.xt, -known.xc, 0.0, 0.0, 0.0])
+    s2 = np.array([0.0, 0.0, known.yt, -known.yc, 0.0])
+    tau = np.array([0.0, 0.0, 0.0, 0.0, known.s12])
+    fabric = is_fabric(named.converted("mm-N-s"))
+    assert fabric is (ply == "AS4-5H/3501-6")
+    names = [name for name in CRITERIA if is_evaluated(name, fabric=fabric)]
+    assert len(names) == 4 - fabric
+    for name in names:
+        exposure, _ = evaluate(CRITERIA[name], known, s1, s2, tau)
+        np.testing.assert_allclose(exposure, 1.0, rtol=1e-12, err_msg=name)
+
+
+@given(st.floats(1.0, 1e3), st.floats(1.0, 1e3), st.floats(0.01, 0.99))
+def test_pucks_exposure_at_yt_is_1_whatever_its_slope(yt: float, s12: float, slope: float) -> None:
+    stress = np.zeros(1), np.array([yt]), np.zeros(1)
+    exposure, _ = evaluate(puck, Ply5(yt=yt, s12=s12, p_plus=slope), *stress)
+    assert exposure[0] == pytest.approx(1.0, rel=1e-9)
 
 
 def test_interlaminar_exposure_is_a_quadratic_sum() -> None:

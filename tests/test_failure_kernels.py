@@ -152,6 +152,16 @@ def zones(*, stretches: bool) -> Monitors:
     return CompiledMonitor(stresses, strengths), FailureMonitor(stresses, strengths)
 
 
+def fabrics(*, stretches: bool) -> Monitors:
+    """With plies that Puck's criterion does not hold for, and with a slope that is too steep."""
+    fabric = replace(PLY, e1=10.5e3, g12=1e3)
+    stack = laminate([PLY, fabric, fabric, fabric, PLY, fabric], ANGLES[:6], [0.125] * 6)
+    weak, steep = replace(STRENGTHS, xt=300.0), replace(STRENGTHS, yt=600.0)
+    strengths = [[STRENGTHS, STRENGTHS, weak, weak, steep, STRENGTHS]]
+    stresses = PlyStresses(plate(), stack, gauss(3), stretches=stretches)
+    return CompiledMonitor(stresses, strengths), FailureMonitor(stresses, strengths)
+
+
 def with_own(*, stretches: bool) -> Monitors:
     """With a user's criterion, which is not proportional to the stresses."""
     one, _ = one_laminate(stretches=stretches)
@@ -172,6 +182,7 @@ CASES: dict[str, Callable[..., Monitors]] = {
     "nonlinear": partial(one_laminate, nonlinear=True),
     "cured": cured,
     "zones": zones,
+    "fabrics": fabrics,
     "own criterion": with_own,
 }
 # What the midplane does, and whether that is known beforehand.

@@ -11,6 +11,7 @@ import pytest
 
 import fecm
 from fecm._json import jsonable
+from fecm.api import Solver
 from fecm.deck.model import Allowables, Ply
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.failure import CRITERIA, exposure_of
@@ -20,8 +21,9 @@ from fecm.mechanics.laminate import laminate
 from fecm.mechanics.mesh import element_blocks
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import PlyStresses
+from fecm.results.exposures import largest_exposures
 from fecm.results.sinks import MemorySink
-from fecm.results.summary import about_run
+from fecm.results.summary import about_run, summary
 from fecm.simulation.run import simulate
 from fecm.sweeps.in_full import without_output
 from tests.builders import nothing, rules, square, table, with_restraints
@@ -37,6 +39,23 @@ ALLO = "ALLO\n   200000.   200000.     7000.    28000.    13000.\n\nEXPE"
 def failing(every: int = 1) -> str:
     program = PROGRAM.replace("DISP          5", f"DISP          1\nFAIL{every:11}")
     return small(program).replace("EXPE", f"PATC\nDISC,.2\n{ALLO}")
+
+
+def of_fabric() -> str:
+    """The same with plies of a fabric."""
+    given = failing()
+    changed = given.replace("17500000.  1150000.   800000.", "17500000. 17000000.   800000.")
+    assert changed != given
+    return changed
+
+
+@pytest.mark.parametrize("solver", ["numpy", "auto"])
+def test_a_run_of_fabrics_leaves_out_pucks_criterion_and_nothing_else(solver: Solver) -> None:
+    result = fecm.run_one(of_fabric(), solver=solver)
+    assert np.isnan(result["failure/puck/exposure"]).all()
+    names = [one.criterion for one in largest_exposures(result)]
+    assert names == ["max_stress", "tsai_wu", "hashin", "interlaminar"]
+    assert not any(line.startswith("puck") for line in summary(result))
 
 
 @pytest.mark.parametrize("name", ["max stress", "Tsai-Wu"])

@@ -19,6 +19,7 @@ from fecm.problem.summary import summarise
 from fecm.results.result import Result
 from fecm.results.vtkhdf import write_vtkhdf
 from tests.pictures import legend_of, plot
+from tests.test_failure_runs import of_fabric
 from tests.test_several_materials import HYBRID, impact, materials, unlike
 
 pytest.importorskip("matplotlib")
@@ -113,6 +114,13 @@ def without_strengths(*layers: int) -> Result:
 def test_failure_without_any_interface_of_known_strength_shows_the_plies() -> None:
     figure: Any = plot(without_strengths(1), "failure")
     assert "interlaminar" not in legend_of(figure)
+
+
+def test_failure_of_fabrics_shows_the_criteria_that_are_evaluated() -> None:
+    result = fecm.run_one(of_fabric())
+    assert {"max stress", "puck"} & {*legend_of(plot(result, "failure"))} == {"max stress"}
+    with pytest.raises(PlotError, match="puck is not evaluated for the plies of the result"):
+        plot(result, "failure", quantity="puck")
 
 
 @pytest.mark.parametrize(

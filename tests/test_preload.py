@@ -19,7 +19,6 @@ from fecm import _memory
 from fecm.api import Solver, load_deck
 from fecm.deck.grid import Grid, uniform
 from fecm.deck.model import (
-    Allowables,
     Deck,
     Impact,
     Material,
@@ -38,6 +37,7 @@ from fecm.mechanics.ply_stresses import uniform_stresses
 from fecm.mechanics.solutions import modes
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
+from fecm.problem.parts import strengths_of_deck
 from fecm.problem.rules.damping import clamped_frequency
 from fecm.problem.summary import summarise
 from fecm.results.result import Result
@@ -356,7 +356,9 @@ def test_a_preload_beyond_the_strength_of_a_ply_is_found() -> None:
     (worst,) = [
         one
         for one in largest_in_plies(
-            problem.deck.require(Allowables), uniform_stresses(laminate, 100.0 * strain)
+            strengths_of_deck(problem.deck)[0],
+            laminate.plies.constants,
+            uniform_stresses(laminate, 100.0 * strain),
         )
         if one.criterion == "max_stress"
     ]
@@ -463,9 +465,9 @@ def test_exposures_begin_with_those_of_the_preload(solver: Solver) -> None:
     text = re.sub(r"(?m)^LOOP(.*\n)*?NEXT\n", STORING, preloaded("500."))
     result = fecm.run_one(text, solver=solver)
     (problem,) = load_deck(text).problems
-    strengths = problem.deck.require(Allowables)
+    (strengths,) = strengths_of_deck(problem.deck)
     stresses = uniform_stresses(problem.laminate, problem.plate.preload_strain)
-    expected = largest_in_plies(strengths, stresses)
+    expected = largest_in_plies(strengths, problem.laminate.plies.constants, stresses)
     assert result["exposures/step"].tolist() == [0, 20, 40]
     assert result["exposures/time"][0] == 0.0
     first = [one.exposure for one in expected]

@@ -322,6 +322,8 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "E459": more("DAMP\n-1.,\n"),
     "W460": more("DAMP\n1.E6,\n"),
     "W556": on_window,
+    "N559": plate(replaced("171420.0    9080.0", " 65000.0   63000.0")),
+    "N560": plate(strengths(2326.2, 1200.1, 62.3, 199.8, 20.0, 92.3, 92.3)),
     "W557": with_hole,
     "E483": more("PREL\n1.,2.,3.\n"),
     "W484": plate(with_card("PREL", "0.,2.E3,0.")),

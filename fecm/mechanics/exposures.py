@@ -60,7 +60,8 @@ class FailureEnvelope:
     """Largest exposures over time, in arrays that are changed in place."""
 
     # (criteria, states): states are points and those that a monitor evaluates at each; UNKNOWN of
-    # plies without strengths, or that an element lacks.
+    # plies without strengths or that an element lacks, and of those that a criterion is not
+    # evaluated for.
     plies: Maxima
     # (elements, plies - 1); NaN where there is none, or no strength, or an element lacks nodes.
     interfaces: Maxima

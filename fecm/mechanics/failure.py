@@ -3,8 +3,8 @@
 The exposure f = 1/R is the reciprocal of the factor on all stresses that reaches failure; without
 residual stresses it is linear in the load.  Stresses are in the axes of the ply; a ply fails at
 f = 1.  Criteria: maximum stress, Tsai and Wu 1971, Hashin 1980 (with S_T = YC/2, for which the
-compressive matrix criterion is a sum of squares), Puck's plane criterion (Puck and Schürmann 1998),
-and a quadratic criterion of the interlaminar shear stresses.
+compressive matrix criterion is a sum of squares), Puck's plane criterion (Puck and Schürmann 1998)
+of unidirectional plies, and a quadratic criterion of the interlaminar shear stresses.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
+from fecm.mechanics.laminate import PlyConstants, is_fabric
 
 MODES = (
     "none",
@@ -111,7 +112,7 @@ def hashin(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
 
 def puck(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
     """Fibre failure by its stress, inter-fibre failure in the modes A, B and C."""
-    s, yc, plus, minus = ply.s12, ply.yc, ply.p_plus, ply.p_minus
+    s, yc, plus, minus = ply.s12, ply.yc, puck_slope(ply), ply.p_minus
     resistance, critical = puck_limits(ply)
     slope = minus * resistance / s
     t, pressed = np.abs(tau), s2 < 0.0
@@ -130,6 +131,11 @@ def puck(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
     )
 
 
+def puck_slope(ply: Strengths) -> float:
+    """Slope p+ in tension, at most S12/YT, where the envelope is straight; it is concave beyond."""
+    return min(ply.p_plus, ply.s12 / ply.yt)
+
+
 def puck_limits(ply: Strengths) -> tuple[float, float]:
     """Fracture resistance R_A of the action plane, and shear stress tau_c where B meets C."""
     s, minus = ply.s12, ply.p_minus
@@ -144,6 +150,12 @@ CRITERIA: dict[str, Criterion] = {
     "hashin": hashin,
     "puck": puck,
 }
+UNIDIRECTIONAL = ("puck",)  # criteria that hold for fibres in one direction
+
+
+def is_evaluated(criterion: str, *, fabric: bool) -> bool:
+    """Whether a criterion is evaluated for a ply; Puck's is not for a fabric."""
+    return not (fabric and criterion in UNIDIRECTIONAL)
 
 
 @frozen
@@ -157,25 +169,25 @@ class PlyExposure:
 
 
 def largest_in_plies(
-    strengths: Strengths | Sequence[Strengths | None],
+    strengths: Sequence[Strengths | None],
+    plies: Sequence[PlyConstants],
     stresses: Floats,
     criteria: Mapping[str, Criterion] = CRITERIA,
 ) -> list[PlyExposure]:
     """Largest exposure of each criterion under stresses of the plies, (plies, faces, 3).
 
-    The strengths are those of all plies or of each, None where they are not given.  Without any
-    strengths the list is empty.
+    Strengths of a ply are None where they are not given; without any the list is empty.  A
+    criterion that no ply is evaluated for is not in it.
     """
-    given = strengths if isinstance(strengths, Sequence) else [strengths] * len(stresses)
     found = []
     for name, criterion in criteria.items():
-        plies = [
+        exposures = [
             _largest_in_ply(criterion, name, ply, number, stresses[number])
-            for number, ply in enumerate(given)
-            if ply is not None
+            for number, ply in enumerate(strengths)
+            if ply is not None and is_evaluated(name, fabric=is_fabric(plies[number]))
         ]
-        if plies:
-            found.append(max(plies, key=lambda one: one.exposure))
+        if exposures:
+            found.append(max(exposures, key=lambda one: one.exposure))
     return found
 
 

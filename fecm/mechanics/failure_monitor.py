@@ -31,6 +31,7 @@ from fecm.mechanics.exposures import (
     Places,
     first_of_largest,
 )
+from fecm.mechanics.laminate import PlyConstants, is_fabric
 from fecm.mechanics.load_circle import CircleStresses
 from fecm.mechanics.own_criterion import OwnCriterion, with_own
 from fecm.mechanics.ply_stresses import PlyStresses, Zone
@@ -50,16 +51,23 @@ class Run:
 
     strengths: failure.Strengths
     states: slice
+    fabric: bool
+
+    def is_evaluated(self, criterion: str) -> bool:
+        """Whether a criterion is evaluated for the plies."""
+        return failure.is_evaluated(criterion, fabric=self.fabric)
 
 
-def _runs(strengths: Sequence[failure.Strengths | None]) -> list[Run]:
-    """Runs of plies with strengths."""
+def _runs(
+    strengths: Sequence[failure.Strengths | None], plies: Sequence[PlyConstants]
+) -> list[Run]:
+    """Runs of plies with strengths; fabrics are apart."""
     found: list[Run] = []
     first = 0
-    for own, group in groupby(strengths):
+    for (own, fabric), group in groupby(zip(strengths, map(is_fabric, plies), strict=True)):
         end = first + len(list(group))
         if own is not None:
-            found.append(Run(own, slice(2 * first, 2 * end)))
+            found.append(Run(own, slice(2 * first, 2 * end), fabric))
         first = end
     return found
 
@@ -102,7 +110,7 @@ class Representatives(NamedTuple):
     def placed(self, run: Run) -> Run:
         """A run of all states as one of those that are evaluated."""
         ends = np.searchsorted(self.states, [run.states.start, run.states.stop]).tolist()
-        return Run(run.strengths, slice(*ends))
+        return Run(run.strengths, slice(*ends), run.fabric)
 
 
 class ZoneCriteria:
@@ -127,7 +135,7 @@ class ZoneCriteria:
         self.strengths = strengths
         # Stresses by components, plies and faces.
         in_plane = zone.in_plane.transpose(3, 2, 0, 1).reshape(6, 3, -1)
-        runs = _runs(strengths)
+        runs = _runs(strengths, zone.laminate.plies.constants)
         self.represent = Representatives.every(in_plane.shape[2])
         if outermost:
             faces = zone.laminate.plies.faces
@@ -283,17 +291,18 @@ class FailureMonitor:
         elements, points, plies = self.stresses.shape
         states = Maxima.none(len(self.criteria), elements * points * self.states)
         interfaces = Maxima.none(elements, max(plies - 1, 0))
-        known = np.zeros((elements * points, self.states), dtype=bool)
+        known = np.zeros((len(self.criteria), elements * points, self.states), dtype=bool)
         for zone in self.zones:
             for run in zone.runs:
-                known[zone.points, run.states] = True
+                for number, name in enumerate(self.criteria):
+                    known[number, zone.points, run.states] = run.is_evaluated(name)
             unknown = np.ones(interfaces.exposure.shape[1], dtype=bool)
             unknown[: zone.interfaces] = np.isnan(zone.weaker).any(axis=1)
             interfaces.exposure[zone.elements] = np.where(unknown, np.nan, 0.0)
         for family, complete in self.stresses.families:
             if not complete:
                 interfaces.exposure[family.rows] = np.nan
-        states.exposure[:, ~known.ravel()] = UNKNOWN
+        states.exposure[~known.reshape(len(self.criteria), -1)] = UNKNOWN
         envelope = FailureEnvelope(states, interfaces, Largest.none(len(self.criteria) + 1))
         envelope.find_largest(self.counts, self.far)
         if self.circle is not None:
@@ -403,8 +412,8 @@ class FailureMonitor:
     def every_state(self, envelope: FailureEnvelope) -> Maxima:
         """Largest exposures of all states, (criteria, states).
 
-        States are elements, points, plies and faces; UNKNOWN of plies without strengths, or that an
-        element lacks.
+        States are elements, points, plies and faces; UNKNOWN of plies without strengths or that an
+        element lacks, and of plies that a criterion is not evaluated for.
         """
         elements, points, plies = self.stresses.shape
         evaluated, count = envelope.plies, len(self.criteria)
@@ -419,8 +428,10 @@ class FailureMonitor:
         for zone in self.zones:
             _, of, share = zone.represent
             factors = share, share > 0.0, share > 0.0  # no time and mode at the midplane
+            known = own[0][:, zone.points][:, :, of] >= 0.0
             for values, given, factor in zip(every, own, factors, strict=True):
-                values[:, zone.points, : len(of)] = given[:, zone.points][:, :, of] * factor
+                of_states = given[:, zone.points][:, :, of]
+                values[:, zone.points, : len(of)] = np.where(known, of_states * factor, of_states)
         return found
 
     @staticmethod
@@ -531,6 +542,8 @@ class FailureMonitor:
     ) -> None:
         """Raise exposures of some criteria to those of strains, (elements * points, 6)."""
         criteria = list(self.criteria.values())
+        names = list(self.criteria)
+        evaluated = [number for number in numbers if run.is_evaluated(names[number])]
         shape = (len(criteria), len(strains), -1)
         exposures, times, modes = (
             values.reshape(shape) for values in (plies.exposure, plies.time, plies.mode)
@@ -544,7 +557,7 @@ class FailureMonitor:
             if zone.has_residual:
                 total += residual
             s1, s2, tau = (np.ascontiguousarray(part) for part in np.split(total, 3, axis=1))
-            for number in numbers:
+            for number in evaluated:
                 candidates = criteria[number](run.strengths, s1, s2, tau)
                 exposure = failure.exposure_of(candidates)
                 before = exposures[number, block, run.states]

@@ -14,12 +14,12 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._typing import Floats
-from fecm.mechanics.laminate import PlyConstants
+from fecm.mechanics.laminate import PlyConstants, is_fabric
 
 # Directions in the surface, and around each of them.
 SURFACE = 72
 AROUND = 180
-ACROSS = 2.0  # E2/E1 above which the fibres are along direction 2; a fabric has 0.8 to 1.2
+ACROSS = 2.0  # E2/E1 above which the fibres are along direction 2
 # In-plane and out-of-plane components.
 _A = [0, 1, 5]
 _B = [2, 4, 3]
@@ -42,7 +42,7 @@ def ply_stiffness(ply: PlyConstants, nu23: float) -> Floats:
             f"E2 = {e2:g} is {e2 / e1:.3g} times E1 = {e1:g}, which is along the fibres: they look "
             "exchanged"
         )
-    if e2 > 0.5 * e1 and ply.g12 < 0.25 * e2:
+    if is_fabric(ply):
         raise PlyError("the ply is a fabric (E2 near E1, G12 far below): its E3 is not its E2")
     compliance = np.zeros((6, 6))
     compliance[:3, :3] = [

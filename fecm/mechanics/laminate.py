@@ -23,6 +23,9 @@ from fecm._typing import Floats
 LISTING_LEAST = 1.0e-6
 SOFT_CORE = 1.0 / 50.0  # G13 of a sandwich's core over that of its faces, at most
 ROUNDING = 1.0e-12
+# Of a fabric: least E2/E1, which is 0.8 to 1.2, and largest G12/E2.
+FABRIC_MODULI = 0.5
+FABRIC_SHEAR = 0.25
 
 
 # Attributes that need not be assignable, without methods, whose definition takes 0.4 ms.
@@ -37,6 +40,11 @@ class PlyConstants(Protocol):
     g12: float
     g13: float
     g23: float
+
+
+def is_fabric(ply: PlyConstants) -> bool:
+    """Whether a ply has fibres in both directions: E2 near E1, G12 far below."""
+    return ply.e2 > FABRIC_MODULI * ply.e1 and ply.g12 < FABRIC_SHEAR * ply.e2
 
 
 @frozen

@@ -17,7 +17,7 @@ from fecm._errors import warn
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Material
 from fecm.mechanics.elements import Quadrature
-from fecm.mechanics.failure import CRITERIA
+from fecm.mechanics.failure import CRITERIA, UNIDIRECTIONAL
 from fecm.mechanics.failure_monitor import UNKNOWN
 from fecm.plot import style
 from fecm.plot.data import deck_of, mesh_of, require
@@ -140,6 +140,10 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
         path = f"failure/{criterion}/exposure"
         if criterion == BETWEEN and not quantity and path in result and not result[path].size:
             continue  # a single ply
+        if criterion in UNIDIRECTIONAL and path in result and np.isnan(result[path]).all():
+            if not quantity:
+                continue
+            raise PlotError(f"{criterion} is not evaluated for the plies of {name}")
         (values,) = require(result, name, path, padded=True)
         if np.isnan(values).all():
             if criterion == BETWEEN and not quantity:

@@ -334,7 +334,7 @@ class Problem:
             stresses = uniform_stresses(laminate, self.plate.preload_strain)
             if self.residuals is not None:
                 stresses += self.residuals[number].stresses
-            exposures += largest_in_plies(strengths[number], stresses)
+            exposures += largest_in_plies(strengths[number], laminate.plies.constants, stresses)
         return max(exposures, key=lambda one: one.exposure, default=None)
 
     @cached_property

@@ -121,7 +121,8 @@ def _write_cure(simulation: Simulation) -> None:
     strengths = strengths_of_deck(deck)
     for number in simulation.problem.used_laminates:
         stresses = model.cure[number].stresses
-        for one in largest_in_plies(strengths[number], stresses, model.failure.criteria):
+        plies = simulation.problem.plate.laminates[number].plies.constants
+        for one in largest_in_plies(strengths[number], plies, stresses, model.failure.criteria):
             largest[one.criterion] = max(largest.get(one.criterion, 0.0), one.exposure)
     for criterion, exposure in largest.items():
         sink.attributes(f"failure/{criterion}", {AT_REST: exposure})

@@ -72,7 +72,8 @@ INLINE void NAME(exposures)(const half *v, half *candidate, half *exposure) {
     }
 }
 
-/* `count` stored exposures in four lanes, the others so large that nothing is above them. */
+/* `count` stored exposures in four lanes, the others so large that nothing is above them; 0 of a criterion that is
+ * not evaluated. */
 INLINE half NAME(stored)(const double *exposure, int count) {
     if (count == 4) return NAME(load)(exposure);
     half found = {HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
@@ -118,13 +119,13 @@ INLINE void NAME(raise)(const Maxima *m, int64_t at, int higher, int criterion, 
 }
 
 /* Four states of stress of a point, of which the arrays have `count`: raise their exposures. */
-INLINE void NAME(four_states)(const Exposures *m, const Limits *limits, int prunes, int64_t point, int64_t state, int count, half s1, half s2, half tau, double now) {
+INLINE void NAME(four_states)(const Exposures *m, const Limits *limits, int prunes, int pucks, int64_t point, int64_t state, int count, half s1, half s2, half tau, double now) {
     const int64_t all = m->points * m->states, at = point * m->states + state;
     const Maxima *plies = &m->plies;
     half before[CRITERIA], F[CRITERIA], v[CANDIDATES], candidate[CRITERIA], exposure[CRITERIA];
 #pragma GCC unroll 4
     for (int i = 0; i < CRITERIA; i++) {
-        before[i] = NAME(stored)(plies->exposure + i * all + at, count);
+        before[i] = NAME(stored)(plies->exposure + i * all + at, i == PUCK && !pucks ? 0 : count);
         F[i] = KEEP * before[i];
     }
     if (prunes) {
@@ -161,7 +162,7 @@ INLINE void NAME(plies)(const Exposures *m, const Plies *f, int strains, double 
             const double *stress = f->stress + first;
             for (int k = 0; k < strains; k++)
                 for (int c = 0; c < 3; c++, stress += width) s[c] += e[k] * NAME(load)(stress);
-            NAME(four_states)(m, &limits, (int)f->prunes, row, f->first + first, f->states < 4 ? (int)f->states : 4, s[0], s[1], s[2], now);
+            NAME(four_states)(m, &limits, (int)f->prunes, (int)f->pucks, row, f->first + first, f->states < 4 ? (int)f->states : 4, s[0], s[1], s[2], now);
         }
     }
 }

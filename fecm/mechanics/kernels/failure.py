@@ -18,7 +18,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.mechanics.exposures import Evaluations, FailureEnvelope
-from fecm.mechanics.failure import CRITERIA, MODES, Strengths, puck_limits
+from fecm.mechanics.failure import CRITERIA, MODES, Strengths, puck_limits, puck_slope
 from fecm.mechanics.failure_monitor import FailureMonitor, Run, ZoneCriteria
 from fecm.mechanics.kernels import LIBRARY, Codes, Doubles, Longs, Structure, filled, floats
 from fecm.mechanics.kernels.midplane import Midplane, midplanes
@@ -66,6 +66,7 @@ class Plies(Structure):
         ("residual", Doubles),
         ("ply", Ply),
         ("prunes", c_int64),  # whether states that cannot rise are not evaluated
+        ("pucks", c_int64),  # whether Puck's criterion is evaluated
     )
 
 
@@ -158,7 +159,7 @@ def _ply(p: Strengths) -> Ply:
         yc=p.yc,
         s12=p.s12,
         f12=p.f12,
-        p_plus=p.p_plus,
+        p_plus=puck_slope(p),
         p_minus=p.p_minus,
         resistance=resistance,
         critical=critical,
@@ -282,6 +283,7 @@ class CompiledMonitor(FailureMonitor):
             residual=filled(zone.residual[:, run.states]),
             ply=_ply(run.strengths),
             prunes=int(_prunes(run.strengths)),
+            pucks=int(run.is_evaluated("puck")),
         )
 
     def _interfaces(self, zone: ZoneCriteria, strains: int) -> Interfaces:

@@ -195,6 +195,7 @@ static const Entry FIELDS[] = {
     FIELD(Plies, residual),
     FIELD(Plies, ply),
     FIELD(Plies, prunes),
+    FIELD(Plies, pucks),
 
     WHOLE(Interfaces),
     FIELD(Interfaces, elements),

@@ -167,7 +167,7 @@ static Limits limits_of(const Ply *p) {
 }
 
 /* Candidates of all criteria: codes of their modes (indices of MODES), and where those of each begin. */
-enum { CANDIDATES = 15, HASHIN = 2 };
+enum { CANDIDATES = 15, HASHIN = 2, PUCK = 3 };
 static const int64_t CODES[CANDIDATES] = {1, 2, 3, 4, 5, 6, 1, 2, 3, 4, 1, 2, 7, 8, 9};
 static const int BEGIN[CRITERIA + 1] = {0, 5, 6, 10, 15};
 

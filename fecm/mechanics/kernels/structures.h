@@ -185,6 +185,7 @@ typedef struct {
     const double *residual; /* (3, width): stresses without strain */
     Ply ply;
     int64_t prunes;         /* whether states that cannot rise are not evaluated, see failure.h */
+    int64_t pucks;          /* whether Puck's criterion is evaluated */
 } Plies;
 
 /* Interfaces between the plies of elements; `width` is `interfaces` in fours. */

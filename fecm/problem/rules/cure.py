@@ -146,7 +146,11 @@ def cracks_at_rest(problem: Problem) -> Reports:
     exposures = [
         (one, laminates[number])
         for number in problem.used_laminates
-        for one in largest_in_plies(strengths[number], residuals[number].stresses)
+        for one in largest_in_plies(
+            strengths[number],
+            problem.plate.laminates[number].plies.constants,
+            residuals[number].stresses,
+        )
     ]
     worst, laminate = max(exposures, key=lambda pair: pair[0].exposure, default=(None, 0))
     if worst is not None and worst.exposure >= 1.0:

@@ -11,7 +11,8 @@ from fecm.deck import model
 from fecm.deck.macros import Loop, every, flat
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import MODULUS, TOUGHNESS, in_si, unit_names
-from fecm.mechanics.failure import largest_in_plies
+from fecm.mechanics.failure import largest_in_plies, puck_slope
+from fecm.mechanics.laminate import is_fabric
 from fecm.mechanics.ply_stresses import uniform_stresses
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
@@ -392,8 +393,9 @@ def preload_beyond_strength(problem: Problem) -> Reports:
     exposures = [
         (one, laminates[number])
         for number in problem.used_laminates
+        for laminate in [problem.plate.laminates[number]]
         for one in largest_in_plies(
-            strengths[number], uniform_stresses(problem.plate.laminates[number], strain)
+            strengths[number], laminate.plies.constants, uniform_stresses(laminate, strain)
         )
     ]
     worst, laminate = max(exposures, key=lambda pair: pair[0].exposure, default=(None, 0))
@@ -424,6 +426,44 @@ def threshold_of_a_sandwich(problem: Problem) -> Reports:
         yield Report(message, card.place(), "remove DELA; FAIL has the exposures of the core")
 
 
+@rule(
+    "N559",
+    Subject.DAMAGE,
+    "FAIL leaves out Puck's criterion for the plies of a fabric.",
+    cause="The criterion is that of unidirectional plies. E2 is near E1, and G12 far below.",
+    remedy="The other criteria are evaluated; none of them is made for fabrics either.",
+)
+def puck_of_a_fabric(problem: Problem) -> Reports:
+    """Find fabrics among the plies with strengths."""
+    for card, ply in _strengths(problem):
+        if is_fabric(ply):
+            message = (
+                f"The ply is a fabric (E2/E1 = {ply.e2 / ply.e1:.2g}, G12/E2 = "
+                f"{ply.g12 / ply.e2:.2g}): Puck's criterion, of unidirectional plies, is left out."
+            )
+            hint = "judge it by the other criteria, and by tests of the fabric"
+            yield Report(message, card.place(), hint)
+
+
+@rule(
+    "N560",
+    Subject.DAMAGE,
+    "Puck's slope p+ is above S12/YT, and is taken as S12/YT.",
+    cause="With a larger slope the exposure at YT would not be 1.",
+    remedy="Check YT and S12, or give p+ on the second card of ALLO.",
+)
+def limited_slope(problem: Problem) -> Reports:
+    """Find slopes with which Puck's criterion does not pass through YT."""
+    for card, ply in _strengths(problem):
+        if is_fabric(ply) or (slope := puck_slope(card)) == card.p_plus:
+            continue
+        message = (
+            f"Puck's slope p+ = {card.p_plus:g} is above S12/YT = {slope:.3g}, which is taken "
+            "instead: the exposure at YT must be 1."
+        )
+        yield Report(message, card.place(), "check YT and S12")
+
+
 OF_STRENGTHS = (invalid_strength, invalid_constant_of_criterion)
 OF_DELAMINATION = (invalid_delamination,)
 OF_THRESHOLD = (coupled_threshold, twisted_threshold)
@@ -432,6 +472,8 @@ STRENGTHS = (strengths_in_another_unit, strengths_in_another_order, weak_in_shea
 VALUES = (
     threshold_of_a_sandwich,
     strengths_without_criteria,
+    puck_of_a_fabric,
+    limited_slope,
     few_evaluations,
     preload_beyond_strength,
     doubtful_toughness,
