@@ -18,7 +18,7 @@ from fecm.studies.estimate import Estimate, estimate
 from fecm.verification import decks
 from tests import curved_panels
 from tests.builders import nothing, with_restraints
-from tests.curved_panels import mesh, struck
+from tests.curved_panels import mesh, panel, struck
 from tests.nonlinear_plates import RULES, equilibrium, pressure, quarter_mesh
 
 NONL = model.Nonlinear()
@@ -135,6 +135,22 @@ def test_an_estimate_of_a_panel_that_snaps_through_ends_at_the_load_that_it_carr
     slower = [found(-500.0, velocity).models[-1].impact.peak for velocity in (3000.0, 9000.0)]
     assert slower[0] < slower[1] < 1.001 * float(limit)
     assert found(500.0, 15000.0).models[-1].name == "nonlinear static plate"
+
+
+# Stresses ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("radii", [(500.0,), (0.0, -500.0), (0.0, 0.0, 400.0)])
+def test_stresses_at_a_small_load_are_those_of_the_linear_panel(radii: tuple[float, ...]) -> None:
+    """Deflections below 2e-6 mm: the squares of slopes are nothing beside w/R."""
+    solved = "LOOP=5 TANG FORM SOLV CONV NEXT STRE"
+    bent, linear = (
+        decks.result_of(panel(radii, solved, load=1e-4, others=others)) for others in ([NONL], [])
+    )
+    for name in ("eps_xx", "eps_yy", "gamma_xy", "N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy"):
+        expected = linear[f"stresses/{name}"][-1]
+        close = 1e-5 * np.abs(expected).max()
+        np.testing.assert_allclose(bent[f"stresses/{name}"][-1], expected, 0.0, close, err_msg=name)
 
 
 # Impact ------------------------------------------------------------------------------------------

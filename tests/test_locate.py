@@ -21,6 +21,7 @@ from fecm.problem.parts import build_plate
 from fecm.sweeps.api import problem_of
 from fecm.sweeps.responses import plate_response
 from tests.panels import (
+    OFF_AXIS,
     PUBLIC,
     PUBLIC_IMPULSE,
     PUBLIC_PEAK,
@@ -246,6 +247,47 @@ def test_the_errors_of_several_seeds_are_those_of_the_covariance() -> None:
         squares += deviations(found, STRUCK) ** 2
     # Chi-square of 2 values a seed: within its 1 % and 99 % quantiles, 8.3 and 37.6 of 20.
     assert 8.3 < squares < 37.6
+
+
+def strains_per_place_and_force(deck: fecm.Deck, found: fecm.Location) -> Floats:
+    """Change of the fitted strains with x, y and the forces that are not held at 0, by runs."""
+    problem, step, dt = problem_of(deck), 0.3, 2e-7
+    mesh, motion = problem.mesh, PlateMotion(moving_plate(problem.plate))
+    read = gages(mesh, deck.require(model.Gages).records)
+    sums = motion.dof_sums(read.dof_indices, read.weights)
+    time = dt * np.arange(1.0, round(TIME[-1] / dt) + 1.0)
+
+    def strains(x: float, y: float, *forces: Floats) -> list[Floats]:
+        load = np.zeros((len(mesh.coordinates), 5))
+        load[:, 2] = patch_weights(mesh, "DISC", 5.0, x, y)
+        _, impulse = plate_response(motion, motion.load(load), dt, len(time), sums)
+        moved = []
+        for force in forces:
+            acting = np.interp(time - dt, np.append(0.0, found.time), np.append(0.0, force))
+            each = [np.interp(TIME, time, np.convolve(one, acting)[: len(time)]) for one in impulse]
+            moved.append(np.concatenate(each))
+        return moved
+
+    x, y, force = found.x, found.y, found.force
+    (right,), (left,) = strains(x + step, y, force), strains(x - step, y, force)
+    (above,), (below,) = strains(x, y + step, force), strains(x, y - step, force)
+    hats = np.eye(len(force))[(force > 0.0) | ~found.determined]
+    slopes = [(right - left) / (2.0 * step), (above - below) / (2.0 * step)]
+    return np.stack([*slopes, *strains(x, y, *hats)], axis=1)
+
+
+def test_the_covariance_of_the_place_is_that_of_least_squares() -> None:
+    """noise**2 (J' J)^-1 for two gages, with J computed without reciprocity."""
+    deck = with_gages(panel(), *OFF_AXIS[:2])
+    strains, noise = scatter(struck()[1][:, :2], NOISE, seed=1)
+    found = fecm.locate(
+        deck, (TIME, strains), region=CLOSE, grid=20.0, basis=9e-6, noise=noise, mesh_error=False
+    )
+    J = strains_per_place_and_force(deck, found)
+    expected = (noise * max(1.0, found.misfit)) ** 2 * np.linalg.inv(J.T @ J)[:2, :2]
+    np.testing.assert_allclose(found.covariance, expected, rtol=0.06)
+    assert found.sd_x == pytest.approx(np.sqrt(expected[0, 0]), rel=0.03)
+    assert found.sd_y == pytest.approx(np.sqrt(expected[1, 1]), rel=0.03)
 
 
 def of_a_run() -> Floats:
