@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 import warnings
 from collections.abc import Callable
 from functools import cache
@@ -494,6 +495,25 @@ def test_a_mistake_of_the_measurement_is_named(name: str, words: str, given: boo
     assert not found.accepted
     (cause,) = [note for note in found.notes if "times better" in note]
     assert words in cause
+
+
+@pytest.mark.parametrize("gage", [1, pytest.param(2, marks=pytest.mark.long)])
+def test_a_gain_of_1_3_that_the_noise_nearly_hides_is_named_with_its_gage(gage: int) -> None:
+    # A gain of one gage explains a part of what the gain of another one does.
+    early = slice(0, 200)
+    gains = np.where(np.arange(1, 5) == gage, 1.3, 1.0)
+    found = fecm.locate(
+        public_panel(30, 20),
+        (PUBLIC[early, 0], PUBLIC[early, 6:10] * gains),
+        noise=3.7e-6,
+        region=(90.0, 60.0, 140.0, 100.0),
+        grid=25.0,
+        mesh_error=False,
+    )
+    assert not found.accepted
+    (cause,) = [note for note in found.notes if "times better" in note]
+    words = rf"gage {gage}, divided by 1\.(29|3|30|31), explains the strains 1\.[3-6] times better"
+    assert re.match(words, cause), cause
 
 
 def test_right_strains_have_no_likely_mistake_and_are_accepted() -> None:

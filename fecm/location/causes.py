@@ -1,8 +1,11 @@
 """Likely causes of strains that the model does not describe: exchanged gages, signs, gains, zeros.
 
-Every cause is tried at the candidate places, with the hats of the search, and the likeliest ones at
-the place that they lead to.  Each gage counts by the share of its squares that is left, so that a
-gage with a wrong factor does not outweigh the others.
+Every cause is tried at the candidate places and at the place of the strains as they are, with the
+hats of the search, and the likeliest ones at the place that they lead to.  Each gage counts by the
+share of its squares that is left, so that a gage with a wrong factor does not outweigh the others.
+A cause whose effect shows in the sum of the squares of all gages, and not in the noise of the weak
+ones, is named too.  A gain that stands out when the gains of all gages are fitted is tried in any
+case: a gain of 1.3 may hide in the noise, and its fall of the misfit is small.
 """
 
 from __future__ import annotations
@@ -21,10 +24,13 @@ from fecm.location.fit import Fit, Trial
 from fecm.location.search import Region
 
 BETTER = 1.5  # fall of the misfit by which a cause is named
+SLIGHT = 1.1  # fall by which a gain is named that is far from those of the other gages
+DISTINCT = 1.15  # such a gain over the others, or its inverse
 REFINED = 3  # causes, with the least shares at the candidates, for which a place is searched
 PLACES = 6  # candidates, with the least squares of coefficients of any sign, for forces
 RIDGE = 1e-10  # of the normal equations, over their largest diagonal
 MOST = 12  # gages whose exchanges are tried: those with the largest shares left
+PASSES = 4  # of place and gain, one after the other
 LEAST = 1e-12  # share of the squares that is rounding
 FEWEST = 3  # gages, for one of them to have a gain of its own
 ROUND = (10.0, 100.0, 1e3, 1e6)  # factors of another unit
@@ -89,61 +95,88 @@ def likely_cause(
 
     `best` is the fit of the strains as they are, `names` are the numbers of the gages in messages.
     """
-    places = [*_products(fit, region, pitch)]
+    places = [*_products(fit, _candidates(region, pitch, best))]
     gages = len(names)
     plain = _Hypothesis("", "", tuple(range(gages)), (1.0,) * gages)
     worst = sorted(np.argsort(-_least(places, plain).left, kind="stable")[:MOST].tolist())
     hypotheses = _hypotheses(plain, worst, names)
     tried = [(hypothesis, _least(places, hypothesis)) for hypothesis in hypotheses]
     tried.sort(key=lambda pair: float(pair[1].left.sum()))
-    before = float(_shares_of(fit, best).sum())
+    before = _unexplained(fit, best)
     found: list[Cause] = []
-    for hypothesis, shares in tried[:REFINED]:
+    likely = tried[:REFINED]
+    if gages >= FEWEST:
+        odd, shares = _odd_gain(fit, best, region)
+        likely = [(h, shares) for h, _ in tried if h.gain == odd]
+        likely += [pair for pair in tried if pair[0].gain != odd][:REFINED]
+    for hypothesis, shares in likely:
         left, factor, level = _refined(fit, region, hypothesis, shares)
         text = hypothesis.text
         if hypothesis.gain >= 0:
             text = f"gage {names[hypothesis.gain]}, divided by {_rounded(factor)}, explains"
         if hypothesis.zero >= 0:
             text = f"gage {names[hypothesis.zero]} less {level:.2g} explains"
-        found.append(Cause(text, hypothesis.remedy, float(np.sqrt(before / max(left, LEAST)))))
-    cause = max(found, key=lambda one: one.ratio)
-    return cause if cause.ratio >= BETTER else None
+        ratio = float(np.sqrt((before / np.maximum(left, LEAST)).max()))
+        distinct = hypothesis.gain >= 0 and max(factor, 1.0 / factor) > DISTINCT
+        if ratio >= (SLIGHT if distinct else BETTER):
+            found.append(Cause(text, hypothesis.remedy, ratio))
+    return max(found, key=lambda one: one.ratio, default=None)
 
 
-def _shares_of(fit: Fit, trial: Trial) -> Floats:
-    """Shares of the squares of every gage that a fit leaves."""
+def _odd_gain(fit: Fit, best: Trial, region: Region) -> tuple[int, _Shares]:
+    """The gage whose gain is farthest from those of the others, and where to begin with it."""
+    free = replace(fit, gains=True)
+    trial = free.refined(best, np.array([region.low, region.high]))
+    apart = np.log(trial.gains) - np.median(np.log(trial.gains))
+    odd = int(np.abs(apart).argmax())
+    place, factor = (trial.x, trial.y), float(np.exp(apart[odd]))
+    return odd, _Shares(np.zeros(len(apart)), place, factor, 0.0)
+
+
+def _unexplained(fit: Fit, trial: Trial) -> Floats:
+    """What a fit leaves: sum of the shares of every gage, and share of the sum of all squares."""
     seen = fit.model.observation
-    squares = (seen.values**2).sum(axis=1) + seen.left
+    squares = np.maximum((seen.values**2).sum(axis=1) + seen.left, np.finfo(float).tiny)
     rest = (trial.residual**2).sum(axis=1) + seen.left
-    return np.asarray(rest / np.maximum(squares, np.finfo(float).tiny))
+    return np.array([(rest / squares).sum(), rest.sum() / squares.sum()])
 
 
 def _refined(
     fit: Fit, region: Region, hypothesis: _Hypothesis, shares: _Shares
-) -> tuple[float, float, float]:
-    """Sum of the shares that are left at the place of a hypothesis; factor and level there."""
+) -> tuple[Floats, float, float]:
+    """What is left at the place of a hypothesis, as :func:`_unexplained`; factor and level there.
+
+    The gage of the hypothesis alone has another factor: with free gains of all gages, every one of
+    them would explain the strains as well as the right one.
+    """
     seen, factor, level = fit.model.observation, shares.factor, shares.level
     columns, signs = list(hypothesis.columns), np.array(hypothesis.signs)[:, None]
     one = seen.of(np.ones(fit.model.responses.shape[2]))
-    values, left = signs * seen.values[columns], seen.left[columns]
-    if hypothesis.gain >= 0:
-        values[hypothesis.gain] /= factor
-        left = left.copy()
-        left[hypothesis.gain] /= factor**2
-    if hypothesis.zero >= 0:
-        values[hypothesis.zero] -= level * one
-    corrected = replace(seen, values=values, left=left)
-    gains = fit.gains or hypothesis.gain >= 0
-    own = replace(fit, gains=gains, model=replace(fit.model, observation=corrected))
-    trial = own.refined(own.at(*shares.place), np.array([region.low, region.high]))
-    if hypothesis.gain >= 0:
-        others = np.delete(trial.gains, hypothesis.gain)
-        factor *= float(trial.gains[hypothesis.gain] / np.exp(np.log(others).mean()))
+    box = np.array([region.low, region.high])
+    place, shift, gains = shares.place, 0.0, None
+    passes = PASSES if hypothesis.gain >= 0 else 1
+    while True:
+        values, left = signs * seen.values[columns], seen.left[columns]
+        if hypothesis.gain >= 0:
+            values[hypothesis.gain] /= factor
+            left[hypothesis.gain] /= factor**2
+        if hypothesis.zero >= 0:
+            values[hypothesis.zero] -= level * one
+        corrected = replace(seen, values=values, left=left)
+        own = replace(fit, model=replace(fit.model, observation=corrected))
+        trial = own.refined(own.at(*place, shift, gains), box)
+        place, shift, gains = (trial.x, trial.y), trial.shift, trial.gains
+        passes -= 1
+        if not passes:
+            break
+        given = values[hypothesis.gain]
+        computed = given - trial.residual[hypothesis.gain]
+        factor *= max(float(given @ computed), LEAST) / max(float(computed @ computed), LEAST)
     if hypothesis.zero >= 0:
         level += float(trial.residual[hypothesis.zero] @ one) / float(one @ one)
         values[hypothesis.zero] = seen.values[hypothesis.zero] - level * one
         trial = own.at(trial.x, trial.y, trial.shift, trial.gains)
-    return float(_shares_of(own, trial).sum()), factor, level
+    return _unexplained(own, trial), factor, level
 
 
 def _hypotheses(plain: _Hypothesis, worst: list[int], names: list[int]) -> Iterator[_Hypothesis]:
@@ -168,22 +201,30 @@ def _hypotheses(plain: _Hypothesis, worst: list[int], names: list[int]) -> Itera
         yield plain._replace(text=text, remedy=remedy, columns=tuple(columns))
 
 
-def _products(fit: Fit, region: Region, pitch: float | None) -> Iterator[_Products]:
-    """Inner products at the candidates."""
+def _candidates(region: Region, pitch: float | None, best: Trial) -> list[tuple[float, float]]:
+    """Candidates of the search, after the place of the strains as they are.
+
+    A gain, a zero or a sign of one of several gages hardly moves the place, and the candidates are
+    too far from it to tell which gage has it.
+    """
     x, y = region.grid(pitch)
+    return [(best.x, best.y), *((u, v) for u in x.tolist() for v in y.tolist())]
+
+
+def _products(fit: Fit, candidates: list[tuple[float, float]]) -> Iterator[_Products]:
+    """Inner products at the candidates."""
     seen = fit.model.observation
     values = seen.values
     one = seen.of(np.ones(fit.model.responses.shape[2]))
     squares = np.maximum((values**2).sum(axis=1) + seen.left, np.finfo(float).tiny)
     level = values @ one
-    for i, j in np.ndindex(len(x), len(y)):
+    for place in candidates:
         try:
-            design = fit.model.design(float(x[i]), float(y[j]))
+            design = fit.model.design(*place)
         except FecmError:  # a hole or a notch
             continue
         turned = np.ascontiguousarray(design.swapaxes(1, 2))  # (gages, hats, rows)
         both = (turned @ values.T).swapaxes(1, 2)
-        place = float(x[i]), float(y[j])
         yield _Products(
             place, turned @ design, both, turned @ one, level, squares, float(one @ one)
         )

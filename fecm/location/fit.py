@@ -20,6 +20,7 @@ HALVINGS = 8  # of a step that does not lower the misfit
 SETTLED = 3e-3  # change of the place, in standard errors, that ends the iteration
 STEP = 0.02  # of central differences, over the side of an element
 VALUES = 2  # strains per value of a force, at least
+MOST_TURN = 1.0  # change of the logarithm of a gain in a pass
 SINGULAR = 1e-12  # least singular value of the scaled Jacobian
 
 
@@ -163,7 +164,8 @@ class Fit:
                 shift += float(np.clip(part * change[2], -most, most))
             if self.gains:
                 turns = ratios(len(gains))
-                gains = gains * np.exp(part * (change[-len(turns) :] @ turns))
+                turned = np.clip(part * (change[-len(turns) :] @ turns), -MOST_TURN, MOST_TURN)
+                gains = gains * np.exp(turned)
             try:
                 found = self.at(x, y, shift, gains)
             except FecmError:  # off the plate
