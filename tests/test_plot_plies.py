@@ -12,6 +12,7 @@ from fecm._typing import Array
 from fecm.plot.failure import outline
 from fecm.plot.kinds import PlotError
 from fecm.plot.pictures import draw
+from fecm.results.exposures import largest_exposures
 from fecm.results.result import Result
 from fecm.results.summary import summary
 from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, PROGRAM, small
@@ -209,12 +210,13 @@ def test_a_bar_per_ply_leaves_out_what_is_under_the_load(failing: Result) -> Non
     assert [bar.get_width() for bar in bars.patches] == expected
     assert plate.collections[0].norm.vmax == max(expected)
     assert bars.get_ylim()[0] > bars.get_ylim()[1]  # the struck face at the top
-    assert list(bars.get_lines()[-1].get_xdata()) == [1.0, 1.0]
+    assert [1.0, 1.0] in [list(line.get_xdata()) for line in bars.get_lines()]
     (line,) = (line for line in summary(failing) if line.startswith("puck"))
     value, mode = plate.get_title(loc="left").split(" (puck): ")
     assert line.split(":")[0].split()[-1] == value
     assert mode.split(",")[0] in line
-    assert legend_of(figure) == ["puck", "exposure 1", "largest", "under the load"]
+    names = ["puck", "exposure 1", "largest", "under the load", "circle around the load"]
+    assert legend_of(figure) == names
 
 
 @pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
@@ -227,7 +229,10 @@ def test_all_criteria_mark_their_values_and_interfaces_have_their_own_bars(
     values = [failing[f"failure/{name}/exposure"][~under].max(axis=(0, 2)) for name in CRITERIA]
     widths = [bar.get_width() for bar in bars.patches]
     np.testing.assert_array_equal(widths[:2], np.max(values, axis=0))
-    np.testing.assert_array_equal([line.get_xdata() for line in bars.get_lines()[:4]], values)
+    marks = bars.get_lines()[:4]
+    np.testing.assert_array_equal([line.get_xdata() for line in marks], values)
+    heights = np.array([line.get_ydata() for line in marks])
+    assert np.diff(heights, axis=0).min() > 0.1  # values may coincide, their marks do not
     between = failing["failure/interlaminar/exposure"]
     assert widths[2:] == [between[:3].max()]  # the fourth element is under the load
     assert bars.patches[2].get_y() + bars.patches[2].get_height() / 2.0 == pytest.approx(1.5)
@@ -236,6 +241,41 @@ def test_all_criteria_mark_their_values_and_interfaces_have_their_own_bars(
     np.testing.assert_array_equal(shown.get_array(), np.repeat(between[:3, 0], 9))
     assert len(hatched.get_paths()) == 9
     assert "plies 1 and 2" in alone.axes[0].get_title(loc="left")
+
+
+@pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
+@pytest.mark.parametrize("between", [0.0, 100.0])
+def test_rings_in_the_bars_are_the_printed_exposures_and_the_map_shows_the_largest(
+    failing: Result, between: float
+) -> None:
+    arrays = {path: failing[path] for path in failing}
+    circle = arrays["failure/circle/exposure"].copy()
+    circle[3] = 50.0  # Puck
+    circle[4] = between
+    arrays["failure/circle/exposure"] = circle
+    groups = {name: getattr(failing, name).attributes for name in ("failure", "patch")}
+    raised = Result(arrays, {"deck": failing.deck_text}, {"": failing.attributes, **groups})
+    figure: Any = draw("failure", {"a": raised}).figure
+    plate, bars, bar = figure.axes
+    rings = [line for line in bars.get_lines() if line.get_markerfacecolor() == "none"]
+    shown = [float(line.get_xdata()[0]) for line in rings]
+    assert sorted(shown) == sorted(one.exposure for one in largest_exposures(raised))
+    assert shown[-1] == max(between, 50.0)  # above the others
+    kinds = ["puck", "interlaminar"]
+    if between:
+        kinds.reverse()
+        assert bar.get_xlabel() == "Largest exposure of the interfaces"
+        places = failing["failure/interlaminar/exposure"][:3, 0]
+        np.testing.assert_array_equal(plate.collections[0].get_array(), np.repeat(places, 9))
+    lines = plate.get_title(loc="left").splitlines()
+    assert [line.split(" (")[1].split(")")[0] for line in lines[:2]] == kinds
+    (drawn,) = plate.patches
+    radius = float(drawn.radius)
+    assert radius == pytest.approx(0.2 + 0.106 / 2.0)  # the disc and half of the thickness
+    assert drawn.center == (1.5, 1.5)
+    largest = next(line for line in plate.get_lines() if line.get_color() == "#C00000")
+    x, y = (float(values[0]) for values in largest.get_data())
+    assert np.hypot(x - 1.5, y - 1.5) == pytest.approx(radius)
 
 
 @pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
@@ -260,7 +300,8 @@ def test_exposures_that_can_not_be_shown_are_refused(failing: Result) -> None:
     with pytest.raises(PlotError, match=words):
         plot(failing, "failure", quantity="strain")
     arrays = {path: failing[path] for path in failing}
-    arrays["failure/under_load"] = np.ones_like(arrays["failure/under_load"])
+    for name in ("under_load", "centre_under_load"):
+        arrays[f"failure/{name}"] = np.ones_like(arrays[f"failure/{name}"])
     groups = {"failure": failing.failure.attributes, "patch": failing.patch.attributes}
     with pytest.raises(PlotError, match="load is over all elements of covered: no exposure"):
         draw("failure", {"covered": Result(arrays, {"deck": failing.deck_text}, groups)})

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.colors import Normalize
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
+from matplotlib.patches import Circle, Patch
 from matplotlib.ticker import MaxNLocator
 
 from fecm._dataclasses import frozen
@@ -20,12 +20,12 @@ from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import CRITERIA, UNIDIRECTIONAL
 from fecm.mechanics.failure_monitor import UNKNOWN
 from fecm.plot import style
-from fecm.plot.data import deck_of, mesh_of, require
+from fecm.plot.data import deck_of, mesh_of, require, struck
 from fecm.plot.kinds import Picture, PlotError, Width
 from fecm.plot.plate import aspect, mark_impact
 from fecm.problem.parts import rules
 from fecm.results.criteria import spelt
-from fecm.results.exposures import LargestExposure, largest_exposures
+from fecm.results.exposures import LargestExposure, largest_exposures, near_load
 from fecm.results.plies import places
 from fecm.results.result import Result
 
@@ -42,12 +42,15 @@ LIMIT: style.Look = {"color": RED, "linewidth": 1.0}
 HATCH: style.Look = {"facecolor": "white", "edgecolor": "0.55", "hatch": "//////"}
 OPEN: style.Look = {"mfc": "none", "ls": "none"}
 LARGEST: style.Look = OPEN | {"color": RED, "marker": "o", "ms": 5.0, "mew": 0.9}
-# Marks of the criteria in the bars: small ones above large ones, as values may coincide.
+CIRCLE: style.Look = {"color": "black", "linewidth": 0.6, "linestyle": style.DASHED}
+# Marks of the criteria in the bars, in lanes below each other, as values may coincide.
+LANE = 0.17  # of the distance of two bars
+FILLED: style.Look = {"ls": "none", "mew": 0.0, "zorder": 3.5}
 MARKS: tuple[style.Look, ...] = (
-    OPEN | {"marker": "s", "ms": 4.0, "mew": 0.6},
-    OPEN | {"marker": "D", "ms": 3.0, "mew": 0.6},
-    OPEN | {"marker": "o", "ms": 4.0, "mew": 0.6},
-    OPEN | {"marker": "x", "ms": 2.5, "mew": 0.6},
+    FILLED | {"marker": "s", "ms": 2.0},
+    FILLED | {"marker": "D", "ms": 2.0},
+    FILLED | {"marker": "o", "ms": 2.3},
+    FILLED | {"marker": "^", "ms": 2.5},
 )
 MANY = 5000  # maps of more cells are drawn as pixels in PDF and SVG
 NAMED = 12  # elements under the load that a note names; the others it counts
@@ -61,18 +64,31 @@ class Exposures:
     under_load: Bools  # (numel, points): mask of the points that are left out
     # (numel, points): largest exposure of all plies (or interfaces) at every point.
     over_plate: Floats
-    # (plies,) or (plies - 1,) each: largest exposure outside the load, by criterion.
+    # (plies,) or (plies - 1,) each: largest exposure of points outside the load, by criterion.
     over_plies: dict[str, Floats]
-    worst: LargestExposure  # the largest of them
+    largest: list[LargestExposure]  # of each criterion, the largest first
+
+    @property
+    def worst(self) -> LargestExposure:
+        """The largest exposure of all criteria."""
+        return self.largest[0]
+
+    @property
+    def title(self) -> str:
+        """The largest exposure, and that of the interfaces or of the plies below it."""
+        between = self.worst.criterion == BETWEEN
+        others = [one for one in self.largest if (one.criterion == BETWEEN) != between]
+        return "\n".join(map(_in_words, (self.worst, *others[:1])))
 
 
 def failure(results: Mapping[str, Result], *, quantity: str = "", width: Width = "full") -> Picture:
     """Largest exposures over time: of the worst ply on the plate, and of every ply in bars.
 
     Points under the load are hatched; the bars leave them out.  Values between two plies belong to
-    an element, which the bars leave out if one of its points is under the load.  `quantity` is a
-    criterion; by default the plate shows the largest of all criteria of the plies, and the bars
-    also the interlaminar exposure between them.
+    an element, which the bars leave out if its centre is under the load.  Exposures are also
+    evaluated on the dashed circle around the load, of which the largest ones have rings in the
+    bars.  `quantity` is a criterion; by default the bars show all of them, and the plate the plies,
+    or the interfaces between them if their exposure is the largest.
     """
     ((name, result),) = results.items()
     found = _exposures(result, name, quantity)
@@ -82,26 +98,34 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: Width =
     figure, plate, bars = _panels(width, aspect(corners.reshape(-1, 2)), most)
     _map(plate, corners, found)
     mark_impact(plate, result, name)
-    worst = found.worst
-    plate.plot(worst.x, worst.y, clip_on=False, **LARGEST)
-    title = f"{worst.exposure:.4g} ({spelt(worst.criterion)}): {worst.mode},"
-    title += f"\n{worst.plies}" if worst.materials else f" {worst.plies}"
+    has_circle = _draw_circle(plate, result, name)
+    plate.plot(found.worst.x, found.worst.y, clip_on=False, **LARGEST)
+    title = found.title
     if result.still_in_contact:
         title += "\nstill in contact at the end: exposures may grow"
     plate.set_title(title, loc="left")
     place.name(plate.xaxis, "$x$")
     place.name(plate.yaxis, "$y$")
-    _bars(figure, bars, found)
+    entries = _bars(bars, found)
+    if has_circle:
+        entries["circle around the load"] = Line2D([], [], **CIRCLE)
+    style.legend(figure, list(entries.values()), list(entries))
     if text := style.open_ends(results):
         bars.set_title(f"{text}: lower bounds", loc="right", fontsize=7.0)
     _warn_of_load(name, found.under_load)
     return Picture(figure)
 
 
+def _in_words(one: LargestExposure) -> str:
+    """An exposure for a title; names of materials take a line of their own."""
+    separator = "\n" if one.materials else " "
+    return f"{one.exposure:.4g} ({spelt(one.criterion)}): {one.mode},{separator}{one.plies}"
+
+
 def _panels(width: Width, high: float, bars: int) -> tuple[Figure, Axes, Axes]:
     """Axes of the plate, of `high` over width, and of the bars, below it or beside it."""
     inches = style.WIDTHS[width]
-    height_of_bars = float(np.clip(0.8 + 0.07 * bars, 1.4, 4.0))
+    height_of_bars = float(np.clip(0.8 + 0.1 * bars, 1.4, 5.0))
     if width == "column":
         height_of_plate = 0.85 * inches * high + 1.5
         heights = (height_of_plate, height_of_bars)
@@ -111,6 +135,20 @@ def _panels(width: Width, high: float, bars: int) -> tuple[Figure, Axes, Axes]:
     ratio = max(0.54 * inches * high + 1.5, height_of_bars + 0.4) * 2 / inches
     figure, (plate, beside) = style.panels(width, 1, 2, ratio=ratio, width_ratios=(5.0, 3.0))
     return figure, plate, beside
+
+
+def _draw_circle(axes: Axes, result: Result, name: str) -> bool:
+    """Draw the circle around the load on which exposures are evaluated, if there is one."""
+    load = struck(result, name)
+    if "failure/circle/x" not in result or not len(load):
+        return False
+    places = np.column_stack([result[f"failure/circle/{axis}"] for axis in "xy"])
+    places = places[np.isfinite(places).all(axis=1)]
+    if not len(places):
+        return False
+    radius = float(np.hypot(*(places[0] - load[0])))
+    axes.add_patch(Circle((load[0, 0], load[0, 1]), radius, fill=False, **CIRCLE))
+    return True
 
 
 def _warn_of_load(name: str, under_load: Bools) -> None:
@@ -134,8 +172,9 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
         raise PlotError(f"there is no criterion {quantity!r}; there are {', '.join(NAMES)}")
     (near,) = require(result, name, "failure/under_load")
     under = near != 0
-    whole = np.broadcast_to(under.any(axis=1)[:, None], under.shape)  # elements
-    over_plies, fields = {}, []
+    whole = np.broadcast_to(near_load(result, BETWEEN), under.shape)  # elements
+    over_plies: dict[str, Floats] = {}
+    fields: dict[str, Floats] = {}
     for criterion in (quantity,) if quantity else NAMES:
         path = f"failure/{criterion}/exposure"
         if criterion == BETWEEN and not quantity and path in result and not result[path].size:
@@ -157,15 +196,15 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
             field, outside = values.max(axis=(2, 3)), values[~under].max(axis=2)
         if (outside != UNKNOWN).any():
             over_plies[criterion] = _known(outside.max(axis=0))
-        if quantity or criterion != BETWEEN:
-            fields.append(np.broadcast_to(field, under.shape))
-    names = set(over_plies) - (set() if quantity else {BETWEEN})
-    largest = [one for one in largest_exposures(result) if one.criterion in names]
+        fields[criterion] = np.broadcast_to(field, under.shape)
+    largest = [one for one in largest_exposures(result) if one.criterion in over_plies]
     if not largest:
         raise PlotError(f"the load is over all elements of {name}: no exposure is left to show")
-    worst = max(largest, key=lambda one: one.exposure)
-    left_out = whole if quantity == BETWEEN else under
-    return Exposures(left_out, _known(np.max(fields, axis=0)), over_plies, worst)
+    largest.sort(key=lambda one: -one.exposure)
+    between = largest[0].criterion == BETWEEN
+    shown = [field for criterion, field in fields.items() if (criterion == BETWEEN) == between]
+    left_out = whole if between else under
+    return Exposures(left_out, _known(np.max(shown, axis=0)), over_plies, largest)
 
 
 def _known(exposures: Floats) -> Floats:
@@ -228,8 +267,11 @@ def _map(axes: Axes, cells: Floats, found: Exposures) -> None:
         bar.ax.axvline(1.0, **LIMIT)
 
 
-def _bars(figure: Figure, axes: Axes, found: Exposures) -> None:
-    """A bar per ply, the struck face at the top, one per interface between them, and the legend."""
+def _bars(axes: Axes, found: Exposures) -> dict[str, Artist]:
+    """Draw a bar per ply, the struck face at the top, and one per interface between them.
+
+    Returns the entries of the legend.
+    """
     plies = {name: values for name, values in found.over_plies.items() if name != BETWEEN}
     between = found.over_plies.get(BETWEEN)
     entries: dict[str, Artist] = {}
@@ -241,8 +283,9 @@ def _bars(figure: Figure, axes: Axes, found: Exposures) -> None:
         if alone:
             entries[alone.replace("_", " ")] = Patch(color=COLOUR_OF[alone])
         else:
-            for (name, values), mark in zip(plies.items(), MARKS, strict=False):
-                (drawn,) = axes.plot(values, number, color=COLOUR_OF[name], **mark)
+            for lane, ((name, values), mark) in enumerate(zip(plies.items(), MARKS, strict=False)):
+                place = number + LANE * (lane - (len(plies) - 1) / 2.0)
+                (drawn,) = axes.plot(values, place, color=COLOUR_OF[name], **mark)
                 entries[name.replace("_", " ")] = drawn
     if between is not None:
         place = np.arange(len(between)) + (1.5 if plies else 1.0)
@@ -253,11 +296,15 @@ def _bars(figure: Figure, axes: Axes, found: Exposures) -> None:
     entries["largest"] = Line2D([], [], **LARGEST)
     if found.under_load.any():
         entries["under the load"] = Patch(linewidth=0.0, **HATCH)
-    style.legend(figure, list(entries.values()), list(entries))
+    for one in reversed(found.largest):  # some are on the circle around the load
+        height = one.ply + (0.5 if plies and one.criterion == BETWEEN else 0.0)
+        colour = RED if one is found.worst else COLOUR_OF[one.criterion]
+        axes.plot(one.exposure, height, **LARGEST | {"color": colour, "zorder": 5.0})
     count = max(map(len, found.over_plies.values()))
     axes.set_ylim(count + 0.6, 0.4)
-    most = max(1.0, *(float(np.nanmax(values)) for values in found.over_plies.values()))
+    most = max(1.0, found.worst.exposure)
     axes.set_xlim(0.0, 1.05 * most)
     axes.yaxis.set_major_locator(MaxNLocator(TICKS, integer=True, min_n_ticks=1))
     axes.set_ylabel("Ply (1: struck face)" if plies else "Interface below ply (1: struck face)")
     axes.set_xlabel("Largest exposure")
+    return entries

@@ -49,7 +49,9 @@ def strain(
     if face == "curvature":
         shown, name = style.scale_of(results, "1/length", values_of), "Curvature"
     else:
-        shown, name = style.scale(style.peak(*values_of), ""), f"Strain, {face} face"
+        stretches = any(map(_may_stretch, results.values()))
+        what = "Bending strain" if stretches else "Strain"
+        shown, name = style.scale(style.peak(*values_of), ""), f"{what}, {face} face"
     figure, (axes,) = style.panels(width)
     for (label, (time, values)), colour in zip(lines.items(), style.colours(), strict=False):
         axes.plot(time, values, color=colour, label=label)
@@ -78,7 +80,7 @@ def _strains(
             symbol, height = "ε", thickness / 2.0
         case _:
             symbol, height = "ε", -thickness / 2.0
-    if face != "curvature" and result["mesh/equations"][:, :2].any():
+    if face != "curvature" and _may_stretch(result):
         warn(
             f"the midplane of {name} may stretch; its strains are not stored, and the picture "
             "shows those of bending alone"
@@ -94,6 +96,11 @@ def _strains(
             direction = AXES.get(angle, f" {angle:g}°")
             found[f"{symbol}{direction} at {x:.4g}, {y:.4g}"] = values
     return found
+
+
+def _may_stretch(result: Result) -> bool:
+    """Whether a point of the midplane can move in the plane."""
+    return bool(result["mesh/equations"][:, :2].any())
 
 
 def _distance(result: Result, name: str, points: Array) -> Array:
