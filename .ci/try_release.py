@@ -74,8 +74,8 @@ def main() -> None:
         if ("not compiled" in system) != given.without_kernels:
             raise SystemExit("a wheel for another machine was installed")
         print(run("fecm", "verify").splitlines()[-1])
-        run("fecm", "example", "impact-115.inp")
-        print(run("fecm", "run", "impact-115.inp").splitlines()[0], flush=True)
+        run("fecm", "example", "impact-patch.inp")
+        print(run("fecm", "run", "impact-patch.inp").splitlines()[0], flush=True)
 
 
 if __name__ == "__main__":

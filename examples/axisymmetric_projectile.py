@@ -3,8 +3,8 @@
 
 On page 100 the report compares its projectile of 20 rod elements with one of 112 axisymmetric
 elements, and finds no significant difference in the middle. Here the contact force of
-``impact-115`` acts on the tip of 28 × 4 axisymmetric elements, and the force that their front half
-passes on is compared with the transducer of the rod. Needs scikit-fem:
+``impact-patch`` acts on the tip of 28 × 4 axisymmetric elements, and the force that their front
+half passes on is compared with the transducer of the rod. Needs scikit-fem:
 ``pip install 'fecm[examples]'``.
 """
 
@@ -17,7 +17,7 @@ from scipy.sparse.linalg import splu
 
 import fecm
 
-text = fecm.examples.path("impact-115.inp").read_text()
+text = fecm.examples.path("impact-patch.inp").read_text()
 for words in ("PATC", "DISC", "SHEA MITC"):  # a point force, as in the report
     text = text.replace(f"\n{words}\n", "\n")
 with warnings.catch_warnings(action="ignore"):  # a point force depends on the mesh

@@ -14,7 +14,7 @@ import numpy as np
 import fecm
 
 warnings.simplefilter("ignore", fecm.FecmWarning)  # the runs end in contact
-deck = fecm.read_one(fecm.examples.path("impact-115.inp"))
+deck = fecm.read_one(fecm.examples.path("impact-patch.inp"))
 truth = fecm.run_one(deck.with_(k=1.6e6, velocity=120))
 time = truth.time[::20]
 scatter = np.random.default_rng(0).normal(size=len(time))

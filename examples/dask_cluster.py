@@ -10,7 +10,7 @@ from distributed import Client
 
 import fecm
 
-deck = fecm.examples.path("impact-115.inp")
+deck = fecm.examples.path("impact-patch.inp")
 # Two threads of this process; ``Client("tcp://192.0.2.1:8786")`` is a cluster of your own.
 with Client(processes=False, n_workers=2, threads_per_worker=1, dashboard_address=None) as client:
     coarse = fecm.sweep(deck, {"velocity": np.linspace(80, 180, 6)}, scheduler=client)

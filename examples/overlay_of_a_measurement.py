@@ -7,7 +7,7 @@ A measured force over the computed one, with peak, impulse, rms of the differenc
 import fecm
 
 measured = fecm.examples.path("measured-force.csv")  # columns time, force
-result = fecm.run_one(fecm.examples.path("impact-115.inp"))
+result = fecm.run_one(fecm.examples.path("impact-patch.inp"))
 
 found = result.compare(measured)
 print(found)

@@ -29,7 +29,7 @@ class Yielding:
         return 0.0
 
 
-deck = fecm.read_one(fecm.examples.path("impact-115.inp"))
+deck = fecm.read_one(fecm.examples.path("impact-patch.inp"))
 results = {"deck": fecm.run_one(deck), "yielding": fecm.run_one(deck, law=Yielding())}
 for name, result in results.items():
     print(f"{name}: {result.force.max():.1f} lbf")

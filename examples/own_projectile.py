@@ -26,7 +26,7 @@ class SpringMounted:
         return [[self.spring, -self.spring], [-self.spring, self.spring]]
 
 
-deck = fecm.read_one(fecm.examples.path("impact-115.inp"))
+deck = fecm.read_one(fecm.examples.path("impact-patch.inp"))
 projectiles = {"rigid": SpringMounted(1e7), "mounted": SpringMounted(1e4)}
 results = {name: fecm.run_one(deck, projectile=one) for name, one in projectiles.items()}
 for name, result in results.items():

@@ -7,7 +7,7 @@ each impact is a convolution with its response.
 
 import fecm
 
-deck = fecm.examples.path("impact-115.inp")
+deck = fecm.examples.path("impact-patch.inp")
 values = {
     "velocity": [50.0 + 15.0 * n for n in range(16)],  # in/s
     "k": [1.0e6, 1.2e6, 1.4e6, 1.6e6, 1.8e6, 2.0e6],  # lbf/in^1.5

@@ -19,7 +19,7 @@ import fecm
 
 table = fecm.examples.path("measured-force.csv")  # of a point force, with a scatter of 0.8 lbf
 time, measured = np.loadtxt(table, delimiter=",", skiprows=4, unpack=True)
-deck = fecm.examples.path("impact-115.inp").read_text()
+deck = fecm.examples.path("impact-patch.inp").read_text()
 deck = re.sub("PATC\n|DISC\n|SHEA MITC\n", "", deck)
 grid = {"velocity": np.linspace(113, 117, 9), "k": np.linspace(1.7e6, 2.1e6, 9)}
 with warnings.catch_warnings(action="ignore"):  # a point force depends on the mesh

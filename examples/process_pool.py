@@ -10,7 +10,7 @@ from multiprocessing import get_context
 
 import fecm
 
-good = fecm.read_one(fecm.examples.path("impact-115.inp"))
+good = fecm.read_one(fecm.examples.path("impact-patch.inp"))
 decks = {
     "as in the report": good.to_text(),
     "mistyped": good.to_text().replace("    1  0.0    0.0053", "    1  0.0    0.OO53"),

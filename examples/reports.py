@@ -14,7 +14,7 @@ import numpy as np
 import fecm
 
 warnings.simplefilter("ignore", fecm.FecmWarning)  # the pages say how far each result holds
-report = fecm.examples.path("impact-115.inp")
+report = fecm.examples.path("impact-patch.inp")
 measured = fecm.examples.path("measured-force.csv")
 drop = fecm.read_one(fecm.examples.path("drop-weight.inp"))
 drop = replace(drop, title="ASTM D7136, 5.5 kg")  # the deck's title has one energy

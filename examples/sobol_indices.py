@@ -12,7 +12,7 @@ from SALib.sample.sobol import sample
 
 import fecm
 
-deck = fecm.examples.path("impact-115.inp")
+deck = fecm.examples.path("impact-patch.inp")
 ends = {"velocity": (110, 170), "k": (1.5e6, 2.4e6), "alpha_p": (1e-4, 1e-3)}  # in/s, lbf, in
 problem = {"names": list(ends), "num_vars": len(ends), "bounds": list(ends.values())}
 draws = sample(problem, 256, calc_second_order=False, seed=1)

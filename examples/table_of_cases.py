@@ -17,7 +17,7 @@ tests = pd.DataFrame(
     }
 ).set_index("specimen")
 
-found = fecm.sweep(fecm.examples.path("impact-115.inp"), cases=tests)
+found = fecm.sweep(fecm.examples.path("impact-patch.inp"), cases=tests)
 columns = ["peak_force", "contact_time", "energy_absorbed", "status"]
 results = tests.join(found.to_dataframe()[columns].set_index(tests.index))
 print(results.to_string())

@@ -22,7 +22,7 @@ def test_the_impact_is_the_trusted_one():
     fecm.assert_same(result, "trusted.h5", rtol=1e-6, only=["history/force", "history/plate_w"])
 """
 
-deck = fecm.read_one(fecm.examples.path("impact-115.inp"))
+deck = fecm.read_one(fecm.examples.path("impact-patch.inp"))
 with TemporaryDirectory() as folder:
     project = Path(folder)
     fecm.run_one(deck, output=project / "trusted.h5")

@@ -180,7 +180,7 @@ def check(deck: str | Path | Deck, mode: Mode = "report") -> DeckCheck:
     Examples
     --------
     >>> import fecm
-    >>> found = fecm.check(fecm.examples.path("impact-115"))
+    >>> found = fecm.check(fecm.examples.path("impact-patch"))
     >>> found.ok, len(found.warnings)
     (True, 0)
     >>> (problem,) = found.problems

@@ -104,7 +104,7 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     for kind, given in results.items():
         html = render(page_of(given))  # type: ignore[arg-type]
         (folder / f"{kind}.html").write_text(html, encoding="utf-8", newline="\n")
-    example = [fecm.examples.path(name) for name in ("impact-115.inp", "measured-force.csv")]
+    example = [fecm.examples.path(name) for name in ("impact-patch.inp", "measured-force.csv")]
     done = call(
         "identify", *example, "--free", "k,velocity", "--report", folder / "fit.html", cwd=folder
     )

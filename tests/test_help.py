@@ -48,7 +48,7 @@ def test_a_help_page_ends_with_two_calls_that_the_command_takes(
         (tmp_path / name).write_bytes(examples.path(name).read_bytes())
     ply = '["mine"]\ndensity = 1.6e-9\nnu12 = 0.3\nE1 = 14e4\nE2 = 9e3\nG12 = 5e3\n'
     (tmp_path / "own-plies.toml").write_text(ply)
-    for name in ("impact-115.h5", "impact-115-sweep.h5"):
+    for name in ("impact-patch.h5", "impact-patch-sweep.h5"):
         (tmp_path / name).write_text("")  # must only exist
     command = found(names)
     _, _, calls = call(*names, "--help").stdout.partition("Typical calls:\n")
@@ -86,7 +86,7 @@ def test_a_group_lists_whole_sentences(group: str) -> None:
         (("run", APPENDIX, "--slip", "tape"), "did you mean tapes?"),
         (("sweep", APPENDIX, "--vary", "velosity=1"), "did you mean velocity?"),
         (("sweep", APPENDIX, "--vary", "k=1e6", "--measure", "deflection"), "max_deflection?"),
-        (("example", "impct-115"), "did you mean impact-115"),
+        (("example", "impct-patch"), "did you mean impact-patch"),
         (("indent", "contacts", "report0.5"), "did you mean report-0.5?"),
     ],
 )
@@ -115,7 +115,7 @@ def test_a_name_like_no_other_gets_no_hint_but_the_choices() -> None:
         ("sweep d.inp --random velo", {"velocity="}),
         ("new --material IM", {"IM7/8552", "IM7/8551-7"}),
         ("identify d.inp m.csv --free mass,velo", {"mass,velocity"}),
-        ("example imp", {"impact-115.inp"}),
+        ("example imp", {"impact-patch.inp"}),
     ],
 )
 def test_the_shell_completes_values(

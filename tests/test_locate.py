@@ -221,7 +221,7 @@ def test_a_modulus_5_percent_too_high_moves_the_place_by_less_than_a_millimetre(
 
 @pytest.mark.long
 def test_the_reports_impact_with_a_rod_is_located_within_one_element() -> None:
-    report = fecm.read_one(fecm.examples.path("impact-115"))
+    report = fecm.read_one(fecm.examples.path("impact-patch"))
     face = 0.5 * sum(layer.thickness for layer in report.require(model.Material).layers)
     deck = with_gages(report, (1.8, 1.4, face, 0.0), (4.3, 2.6, face, 90.0), (2.2, 2.9, face, 0.0))
     run = fecm.run_one(fecm.read_one(deck.to_text()))

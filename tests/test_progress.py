@@ -130,9 +130,9 @@ def test_a_sweep_a_search_and_a_run_in_full_say_how_far_they_are(tmp_path: Path)
 
 @pytest.mark.usefixtures("_line_at_begin_and_end")
 def test_a_fit_says_how_many_forces_it_has_computed(tmp_path: Path) -> None:
-    for name in ("impact-115.inp", "measured-force.csv"):
+    for name in ("impact-patch.inp", "measured-force.csv"):
         call("example", name, cwd=tmp_path)
-    done = call("identify", "impact-115.inp", "measured-force.csv", "--free", "k", cwd=tmp_path)
+    done = call("identify", "impact-patch.inp", "measured-force.csv", "--free", "k", cwd=tmp_path)
     told = re.findall(r"^fecm: (\d+) trial forces after 1 min$", done.stderr, re.M)
     numbers = list(map(int, told))
     assert numbers == sorted(numbers)

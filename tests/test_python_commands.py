@@ -79,7 +79,7 @@ def test_each_problem_of_a_deck_has_its_summary() -> None:
 
 
 def test_listing_mode_refuses_what_the_printed_program_lacks_and_other_modes_are_unknown() -> None:
-    deck = fecm.examples.path("impact-115")
+    deck = fecm.examples.path("impact-patch")
     assert fecm.check(deck).ok
     assert not fecm.check(deck, "listing").ok
     with pytest.raises(ValueError, match="unknown mode 'raport'"):

@@ -199,7 +199,7 @@ TAKEN = {
     "decks/pulse-load.inp": 0.0662,
     "decks/static-bending.inp": 0.0661,
     "fecm/examples/drop-weight.inp": 2.96e-07,
-    "fecm/examples/impact-115.inp": 4.57e-07,
+    "fecm/examples/impact-patch.inp": 4.57e-07,
     "fecm/examples/panel-with-gages.inp": 1.71e-07,
     "fecm/examples/plate-with-gages.inp": 3.07e-07,
 }

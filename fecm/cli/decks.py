@@ -101,8 +101,8 @@ def _failures(decks: Sequence[Path], work: Callable[[Path], None]) -> list[Excep
 @click.command(
     short_help="Check decks without running them, and summarise them.",
     epilog=typical(
-        "fecm check impact-115.inp",
-        "fecm check impact-115.inp --mesh-error --strict",
+        "fecm check impact-patch.inp",
+        "fecm check impact-patch.inp --mesh-error --strict",
     ),
 )
 @DECKS
@@ -261,8 +261,8 @@ def _location(deck: Path, finding: Finding) -> dict[str, Any]:
 @click.command(
     short_help="Align the columns of decks.",
     epilog=typical(
-        "fecm fmt impact-115.inp -o aligned.inp",
-        "fecm fmt impact-115.inp --check",
+        "fecm fmt impact-patch.inp -o aligned.inp",
+        "fecm fmt impact-patch.inp --check",
     ),
 )
 @DECKS

@@ -16,7 +16,7 @@ from fecm.sweeps.estimate import estimate_problem
 @click.command(
     epilog=typical(
         "fecm estimate drop-weight.inp",
-        "fecm estimate impact-115.inp --format json",
+        "fecm estimate impact-patch.inp --format json",
     )
 )
 @click.argument("deck", type=DECK_PATH)

@@ -17,7 +17,7 @@ from fecm.cli.options import FILE_PATH, Parsed
     short_help="List the example decks and tables, or write one.",
     epilog=typical(
         "fecm example",
-        "fecm example impact-115.inp",
+        "fecm example impact-patch.inp",
     ),
 )
 @click.argument("name", type=Parsed(str, "NAME", examples.CONTENTS), required=False)

@@ -24,8 +24,8 @@ from fecm.results.tapes import tape_texts, write_tapes
 
 @click.command(
     epilog=typical(
-        "fecm tapes impact-115.h5",
-        "fecm tapes impact-115.h5 -d tapes",
+        "fecm tapes impact-patch.h5",
+        "fecm tapes impact-patch.h5 -d tapes",
     )
 )
 @click.argument("result", type=DECK_PATH)
@@ -52,8 +52,8 @@ def tapes(result: Path, directory: Path, overwrite: bool) -> None:
 
 @click.command(
     epilog=typical(
-        "fecm export impact-115.h5 --to vtkhdf",
-        "fecm export impact-115.h5 --to csv --dataset energy",
+        "fecm export impact-patch.h5 --to vtkhdf",
+        "fecm export impact-patch.h5 --to csv --dataset energy",
     )
 )
 @click.argument("result", type=DECK_PATH)

@@ -55,8 +55,8 @@ class Options:
 
 @click.command(
     epilog=typical(
-        "fecm identify impact-115.inp measured-force.csv --free k",
-        "fecm identify impact-115.inp measured-force.csv --free k,velocity --plot fit.png",
+        "fecm identify impact-patch.inp measured-force.csv --free k",
+        "fecm identify impact-patch.inp measured-force.csv --free k,velocity --plot fit.png",
     )
 )
 @click.argument("deck", type=DECK_PATH)

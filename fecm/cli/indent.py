@@ -164,8 +164,8 @@ class CurveOptions:
 
 @indent.command(
     epilog=typical(
-        "fecm indent curve impact-115.inp --path 1.5e-3,0,2.5e-3,0 -o path.csv",
-        "fecm indent curve impact-115.inp --rigidity --q 2.5 --plot rigidity.png",
+        "fecm indent curve impact-patch.inp --path 1.5e-3,0,2.5e-3,0 -o path.csv",
+        "fecm indent curve impact-patch.inp --rigidity --q 2.5 --plot rigidity.png",
     )
 )
 @click.argument("deck", type=DECK_PATH)

@@ -61,8 +61,8 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
 @click.command(
     short_help="Describe the contents of RESULT.",
     epilog=typical(
-        "fecm info impact-115.h5",
-        "fecm info impact-115.h5 --format json",
+        "fecm info impact-patch.h5",
+        "fecm info impact-patch.h5 --format json",
     ),
 )
 @click.argument("result", type=NAMED_PATH)

@@ -81,8 +81,8 @@ class PictureOptions:
 @click.command(
     short_help="Draw the report's figures, or the map of a sweep.",
     epilog=typical(
-        "fecm plot impact-115.h5 --kind force --kind loop",
-        "fecm plot impact-115-sweep.h5 --quantity peak_force --over velocity",
+        "fecm plot impact-patch.h5 --kind force --kind loop",
+        "fecm plot impact-patch-sweep.h5 --quantity peak_force --over velocity",
     ),
 )
 @click.argument("results", type=DECK_PATH, nargs=-1, required=True, metavar="RESULT...")

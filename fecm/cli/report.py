@@ -19,7 +19,7 @@ from fecm.results.schema import Form
 
 @click.command(
     epilog=typical(
-        "fecm report impact-115.h5",
+        "fecm report impact-patch.h5",
         "fecm report thin.h5 thick.h5 -o comparison.html",
     ),
 )

@@ -102,8 +102,8 @@ class PulseOptions:
 
 @rod.command(
     epilog=typical(
-        "fecm rod impact-115.inp --pulse gauss:1000,200e-6,40e-6 --plot pulse.png",
-        "fecm rod impact-115.inp --pulse pulse.csv --station .25 --station .5 -o forces.csv",
+        "fecm rod impact-patch.inp --pulse gauss:1000,200e-6,40e-6 --plot pulse.png",
+        "fecm rod impact-patch.inp --pulse pulse.csv --station .25 --station .5 -o forces.csv",
     )
 )
 @click.argument("deck", type=DECK_PATH, required=False)
@@ -223,7 +223,7 @@ def _of_deck(options: PulseOptions) -> Struck:
 @rod.command(
     "filter",
     epilog=typical(
-        "fecm rod filter impact-115.h5 --filter first-order:10e-6 -o filtered.csv",
+        "fecm rod filter impact-patch.h5 --filter first-order:10e-6 -o filtered.csv",
         "fecm rod filter calibration-test.csv --column V_F --filter cfc:1000",
     ),
 )

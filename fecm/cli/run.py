@@ -120,7 +120,7 @@ class Job:
     cls=GroupedCommand,
     groups=GROUPS,
     epilog=typical(
-        "fecm run impact-115.inp",
+        "fecm run impact-patch.inp",
         "fecm run drop-weight.inp -o drop.h5 --overwrite --fail-limit 1",
     ),
 )

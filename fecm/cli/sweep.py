@@ -174,7 +174,7 @@ def _checked_vary(text: str) -> str:
     cls=GroupedCommand,
     groups=GROUPS,
     epilog=typical(
-        "fecm sweep impact-115.inp --vary velocity=50:150:11 --vary k=1e6,2e6",
+        "fecm sweep impact-patch.inp --vary velocity=50:150:11 --vary k=1e6,2e6",
         "fecm sweep drop-weight.inp --find velocity --until peak_force=threshold",
         "fecm sweep drop-weight.inp --random k=lognormal:42000,.2 --samples 200 "
         "--exceed peak_force=threshold",

@@ -165,8 +165,8 @@ def waves() -> None:
 @waves.command(
     cls=_ListCommand,
     epilog=typical(
-        "fecm waves dispersion impact-115.inp --angle 0 45 90 --plot dispersion.png",
-        "fecm waves dispersion impact-115.inp --wavelengths 1:20:100 -o dispersion.csv",
+        "fecm waves dispersion impact-patch.inp --angle 0 45 90 --plot dispersion.png",
+        "fecm waves dispersion impact-patch.inp --wavelengths 1:20:100 -o dispersion.csv",
     ),
 )
 @option(
@@ -220,8 +220,8 @@ def dispersion(
 
 @waves.command(
     epilog=typical(
-        "fecm waves speeds impact-115.inp -o speeds.csv",
-        "fecm waves speeds impact-115.inp --plot speeds.png",
+        "fecm waves speeds impact-patch.inp -o speeds.csv",
+        "fecm waves speeds impact-patch.inp --plot speeds.png",
     )
 )
 @STEP
@@ -240,8 +240,8 @@ def speeds(step: float, source: Source, targets: OutputPaths) -> None:
 @waves.command(
     cls=_ListCommand,
     epilog=typical(
-        "fecm waves fronts impact-115.inp --time 10e-6 -o fronts.csv",
-        "fecm waves fronts impact-115.inp --time 10e-6 20e-6 --plot fronts.png",
+        "fecm waves fronts impact-patch.inp --time 10e-6 -o fronts.csv",
+        "fecm waves fronts impact-patch.inp --time 10e-6 20e-6 --plot fronts.png",
     ),
 )
 @option(

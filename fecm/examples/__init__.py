@@ -10,17 +10,17 @@ __all__ = ["names", "path"]
 
 # What is in each file.
 CONTENTS = {
-    "impact-115.inp": "the report's experiment at 115 in/s, with a contact patch (lbf, in, s)",
+    "impact-patch.inp": "the report's experiment at 115 in/s, with a contact patch (lbf, in, s)",
     "drop-weight.inp": "ASTM D7136 at 2.5 J, with strengths and delamination threshold (mm, N, s)",
     "plate-with-gages.inp": "a ball of 20 g on a clamped plate with strain gages (mm, N, s)",
     "panel-with-gages.inp": "a panel with four strain gages, to locate an impact (mm, N, s)",
     "panel-strains.csv": "strains of an impact somewhere on that panel: time, gages 1 to 4",
     "hole.msh": "mesh of Gmsh: 60 x 40 with a hole of radius 6, groups edge and hole",
-    "measured-force.csv": "a force of impact-115 as a transducer shows it: time, force",
+    "measured-force.csv": "a force of impact-patch as a transducer shows it: time, force",
     "indentation-test.csv": "an indentation test in five cycles: indentation, force",
     "calibration-test.csv": "a calibration of a transducer: time, V_F, V_a",
     "pulse.csv": "a force on a rod: time, force",
-    "cases.csv": "cases of a sweep of impact-115: velocity, k, layup",
+    "cases.csv": "cases of a sweep of impact-patch: velocity, k, layup",
 }
 
 
@@ -30,7 +30,7 @@ def names() -> list[str]:
     Examples
     --------
     >>> names()[0]
-    'impact-115.inp'
+    'impact-patch.inp'
     """
     return list(CONTENTS)
 
@@ -50,8 +50,8 @@ def path(name: str) -> Path:
 
     Examples
     --------
-    >>> path("impact-115").name
-    'impact-115.inp'
+    >>> path("impact-patch").name
+    'impact-patch.inp'
     """
     for known in CONTENTS:
         if name in (known, Path(known).stem):

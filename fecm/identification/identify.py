@@ -249,7 +249,7 @@ def identify(
     >>> import numpy as np
     >>> table = fecm.examples.path("measured-force.csv")
     >>> time, force = np.loadtxt(table, delimiter=",", skiprows=3, unpack=True)
-    >>> found = fecm.identify("impact-115.inp", time, force, ["k"], filter="first-order:5e-6")
+    >>> found = fecm.identify("impact-patch.inp", time, force, ["k"], filter="first-order:5e-6")
     >>> round(found.values["k"], -4)
     1900000.0
     """

@@ -109,7 +109,7 @@ def diff(
     Examples
     --------
     >>> import fecm
-    >>> deck = fecm.read_one(fecm.examples.path("impact-115"))
+    >>> deck = fecm.read_one(fecm.examples.path("impact-patch"))
     >>> result, other = fecm.run_one(deck), fecm.run_one(deck.with_(velocity=116.0))
     >>> found = fecm.diff(result, other, rtol=1e-6, only=["laminate", "history/force"])
     >>> found.same, found.different
@@ -201,7 +201,7 @@ def assert_same(
     Examples
     --------
     >>> import fecm
-    >>> deck = fecm.examples.path("impact-115")
+    >>> deck = fecm.examples.path("impact-patch")
     >>> fecm.run_one(deck).save("trusted.h5")
     >>> fecm.assert_same(fecm.run_one(deck, solver="csr"), "trusted.h5")
     """

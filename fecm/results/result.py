@@ -238,8 +238,8 @@ class Result(Stored, schema.Contact):
         Examples
         --------
         >>> import fecm
-        >>> result = fecm.run_one(fecm.examples.path("impact-115"))
-        >>> result.export("impact-115.vtkhdf")
+        >>> result = fecm.run_one(fecm.examples.path("impact-patch"))
+        >>> result.export("impact-patch.vtkhdf")
         >>> result.export("curvature.csv", "tape8/kappa_x")
         """
         from fecm.results.export import export, format_of  # h5py takes 30 ms

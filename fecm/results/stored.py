@@ -137,7 +137,7 @@ class Stored:
         Examples
         --------
         >>> import fecm
-        >>> result = fecm.run_one(fecm.examples.path("impact-115"))
+        >>> result = fecm.run_one(fecm.examples.path("impact-patch"))
         >>> result.unit("velocity"), result.unit("energy_absorbed")
         ('in/s', 'lbf*in')
         """

@@ -99,7 +99,7 @@ def mesh_error(
     Examples
     --------
     >>> import fecm
-    >>> found = fecm.mesh_error(fecm.examples.path("impact-115"))
+    >>> found = fecm.mesh_error(fecm.examples.path("impact-patch"))
     >>> print(f"{found.peak_force:.3f} lb, {found.refined_peak_force:.3f} lb")
     85.013 lb, 85.101 lb
     """

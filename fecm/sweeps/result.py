@@ -191,7 +191,7 @@ class SweepResult(StoredSweep):
         Examples
         --------
         >>> import fecm
-        >>> deck = fecm.examples.path("impact-115")
+        >>> deck = fecm.examples.path("impact-patch")
         >>> found = fecm.sweep(deck, {"velocity": [100.0, 115.0, 130.0]})
         >>> found.export("velocities.csv")
         """
