@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +20,7 @@ from fecm.sweeps import api
 from fecm.sweeps.case import CasesError
 from fecm.sweeps.plan import Task, plan, tasks
 from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
-from fecm.sweeps.reduced_check import ReducedModel
+from fecm.sweeps.reduced_check import ReducedModel, count_held
 from fecm.sweeps.responses import Hits
 from fecm.sweeps.strike import strike_of
 from tests.builders import table
@@ -125,7 +126,49 @@ def test_too_few_modes_are_refused_before_the_sweep(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(api, "_outcomes", counted)
     with pytest.raises(CasesError, match=r"1 mode differs by \+.* case 3; .*2%.*more modes"):
         fecm.sweep(DECK, {"velocity": [100.0, *SPEEDS]}, model="reduced", modes=1)
-    assert [task.numbers for task in ran] == [(3,)] * 2  # the largest energy, in full and reduced
+    # The largest energy and the smallest, each in full and by the model.
+    assert [task.numbers for task in ran] == [(3,)] * 2 + [(0,)] * 2
+
+
+def test_cases_of_energies_at_which_the_model_does_not_hold_are_run_in_full(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "d.inp").write_text(DECK)
+    given = ("sweep", "d.inp", "--vary", "velocity=50,100,200,300,400,600,900", "--history")
+    assert call(*given, "-o", "full.h5", cwd=tmp_path).exit_code == 0
+    done = call(*given, "--model", "reduced", "--modes", "2", "-o", "s.h5", cwd=tmp_path)
+    assert done.exit_code == 0, done.stderr
+    found, full = (fecm.load_sweep(tmp_path / name) for name in ("s.h5", "full.h5"))
+    assert found.reduced is not None
+    assert found.reduced.in_full == 3
+    np.testing.assert_array_equal(found["peak_force"][4:], full["peak_force"][4:])
+    assert np.all(np.abs(found["peak_force"][:4] / full["peak_force"][:4] - 1.0) < 0.02)
+    assert "the 3 cases of the largest energies are run in full" in done.stderr
+    assert "with more modes they may be fewer" in done.stderr
+    for shown in (done.stdout, call("info", "s.h5", cwd=tmp_path).stdout):
+        assert "3 cases of the largest energies: in full, as above 2%" in shown
+    assert found.force is not None
+    assert full.force is not None
+    np.testing.assert_array_equal(found.force[5, :STEPS], full.force[5])
+    np.testing.assert_allclose(np.nanmax(found.force, axis=1)[1:], found["peak_force"][1:])
+
+
+@pytest.mark.parametrize("held", [*range(9), 29, 30])
+def test_the_model_holds_up_to_the_smallest_energy_at_which_it_fails(held: int) -> None:
+    ordered = list(range(100, 130))
+    ran: list[int] = []
+
+    def failing(cases: Iterable[int]) -> set[int]:
+        ran.extend(case for case in cases if case not in ran)
+        return {case for case in ran if case >= 100 + held}
+
+    assert count_held(ordered, failing) == held
+    assert ran[0] == 129  # the largest energy first
+    assert len(ran) <= 2 + 5 + 1  # smallest and largest, bisection of 30, the middle
+
+
+def test_a_model_that_fails_in_the_middle_is_not_taken_beyond_it() -> None:
+    assert count_held(list(range(30)), lambda cases: {case for case in cases if case == 15}) == 15
 
 
 def test_a_model_with_all_its_modes_is_not_told_to_take_more() -> None:

@@ -355,7 +355,7 @@ def sweep(options: Options) -> None:
     click.get_current_context().with_resource(alone(path))
     parts = PartialResults(path, planned.fingerprint(), restart=options.overwrite)
     result = _carry_out(problem, planned, parts, options.workers, scheduler)
-    forces = parts.forces(tasks(problem, planned)) if options.history else ()
+    forces = parts.forces() if options.history else ()
     save(result, path, overwrite=options.overwrite, forces=forces)
     if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
         note(f"{lost} cases were lost with their workers; --overwrite runs them again")

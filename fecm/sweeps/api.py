@@ -7,6 +7,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import suppress
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -57,7 +58,7 @@ from fecm.sweeps.random import (
     doubt,
     random_cases,
 )
-from fecm.sweeps.reduced_check import ReducedModel, compared, trials
+from fecm.sweeps.reduced_check import ReducedModel, Trials, by_energy, count_held, trials
 from fecm.sweeps.refine import refined_cases
 from fecm.sweeps.result import SweepResult, result_of
 from fecm.sweeps.result_writer import save
@@ -137,7 +138,7 @@ def carry_out(
     Tasks that `parts` has stored are not run again; with it, the result has no forces.  `done` is
     called with each task and its outcome, including tasks finished earlier, `idle` regularly,
     `note` with messages for the user.  Raises SchedulerError if the scheduler cannot be used, and
-    CasesError if full runs show that the reduced model of the plan does not hold.
+    CasesError if full runs show that the reduced model of the plan holds for no case.
     """
     run = partial(
         _outcomes,
@@ -149,32 +150,41 @@ def carry_out(
         idle=idle,
         note=note,
     )
-    whole = tasks(problem, made)
-    model = None
-    if made.settings.modes is not None:
-        model = _checked_model(made, made.settings.modes, len(whole), run)
+    if made.settings.modes is None:
+        model, whole = None, tasks(problem, made)
+    else:
+        model, whole = _by_model(problem, made, made.settings.modes, run, note)
+    if parts is not None:
+        parts.tasks = whole
     outcomes = [outcome for _, outcome in run(whole, done=done)]
     history = made.settings.history and parts is None
     return result_of(made, merge(outcomes, history=history), model)
 
 
-def _checked_model(
-    made: Plan, modes: int, first: int, run: Callable[..., list[tuple[Task, Outcome]]]
-) -> ReducedModel:
-    """Compare the reduced model with full runs; the largest energy first, which fits worst.
+def _by_model(
+    problem: Problem,
+    made: Plan,
+    modes: int,
+    run: Callable[..., list[tuple[Task, Outcome]]],
+    note: Callable[[str], None],
+) -> tuple[ReducedModel, list[Task]]:
+    """Compare the reduced model with full runs; tasks of the cases, by the model or in full.
 
-    The tasks are numbered from `first`.  Raises CasesError if the model differs too much.
+    Raises CasesError if the model holds for no case.
     """
-    fulls, models = trials(made, first)
-    in_full: list[Outcome] = []
-    by_model: list[Outcome] = []
-    for some in (slice(-1, None), slice(None, -1)):
-        pairs = [*fulls[some], *models[some]]
-        for task, outcome in run(pairs, done=lambda task, outcome: None) if pairs else ():
-            (in_full if task.settings.modes is None else by_model).append(outcome)
-        if all(outcome.fine.all() for outcome in (*in_full, *by_model)):
-            compared(modes, in_full, by_model)
-    return compared(modes, in_full, by_model)
+    ordered, count = by_energy(made), len(made.cases)
+    tried = Trials(made, count, partial(run, done=lambda task, outcome: None))
+    held = count_held(ordered, tried.failing)
+    model = replace(tried.compared(modes), in_full=len(ordered) - held)
+    if not held:
+        model.check()
+    in_full = set(ordered[held:])
+    if not in_full:
+        return model, tasks(problem, made)
+    note(model.note)
+    rest = [case for case in range(count) if case not in in_full]
+    fulls = [task for task in trials(made, sorted(in_full), count) if task.settings.modes is None]
+    return model, [*tasks(problem, made, rest), *fulls]
 
 
 def _outcomes(
@@ -348,7 +358,7 @@ def sweep(
     ------
     CasesError
         If the cases are invalid, options exclude each other, no case has a deck, `measure` returns
-        different names in different cases, or the reduced model differs too much from full runs.
+        different names in different cases, or the reduced model holds for no case.
     DeckError
         If the deck has errors.
     NotEnoughMemoryError

@@ -159,7 +159,7 @@ def _found_in_full(
         return Outcome.failed({number: str(error)})
 
 
-@lru_cache(maxsize=1)
+@lru_cache(maxsize=2)  # for runs in full beside those of the reduced model
 def _prepared(
     deck: Deck,
     of_plate: tuple[tuple[str, Value], ...],

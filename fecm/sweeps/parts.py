@@ -49,6 +49,7 @@ class PartialResults:
 
     def __init__(self, result: Path, fingerprint: str, *, restart: bool = False) -> None:
         self.folder = parts_of(result)
+        self.tasks: Sequence[Task] = ()  # those of all cases, once they are known
         self.folder.mkdir(exist_ok=True)
         mark, found = self.folder / "sweep.json", ""
         with suppress(OSError, ValueError, KeyError, TypeError):
@@ -95,9 +96,9 @@ class PartialResults:
             file.write(data)
             file.write(hashlib.sha256(data).digest())
 
-    def forces(self, tasks: Sequence[Task]) -> Iterator[Forces]:
+    def forces(self) -> Iterator[Forces]:
         """Read the contact forces of one task after the other; None if all its cases failed."""
-        for task in tasks:
+        for task in self.tasks:
             outcome = self.get(task)
             yield task.numbers, None if outcome is None else outcome.force
 

@@ -270,8 +270,8 @@ def _runs_of_case(made: Plan) -> int:
     return 1 if made.settings.search is None else FIRST_VELOCITIES
 
 
-def tasks(checked: Problem, made: Plan) -> list[Task]:
-    """Split a plan into tasks.
+def tasks(checked: Problem, made: Plan, cases: Sequence[int] | None = None) -> list[Task]:
+    """Split a plan, or some of its cases, into tasks.
 
     These are cases that share a plate, full runs that share a motion, or single ones.
     """
@@ -280,8 +280,8 @@ def tasks(checked: Problem, made: Plan) -> list[Task]:
     if made.settings.shares_motion:
         together, common = MOST_IN_MOTION, motion_values
     plates: dict[object, list[int]] = {}
-    for number, case in enumerate(made.cases):
-        plates.setdefault(frozenset(common(case).items()), []).append(number)
+    for number in range(len(made.cases)) if cases is None else cases:
+        plates.setdefault(frozenset(common(made.cases[number]).items()), []).append(number)
     parts = [
         tuple(numbers[start : start + together])
         for numbers in plates.values()

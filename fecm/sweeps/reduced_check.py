@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -19,6 +19,7 @@ from fecm.sweeps.vary import strike
 if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
 
+RunTasks = Callable[[Sequence[Task]], list[tuple[Task, Outcome]]]
 GROUP = "reduced"
 LIMIT = 0.02  # largest difference of the peaks, relative to that of the full run
 TEXTS = {
@@ -43,10 +44,14 @@ class ReducedModel:
         Of the cases that were also run in full: ``case``, their numbers; ``peak_force`` and
         ``deflection_ratio`` by the model; ``full_peak_force`` and ``full_deflection_ratio`` by the
         full runs.
+    in_full : int
+        Number of cases that were run in full, as the model differs too much: those of the largest
+        energies.
     """
 
     modes: int
     columns: dict[str, Column]
+    in_full: int = 0
 
     def difference(self, name: str) -> Column:
         """Difference of the model from the full runs, relative to these, (n,)."""
@@ -66,43 +71,49 @@ class ReducedModel:
         for case, peak, w in rows:
             of_w = "open" if np.isnan(w) else f"{w:+.3%}"
             yield f"{'':18}peak {peak:+.2%}, w {of_w} (case {case})"
+        if self.in_full:
+            cases = "1 case" if self.in_full == 1 else f"{self.in_full} cases"
+            yield f"{'':18}{cases} of the largest energies: in full, as above {LIMIT:.0%}"
         yield f"{'':18}slopes and strains are not judged"
 
     def check(self) -> None:
         """Raise CasesError if a peak differs by more than the limit."""
-        peaks = self.difference("peak_force")
-        worst = int(np.abs(peaks).argmax())
-        if not abs(peaks[worst]) <= LIMIT:
+        if not np.abs(self.difference("peak_force")).max() <= LIMIT:
             remedy = "take more modes, or full runs (leave out the reduced model)"
             if self.modes >= MOST_MODES:
                 remedy = "these are all its modes; take full runs: leave out the reduced model"
-            raise CasesError(
-                f"the peak force of the reduced model with {self._modes} differs by "
-                f"{peaks[worst]:+.1%} from the full run of case {self.columns['case'][worst]}; "
-                f"at most {LIMIT:.0%} is allowed: {remedy}"
-            )
+            raise CasesError(f"{self._misfit}; at most {LIMIT:.0%} is allowed: {remedy}")
+
+    @property
+    def note(self) -> str:
+        """Which cases are run in full, and why."""
+        cases = "the case" if self.in_full == 1 else f"the {self.in_full} cases"
+        more = "" if self.modes >= MOST_MODES else "; with more modes they may be fewer"
+        return f"{self._misfit}: {cases} of the largest energies are run in full{more}"
+
+    @property
+    def _misfit(self) -> str:
+        """The largest difference of a peak force."""
+        peaks = self.difference("peak_force")
+        worst = int(np.abs(peaks).argmax())
+        return (
+            f"the peak force of the reduced model with {self._modes} differs by "
+            f"{peaks[worst]:+.1%} from the full run of case {self.columns['case'][worst]}"
+        )
 
 
-def trials(made: Plan, first: int) -> tuple[list[Task], list[Task]]:
-    """Tasks of the cases of smallest, middle and largest energy: full runs, and by the model.
-
-    They are numbered from `first`.  Raises CasesError if no case has an energy.
-    """
-    settings = replace(made.settings, history=False)
-    in_full = replace(settings, modes=None)
-    chosen = _chosen(made)
-    fulls, models = (
-        [
-            Task(own, number, (case,), (made.cases[case],))
-            for number, case in enumerate(chosen, start=start)
-        ]
-        for own, start in ((in_full, first), (settings, first + len(chosen)))
-    )
-    return fulls, models
+def trials(made: Plan, cases: Sequence[int], first: int) -> list[Task]:
+    """Tasks of some cases, each in full and by the model; case n has number `first` + 2 n."""
+    both = (replace(made.settings, modes=None), made.settings)
+    return [
+        Task(own, first + 2 * case + place, (case,), (made.cases[case],))
+        for case in cases
+        for place, own in enumerate(both)
+    ]
 
 
-def _chosen(made: Plan) -> list[int]:
-    """Cases of smallest, middle and largest energy; CasesError if none has an energy."""
+def by_energy(made: Plan) -> list[int]:
+    """Cases with an energy, the smallest first; CasesError if none has one."""
     energies: list[tuple[float, int]] = []
     for number, case in enumerate(made.cases):
         with suppress(CasesError):  # the case will fail
@@ -110,11 +121,60 @@ def _chosen(made: Plan) -> list[int]:
     ordered = [number for energy, number in sorted(energies) if energy > 0.0]
     if not ordered:
         raise CasesError("no case has an energy, by which the reduced model could be checked")
-    return list(dict.fromkeys([ordered[0], ordered[len(ordered) // 2], ordered[-1]]))
+    return ordered
+
+
+class Trials:
+    """Cases that were run in full and by the model."""
+
+    def __init__(self, made: Plan, first: int, run: RunTasks) -> None:
+        self._made, self._first, self._run = made, first, run
+        self._fulls: list[Outcome] = []
+        self._models: list[Outcome] = []
+
+    def failing(self, cases: Iterable[int]) -> set[int]:
+        """Run cases that have not been run yet; those of all for which the model does not hold."""
+        before = {number for outcome in self._fulls for number in outcome.numbers}
+        new = [case for case in dict.fromkeys(cases) if case not in before]
+        for task, outcome in self._run(trials(self._made, new, self._first)) if new else ():
+            (self._models if task.settings.modes else self._fulls).append(outcome)
+        full, model = (merge(some, history=False) for some in (self._fulls, self._models))
+        forces = [one.columns[About.REACHED] for one in (model, full)]
+        holds = ~full.fine | (model.fine & (np.abs(forces[0] - forces[1]) <= LIMIT * forces[1]))
+        return {number for number, one in zip(full.numbers, holds, strict=True) if not one}
+
+    def compared(self, modes: int) -> ReducedModel:
+        """The model beside the full runs; CasesError if all failed."""
+        return compared(modes, self._fulls, self._models)
+
+
+def count_held(ordered: Sequence[int], failing: Callable[[Iterable[int]], set[int]]) -> int:
+    """Count the cases, ordered by energy, for which the model holds; others are run in full.
+
+    The model fits worst where the plate bends most.  So the case of the largest energy goes first.
+    If it fails, and that of the smallest holds, bisection finds the last that holds.  A case of the
+    middle is tried too.
+    """
+    held = len(ordered)
+    if failing(ordered[-1:]):
+        held -= 1
+        if ordered[0] in failing(ordered[:1]):
+            return 0
+        low = min(1, held)
+        while low < held:
+            middle = (low + held) // 2
+            if ordered[middle] in failing([ordered[middle]]):
+                held = middle
+            else:
+                low = middle + 1
+    if held:
+        wrong = failing([ordered[0], ordered[held // 2]])
+        held = next((n for n in range(held) if ordered[n] in wrong), held)
+    return held
 
 
 def compared(modes: int, fulls: Sequence[Outcome], models: Sequence[Outcome]) -> ReducedModel:
-    """Compare outcomes of the trials; CasesError if they differ too much, or if all failed."""
+    """Compare outcomes of the trials; CasesError if all failed."""
     full, model = merge(fulls, history=False), merge(models, history=False)
     fine = np.flatnonzero(full.fine & model.fine)
     if not len(fine):
@@ -122,7 +182,7 @@ def compared(modes: int, fulls: Sequence[Outcome], models: Sequence[Outcome]) ->
         reason = failed.status[int(np.flatnonzero(~failed.fine)[0])]
         raise CasesError(f"the reduced model can't be checked by full runs: {reason}")
     full, model = full.select(fine), model.select(fine)
-    found = ReducedModel(
+    return ReducedModel(
         modes,
         {
             "case": np.array(full.numbers),
@@ -132,13 +192,12 @@ def compared(modes: int, fulls: Sequence[Outcome], models: Sequence[Outcome]) ->
             f"full_{RATIO}": full.columns[RATIO],
         },
     )
-    found.check()
-    return found
 
 
 def attributes(model: ReducedModel) -> dict[str, Any]:
     """Attributes of the group in the file."""
-    return {"description": "full runs beside the reduced model", "modes": model.modes}
+    found = {"description": "full runs beside the reduced model", "modes": model.modes}
+    return found | ({"in_full": model.in_full} if model.in_full else {})
 
 
 def reduced_of(contents: Contents) -> ReducedModel | None:
@@ -147,10 +206,11 @@ def reduced_of(contents: Contents) -> ReducedModel | None:
         return None
     try:
         modes = int(contents.groups[GROUP]["modes"])
+        in_full = int(contents.groups[GROUP].get("in_full", 0))
         columns = {name: contents[f"{GROUP}/{name}"] for name in TEXTS}
     except (KeyError, ValueError, TypeError) as error:
         message = f"{contents.path}: what is stored of the reduced model is incomplete ({error})"
         raise ResultFileError(message) from None
     if len({np.shape(values) for values in columns.values()}) != 1:
         raise ResultFileError(f"{contents.path}: columns of the reduced model differ in length")
-    return ReducedModel(modes, columns)
+    return ReducedModel(modes, columns, in_full)
