@@ -16,9 +16,11 @@ from scipy.special import beta, j1
 
 from fecm._typing import Floats
 from fecm.deck.model import Ply
+from tests.builders import turned_stiffness
 from tests.closed_forms_plies import (
     equilibrium_shear,
     exposures,
+    inclined_failure,
     interlaminar,
     residual_stresses,
 )
@@ -374,6 +376,13 @@ def time_steps() -> tuple[float, float]:
     return math.sqrt(5.0) / 4.0 * side * math.sqrt(RHO / G), 2.0 * tilt
 
 
+def curved_strains() -> tuple[float, ...]:
+    """Strains of w = 1 on a ply at 30 degrees, and the pressure of its membrane forces."""
+    ply = Ply(1.57e-9, 0.32, 171420.0, 9080.0, 5290.0, 5290.0, 3242.9)
+    strain = np.array([1.0 / 500.0, -1.0 / 1000.0, 2.0 / 800.0])
+    return *strain.tolist(), float(strain @ turned_stiffness(ply, 30.0) @ strain * 0.2)
+
+
 STRAIN, CURVATURE = (1e-3, 2e-3, 3e-3), (0.4, -0.5, 0.6)
 MOMENT = (
     (Q22 - Q11) * THICK**2 / 8.0 * STRAIN[0]
@@ -448,6 +457,10 @@ EXPECTED: dict[str, Sequence[float | None]] = {
     ),
     "failure-states": (*exposures(), *interlaminar()),
     "residual-stresses": residual_stresses(),
+    "inclined-failure": inclined_failure(),
+    # Faces from 0.4 to 0.5 on either side, a core of 0.2 of their density.
+    "unlike-densities": (0.2 + 0.2 * 0.8, 2.0 / 3.0 * (0.5**3 - 0.4**3 + 0.2 * 0.4**3)),
+    "curved-strains": curved_strains(),
     "random-values": (*ishigami(), *lognormal(115.0, 0.08), *wilson(3, 40)),
     "refinement": (1.7, 1.0),
     "identification": (1.0e6, 100.0),
@@ -460,7 +473,9 @@ EXPECTED: dict[str, Sequence[float | None]] = {
     # Timoshenko and Woinowsky-Krieger, equation 147: w D/(F a²) of a simply supported square.
     "large-mass": (240e9 * 0.004**3 / (12.0 * 0.91) / (0.0116008395 * 0.2**2), None),
     # The force of a half sine is below 0.9 after this; the mass leaves with cos of the phase.
-    "end-of-contact": (math.asin(0.9) / math.pi, math.acos(0.9) / math.pi),
+    "end-of-contact": (
+        math.asin(0.9) / math.pi, math.acos(0.9) / math.pi, 0.0, math.asin(0.9) / math.pi,
+    ),
 }  # fmt: skip
 # References of relative errors that are derived too.
 SCALES = {"indentation": EXPECTED["indentation"][1], "ply-shear": PARABOLA}

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from scipy.optimize import brentq
+from scipy.optimize import brentq, minimize_scalar
 
 from fecm._typing import Floats
 from fecm.deck.model import Ply
@@ -192,4 +192,36 @@ def residual_stresses() -> tuple[float, ...]:
     lower, upper = (q @ (strain + z * curvature - ALPHA * dt) for z in (-h / 2.0, 0.0))
     common = -100.0 * q[:, :2].sum(axis=0)[:2] @ ALPHA[:2] / q[:2, :2].sum()
     across = float((q @ (np.array([common, common, 0.0]) + 100.0 * ALPHA))[1])
-    return strain[0], curvature[0], lower[0], upper[0], lower[1], upper[1], across, across
+    swollen = 0.5 * np.array([2e-4, 6e-3, 0.0])
+    both = (q[0] + q[1]) @ swollen / q[:2, :2].sum()
+    wet = float((q @ (np.array([both, both, 0.0]) - swollen))[1])
+    return strain[0], curvature[0], lower[0], upper[0], lower[1], upper[1], across, across, wet
+
+
+def inclined_failure() -> list[float]:
+    """Puck's exposure, largest over the planes along the fibres, of pressed plies.
+
+    On a plane whose normal is at an angle to the ply, sigma_n = s2 cos^2, tau_nt = -s2 sin cos and
+    tau_nl = tau cos.  Its exposure is sqrt((tau_nt/R_A)^2 + (tau_nl/S)^2 + (r sigma_n)^2) +
+    r sigma_n with r = p/S; R_A follows from an exposure of 1 at s2 = -YC.
+    """
+    yc, s, p = 200.0, 90.0, 0.25
+    r = p / s
+
+    def largest(s2: float, tau: float, resistance: float) -> float:
+        def exposure(angle: float) -> float:
+            cos, sin = math.cos(angle), math.sin(angle)
+            n = r * s2 * cos**2
+            return math.hypot(s2 * sin * cos / resistance, tau * cos / s, n) + n
+
+        steps = np.linspace(0.0, math.pi / 2.0, 181)
+        best = float(steps[np.argmax([exposure(angle) for angle in steps])])
+        around = (best - 0.02, best + 0.02)
+        found = minimize_scalar(
+            lambda a: -exposure(a), bounds=around, method="bounded", options={"xatol": 1e-9}
+        )
+        return exposure(float(found.x))
+
+    resistance = brentq(lambda one: largest(-yc, 0.0, one) - 1.0, 20.0, 200.0, xtol=1e-12)
+    pressed = ((-180.0, 0.0), (-180.0, 60.0), (-150.0, -80.0))
+    return [largest(s2, tau, resistance) for s2, tau in pressed]

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
+import numpy as np
+
 from fecm.deck import model
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.grid import EDGES, Grid, refined, uniform
@@ -72,3 +74,26 @@ def _curved_impact() -> Sequence[Value]:
     macros = decks.impact_program(1.6e-7, 1250)
     found = panel(Curvature(radius_x=500.0), grid, macros, patch, *hit)
     return [*peak(found), found.plate_w[-1]]
+
+
+@case
+def _curved_strains() -> Sequence[Value]:
+    """One element of a twisted panel with NONL, held in a constant w."""
+    side, w = 10.0, 0.01
+    grid = Grid(uniform(side, 1), uniform(side, 1))
+    held = np.zeros((grid.nodes, 5))
+    held[:, 2] = w
+    ply = MATERIALS["IM7/8552"].converted("mm-N-s")
+    segments = (
+        decks.held_but(0, node=5),  # u of the middle, on which a constant N does not act
+        decks.forces(held),
+        Curvature(500.0, -1000.0, 800.0),
+        model.Nonlinear(),
+        decks.MITC,
+        decks.material(ply, (30.0,), 0.2),
+    )
+    macros = decks.program("TANG FORM SOLV STRE REAC")
+    found = decks.result_of(decks.deck(grid, segments, macros))
+    strains = decks.fields(found, "stresses", "eps_xx eps_yy gamma_xy")
+    pressure = found["reactions/force"][..., 2].sum() / side**2
+    return [*(strain / w for strain in strains), pressure / w]

@@ -37,3 +37,23 @@ def _failure_states() -> Sequence[Value]:
     found = decks.result_of(decks.deck(grid, (decks.held_but(2), held, STRENGTHS, plate), macros))
     plies = [found[f"failure/{name}/exposure"].max(axis=(0, 1, 3)) for name in CRITERIA]
     return [*np.ravel(plies), *found["failure/interlaminar/exposure"][0]]
+
+
+# σ2 and τ12 of a ply at 0 degrees that is pressed across its fibres; the action plane is inclined.
+PRESSED = ((-180.0, 0.0), (-180.0, 60.0), (-150.0, -80.0))
+
+
+@case
+def _inclined_failure() -> Sequence[Value]:
+    """Puck's exposure in constant stresses of one element, by which mode C decides."""
+    grid = Grid(uniform(1.0, 1), uniform(1.0, 1))
+    x, y = (v.ravel() - 0.5 for v in np.meshgrid(lines(grid.columns), lines(grid.rows)))
+    plate, macros = decks.material(CARBON, [0.0], 1.0), decks.program("TANG FORM SOLV FAIL")
+    found = []
+    for across, shear in PRESSED:
+        strain = (-CARBON.nu12 * across / CARBON.e1, across / CARBON.e2, shear / CARBON.g12)
+        held = decks.forces(decks.constant_strains(x, y, (0.0, 0.0, 0.0), strain=strain))
+        segments = (decks.held_but(2), held, STRENGTHS, plate)
+        result = decks.result_of(decks.deck(grid, segments, macros))
+        found.append(result["failure/puck/exposure"].max())
+    return found

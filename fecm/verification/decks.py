@@ -78,10 +78,12 @@ def supports(grid: Grid, codes: str) -> model.Boundary | None:
     return grid.boundary(every, dict(zip(("left", "bottom", "right", "top"), edges, strict=True)))
 
 
-def held_but(dof: int) -> model.Boundary:
-    """Hold the nodes of one element, but for a dof of the first: a deck needs an equation."""
-    first = NodeCodes(1, 0, tuple(int(one != dof) for one in range(5)))
-    return model.Boundary((first, *(NodeCodes(n, 0, (1,) * 5) for n in range(2, 10))))
+def held_but(dof: int, node: int = 1) -> model.Boundary:
+    """Hold the nodes of one element, but for a dof of one of them: a deck needs an equation."""
+    freed = tuple(int(one != dof) for one in range(5))
+    return model.Boundary(
+        tuple(NodeCodes(n, 0, freed if n == node else (1,) * 5) for n in range(1, 10))
+    )
 
 
 def deck(

@@ -18,7 +18,7 @@ from fecm.mechanics.solutions import static_stiffness
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
-from fecm.results.end import Deflection, LastContact, ends, peak_known
+from fecm.results.end import Deflection, LastContact, decided, ends, peak_known
 from fecm.results.result import Result
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.plan import plan
@@ -58,7 +58,11 @@ def _end_of_contact() -> Sequence[Value]:
         plate = Deflection(one, 0.0 * one, speed * one, one, one)
         return float(peak_known(ends(last, plate)).mean())
 
-    return [known(1.0), known(3.0)]
+    passed = ends(last, Deflection(one, 0.0 * one, one, one, one))
+    # Deflections that go on growing, and that fall with the force.
+    growing = np.isfinite(decided(phase, phase, passed)).mean()
+    falling = np.isfinite(decided(peak, force, passed)).mean()
+    return [known(1.0), known(3.0), growing, falling]
 
 
 @case

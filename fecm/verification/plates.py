@@ -227,8 +227,8 @@ def _ply_stresses() -> Sequence[Value]:
     ]
 
 
-def _pressed_sandwich(ratio: float) -> Result:
-    """Run Pagano's sandwich, a square of side 1, under q = cos(pi x) cos(pi y)."""
+def _sandwich_deck(ratio: float) -> model.Deck:
+    """Build Pagano's sandwich, a square of side 1, under q = cos(pi x) cos(pi y)."""
     along = np.cos(np.pi * np.array(lines(uniform(0.5, ELEMENTS))))
     parts = ((0.1, 1), (0.8, 2), (0.1, 1))  # of the thickness; material
     layers = tuple(
@@ -240,12 +240,20 @@ def _pressed_sandwich(ratio: float) -> Result:
     shear = model.Shear(assumed=True, equilibrium=True)
     macros = decks.program("TANG FORM SOLV DISP PLYS STRE")
     load = np.outer(along, along)
-    return decks.result_of(decks.quarter_plate(ELEMENTS, plate, macros, load, others=[shear, core]))
+    return decks.quarter_plate(ELEMENTS, plate, macros, load, others=[shear, core])
+
+
+@case
+def _unlike_densities() -> Sequence[Value]:
+    """The sandwich of thickness 1, whose core has a fifth of the faces' density."""
+    made = _sandwich_deck(1.0)
+    found = build_plate(made, generate(made)).laminate
+    return [found.mass, found.rotary_inertia]
 
 
 @case
 def _sandwich() -> Sequence[Value]:
-    thin, thick = _pressed_sandwich(100.0), _pressed_sandwich(10.0)
+    thin, thick = (decks.result_of(_sandwich_deck(ratio)) for ratio in (100.0, 10.0))
     x, y = decks.fields(thin, "stresses", "x y")
     even, odd = np.cos(np.pi * x) * np.cos(np.pi * y), np.sin(np.pi * x) * np.sin(np.pi * y)
     x, y = x.mean(axis=1), y.mean(axis=1)
@@ -296,6 +304,8 @@ def _residual_stresses() -> Sequence[Value]:
         bent(ply, angles, 0.01, "PLYS", cold)["plies/cure_stress"][0, 0, 1]
         for angles in ((0.0, 90.0, 90.0, 0.0), 4 * QUASI + 4 * QUASI[::-1])
     ]
+    moist = model.Cure(0.0, 0.5, (model.Expansion(beta1=2e-4, beta2=6e-3),)).strains(1)
+    symmetric = laminate(ply, (0.0, 90.0, 90.0, 0.0), (0.0025,) * 4)
     return [
         found.strain[0],
         found.curvature[0],
@@ -304,6 +314,7 @@ def _residual_stresses() -> Sequence[Value]:
         lower[1],
         upper[1],
         *across,
+        residual_stresses(symmetric, *moist).stresses[0, 0, 1],
     ]
 
 

@@ -46,10 +46,15 @@ BREAKS: Breaks = {
         },
     ),
     "a peak passes at 0.8 of the force": (
-        value(end, "FALLEN", 0.8), {"end-of-contact": ("plate as fast",)},
+        value(end, "FALLEN", 0.8),
+        {"end-of-contact": ("plate as fast", "share that decides a deflection which falls")},
     ),
     "a projectile leaves clearly at half of the plate's velocity": (
         value(end, "CLEAR", 0.5), {"end-of-contact": ("plate three times",)},
+    ),
+    "a value that is largest at the last step is decided": (
+        instead(end, "decided", lambda right, most, last, state: right(most, last - 1.0, state)),
+        {"end-of-contact": ("share that decides a deflection which still",)},
     ),
     "permanent indentation halved": (
         changed(LinearPermanent, "permanent", halved),

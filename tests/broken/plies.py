@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from fecm.deck.model import Cure
 from fecm.mechanics import failure, ply_stresses, residual_stresses
+from fecm.mechanics import laminate as laminates
 from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.problem import parts
 from tests.breaks import (
@@ -55,7 +59,7 @@ BREAKS: Breaks = {
     ),
     "one material for all layers": (
         instead(parts, "_laminate_of", of_one_material),
-        {"sandwich": ("σ", "τ", "100 w")},
+        {"sandwich": ("σ", "τ", "100 w"), "unlike-densities": ("",)},
     ),
     "faces of a ply exchanged": (
         changed(ply_stresses, "in_plane_stresses", lambda found: found[:, ::-1]),
@@ -69,7 +73,7 @@ BREAKS: Breaks = {
     "σ2 a tenth too small": (
         changed(ply_stresses, "in_plane_stresses",
                 lambda found: found * np.array([1.0, 0.9, 1.0])[:, None]),
-        {"ply-stresses": ("σ2",), "failure": ("",)},
+        {"ply-stresses": ("σ2",), "failure": ("",), "inclined-failure": ("",)},
     ),
     "free strains of a ply in its own axes": (
         instead(residual_stresses, "free_strains",
@@ -80,6 +84,20 @@ BREAKS: Breaks = {
         changed(residual_stresses, "in_plane_stresses",
                 lambda found: np.concatenate([found[..., :3], 0.0 * found[..., 3:]], axis=-1)),
         {"residual-stresses": ("σ1 of [0/90], outer", "σ2 of [0/90], outer")},
+    ),
+    "moisture forgotten": (
+        instead(Cure, "strains",
+                lambda right, cure, material: right(replace(cure, delta_c=0.0), material)),
+        {"residual-stresses": ("σ2 of [0/90]s, 0.5 %",)},
+    ),
+    "mode C with another resistance of the action plane": (
+        in_numpy(changed(failure, "puck_limits", lambda limits: (1.1 * limits[0], limits[1]))),
+        {"inclined-failure": ("σ2 = -180, τ12", "σ2 = -150")},
+    ),
+    "the rotary inertia of the mean density": (
+        changed(laminates, "laminate",
+                lambda made: replace(made, rotary_inertia=made.mass * made.thickness**2 / 12.0)),
+        {"unlike-densities": ("rotary",)},
     ),
     "FAIL takes half of the residual stresses": (
         instead(FailureMonitor, "with_residual",
