@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.results.exposures import band_of_largest, largest_exposures
 from fecm.results.metrics import EXPOSURES
 from fecm.sweeps.case import CasesError
 from fecm.sweeps.find_in_full import ERROR, search
@@ -67,6 +68,8 @@ def test_a_run_at_the_found_velocity_has_this_exposure(tmp_path: Path) -> None:
     found = fecm.load_sweep(tmp_path / "s.h5")
     (velocity,) = found["found_velocity"]
     assert f"smallest found    {velocity:.8g}, " in done.stdout
+    low, high = (found[name][0] for name in ("found_energy_low", "found_energy_high"))
+    assert f"; finer meshes {low:.3g} to {high:.3g}" in done.stdout
     result = run(DECK.replace("     115.0", f"{velocity:10.6f}"))
     largest = result["exposures/exposure"][-1]
     assert largest.max() == pytest.approx(1.0, rel=2e-5)
@@ -76,6 +79,36 @@ def test_a_run_at_the_found_velocity_has_this_exposure(tmp_path: Path) -> None:
     assert found["fail_evaluations"][0] == result.failure.attributes["evaluations_in_contact"]
     # The mass of the report's rod is 1.8096e-4.
     assert found["found_energy"][0] == pytest.approx(0.5 * 1.8096e-4 * velocity**2, rel=1e-4)
+
+
+def test_at_the_ends_of_the_energies_the_band_of_the_exposure_ends_at_the_level() -> None:
+    found = fecm.sweep(DECK, until={"exposure": 1.0})
+    low, energy, high = (
+        found[name][0] for name in ("found_energy_low", "found_energy", "found_energy_high")
+    )
+    assert low < energy < high
+    for end, of_band in ((low, 1), (high, 0)):
+        velocity = found["found_velocity"][0] * np.sqrt(end / energy)
+        result = run(DECK.replace("     115.0", f"{velocity:10.6f}"))
+        assert band_of_largest(largest_exposures(result))[of_band] == pytest.approx(1.0, rel=0.01)
+    exposures = fecm.sweep(DECK, {"velocity": [115.0]}, measure=["failure"])
+    band = band_of_largest(largest_exposures(run(DECK)))
+    assert (exposures["exposure_low"][0], exposures["exposure_high"][0]) == pytest.approx(band)
+
+
+@pytest.mark.parametrize(("radius", "noted"), [("0.2", False), ("0.02", True)])
+def test_a_note_says_where_the_mesh_decides_the_energy(
+    radius: str, noted: bool, tmp_path: Path
+) -> None:
+    patch = "DISC             .2"
+    assert patch in DECK
+    (tmp_path / "d.inp").write_text(DECK.replace(patch, f"DISC{radius:>15}"))
+    options = ("--find", "velocity", "--until", "exposure=1", "-o", "s.h5")
+    done = call("sweep", "d.inp", *options, cwd=tmp_path)
+    assert ("the mesh decides the energy found in 1 of 1 cases" in done.stderr) is noted
+    sweep = fecm.load_sweep(tmp_path / "s.h5")
+    share = sweep["found_energy_low"][0] / sweep["found_energy"][0]
+    assert (share < 0.75) == noted
 
 
 def test_each_case_of_a_sweep_has_its_velocity() -> None:

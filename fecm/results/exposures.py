@@ -115,6 +115,18 @@ def mesh_band(exposure: float, criterion: str, coarseness: float) -> tuple[float
     return exposure / (1.0 + TOO_HIGH[kind]), highest
 
 
+def band_of_largest(largest: Sequence[LargestExposure]) -> tuple[float, float]:
+    """Lowest and highest value of the largest exposure of all that finer meshes may give.
+
+    NaN where it is not known.
+    """
+    bands = [one.band for one in largest if one.band is not None]
+    if not bands or len(bands) < len(largest):
+        return math.nan, math.nan
+    low, high = (max(ends) for ends in zip(*bands, strict=True))
+    return low, high
+
+
 def largest_exposures(stored: Stored) -> list[LargestExposure]:
     """Largest exposure of each criterion, outside the load and on the circle around it.
 

@@ -79,6 +79,15 @@ EXPOSURES = {
     f"exposure_{name}": Quantity(f"largest exposure {spelt(name)} outside the load")
     for name in ALL_CRITERIA
 }
+BAND = {
+    "exposure_low": Quantity("lowest value of the largest exposure that finer meshes may give"),
+    "exposure_high": Quantity("highest value of the largest exposure that finer meshes may give"),
+}
+# Of a search for an exposure, from that band.
+FOUND_BAND = {
+    "found_energy_low": Quantity("lowest energy that finer meshes may find", "force*length"),
+    "found_energy_high": Quantity("highest energy that finer meshes may find", "force*length"),
+}
 EVALUATIONS = {
     "fail_evaluations": Quantity("evaluations of FAIL during contact"),
 }
@@ -92,7 +101,7 @@ RATIOS = {
     RATIO: Quantity("largest displacement of the plate under the load over its thickness"),
 }
 # All of a sweep; gages have one each, whose name begins with GAGE.
-COLUMNS = {**METRICS, **FOUND, **EXPOSURES, **EVALUATIONS, **HIT, **RATIOS}
+COLUMNS = {**METRICS, **FOUND, **FOUND_BAND, **EXPOSURES, **BAND, **EVALUATIONS, **HIT, **RATIOS}
 GAGE = "gage_"
 # Columns of texts: whether a case was run, and whether its result is valid.
 STATUS = "status"

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from fecm.results.exposures import FEWEST
-from fecm.results.metrics import EVALUATIONS, EXPOSURES
+from fecm.results.metrics import BAND, EVALUATIONS, EXPOSURES, FOUND_BAND
 from fecm.sweeps.case import CasesError
 from fecm.sweeps.find import LONGER, RANGE, Sought, with_found
 from fecm.sweeps.outcome import Outcome
@@ -17,6 +17,7 @@ from fecm.sweeps.strike import Strike
 ERROR = 1e-5  # largest relative excess of the value found
 USUAL = 5  # runs of a case, if the value depends smoothly on the velocity
 MOST = 40
+APART = 1e-3  # least relative distance of the trials that give a slope
 NAMES = {Sought.PEAK_FORCE: "peak force", Sought.EXPOSURE: "exposure"}
 
 
@@ -54,7 +55,34 @@ def found(
         raise CasesError(f"{at} the largest {NAMES[quantity]} is {text}")
 
     velocity = search(start.velocity, level, reached, NAMES[quantity])
-    return with_found(outcomes[velocity], {number: start.with_velocity(velocity)})
+    outcome = with_found(outcomes[velocity], {number: start.with_velocity(velocity)})
+    if quantity is Sought.EXPOSURE:
+        exposures = {v: largest_exposure(one) for v, one in outcomes.items()}
+        _add_band(outcome, velocity, level, exposures)
+    return outcome
+
+
+def _add_band(
+    outcome: Outcome, velocity: float, level: float, exposures: Mapping[float, float]
+) -> None:
+    """Add the energies at which finer meshes may reach the level, from the band of the exposure.
+
+    Near the velocity that was found the exposure is a power of the velocity, by the nearest other
+    trial; without one it is proportional to it.
+    """
+    columns = outcome.columns
+    if not columns.keys() >= {*BAND}:
+        return
+    exponent = 1.0
+    apart = {v: abs(math.log(v / velocity)) for v in exposures}
+    others = [v for v, distance in apart.items() if distance > APART]
+    if others:
+        other = min(others, key=apart.__getitem__)
+        slope = math.log(exposures[other] / exposures[velocity]) / math.log(other / velocity)
+        exponent = slope if slope > 0.0 else exponent
+    for name, end in zip(FOUND_BAND, reversed(BAND), strict=True):
+        with np.errstate(divide="ignore"):
+            columns[name] = columns["found_energy"] * (level / columns[end]) ** (2.0 / exponent)
 
 
 def peak_force(outcome: Outcome) -> float:

@@ -18,8 +18,16 @@ from fecm.mechanics.plate_motion import DivergenceError
 from fecm.problem.build import RunOptions
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
-from fecm.results.exposures import count_evaluations
-from fecm.results.metrics import EVALUATIONS, HIT, Indentation, Projectiles, summarise
+from fecm.results.exposures import band_of_largest, count_evaluations, largest_exposures
+from fecm.results.metrics import (
+    BAND,
+    EVALUATIONS,
+    EXPOSURES,
+    HIT,
+    Indentation,
+    Projectiles,
+    summarise,
+)
 from fecm.results.result import Result
 from fecm.results.run_metrics import deflection_of
 from fecm.results.sinks import MemorySink
@@ -217,6 +225,9 @@ def _outcome(
     if Measure.FAILURE in measures:
         count = np.array([float(count_evaluations(result))])
         outcome.columns |= dict.fromkeys(EVALUATIONS, count)
+        band = band_of_largest(largest_exposures(result))
+        if not any(np.isnan(outcome.columns[name][0]) for name in EXPOSURES if name in peaks):
+            outcome.columns |= {name: np.array([end]) for name, end in zip(BAND, band, strict=True)}
     return outcome
 
 

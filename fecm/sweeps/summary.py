@@ -13,8 +13,9 @@ from fecm.deck.model import Curvature, Preload, Segment
 from fecm.deck.units import quantity
 from fecm.problem.generate import generate
 from fecm.results.errors import ResultFileError
+from fecm.results.exposures import RESOLVED
 from fecm.results.linear_plate import TOO_SOFT, InPlane, in_plane_of, softness, unsafe
-from fecm.results.metrics import RATIO
+from fecm.results.metrics import FOUND_BAND, RATIO
 from fecm.results.validity import BENT, MEANING, counted
 from fecm.sweeps.case import pair
 from fecm.sweeps.outcome import Column
@@ -24,6 +25,7 @@ LABEL_WIDTH = 18  # of the lines of the summary
 DIGITS = 6  # of the values of a case, unless others are closer
 MOST_REASONS = 5  # of failure, that the summary lists
 WEIGHED = ("mass", "rod_mass", "energy")  # values that the summary shows in g and J
+WIDE = 0.75  # share of an energy found that finer meshes leave where the load is resolved
 SAME_PLACE = 1e-9  # distance from the place given, relative to its coordinates, that is rounding
 
 
@@ -56,7 +58,19 @@ def _extremes(result: StoredSweep) -> Iterator[str]:
         texts = [quantity(result[name][case], result.unit(name), digits) for name in names]
         values = ", ".join(f"{name} {_shown(result, name, int(case))}" for name in result.cases)
         given = f" ({values})" if values else ""
-        yield f"{size} {what:{LABEL_WIDTH - 2 - len(size)}} {', '.join(texts)}{given}"
+        label = f"{size} {what:{LABEL_WIDTH - 2 - len(size)}}"
+        yield f"{label} {', '.join(texts)}{given}{_found_band(result, int(case))}"
+
+
+def _found_band(result: StoredSweep, case: int) -> str:
+    """The energies that finer meshes may find for a case."""
+    if not all(name in result.summary for name in FOUND_BAND):
+        return ""
+    low, high = (float(result[name][case]) for name in FOUND_BAND)
+    if math.isnan(low) or math.isnan(high):
+        return ""
+    unit = result.unit("found_energy")
+    return f"; finer meshes {quantity(low, unit, 3)} to {quantity(high, unit, 3)}"
 
 
 def _moved(result: StoredSweep) -> Iterator[str]:
@@ -132,6 +146,12 @@ def remarks(result: StoredSweep) -> Iterator[str]:
             f"{is_open.sum()} of {len(result)} cases end before their contact does: what comes "
             f"after is open; a longer run decides it, as with --vary duration={duration:.3g}"
         )
+    if wide := _decided_by_mesh(result):
+        yield (
+            f"the mesh decides the energy found in {wide} of {len(result)} cases: finer meshes may "
+            f"find less than {WIDE:g} of it; the elements at the load are larger than "
+            f"{RESOLVED:g} (c + h/2); refine them (fecm new --grading)"
+        )
     bent = [reason for reason, _ in counted(result.validity) if reason in BENT.values()]
     if bent:
         held = any(reason != BENT[InPlane.FREE] for reason in bent)
@@ -144,6 +164,15 @@ def remarks(result: StoredSweep) -> Iterator[str]:
             size = f" (at w = {largest:.3g} h {error})"
         curved = _has(result, Curvature) or any(name in result for name in ("radius_x", "radius_y"))
         yield f"beyond its range {TOO_SOFT}{size}; {unsafe(curved=curved)}"
+
+
+def _decided_by_mesh(result: StoredSweep) -> int:
+    """Count the cases whose energy found has a wide band."""
+    names = ("found_energy_low", "found_energy")
+    if not all(name in result.summary for name in names):
+        return 0
+    low, found = (result[name] for name in names)
+    return int(np.count_nonzero(low < WIDE * found))
 
 
 def _in_plane(result: StoredSweep) -> InPlane:
