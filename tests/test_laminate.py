@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import fecm
 from fecm.deck.model import Control, Deck, Integration, Layer, Material, Ply
 from fecm.mechanics.laminate import (
     Laminate,
@@ -198,3 +199,64 @@ def test_a_woven_ply_keeps_its_shear_modulus_unless_it_is_asked_to_be_isotropic(
 def test_only_a_ply_of_equal_moduli_is_taken_for_isotropic() -> None:
     deck = material(REPORT_PLY, 0.106)
     assert_same(laminate_of(deck, isotropic_g12=True).A, reference_matrix("A"))
+
+
+# The laminate as users give it --------------------------------------------------------------------
+
+GRAPHITE = fecm.Ply(1600.0, 0.28, 181e9, 10.3e9, 7.17e9, 7.17e9, 7.17e9)
+
+
+def test_a_published_laminate_has_its_published_stiffness() -> None:
+    """[0/30/-45] of graphite/epoxy, 5 mm plies: Kaw, Mechanics of Composite Materials, example 4.3.
+
+    His z, too, is negative in the first ply, and his angles are counter-clockwise from x.
+    """
+    laminate = fecm.Laminate("[0/30/-45]", GRAPHITE, 5e-3)
+    A = [[1.739e9, 3.884e8, 5.663e7], [3.884e8, 4.533e8, -1.141e8], [5.663e7, -1.141e8, 4.525e8]]
+    B = [[-3.129e6, 9.855e5, -1.072e6], [9.855e5, 1.158e6, -1.072e6], [-1.072e6, -1.072e6, 9.855e5]]
+    D = [[3.343e4, 6.461e3, -5.240e3], [6.461e3, 9.320e3, -5.596e3], [-5.240e3, -5.596e3, 7.663e3]]
+    np.testing.assert_allclose(laminate.A, A, rtol=4e-4)
+    np.testing.assert_allclose(laminate.B, B, rtol=4e-4)
+    np.testing.assert_allclose(laminate.D, D, rtol=4e-4)
+
+
+def test_engineering_constants_are_those_of_the_inverse_of_the_whole_stiffness() -> None:
+    laminate = fecm.Laminate("[0/30/-45]", GRAPHITE, 5e-3)
+    whole = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
+    inverse, h = np.linalg.inv(whole), 15e-3
+    a, d = inverse[:3, :3], inverse[3:, 3:]
+    membrane = [1 / (h * a[0, 0]), 1 / (h * a[1, 1]), 1 / (h * a[2, 2]), -a[0, 1] / a[0, 0]]
+    bending = [12 / (h**3 * d[n, n]) for n in range(3)] + [-d[0, 1] / d[0, 0]]
+    np.testing.assert_allclose(laminate.in_plane_constants, membrane, rtol=1e-10)
+    np.testing.assert_allclose(laminate.flexural_constants, bending, rtol=1e-10)
+
+
+def test_a_cross_ply_has_the_engineering_constants_of_the_closed_form() -> None:
+    """[0/90]s: means of Q11 and Q22, in bending with the weights 7/8 and 1/8."""
+    ply = fecm.Ply(1.6e-9, 0.3, 140e3, 9e3, 5e3, 5e3, 3e3)
+    laminate = fecm.Laminate("[0/90]s", ply, 0.125)
+    full = 1.0 - 0.3**2 * 9e3 / 140e3
+    q11, q22, q12 = 140e3 / full, 9e3 / full, 0.3 * 9e3 / full
+    mean = (q11 + q22) / 2.0
+    of_membrane = mean - q12**2 / mean, mean - q12**2 / mean, 5e3, q12 / mean
+    along, across = (7.0 * q11 + q22) / 8.0, (q11 + 7.0 * q22) / 8.0
+    of_bending = along - q12**2 / across, across - q12**2 / along, 5e3, q12 / across
+    np.testing.assert_allclose(laminate.in_plane_constants, of_membrane, rtol=1e-12)
+    np.testing.assert_allclose(laminate.flexural_constants, of_bending, rtol=1e-12)
+    np.testing.assert_allclose(laminate.B, 0.0, atol=1e-9)
+
+
+def test_an_isotropic_laminate_has_the_constants_of_its_material() -> None:
+    steel = fecm.Ply(7.8e-9, 0.3, 210e3, 210e3, 210e3 / 2.6, 210e3 / 2.6, 210e3 / 2.6)
+    laminate = fecm.Laminate([30.0, -70.0, 5.0], steel, 0.4)
+    wanted = 210e3, 210e3, 210e3 / 2.6, 0.3
+    np.testing.assert_allclose(laminate.in_plane_constants, wanted, rtol=1e-12)
+    np.testing.assert_allclose(laminate.flexural_constants, wanted, rtol=1e-12)
+
+
+def test_a_laminate_without_a_material_or_with_an_impossible_one_has_no_stiffness() -> None:
+    with pytest.raises(ValueError, match="`ply` is None"):
+        fecm.Laminate("[0/90]s").A  # noqa: B018
+    bad = fecm.Ply(1600.0, 0.28, -1.0, 10.3e9, 7.17e9, 7.17e9, 7.17e9)
+    with pytest.raises(ValueError, match="Young's modulus E1 is -1; it must be positive"):
+        fecm.Laminate("[0]", bad, 1e-3).D  # noqa: B018

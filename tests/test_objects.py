@@ -174,6 +174,78 @@ def test_an_imported_mesh_passes_the_patch_test(path: Path, mirrored: bool) -> N
     assert residual(mesh, stretched(made.points, STRAIN)) < 1e-12
 
 
+TWO = [(0.0, 0.0), (1.0, 0.0), (2.0, 0.0), (0.0, 1.0), (1.0, 1.0), (2.0, 1.0)]
+QUADS, ENDS = [[0, 1, 4, 3], [1, 2, 5, 4]], [[0, 3], [2, 5]]  # two squares, and their outer sides
+
+
+def test_a_med_file_that_was_converted_from_gmsh_has_the_groups_numbers(tmp_path: Path) -> None:
+    meshio = pytest.importorskip("meshio", reason="meshes are read by meshio")
+    cells = [("quad", QUADS), ("line", ENDS)]
+    tags = [np.array([7, 7]), np.array([1, 2])]
+    names = {"left": np.array([1, 1]), "right": np.array([2, 1]), "sheet": np.array([7, 2])}
+    points = np.column_stack([TWO, np.zeros(6)])
+    mesh = meshio.Mesh(points, cells, cell_data={"gmsh:physical": tags}, field_data=names)
+    mesh.write(tmp_path / "two.med")
+    assert meshio.read(tmp_path / "two.med").field_data  # which names no groups in such a file
+    made = imported(tmp_path / "two.med", {"1": "clamped", "2": "free"}).imported
+    assert made is not None
+    assert {name: group.tolist() for name, group in made.groups.items()} == {
+        "1": [0, 3], "2": [2, 5]
+    }  # fmt: skip
+
+
+def test_the_families_of_a_med_file_are_its_groups_of_lines_nodes_and_elements(
+    tmp_path: Path,
+) -> None:
+    meshio = pytest.importorskip("meshio", reason="meshes are read by meshio")
+    mesh = meshio.Mesh(
+        np.column_stack([TWO, np.zeros(6)]),
+        [("quad", QUADS), ("line", ENDS)],
+        point_data={"point_tags": np.array([0, 3, 0, 0, 3, 0])},
+        cell_data={"cell_tags": [np.array([0, -3]), np.array([-1, -2])]},
+    )
+    mesh.cell_tags = {-1: ["left", "ends"], -2: ["ends"], -3: ["thick"]}
+    mesh.point_tags = {3: ["seam"]}
+    mesh.write(tmp_path / "two.med")
+    made = imported(tmp_path / "two.med").imported
+    assert made is not None
+    assert {name: group.tolist() for name, group in made.groups.items()} == {
+        "left": [0, 3], "ends": [0, 2, 3, 5], "seam": [1, 4]
+    }  # fmt: skip
+    assert {name: zone.tolist() for name, zone in made.surfaces.items()} == {"thick": [1]}
+
+
+def test_a_grid_of_pyvista_is_the_plate_that_meshio_reads_from_the_same_file() -> None:
+    pyvista = pytest.importorskip("pyvista")
+    plate = imported(HOLE, {"clamped": "clamped"}).imported
+    made = fecm.Plate.from_mesh(pyvista.read_meshio(HOLE)).imported
+    assert plate is not None
+    assert made is not None
+    np.testing.assert_array_equal(made.points, plate.points)
+    np.testing.assert_array_equal(made.cells, plate.cells)
+    groups = [{tuple(group) for group in one.groups.values()} for one in (made, plate)]
+    assert groups[0] == groups[1]
+    flat = fecm.Plate.from_mesh(pyvista.Plane(i_size=3, j_size=2, i_resolution=3, j_resolution=2))
+    assert flat.imported is not None
+    assert (flat.imported.elements, flat.imported.extent) == (6, ([-1.5, -1.0], [1.5, 1.0]))
+    with pytest.raises(fecm.MeshError, match="the mesh has VTK's type 11 elements"):
+        fecm.Plate.from_mesh(pyvista.ImageData(dimensions=(3, 3, 3)))
+
+
+def test_equal_plates_and_laminates_are_one_key() -> None:
+    def plates() -> list[fecm.Plate]:
+        corners = fecm.Plate.from_mesh((SQUARE, [[0, 1, 2, 3]]), "clamped")
+        return [fecm.Plate.rectangle(SIDES, (6, 4)), fecm.Plate.on_fixture("D7136"), corners]
+
+    def laminates() -> list[fecm.Laminate]:
+        hybrid = {"C": "IM7/8552", "G": "E-glass/MY750"}
+        return [fecm.Laminate([0, 90], "AS4/8552"), fecm.Laminate("[0C/90G]s", hybrid, 0.2)]
+
+    assert len({*plates()[:2], *plates()[:2]}) == 2
+    assert len({*plates(), *plates()}) == 4  # an imported mesh equals itself alone
+    assert len({*laminates(), *laminates()}) == 2
+
+
 def turned(cells: Any) -> np.ndarray:
     """Cells of 3, 4, 6, 8 or 9 nodes clockwise, from their second corner."""
     order = {

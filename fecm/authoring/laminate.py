@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import fields, replace
+from textwrap import shorten
 from typing import NamedTuple
+
+import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm._errors import did_you_mean
-from fecm.authoring.parameters import ObjectError, check_positive
+from fecm._tables import html_table
+from fecm._typing import Floats
+from fecm.authoring.parameters import ObjectError, check_numbers, check_positive
 from fecm.deck import catalogue
 from fecm.deck.catalogue import MATERIALS, NamedPly
 from fecm.deck.findings import Findings
@@ -35,7 +40,8 @@ from fecm.deck.model import (
     Segment,
 )
 from fecm.deck.unit_systems import UnitsError, system_named, units_of
-from fecm.deck.units import in_si
+from fecm.deck.units import MODULUS, in_si, unit_of
+from fecm.mechanics.laminate import ROUNDING, EngineeringConstants
 from fecm.mechanics.laminate import Laminate as Stiffness
 from fecm.mechanics.laminate import laminate as stiffness_of
 from fecm.problem.check import check_segment
@@ -46,6 +52,9 @@ THINNEST = 1e-6  # m; thin plies have 15e-6
 USUAL_THICKNESS = 2e-4  # m
 ORDER = 3  # integration order of stiffness and mass
 NODAL_POINTS = -3  # where stresses are computed
+# Dimensions of the stiffness matrices, and their entries 11, 22, 66, 12, 16, 26.
+STIFFNESS = {"A": "force/length", "B": "force", "D": "force*length"}
+ENTRIES = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
 
 AnyPly = str | Ply | NamedPly
 # Angle, name of the material and thickness of a ply; what is left out is that of the laminate.
@@ -63,7 +72,12 @@ class LaminatePly(NamedTuple):
 
 @frozen
 class Laminate:
-    """Layup of a plate.
+    """Layup of a plate, and its stiffness.
+
+    The x-axis is that of the plate, and angles are counter-clockwise from it.  z runs from the
+    struck face, z = -h/2, to the other.  The matrices have the order xx, yy, xy, with the
+    engineering shear strain.  All numbers are in the units of the first named ply's source, which
+    ``fecm.materials()`` has, or else in those of the constants in `ply`.
 
     Attributes
     ----------
@@ -93,6 +107,12 @@ class Laminate:
     >>> hybrid = {"C": "IM7/8552", "G": "E-glass/MY750"}
     >>> fecm.Laminate("[0C/90G]s", hybrid, {"C": 0.125, "G": 0.25}).thickness
     0.75
+
+    The constants are in MPa:
+
+    >>> constants = fecm.Laminate("[0/90]s", "AS4/8552", 0.13).in_plane_constants
+    >>> print(f"Ex {constants.ex:.0f}, Gxy {constants.gxy:.0f}, nu_xy {constants.nu_xy:.4f}")
+    Ex 72699, Gxy 5300, nu_xy 0.0425
     """
 
     layup: Layup
@@ -134,6 +154,54 @@ class Laminate:
         named = [one for ply in self.plies if isinstance(one := self._bound(ply), NamedPly)]
         system = named[0].system if named else None
         return _total([self.thickness_of(ply) or self._own(ply, system) for ply in self.plies])
+
+    @property
+    def A(self) -> Floats:
+        """Extensional stiffness, (3, 3), force/length; ValueError if the laminate is incomplete."""
+        return self._stiffness.A
+
+    @property
+    def B(self) -> Floats:
+        """Coupling stiffness of membrane forces and curvatures, (3, 3), force."""
+        return self._stiffness.B
+
+    @property
+    def D(self) -> Floats:
+        """Bending stiffness, (3, 3), force*length."""
+        return self._stiffness.D
+
+    @property
+    def in_plane_constants(self) -> EngineeringConstants:
+        """Moduli `ex`, `ey`, `gxy` (force/area) and `nu_xy` under membrane forces.
+
+        The laminate is free to bend: Ex = 1/(h a11), where a is a part of the inverse of A, B, D.
+        """
+        return self._stiffness.in_plane_constants
+
+    @property
+    def flexural_constants(self) -> EngineeringConstants:
+        """Moduli `ex`, `ey`, `gxy` (force/area) and `nu_xy` under moments.
+
+        The laminate is free to stretch: Ex = 12/(h^3 d11), where d is a part of the inverse.
+        """
+        return self._stiffness.flexural_constants
+
+    @property
+    def _stiffness(self) -> Stiffness:
+        return stiffness_of_laminate(self, None, [])[0]
+
+    def __hash__(self) -> int:
+        return hash(self.plies)  # a layup may be a list, and materials a dictionary
+
+    def _repr_html_(self) -> str:
+        """Table of plies, stiffness and engineering constants, for notebooks."""
+        angles = "/".join(f"{ply.angle:g} {ply.name}".rstrip() for ply in self.plies)
+        rows = [("angles", shorten(angles, 200))]
+        try:
+            rows += _stiffness_rows(*stiffness_of_laminate(self, None, []))
+        except ObjectError as error:
+            rows.append(("note", str(error)))
+        return html_table(repr(self), rows)
 
     def _bound(self, ply: LaminatePly) -> Ply | NamedPly | None:
         """Material of a ply; None if it has none."""
@@ -318,6 +386,31 @@ def stiffness_of_laminate(
     return laminates_of_deck(deck)[0], names
 
 
+def _stiffness_rows(stiffness: Stiffness, names: dict[str, str]) -> list[tuple[str, str]]:
+    """Rows of a table: thickness, matrices without rounding errors, and engineering constants."""
+
+    def text(values: Iterable[float], dimension: str) -> str:
+        numbers = ", ".join(f"{value:.5g}" for value in values)
+        return f"{numbers} {unit_of(dimension, names)}".rstrip()
+
+    h = stiffness.thickness
+    least = ROUNDING * float(np.abs(stiffness.A).max())
+    rows = [("thickness", text([h], "length"))]
+    for power, (name, dimension) in enumerate(STIFFNESS.items()):
+        entries = getattr(stiffness, name)[ENTRIES].tolist()
+        kept = [value if abs(value) > least * h**power else 0.0 for value in entries]
+        label = ", ".join(f"{name}{number}" for number in (11, 22, 66, 12, 16, 26))
+        rows.append((label, text(kept, dimension)))
+    for name, constants in (
+        ("in-plane", stiffness.in_plane_constants),
+        ("flexural", stiffness.flexural_constants),
+    ):
+        *moduli, ratio = constants
+        rows.append((f"{name} Ex, Ey, Gxy", text(moduli, MODULUS)))
+        rows.append((f"{name} nu_xy", text([ratio], "")))
+    return rows
+
+
 def system_asked(units: str | None) -> str | None:
     """Name of the system of units that is asked for."""
     if units is None:
@@ -332,7 +425,10 @@ def system_asked(units: str | None) -> str | None:
 
 def _known(ply: object) -> Ply | NamedPly:
     """A ply; the named one of a name."""
-    if isinstance(ply, Ply | NamedPly):
+    if isinstance(ply, Ply):
+        check_numbers(**{one.name: getattr(ply, one.name) for one in fields(Ply)[1:]})
+        return ply
+    if isinstance(ply, NamedPly):
         return ply
     if not isinstance(ply, str):
         raise ObjectError(f"`ply` is {ply!r}, not a name or a Ply")

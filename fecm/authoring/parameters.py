@@ -31,15 +31,27 @@ class ObjectError(FecmError, ValueError):
     """Objects that make no deck; messages quote the names of parameters in backquotes."""
 
 
+def is_number(value: object) -> TypeGuard[float]:
+    """Whether a parameter is a number; True and False are not."""
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
 def is_finite(value: object) -> TypeGuard[float]:
     """Whether a parameter is a finite number."""
-    return isinstance(value, Real) and math.isfinite(value)
+    return is_number(value) and math.isfinite(value)
+
+
+def check_numbers(**values: object) -> None:
+    """Refuse parameters that are not numbers; None is not given."""
+    for name, value in values.items():
+        if value is not None and not is_number(value):
+            raise ObjectError(f"`{name}` is {value!r}; it must be a number")
 
 
 def check_positive(**values: float | None) -> None:
     """Refuse parameters that are not positive numbers; None is not given."""
     for name, value in values.items():
-        if value is not None and not (isinstance(value, Real) and 0.0 < value < math.inf):
+        if value is not None and not (is_finite(value) and value > 0.0):
             raise ObjectError(f"`{name}` is {value!r}; it must be a positive number")
 
 
@@ -49,16 +61,30 @@ def check_kind(name: str, value: object, kind: type | UnionType) -> None:
         raise ObjectError(f"`{name}` is {value!r}, not a {name} of fecm")
 
 
-def in_units(
-    name: str, value: float | str | None, dimension: str, system: str | None
-) -> float | None:
+def text_of(value: object) -> object:
+    """Text of a quantity of pint, unyt or astropy, as in ``3.0 m/s``; any other value as it is."""
+    number = getattr(value, "magnitude", getattr(value, "value", None))
+    unit = getattr(value, "units", getattr(value, "unit", None))
+    if number is None or unit is None:
+        return value
+    try:
+        name = format(unit, "~C")  # the short names of pint
+    except (TypeError, ValueError):
+        name = str(unit)
+    return f"{number} {name}"
+
+
+def in_units(name: str, value: object, dimension: str, system: str | None) -> float | None:
     """A parameter in a system of units; one that is a number or None stays as it is.
 
-    Raises ObjectError if a text, as in ``10J`` or ``3m/s``, is no positive number with a unit of
-    the dimension, or the system is not known.
+    Raises ObjectError if a text, as in ``10J`` or ``3m/s``, or a quantity is no number with a unit
+    of the dimension, the system is not known, or the value is none of these.
     """
-    if not isinstance(value, str):
+    value = text_of(value)
+    if value is None or is_number(value):
         return value
+    if not isinstance(value, str):
+        raise ObjectError(f"`{name}` is {value!r}, not a number or a text")
     match = re.fullmatch(rf"\s*({NUMBER})\s*(\S.*)?", value)
     unit = match[2] if match else None
     known = unit_in_si(unit, dimension) if unit else 1.0

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import field, fields, replace
 from pathlib import Path
 from typing import Literal, Self
 
 from numpy.typing import ArrayLike
 
 from fecm._dataclasses import frozen
+from fecm._tables import html_table
 from fecm.authoring.fixtures import Fixture, parse_fixture
 from fecm.authoring.parameters import ObjectError, check_positive, pair
 from fecm.deck import grid as grids
 from fecm.deck.grid import EDGES, SUPPORTS, Section
 from fecm.problem import plate_mesh
-from fecm.problem.plate_mesh import BOUNDARY, MeshLike, PlateMesh
+from fecm.problem.plate_mesh import BOUNDARY, GridLike, MeshLike, PlateMesh
 
 MOST = 2000  # elements in one direction
 # Elements of the window where the mesh does not give them, and their grading.
@@ -55,6 +56,15 @@ class Plate:
     rows: tuple[Section, ...] = field(default=(), repr=False)
     fixture: Fixture | None = None
     imported: PlateMesh | None = None
+
+    def __hash__(self) -> int:
+        supports = frozenset(self.supports.items())
+        return hash((supports, self.size, self.mesh, self.grading, self.columns, self.rows))
+
+    def _repr_html_(self) -> str:
+        """Table of what the plate is made of, for notebooks."""
+        values = ((one.name, getattr(self, one.name)) for one in fields(self) if one.repr)
+        return html_table("Plate", [(name, str(value)) for name, value in values if value])
 
     @classmethod
     def rectangle(
@@ -151,7 +161,7 @@ class Plate:
     @classmethod
     def from_mesh(
         cls,
-        mesh: str | Path | MeshLike | tuple[ArrayLike, ArrayLike],
+        mesh: str | Path | MeshLike | GridLike | tuple[ArrayLike, ArrayLike],
         support: Mapping[str, Support] | Support | None = None,
         *,
         groups: Mapping[str, ArrayLike] | None = None,
@@ -164,9 +174,9 @@ class Plate:
 
         Parameters
         ----------
-        mesh : str, Path, meshio.Mesh or tuple of arrays
-            A file that meshio reads, such as Gmsh's `.msh`; or points (n, 2) and cells (m, k) with
-            points counted from 0.
+        mesh : str, Path, meshio.Mesh, pyvista.DataSet or tuple of arrays
+            A file that meshio reads, such as Gmsh's `.msh`; a mesh of meshio or PyVista; or points
+            (n, 2) and cells (m, k) with points counted from 0.
         support : dict or str, optional
             Support by the name of a group of lines: ``"free"``, ``"simple"``, ``"pinned"`` or
             ``"clamped"``.  The group ``"boundary"``, or a single support, means all outer sides and
@@ -197,6 +207,8 @@ class Plate:
             raise ObjectError("`groups` are for arrays; a mesh has its own")
         elif isinstance(mesh, str | Path):
             found = plate_mesh.read_mesh(mesh)
+        elif isinstance(mesh, GridLike):
+            found = plate_mesh.from_pyvista(mesh)
         else:
             found = plate_mesh.from_meshio(mesh)
         wanted = {BOUNDARY: support} if isinstance(support, str) else support or {}

@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -65,6 +65,15 @@ class Plies:
         return np.stack([lower, (lower + upper) / 2.0, upper], axis=1)
 
 
+class EngineeringConstants(NamedTuple):
+    """Elastic constants of the homogeneous plate that has the thickness and these compliances."""
+
+    ex: float  # Young's moduli, force/area
+    ey: float
+    gxy: float  # shear modulus, force/area
+    nu_xy: float  # Poisson's ratio: contraction along y over extension along x
+
+
 @frozen
 class Laminate:
     """Stiffness and inertia of a laminate, per area."""
@@ -103,6 +112,18 @@ class Laminate:
         scale = np.abs(self.A).max() * self.thickness
         return bool(np.abs(self.B).max() > ROUNDING * scale)
 
+    @property
+    def in_plane_constants(self) -> EngineeringConstants:
+        """Constants under membrane forces, if the laminate is free to bend: Ex = 1/(h a11)."""
+        stiffness = self.A - self.B @ np.linalg.solve(self.D, self.B)
+        return _constants(stiffness / self.thickness)
+
+    @property
+    def flexural_constants(self) -> EngineeringConstants:
+        """Constants under moments, if the laminate is free to stretch: Ex = 12/(h^3 d11)."""
+        stiffness = self.D - self.B @ np.linalg.solve(self.A, self.B)
+        return _constants(stiffness * 12.0 / self.thickness**3)
+
     def without_small_entries(self) -> Laminate:
         """Set entries of A, B, D below 1e-6, but not rounding errors, to 0: the listing's CNPD."""
         scale = ROUNDING * np.abs(self.A).max()
@@ -113,6 +134,13 @@ class Laminate:
             return np.where(small, 0.0, matrix)
 
         return replace(self, A=cut(self.A, 0), B=cut(self.B, 1), D=cut(self.D, 2))
+
+
+def _constants(stiffness: Floats) -> EngineeringConstants:
+    """Engineering constants of a plane-stress stiffness, (3, 3)."""
+    compliance = np.linalg.inv(stiffness)
+    ex, ey, gxy = (1.0 / np.diag(compliance)).tolist()
+    return EngineeringConstants(ex, ey, gxy, float(-compliance[0, 1] / compliance[0, 0]))
 
 
 def reduced_stiffness(ply: PlyConstants) -> Floats:

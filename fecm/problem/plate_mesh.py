@@ -7,7 +7,8 @@ import io
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
+from types import SimpleNamespace
+from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,8 +33,14 @@ Integers = NDArray[np.int_]
 KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
 DIMENSIONS = {"vertex": 0, "line": 1, "line3": 1}  # of the cells of groups of nodes
 LINES = tuple(DIMENSIONS)
+# meshio's names of VTK's types of cells.
+VTK_KINDS = {
+    1: "vertex", 3: "line", 21: "line3", 5: "triangle", 9: "quad", 22: "triangle6", 23: "quad8",
+    28: "quad9",
+}  # fmt: skip
 # Name of all sides that belong to one element, unless the mesh has a group of that name.
 BOUNDARY = "boundary"
+PHYSICAL = "gmsh:physical"  # name of the numbers of physical groups
 ELSEWHERE = (".xdmf", ".xmf")  # formats whose files name other files
 SAME = 1e-9  # difference of coordinates, over the size of the mesh, that is none
 NO_AREA = 1e-12  # area over the square of the size that is none
@@ -165,10 +172,19 @@ class MeshLike(Protocol):
 
     points: Any
     cells: Any
+    point_data: Any
     cell_data: Any
     cell_sets: Any
     point_sets: Any
     field_data: Any
+
+
+@runtime_checkable
+class GridLike(Protocol):
+    """What is used of a data set of PyVista."""
+
+    def cast_to_unstructured_grid(self) -> Any:
+        """Convert the data set to a grid with points, cells and types of cells."""
 
 
 def read_mesh(path: str | Path) -> PlateMesh:
@@ -195,10 +211,36 @@ def read_mesh(path: str | Path) -> PlateMesh:
     return from_meshio(read, f"{path}: ")
 
 
+def from_pyvista(grid: GridLike) -> PlateMesh:
+    """Plate of a data set of PyVista, whose groups are numbers in the cell data `gmsh:physical`."""
+    made = grid.cast_to_unstructured_grid()
+    blocks: list[Any] = []
+    physical: list[Any] = []
+    for number, cells in made.cells_dict.items():
+        kind = VTK_KINDS.get(int(number), f"VTK's type {number}")
+        blocks.append(SimpleNamespace(type=kind, data=cells))
+        if PHYSICAL in made.cell_data:
+            physical.append(np.asarray(made.cell_data[PHYSICAL])[made.celltypes == number])
+    cell_data = {PHYSICAL: physical} if physical else {}
+    none: dict[str, Any] = {}
+    read = SimpleNamespace(
+        points=made.points,
+        cells=blocks,
+        point_data=none,
+        cell_data=cell_data,
+        cell_sets=none,
+        point_sets=none,
+        field_data=none,
+    )
+    return from_meshio(read)
+
+
 def from_meshio(read: MeshLike, where: str = "") -> PlateMesh:
     """Plate of a `meshio.Mesh`; see :func:`plate_mesh`."""
     if not all(hasattr(read, name) for name in MeshLike.__annotations__):
-        raise MeshError(f"{read!r} is not a file, a meshio.Mesh, or points and cells")
+        raise MeshError(
+            f"{read!r} is not a file, a meshio.Mesh, a grid of PyVista, or points and cells"
+        )
     blocks = {n: block for n, block in enumerate(read.cells) if block.type not in LINES}
     kinds = sorted({block.type for block in blocks.values()})
     if len(kinds) != 1 or kinds[0] not in KINDS.values():
@@ -209,24 +251,38 @@ def from_meshio(read: MeshLike, where: str = "") -> PlateMesh:
     groups: dict[str, list[Any]] = {}
     surfaces: dict[str, list[Any]] = {}
     first = 0  # number of the next element
-    names = {(int(tag), int(dim)): name for name, (tag, dim) in read.field_data.items()}
+    names = {tuple(pair): name for name, pair in read.field_data.items() if _is_group(pair)}
+    families = getattr(read, "cell_tags", {})  # names of groups by family, in MED files
     for number, block in enumerate(read.cells):
         found, rows = groups, block.data
         if number in blocks:
             found, rows = surfaces, np.arange(len(block.data)) + first
             first += len(block.data)
-        if "gmsh:physical" in read.cell_data:
-            tags = read.cell_data["gmsh:physical"][number]
+        if PHYSICAL in read.cell_data:
+            tags = read.cell_data[PHYSICAL][number]
             for tag in np.unique(tags[tags > 0]).tolist():
                 name = names.get((tag, 2 if number in blocks else DIMENSIONS[block.type]), str(tag))
                 found.setdefault(name, []).append(rows[tags == tag])
         for name, sets in read.cell_sets.items():
             if not name.startswith("gmsh:") and name not in read.field_data:
                 found.setdefault(name, []).append(rows[np.asarray(sets[number], int)])
+        for family, of_family in families.items():
+            for name in of_family:
+                tags = read.cell_data["cell_tags"][number]
+                found.setdefault(name, []).append(rows[tags == family])
     for name, rows in read.point_sets.items():
         groups.setdefault(name, []).append(rows)
+    for family, of_family in getattr(read, "point_tags", {}).items():
+        for name in of_family:
+            tags = read.point_data["point_tags"]
+            groups.setdefault(name, []).append(np.flatnonzero(tags == family))
     cells = np.concatenate([block.data for block in blocks.values()])
     return plate_mesh(read.points, cells, _joined(groups), where, _joined(surfaces))
+
+
+def _is_group(value: Any) -> bool:
+    """Whether field data are the number and dimension of a group; MED files have other data."""
+    return len(value) == 2 and all(isinstance(one, int | np.integer) for one in value)
 
 
 def _joined(groups: Mapping[str, list[Any]]) -> dict[str, Integers]:
