@@ -158,6 +158,10 @@ ZONED = fecm.impact(
         (DECK, {"energy": "10"}, None),
         (DECK, {"energy": "10V"}, "`energy` is '10V', not a number or one with a unit"),
         (DECK, {"layup": [[0], [90]], "angle": "x"}, "with_: angle must be a finite number"),
+        (DECK, {"velocity": True}, "`velocity` is True, not a number or a text"),
+        (DECK, {"angle": True}, "with_: angle can't be True"),
+        (DECK, {"nonlinear": True}, "with_: the deck has no NONL"),
+        (DECK, {"nonlinear": 0}, "with_: nonlinear is 0, not True or False"),
         (ZONED, {"plate": PLATE}, "`plate` can't replace that of a deck with ZONE"),
         (ZONED, {"laminate": PLIES}, "`laminate` can't replace that of a deck with LAMS and ZONE"),
         (BENDING, {"velocity": 2}, "with_: the deck has no ROD segment"),
@@ -178,8 +182,65 @@ def test_what_can_not_be_changed_is_refused_by_its_name(
         made.with_(**given)
 
 
+def test_a_quantity_of_pint_is_the_text_that_it_prints() -> None:
+    pint = pytest.importorskip("pint")
+    units = pint.UnitRegistry()
+    speed, energy, time = (units(text) for text in ("3 m/s", "2 J", "50 microsecond"))
+    assert DECK.with_(velocity=speed).require(Impact).velocity == 3000.0
+    assert DECK.with_(energy=energy, duration=time) == DECK.with_(energy="2J", duration="50us")
+    made = fecm.impact(PLATE, PLIES, MASS, FIRM, **QUICK | {"velocity": speed, "duration": time})
+    texts = {"velocity": "3m/s", "duration": "50us"}
+    assert made == fecm.impact(PLATE, PLIES, MASS, FIRM, **QUICK | texts)
+    swept = fecm.sweep(DECK, {"energy": [0.1, 0.2] * units.J})
+    assert swept["energy"].tolist() == [100.0, 200.0]
+    with pytest.raises(ValueError, match="`energy` is '2 mm', not a number or one with a unit"):
+        DECK.with_(energy=2 * units.mm)
+    with pytest.raises(ValueError, match=r"density must be a finite number, not `1600\.0 kg/m"):
+        DECK.with_(density=1600 * units.kg / units.m**3)
+
+
+def test_the_unit_of_a_quantity_is_never_dropped_where_float_would_drop_it() -> None:
+    class Quantity(float):  # as unyt's: a number with `value` and `units`
+        value, units = 3.0, "m/s"
+
+    assert DECK.with_(velocity=Quantity(3.0)).require(Impact).velocity == 3000.0
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (fecm.RigidMass, "`total_mass` of RigidMass is '5.5'; it must be a number"),
+        (lambda text: fecm.Rod.cylinder(20.0, text, 2e5, 8e-9), "`diameter` of Rod is '5.5'"),
+        (lambda text: fecm.Rod(20.0, (16.0,), text, 8e-9), "`modulus` of Rod is '5.5'"),
+        (fecm.Contact, "`k` is '5.5'; it must be a number"),
+        (lambda text: fecm.Contact.estimate(8, 2e5, text), "`poisson` is '5.5'; it must be a num"),
+        (
+            lambda text: fecm.Laminate("[0]", fecm.Ply(1e-9, 0.3, 1e5, text, 5e3, 5e3, 3e3), 0.2),
+            "`e2` is '5.5'; it must be a number",
+        ),
+    ],
+)
+def test_a_text_in_the_place_of_a_number_is_refused_where_it_is_given(
+    make: Any, message: str
+) -> None:
+    with pytest.raises(fecm.FecmError, match=message):
+        make("5.5")
+
+
+def test_a_nonlinear_deck_without_nonl_moves_as_the_deck_that_is_made_linear() -> None:
+    common = QUICK | {"velocity": 2e4, "duration": 1e-4}
+    linear, nonlinear = (
+        fecm.impact(PLATE, PLIES, MASS, FIRM, **common | {"kinematics": kinematics})
+        for kinematics in ("linear", "von-karman")
+    )
+    assert nonlinear.with_(nonlinear=True) == nonlinear
+    force = fecm.run_one(nonlinear.with_(nonlinear=False)).force
+    np.testing.assert_allclose(force, fecm.run_one(linear).force, rtol=1e-9)
+    assert np.abs(fecm.run_one(nonlinear).force / force - 1.0)[force > 0.0].max() > 0.01
+
+
 def test_the_type_of_the_values_has_every_name_that_can_be_given() -> None:
-    assert set(changes.Values.__annotations__) == {*NAMES, *changes.OBJECTS}
+    assert set(changes.Values.__annotations__) == {*NAMES, *changes.OBJECTS, changes.NONLINEAR}
     known = {"Plate": Plate, "Laminate": fecm.Laminate, "Support": Support}
     known |= {"AnyProjectile": fecm.Rod, "AnyContact": fecm.Contact}
     hints = get_type_hints(changes.Values, localns=known)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from fecm._dataclasses import frozen
 from fecm.authoring.fixtures import DropWeight
 from fecm.authoring.laminate import Plies
-from fecm.authoring.parameters import ObjectError, check_positive
+from fecm.authoring.parameters import ObjectError, check_numbers, check_positive
 from fecm.deck.catalogue import (
     CONTACTS,
     STANDARD,
@@ -129,6 +129,9 @@ class Contact(Indentation):
     s_p: float = 0.0
     q: float = ELASTIC_POWER
 
+    def __post_init__(self) -> None:
+        check_numbers(k=self.k, alpha_p=self.alpha_p, s_p=self.s_p, q=self.q)
+
     @staticmethod
     def named(name: str) -> NamedContact:
         """Published law, which `fecm indent contacts` lists; converted to the deck's units.
@@ -162,6 +165,7 @@ class Contact(Indentation):
         Contact.estimate(radius=8)
         """
         check_positive(radius=radius, modulus=modulus)
+        check_numbers(poisson=poisson)
         return Sphere(radius, modulus, poisson)
 
 

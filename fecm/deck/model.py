@@ -193,7 +193,8 @@ class Deck(Record):
         Parts go first: a `plate`, which is struck in its middle or at `at`; a `laminate`, whose
         named plies bring strengths, toughness and expansions where the deck has them; a
         `projectile`, at the velocity of the deck unless `velocity` or `energy` is given; and a
-        `contact`, an estimated one for the new laminate.
+        `contact`, an estimated one for the new laminate.  ``nonlinear=False`` takes NONL out of the
+        deck.
 
         A time step of 0, or that which :func:`fecm.impact` takes for the deck's plate, follows a
         new `plate` or `laminate`.  Any other is kept, also where values change the plate;
@@ -203,7 +204,7 @@ class Deck(Record):
         ----------
         **values : float or str or sequence or object
             Values in the deck's units; energy, velocity, duration and preload also with a unit, as
-            in ``"10J"``, if the deck names its units.
+            in ``"10J"`` or a quantity of pint, if the deck names its units.
 
         Raises
         ------

@@ -8,6 +8,7 @@ is negative, and the contact force acts on u of node 1 in the positive direction
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from numbers import Real
 from typing import ClassVar, Literal, Protocol, TypeVar
 
 import numpy as np
@@ -57,6 +58,15 @@ class RodMethod:
         return {name: value for name, value in values.items() if value not in (LUMPED, WILSON)}
 
 
+def _check_numbers(kind: str, **values: object) -> None:
+    """Raise ProjectileError if a value of a projectile is not a number."""
+    for name, value in values.items():
+        if not isinstance(value, Real) or isinstance(value, bool):
+            raise ProjectileError(
+                f"`{name}` of {kind} is {value!r}; it must be a number in the units of the deck"
+            )
+
+
 @frozen
 class Rod:
     """A straight elastic rod of equal elements."""
@@ -68,11 +78,15 @@ class Rod:
     # Use the consistent mass matrix, equation 4-24, instead of the lumped one.
     consistent: bool = False
 
+    def __post_init__(self) -> None:
+        _check_numbers("Rod", length=self.length, modulus=self.modulus, density=self.density)
+
     @classmethod
     def cylinder(
         cls, length: float, diameter: float, modulus: float, density: float, elements: int = 20
     ) -> Rod:
         """Rod of one diameter."""
+        _check_numbers("Rod", diameter=diameter)
         return cls(length, (float(diameter),) * elements, modulus, density)
 
     def __repr__(self) -> str:
@@ -168,6 +182,9 @@ class RigidMass:
     """A projectile that does not deform, with one dof."""
 
     total_mass: float
+
+    def __post_init__(self) -> None:
+        _check_numbers("RigidMass", total_mass=self.total_mass)
 
     def with_mass(self, mass: str) -> RigidMass:
         """The same projectile: lumped and consistent mass are equal."""

@@ -11,7 +11,7 @@ from fecm.authoring.parameters import EXAMPLES, in_units
 from fecm.deck.catalogue import system_of
 from fecm.deck.findings import DeckError
 from fecm.deck.macros import compile_program
-from fecm.deck.model import END, MACROS, STOP, TITLE, Deck
+from fecm.deck.model import END, MACROS, STOP, TITLE, Deck, Nonlinear
 from fecm.deck.reader import Reader
 from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.cases import checked
@@ -28,6 +28,7 @@ if TYPE_CHECKING:
 
 Number = float | str  # a number, or its text
 OBJECTS = ("plate", "laminate", "projectile", "contact")
+NONLINEAR = "nonlinear"
 
 
 class Values(TypedDict, total=False):
@@ -37,6 +38,7 @@ class Values(TypedDict, total=False):
     laminate: Laminate
     projectile: AnyProjectile
     contact: AnyContact
+    nonlinear: bool
     velocity: Number
     energy: Number
     k: Number
@@ -93,9 +95,12 @@ def with_values(deck: Deck, values: Mapping[str, Any]) -> Deck:
     Raises CasesError if a name is unknown or a value is invalid, and ObjectError if an object is.
     """
     for name in values:
-        check_known(name, "with_", (*OBJECTS, *NAMES))
+        check_known(name, "with_", (*OBJECTS, NONLINEAR, *NAMES))
+    if NONLINEAR in values:
+        deck = _with_kinematics(deck, nonlinear=values[NONLINEAR])
     given = {name: value for name, value in values.items() if name in OBJECTS}
-    numbers = _converted(deck, {name: values[name] for name in values if name not in OBJECTS})
+    others = (*OBJECTS, NONLINEAR)
+    numbers = _converted(deck, {name: values[name] for name in values if name not in others})
     (case,) = checked([numbers], "with_")
     objects = None
     if given:
@@ -120,6 +125,21 @@ def _converted(deck: Deck, values: Mapping[str, Any]) -> dict[str, Any]:
         else value
         for name, value in values.items()
     }
+
+
+def _with_kinematics(deck: Deck, *, nonlinear: object) -> Deck:
+    """The deck without NONL, or as it is if it has NONL and is to keep it."""
+    if not isinstance(nonlinear, bool):
+        raise CasesError(f"with_: nonlinear is {nonlinear!r}, not True or False")
+    if nonlinear and not deck.has(Nonlinear):
+        raise CasesError(
+            "with_: the deck has no NONL, and its supports may not suit it; make the nonlinear "
+            'deck with fecm.impact(kinematics="von-karman"), and take NONL out with nonlinear=False'
+        )
+    if nonlinear:
+        return deck
+    kept = tuple(segment for segment in deck.segments if not isinstance(segment, Nonlinear))
+    return replace(deck, segments=kept, text="")
 
 
 def _on_the_clock(deck: Deck, made: Deck, case: Case) -> Deck:

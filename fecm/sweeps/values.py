@@ -12,7 +12,7 @@ from typing import Generic, TypeVar
 import numpy as np
 
 from fecm._errors import did_you_mean
-from fecm.authoring.parameters import EXAMPLES, NUMBER, ObjectError, in_units
+from fecm.authoring.parameters import EXAMPLES, NUMBER, ObjectError, in_units, text_of
 from fecm.deck.grid import SUPPORTS
 from fecm.deck.units import TOUGHNESS
 from fecm.results.metrics import COLUMNS, VERDICTS
@@ -303,10 +303,13 @@ def parse_value(name: str, text: str, system: str | None = None) -> Value:
 def value_of(name: str, given: object, where: str, system: str | None = None) -> Value:
     """The value of a name that a caller of Python has given; CasesError if it is invalid.
 
-    A text with a unit is converted to a system of units.
+    A text with a unit, or a quantity, is converted to a system of units.
     """
+    given = text_of(given)
     if isinstance(given, np.generic):
         given = given.item()
+    if isinstance(given, bool):
+        raise CasesError(f"{where}: {name} can't be {given}")
     if kind_of(name) is Kind.TEXT and isinstance(given, Iterable) and not isinstance(given, str):
         separator = {"at": ",", "size": "x"}.get(name, "/")
         given = separator.join(map(str, given))
