@@ -1,8 +1,8 @@
-"""Array types."""
+"""Types of arrays and of open files."""
 
 from __future__ import annotations
 
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,3 +11,5 @@ Array = NDArray[Any]
 Floats = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Indices = NDArray[np.intp]
+
+AnyFile = IO[str] | IO[bytes]  # open as text or as bytes

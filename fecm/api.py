@@ -6,12 +6,14 @@ import logging
 from collections.abc import Callable, Iterable, Sequence
 from itertools import zip_longest
 from pathlib import Path
-from typing import BinaryIO, Literal
+from typing import Literal
 
 from fecm._dataclasses import frozen
 from fecm._errors import OptionsError, warn
 from fecm._files import ARGUMENT, check_outputs
 from fecm._progress import once_a_minute
+from fecm._tables import html_table
+from fecm._typing import AnyFile
 from fecm.deck.findings import DeckError, Finding, Severity
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, read_deck
@@ -64,8 +66,8 @@ class LoadedDeck:
         return [f for f in self.findings if f.severity == "error" and f.code not in allowed]
 
 
-def load_deck(path_or_text: str | Path | BinaryIO | Deck, mode: str = REPORT) -> LoadedDeck:
-    """Read and check the deck of a path, a text, standard input or a model, without running it.
+def load_deck(path_or_text: str | Path | AnyFile | Deck, mode: str = REPORT) -> LoadedDeck:
+    """Read and check the deck of a path, a text, an open file or a model, without running it.
 
     In listing mode blanks inside numbers are zeros, and decks that the printed program can't
     compute are errors.  Raises OSError if the file can't be read.
@@ -134,6 +136,13 @@ class DeckCheck:
         texts = [finding.render(self.source) for finding in self.findings]
         return "\n".join([*texts, *(line for one in self.problems for line in one.lines())])
 
+    def _repr_html_(self) -> str:
+        """Table of the findings and of each problem, for notebooks."""
+        rows = [(f"{one.severity} {one.code}", one.message) for one in self.findings]
+        for problem in self.problems:
+            rows += [("title", problem.title), *problem.rows()]
+        return html_table(repr(self)[1:-1], rows)
+
     def __repr__(self) -> str:
         counts = {"error": len(self.errors), "warning": len(self.warnings)}
         texts = (f"{count} {word}{'s' * (count != 1)}" for word, count in counts.items())
@@ -155,13 +164,13 @@ def check_loaded(loaded: LoadedDeck) -> DeckCheck:
     return DeckCheck(loaded.source, tuple(loaded.findings), tuple(map(summarise, problems)))
 
 
-def check(deck: str | Path | Deck, mode: Mode = "report") -> DeckCheck:
+def check(deck: str | Path | AnyFile | Deck, mode: Mode = "report") -> DeckCheck:
     """Check a deck without running it.
 
     Parameters
     ----------
-    deck : str, Path or Deck
-        A file's path, a deck's text, or a model built in Python.
+    deck : str, Path, file or Deck
+        A file's path, a deck's text, an open file, or a model built in Python.
     mode : str
         ``"report"``, or ``"listing"``, which refuses what the printed program can't compute.
 
@@ -191,7 +200,7 @@ def check(deck: str | Path | Deck, mode: Mode = "report") -> DeckCheck:
     return check_loaded(load_deck(deck, mode))
 
 
-def read_one(path_or_text: str | Path) -> Deck:
+def read_one(path_or_text: str | Path | AnyFile) -> Deck:
     """Read a deck with exactly one problem; see :func:`read_deck`.
 
     Raises
@@ -208,7 +217,7 @@ def read_one(path_or_text: str | Path) -> Deck:
 
 
 def run_one(
-    deck: str | Path | Deck,
+    deck: str | Path | AnyFile | Deck,
     mode: Mode = "report",
     slips: Iterable[str] = (),
     output: str | Path | None = None,
@@ -252,7 +261,7 @@ def run_one(
 
 
 def run(
-    deck: str | Path | Deck,
+    deck: str | Path | AnyFile | Deck,
     mode: Mode = "report",
     slips: Iterable[str] = (),
     output: str | Path | None = None,
@@ -275,8 +284,8 @@ def run(
 
     Parameters
     ----------
-    deck : str, Path or Deck
-        A file's path, a deck's text, or a model built in Python.
+    deck : str, Path, file or Deck
+        A file's path, a deck's text, an open file, or a model built in Python.
     mode : str
         ``"report"`` or ``"listing"``.
     slips : iterable of str
@@ -391,7 +400,7 @@ def _warn_of(prepared: LoadedDeck) -> None:
 
 
 def _run(
-    deck: str | Path | Deck,
+    deck: str | Path | AnyFile | Deck,
     mode: str,
     force: bool,
     choices: RunOptions,

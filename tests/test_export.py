@@ -429,6 +429,8 @@ def test_the_history_is_a_data_frame_by_time(result: Result) -> None:
     assert list(frame.columns[:3]) == ["step", "force", "indentation"]
     np.testing.assert_array_equal(frame.index, result.time)
     np.testing.assert_array_equal(frame["plate_w"], result["history/plate_w"])
+    units = {name: result.unit(f"history/{name}") for name in ("time", *frame.columns)}
+    assert frame.attrs["units"] == {name: unit for name, unit in units.items() if unit}
 
 
 def test_without_pandas_the_message_says_what_to_install(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import inspect
+import io
 import logging
 import os
 import pickle
@@ -21,6 +22,7 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.deck.source_text import HDF5
 from fecm.mechanics.contact_law import ContactPoint
 from tests.calls import call
 from tests.decks import APPENDIX, DATA_CARDS, DISC, LONG, PLY_PROGRAM, PROGRAM, ROOT, small
@@ -423,6 +425,68 @@ def test_a_grid_of_pyvista_has_the_nodes_and_their_displacements() -> None:
     assert (grid.n_cells, set(grid.celltypes)) == (4, {28})
     with pytest.raises(KeyError, match="no displacements at time 1"):
         result.to_pyvista(1.0)
+
+
+def test_an_open_file_is_read_as_the_file_of_its_name(tmp_path: Path) -> None:
+    text, path = small(), tmp_path / "small.inp"
+    path.write_text(text)
+    deck = fecm.read_one(path)
+    with path.open() as as_text, path.open("rb") as as_bytes:
+        for stream in (io.StringIO(text), io.BytesIO(text.encode()), as_text, as_bytes):
+            assert fecm.read_one(stream) == deck
+    assert fecm.read_deck(io.StringIO(text)) == deck
+    assert fecm.check(io.StringIO(text)).source == "<text>"
+    with path.open() as as_text:
+        assert fecm.check(as_text).source == str(path)
+    with path.open() as as_text, pytest.raises(fecm.FecmError, match="is an input"):
+        fecm.run_one(as_text, output=path, overwrite=True)
+    assert path.read_text() == text
+
+
+def test_a_result_is_read_from_bytes_and_from_a_file_that_is_closed_then(tmp_path: Path) -> None:
+    path = tmp_path / "small.h5"
+    result = fecm.run_one(small(), output=path)
+    with path.open("rb") as opened:
+        loaded = fecm.load(opened)
+    np.testing.assert_array_equal(loaded.force, result.force)
+    loaded = fecm.load(io.BytesIO(path.read_bytes()))
+    assert fecm.diff(loaded, path).same
+    swept = fecm.sweep(small(), {"velocity": [50.0, 60.0]}, output=tmp_path / "swept.h5")
+    with (tmp_path / "swept.h5").open("rb") as opened:
+        again = fecm.load_sweep(opened)
+    np.testing.assert_array_equal(again["peak_force"], swept["peak_force"])
+
+
+def test_data_frames_have_the_units_of_their_columns() -> None:
+    pytest.importorskip("pandas")
+    deck = fecm.read_one(with_units(small()))
+    history = fecm.run_one(deck).to_dataframe().attrs["units"]
+    assert (history["time"], history["force"], history["velocity"]) == ("s", "lbf", "in/s")
+    assert "step" not in history
+    swept = fecm.sweep(deck, {"velocity": [50.0]}).to_dataframe().attrs["units"]
+    assert (swept["velocity"], swept["peak_force"], swept["impulse"]) == ("in/s", "lbf", "lbf*s")
+    assert "validity" not in swept
+    assert fecm.run_one(small()).to_dataframe().attrs["units"] == {}
+
+
+@pytest.mark.parametrize(
+    ("read", "given", "message"),
+    [
+        (fecm.read_one, 3, "a deck is a path, a text, an open file or a Deck, not 3"),
+        (fecm.run, None, "a deck is a path, a text, an open file or a Deck, not None"),
+        (fecm.load, 3, "a result file is a path or an open file, not 3"),
+        (fecm.load, io.BytesIO(), "<file> has no bytes to read"),
+        (fecm.load, io.StringIO("x"), '<file> is open as text; open it anew with the mode "rb"'),
+        (fecm.load, io.BytesIO(small().encode()), "<file> is a deck, not a result"),
+        (fecm.load, io.BytesIO(b"0" * 100), "<file>: not a readable HDF5 file"),
+        (fecm.read_one, io.BytesIO(HDF5), "<text> is an HDF5 file, not a deck"),
+    ],
+)
+def test_what_is_neither_a_path_nor_a_readable_file_is_refused_in_a_sentence(
+    read: Any, given: Any, message: str
+) -> None:
+    with pytest.raises(fecm.FecmError, match=message):
+        read(given)
 
 
 def test_progress_counts_the_steps_up_to_the_last() -> None:

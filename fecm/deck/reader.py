@@ -8,6 +8,7 @@ from dataclasses import field
 from pathlib import Path
 
 from fecm._dataclasses import frozen, mutable
+from fecm._typing import AnyFile
 from fecm.deck.card import Card, Source
 from fecm.deck.findings import DeckError, Place
 from fecm.deck.macros import LoadTable, Macro
@@ -334,13 +335,14 @@ def _close(word: str, known: list[str]) -> list[str]:
     return difflib.get_close_matches(word, known, 1, 0.6)
 
 
-def read_deck(path_or_text: str | Path) -> Deck | list[Deck]:
+def read_deck(path_or_text: str | Path | AnyFile) -> Deck | list[Deck]:
     r"""Read a deck.
 
     Parameters
     ----------
-    path_or_text : str or Path
-        A file's path, or the deck's text: a string with a line end in it is text.
+    path_or_text : str, Path or file
+        A file's path; the deck's text, which has a line end in it; or a file that is open as text
+        or bytes, such as :class:`io.StringIO`.
 
     Returns
     -------

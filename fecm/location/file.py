@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from fecm._typing import Array
+from fecm._typing import AnyFile, Array
 from fecm.location.location import OF_FORCE, OPTIONAL, Candidate, Location
 from fecm.location.writer import BY_TIME, DATASETS
 from fecm.results import schema
@@ -20,13 +20,13 @@ if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
 
 
-def load(path: str | Path) -> Location:
+def load(path: str | Path | AnyFile) -> Location:
     """Read a location that ``fecm locate -o`` or :meth:`Location.save` wrote.
 
     Parameters
     ----------
-    path : str or Path
-        HDF5 file.
+    path : str, Path or file
+        HDF5 file, or one that is open as bytes.
 
     Raises
     ------
@@ -37,7 +37,7 @@ def load(path: str | Path) -> Location:
     """
     from fecm.results.hdf5_reader import read  # h5py takes 60 ms to import
 
-    return location_of(read(Path(path), schema.Form.LOCATION))
+    return location_of(read(path, schema.Form.LOCATION))
 
 
 def location_of(contents: Contents) -> Location:

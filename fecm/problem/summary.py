@@ -27,6 +27,7 @@ from fecm.problem.resolution import resolution, said_error
 from fecm.problem.static_plate import MOST_SOLVED
 
 ROOM = 0.6  # share of the critical time step below which the step that DT 0 takes is shown
+LABEL_WIDTH = 20  # of the lines of a summary, at least
 
 
 def leaves_out_equilibrium(problem: Problem) -> bool:
@@ -164,6 +165,11 @@ class ProblemSummary:
         """Plain values, for JSON."""
         values = vars(self).items()
         return {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in values}
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Labels and texts of the lines after the title."""
+        lines = self.lines()[1:]
+        return [(line[:LABEL_WIDTH].strip(), line[LABEL_WIDTH:].strip()) for line in lines]
 
     def lines(self) -> list[str]:
         """Lines of text, as ``fecm check`` prints them."""

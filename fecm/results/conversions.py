@@ -32,7 +32,11 @@ def dataframe(stored: Stored) -> pandas.DataFrame:
     known = [path for path in DATASETS if path in members]
     columns = {path.partition("/")[2]: stored[path] for path in dict.fromkeys(known + members)}
     index = pandas.Index(columns.pop("time"), name="time")
-    return pandas.DataFrame(columns, index=index)
+    table = pandas.DataFrame(columns, index=index)
+    table.attrs["units"] = {
+        name: unit for name in ("time", *columns) if (unit := stored.unit(f"history/{name}"))
+    }
+    return table
 
 
 def datatree(stored: Stored) -> xarray.DataTree:

@@ -9,6 +9,7 @@ Any error of the library on a damaged file becomes a
 from __future__ import annotations
 
 import contextlib
+import io
 import math
 import re
 from collections.abc import Iterator, Mapping
@@ -18,7 +19,8 @@ from typing import Any
 import h5py
 import numpy as np
 
-from fecm._typing import Array
+from fecm._errors import OptionsError
+from fecm._typing import AnyFile, Array
 from fecm.results.errors import NotStoredError, ResultFileError
 from fecm.results.missing import not_stored
 from fecm.results.schema import FORMAT_VERSION, Form
@@ -46,8 +48,11 @@ PACKED = 2000  # upper bound of the compression of HDF5's filters; deflate reach
 class Contents(Mapping[str, Array]):
     """Contents of a result file: its datasets by path, read on demand."""
 
-    def __init__(self, path: Path, attributes: dict[str, Any]) -> None:
+    def __init__(
+        self, path: Path, attributes: dict[str, Any], in_memory: io.BytesIO | None = None
+    ) -> None:
         self.path = path
+        self._source = in_memory or path
         # A value of an unsupported type is replaced by the type's name.
         self.attributes = attributes
         # All by path: attributes of groups; shapes, and types in native byte order, of datasets.
@@ -63,7 +68,7 @@ class Contents(Mapping[str, Array]):
     def held(self) -> Iterator[None]:
         """Keep the file open for many reads; each of them opens it otherwise."""
         with _troubles(self.path):
-            self._held = h5py.File(self.path)
+            self._held = h5py.File(self._source)
         try:
             with self._held:
                 yield
@@ -74,7 +79,7 @@ class Contents(Mapping[str, Array]):
     def _file(self) -> Iterator[h5py.File]:
         """The open file; its errors become those of this module."""
         held = self._held and contextlib.nullcontext(self._held)
-        with _troubles(self.path), held or h5py.File(self.path) as file:
+        with _troubles(self.path), held or h5py.File(self._source) as file:
             yield file
 
     @property
@@ -138,19 +143,24 @@ def _troubles(path: Path) -> Iterator[None]:
         raise ResultFileError(f"{path}: not a readable HDF5 file ({message})") from None
 
 
-def read(path: Path, *forms: str) -> Contents:
+def read(source: str | Path | AnyFile, *forms: str) -> Contents:
     """List the contents of a result file of one of these formats; by default that of a run.
 
-    Raises ResultFileError if it is not an HDF5 file, or not a result of these forms.  Raises
-    OSError if it can't be opened.
+    A file that is open is read into memory.  Raises ResultFileError if it is not an HDF5 file, or
+    not a result of these forms.  Raises OSError if it can't be opened.
     """
-    path = Path(path)
-    if path.exists() and not (path.is_file() or path.is_dir()):
-        raise ResultFileError(f"{path}: not a regular file")
-    with path.open("rb") as opened:  # raises the error of a missing or forbidden file
-        if DECK.search(opened.read(FIRST)):
-            raise ResultFileError(f"{path} is a deck, not a result; `fecm run {path}` makes one")
-    with _troubles(path), h5py.File(path) as file:
+    if isinstance(source, str | Path):
+        path, in_memory = Path(source), None
+        if path.exists() and not (path.is_file() or path.is_dir()):
+            raise ResultFileError(f"{path}: not a regular file")
+        with path.open("rb") as opened:  # raises the error of a missing or forbidden file
+            begin = opened.read(FIRST)
+    else:
+        path, in_memory = _open_file(source)
+        begin = in_memory.getvalue()[:FIRST]
+    if DECK.search(begin):
+        raise ResultFileError(f"{path} is a deck, not a result; `fecm run {path}` makes one")
+    with _troubles(path), h5py.File(in_memory or path) as file:
         attributes = _attributes(file)
         form = attributes.get("format")
         version = attributes.get("format_version")
@@ -164,15 +174,28 @@ def read(path: Path, *forms: str) -> Contents:
         if version != FORMAT_VERSION:
             raise ResultFileError(f"{path}: format version {version} is not {FORMAT_VERSION}")
         _check_links(path, file)
-        contents = Contents(path, attributes)
+        contents = Contents(path, attributes, in_memory)
         names: list[str | bytes] = []
         file.visit(names.append)
-        size = path.stat().st_size
+        size = len(in_memory.getbuffer()) if in_memory else path.stat().st_size
         for name in names:
             if isinstance(name, bytes):
                 raise ResultFileError(f"{path}: the name {_text(name)!r} is not UTF-8")
             _list(contents, size, name, h5py.h5o.open(file.id, name.encode()))
     return contents
+
+
+def _open_file(file: AnyFile) -> tuple[Path, io.BytesIO]:
+    """Name and bytes of an open file; OptionsError if it is none, or is open as text."""
+    if not hasattr(file, "read"):
+        raise OptionsError(f"a result file is a path or an open file, not {file!r}")
+    name = getattr(file, "name", None)
+    path = Path(name if isinstance(name, str) else "<file>")
+    data = b"" if isinstance(file, io.TextIOBase) else file.read()
+    if not data or isinstance(data, str):
+        what = "is open as text" if isinstance(file, io.TextIOBase) else "has no bytes to read"
+        raise OptionsError(f'{path} {what}; open it anew with the mode "rb"')
+    return path, io.BytesIO(data)
 
 
 def _check_links(path: Path, file: h5py.File) -> None:

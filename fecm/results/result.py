@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from fecm._errors import warn
 from fecm._tables import html_table
-from fecm._typing import Floats
+from fecm._typing import AnyFile, Floats
 from fecm.deck.model import Deck
 from fecm.results import schema
 from fecm.results.end import End
@@ -120,6 +120,8 @@ class Result(Stored, schema.Contact):
 
     def to_dataframe(self) -> pandas.DataFrame:
         """The history as a pandas DataFrame: one row per step, indexed by time.
+
+        ``attrs["units"]`` has the units of the columns and of the time, if the deck names its own.
 
         Raises
         ------
@@ -409,13 +411,13 @@ class Result(Stored, schema.Contact):
         return html_table(repr(self)[1:-1], [*rows, *(("note", note) for note in self.notes)])
 
 
-def load(path: str | Path) -> Result:
+def load(path: str | Path | AnyFile) -> Result:
     """Open a result file; datasets are read on demand.
 
     Parameters
     ----------
-    path : str or Path
-        A file that ``fecm run`` wrote.
+    path : str, Path or file
+        A file that ``fecm run`` wrote, or one that is open as bytes, which is read into memory.
 
     Raises
     ------
@@ -432,7 +434,7 @@ def load(path: str | Path) -> Result:
     """
     from fecm.results.hdf5_reader import read  # h5py takes 30 ms
 
-    return result_of(read(Path(path)))
+    return result_of(read(path))
 
 
 def result_of(contents: Contents, model: Deck | None = None) -> Result:

@@ -107,11 +107,15 @@ class SweepResult(StoredSweep):
         save(self, Path(path), overwrite=overwrite)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """Return values and results as a table with one row per case (requires pandas)."""
+        """Return values and results as a table with one row per case (requires pandas).
+
+        ``attrs["units"]`` has the units of the columns that have one.
+        """
         import pandas
 
         table = pandas.DataFrame({**self.cases, **self.summary})
         table.index.name = "case"
+        table.attrs["units"] = {str(n): unit for n in table.columns if (unit := self.unit(str(n)))}
         return table
 
     def to_xarray(self) -> xarray.Dataset:

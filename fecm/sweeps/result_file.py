@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fecm._typing import AnyFile
 from fecm.deck.units import declared_units
 from fecm.results import schema
 from fecm.results.errors import ResultFileError
@@ -21,8 +22,13 @@ if TYPE_CHECKING:
     from fecm.results.hdf5_reader import Contents
 
 
-def load(path: str | Path) -> SweepResult:
+def load(path: str | Path | AnyFile) -> SweepResult:
     """Read the result of a sweep.
+
+    Parameters
+    ----------
+    path : str, Path or file
+        HDF5 file, or one that is open as bytes.
 
     Raises
     ------
@@ -33,7 +39,7 @@ def load(path: str | Path) -> SweepResult:
     """
     from fecm.results.hdf5_reader import read  # h5py takes 60 ms to import
 
-    return sweep_of(read(Path(path), schema.Form.SWEEP))
+    return sweep_of(read(path, schema.Form.SWEEP))
 
 
 def sweep_of(contents: Contents, *, history: bool = True) -> SweepResult:
