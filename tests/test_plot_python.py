@@ -175,16 +175,34 @@ def test_what_a_notebook_shows_of_an_object_is_short_and_escaped(
 ) -> None:
     deck = fecm.read_one(APPENDIX.read_text().replace("**LOW", "<b>LOW"))
     bare = fecm.run_one(small("LMAS\nDT        .5E-6\n"))
-    shown: list[Any] = [result, result.tape3, sweep, deck, bare]
+    checked, difference = fecm.check(deck), fecm.diff(result, result)
+    shown: list[Any] = [result, result.tape3, sweep, deck, bare, checked, difference]
     for one in shown:
         assert len(repr(one)) < 200
         assert "\n" not in repr(one)
         assert repr(one).startswith("<")
-        assert len(one._repr_html_()) < 3000
+        assert len(one._repr_html_()) < 4000
     assert "peak force" in shown[0]._repr_html_()
     assert "&lt;b&gt;LOW" in shown[3]._repr_html_()
     assert "<b>" not in shown[3]._repr_html_()
     assert repr(sweep) == "<fecm sweep 'small plate' over velocity, k: 4 cases: all ok>"
+
+
+def test_a_notebook_shows_plates_laminates_and_estimates_as_tables() -> None:
+    laminate = fecm.Laminate("[0/90]s", "AS4/8552", 0.13)._repr_html_()
+    cell = "</th><td style='text-align:left'>"
+    assert f">in-plane Ex, Ey, Gxy{cell}72699, 72699, 5300 N/mm^2<" in laminate
+    assert f">B11, B22, B66, B12, B16, B26{cell}0, 0, 0, 0, 0, 0 N<" in laminate
+    assert "`ply` is None" in fecm.Laminate("[0/90]s")._repr_html_()
+    assert f">mesh{cell}(20, 12)<" in fecm.Plate.on_fixture("D7136")._repr_html_()
+    path = fecm.examples.path("impact-115")
+    assert f">run{cell}peak force 85.013 lbf, duration" in fecm.estimate(path)._repr_html_()
+    assert f">nodes{cell}609<" in fecm.check(path)._repr_html_()
+    slower = fecm.read_one(small()).with_(velocity=1.0)
+    assert (
+        ">history/force</th>"
+        in fecm.diff(fecm.run_one(small()), fecm.run_one(slower))._repr_html_()
+    )
 
 
 NOTEBOOK = """

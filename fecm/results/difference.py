@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from fecm._dataclasses import frozen
+from fecm._tables import html_table
 from fecm._text import printable, shown_apart
 
 MAX = "max"  # the usual scale of differences, in words
@@ -271,6 +272,13 @@ class Difference:
 
     def __repr__(self) -> str:
         return f"<fecm difference of {self.a} and {self.b}: {self.verdict}>"
+
+    def _repr_html_(self) -> str:
+        """Table of the datasets that differ and of what is listed, for notebooks."""
+        rows = [(found.name, str(found)) for found in self.datasets if not found.same]
+        rows += ((name, "only in A") for name in self.only_in_a)
+        rows += ((name, "only in B") for name in self.only_in_b)
+        return html_table(repr(self)[1:-1], [*rows, *(("listed", str(one)) for one in self.listed)])
 
     def lines(self, *, same: bool = True) -> list[str]:
         """Return one line per dataset, what is listed, and the verdict.

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from fecm._dataclasses import frozen
 from fecm._errors import warn
-from fecm._tables import aligned
+from fecm._tables import aligned, html_table
 from fecm.api import sole_problem
 from fecm.deck.model import Deck
 from fecm.deck.units import quantity, unit_names, unit_of
@@ -120,6 +120,21 @@ class Estimate:
         return "\n".join(
             [self.title or "(no title)", *(f"  {line}" for line in (*lines, *aligned(table)))]
         )
+
+    def _repr_html_(self) -> str:
+        """Table of the models and of the run, for notebooks."""
+        rows = [
+            ("class", f"M/M_plate = {self.mass_ratio:.4g}, {self.response}"),
+            ("lambda", f"{self.inelasticity:.4g}"),
+            ("stiffness", self._text(self.stiffness, "force/length")),
+            *self.remarks.items(),
+        ]
+        for name, one in self.models.items():
+            model, *cells = self._row(name, one)
+            named = zip(COLUMNS, cells, strict=True)
+            rows.append((model, ", ".join(f"{n.replace('_', ' ')} {cell}" for n, cell in named)))
+        rows += (("note", note) for note in self.notes)
+        return html_table(self.title or "(no title)", rows)
 
     def _row(self, model: str, one: ModelEstimate) -> list[str]:
         """Cells of a model."""
