@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from fecm.deck.catalogue import material_names
 from fecm.deck.model import Allowables, Deck
 from fecm.mechanics.failure import CRITERIA, PlyExposure
 
@@ -64,6 +63,8 @@ def materials_at(deck: Deck, laminate: int, criterion: str, ply: int) -> tuple[s
     used = {layer.material for layers in deck.layers.values() for layer in layers}
     if len(used) < 2 or len(numbers) < count:
         return ()
+    from fecm.deck.catalogue import material_names  # reads the catalogue, which few results need
+
     names = material_names(deck)
     return tuple(names.get(number, f"material {number}") for number in numbers)
 
