@@ -50,6 +50,9 @@ class _FieldsOf:
         self._cls = cls
 
     def __get__(self, instance: object, owner: type) -> dict[str, Field[Any]]:
+        # Without docstrings (python -OO) dataclass would write the signature in their place, of a
+        # class whose defaults may not exist yet.
+        self._cls.__doc__ = self._cls.__doc__ or self._cls.__name__
         made: Any = dataclass(init=False, repr=False, eq=False)(self._cls)
         found: dict[str, Field[Any]] = made.__dataclass_fields__
         return found

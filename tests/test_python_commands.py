@@ -6,8 +6,11 @@ import contextlib
 import csv
 import doctest
 import json
+import os
 import pickle
 import shutil
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
@@ -17,7 +20,7 @@ import pytest
 
 import fecm
 from fecm._json import jsonable
-from tests.calls import call
+from tests.calls import call, program
 from tests.decks import APPENDIX, DATA_CARDS, LONG, PROGRAM, small
 from tests.test_check import WRONG
 
@@ -265,3 +268,38 @@ def test_a_printed_result_is_the_summary_of_the_run_with_its_doubts(tmp_path: Pa
     assert [line for line in lines if line not in notes] == shown
     assert [line[2:].split(None, 1)[1] for line in notes] == list(result.notes)
     assert str(fecm.load(tmp_path / "small.h5")) == str(result)
+
+
+UNGUARDED = """
+import fecm
+deck = fecm.read_one({deck!r})
+fecm.sweep(deck, {{"layup": ["[0]", "[90]"]}}, workers=2, output="sweep.h5")
+"""
+
+
+def test_a_script_without_the_main_guard_is_told_so_and_leaves_no_result(tmp_path: Path) -> None:
+    script = tmp_path / "script.py"
+    script.write_text(UNGUARDED.format(deck=small()))
+    done = subprocess.run(
+        [sys.executable, script.name], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 1
+    message = done.stderr.splitlines()[-1]
+    assert "no worker process could start" in message
+    assert '`if __name__ == "__main__":`' in message
+    assert [file.name for file in tmp_path.iterdir()] == ["script.py"]
+
+
+def test_commands_run_without_docstrings_and_under_a_notebooks_backend(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(small())
+    surroundings = {
+        **os.environ,
+        "PYTHONOPTIMIZE": "2",
+        "MPLBACKEND": "module://not_installed.backend",
+    }
+    run = program("run", "d.inp", cwd=tmp_path, env=surroundings)
+    assert run.exit_code == 0, run.stderr
+    assert "Traceback" not in run.stderr
+    plot = program("plot", "d.h5", "--kind", "force", "-o", "f.png", cwd=tmp_path, env=surroundings)
+    assert plot.exit_code == 0, plot.stderr
+    assert (tmp_path / "f.png").stat().st_size > 1000

@@ -8,6 +8,7 @@ imported when the command is called.
 from __future__ import annotations
 
 import errno
+import os
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
@@ -116,6 +117,9 @@ def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoR
     streams.guard_streams()
     isolation.switch.on = arguments is None
     warnings.showwarning = _show_warning
+    os.environ["MPLBACKEND"] = (
+        "agg"  # pictures are files; the environment of a notebook has its own
+    )
     status = _status(arguments, prog_name)
     if (error := streams.output_error()) is not None and status not in SIGNALLED:
         status = UNUSABLE

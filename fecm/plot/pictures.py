@@ -58,11 +58,13 @@ def kind_named(name: str) -> Kind:
 
 
 def require_matplotlib() -> None:
-    """Raise MatplotlibError, which says what to install, if matplotlib is absent."""
+    """Raise MatplotlibError, which says what to do, if matplotlib can't be imported."""
     try:
         import matplotlib  # noqa: F401
     except ImportError:
         raise MatplotlibError(MISSING) from None
+    except ValueError as error:  # MPLBACKEND names a backend that is not installed
+        raise MatplotlibError(f"matplotlib can't start: {error}; unset MPLBACKEND") from None
 
 
 def imported(place: str) -> Callable[..., Picture]:

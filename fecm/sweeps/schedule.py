@@ -18,6 +18,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent import futures
 from contextlib import nullcontext
 from multiprocessing import resource_tracker
+from multiprocessing.synchronize import Event
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
@@ -36,6 +37,10 @@ WORTH_WORKERS = 10.0  # seconds that tasks take, from which on workers are worth
 LOOK = 0.5  # polling interval in seconds
 PATIENCE = 5.0  # seconds for the scheduler to answer
 LOST = "lost with its worker"
+UNGUARDED = (
+    "no worker process could start: each imports the script that is running; call fecm there under "
+    '`if __name__ == "__main__":`'
+)
 MOST_ADDRESS = 100_000  # bytes of a file with the scheduler's address
 
 
@@ -51,8 +56,9 @@ def attempt(task: Task) -> Outcome:
         return Outcome.failed(dict.fromkeys(task.numbers, f"{type(error).__name__}: {error}"))
 
 
-def _end_with(parent: int) -> None:
-    """End this worker process soon after its parent process has ended."""
+def _begin(started: Event, parent: int) -> None:
+    """Say that this worker process has started, and end it soon after its parent process."""
+    started.set()
 
     def watch() -> None:
         while os.getppid() == parent:
@@ -71,6 +77,8 @@ def _run_on(
         for task in tasks:
             try:
                 running[executor.submit(attempt, task)] = task
+            except futures.BrokenExecutor:
+                raise
             except (RuntimeError, TypeError, pickle.PicklingError) as error:
                 raise SchedulerError(f"the executor takes no tasks: {error}") from None
         while running:
@@ -133,19 +141,28 @@ def start_resource_tracker() -> None:
 
 
 def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> None:
-    """Run tasks in worker processes; rerun the tasks of a worker that died."""
+    """Run tasks in worker processes; rerun the tasks of a worker that died.
+
+    Raises SchedulerError if no worker starts.  Each worker imports the script that is running: one
+    that calls this function whenever it is imported can't have workers.
+    """
     left = {task.number: task for task in tasks}
     deaths = 0
     start_resource_tracker()
     while left and deaths < DEATHS:
         before = len(left)
         context = multiprocessing.get_context("spawn")
-        pool = futures.ProcessPoolExecutor(count, context, _end_with, (os.getpid(),))
+        started = context.Event()
+        pool = futures.ProcessPoolExecutor(count, context, _begin, (started, os.getpid()))
         try:
             for task, future in _run_on(pool, list(left.values()), idle):
                 done(task, future.result())
                 del left[task.number]
-        except (futures.BrokenExecutor, SchedulerError):
+        except SchedulerError:  # Python starts no process while it imports the script
+            raise SchedulerError(UNGUARDED) from None
+        except futures.BrokenExecutor:
+            if not started.is_set():
+                raise SchedulerError(UNGUARDED) from None
             deaths = 0 if len(left) < before else deaths + 1
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
