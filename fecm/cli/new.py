@@ -265,7 +265,7 @@ class Options:
     type=click.Choice(SUPPORTS),
     default="free",
     show_default=True,
-    help="Support of all edges.",
+    help="Support of all edges: simple holds w and the rotation along the edge (a hard support).",
 )
 @option(
     "--edge",

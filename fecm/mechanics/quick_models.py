@@ -144,54 +144,45 @@ def _value(powers: list[float], s: float) -> float:
     return value
 
 
-def static_plate(mass: float, velocity: float, k: float, stiffness: float) -> QuickImpact:
-    """Impact whose energy M V^2/2 is F^2/(2 k_b) in bending and (2/5) F^(5/3)/k^(2/3) in contact.
-
-    k_b is the static stiffness of the plate under its patch, force/length.
-    """
+def static_peak(mass: float, velocity: float, k: float, stiffness: float) -> float:
+    """Peak force of :func:`static_plate`."""
     energy = 0.5 * mass * velocity**2
     most = velocity * math.sqrt(stiffness * mass)  # without indentation
 
     def missing(force: float) -> float:
         return force**2 / (2.0 * stiffness) + 0.4 * math.cbrt(force**5 / k**2) - energy
 
-    duration = math.pi * math.sqrt(mass / stiffness)
-    peak = root(missing, 0.0, most, 1e-12 * most)
-    return QuickImpact(peak, duration / 2.0, duration)
+    return root(missing, 0.0, most, 1e-12 * most)
 
 
-def contact_time(mass: float, velocity: float, k: float, stiffness: float) -> float:
-    """Duration of the contact of :func:`static_plate`, with the indentation.
+def static_plate(mass: float, velocity: float, k: float, stiffness: float) -> QuickImpact:
+    """Impact whose energy M V^2/2 is F^2/(2 k_b) in bending and (2/5) F^(5/3)/k^(2/3) in contact.
 
-    Plate and contact are springs in series.  The displacement of the mass at the force F is
-    x = F/k_b + (F/k)^(2/3), and the time is 2 times the integral of dx/v up to the peak F_m; the
-    variable s of F = F_m (1 - s^2)^3 leaves no singularity.
+    k_b is the static stiffness of the plate under its patch, force/length.  Plate and contact are
+    springs in series.  The displacement of the mass at the force F is x = F/k_b + (F/k)^(2/3), and
+    the duration is 2 times the integral of dx/v up to the peak F_m; the variable s of
+    F = F_m (1 - s^2)^3 leaves no singularity.
     """
-    peak = static_plate(mass, velocity, k, stiffness).peak
+    peak = static_peak(mass, velocity, k, stiffness)
     s = (np.arange(MIDPOINTS) + 0.5) / MIDPOINTS
-    root = 1.0 - s * s
-    force = peak * root**3
+    rest = 1.0 - s * s
+    force = peak * rest**3
     stored = force**2 / (2.0 * stiffness) + 0.4 * np.cbrt(force**5 / k**2)
     left = np.sqrt(velocity**2 - 2.0 * stored / mass)
     slope = 1.0 / stiffness + 2.0 / 3.0 / np.cbrt(force * k**2)
-    return 2.0 * float(np.mean(slope * 6.0 * peak * root**2 * s / left))
+    duration = 2.0 * float(np.mean(slope * 6.0 * peak * rest**2 * s / left))
+    return QuickImpact(peak, duration / 2.0, duration)
 
 
 def curved_plate(mass: float, velocity: float, k: float, curve: StaticCurve) -> QuickImpact:
     """Impact of :func:`static_plate` on a nonlinear plate, whose curve reaches the energy.
 
-    M V^2/2 is the integral of F dW in the plate, and (2/5) F^(5/3)/k^(2/3) in the contact.  The
-    duration is 2 times the integral of dW/v without indentation; the variable s of W = W_m (1 -
-    s^2) leaves no singularity.
+    M V^2/2 is the integral of F dW in the plate, and (2/5) F^(5/3)/k^(2/3) in the contact.
     """
     energy = 0.5 * mass * velocity**2
     most = curve.deflection[-1]
-    tight = 1e-12 * most
-    deflection = root(lambda w: stored_at(curve, k, w)[1] - energy, 0.0, most, tight)
-    alone = root(lambda w: float(curve.at(w)[1]) - energy, 0.0, most, tight)  # not indented
-    s = (np.arange(MIDPOINTS) + 0.5) / MIDPOINTS
-    _, work = curve.at(alone * (1.0 - s * s))
-    duration = 2.0 * float(np.mean(2.0 * alone * s / np.sqrt(2.0 * (energy - work) / mass)))
+    deflection = root(lambda w: stored_at(curve, k, w)[1] - energy, 0.0, most, 1e-12 * most)
+    duration = contact_time_on_curve(mass, velocity, k, curve)
     return QuickImpact(stored_at(curve, k, deflection)[0], duration / 2.0, duration)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm.deck.model import Impact, Indentation
-from fecm.mechanics.quick_models import contact_time, contact_time_on_curve, static_plate
+from fecm.mechanics.quick_models import contact_time_on_curve, static_peak, static_plate
 from fecm.mechanics.solutions import ConvergenceError, SingularStiffnessError, static_stiffness
 from fecm.mechanics.static_curve import StaticCurve, static_curve
 from fecm.problem.contact_estimates import wave_impedance
@@ -56,7 +56,7 @@ def static_deflection(problem: Problem) -> float:
         return math.nan
     wave = 2.0 * mass * velocity / wave_impedance(problem.laminate)
     try:
-        peak = static_plate(mass, velocity, _coefficient(problem), stiffness).peak
+        peak = static_peak(mass, velocity, _coefficient(problem), stiffness)
     except OverflowError:  # of a k that the checks doubt
         return math.nan
     return min(wave, peak / stiffness)
@@ -109,7 +109,9 @@ def contact_duration(problem: Problem) -> float:
     if velocity > 0.0:
         with suppress(OverflowError):  # of a k that the checks doubt
             k = _coefficient(problem)
-            duration = max(duration, CONTACT_TIMES * contact_time(mass, velocity, k, stiffness))
+            duration = max(
+                duration, CONTACT_TIMES * static_plate(mass, velocity, k, stiffness).duration
+            )
     return _rounded(duration)
 
 

@@ -13,7 +13,7 @@ from fecm.deck import model
 from fecm.deck.grid import Grid, refined, uniform
 from fecm.deck.model import Deck, Impact, Indentation, Patch, Projectile
 from fecm.mechanics.laminate import effective_rigidity, laminate
-from fecm.mechanics.quick_models import inelasticity, infinite_plate, static_plate
+from fecm.mechanics.quick_models import inelasticity, infinite_plate, static_peak
 from fecm.mechanics.solutions import static_stiffness
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
@@ -196,4 +196,4 @@ def _large_mass() -> Sequence[Value]:
     (problem,) = load_deck(struck_square(1.0, 1e-6).to_text()).problems
     assert problem.contact is not None
     stiffness = static_stiffness(problem.moving_plate, problem.contact)
-    return [stiffness, static_plate(5.5, 2.0, 1e9, 2.5e6).peak]
+    return [stiffness, static_peak(5.5, 2.0, 1e9, 2.5e6)]

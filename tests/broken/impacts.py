@@ -141,7 +141,7 @@ BREAKS: Breaks = {
         {"small-mass": ("λ", "largest force on")},
     ),
     "nine tenths of the plate's stiffness": (
-        instead(quick_models, "static_plate", lambda right, *a: right(*a[:-1], 0.9 * a[-1])),
+        instead(quick_models, "static_peak", lambda right, *a: right(*a[:-1], 0.9 * a[-1])),
         {"large-mass": ("largest",)},
     ),
 }  # fmt: skip
