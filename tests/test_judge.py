@@ -6,6 +6,7 @@ import functools
 import json
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,7 @@ from fecm.results.end import Deflection, End, LastContact, decided, ends, settle
 from fecm.results.linear_plate import LIMITS, InPlane, in_plane_of, softness
 from fecm.results.metrics import Indentation, Projectiles, summarise
 from fecm.results.summary import summary
-from fecm.results.validity import counted
+from fecm.results.validity import Extent, counted
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.statistics import bounds, wilson
 from tests.builders import table
@@ -430,3 +431,21 @@ def test_a_plate_on_a_window_is_told_one_error_which_is_that_of_nonlinear_runs(
     (said,) = re.findall(r"about (\d+) % too low", words)
     assert abs(float(said) - low) <= 2.0
     assert "window" in words
+
+
+def test_the_indentation_of_a_sandwich_is_compared_with_the_face_that_is_struck() -> None:
+    core: Any = (0, "Divinycell-H60", 10.0)
+    deck = fecm.impact(
+        fecm.Plate.rectangle((100.0, 100.0), (4, 4), support="simple"),
+        fecm.Laminate([0, 90, core, 90, 0], "AS4/8552", 0.13),
+        fecm.RigidMass(1e-5),
+        fecm.Contact(5e4),
+        velocity=2000.0,
+        duration=2e-4,
+    )
+    (problem,) = load_deck(deck.to_text()).problems
+    assert problem.laminate.struck_thickness == pytest.approx(0.26)
+    extent = Extent(*(np.array([value]) for value in (End.OVER, 1.0, 0.07, 0.0)))
+    assert problem.judge.validity(extent).tolist() == ["indentation > h/4"]
+    shallow = replace(extent, indentation=np.array([0.06]))
+    assert problem.judge.validity(shallow).tolist() == ["ok"]

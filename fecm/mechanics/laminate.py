@@ -107,6 +107,15 @@ class Laminate:
         return min(moduli) < SOFT_CORE * max(moduli)
 
     @property
+    def struck_thickness(self) -> float:
+        """Thickness of the struck face of a sandwich, from its first ply to the core, or of all."""
+        if not self.has_core:
+            return self.thickness
+        moduli = np.array([ply.g13 for ply in self.plies.constants])
+        core = int(np.argmax(moduli < SOFT_CORE * moduli.max()))
+        return float(self.plies.faces[core] - self.plies.faces[0])
+
+    @property
     def is_coupled(self) -> bool:
         """Whether stretching and bending are coupled (B is not zero beyond rounding)."""
         scale = np.abs(self.A).max() * self.thickness

@@ -350,6 +350,7 @@ class Problem:
             preloaded=self.plate.is_preloaded,
             curved=self.plate.is_curved,
             nonlinear=self.plate.nonlinear,
+            struck=self.laminate.struck_thickness if self.laminate.has_core else None,
         )
 
     @property

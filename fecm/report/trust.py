@@ -135,9 +135,10 @@ def _reached(result: Result, problem: Problem, reasons: list[str]) -> Iterator[J
         elif beyond:
             words = f"{words}; the notes of the run have its size"
         yield Judgement(level, name, place, words)
-    depth = float(result["history/indentation"].max(initial=0.0)) / limits.thickness
+    depth = float(result["history/indentation"].max(initial=0.0)) / limits.indented
     level = Level.OUTSIDE if Reason.SOFT in reasons else Level.WITHIN
-    words = f"the contact law of a half-space holds up to {INDENTATION:g} h"
+    of_face = " of the struck face" if limits.struck else ""
+    words = f"the contact law of a half-space holds up to {INDENTATION:g} h{of_face}"
     yield Judgement(level, "indentation", Number(depth, f"{depth:.3g} h"), words)
 
 

@@ -336,7 +336,8 @@ def _left(result: Stored) -> str:
     if end_of(result) is not End.OVER:
         return "open"
     permanent = float(result.attributes_of("history")["permanent_indentation"])
-    return _quantity(result, permanent, "length")
+    said = _quantity(result, permanent, "length")
+    return said if permanent else f"{said} by the contact law"
 
 
 def _rebound(result: Stored) -> str:

@@ -120,6 +120,15 @@ class Judge:
     preloaded: bool = False  # whether an initial membrane force acts
     curved: bool = False  # whether the plate at rest is curved
     nonlinear: bool = False  # whether stretching follows from bending
+    struck: float | None = None  # thickness of the struck face of a sandwich, if there is one
+
+    @property
+    def indented(self) -> float:
+        """Thickness that the indentation is compared with: the struck face's, or the plate's.
+
+        A core under the first ply leaves no face to compare with.
+        """
+        return self.struck or self.thickness
 
     def softness(self, ratio: float) -> str:
         """Error of the linear plate at a deflection over its thickness, in words."""
@@ -143,7 +152,7 @@ class Judge:
                 BENT[self.in_plane]: extent.deflection > self.limit * h,
                 Reason.STEEP: np.full(extent.peak.shape, Reason.STEEP in extent.of_rows),
                 Reason.STRAINED: np.full(extent.peak.shape, Reason.STRAINED in extent.of_rows),
-                Reason.SOFT: extent.indentation > INDENTATION * h,
+                Reason.SOFT: extent.indentation > INDENTATION * self.indented,
                 Reason.BROKEN: np.broadcast_to(extent.exposure > CROSSED, extent.peak.shape),
                 Reason.DELAMINATED: extent.peak > CROSSED * extent.threshold,
             }

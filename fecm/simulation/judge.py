@@ -201,10 +201,13 @@ def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:
     if strain.value > STRAIN:
         reached = _reached(result, "strain", f"{strain.value:.2%}", strain)
         yield Doubt(Reason.STRAINED, f"{reached} 1 % linear plies are doubtful")
-    if indentation.value > INDENTATION * h:
-        size = _size(result, indentation.value, h)
+    if indentation.value > INDENTATION * limits.indented:
+        size = _size(result, indentation.value, limits.indented)
         reached = _reached(result, "indentation", size, indentation)
-        yield Doubt(Reason.SOFT, f"{reached} h/4 the contact law of a half-space is doubtful")
+        of_face = ", h being the struck face's," if limits.struck else ""
+        yield Doubt(
+            Reason.SOFT, f"{reached} h/4{of_face} the contact law of a half-space is doubtful"
+        )
     broken = [spelt(one.criterion) for one in largest_exposures(result) if one.exposure > CROSSED]
     if broken:
         yield Doubt(

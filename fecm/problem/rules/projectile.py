@@ -135,7 +135,7 @@ def rod_out_of_range(card: model.Projectile, diameters: Floats) -> Reports:
     Subject.IMPACT,
     "The projectile is far too light, or too heavy, for the plate.",
     cause="Its mass over that of the plate is outside 10⁻⁴ to 2000.",
-    remedy="Mass in force·time²/length: t in mm, N and s.",
+    remedy="Mass in force·time²/length: t in mm, N and s; pounds over 386.09 in in, lbf and s.",
 )
 def doubtful_mass(problem: Problem) -> Reports:
     """Find masses in another unit."""
@@ -147,11 +147,16 @@ def doubtful_mass(problem: Problem) -> Reports:
     message = f"The projectile's mass {mass:.4g} is {ratio:.3g} times the plate's"
     own = in_si(MASS, names)
     usual = USUAL_MASS_RATIO * mass / ratio * (own or 1.0)
-    if own is not None and (looks := looks_like(mass, MASS, usual, names)):
+    in_inches = names.get("length") == "in"
+    if not in_inches and own is not None and (looks := looks_like(mass, MASS, usual, names)):
         message += f"; it {looks}"
     card, impact = deck.last(model.Projectile), deck.require(model.Impact)
     place = impact.place("impact node") if card is None else card.place("length or mass")
-    hint = "mass is force time^2/length in the deck's units: t in mm, N and s"
+    hint = "mass is force time^2/length in the deck's units"
+    if in_inches:
+        hint += ": a weight in pounds is divided by 386.09 in/s^2"
+    elif not names:
+        hint += ": t in mm, N and s; pounds over 386.09 in in, lbf and s"
     yield Report(f"{message}.", place, hint)
 
 
