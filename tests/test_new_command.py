@@ -559,3 +559,14 @@ def test_a_plate_that_stretches_is_run_for_the_shorter_contact_of_its_static_cur
 )
 def test_a_title_names_plate_layup_ply_and_energy(options: tuple[str, ...], title: str) -> None:
     assert fecm.read_one(new(*THIN, "--energy", "10J", *options).stdout).title == title
+
+
+@pytest.mark.parametrize(
+    "option",
+    [("--projectile", "mass:5.5kg"), ("--contact", "estimate:8mm"), ("--ply-thickness", ".184 mm")],
+)
+def test_a_unit_where_a_number_is_needed_is_named(option: tuple[str, str]) -> None:
+    made = new(*D7136, *QUICK, *option)
+    assert_unusable(made)
+    number = option[1].partition(":")[2] or option[1]
+    assert f"{number!r} has a unit; give the number alone, in the deck's units" in made.stderr

@@ -71,6 +71,9 @@ NAMED_PATH = NamedFile(path_type=Path)
 FILE_PATH = click.Path(path_type=Path, allow_dash=True)  # - is standard input or output
 
 
+WITH_UNIT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[a-zA-Zµμ/]*[a-zA-Zµμ]")
+
+
 class Finite(click.FloatRange):
     """A float in a range; never infinite, never NaN."""
 
@@ -78,6 +81,9 @@ class Finite(click.FloatRange):
 
     def convert(self, value: Any, param: Any, ctx: Any) -> float:
         """Read a number."""
+        if isinstance(value, str) and WITH_UNIT.fullmatch(value.strip()):  # 5.5kg
+            message = f"{value!r} has a unit; give the number alone, in the deck's units"
+            self.fail(message, param, ctx)
         number = float(super().convert(value, param, ctx))
         if not math.isfinite(number):
             self.fail(f"{value!r} is not a finite number.", param, ctx)
