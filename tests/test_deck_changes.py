@@ -294,6 +294,17 @@ def test_each_loop_of_steps_stores_and_others_do_not() -> None:
     assert program(static)[-1] == ("PLYS", 3, 0)
 
 
+def test_a_program_brings_the_load_tables_that_follow_its_end() -> None:
+    ramp = "    1    1        0.       10.        0.        1."
+    loaded = DECK.with_program(f"TANG\nLOOP,4\nTIME\nPROP,1\nFORM\nSOLV\nNEXT\nEND\n{ramp}\n")
+    assert [(table.begin, table.end, table.constants[1]) for table in loaded.tables] == [
+        (0.0, 10.0, 1.0)
+    ]
+    assert loaded.with_program("TANG\nPROP,1\nFORM\nSOLV").tables == loaded.tables
+    with pytest.raises(fecm.DeckError, match="E011"):
+        DECK.with_program("TANG\nPROP,1\nFORM\nSOLV")
+
+
 def test_a_program_of_cards_or_macros_replaces_the_decks() -> None:
     modes = DECK.with_program("LMAS\nEIGE,,3\n")
     assert program(modes) == [("LMAS", 0, 0), ("EIGE", 3, 0)]

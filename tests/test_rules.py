@@ -388,7 +388,9 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "W517": stiff_contact,
     "W518": macros(PROGRAM + "EXCD\n"),
     "E519": macros("LMAS\nDT        .5E-6\nLOOP          3\nTIME\nDISP\nNEXT\n"),
-    "W520": macros("LMAS\nEIGE          2\n"),
+    "W520": lambda: small(
+        PROGRAM.replace("RODP          5", "EXCD"), data="FORC\n13,0,0.,0.,1.\n\n" + DATA_CARDS
+    ),
     "W521": more("CURV\n,,\n"),
     "E522": lambda: wrong("assumed-shear-of-8-nodes")().replace("SHEA MITC", "CURV\n9.,,"),
     "E523": more("CURV\n.9,,\n"),

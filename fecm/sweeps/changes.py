@@ -151,16 +151,18 @@ def _on_the_clock(deck: Deck, made: Deck, case: Case) -> Deck:
 
 
 def with_cards(deck: Deck, cards: str) -> Deck:
-    """The deck with the macro program of cards, those between MACR and END.
+    """The deck with the macro program of cards: those between MACR and END.
 
-    Its load tables stay.  Raises DeckError if the cards are no macro program.
+    The cards of PROP's load tables may follow after END; otherwise the deck's own stay.  Raises
+    DeckError if the cards are no macro program.
     """
-    lines = [TITLE, deck.control.to_card(), END, MACROS, cards.rstrip("\n"), END]
-    lines += [table.to_card() for table in deck.tables]
+    lines = [TITLE, deck.control.to_card(), END, MACROS, *cards.rstrip("\n").split("\n")]
+    if END not in map(str.strip, lines[4:]):
+        lines += [END, *(table.to_card() for table in deck.tables)]
     reader = Reader("\n".join([*lines, STOP, ""]))
     found = [problem.deck for problem in reader.problems() if problem.deck is not None]
     for one in found:
         compile_program(one.macros, reader.findings)
     if errors := reader.findings.errors:
         raise DeckError(errors, "<macros>")
-    return replace(deck, macros=found[0].macros)
+    return replace(deck, macros=found[0].macros, tables=found[0].tables)

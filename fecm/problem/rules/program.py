@@ -203,13 +203,14 @@ def plate_at_rest(problem: Problem) -> Reports:
 @rule(
     "W520",
     Subject.PROGRAM,
-    "ROD, EXPE or PROJ are without RODP: nothing hits.",
+    "ROD, EXPE or PROJ are without RODP, and EXCD moves the plate: nothing hits.",
+    cause="Statics and natural modes of a plate do not need its impact, and are not doubted.",
     remedy="RODP, or remove the segments.",
 )
 def nothing_hits(problem: Problem) -> Reports:
     """Find segments of an impact in another program."""
     segment = _unused_segment(problem)
-    if segment is not None and _storing_at_rest(problem) is None and _movers(problem):
+    if segment is not None and _storing_at_rest(problem) is None and "EXCD" in _movers(problem):
         message = f"{_without_impact(segment)}: nothing hits the plate."
         yield Report(message, segment.place(), NO_RODP_HINT)
 
