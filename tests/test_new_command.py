@@ -139,6 +139,23 @@ def test_a_bare_number_that_is_small_for_an_energy_is_doubted() -> None:
         assert "unless it has a unit" not in new(*plate, "--energy", meant).stderr
 
 
+def test_the_patch_of_a_soft_tip_is_doubted() -> None:
+    # Rubber of 20 MPa: 10 J on k = 97.8 indent by (2.5 E/k)^0.4 = 9.19, and (8 * 9.19)^(1/2) = 8.6.
+    soft = new(*THIN, "--energy", "10J", "--contact", "estimate:8,20,.48")
+    assert "the tip is soft: its contact circle has a radius of up to 8.6" in soft.stderr
+    steel = new(*THIN, "--energy", "10J", "--contact", "estimate:8")
+    assert "tip is soft" not in steel.stderr
+    wide = new(*THIN, "--energy", "10J", "--contact", "estimate:8,20,.48", "--patch", "disc:6")
+    assert "tip is soft" not in wide.stderr
+
+
+def test_a_moved_impact_point_is_said_beside_an_error() -> None:
+    held = new(*D7136, *QUICK, "--at", "13,50")
+    assert held.exit_code == 2
+    assert "E410" in held.stderr
+    assert "the impact point is moved by" in held.stderr
+
+
 def test_a_core_that_is_thinner_than_a_ply_is_doubted() -> None:
     plate = (
         *("--size", "150x100", "--mesh", "6x4", "--support", "simple", "--layup", "[0/90/K/90/0]"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from fecm._dataclasses import frozen
@@ -29,6 +30,7 @@ SOLID = (5e10, 1e12)
 STEEL_IN_SI = 2e11
 ELASTIC_POWER = 1.5  # of unloading as of loading
 # Shapes of the contact patch.
+SOFT_TIP = 0.3  # modulus of a tip over E2, below which its contact is wide
 PATCHES = {"disc": DISC, "hertz": HERTZ}
 
 
@@ -99,6 +101,25 @@ def doubts_of_sphere(sphere: Sphere, system: str | None, test: DropWeight | None
             f"of the standard's indenter, whose radius is {test.radius:g}"
         )
     return doubts
+
+
+def doubts_of_soft_tip(
+    sphere: Sphere, radius: float, k: float, energy: float, modulus: float
+) -> list[str]:
+    """Doubt the radius of the patch of a sphere that is softer than the plies across their fibres.
+
+    The contact circle of a sphere is (R alpha)^(1/2); the indentation alpha is at most that of a
+    rigid plate, whose energy is (2/5) k alpha^(5/2).
+    """
+    if sphere.radius is None or sphere.modulus is None or sphere.modulus > SOFT_TIP * modulus:
+        return []
+    circle = math.sqrt(sphere.radius * (2.5 * energy / k) ** 0.4)
+    if circle < 2.0 * radius:
+        return []
+    return [
+        f"the tip is soft: its contact circle has a radius of up to {circle:.2g}, and the patch "
+        f"one of {radius:.3g}; `patch` disc:RADIUS takes another, on which stresses depend"
+    ]
 
 
 @frozen

@@ -18,7 +18,7 @@ LEAST_ENERGY = 0.02
 ENERGY_UNITS = {1.0: "J", 1e-3: "mJ"}
 
 
-def _energy_of(deck: model.Deck) -> float:
+def energy_of(deck: model.Deck) -> float:
     """Kinetic energy of the projectile."""
     velocity, mass = deck.require(model.Impact).velocity, build_projectile(deck).total_mass
     return 0.5 * mass * velocity**2
@@ -26,14 +26,14 @@ def _energy_of(deck: model.Deck) -> float:
 
 def said_energy(deck: model.Deck, plies: Plies) -> str:
     """Kinetic energy of the projectile, in joule where the units are known."""
-    energy = _energy_of(deck)
+    energy = energy_of(deck)
     joule = in_si("force*length", units_of(plies.system) if plies.system else {})
     return f"{energy * joule:.4g} J" if joule else f"{energy:.4g}"
 
 
 def energy_note(deck: model.Deck, plies: Plies, *, per_thickness: bool) -> str:
     """Say energy and velocity of the projectile."""
-    energy, velocity = _energy_of(deck), deck.require(model.Impact).velocity
+    energy, velocity = energy_of(deck), deck.require(model.Impact).velocity
     names = units_of(plies.system) if plies.system else {}
     said = said_energy(deck, plies)
     if per_thickness:
@@ -58,7 +58,7 @@ def doubts_of_energy(
     joule, length = in_si("force*length", names), in_si("length", names)
     if joule is None or length is None or not (standard or is_bare):
         return []
-    energy = _energy_of(deck) * joule
+    energy = energy_of(deck) * joule
     share = energy / (plies.thickness * length * 1e3)  # J/mm
     least = 1e-3 * standard.least_energy if standard else LEAST_ENERGY
     if share >= least:

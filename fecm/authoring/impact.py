@@ -9,8 +9,14 @@ from typing import Literal, NamedTuple, get_args
 from fecm._dataclasses import frozen
 from fecm._errors import warn
 from fecm.api import load_deck
-from fecm.authoring.contact import AnyContact, Sphere, doubts_of_sphere, law_of
-from fecm.authoring.energy import doubts_of_energy, energy_note, with_energy
+from fecm.authoring.contact import (
+    AnyContact,
+    Sphere,
+    doubts_of_soft_tip,
+    doubts_of_sphere,
+    law_of,
+)
+from fecm.authoring.energy import doubts_of_energy, energy_note, energy_of, with_energy
 from fecm.authoring.fixtures import DropWeight
 from fecm.authoring.kinematics import (
     AUTO as AUTO_KINEMATICS,
@@ -47,6 +53,7 @@ from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Control, Gage
 from fecm.deck.unit_systems import units_of
 from fecm.mechanics.laminate import SOFT_CORE
+from fecm.mechanics.points import RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.parts import projectile_segment
 
@@ -290,11 +297,11 @@ def impact(
             zones=tuple(zones),
         )
     )
+    for doubt in made.doubts:
+        warn(doubt)
     loaded = load_deck(made.deck)
     if errors := loaded.errors():
         raise DeckError(errors, "<deck>")
-    for doubt in made.doubts:
-        warn(doubt)
     return replace(loaded.problems[0].deck, text="")
 
 
@@ -371,6 +378,10 @@ def author(asked: Request) -> Authored:
     notes.append(energy_note(plain, plies, per_thickness=asked.test is not None))
     is_bare = strike.energy is not None and not str(strike.energy).strip()[-1:].isalpha()
     doubts += doubts_of_energy(plain, fixture, plies, is_bare=is_bare)
+    if isinstance(strike.contact, Sphere) and patch is not None:
+        radius = patch.radius or RADIUS_PER_THICKNESS[patch.shape] * plies.thickness
+        softest = min(plies.of(layer).ply.e2 for layer in struck)
+        doubts += doubts_of_soft_tip(strike.contact, radius, law.k, energy_of(plain), softest)
     title = (
         default_title(asked.plate, asked.laminate, plain, plies)
         if asked.title is None

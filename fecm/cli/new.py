@@ -389,6 +389,7 @@ def new(options: Options) -> None:
     text = made.comments + format_deck(made.deck.to_text())
     prepared = load_deck(text)
     if errors := prepared.errors():
+        note(*(as_options(text, context.params) for text in made.doubts))
         for finding in errors:
             echo(finding.render("the new deck"), err=True)
         raise RefusedError("these options do not give a valid deck; nothing was written")

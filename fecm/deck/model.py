@@ -237,8 +237,8 @@ class Deck(Record):
         Parameters
         ----------
         macros : str or sequence of Macro, optional
-            The cards between MACR and END; the deck's own by default.  In a text END and the cards of
-            PROP's load tables may follow; without them the tables stay.
+            The cards between MACR and END; the deck's own by default.  In a text END and the cards
+            of PROP's load tables may follow; without them the tables stay.
         every : int, optional
             Steps between stored rows of contact, strains and displacements (RODP, DISP).
         plies : int or bool or tuple of int, optional
