@@ -73,7 +73,7 @@ def test_a_sweep_runs_a_layup_of_tiny_angles() -> None:
 def test_a_small_letter_is_an_exponent_and_a_capital_a_material() -> None:
     assert parse_layup("[1e-05/-2.5e1/±3e0]s") == [1e-5, -25.0, 3.0, -3.0, -3.0, 3.0, -25.0, 1e-5]
     assert [tuple(ply) for ply in parse_plies("[1e1E/0E]")] == [(10.0, "E"), (0.0, "E")]
-    for wrong in ("[1e]", "[1E-5]", "[e5]", "[1e999]", "[1e5.0]"):
+    for wrong in ("[1e]", "[1E-5]", "[e5]", "[1e999]", "[1e1.0]"):
         with pytest.raises(ValueError, match="can't be read"):
             parse_plies(wrong)
 

@@ -18,7 +18,7 @@ from fecm.authoring.parameters import ObjectError, check_numbers, check_positive
 from fecm.deck import catalogue
 from fecm.deck.catalogue import MATERIALS, NamedPly
 from fecm.deck.findings import Findings
-from fecm.deck.layup import parse_plies
+from fecm.deck.layup import LARGEST_ANGLE, parse_plies
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import (
     Allowables,
@@ -134,11 +134,17 @@ class Laminate:
         if isinstance(self.layup, str):
             return tuple(LaminatePly(*ply) for ply in parse_plies(self.layup))
         try:
-            if plies := tuple(map(_ply_of, self.layup)):
-                return plies
+            plies = tuple(map(_ply_of, self.layup))
         except (TypeError, ValueError):
-            pass
-        raise ObjectError(f"the layup {self.layup!r} is not a list of angles")
+            plies = ()
+        if not plies:
+            raise ObjectError(f"the layup {self.layup!r} is not a list of angles")
+        if wrong := [ply.angle for ply in plies if abs(ply.angle) > LARGEST_ANGLE]:
+            raise ObjectError(
+                f"`layup` has the angle {wrong[0]:g}, beyond ±{LARGEST_ANGLE:g}; angles are in "
+                "degrees"
+            )
+        return plies
 
     @property
     def angles(self) -> tuple[float, ...]:

@@ -1,10 +1,7 @@
 """Layups in the usual notation: ``[0/45/0/-45/0]2s``.
 
-Angles in degrees, from the struck face on, separated by ``/``.  ``_2`` or ``_{2}`` repeats a ply,
-``±45`` (or ``+-45``) is 45/-45, a number after a group repeats it, ``s`` mirrors it, ``T``
-marks a total layup.  Groups may be nested.  A capital letter after an angle names the material of
-the ply, as in ``[0C/90G]s``; alone, as in ``[0/90/K/90/0]``, it is a ply at 0 degrees, a core say.
-An exponent has a small letter, ``1e-05``, as Python writes it.
+The grammar is described in docs/making.md, *Layups*.  Angles are in degrees, from the struck face
+on.  All plies of a layup are separated by ``/``, by ``,``, or by blanks.
 """
 
 from __future__ import annotations
@@ -20,12 +17,33 @@ from fecm._errors import FecmError
 MOST_PLIES = 10_000  # a layup of more plies is certainly a typo
 NESTING = 32  # deepest nesting of groups
 QUOTED = 60  # characters of a layup that a message quotes
+LARGEST_ANGLE = 180.0  # degrees
 _PLY = re.compile(
-    r"(?:(?P<pair>±|\+-|\+/-)?"
-    r"(?P<angle>[+-]?(?:\d+(?:\.\d*)?|\.\d+)(?:e[+-]?\d+)?)(?P<of>[A-Z])?"
-    r"|(?P<alone>[A-Z]))(?:_\{?(?P<times>\d+)\}?)?"
+    r"(?:(?P<pair>[±∓])?"
+    r"(?P<angle>[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+)(?:e[+-]?[0-9]+)?)°?(?P<of>[A-Z])?"
+    r"|(?P<alone>[A-Z]))(?:_\{?(?P<times>[0-9]+)\}?)?"
 )
-_SUFFIX = re.compile(r"_?\{?(\d*)([sST]?)\}?")
+_SUFFIX = re.compile(r"_?\{?([0-9]*)([sST]?)\}?")
+_LEADING_ZERO = re.compile(r"[+-]?0([0-9].*)")
+_LOST_SUBSCRIPT = re.compile(r"([+-]?[0-9]+)([2-9])")
+_SEPARATORS = {" ": "blanks", "/": "`/`", ",": "`,`"}
+# Characters that are read as one of the grammar.
+_PAIRS = (("+/-", "±"), ("-/+", "∓"), ("+-", "±"), ("-+", "∓"))
+_CHARACTERS = str.maketrans(
+    {
+        **dict.fromkeys("\N{MINUS SIGN}\N{EN DASH}\N{HYPHEN}\N{NON-BREAKING HYPHEN}", "-"),
+        **dict.fromkeys("\N{FRACTION SLASH}\N{DIVISION SLASH}", "/"),
+        **dict.fromkeys("\N{MASCULINE ORDINAL INDICATOR}\N{RING ABOVE}", "°"),
+        "\N{LATIN SUBSCRIPT SMALL LETTER S}": "s",
+        "\N{LATIN SUBSCRIPT SMALL LETTER T}": "T",
+    }
+)
+_SUBSCRIPTS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
+# Blanks that separate no plies.
+_INSIDE = re.compile(r"(?<=[\[(/,_{±∓]) | (?=[\])/,_{}°s])")
+_AFTER_SIGN = re.compile(r"(?<=[\[(/,][+-]) ")
+_BEFORE_REPEATS = re.compile(r"(?<=[\])]) (?=[0-9ST])")  # or before a ply
+_DECIMAL_COMMA = re.compile(r"(?<=[0-9]),(?=[0-9])")
 
 
 class LayupError(FecmError, ValueError):
@@ -39,12 +57,13 @@ class LayupPly(NamedTuple):
     name: str = ""  # letter of its material; empty if it has none
 
 
-def parse_layup(text: str) -> list[float]:
+def parse_layup(text: str, largest: float = LARGEST_ANGLE) -> list[float]:
     """Angles of the plies of a layup such as ``"[0_2/(±45)2/90]s"``, from the struck face on.
 
-    Raises LayupError, whose message shows where, if the text is not a layup or has materials.
+    None is beyond plus or minus `largest`.  Raises LayupError, whose message shows where, if the
+    text is not a layup or has materials.
     """
-    plies = parse_plies(text)
+    plies = parse_plies(text, largest)
     if named := next((ply.name for ply in plies if ply.name), ""):
         raise LayupError(
             f"the layup `{_quoted(text)}` has the material {named}; here a layup has angles alone"
@@ -52,15 +71,62 @@ def parse_layup(text: str) -> list[float]:
     return [ply.angle for ply in plies]
 
 
-def parse_plies(text: str) -> list[LayupPly]:
+def parse_plies(text: str, largest: float = LARGEST_ANGLE) -> list[LayupPly]:
     """Plies of a layup such as ``"[0C/90G]s"``, with the letters of their materials.
 
-    Raises LayupError, whose message shows where, if the text is not a layup.
+    No angle is beyond plus or minus `largest`.  Raises LayupError, whose message shows where, if
+    the text is not a layup.
     """
-    compact = re.sub(r"\s", "", text)
+    plain = _plain(text)
+    compact = _AFTER_SIGN.sub("", _INSIDE.sub("", plain))
+    opening, bracket, end = compact.rpartition("]")
+    compact = opening + bracket + (end.replace(" ", "") if bracket else end)
+    used = [name for mark, name in _SEPARATORS.items() if mark in compact]
+    if len(used) > 1:
+        what = f"separates plies by {' and by '.join(used)}"
+        raise _unclear(text, what, _readings(plain, compact, largest))
+    if _BEFORE_REPEATS.search(compact):
+        what = "has a blank between a group and what follows it"
+        raise _unclear(text, what, _readings(plain, compact, largest))
+    return _parse(compact.replace(" ", "/"), largest)
+
+
+def _plain(text: str) -> str:
+    """A layup with single blanks and the characters of the grammar."""
+    plain = " ".join(text.split()).translate(_CHARACTERS)
+    for written, mark in _PAIRS:
+        plain = plain.replace(written, mark)
+    return re.sub("[₀-₉]+", lambda found: "_" + found[0].translate(_SUBSCRIPTS), plain)
+
+
+def _readings(plain: str, compact: str, largest: float) -> list[str]:
+    """What a layup may mean whose separators are not clear, separated by ``/``."""
+    # Blanks after a comma show that it separates.
+    commas = [_DECIMAL_COMMA.sub(".", compact)] if ", " not in plain else []
+    found: list[str] = []
+    for one in (*commas, compact.replace(",", "/")):
+        for blanks in (one, _BEFORE_REPEATS.sub("", one), one.replace(" ", "")):
+            reading = blanks.replace(" ", "/")
+            try:
+                _parse(reading, largest)
+            except LayupError:
+                continue
+            if "," not in reading and reading not in found:
+                found.append(reading)
+    return found
+
+
+def _unclear(text: str, what: str, readings: Sequence[str]) -> LayupError:
+    listing = " or ".join(f"`{_quoted(reading)}`" for reading in readings)
+    hint = f"write {listing}" if readings else "write for example [0/45/-45/90]2s"
+    return LayupError(f"the layup `{_quoted(text)}` {what}; {hint}")
+
+
+def _parse(compact: str, largest: float) -> list[LayupPly]:
+    """Plies of a layup without blanks."""
     if not compact.startswith("["):
         compact = f"[{compact}]" if compact[-1:] not in "])" or "[" not in compact else compact
-    plies, end = _group(compact, 0)
+    plies, end = _group(compact, 0, largest)
     if end != len(compact) or len(plies) > MOST_PLIES:
         raise _error(compact, end)
     return plies
@@ -77,7 +143,29 @@ def _quoted(text: str) -> str:
     return text if len(text) <= QUOTED else f"{text[:QUOTED]}..."
 
 
-def _group(text: str, start: int, depth: int = 1) -> tuple[list[LayupPly], int]:
+def _angle(written: str, text: str, position: int, largest: float) -> float:
+    """Read an angle; LayupError if it is likely to have lost a subscript."""
+    angle = float(written)
+    if zero := _LEADING_ZERO.fullmatch(written):
+        ply = zero[1].lstrip("0") or "0"
+        plies = (
+            f"`0_{ply}` for {ply} plies at 0 degrees, or " if ply.isdigit() and ply > "0" else ""
+        )
+        what = f"has a zero before other digits, `{_quoted(written)}`"
+        raise LayupError(f"the layup `{_quoted(text)}` {what}; write {plies}`{_quoted(ply)}`")
+    if not math.isfinite(angle):
+        raise _error(text, position)
+    if abs(angle) > largest:
+        lost = _LOST_SUBSCRIPT.fullmatch(written)
+        hint = "angles are in degrees"
+        if lost and abs(float(lost[1])) <= largest:
+            hint = f"write `{lost[1]}_{lost[2]}` for {lost[2]} plies at {lost[1]} degrees"
+        what = f"has the angle {_quoted(written)}, beyond ±{largest:g}"
+        raise LayupError(f"the layup `{_quoted(text)}` {what}; {hint}")
+    return angle
+
+
+def _group(text: str, start: int, largest: float, depth: int = 1) -> tuple[list[LayupPly], int]:
     """Plies of the group that begins at `start`, and where it ends."""
     if depth > NESTING:
         raise LayupError(f"the layup `{_quoted(text)}` has groups nested deeper than {NESTING}")
@@ -88,14 +176,15 @@ def _group(text: str, start: int, depth: int = 1) -> tuple[list[LayupPly], int]:
     position = start + 1
     while True:
         if text[position : position + 1] in ("[", "("):
-            inner, position = _group(text, position, depth + 1)
+            inner, position = _group(text, position, largest, depth + 1)
             plies += inner
         else:
             match = _PLY.match(text, position)
-            if match is None or not math.isfinite(angle := float(match["angle"] or 0.0)):
+            if match is None:
                 raise _error(text, position)
+            angle = _angle(match["angle"] or "0", text, position, largest)
             name = match["of"] or match["alone"] or ""
-            signs = (1.0, -1.0) if match["pair"] else (1.0,)
+            signs = {"±": (1.0, -1.0), "∓": (-1.0, 1.0)}.get(match["pair"], (1.0,))
             one = [LayupPly(sign * angle, name) for sign in signs]
             plies += one * _times(match["times"] or "1", len(one), text, position)
             position = match.end()

@@ -6,6 +6,7 @@ invalid for the deck.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
@@ -66,7 +67,7 @@ def set_layer_materials(deck: model.Deck, value: Value) -> model.Deck:
     """Change the numbers of the materials of the layers, which are written as a layup's angles."""
     old = deck.require(model.Material)
     try:
-        numbers = parse_layup(str(value))
+        numbers = parse_layup(str(value), math.inf)
     except LayupError as error:
         raise CasesError(f"layer_materials: {error}") from None
     known = sorted(deck.plies)

@@ -136,7 +136,7 @@ PLATE_VALUES: tuple[Variable[PlateSetter], ...] = (
     Variable("g23", Changes.LAMINATE, _STRESS, plates.ply_property("g23"),
              meaning="transverse shear modulus across the fibres"),
     Variable("layup", Changes.LAMINATE, "", plates.set_layup, Kind.TEXT,
-             meaning="as in [`fecm new`](making.md), with the ply thickness of the deck"),
+             meaning="[layup](making.md#layups), with the ply thickness of the deck"),
     Variable("layer_materials", Changes.LAMINATE, "", plates.set_layer_materials, Kind.TEXT,
              meaning="numbers of the materials of the layers, written as a layup's angles: "
                      "`[1/2]s`; `layup` keeps each layer's"),

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from fecm.deck import model
+from fecm.deck.layup import LARGEST_ANGLE
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.mechanics.elements import HIGHEST_ORDER
 from fecm.mechanics.laminate import SOFT_CORE
@@ -28,7 +29,6 @@ LOWEST_RATIO = 0.5  # E1/E2 of a ply whose fibres are along 1
 # E1/E2 above which a ply has parallel fibres, and the least and largest NU12 of such plies.
 FIBROUS = 3.0
 LEAST_NU12, MOST_NU12 = 0.1, 0.6
-LARGEST_ANGLE = 180.0
 SHOWN_ANGLES = 8
 POISSONS_RATIO = "Poisson's ratio NU12"
 
