@@ -104,6 +104,16 @@ def node_doubled() -> str:
     return element_deck((np.vstack([coordinates, coordinates[middle - 1]]), nodes), (2, 1, 2))
 
 
+def side_node_hanging() -> str:
+    """The first element, of five nodes, has a mid-side node that its neighbour lacks."""
+    coordinates, nodes = square(2, 2, 4)
+    wide = np.zeros((len(nodes), 9), int)
+    wide[:, :4] = nodes
+    a, b = (coordinates[nodes[0][n] - 1] for n in (1, 2))
+    wide[0, 5] = len(coordinates) + 1
+    return element_deck((np.vstack([coordinates, (a + b) / 2.0]), wide), (3, 3, 2))
+
+
 def quadrilateral_in_two() -> str:
     coordinates, nodes = square(2, 2, 4)
     a, b, c, d = nodes[0]
@@ -232,6 +242,7 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "E312": mesh("    1    1    3   13   11", "    1    1    1   13   11"),
     "E313": wrong("clockwise-element"),
     "W314": node_doubled,
+    "E324": side_node_hanging,
     "E315": data("    3    3   -3", "    1    3   -3"),
     "W316": elements(12, 3, 2, 2),
     "E317": elements(3, 2, 1, -2),
@@ -328,6 +339,7 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "E483": more("PREL\n1.,2.,3.\n"),
     "W484": plate(with_card("PREL", "0.,2.E3,0.")),
     "W485": plate(with_card("PREL", ",,")),
+    "E535": plate(with_card("PREL", "-12,5")),
     "E490": lambda: small(data="NONL\nSHEA MITC\n" + DATA_CARDS),
     "E491": nonlinear(*CLAMPED, words=""),
     "E492": nonlinear_of_8_nodes,

@@ -12,6 +12,7 @@ from fecm.authoring.contact import parse_patch
 from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck.model import Allowables, Deck, Macro, Patch, Shear
 from fecm.deck.outputs import PLY_ROWS, Rows, RowsOfPlies, with_outputs
+from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.points import HERTZ
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
@@ -70,7 +71,12 @@ class Numerics:
         """Time step, by default 0.9 of the critical one."""
         if self.dt is not None:
             return self.dt
-        return rounded_time_step(critical_time_step(build_plate(deck, generate(deck))))
+        try:
+            return rounded_time_step(critical_time_step(build_plate(deck, generate(deck))))
+        except UnsoundPlateError:
+            if load_deck(replace(deck, macros=self.program(deck, 1.0, 1.0))).errors():
+                return 1.0  # the deck is refused later
+            raise
 
     def program(
         self, deck: Deck, dt: float, duration: float, elements: int | None = None

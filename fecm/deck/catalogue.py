@@ -203,6 +203,11 @@ def _ply(name: str, table: Mapping[str, object]) -> NamedPly:
         raise ValueError(f"[{name}] units: {error}") from None
     if missing := [key for key in ELASTIC if key not in numbers]:
         raise ValueError(f"[{name}] {' and '.join(missing)} missing")
+    if numbers["nu12"] ** 2 >= numbers["E1"] / numbers["E2"]:
+        raise ValueError(
+            f"[{name}] nu12: {numbers['nu12']:g} is too large; nu12² must be below E1/E2; in fibre "
+            "composites nu12 is 0.2 to 0.4"
+        )
     values = {key: numbers[key] for key in KEYS if key in numbers}
     return NamedPly(name, values, system, texts.get("source", ""), texts.get("assumed", ""))
 

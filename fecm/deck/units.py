@@ -53,9 +53,18 @@ NAMED = {
 
 
 def unit_names(deck: Deck) -> dict[str, str]:
-    """Names of the units of length, force and time; empty where the deck gives none."""
+    """Names of the units of length, force and time; empty where the deck gives none.
+
+    Known units in capitals or small letters, such as MM, have their usual names.
+    """
     units = deck.last(Units)
-    return {} if units is None else {name: getattr(units, name) for name in Units.NAMES}
+    return {} if units is None else {n: _usual(n, getattr(units, n)) for n in Units.NAMES}
+
+
+def _usual(dimension: str, name: str) -> str:
+    """Usual name of a unit; the name itself if it is not clear without its capitals."""
+    alike = [known for known in KNOWN[dimension] if known.casefold() == name.casefold()]
+    return alike[0] if len(alike) == 1 and name not in KNOWN[dimension] else name
 
 
 def declared_units(attributes: Mapping[str, Any]) -> dict[str, str]:

@@ -27,10 +27,18 @@ from fecm.deck.grid import (
     round_to,
 )
 from fecm.deck.model import Boundary, Control, Coordinates, Elements
+from fecm.mechanics.joints import (
+    coincident,
+    hanging_nodes,
+    merged,
+    representatives,
+    sides_of_cells,
+)
 
 Integers = NDArray[np.int_]
 # Kinds of cells by their number of nodes: meshio's name, which is that of the corners' number too.
 KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
+CORNERS = {3: 3, 4: 4, 6: 3, 8: 4, 9: 4}  # by the number of nodes
 DIMENSIONS = {"vertex": 0, "line": 1, "line3": 1}  # of the cells of groups of nodes
 LINES = tuple(DIMENSIONS)
 # meshio's names of VTK's types of cells.
@@ -153,8 +161,12 @@ class PlateMesh:
     def _group(self, name: str) -> Integers:
         if name in self.groups or name != BOUNDARY:
             return self.groups[name]
-        sides, _, counts = _sides(self.cells)
-        return np.unique(sides[counts == 1])
+        sides, number, _ = _sides(self.cells)
+        # A seam, where nodes are in the same place, is no boundary.
+        pairs = coincident(self.points, sides_of_cells(self.cells, min(self.most_nodes, 4)))
+        joined = representatives(self.nodes, pairs)[self.cells]
+        _, of_joined, counts = _sides(joined)
+        return np.unique(sides[number[counts[of_joined] == 1]])
 
     def supports(self, wanted: Mapping[str, str]) -> dict[str, str]:
         """Supports of groups; those named after a support have it.  Raises MeshError."""
@@ -264,7 +276,7 @@ def from_meshio(read: MeshLike, where: str = "") -> PlateMesh:
                 name = names.get((tag, 2 if number in blocks else DIMENSIONS[block.type]), str(tag))
                 found.setdefault(name, []).append(rows[tags == tag])
         for name, sets in read.cell_sets.items():
-            if not name.startswith("gmsh:") and name not in read.field_data:
+            if not name.startswith("gmsh:"):
                 found.setdefault(name, []).append(rows[np.asarray(sets[number], int)])
         for family, of_family in families.items():
             for name in of_family:
@@ -288,7 +300,7 @@ def _is_group(value: Any) -> bool:
 def _joined(groups: Mapping[str, list[Any]]) -> dict[str, Integers]:
     """Numbers of each group that has any."""
     flat = {name: np.concatenate([np.ravel(p) for p in parts]) for name, parts in groups.items()}
-    return {name: numbers for name, numbers in flat.items() if len(numbers)}
+    return {name: np.unique(numbers) for name, numbers in flat.items() if len(numbers)}
 
 
 def plate_mesh(
@@ -325,6 +337,8 @@ def plate_mesh(
         low, high = places[:, 2].min(), places[:, 2].max()
         raise MeshError(f"{where}the mesh is not in a plane z = const: z is {low:g} to {high:g}")
     nodes = _turned(places[:, :2], nodes, size, where)
+    _check_joints(places[:, :2], nodes, where)
+    rows = {name: _with_middles(nodes, group) for name, group in rows.items()}
     count, asked = len(places), len(nodes)
     places, nodes, new = _quadrilaterals(places[:, :2], nodes, rows)
     used, numbers = np.unique(nodes, return_inverse=True)
@@ -346,7 +360,7 @@ def plate_mesh(
 
 def _turned(places: Floats, nodes: Integers, size: float, where: str) -> Integers:
     """The cells counter-clockwise; those without an area, or given twice, are refused."""
-    count = 3 if nodes.shape[1] in (3, 6) else 4
+    count = CORNERS[nodes.shape[1]]
     x, y = np.moveaxis(places[nodes[:, :count]], 2, 0)
     area = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) / 2.0
     ordered = np.sort(nodes, axis=1)
@@ -364,6 +378,33 @@ def _turned(places: Floats, nodes: Integers, size: float, where: str) -> Integer
         back += [2 * count - 1 - n for n in range(count)]
     back += range(2 * count, nodes.shape[1])
     return np.where(area[:, None] < 0.0, nodes[:, back], nodes)
+
+
+def _check_joints(places: Floats, nodes: Integers, where: str) -> None:
+    """Refuse nodes inside a side of an element that does not have them."""
+    sides = sides_of_cells(nodes, CORNERS[nodes.shape[1]])
+    hanging, elements = hanging_nodes(merged(sides, coincident(places, sides)), places)
+    if not len(hanging):
+        return
+    (x, y), node, element = places[hanging[0]], hanging[0] + 1, elements[0] + 1
+    others = f", and so do {len(hanging) - 1} others" if len(hanging) > 1 else ""
+    raise MeshError(
+        f"{where}point {node} at {x:g}, {y:g} lies inside a side of number {element} of the plane "
+        f"elements, which does not have it{others}: the plate is cut there; elements must have the "
+        "same nodes along their common side"
+    )
+
+
+def _with_middles(nodes: Integers, group: Integers) -> Integers:
+    """A group of nodes with the middles of its sides, if it has corners alone."""
+    corners = CORNERS[nodes.shape[1]]
+    middles = nodes[:, corners : 2 * corners]
+    if not middles.shape[1] or np.isin(middles, group).any():
+        return group
+    sides, number, counts = _sides(nodes[:, :corners])
+    middle = np.empty(len(sides), int)
+    middle[number] = middles
+    return np.concatenate([group, middle[_inside(sides, counts, group)]])
 
 
 def _quadrilaterals(

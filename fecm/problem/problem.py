@@ -15,6 +15,7 @@ from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, move
 from fecm.deck.model import Deck
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import CRITERIA, PlyExposure, largest_in_plies
+from fecm.mechanics.joints import Sides, coincident, sides_of
 from fecm.mechanics.laminate import Laminate, effective_rigidity, threshold_force
 from fecm.mechanics.mesh import (
     ElementBlock,
@@ -86,6 +87,16 @@ class Problem:
     def families(self) -> list[ElementBlock]:
         """Elements with the same nodes present; ValueError if one lacks a corner."""
         return element_blocks(self.mesh.elements, self.mesh.coordinates)
+
+    @cached_property
+    def sides(self) -> Sides:
+        """Sides of the elements."""
+        return sides_of(self.families, self.mesh.elements)
+
+    @cached_property
+    def coincident_nodes(self) -> Indices:
+        """Pairs of rows of nodes in the same place, (n, 2)."""
+        return coincident(self.mesh.coordinates, self.sides)
 
     @cached_property
     def longer_side(self) -> float:

@@ -8,6 +8,7 @@ from fecm._typing import Bools
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, declare, rule
 from fecm.mechanics.elements import CUBIC, TRIANGLE
+from fecm.mechanics.joints import hanging_nodes, merged
 from fecm.mechanics.mesh import distinct, holds_the_plane
 from fecm.problem.generate import place_of_element
 from fecm.problem.parts import THETA_X, W
@@ -18,7 +19,7 @@ CORNERS = TRIANGLE.corners
 FEW_SUPPORTS = 2  # nodes that hold w up to which they are no support
 # Distance of a mid-side node from its place along the side, over the side's length.
 OFF_PLACE = 0.05
-UNCOMMON = 2.0**-0.5  # x + UNCOMMON y differs from node to node of any usual mesh
+SHOWN = 3  # hanging nodes that have a finding of their own
 
 # Found while the mesh is generated, in generate.py.
 declare(
@@ -125,7 +126,16 @@ def repeated_node(problem: Problem) -> Reports:
     """Find elements with a node twice."""
     ordered = np.sort(problem.mesh.elements, axis=1)
     repeated = ((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] != 0)).any(axis=1)
-    yield from _report(problem, repeated, "has a node twice")
+    hint = _hint_of_feap(problem) if repeated.any() else ""
+    yield from _report(problem, repeated, "has a node twice", hint)
+
+
+def _hint_of_feap(problem: Problem) -> str:
+    """Hint for ELEM cards that have a material number before their nodes; empty for others."""
+    records = problem.deck.require(model.Elements).records
+    if len({record.nodes[0] for record in records}) > 1 or records[0].nodes[0] != 1:
+        return ""
+    return "ELEM has no material number; FEAP's has one before the nodes: leave it out"
 
 
 @rule(
@@ -176,19 +186,38 @@ def nothing_free(problem: Problem) -> Reports:
     remedy="Give the elements the same node.",
 )
 def coincident_nodes(problem: Problem) -> Reports:
-    """Find nodes with the same coordinates."""
-    coordinates = problem.mesh.coordinates
-    x, y = coordinates.T
-    with np.errstate(all="ignore"):
-        if (np.diff(np.sort(x + UNCOMMON * y)) > 0.0).all():
-            return  # at a tenth of the cost of sorting by both
-    order = np.lexsort(coordinates.T)
-    sorted_places = coordinates[order]
-    same = (sorted_places[1:] == sorted_places[:-1]).all(axis=1)
-    if same.any():
-        rows = distinct(np.concatenate([order[1:][same], order[:-1][same]]))
-        message = f"{describe_nodes(rows)} in the place of another node: the plate is cut there."
+    """Find nodes whose distance is nothing beside the shortest side."""
+    pairs = problem.coincident_nodes
+    if len(pairs):
+        message = (
+            f"{describe_nodes(distinct(pairs))} in the place of another node: the plate is cut "
+            "there."
+        )
         yield Report(message, problem.deck.require(model.Coordinates).place())
+
+
+@rule(
+    "E324",
+    Subject.MESH,
+    "A node lies inside a side of an element that does not have it.",
+    cause="The plate is cut there: elements of another size, or of other mid-side nodes, meet.",
+    remedy="Give both elements the same nodes along their common side.",
+)
+def hanging_node(problem: Problem) -> Reports:
+    """Find nodes that the element on one side of a joint has, and that on the other lacks."""
+    sides = merged(problem.sides, problem.coincident_nodes)
+    nodes, elements = hanging_nodes(sides, problem.mesh.coordinates)
+    hint = "give both elements the same nodes along their common side"
+    for node, element in zip(nodes[:SHOWN].tolist(), elements.tolist(), strict=False):
+        message = (
+            f"Node {node + 1} lies inside a side of element {element + 1}, which does not have it: "
+            "the plate is cut there."
+        )
+        yield Report(message, place_of_element(problem.deck, element + 1), hint)
+    if len(nodes) > SHOWN:
+        where = f"inside sides of {describe_elements(distinct(elements))}"
+        message = f"{describe_nodes(distinct(nodes))} {where} that do not have them."
+        yield Report(message, problem.deck.require(model.Elements).place(), hint)
 
 
 @rule(
@@ -263,5 +292,5 @@ def held_plane_of_coupled_laminate(problem: Problem) -> Reports:
 
 OF_ELEMENTS = (empty_element, unknown_node, missing_corner, repeated_node)
 OF_NODES = (nodes_without_coordinates, nodes_in_no_element, nothing_free)
-OF_PLACES = (coincident_nodes,)
+OF_PLACES = (coincident_nodes, hanging_node)
 OF_SUPPORTS = (side_node_off_place, too_few_supports, held_plane_of_coupled_laminate)

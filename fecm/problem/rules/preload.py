@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from fecm.deck import model
@@ -101,6 +103,21 @@ def preload_around_hole(problem: Problem) -> Reports:
     yield Report(message, card.place(), hint)
 
 
-ALONE = (no_preload,)
+@rule(
+    "E535",
+    Subject.LAMINATE,
+    "PREL has two whole numbers that may be one with a decimal comma.",
+    remedy="Write -12.5, or give all three forces: -12,5,0.",
+)
+def decimal_comma(card: model.Preload) -> Reports:
+    """Find a card such as `-12,5`."""
+    text = "" if card.source is None else card.source.card.data.strip()
+    if match := re.fullmatch(r"([+-]?[0-9]+),([0-9]*[1-9][0-9]*)", text):
+        message = f"PREL has `{text}`, which is two forces or one with a decimal comma."
+        hint = f"write {match[1]}.{match[2]}, or {match[1]},{match[2]},0"
+        yield Report(message, card.place(), hint)
+
+
+ALONE = (no_preload, decimal_comma)
 OF_PRELOAD = (preload_of_coupled_laminate, preload_of_unlike_laminates)
 VALUES = (large_preload, preload_around_hole)
