@@ -35,9 +35,15 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
+class Piped(io.BytesIO):
+    """Bytes on standard input."""
+
+    name = "<stdin>"
+
+
 def typed(monkeypatch: pytest.MonkeyPatch, text: str) -> None:
     """Put a text on standard input."""
-    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(io.BytesIO(text.encode())))
+    monkeypatch.setattr("sys.stdin", io.TextIOWrapper(Piped(text.encode())))
 
 
 def closed(schema: Any) -> Any:

@@ -91,7 +91,9 @@ def infinite(file: h5py.File) -> None:
     file["history/force"][...] = np.inf
     file["energy/plate_kinetic"][...] = np.nan
     file["tape8/kappa_x"][...] = file["plies/sigma_1"][...] = np.inf
-    file["failure/puck/exposure"][...] = np.nan
+    for criterion in file["failure"].values():
+        if isinstance(criterion, h5py.Group) and "exposure" in criterion:
+            criterion["exposure"][...] = np.nan
 
 
 def huge(file: h5py.File) -> None:

@@ -455,7 +455,8 @@ def puck_of_a_fabric(problem: Problem) -> Reports:
 def limited_slope(problem: Problem) -> Reports:
     """Find slopes with which Puck's criterion does not pass through YT."""
     for card, ply in _strengths(problem):
-        if is_fabric(ply) or (slope := puck_slope(card)) == card.p_plus:
+        is_endless = card.yt > ENDLESS * ply.e2
+        if is_fabric(ply) or is_endless or (slope := puck_slope(card)) == card.p_plus:
             continue
         message = (
             f"Puck's slope p+ = {card.p_plus:g} is above S12/YT = {slope:.3g}, which is taken "
