@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import fecm
 from fecm.results.result import Result
@@ -148,3 +149,43 @@ def test_an_estimate_warns_of_its_static_plate(tmp_path: Path) -> None:
 
 def test_the_reports_deck_is_within_the_assumptions(tmp_path: Path) -> None:
     assert notes(tmp_path, APPENDIX.read_text())[0] == []
+
+
+@pytest.mark.parametrize(("energy", "is_heavy"), [(540.0, True), (4000.0, False)])
+def test_gravity_is_said_to_add_what_a_falling_mass_on_a_spring_shows(
+    energy: float, *, is_heavy: bool
+) -> None:
+    mass = 5.5e-3
+    deck = fecm.impact(
+        fecm.Plate.rectangle((125, 75), (4, 4), support="simple"),
+        fecm.Laminate("[0/90]4s", "E-glass/MY750", 0.125 if is_heavy else 0.25),
+        fecm.RigidMass(mass),
+        fecm.Contact(62000.0, 1.0, 0.0, 1.5),
+        velocity=(2.0 * energy / mass) ** 0.5,
+        duration=16e-3,
+        units="mm-N-s",
+        kinematics="linear",
+    )
+    result = fecm.run_one(deck)
+    said = [note for note in result.notes if "gravity" in note]
+    assert bool(said) == is_heavy
+    unnamed = fecm.run_one(re.sub(r"(?m)^UNIT\n.*\n", "", deck.to_text()))
+    assert not unnamed.units
+    assert not [note for note in unnamed.notes if "gravity" in note]
+    if not is_heavy:
+        return
+    # The spring that the run compresses, and the mass in free fall until it turns.
+    way = (result.plate_w + result.indentation)[result.force > 0.0].max()
+    spring = 2.0 * energy / way**2
+    forces = []
+    for gravity in (0.0, 9806.65):
+        fall = solve_ivp(
+            lambda _, y, g=gravity: [y[1], g - spring * y[0] / mass],
+            (0.0, 16e-3),
+            [0.0, (2.0 * energy / mass) ** 0.5],
+            max_step=1e-4,
+        )
+        forces.append(spring * fall.y[0].max())
+    share, rise = (float(text) for text in re.findall(r"([\d.]+)%", said[0]))
+    assert share == pytest.approx(100.0 * mass * 9806.65 * way / energy, abs=0.06)
+    assert rise == pytest.approx(100.0 * (forces[1] / forces[0] - 1.0), abs=0.6)

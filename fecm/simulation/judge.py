@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fecm._dataclasses import frozen
+from fecm.deck.units import in_si
 from fecm.mechanics.mesh import rigid_deflections
 from fecm.mechanics.solutions import static_support
 from fecm.problem.static_plate import MOST_SOLVED
@@ -33,6 +34,8 @@ ENERGY_WARNING = 0.01
 # deflection at the peak force at which they are taken to carry it.
 PULL = 0.1
 STATIC = 0.5
+STANDARD_GRAVITY = 9.80665  # m/s^2
+HEAVY = 0.02  # share of the peak force that gravity adds, above which a note says so
 LATER = 1.1  # peak of a later contact over that of the first, above which a note says so
 
 
@@ -66,7 +69,8 @@ def judge(simulation: Simulation, result: Result) -> Verdict:
         return Verdict(notes, "")
     if end in OPEN_ENDS:
         notes.append(OPEN_ENDS[end] + _remedy(result, end))
-    notes += [*_later_peak(result), *_late_values(result, end), *_pull(simulation, result)]
+    notes += [*_later_peak(result), *_late_values(result, end)]
+    notes += [*_pull(simulation, result), *_gravity(simulation, result)]
     reasons = [Reason.AGAIN] if end is End.AGAIN else [Reason.OPEN] if end in OPEN_PEAKS else []
     reasons += [doubt.reason for doubt in beyond]
     peak_force = simulation.state.monitor.peak_force
@@ -134,6 +138,33 @@ def _pull(simulation: Simulation, result: Result) -> Iterator[str]:
             f"the supports pull the plate down with {support.pull:.0%} of a static load at the "
             "impact; a window or a ring can only push: the plate lifts off there, is softer, and "
             "its peak force is lower"
+        )
+
+
+def _gravity(simulation: Simulation, result: Result) -> Iterator[str]:
+    """Note of a projectile so heavy and slow that its weight counts.
+
+    Until it turns, the weight does the work M g w, where w is the way of the projectile. On a
+    linear spring with the energy E this raises the force by x + (1 + x^2)^(1/2) - 1, where
+    x = M g w/(2 E) is the weight over the peak force.
+    """
+    impact, unit = simulation.model.impact, in_si("length/time^2", result.units)
+    if impact is None or unit is None:
+        return
+    mass, velocity = impact.rod.total_mass, impact.contact.velocity
+    energy = 0.5 * mass * velocity**2
+    in_contact = result["history/force"] > 0.0
+    if not energy or not in_contact.any():
+        return
+    way = (result["history/plate_w"] + result["history/indentation"])[in_contact].max()
+    share = float(mass * STANDARD_GRAVITY / unit * way / energy)
+    x = 0.5 * share
+    rise = x + math.hypot(1.0, x) - 1.0
+    if rise > HEAVY:
+        yield (
+            f"gravity is left out: the weight of a projectile that falls adds {share:.1%} to the "
+            "impact energy until it turns (M g w); the force and the deflection are then about "
+            f"{rise:.0%} larger"
         )
 
 
