@@ -23,7 +23,7 @@ from fecm.report.report import page_of
 from fecm.results.linear_plate import CURVED
 from fecm.results.summary import summary as summary_of
 from fecm.sweeps.case import CasesError
-from tests.calls import call
+from tests.calls import call, new
 from tests.pictures import plot
 
 # Of `fecm new`; the numbers of the deck that `panel` makes.
@@ -177,6 +177,26 @@ def test_a_new_plate_of_a_curved_deck_has_the_supports_of_a_panel() -> None:
 
 
 # Results ------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("nx", "factor"), [(16, 1.461), (32, 1.161)])
+def test_the_buckling_load_of_a_coarse_curved_panel_is_an_upper_bound(
+    nx: int, factor: float
+) -> None:
+    # A Ritz series gives 1.128; 64 x 32 elements, 2.4 along a buckle, give 1.130.
+    made = new(
+        *("--size", "2000x1000", "--mesh", f"{nx}x{nx // 2}", "--radius-y", "2000"),
+        *("--support", "simple", "--layup", "[0/90/-45/45]s", "--ply-thickness", ".125"),
+        *("--units", "mm-N-s", "--ply", "1.58e-9,.28,142500,8700,5100,5100,5100"),
+        *("--preload=-10,0,1", "--projectile", "mass:1e-3", "--law", "4e4,0,0,1.5"),
+        *("--velocity", "1000", "--duration", "1e-4", "--dt", "1e-7", "--patch", "none"),
+    )
+    assert "W561" in made.stderr
+    (problem,) = load_deck(made.stdout).problems
+    summary = summarise(problem)
+    assert summary.buckling_factor == pytest.approx(factor, rel=1e-3)
+    assert summary.elements_per_buckle == pytest.approx(1.73 * 2000.0**0.5 / (2000.0 / nx))
+    assert f"at most {summary.buckling_factor:.4g} times the preload" in "\n".join(summary.lines())
 
 
 @pytest.fixture(scope="module")

@@ -172,6 +172,12 @@ def on_window() -> str:
     return impact(fecm.Plate.on_fixture("window:40x30,20x10", (2, 2)), at=(5.0, 15.0)).to_text()
 
 
+def coarse_panel() -> str:
+    """A curved panel under compression with elements that are longer than its buckles."""
+    plate = fecm.Plate.rectangle((40.0, 30.0), (2, 2), support="simple")
+    return impact(plate, radius_y=200.0, preload=(-1e-3, 0.0)).to_text()
+
+
 def with_hole() -> str:
     """A preloaded plate with a hole in its middle."""
     places = [(10.0 * x, 10.0 * y) for y in range(4) for x in range(4)]
@@ -336,6 +342,7 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
     "N559": plate(replaced("171420.0    9080.0", " 65000.0   63000.0")),
     "N560": plate(strengths(2326.2, 1200.1, 62.3, 199.8, 20.0, 92.3, 92.3)),
     "W557": with_hole,
+    "W561": coarse_panel,
     "E483": more("PREL\n1.,2.,3.\n"),
     "W484": plate(with_card("PREL", "0.,2.E3,0.")),
     "W485": plate(with_card("PREL", ",,")),

@@ -179,6 +179,19 @@ class Problem:
         return buckling_factor(self.plate)
 
     @cached_property
+    def elements_per_buckle(self) -> float:
+        """Least number of elements along a half wave of the buckled panel; infinite if it is flat.
+
+        The half wave of a cylinder under axial compression is pi (D R^2/(E h))^(1/4), or 1.73
+        (R h)^(1/2) of an isotropic one (Timoshenko and Gere, Theory of Elastic Stability, 11.1).
+        """
+        largest = max(map(abs, self.plate.curvature))
+        if not largest:
+            return math.inf
+        x, y = (np.diff(self.mesh.coordinates[self.sides.ends], axis=1)[:, 0]).T
+        return 1.73 * math.sqrt(self.laminate.thickness / largest) / float(np.hypot(x, y).max())
+
+    @cached_property
     def contact_step(self) -> ContactStep | None:
         """Limit of the time step from the contact, for the largest DT; None without impact."""
         bound = self.safe_time_step

@@ -24,6 +24,7 @@ from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.parts import W, build_projectile
 from fecm.problem.problem import Problem
 from fecm.problem.resolution import resolution, said_error
+from fecm.problem.rules.buckling import FEWEST_ELEMENTS
 from fecm.problem.static_plate import MOST_SOLVED
 
 ROOM = 0.6  # share of the critical time step below which the step that DT 0 takes is shown
@@ -104,6 +105,8 @@ class ProblemSummary:
     buckling_factor : float or None
         Factor on the preload at which the plate buckles, infinite if that is far away; None where
         the preload does not compress the plate.
+    elements_per_buckle : float or None
+        Least number of elements along a buckle of a curved panel; None for a flat plate.
     time_steps : tuple of float
         Every DT of the program; 0 takes 0.9 of the critical time step.
     output_bytes : int
@@ -148,6 +151,7 @@ class ProblemSummary:
     projectile_mass: float
     critical_time_step: float
     buckling_factor: float | None
+    elements_per_buckle: float | None
     time_steps: tuple[float, ...]
     output_bytes: int
     elements_per_wave: float | None
@@ -227,7 +231,9 @@ class ProblemSummary:
 
             far = math.isinf(self.buckling_factor)
             times = f"more than {FAR:g}" if far else f"{self.buckling_factor:.4g}"
-            lines.append(f"  buckling load       {times} times the preload")
+            count = self.elements_per_buckle
+            bound = "at most " if count is not None and count < FEWEST_ELEMENTS else ""
+            lines.append(f"  buckling load       {bound}{times} times the preload")
         for dt in dict.fromkeys(self.time_steps):
             dt = dt or SAFE * self.critical_time_step
             share = dt / self.critical_time_step
@@ -282,6 +288,7 @@ def summarise(problem: Problem) -> ProblemSummary:
         projectile_mass=mass,  # even without impact
         critical_time_step=critical,
         buckling_factor=problem.buckling_factor if plate.is_compressed else None,
+        elements_per_buckle=problem.elements_per_buckle if plate.is_curved else None,
         time_steps=tuple(macro.value for macro in flat(problem.program) if macro.word == "DT"),
         output_bytes=problem.output_bytes,
         elements_per_wave=None if resolved is None else resolved.elements,
