@@ -1,32 +1,44 @@
 """Printed outputs in the documentation, compared with what their commands print.
 
-A block ``text`` shows the output of the commands in the block ``sh`` before it, or is a
-transcript: lines that begin with ``$ `` are commands, and the output of each follows.  A line
-``...`` stands for any number of lines.  Times of computing, sizes of files and memory, versions and
-paths differ from machine to machine: :data:`MASKED` are not compared.
+The blocks ``sh`` and ``python`` of a page run in order in one folder.  A block ``text`` shows the
+output of the block before it in the same section, or is a transcript: lines that begin with ``$ ``
+are commands, and the output of each follows.  Other blocks ``text`` are not compared.  Transcripts
+that can't run (a damaged file, Ctrl-C) are blocks ``console``.
 
-``python -m tests.printed --write docs/tutorial.md`` runs the commands of a page and writes the
-lines anew whose numbers have changed.
+A line ``...`` stands for any number of lines, and ``...`` at the end of a line for its rest.  Times
+of computing, sizes of files and memory, versions and paths differ from machine to machine:
+:data:`MASKED` are not compared.
+
+``python -m tests.printed --write docs/tutorial.md`` runs a page and writes the lines anew whose
+numbers have changed.
 """
 
 from __future__ import annotations
 
+import contextlib
+import io
+import os
 import re
 import shlex
+import subprocess
 import sys
 import tempfile
+import textwrap
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
 
 from tests.calls import call
 
-BLOCK = re.compile(r"^( *)```(\w*)\n(.*?)^ *```$", re.M | re.S)
+BLOCK = re.compile(r"^( *)```(\w+)\n(.*?)^ *```$|^#+ [^\n]*$", re.M | re.S)
 MASKED = re.compile(
     r"\d[\d.,]* ?(?:kB|MB|GB|min|seconds|minutes|steps per second)\b"
     r"|fecm \d[\w.+]*|about \d+ s\b|(?:/[\w.-]+){2,}"
 )
 GAP = "..."
+# Commands of a checkout, which .ci/run executes.
+SET_UP = "python3 -m venv"
 
 
 class Printed(NamedTuple):
@@ -37,56 +49,113 @@ class Printed(NamedTuple):
 
 
 def outputs(page: Path, folder: Path) -> Iterator[Printed]:
-    """Run the commands of a page in a folder, and yield the outputs that it shows."""
+    """Run the blocks of a page in a folder, and yield the outputs that it shows.
+
+    The commands of a block ``sh`` must succeed; a warning in Python is an error.
+    """
+    names: dict[str, object] = {"__name__": page.stem}
     last: list[str] = []
-    for block in BLOCK.finditer(page.read_text(encoding="utf-8")):
-        _, language, text = block.groups()
-        commands = [line.strip() for line in text.replace("\\\n", " ").strip().split("\n")]
-        if language == "sh":
-            last = []
-            for line in commands:
-                if line.startswith("fecm ") and not re.search("[|>]", line):
-                    last += output_of(line, folder)
-        elif language == "text" and commands[0].startswith("$ "):
-            printed: list[str] = []
-            for line in commands:
-                if line.startswith("$ fecm "):
-                    printed += [line, *output_of(line[2:], folder)]
-            yield Printed(text, printed)
+    for match in BLOCK.finditer(page.read_text(encoding="utf-8")):
+        language, text = match[2], textwrap.dedent(match[3] or "")
+        if language == "python":
+            last = lines_of(run_python(text, folder, names))
+        elif language == "sh" and not text.startswith(SET_UP):
+            last = lines_of(run_shell(text, folder))
+        elif language == "text" and text.startswith("$ "):
+            yield Printed(match[3], transcript(text, folder))
         elif language == "text" and last:
-            yield Printed(text, last)
+            yield Printed(match[3], last)
+            last = []
+        elif not language:  # a heading
             last = []
 
 
-def output_of(command: str, folder: Path) -> list[str]:
-    """Lines of a command, standard error first."""
-    done = call(*shlex.split(command, comments=True)[1:], cwd=folder)
-    return [line.rstrip() for line in (done.stderr + done.stdout).split("\n") if line.strip()]
+def run_python(text: str, folder: Path, names: dict[str, object]) -> str:
+    """Run a snippet in a folder with the names of those before; returns what it prints."""
+    with (
+        contextlib.chdir(folder),
+        contextlib.redirect_stdout(io.StringIO()) as out,
+        warnings.catch_warnings(action="error"),
+    ):
+        exec(compile(text, str(names["__name__"]), "exec"), names)
+    return out.getvalue()
+
+
+def run_shell(text: str, folder: Path, *, fails: bool = False) -> str:
+    """Run commands: those of ``fecm`` in this process if there are no others.
+
+    Returns what they print, standard error first.
+    """
+    commands = text.replace("\\\n", " ").strip().split("\n")
+    if all(line.startswith("fecm ") and not re.search("[|>]", line) for line in commands):
+        printed = ""
+        for line in commands:
+            done = call(*shlex.split(line, comments=True)[1:], cwd=folder)
+            printed += done.stderr + done.stdout
+            assert fails or done.exit_code == 0, f"{line}\n{printed}"
+        return printed
+    path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    return subprocess.run(
+        ["bash", "-euo", "pipefail", "-c", text],
+        cwd=folder,
+        env=os.environ | {"PATH": path},
+        check=not fails,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        encoding="utf-8",
+    ).stdout
+
+
+def transcript(text: str, folder: Path) -> list[str]:
+    """Run the commands of a transcript; returns each with the lines that it prints."""
+    lines: list[str] = []
+    for line in text.replace("\\\n", " ").split("\n"):
+        if line.startswith("$ "):
+            lines += [line, *lines_of(run_shell(line[2:], folder, fails=True))]
+    return lines
+
+
+def lines_of(printed: str) -> list[str]:
+    """Lines that are not blank."""
+    return [line.rstrip() for line in printed.split("\n") if line.strip()]
 
 
 def differences(shown: str, printed: list[str]) -> list[str]:
     """Lines of a block that the output does not have in this order."""
     wrong, place = [], 0
-    masked = [MASKED.sub("#", " ".join(line.split())) for line in printed]
+    masked = [_masked(line) for line in printed]
     for line in filter(str.strip, shown.replace("\\\n", " ").split("\n")):
-        if line.strip() == GAP:
-            continue
-        text = MASKED.sub("#", " ".join(line.split()))
-        if text in masked[place:]:
-            place = masked.index(text, place) + 1
-        else:
+        text = _masked(line)
+        fits = [n for n in range(place, len(masked)) if _fits(text, masked[n])]
+        if fits:
+            place = fits[0] + (text != GAP)
+        elif text != GAP:
             wrong.append(line)
     return wrong
 
 
+def _masked(line: str) -> str:
+    return MASKED.sub("#", " ".join(line.split()))
+
+
+def _fits(shown: str, line: str) -> bool:
+    return line == shown or (shown.endswith(GAP) and line.startswith(shown.removesuffix(GAP)))
+
+
 def updated(shown: str, printed: list[str]) -> str:
     """The block with the lines of the output that begin as its own do, in their order."""
+    indent = shown[: len(shown) - len(shown.lstrip())] if "$ " in shown else ""
+    shown_lines = shown.split("\n")
+    if GAP not in shown and len(lines_of(shown)) == len(printed):
+        rest = iter(printed)
+        return "\n".join(indent + next(rest) if line.strip() else line for line in shown_lines)
     lines, place = [], 0
-    for line in shown.split("\n"):
-        start = re.split(r"[\d(]", line, maxsplit=1)[0].rstrip()
+    for line in shown_lines:
+        text = line.removeprefix(indent)
+        start = re.split(r"[\d(]|[+-]\d", text, maxsplit=1)[0].rstrip()
         rows = [n for n, one in enumerate(printed) if n >= place and one.startswith(start)]
-        if start.strip() and rows and line.strip() != GAP and not line.startswith("$"):
-            lines.append(printed[rows[0]])
+        if start.strip() and rows and not text.endswith(GAP) and not text.startswith("$"):
+            lines.append(indent + printed[rows[0]])
             place = rows[0] + 1
         else:
             lines.append(line)
