@@ -71,8 +71,11 @@ class Numerics:
         """Time step, by default 0.9 of the critical one."""
         if self.dt is not None:
             return self.dt
+        mesh = generate(deck)
+        if not mesh.number_of_equations:
+            return 1.0  # the deck is refused later
         try:
-            return rounded_time_step(critical_time_step(build_plate(deck, generate(deck))))
+            return rounded_time_step(critical_time_step(build_plate(deck, mesh)))
         except UnsoundPlateError:
             if load_deck(replace(deck, macros=self.program(deck, 1.0, 1.0))).errors():
                 return 1.0  # the deck is refused later

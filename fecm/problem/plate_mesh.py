@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -34,6 +35,7 @@ from fecm.mechanics.joints import (
     representatives,
     sides_of_cells,
 )
+from fecm.problem.nastran import NastranError, read_nastran
 
 Integers = NDArray[np.int_]
 # Kinds of cells by their number of nodes: meshio's name, which is that of the corners' number too.
@@ -49,7 +51,12 @@ VTK_KINDS = {
 # Name of all sides that belong to one element, unless the mesh has a group of that name.
 BOUNDARY = "boundary"
 PHYSICAL = "gmsh:physical"  # name of the numbers of physical groups
-ELSEWHERE = (".xdmf", ".xmf")  # formats whose files name other files
+XDMF = (".xdmf", ".xmf")  # whose data may be in other files
+FORM = re.compile(rb"""Format\s*=\s*["'](\w+)""", re.IGNORECASE)  # of such data
+NASTRAN = (".bdf", ".fem", ".nas")
+BULK = re.compile(rb"^\s*BEGIN[ ,]+BULK", re.IGNORECASE | re.MULTILINE)
+# Elements of Abaqus that meshio knows by another name.
+ALIKE = {"S8": "S8R", "S6": "STRI65"}
 SAME = 1e-9  # difference of coordinates, over the size of the mesh, that is none
 NO_AREA = 1e-12  # area over the square of the size that is none
 NAMED = 8  # most elements named in a message
@@ -200,27 +207,67 @@ class GridLike(Protocol):
 
 
 def read_mesh(path: str | Path) -> PlateMesh:
-    """Read a mesh with meshio: Gmsh's `.msh`, or what else it reads.
+    """Read a mesh: the bulk data of Nastran, or with meshio Gmsh's `.msh` or what else it reads.
 
     Raises MeshError if the file is not the mesh of a plane plate, ImportError without meshio.
     """
+    path = Path(path)
+    text = read_input(path)
+    if path.suffix.lower() in NASTRAN or BULK.search(text):
+        try:
+            bulk = read_nastran(path)
+        except NastranError as error:
+            raise MeshError(str(error)) from None
+        return plate_mesh(*bulk, f"{path}: ")
     try:
         import meshio
     except ModuleNotFoundError:
         raise ImportError("meshes need meshio: pip install 'fecm[mesh]'") from None
-    path = Path(path)
-    text = read_input(path)
-    include = path.suffix.lower() == ".inp" and b"*include" in text.lower()
-    if include or path.suffix.lower() in ELSEWHERE:
-        raise MeshError(f"{path} refers to other files, which are not read; put it into one file")
+    _check_whole(path, text)
     printed = io.StringIO()
     try:
         with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(printed):
             read = meshio.read(path)
     except (Exception, SystemExit) as error:
-        why = " ".join(str(error).split()) if isinstance(error, Exception) else "unknown format"
-        raise MeshError(f"{path} can't be read as a mesh by meshio: {why[:200]}") from None
+        raise MeshError(_why_unreadable(path, text, error, printed.getvalue())) from None
     return from_meshio(read, f"{path}: ")
+
+
+def _check_whole(path: Path, text: bytes) -> None:
+    """Refuse files that refer to others, and several parts in one."""
+    suffix, abaqus = path.suffix.lower(), path.suffix.lower() == ".inp"
+    elsewhere = suffix in XDMF and any(form.lower() != b"xml" for form in FORM.findall(text))
+    if elsewhere or (abaqus and b"*include" in text.lower()):
+        raise MeshError(f"{path} refers to other files, which are not read; put it into one file")
+    if abaqus and len(parts := _lines_with(text, rb"\*part\b")) > 1:
+        raise MeshError(f"{path}:{parts[1]}: a second *Part; write the part of the plate alone")
+
+
+def _why_unreadable(path: Path, text: bytes, error: BaseException, printed: str) -> str:
+    """What meshio can't read, where it is, and what helps."""
+    why = " ".join(str(error).split()) if isinstance(error, Exception) else ""
+    if found := re.search(r"Element type not available: (\S+)", printed):
+        kind = found[1]
+        lines = _lines_with(text, rb"\*element\b.*type\s*=\s*" + re.escape(kind).encode() + rb"\b")
+        instead = f"; write it as {ALIKE[kind]}" if kind in ALIKE else ""
+        instead = instead or "; write the plate alone, of S4R, S8R, S3 or STRI65 elements"
+        return f"{path}:{lines[0] if lines else 1}: meshio has no elements of type {kind}{instead}"
+    if PHYSICAL in why:
+        return (
+            f"{path}: some elements are in a physical group and others in none (Gmsh's "
+            "Mesh.SaveAll); save the mesh as MSH 2.2, or without SaveAll"
+        )
+    if path.suffix.lower() == ".inp" and "could not convert" in why:
+        for line in _lines_with(text, rb"\s*[0-9]+\s*(,[^,\n]*)*,\s*,[^\n]*[0-9]"):
+            return f"{path}:{line}: a coordinate is blank; write 0."
+    what = f": {why[:200]}" if why else ""
+    return f"{path} can't be read as a mesh by meshio{what}; save it as MSH 2.2 or VTK"
+
+
+def _lines_with(text: bytes, pattern: bytes) -> list[int]:
+    """Numbers of the lines that begin with a pattern."""
+    begins = re.compile(pattern, re.IGNORECASE)
+    return [n for n, line in enumerate(text.splitlines(), start=1) if begins.match(line)]
 
 
 def from_pyvista(grid: GridLike) -> PlateMesh:
