@@ -146,6 +146,16 @@ def test_xdmf_is_read_where_its_numbers_are_in_the_file(tmp_path: Path) -> None:
         read(tmp_path, text.replace('Format="XML"', "Format='HDF'", 1), "two.xdmf")
 
 
+@pytest.mark.parametrize("name", ["unnamed-4.1.msh", "unnamed-binary-4.1.msh"])
+def test_a_curve_or_surface_of_gmsh_counts_for_all_its_groups_without_a_name(name: str) -> None:
+    """The left side is in groups 11 and 12, the others in 12, the surface in 21 and 22."""
+    pytest.importorskip("meshio", reason="meshes are read by meshio")
+    mesh = read_mesh(MESHES / name)
+    assert (mesh.points[mesh.groups["11"], 0] == 0.0).all()
+    assert (len(mesh.groups["11"]), len(mesh.groups["12"])) == (3, 8)  # of 2 x 2 elements
+    assert [mesh.surfaces[group].tolist() for group in ("21", "22")] == [[0, 1, 2, 3]] * 2
+
+
 @pytest.mark.parametrize(
     ("text", "name", "message"),
     [

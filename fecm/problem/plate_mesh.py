@@ -35,6 +35,7 @@ from fecm.mechanics.joints import (
     representatives,
     sides_of_cells,
 )
+from fecm.problem.gmsh import physical_groups
 from fecm.problem.nastran import NastranError, read_nastran
 
 Integers = NDArray[np.int_]
@@ -230,7 +231,24 @@ def read_mesh(path: str | Path) -> PlateMesh:
             read = meshio.read(path)
     except (Exception, SystemExit) as error:
         raise MeshError(_why_unreadable(path, text, error, printed.getvalue())) from None
+    _add_groups(read, physical_groups(text))
     return from_meshio(read, f"{path}: ")
+
+
+def _add_groups(read: MeshLike, groups: Mapping[tuple[int, int], list[int]]) -> None:
+    """Add the groups without a name that are not the first of their entity."""
+    named = {tuple(pair) for pair in read.field_data.values() if _is_group(pair)}
+    entities = read.cell_data.get("gmsh:geometrical", [])
+    for (dimension, entity), numbers in groups.items():
+        for number in numbers[1:]:
+            if (number, dimension) in named:
+                continue
+            own = [
+                np.flatnonzero((tags == entity) & (block.dim == dimension))
+                for block, tags in zip(read.cells, entities, strict=False)
+            ]
+            before = read.cell_sets.get(str(number), [[]] * len(own))
+            read.cell_sets[str(number)] = list(map(np.append, before, own))
 
 
 def _check_whole(path: Path, text: bytes) -> None:
