@@ -263,12 +263,16 @@ def test_include_is_followed_from_the_file_that_has_it(tmp_path: Path) -> None:
         (["CHEXA,1,1,1,2,3,4"], "bdf:8: CHEXA 1 is not part of a plate: leave it out"),
         (["RBE2,1,1,123456,2,3"], "RBE2 1 is not part of a plate"),
         (["CQUAD4,1,1,1,2,3,4", "CBAR,2,7,1,2", "PBAR,7,1,1."], "bdf:9: CBAR 2 is not part of"),
+        (["GRID,5,,4.,1.", "=,*1,=,*1.,=="], "bdf:9: = .*write the card in full"),
         (["GRID,1,,1.,1."], "bdf:8: GRID 1 is given twice, first at .*bdf:4"),
-        (["GRID,5,,1.x", "CQUAD4,1,1,1,2,3,5"], "GRID 5 has `1.x`, which is not a number"),
+        (["GRID,5,,1.x", "CQUAD4,1,1,1,2,3,5"], "GRID 5 has `1.x`, which is not a finite number"),
         (["GRID*,5,,1.,1.,+A", "*B,0."], "bdf:9: the continuation `.B` does not follow its card"),
         (["GRID,5,9,0.", "CQUAD4,1,1,1,2,3,5"], "has the system 9"),
         (["CORD2R,5,5,0.,0.,0.,0.,0.,1.,+", "+,1.,0.,0.", "GRID,5,5", "CQUAD4,1,1,1,2,3,5"],
          "CORD2R 5 depends on itself"),
+        ([f"CORD2R,{n},{n + 1},0.,0.,0.,0.,0.,1.,+\n+,1.,0.,0." for n in range(5, 2000)]
+         + ["GRID,5,5", "CQUAD4,1,1,1,2,3,5"], "is within more than 100 other systems"),
+        (["GRID,5,,1.e400", "CQUAD4,1,1,1,2,3,5"], "not a finite number"),
         ([], "has no elements of a plate"),
     ],
 )  # fmt: skip

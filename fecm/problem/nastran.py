@@ -7,6 +7,7 @@ Bars without a property, as Gmsh writes lines, are groups of nodes named by its 
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -20,6 +21,7 @@ from fecm._inputs import read_input
 from fecm._typing import Floats
 
 DEPTH = 10  # deepest nesting of INCLUDE
+MOST_SYSTEMS = 100  # within one another
 PARALLEL = 1e-9
 _NUMBER = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?:[EeDd]?([+-]?[0-9]+))?")
 _INCLUDE = re.compile(r"\s*INCLUDE\s*(['\"]?)(.+?)\1\s*", re.IGNORECASE)
@@ -55,9 +57,10 @@ class Card(NamedTuple):
         """Number in a field; 0 in a blank one."""
         text = self.text(place)
         match = _NUMBER.fullmatch(text) if text else None
-        if text and match is None:
-            raise self.error(keyword, f"has `{text}`, which is not a number")
-        return float(f"{match[1]}e{match[2] or 0}") if match else 0.0
+        value = float(f"{match[1]}e{match[2] or 0}") if match else 0.0
+        if (text and match is None) or not math.isfinite(value):
+            raise self.error(keyword, f"has `{text}`, which is not a finite number")
+        return value
 
     def whole(self, keyword: str, place: int, default: int | None = None) -> int:
         """Whole number in a field; the default in a blank one."""
@@ -155,6 +158,8 @@ class _Reader:
 
     def add(self, keyword: str, card: Card) -> None:
         """Take a card."""
+        if keyword.startswith("=") or "=" in card.fields:
+            raise card.error(keyword, "repeats the card before it by `=`; write the card in full")
         if keyword == "GRID":
             number = card.whole(keyword, 0)
             if number in self._grids:
@@ -259,6 +264,8 @@ class _Reader:
         name, card, first = self._systems[number]
         if number in self._open:
             raise card.error(name, "depends on itself")
+        if len(self._open) == MOST_SYSTEMS:
+            raise card.error(name, f"is within more than {MOST_SYSTEMS} other systems")
         self._open.append(number)
         if name[4] == "2":
             within = self._system(card.whole(name, 1, 0), name, card)
