@@ -1,7 +1,11 @@
-"""Files that the user names, read within bounds: regular files of a size that memory holds."""
+"""Files that the user names, read within bounds: regular files of a size that memory holds.
+
+Text is UTF-8, UTF-16 with a byte order mark, or else Windows-1252.  Lines end at LF, CRLF or CR.
+"""
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import os
 import stat
@@ -55,15 +59,48 @@ def read_input(path: Path, most: int = LARGEST) -> bytes:
         return file.read()
 
 
+def decoded(data: bytes, name: str) -> str:
+    """Text of a file.  A byte order mark of UTF-8 stays.
+
+    Bytes that Windows-1252 does not define become U+FFFD.  Raises InputError if the file is not
+    text.
+
+    >>> decoded("5 €".encode("cp1252"), "a"), decoded("5 €".encode("utf-16"), "a")
+    ('5 €', '5 €')
+    """
+    if data.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)):
+        text = data.decode("utf-16", "replace")
+    else:
+        try:
+            text = data.decode("utf-8")
+        except UnicodeDecodeError:
+            text = data.decode("cp1252", "replace")
+    if "\0" in text:
+        raise InputError(f"{name} is binary, or text in an unknown encoding; save it as UTF-8")
+    return text
+
+
+def lines_of(text: str) -> list[str]:
+    r"""Lines of a text without their ends.
+
+    ``str.splitlines`` also splits at form feeds, U+0085 and U+2028.
+
+    >>> lines_of("a\r\nb\rc\u2028d\n")
+    ['a', 'b', 'c\u2028d']
+    """
+    lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+    return lines if lines[-1] else lines[:-1]
+
+
 def parsed_file(path: Path, parse: Callable[[str], T]) -> T:
     """What a function makes of the text of a file of settings.
 
     A ValueError of the function becomes a ContentError; raises InputError and OSError as
     :func:`read_input`.
     """
-    data = read_input(path, LARGEST_SETTINGS)
+    text = decoded(read_input(path, LARGEST_SETTINGS), str(path)).removeprefix("\ufeff")
     try:
-        return parse(data.decode("utf-8-sig"))
+        return parse(text)
     except ValueError as error:
         raise ContentError(f"{path}: {error}") from None
 
@@ -72,7 +109,7 @@ def parsed_toml(text: str) -> dict[str, Any]:
     """Tables of a TOML text; raises ValueError if it is not TOML, or nested too deeply."""
     import tomllib  # 2 ms, and few commands read TOML
 
-    for number, line in enumerate(text.splitlines(), start=1):
+    for number, line in enumerate(lines_of(text), start=1):
         if line.count(".") > MOST_DOTS:
             raise ValueError(f"line {number} has more than {MOST_DOTS} dots; write it as several")
     try:

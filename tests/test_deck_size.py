@@ -223,7 +223,7 @@ def test_a_result_given_as_a_deck_is_named_with_its_command(command: str, tmp_pa
     assert f"`fecm info {result}`" in done.stderr
 
 
-@pytest.mark.parametrize("data", [b"\x7fELF\x02\x01\x01\x00\x00", small().encode("utf-16")])
+@pytest.mark.parametrize("data", [b"\x7fELF\x02\x01\x01\x00\x00", small().encode("utf-16-le")])
 def test_a_binary_file_given_as_a_deck_is_refused_in_one_line(data: bytes, tmp_path: Path) -> None:
     deck = tmp_path / "deck.inp"
     deck.write_bytes(data)

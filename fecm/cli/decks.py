@@ -280,8 +280,8 @@ def _location(deck: Path, finding: Finding) -> dict[str, Any]:
 def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrite: bool) -> None:
     """Align the columns of decks and put a ruler above each kind of card.
 
-    The model, comments and blank cards stay as they are.  A DECK of - is standard input, whose
-    aligned deck goes to standard output.
+    The model, comments, blank cards and line ends stay as they are.  What is written is UTF-8.  A
+    DECK of - is standard input, whose aligned deck goes to standard output.
     """
     from fecm.deck.format import format_deck  # which other commands do not need
 
@@ -294,6 +294,8 @@ def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrit
         if not only_check and target != DASH:
             check_outputs([target], overwrite or in_place, [] if in_place else [deck])
         before, source = load_text(_input(deck))
+        if "\ufffd" in before:
+            raise RefusedError(f"{source} has characters that can't be read; save it as UTF-8")
         try:
             after = format_deck(before, source)
         except DeckError as error:

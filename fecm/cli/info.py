@@ -11,6 +11,7 @@ from typing import Any
 import click
 import numpy as np
 
+from fecm._inputs import lines_of
 from fecm._tables import aligned
 from fecm._text import printable, shown
 from fecm._version import __version__
@@ -94,9 +95,9 @@ def _about(contents: Contents) -> dict[str, Any]:
     elif contents.form == Form.LOCATION:
         # 5 ms, which the result of a run does not need.
         from fecm.location.file import location_of
-        from fecm.location.summary import lines as lines_of
+        from fecm.location.summary import lines as summary_lines
 
-        extent = {"summary": lines_of(location_of(contents))}
+        extent = {"summary": summary_lines(location_of(contents))}
     else:
         extent = about_run(result_of(contents))
     if extent.get("still_in_contact") and PERMANENT in contents.groups["history"]:
@@ -114,7 +115,7 @@ def _about(contents: Contents) -> dict[str, Any]:
         "attributes": {n: value for n, value in attributes.items() if n not in HEADING},
         "summary": lines,
         "groups": describe_groups(contents),
-        "texts": {n: {"lines": len(text.splitlines())} for n, text in contents.texts.items()},
+        "texts": {n: {"lines": len(lines_of(text))} for n, text in contents.texts.items()},
     }
 
 

@@ -6,6 +6,7 @@ and are replaced each time.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from fecm.deck.card import BLANK, Card, Fields, Value, write_card
@@ -20,7 +21,10 @@ RULER = "!:"  # first letters of a comment that shows where the fields are
 
 
 def format_deck(text: str, source: str = "<text>") -> str:
-    """Align a deck's columns; `source` is its name in messages.  Raises DeckError."""
+    """Align a deck's columns; `source` is its name in messages.  Raises DeckError.
+
+    A byte order mark stays, and line ends are those of the first line.
+    """
     reader = Reader(text, keeps_values=True)
     reader.problems()
     if reader.findings.errors:
@@ -48,7 +52,9 @@ def format_deck(text: str, source: str = "<text>") -> str:
         if card.keyword == STOP:
             written += [rest.rstrip() for rest in lines[number:]]
             break
-    return "\n".join(written) + "\n"
+    mark = "\ufeff" if text.startswith("\ufeff") else ""
+    end = found[0] if (found := re.search("\r?\n|\r", text)) else "\n"
+    return mark + end.join([*written, ""])
 
 
 def _keyword(card: Card) -> str:

@@ -84,7 +84,7 @@ class Indentation(Segment, keyword="EXPE"):
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
-        yield from self.text().splitlines()
+        yield from self.text().split("\n")
 
 
 @frozen

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from fecm._errors import OptionsError
-from fecm._inputs import InputError
+from fecm._inputs import InputError, decoded
 from fecm._memory import NotEnoughMemoryError, available, format_bytes, require
 from fecm._typing import AnyFile
 
@@ -13,8 +13,6 @@ LARGEST_FILE = 1_000_000_000  # no deck needs more bytes
 # Largest memory of a deck per byte of text and per line, measured at 10 MB.
 BYTES_A_BYTE = 12
 BYTES_A_LINE = 1100
-# Line ends, see str.splitlines.  The last three are the last bytes of longer characters.
-LINE_ENDS = b"\n\r\x0b\x0c\x1c\x1d\x1e\x85\xa8\xa9"
 FIRST = 4096  # number of bytes that identify a binary file
 HDF5 = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
 INLINE = "<text>"  # name of a deck that is given as text, or in a stream without a name
@@ -40,23 +38,19 @@ def load_text(path_or_text: str | Path | AnyFile) -> tuple[str, str]:
 
 
 def _text(file: AnyFile, path: str) -> str:
-    """Text of a deck, which may be an endless pipe: UTF-8, or Latin-1 where it is not."""
+    """Text of a deck, which may be an endless pipe; see :func:`decoded`."""
     free = available()
     most = LARGEST_FILE if free is None else min(LARGEST_FILE, free // BYTES_A_BYTE)
     begin = _read(file, FIRST)
     if begin.startswith(HDF5):
         raise InputError(f"{path} is an HDF5 file, not a deck; `fecm info {path}` shows a result")
-    if b"\0" in begin:
-        raise InputError(f"{path} is a binary file or UTF-16 text, not a deck in UTF-8 or Latin-1")
+    decoded(begin, path)
     data = begin + _read(file, max(0, most + 1 - len(begin)))
     if len(data) > most:
         raise NotEnoughMemoryError(f"{path}: a deck of more than {format_bytes(most)} is not read")
-    lines = len(data) - len(data.translate(None, LINE_ENDS)) - data.count(b"\r\n")
+    lines = data.count(b"\n") + data.count(b"\r") - data.count(b"\r\n")
     require(BYTES_A_BYTE * len(data) + BYTES_A_LINE * lines, f"{path}: the deck")
-    try:
-        return data.decode("utf-8")
-    except UnicodeDecodeError:
-        return data.decode("latin-1")
+    return decoded(data, path)
 
 
 def _read(file: AnyFile, size: int) -> bytes:

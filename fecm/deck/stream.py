@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Sequence
 from typing import TypeVar
 
+from fecm._inputs import lines_of
 from fecm.deck.card import Card, Fields, Source, Value
 from fecm.deck.findings import Findings
 from fecm.deck.record import Control, Record
@@ -37,7 +38,7 @@ class CardStream:
         blanks_are_zeros: bool = False,
         keeps_values: bool = False,
     ) -> None:
-        self.lines: list[str] = text.removeprefix("\ufeff").splitlines()
+        self.lines: list[str] = lines_of(text.removeprefix("\ufeff"))
         numbered = enumerate(self.lines, start=1)
         self._cards = [(n, line) for n, line in numbered if not line.startswith("!")]
         self._keywords = frozenset(keywords)
