@@ -1,9 +1,9 @@
-"""Tables of measured data: text files with a header of column names.
+"""Tables of other programs: text files with a header of column names.
 
-Columns are separated by tabs, semicolons or commas; with tabs and semicolons, numbers may have a
-decimal comma.  Blank lines and lines that begin with # are skipped, and so is what a test rig
-writes above the names (preamble).  A unit follows its name in brackets, or is in the line below the
-names.  Names are not case-sensitive.
+Columns are separated by tabs, semicolons, commas or blanks; unless it separates them, a comma may
+be the decimal mark.  A first line such as ``sep=;`` names the separator.  Blank lines and lines
+that begin with # are skipped, and so is what a test rig writes above the names (preamble).  A unit
+follows its name in brackets, or is in the line below the names.  Names are not case-sensitive.
 """
 
 from __future__ import annotations
@@ -13,49 +13,51 @@ import math
 import re
 import sys
 from collections.abc import Mapping, Sequence
-from itertools import chain, repeat
+from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 
 from fecm._dataclasses import frozen
-from fecm._errors import StudyError
-from fecm._inputs import read_input
+from fecm._errors import StudyError, warn
+from fecm._inputs import decoded, lines_of, read_input
 from fecm._memory import require
 from fecm._typing import Floats
 
-Row = tuple[int, list[str]]
+Row = tuple[int, list[str]]  # number of the line, and its fields
 
 # Memory of a table: bytes of a line and of a field as objects, and copies of the text.
 LINE_BYTES = 400
 FIELD_BYTES = 80
 COPIES = 4
+SAMPLE = 200  # lines that tell the separator
 
-# Units that tables may name: in m, N, s and m/m.  The pound-force is 0.45359237 kg times
-# 9.80665 m/s^2.  Both spellings of the letter for micro are in use.
+# Units that tables may name: in m, N, s, V and m/m, with u for micro.  The pound-force is
+# 0.45359237 kg times 9.80665 m/s^2.
 UNITS = {
     "length": {
-        "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "μm": 1e-6, "nm": 1e-9,
+        "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9,
         "in": 0.0254, "inch": 0.0254, "inches": 0.0254, "mil": 2.54e-5, "mils": 2.54e-5,
         "ft": 0.3048,
     },
     "force": {
-        "N": 1.0, "mN": 1e-3, "daN": 10.0, "kN": 1e3, "MN": 1e6, "kgf": 9.80665, "gf": 9.80665e-3,
-        "lbf": 4.4482216152605, "lb": 4.4482216152605, "lbs": 4.4482216152605,
+        "N": 1.0, "uN": 1e-6, "mN": 1e-3, "daN": 10.0, "kN": 1e3, "MN": 1e6, "kgf": 9.80665,
+        "gf": 9.80665e-3, "lbf": 4.4482216152605, "lb": 4.4482216152605, "lbs": 4.4482216152605,
         "kip": 4448.2216152605, "kips": 4448.2216152605,
     },
     "time": {
         "s": 1.0, "sec": 1.0, "secs": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3,
-        "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "usec": 1e-6, "min": 60.0,
+        "us": 1e-6, "usec": 1e-6, "min": 60.0,
     },
     "strain": {
         "": 1.0, "-": 1.0, "1": 1.0, "m/m": 1.0, "mm/mm": 1.0, "in/in": 1.0, "strain": 1.0,
-        "%": 1e-2, "percent": 1e-2, "‰": 1e-3, "mm/m": 1e-3, "um/m": 1e-6, "µm/m": 1e-6,
-        "μm/m": 1e-6, "ue": 1e-6, "µe": 1e-6, "με": 1e-6, "µε": 1e-6, "ustrain": 1e-6,
-        "µstrain": 1e-6, "microstrain": 1e-6, "uin/in": 1e-6, "ppm": 1e-6,
+        "%": 1e-2, "percent": 1e-2, "‰": 1e-3, "mm/m": 1e-3, "um/m": 1e-6, "ue": 1e-6,
+        "ustrain": 1e-6, "microstrain": 1e-6, "uin/in": 1e-6, "ppm": 1e-6,
     },
+    "voltage": {"V": 1.0, "mV": 1e-3, "uV": 1e-6, "volt": 1.0, "volts": 1.0},
 }  # fmt: skip
+_MICRO = str.maketrans("µμε", "uue")  # both letters for micro are in use
 # Names of columns in the tables of test rigs, by the quantity; the first is that of fecm.
 WORDS = {
     "time": ("time", "zeit", "temps", "tempo", "tiempo", "t"),
@@ -63,14 +65,18 @@ WORDS = {
         *("force", "load", "contact force", "impact force", "tup load", "kraft", "last"),
         *("effort", "forza", "fuerza", "carga", "f"),
     ),
-    "transducer": ("transducer",),
     "indentation": ("indentation", "displacement", "extension", "stroke", "depth"),
 }
-DIMENSIONS = {"time": "time", "force": "force", "transducer": "force", "indentation": "length"}
+DIMENSIONS = {
+    **{"time": "time", "force": "force", "transducer": "force", "indentation": "length"},
+    **{"V_F": "voltage", "V_a": "voltage", "strain": "strain"},
+}
+REMARKS = {"filtered", "unfiltered", "raw", "smoothed", "corrected", "measured", "gefiltert"}
 NO_UNITS: Mapping[str, str] = MappingProxyType({})
 
 _COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")  # a number with a decimal comma
-_UNIT = re.compile(r"[^(\[]*[(\[]([^)\]]*)[)\]]")  # a name followed by its unit in brackets
+_BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
+_SEPARATOR = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
 
 
 @frozen
@@ -81,107 +87,137 @@ class Table:
     head: Row  # number and fields of the line of names
     units: list[str]  # empty texts for columns without unit
     rows: list[Row]
+    is_decimal_comma: bool
 
     @property
     def names(self) -> list[str]:
         """Names of the columns, without units."""
-        return [_without_unit(name) for name in self.head[1]]
-
-    def columns(
-        self, names: Sequence[str], *, increasing: str = "", places: Sequence[int] = ()
-    ) -> dict[str, Floats]:
-        """Numbers of some columns, (rows,) each, by name.
-
-        If the file has none of the names, the first columns are taken in this order; with `places`,
-        numbers of the columns from 0, the names in the file are ignored.  Raises StudyError if a
-        column is missing, a field is not a finite number, there are fewer than two rows, or the
-        values of the column `increasing` do not increase.
-        """
-        own = list(places) or self._places(names)
-        if len(self.rows) < 2:
-            raise StudyError(f"{self.path}: the table has fewer than two rows of numbers")
-        values = np.array([self._values(row, names, own) for row in self.rows])
-        columns = dict(zip(names, values.T, strict=True))
-        rises = {name: column[1:] > column[:-1] for name, column in columns.items()}
-        if increasing and not rises[increasing].all():
-            row = int(rises[increasing].argmin())
-            before, after = columns[increasing][row : row + 2]
-            others = [n for n in names if n != increasing and rises[n].all()]
-            swapped = f"; are {increasing} and {others[0]} swapped?" if others else ""
-            raise StudyError(
-                f"{self.path}:{self.rows[row + 1][0]}: {increasing} must increase: {after:g} "
-                f"follows {before:g}{swapped}"
-            )
-        return columns
-
-    def places(
-        self, names: Sequence[str], columns: Sequence[str] = (), units: Mapping[str, str] = NO_UNITS
-    ) -> list[int]:
-        """Numbers of the columns of quantities in :data:`WORDS`, from 0.
-
-        `columns` has the names or the numbers (from 1) that the user gave, or empty texts.  In a
-        table without names the first columns are taken.  Of several columns with the same name the
-        one in the unit of its dimension in `units` is taken, or else the first one in a known unit.
-        Raises StudyError if a column is missing, or two can't be told apart.
-        """
-        places = []
-        for order, (name, column) in enumerate(
-            zip(names, columns or [""] * len(names), strict=True)
-        ):
-            number = column.isdecimal() and not any(same_name(column, n) for n in self.names)
-            if number and int(column):
-                places.append(int(column) - 1)
-            elif not self.head[1] and not column:
-                places.append(order)
-            else:
-                unit = units.get(DIMENSIONS[name], "")
-                if (place := self._place(name, (column,) if column else WORDS[name], unit)) is None:
-                    listing = ", ".join(self.names)[:80] or "unnamed"
-                    others = "" if column else f" (or {', '.join(WORDS[name][1:])})"
-                    raise StudyError(
-                        f"{self.path}: the columns are {listing}; one must be named "
-                        f"{column or name}{others}; `columns` of {' and '.join(names)} selects "
-                        "others by name or number"
-                    )
-                places.append(place)
-        return places
+        return [unit_free(name) for name in self.head[1]]
 
     def has(self, name: str) -> bool:
-        """Whether a column has a name of a quantity in :data:`WORDS`."""
-        return any(_plain(field) in WORDS[name] for field in self.head[1])
-
-    def _place(self, name: str, words: Sequence[str], unit: str) -> int | None:
-        """Number of the column with the first of some names that the table has."""
-        for word in words:
-            places = [place for place, n in enumerate(self.names) if same_name(word, n)]
-            if len(places) > 1:  # in several units
-                places = [n for n in places if self.units[n] in UNITS[DIMENSIONS[name]]]
-                return next((n for n in places if self.units[n] == unit), (*places, None)[0])
-            if places:
-                return places[0]
-        return None
+        """Whether a column has a name of a quantity."""
+        return any(same_name(word, one) for word in WORDS.get(name, (name,)) for one in self.names)
 
     def unit(self, place: int) -> str:
         """Unit of a column; empty if the table names none."""
         return self.units[place] if place < len(self.units) else ""
 
-    def _places(self, names: Sequence[str]) -> list[int]:
-        """Return the numbers of the columns from the line of names."""
-        line, head = self.head
-        known = [_plain(name) for name in head]
-        missing = [name for name in names if _plain(name) not in known]
-        if not head or (len(missing) == len(names) and len(known) >= len(names)):
-            return list(range(len(names)))
-        if missing:
-            raise StudyError(
-                f"{self.path}:{line}: there is no column {missing[0]}; the columns are "
-                f"{', '.join(head)}; {', '.join(names)} are required"
-            )
-        return [known.index(_plain(name)) for name in names]
+    def places(
+        self,
+        names: Sequence[str],
+        columns: Sequence[str] | None = None,
+        units: Mapping[str, str] = NO_UNITS,
+    ) -> list[int]:
+        """Numbers of the columns of quantities, which have a name of :data:`WORDS` or their own.
+
+        `columns` has the names or the numbers (from 1) that the user gave, empty if none; None if
+        the user can't give them.  In a table without names the first columns are taken, with a
+        warning that says so.  Of several columns with the same name, the one in the unit of
+        `units`, or else the first one in a known unit, is taken.  Raises StudyError if a column is
+        missing, or two can't be told apart.
+        """
+        places = []
+        for order, name in enumerate(names):
+            column = (columns[order] if columns else "").removeprefix("-")
+            if column.isdecimal() and int(column) and column not in self.names:
+                places.append(int(column) - 1)
+            elif not self.head[1] and not column:
+                places.append(order)
+            else:
+                words = (column,) if column else WORDS.get(name, (name,))
+                dimension = DIMENSIONS.get(name, "")
+                if (place := self._place(words, dimension, units.get(dimension, ""))) is None:
+                    listing = ", ".join(self.head[1])[:80] or "unnamed"
+                    others = f" (or {', '.join(words[1:])})" if words[1:] else ""
+                    remedy = f"`columns` of {' and '.join(names)} selects others by name or number"
+                    if columns is None:
+                        remedy = "rename it in the file"
+                    raise StudyError(
+                        f"{self.path}: the columns are {listing}; one must be named "
+                        f"{words[0]}{others}; {remedy}"
+                    )
+                places.append(place)
+        if not (self.head[1] or any(columns or ())):
+            taken = ", ".join(f"column {n + 1} as {name}" for n, name in enumerate(names))
+            warn(f"{self.path} has no names of columns: {taken}")
+        return places
+
+    def _place(self, words: Sequence[str], dimension: str, unit: str) -> int | None:
+        """Number of the column with the first of some names that the table has."""
+        for word in words:
+            places = [n for n, name in enumerate(self.names) if same_name(word, name)]
+            exact = [n for n in places if self.head[1][n] == word and unit_in(word) != ""]
+            if len(places) > 1:  # in several units
+                own = {n: plain_unit(self.units[n]) for n in places}
+                known = [n for n in places if own[n] and own[n] in UNITS.get(dimension, {})]
+                wanted = exact or [n for n in known if own[n] == plain_unit(unit)]
+                distinct = len({own[n] for n in known}) == len(known)
+                places = wanted if len(wanted) == 1 else known[: distinct and not wanted]
+                return places[0] if places else None
+            if places:
+                return places[0]
+        return None
+
+    def columns(
+        self,
+        names: Sequence[str],
+        columns: Sequence[str] | None = None,
+        units: Mapping[str, str] | None = None,
+        *,
+        stated: Sequence[str] = (),
+        places: Sequence[int] = (),
+        increasing: str = "",
+    ) -> dict[str, Floats]:
+        """Numbers of some columns, (rows,) each, by name, in `units` by dimension.
+
+        Without `units`, nothing is converted.  `columns` is that of :meth:`places`, unless `places`
+        are given; a minus before one changes the sign.  `stated` are the units of a table that
+        names none.  Raises StudyError as :meth:`places`, and if a unit is unknown or has none to be
+        converted to, a field is not a finite number, there are fewer than two rows, or the values
+        of the column `increasing` do not increase.
+        """
+        places = places or self.places(names, columns, units or NO_UNITS)
+        if len(self.rows) < 2:
+            raise StudyError(f"{self.path}: the table has fewer than two rows of numbers")
+        values = np.array([self._values(row, names, places) for row in self.rows])
+        found = dict(zip(names, values.T, strict=True))
+        if increasing:
+            self._check_increase(found, increasing)
+        for n, (name, place) in enumerate(zip(names, places, strict=True)):
+            dimension = DIMENSIONS.get(name, "strain" if name.startswith("gage ") else "")
+            own, said = self.unit(place), stated[n] if stated else ""
+            where = f"{self.path}: {name}"
+            if own and said and factor(where, own, said, dimension) != 1.0:
+                raise StudyError(f"{where} is in {own}, and `units` says {said}")
+            if units is not None and dimension:
+                found[name] *= factor(where, said or own, units.get(dimension, ""), dimension)
+            if columns and columns[n].startswith("-"):
+                found[name] = -found[name]
+        return found
+
+    def _check_increase(self, columns: Mapping[str, Floats], increasing: str) -> None:
+        """Raise StudyError if a column does not increase; name one that does."""
+        rises = {name: column[1:] > column[:-1] for name, column in columns.items()}
+        if rises[increasing].all():
+            return
+        row = int(rises[increasing].argmin())
+        before, after = columns[increasing][row : row + 2]
+        others = [n for n in columns if n != increasing and rises[n].all()]
+        swapped = f"; are {increasing} and {others[0]} swapped?" if others else ""
+        raise StudyError(
+            f"{self.path}:{self.rows[row + 1][0]}: {increasing} must increase: {after:g} "
+            f"follows {before:g}{swapped}"
+        )
 
     def _values(self, row: Row, names: Sequence[str], places: Sequence[int]) -> list[float]:
         """Return the numbers of one row in the order of `names`."""
         line, fields = row
+        if self.head[1] and len(fields) > len(self.head[1]):
+            raise StudyError(
+                f"{self.path}:{line}: {len(fields)} fields, but {len(self.head[1])} names; delete "
+                "what is above the names, or, if the comma is the decimal mark, separate the "
+                "columns by semicolons or tabs"
+            )
         values = []
         for name, place in zip(names, places, strict=True):
             field = fields[place] if place < len(fields) else ""
@@ -193,54 +229,180 @@ class Table:
         return values
 
 
-def read_table(path: Path) -> Table:
+# Units --------------------------------------------------------------------------------------------
+
+
+def plain_unit(unit: str) -> str:
+    """A unit with u for micro.
+
+    >>> plain_unit("µm/m")
+    'um/m'
+    """
+    return unit.translate(_MICRO)
+
+
+def unit_size(source: str | Path, unit: str, dimension: str) -> float:
+    """Return the size of a unit in m, N, s, V or m/m; StudyError if it is unknown."""
+    sizes, plain = UNITS[dimension], plain_unit(unit)
+    folded = [name for name in sizes if name.casefold() == plain.casefold()]
+    if plain not in sizes and len(folded) != 1:
+        listing = ", ".join(filter(None, sizes))
+        raise StudyError(f"{source}: unknown unit of {dimension} `{unit}`; known units: {listing}")
+    return sizes[plain if plain in sizes else folded[0]]
+
+
+def factor(source: str, unit: str, deck: str, dimension: str) -> float:
+    """Factor from a unit of a table to the deck's; 1 if the table names none.
+
+    Raises StudyError if one is unknown, unless they are the same.
+    """
+    if not unit or unit == deck:
+        return 1.0
+    size = unit_size(source, unit, dimension)
+    if not deck and dimension != "strain":
+        raise StudyError(
+            f"{source} is in {unit}, and the units of the model are not known; name them (UNIT in "
+            "a deck), or take the unit out of the header"
+        )
+    return size / unit_size(source, deck, dimension)
+
+
+def unit_in(name: str) -> str:
+    """The unit in brackets behind the name of a column; empty if there is none.
+
+    >>> unit_in("force (filtered) [kN]")
+    'kN'
+    """
+    texts = [text.strip() for text in _BRACKETS.findall(name)]
+    return next((text for text in reversed(texts) if text.casefold() not in REMARKS), "")
+
+
+def same_name(one: str, other: str) -> bool:
+    """Whether two names denote the same column."""
+    return unit_free(one).casefold() == unit_free(other).casefold()
+
+
+def unit_free(name: str) -> str:
+    """Name of a column without its unit."""
+    return re.split(r"[(\[]", name)[0].strip()
+
+
+# Reading ------------------------------------------------------------------------------------------
+
+
+def read_table(path: Path, most: int = sys.maxsize) -> Table:
     """Read a table; the first line contains names, and the second units, if they aren't numbers.
 
-    Raises StudyError if the file is not text.  Raises OSError if the file cannot be read.
+    Raises StudyError if there are more than `most` lines, or the file is not a table;
+    NotEnoughMemoryError if its fields take more memory than is free; OSError if the file cannot be
+    read or is not text.
     """
-    rows = _without_preamble(read_rows(path))
-    if not rows or all(_number(field) is not None for field in rows[0][1]):
-        return Table(path, (0, []), [], rows)
-    head, *rows = rows
-    below: list[str] = []
-    if len(rows) > 1 and not _has_number(rows[0]) and _has_number(rows[1]):
-        below = [field.strip("()[] ") for field in rows.pop(0)[1]]
-    units = [
-        found[1].strip() if (found := _UNIT.match(name)) else under
-        for name, under in zip(head[1], chain(below, repeat("")), strict=False)
-    ]
-    return Table(path, head, units, rows)
+    rows, is_decimal_comma = _rows(path, most)
+    skipped, named, below = _heading(rows)
+    if not named:
+        return Table(path, (0, []), [], rows, is_decimal_comma)
+    head, under = rows[skipped], rows[skipped + 1][1] if below else []
+    under = [field.strip("()[] ") for field in under] + [""] * len(head[1])
+    units = [unit_in(name) or unit for name, unit in zip(head[1], under, strict=False)]
+    return Table(path, head, units, rows[skipped + 1 + below :], is_decimal_comma)
 
 
-def _without_preamble(rows: list[Row]) -> list[Row]:
-    """Rows from the line of names on, which is above the first numbers, or above their units.
+def _heading(rows: list[Row]) -> tuple[int, bool, bool]:
+    """Lines above the names, whether there are names, and whether a line of units is below them.
 
-    A line with both texts and numbers directly above the numbers is a row of the table with a
-    wrong field, unless it has a known name; then nothing is skipped.
+    The names are above the first line of numbers, or above their units.  A line with both texts and
+    numbers above the numbers is a row of the table with a wrong field, unless it has a known name.
     """
-    first = next((n for n, row in enumerate(rows) if _is_numeric(row)), 0)
-    if first < 2:
-        return rows
-    above, last = rows[first - 2 : first]
+    first = next((n for n, row in enumerate(rows) if _is_numeric(row)), -1)
+    if first < 1:  # some tables of cases have no line of numbers alone
+        named = bool(rows) and any(field and _number(field) is None for field in rows[0][1])
+        below = len(rows) > 2 and _is_of_units(rows[1]) and _has_number(rows[2])
+        return 0, named, named and below and not _has_number(rows[1])
+    above, last = rows[first - 2 : first] if first > 1 else (rows[0], rows[0])
     if _has_word(last):
-        return rows[first - 1 :]
+        return first - 1, True, False
     if _has_number(last):
-        return rows
-    alike = len(above[1]) == len(last[1])
-    units = alike and (first == 2 or _has_word(above) or _is_of_units(last))
-    return rows[first - 2 :] if units else rows[first - 1 :]
+        return 0, True, False
+    alike = first > 1 and len(above[1]) == len(last[1])
+    below = alike and (first == 2 or _has_word(above) or _is_of_units(last))
+    return first - 1 - below, True, below
+
+
+def _rows(path: Path, most: int) -> tuple[list[Row], bool]:
+    """Fields of every line with content, and whether they may have decimal commas."""
+    data = read_input(path)
+    line_count = 1 + max(data.count(b"\n"), data.count(b"\r"))
+    field_count = line_count + sum(data.count(mark) for mark in (b",", b";", b"\t", b" "))
+    needed = LINE_BYTES * line_count + FIELD_BYTES * field_count + COPIES * len(data)
+    require(needed, f"{path}: a table of {line_count} lines")
+    every = lines_of(decoded(data, str(path)).removeprefix("\ufeff"))
+    named = _SEPARATOR.fullmatch(every[0]) if every else None
+    lines = [
+        (number, line)
+        for number, line in enumerate(every, start=1)
+        if line.strip() and not line.lstrip().startswith("#") and not (named and number == 1)
+    ]
+    if len(lines) > most:
+        raise StudyError(f"{path} has {len(lines)} lines; at most {most} are allowed")
+    separator = named[1] if named else _separator([line for _, line in lines[-SAMPLE:]])
+    rows = []
+    for number, line in lines:
+        try:
+            rows.append((number, _fields(line, separator)))
+        except csv.Error as error:
+            raise StudyError(f"{path}:{number}: {error}") from None
+    values = chain.from_iterable(row for _, row in rows)
+    # Beside numbers with a point a comma may separate thousands.
+    if separator == "," or any("." in field and _number(field) is not None for field in values):
+        return rows, False
+    return [
+        (number, [f.replace(",", ".") if _COMMA.fullmatch(f) else f for f in row])
+        for number, row in rows
+    ], True
+
+
+def _fields(line: str, separator: str) -> list[str]:
+    """Fields of a line without the empty ones at its end; by blanks, units stay at their names."""
+    fields = [
+        f.strip() for f in next(csv.reader([line], delimiter=separator, skipinitialspace=True))
+    ]
+    while fields and not fields[-1]:
+        fields.pop()
+    if separator != " ":
+        return fields
+    joined = fields[:1]
+    for field in fields[1:]:
+        if field[:1] in ("(", "[") and joined[-1][:1] not in ("(", "["):
+            joined[-1] += f" {field}"
+        else:
+            joined.append(field)
+    return joined
+
+
+def _separator(lines: Sequence[str]) -> str:
+    """The separator that makes the most lines of numbers, or else is in the most lines."""
+
+    def numbers(mark: str) -> int:
+        return sum(_is_numeric((0, _fields(line, mark))) for line in lines)
+
+    try:
+        return max("\t;, ", key=lambda m: (numbers(m), m != " " and sum(m in n for n in lines)))
+    except csv.Error:
+        return ","  # which reports the line
 
 
 def _has_word(row: Row) -> bool:
     """Whether a row has a name in :data:`WORDS`."""
-    words = {word for names in WORDS.values() for word in names}
-    return any(_plain(field) in words for field in row[1])
+    words = set(chain.from_iterable(WORDS.values()))
+    return any(unit_free(field).casefold() in words for field in row[1])
 
 
 def _is_numeric(row: Row) -> bool:
     """Whether a row has two numbers or more, and nothing else."""
     fields = [field for field in row[1] if field]
-    return len(fields) > 1 and all(_number(field) is not None for field in fields)
+    return len(fields) > 1 and all(
+        _COMMA.fullmatch(field) or _number(field) is not None for field in fields
+    )
 
 
 def _is_of_units(row: Row) -> bool:
@@ -249,78 +411,11 @@ def _is_of_units(row: Row) -> bool:
     known = {unit.casefold() for sizes in UNITS.values() for unit in sizes}
     if all(field[0] in "([" and field[-1] in ")]" for field in fields):
         return True
-    return any(field.strip("()[] ").casefold() in known for field in fields)
-
-
-def unit_size(source: str | Path, unit: str, dimension: str) -> float:
-    """Return the size of a unit in m, N, s or m/m; StudyError if it is unknown."""
-    sizes = UNITS[dimension]
-    folded = [name for name in sizes if name.casefold() == unit.casefold()]
-    if unit not in sizes and len(folded) != 1:
-        listing = ", ".join(filter(None, sizes))
-        raise StudyError(f"{source}: unknown unit of {dimension} `{unit}`; known units: {listing}")
-    return sizes[unit if unit in sizes else folded[0]]
-
-
-def same_name(one: str, other: str) -> bool:
-    """Whether two names denote the same column."""
-    return _plain(one) == _plain(other)
+    return any(plain_unit(field.strip("()[] ")).casefold() in known for field in fields)
 
 
 def _has_number(row: Row) -> bool:
     return any(_number(field) is not None for field in row[1])
-
-
-def read_rows(path: Path, most: int = sys.maxsize) -> list[Row]:
-    """Read the number and the fields of every line with content.
-
-    Raises StudyError if there are more than `most` such lines, NotEnoughMemoryError if their fields
-    take more memory than is free, and other errors as :func:`read_table`.
-    """
-    data = read_input(path)
-    line_count = 1 + max(data.count(b"\n"), data.count(b"\r"))
-    field_count = line_count + sum(data.count(mark) for mark in (b",", b";", b"\t"))
-    needed = LINE_BYTES * line_count + FIELD_BYTES * field_count + COPIES * len(data)
-    require(needed, f"{path}: a table of {line_count} lines")
-    if b"\0" in data:
-        raise StudyError(f"{path} is not a text file")
-    try:
-        text = data.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        text = data.decode("latin-1")  # older programs write µm and ° so
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not line.lstrip().startswith("#")
-    ]
-    if len(lines) > most:
-        raise StudyError(f"{path} has {len(lines)} lines; at most {most} are allowed")
-    last = lines[-1][1] if lines else ""
-    separator = next((mark for mark in "\t;" if mark in last), ",")
-    found = []
-    for number, line in lines:
-        try:
-            fields = next(csv.reader([line], delimiter=separator, skipinitialspace=True))
-        except csv.Error as error:
-            raise StudyError(f"{path}:{number}: {error}") from None
-        found.append((number, [field.strip() for field in fields]))
-    every = chain.from_iterable(row for _, row in found)
-    # Beside numbers with a point a comma may separate thousands.
-    if separator == "," or any("." in field and _number(field) is not None for field in every):
-        return found
-    return [
-        (number, [f.replace(",", ".") if _COMMA.fullmatch(f) else f for f in row])
-        for number, row in found
-    ]
-
-
-def _without_unit(name: str) -> str:
-    return name.partition("(")[0].partition("[")[0].strip()
-
-
-def _plain(name: str) -> str:
-    """Name of a column without unit, in lower case."""
-    return _without_unit(name).casefold()
 
 
 def _number(field: str) -> float | None:

@@ -76,7 +76,10 @@ def test_the_command_prints_the_sensitivity_for_persons_and_for_programs(tmp_pat
         ("time,V_F,V_a\n0,1,1\n1,2,2\n", "at least 3 points"),
         ("time,V_F,V_a\n0,1,4\n1,2,4\n2,3,4\n", "V_a is constant (4)"),
         ("time,V_F,V_a\n0,1,1\n1,x,2\n2,3,3\n", ":3: V_F is 'x'"),
-        ("time,V_F,V_b\n0,1,1\n1,2,2\n2,3,3\n", ":1: there is no column V_a"),
+        (
+            "time,V_F,V_b\n0,1,1\n1,2,2\n2,3,3\n",
+            "one must be named V_a; --columns of time and V_F and V_a",
+        ),
         ("time,V_F,V_a\n0,1,1\n1,2\n2,3,3\n", ":3: V_a is empty"),
         ("time,V_F,V_a\n0,1,1\n1,2,2\n1,3,3\n", ":4: time must increase: 1 follows 1"),
         ("", "fewer than two rows"),

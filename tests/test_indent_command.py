@@ -94,7 +94,7 @@ def test_one_cycle_gives_no_card_but_one_of_alpha_cr(tmp_path: Path) -> None:
         ("indentation,force\n" + "0.001,5\n" * 20, "never changes"),
         ("indentation,force\n1,1\n2,2\n", "too few"),
         ("indentation,force\n" + "".join(f"{n},{n}\n" for n in range(30, 0, -1)), "unloading"),
-        ("indentation,force\n" + "".join(f"{n},{-n}\n" for n in range(30)), "never positive"),
+        ("indentation,force\n" + "".join(f"{n},{-n}\n" for n in range(30)), "force is -29 at the"),
         ("indentation,force\n" + "".join(f"{n}e90,{n}\n" for n in range(30)), "not between"),
     ],
 )

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 import fecm._memory
-from fecm._measured_tables import COPIES, FIELD_BYTES, LINE_BYTES, read_rows
+from fecm._measured_tables import COPIES, FIELD_BYTES, LINE_BYTES, read_table
 from fecm._memory import NotEnoughMemoryError
 from fecm.sweeps.case import CasesError
 from fecm.sweeps.cases import read_cases
@@ -46,7 +46,7 @@ def test_a_table_of_short_lines_that_memory_does_not_hold_is_refused(
     path = table(tmp_path / "cases.csv", 220_000, 1, "2")  # 0.44 MB of text
     monkeypatch.setattr(fecm._memory, "available", lambda: 50_000_000)
     with pytest.raises(NotEnoughMemoryError, match="a table of 220001 lines takes about 107 MB"):
-        read_rows(path)
+        read_table(path)
 
 
 def test_a_table_of_too_many_cases_is_refused_before_its_fields_are_read(

@@ -236,8 +236,14 @@ def test_mass_and_integrator_are_the_users_choice() -> None:
 
 def test_a_table_in_a_file_is_a_pulse(tmp_path: Path) -> None:
     file = tmp_path / "pulse.csv"
-    file.write_text("# measured\nForce [lb], Time (s)\r\n0,0\r\n\n100,1e-4\n0,2e-4\n")
-    found = columns(call("rod", *SHAPE, "--dt", 1e-6, "--pulse", file).stdout)
+    text = "# measured\nForce [lb], Time (s)\r\n0,0\r\n\n100,1e-4\n0,2e-4\n"
+    file.write_text(text)
+    options = ("rod", *SHAPE, "--dt", 1e-6, "--pulse", file)
+    done = call(*options)
+    assert_unusable(done)
+    assert "time is in s, and the units of the model are not known" in done.stderr
+    file.write_text(text.replace(" [lb]", "").replace(" (s)", ""))
+    found = columns(call(*options).stdout)
     assert found["time"][-1] == pytest.approx(2e-4)
     assert found["force"][50] == pytest.approx(50.0)
     assert found["force"][150] == pytest.approx(50.0)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
@@ -181,7 +182,7 @@ def _message(error: Exception) -> str:
         named = name and not isinstance(name, int)
         return printable(f"{name}: {error.strerror}" if named else error.strerror)
     if isinstance(error, FecmError):
-        return printable(str(error))
+        return printable(re.sub("`(columns|units)`", r"--\1", str(error)))  # names of options
     if isinstance(error, MemoryError):
         return "there is not enough memory"
     if isinstance(error, ImportError):

@@ -91,8 +91,8 @@ class FitOptions:
 @option(
     "--columns",
     type=list_of("INDENTATION,FORCE", click.STRING, [2]),
-    help="Names or numbers (from 1) of the two columns.  [default: indentation, displacement, "
-    "extension, stroke or depth; force or load]",
+    help="Names or numbers (from 1) of the two columns; a minus before one changes its sign.  "
+    "[default: indentation, displacement, extension, stroke or depth; force or load]",
 )
 @option(
     "--unit",
@@ -122,7 +122,7 @@ def fit(options: FitOptions) -> None:
     try:
         found = fit_law(read, q=options.q, acr=options.acr, turn=options.turn)
     except StudyError as error:
-        raise RefusedError(f"{test}: {error}") from None
+        raise RefusedError(as_options(f"{test}: {error}", PARAMETERS)) from None
     names = {**read.units, "time": "s"} if read.units else {}
     options.targets.draw("studies:fit_picture", read.indentation, read.force, found.fit, names)
     note(*(as_options(text, PARAMETERS) for text in found.notes))

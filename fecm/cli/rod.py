@@ -11,7 +11,7 @@ from click import option
 
 from fecm._dataclasses import frozen
 from fecm._measured_tables import read_table
-from fecm.cli.common import DASH, RefusedError
+from fecm.cli.common import DASH, RefusedError, note
 from fecm.cli.decks import load_valid
 from fecm.cli.help import Group, typical
 from fecm.cli.options import (
@@ -23,6 +23,7 @@ from fecm.cli.options import (
     Format,
     Parsed,
     collected,
+    list_of,
 )
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.mechanics.projectile import (
@@ -39,7 +40,6 @@ from fecm.studies import StudyError
 from fecm.studies.rod_test import pulse_test
 from fecm.studies.rod_test.calibration import calibrate as fit_sensitivity
 from fecm.studies.rod_test.filters import Filter, filter_of
-from fecm.studies.rod_test.pulse_test import Pulse
 from fecm.studies.rod_test.recordings import recorded
 from fecm.studies.rod_test.study import Struck, rod_of, strike, uniform
 
@@ -90,7 +90,7 @@ class PulseOptions:
 
     deck: Path | None
     shape: Shape
-    pulse: Pulse
+    pulse: str
     dt: float | None
     duration: float | None
     stations: tuple[float, ...]
@@ -109,10 +109,10 @@ class PulseOptions:
 @click.argument("deck", type=DECK_PATH, required=False)
 @option(
     "--pulse",
-    type=Parsed(pulse_test.pulse_of, "PULSE"),
+    metavar="PULSE",
     required=True,
     help="gauss:F0,TAU,B (F0 exp(-(t-TAU)²/4B²)), sine:F0,B (F0 sin(πt/B), zero after B), or a "
-    "CSV of time and force, linear between its rows.",
+    "CSV of time and force, linear between its rows, in the units of its header or of the rod.",
 )
 @option("--length", type=POSITIVE, help="Length of the rod, without a deck.")
 @option("--modulus", type=POSITIVE, help="Young's modulus, without a deck.")
@@ -181,7 +181,7 @@ def pulse(options: PulseOptions) -> None:
     struck = _uniform(options.shape) if options.deck is None else _of_deck(options)
     found = strike(
         struck,
-        options.pulse,
+        pulse_test.pulse_of(options.pulse, struck.units),
         options.dt,
         options.duration,
         options.stations,
@@ -265,25 +265,46 @@ def filter_(history: Path, transducer: Filter, column: str | None, targets: Outp
     required=True,
     help="Sensitivity of the accelerometer, V_a per acceleration.",
 )
+@option(
+    "--columns",
+    type=list_of("TIME,V_F,V_a", click.STRING, [3]),
+    help="Names or numbers (from 1) of the columns; a minus before one changes its sign.",
+)
 @option("--through-origin", is_flag=True, help="Fit a line without an offset.")
 @FORMAT_OPTION
 @outputs("test", table=False)
 def calibrate(
-    test: Path, mass: float, c_a: float, through_origin: bool, form: Format, targets: OutputPaths
+    test: Path,
+    mass: float,
+    c_a: float,
+    columns: tuple[str, ...] | None,
+    through_origin: bool,
+    form: Format,
+    targets: OutputPaths,
 ) -> None:
     """Calibrate the impact-force transducer with TEST.csv.
 
     TEST.csv has the columns time, V_F and V_a: outputs of the transducer on the projectile and of
-    the accelerometer on a free target.  The slope of V_F over V_a gives c_F = (c_a / m) V_F / V_a.
+    the accelerometer on a free target.  V_F is converted to the unit of V_a.  The slope of V_F over
+    V_a gives c_F = (c_a / m) V_F / V_a.
     """
-    measured = read_table(test)
-    time, v_f, v_a = measured.columns(("time", "V_F", "V_a"), increasing="time").values()
+    measured, names = read_table(test), ("time", "V_F", "V_a")
+    places = measured.places(names, columns or ())
+    units = [measured.unit(place) for place in places]
+    if bool(units[1]) != bool(units[2]):
+        raise RefusedError(
+            f"{test}: one of V_F and V_a is in {units[1] or units[2]}; name both units"
+        )
+    time, v_f, v_a = measured.columns(
+        names, columns, {"time": units[0], "voltage": units[2]}, places=places, increasing="time"
+    ).values()
     try:
         found = fit_sensitivity(v_f, v_a, mass, c_a, through_origin=through_origin)
     except StudyError as error:
         raise RefusedError(f"{test}: {error}") from None
-    names = dict(zip(map(str.casefold, measured.names), measured.units, strict=True))
-    units = [names.get(name, "") for name in ("time", "v_f", "v_a")]
+    units[1] = units[2]
+    if found.slope < 0.0:
+        note("the slope is negative: V_F and V_a have opposite signs; --columns time,V_F,-V_a")
     targets.draw("studies:calibration_picture", time, v_f, v_a, found, units)
     if form is Format.JSON:
         click.echo(json.dumps(vars(found)))

@@ -113,7 +113,10 @@ def check_measured(
         text = f"the measured force is constant, {np.mean(force):.3g}"
         raise IdentifyError(f"{name}: {text}; there is no contact in it")
     if -force.min() > force.max():
-        raise StudyError(f"{name}: the contact force is negative; it is positive in compression")
+        raise StudyError(
+            f"{name}: the contact force is negative; it is positive in compression; write "
+            "`columns` as time,-force"
+        )
     if np.count_nonzero(force > 0.5 * force.max()) < TOP_POINTS:
         raise StudyError(f"{name} has fewer than {TOP_POINTS} points above half of its peak")
     long = _top(measured.time, force)

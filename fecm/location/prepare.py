@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._errors import StudyError
-from fecm._measured_tables import UNITS
+from fecm._measured_tables import UNITS, plain_unit
 from fecm._memory import require
 from fecm._typing import Floats, Indices
 from fecm.deck import model
@@ -179,7 +179,7 @@ def _refuse_records(problem: Problem, record: float, critical: float) -> None:
     if FEWEST_STEPS <= steps <= MOST_STEPS and record <= MOST_PERIODS * period:
         return
     units = unit_names(problem.deck)
-    clock, sizes = units.get("time", ""), UNITS["time"]
+    clock, sizes = plain_unit(units.get("time", "")), UNITS["time"]
     what = f"{record:.3g} {clock}".rstrip()
     usual = f"{period:.2g} {clock}".rstrip()
     times = record / period

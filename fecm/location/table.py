@@ -5,16 +5,18 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm._dataclasses import frozen
-from fecm._errors import StudyError
-from fecm._measured_tables import Table, read_table, same_name, unit_size
+from fecm._errors import StudyError, warn
+from fecm._measured_tables import Table, factor, read_table, same_name, unit_free, unit_in
 from fecm._text import printable
 from fecm._typing import Floats
+
+_K = TypeVar("_K")
 
 # A CSV file; times and strains, (points, gages); or columns by name, as of a DataFrame.
 StrainSource = str | Path | tuple[Any, Any] | Mapping[str, Any]
@@ -49,7 +51,7 @@ def strain_table(
     elif isinstance(source, tuple):
         made = _from_arrays(source, numbers)
     else:
-        made = _from_columns(source, numbers)
+        made = _from_columns(source, units, numbers)
     _check(made)
     return made
 
@@ -88,24 +90,29 @@ def _likely_unit(largest: float) -> str:
     )
 
 
-def _numbered(name: str, heads: Sequence[str], numbers: Sequence[int]) -> list[int]:
-    """Numbers of the gages of columns; in the order of the deck if the columns have no numbers."""
-    found = [_NUMBER.fullmatch(head.partition("(")[0].strip().casefold()) for head in heads]
+def _numbered(name: str, heads: Mapping[_K, str], numbers: Sequence[int]) -> dict[_K, int]:
+    """Numbers of the gages of columns; in the order of the deck if no column has a number.
+
+    Columns without a number beside others with one are not strains, and left out.
+    """
+    found = {n: _NUMBER.fullmatch(unit_free(head).casefold()) for n, head in heads.items()}
     known = ", ".join(map(str, numbers))
-    if not any(found):
+    if not any(found.values()):
         if len(heads) != len(numbers):
             raise StudyError(
                 f"{name} has {len(heads)} columns of strains, and the deck {len(numbers)} gages: "
                 f"{known}; name the columns by the numbers of their gages"
             )
-        return list(numbers)
-    gages = [int(one[1]) if one else None for one in found]
-    for head, gage in zip(heads, gages, strict=True):
+        listing = ", ".join(f"{heads[n]} of {m}" for n, m in zip(heads, numbers, strict=True))
+        warn(f"{name}: the columns name no gages; their strains are taken as {listing}")
+        return dict(zip(heads, numbers, strict=True))
+    gages = {n: int(one[1]) for n, one in found.items() if one}
+    for n, gage in gages.items():
         if gage not in numbers:
-            raise StudyError(f"{name}: {head} is not a gage of the deck; its gages are {known}")
-    if len(set(gages)) < len(gages):
+            raise StudyError(f"{name}: {heads[n]} is not a gage of the deck; its gages are {known}")
+    if len(set(gages.values())) < len(gages):
         raise StudyError(f"{name}: a gage has two columns")
-    return [gage for gage in gages if gage is not None]
+    return gages
 
 
 def _made(name: str, time: Any, gages: Sequence[int], strains: Any) -> StrainTable:
@@ -135,7 +142,9 @@ def _from_arrays(source: tuple[Any, Any], numbers: Sequence[int]) -> StrainTable
     return _made("the table", time, numbers, strains.T)
 
 
-def _from_columns(source: Mapping[str, Any], numbers: Sequence[int]) -> StrainTable:
+def _from_columns(
+    source: Mapping[str, Any], units: Mapping[str, str], numbers: Sequence[int]
+) -> StrainTable:
     """A column of times and those of gages, by name."""
     try:
         columns = {str(name): np.asarray(source[name], dtype=float) for name in source}
@@ -147,56 +156,39 @@ def _from_columns(source: Mapping[str, Any], numbers: Sequence[int]) -> StrainTa
     time = columns.pop(times[0])
     if time.ndim != 1 or any(column.shape != time.shape for column in columns.values()):
         raise StudyError("the columns of the table differ in length")
-    gages = _numbered("the table", list(columns), numbers)
-    return _made("the table", time, gages, list(columns.values()))
+    gages = _numbered("the table", {name: name for name in columns}, numbers)
+    time = time * factor("the table: time", unit_in(times[0]), units.get("time", ""), "time")
+    strains = [columns[n] * factor(f"the table: {n}", unit_in(n), "", "strain") for n in gages]
+    return _made("the table", time, list(gages.values()), strains)
 
 
 # A file -------------------------------------------------------------------------------------------
 
 
 def _from_file(path: Path, units: Mapping[str, str], numbers: Sequence[int]) -> StrainTable:
-    table = read_table(path)
-    name, names = printable(path.name), table.names
-    if all(any(same_name(one, known) for one in names) for known in ("time", "gage", "strain")):
+    table, name = read_table(path), printable(path.name)
+    if all(map(table.has, ("time", "gage", "strain"))):
         return _from_long(table, name, units, numbers)
     width = len(table.rows[0][1]) if table.rows else 0
-    heads = names or [f"column {n}" for n in range(1, width + 1)]
-    clock = table.places(["time"])[0] if table.has("time") else 0
-    places = [n for n in range(len(heads)) if n != clock]
-    gages = _numbered(name, [heads[n] for n in places], numbers)
-    keys = ["time", *(f"gage {gage}" for gage in gages)]
-    columns = table.columns(keys, increasing="time", places=[clock, *places])
-    time, *strains = columns.values()
-    sizes = [unit_size(name, table.unit(place), "strain") for place in places]
-    converted = [size * strain for size, strain in zip(sizes, strains, strict=True)]
-    return _made(name, time * _clock(table, name, clock, units), gages, converted)
-
-
-def _clock(table: Table, name: str, place: int, units: Mapping[str, str]) -> float:
-    """Factor from the unit of a column of times to the deck's; 1 if one of them has no name."""
-    unit, deck = table.unit(place), units.get("time", "")
-    if not unit or not deck or unit == deck:
-        return 1.0
-    return unit_size(name, unit, "time") / unit_size(name, deck, "time")
+    heads = table.head[1] or [f"column {n}" for n in range(1, width + 1)]
+    clock = table.places(["time"])[0] if table.has("time") or not table.head[1] else 0
+    gages = _numbered(name, {n: head for n, head in enumerate(heads) if n != clock}, numbers)
+    keys = ["time", *(f"gage {gage}" for gage in gages.values())]
+    places = [clock, *gages]
+    time, *strains = table.columns(keys, units=units, places=places, increasing="time").values()
+    return _made(name, time, list(gages.values()), strains)
 
 
 def _from_long(
     table: Table, name: str, units: Mapping[str, str], numbers: Sequence[int]
 ) -> StrainTable:
     """A row for every time and gage, as ``fecm export`` writes them."""
-    columns = table.columns(("time", "gage", "strain"))
-    clock, strain = (
-        next(n for n, one in enumerate(table.names) if same_name(one, known))
-        for known in ("time", "strain")
-    )
-    gages = [gage for gage in numbers if (columns["gage"] == gage).any()]
-    if unknown := sorted(set(columns["gage"].tolist()) - set(gages)):
+    time, gage, strain = table.columns(("time", "gage", "strain"), units=units).values()
+    gages = [number for number in numbers if (gage == number).any()]
+    if unknown := sorted(set(gage.tolist()) - set(gages)):
         known = ", ".join(map(str, numbers))
         raise StudyError(f"{name}: {unknown[0]:g} is not a gage of the deck; its gages are {known}")
-    rows = [columns["gage"] == gage for gage in gages]
-    times = [columns["time"][row] for row in rows]
-    if any(not np.array_equal(time, times[0]) for time in times):
+    rows = [gage == number for number in gages]
+    if any(not np.array_equal(time[row], time[rows[0]]) for row in rows):
         raise StudyError(f"{name}: the gages have different times")
-    size = unit_size(name, table.unit(strain), "strain")
-    strains = [size * columns["strain"][row] for row in rows]
-    return _made(name, times[0] * _clock(table, name, clock, units), gages, strains)
+    return _made(name, time[rows[0]], gages, [strain[row] for row in rows])

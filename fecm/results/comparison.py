@@ -12,7 +12,7 @@ import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm._errors import StudyError
-from fecm._measured_tables import DIMENSIONS, read_table, unit_size
+from fecm._measured_tables import factor, read_table
 from fecm._text import printable
 from fecm._typing import Floats
 from fecm.results.stored import Stored
@@ -138,7 +138,7 @@ def measurement_of(
     if not (np.isfinite([time, force]).all() and (np.diff(time) > 0.0).all()):
         raise StudyError("a measurement needs finite numbers at increasing times")
     factors = [
-        _factor("the measurement", unit, units.get(dimension, ""), dimension)
+        factor("the measurement", unit, units.get(dimension, ""), dimension)
         for unit, dimension in zip(stated, ("time", "force"), strict=False)
     ] or [1.0, 1.0]
     return Measurement("measured", "force", time * factors[0], force * factors[1])
@@ -153,26 +153,10 @@ def _from_file(
 ) -> Measurement:
     table = read_table(path)
     column = "transducer" if table.has("transducer") and not table.has("force") else "force"
-    names = ("time", column)
-    places = table.places(names, columns, units)
-    values = table.columns(names, increasing="time", places=places)
-    for name, place, unit in zip(names, places, stated or ("", ""), strict=True):
-        dimension = DIMENSIONS[name]
-        named = table.unit(place)
-        if unit and named and unit_size(path, unit, dimension) != unit_size(path, named, dimension):
-            raise StudyError(f"{path}: {name} is in {named}, and `units` says {unit}")
-        values[name] *= _factor(path, unit or named, units.get(dimension, ""), dimension)
-    return Measurement(printable(path.name), column, *values.values())
-
-
-def _factor(source: str | Path, unit: str, deck: str, dimension: str) -> float:
-    """Factor from a unit of a measurement to the deck's; 1 if one of them has no name.
-
-    Raises StudyError if one is unknown, unless they are the same.
-    """
-    if not unit or not deck or unit == deck:
-        return 1.0
-    return unit_size(source, unit, dimension) / unit_size(source, deck, dimension)
+    time, force = table.columns(
+        ("time", column), columns, units, stated=stated, increasing="time"
+    ).values()
+    return Measurement(printable(path.name), column, time, force)
 
 
 def compare(stored: Stored, measured: Measurement) -> Comparison:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, runtime_checkable
 
-from fecm._measured_tables import read_rows
+from fecm._measured_tables import read_table
 from fecm.studies import StudyError
 from fecm.sweeps.case import MOST_CASES, Case, CasesError, check_count
 from fecm.sweeps.values import check_free, check_known, free_value_of, parse_value, value_of
@@ -16,26 +17,30 @@ from fecm.sweeps.values import check_free, check_known, free_value_of, parse_val
 def read_cases(path: Path, system: str | None = None) -> list[Case]:
     """Read a CSV table, a header of names and one row per case; CasesError states a line.
 
-    Values with a unit are converted to a system of units.
+    Values with a unit, theirs or that of the header, are converted to a system of units.
     """
     try:
-        rows = [(line, row) for line, row in read_rows(path, MOST_CASES + 1) if any(row)]
+        table = read_table(path, MOST_CASES + 1)
     except StudyError as error:
         raise CasesError(str(error)) from None
-    if len(rows) < 2:
+    if not (table.head[1] and table.rows):
         raise CasesError(f"{path}: a table of cases has a header of names and at least one row")
-    header = rows[0][1]
+    (number, _), header = table.head, table.names
     for name in header:
-        check_known(name, f"{path}:{rows[0][0]}")
+        check_known(name, f"{path}:{number}")
         if header.count(name) > 1:
-            raise CasesError(f"{path}:{rows[0][0]}: column {name} is repeated")
+            raise CasesError(f"{path}:{number}: column {name} is repeated")
     cases: list[Case] = []
-    for line, row in rows[1:]:
+    for line, row in table.rows:
         if len(row) != len(header):
             raise CasesError(f"{path}:{line}: {len(row)} values, but {len(header)} names")
         try:
-            values = zip(header, row, strict=True)
-            cases.append({name: parse_value(name, text, system) for name, text in values})
+            case = {}
+            for name, text, unit in zip(header, row, table.units, strict=True):
+                if name == "layup" and table.is_decimal_comma:
+                    text = re.sub("(?<=[0-9]),(?=[0-9])", ".", text)
+                case[name] = parse_value(name, text + unit, system)
+            cases.append(case)
         except CasesError as error:
             raise CasesError(f"{path}:{line}: {error}") from None
     check_count(len(cases), f"{path} has {len(cases)} cases")

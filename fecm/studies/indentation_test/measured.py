@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from fecm._dataclasses import frozen
-from fecm._measured_tables import read_table, unit_size
+from fecm._measured_tables import read_table
 from fecm._typing import Floats
 from fecm.studies import StudyError
 
@@ -37,23 +37,16 @@ def read_test(
     """
     table = read_table(path)
     places = table.places(NAMES, columns)
-    indentation, load = table.columns(NAMES, places=places).values()
-    length, force = (table.unit(n) for n in places)
-    if not (length or force):
-        names = {} if units is None else dict(zip(("length", "force"), units, strict=True))
-        return Test(indentation, load, names, ("", ""))
-    if units is None and not (length and force):
-        raise StudyError(
-            f"{path}: one column is in {length or force}, the other has no unit; state both, or "
-            "give both in `units`"
-        )
-    missing = units or (length, force)
-    length, force = length or missing[0], force or missing[1]
-    sizes = unit_size(path, length, "length"), unit_size(path, force, "force")
-    target = dict(zip(("length", "force"), units or _system(length, force), strict=True))
-    wanted = [unit_size(path, unit, dimension) for dimension, unit in target.items()]
-    indentation, load = indentation * (sizes[0] / wanted[0]), load * (sizes[1] / wanted[1])
-    return Test(indentation, load, target, (length, force))
+    stated = (table.unit(places[0]), table.unit(places[1]))
+    if units is None and any(stated) and not all(stated):
+        text = f"{path}: one column is in {stated[0] or stated[1]}, the other has no unit"
+        raise StudyError(f"{text}; state both, or give both in `units`")
+    names = units or (_system(*stated) if any(stated) else None)
+    target = dict(zip(("length", "force"), names, strict=True)) if names else {}
+    indentation, force = table.columns(NAMES, columns, target, places=places).values()
+    if names and any(stated):
+        stated = (stated[0] or names[0], stated[1] or names[1])
+    return Test(indentation, force, target, stated)
 
 
 def _system(length: str, force: str) -> tuple[str, str]:

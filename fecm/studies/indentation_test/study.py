@@ -190,6 +190,13 @@ def fit_law(
         raise StudyError("`acr` needs q = 5/2: equation 3-7 holds for no other power")
     if q is not None and not LIMITS_Q[0] <= q <= LIMITS_Q[1]:
         raise StudyError(f"`q` is {q:g}, not between {LIMITS_Q[0]:g} and {LIMITS_Q[1]:g}")
+    peak = int(np.abs(test.force).argmax())
+    for name, values in (("force", test.force), ("indentation", test.indentation)):
+        if values[peak] < 0.0:
+            raise StudyError(
+                f"{name} is {values[peak]:g} at the largest force; both are positive in "
+                f"compression: a minus before a name or number of `columns` changes the sign"
+            )
     found = fit(test.indentation, test.force, retreat=turn, q=q, acr=acr)
     return IndentationFit(test.indentation, test.force, test.units, test.stated, found)
 

@@ -8,13 +8,13 @@ acts from t = 0.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from fecm._dataclasses import frozen
-from fecm._measured_tables import read_table
+from fecm._measured_tables import NO_UNITS, read_table
 from fecm._typing import Floats
 from fecm.mechanics.projectile import STEPS, WILSON, Rod, RodState
 from fecm.studies import StudyError
@@ -61,14 +61,15 @@ def table_pulse(times: Floats, forces: Floats) -> Pulse:
     )
 
 
-def pulse_of(text: str) -> Pulse:
+def pulse_of(text: str, units: Mapping[str, str] = NO_UNITS) -> Pulse:
     """Parse ``gauss:F0,TAU,B``, ``sine:F0,B``, or the path of a CSV file of time and force.
 
-    Anything else, a width that is not positive, and an invalid table are a StudyError.
+    A file that names its units is converted to `units`.  Anything else, a width that is not
+    positive, and an invalid table are a StudyError.
     """
     kind, colon, rest = text.partition(":")
     if not colon or kind not in FORMS:
-        return _table(text)
+        return _table(text, units)
     names = FORMS[kind]
     try:
         values = [float(part) for part in rest.split(",")]
@@ -81,14 +82,16 @@ def pulse_of(text: str) -> Pulse:
     return gauss_pulse(*values) if kind == "gauss" else sine_pulse(*values)
 
 
-def _table(text: str) -> Pulse:
+def _table(text: str, units: Mapping[str, str]) -> Pulse:
     path = Path(text)
     if not path.is_file():
         raise StudyError(f"{text} is neither a file nor a pulse; use {USAGE}")
-    columns = read_table(path).columns(("time", "force"), increasing="time")
-    if columns["time"][-1] <= 0.0:
+    time, force = (
+        read_table(path).columns(("time", "force"), None, units, increasing="time").values()
+    )
+    if time[-1] <= 0.0:
         raise StudyError(f"{path}: the pulse ends before time 0")
-    return table_pulse(columns["time"], columns["force"])
+    return table_pulse(time, force)
 
 
 # The rod ------------------------------------------------------------------------------------------

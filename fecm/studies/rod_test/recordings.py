@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 
 from fecm._dataclasses import frozen
+from fecm._errors import warn
 from fecm._inputs import open_input
-from fecm._measured_tables import read_table, same_name
+from fecm._measured_tables import read_table
 from fecm._typing import Floats
 from fecm.deck.source_text import HDF5
 from fecm.results.result import Result, load
@@ -68,18 +69,18 @@ def _of_result(path: Path, result: Result, column: str | None) -> TimeHistory:
 
 def _of_table(path: Path, column: str | None) -> TimeHistory:
     table = read_table(path)
-    names = table.names
-
-    def found(name: str) -> str | None:
-        return next((known for known in names if same_name(name, known)), None)
-
-    if column is not None and found(column) is None:
-        known = f"it has {', '.join(names)}" if names else "the first line has no names"
-        raise StudyError(f"{path} has no column {column}; {known}")
-    clock = found("time") or (names[0] if names else "time")
-    others = [name for name in names if name != clock]
-    name = found(column or TRANSDUCER) or (others[0] if others else "value")
-    columns = table.columns((clock, name), increasing=clock)
-    unit = next((u for n, u in zip(names, table.units, strict=True) if n == clock), "")
-    units = {"time": unit} if unit else {}
-    return TimeHistory(name, columns[clock], columns[name], dimension="", units=units)
+    heads, clock, value = table.head[1], "", column or ""
+    if heads and column and not (column.isdecimal() or table.has(column)):
+        raise StudyError(f"{path} has no column {column}; it has {', '.join(table.names)}")
+    if heads and not table.has("time"):
+        clock = "1"
+    if heads and not value:
+        first = table.places(["time"])[0] if not clock else 0
+        value = TRANSDUCER if table.has(TRANSDUCER) else "2" if first == 0 else "1"
+        if value != TRANSDUCER and len(heads) > 2:
+            warn(f"{path}: the column {heads[int(value) - 1]} is filtered; --column takes another")
+    places = table.places(("time", "value"), (clock, value))
+    time, values = table.columns(("time", "value"), places=places, increasing="time").values()
+    unit = table.unit(places[0])
+    name = table.names[places[1]] if heads else "value"
+    return TimeHistory(name, time, values, dimension="", units={"time": unit} if unit else {})

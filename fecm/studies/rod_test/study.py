@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Mapping
 from dataclasses import field
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecm._dataclasses import frozen
-from fecm._errors import StudyError
+from fecm._errors import StudyError, warn
 from fecm._typing import Floats
 from fecm.api import sole_problem
 from fecm.authoring.laminate import system_asked
@@ -36,6 +37,8 @@ from fecm.studies.rod_test.pulse_test import (
     simulate_pulse,
     table_pulse,
 )
+
+MOST_TRAVELS = 1000.0  # of a wave along the rod in a usual pulse
 
 
 @frozen
@@ -172,7 +175,14 @@ def pulse_test(
         struck = rod_of(sole_problem(rod, warns=False).deck)
     chosen = filter_of(filter) if isinstance(filter, str) else filter
     return strike(
-        struck, _pulse(pulse), dt, duration, tuple(stations), chosen, mass_matrix, integrator
+        struck,
+        _pulse(pulse, struck.units),
+        dt,
+        duration,
+        tuple(stations),
+        chosen,
+        mass_matrix,
+        integrator,
     )
 
 
@@ -205,6 +215,12 @@ def strike(
 ) -> PulseTest:
     """Simulate a test; raises StudyError as :func:`pulse_test`."""
     rod = struck.rod.with_mass(mass_matrix)
+    travels = pulse.duration / (rod.length * math.sqrt(rod.density / rod.modulus))
+    if travels > MOST_TRAVELS:
+        warn(
+            f"the pulse lasts {travels:.2g} times the travel time of a wave along the rod; if its "
+            "times are in another unit, name it in the header, as in `time (ms)`"
+        )
     history = simulate_pulse(
         rod,
         pulse,
@@ -220,10 +236,10 @@ def strike(
     return PulseTest(**vars(history), rod=rod, filtered=filtered, units=struck.units)
 
 
-def _pulse(pulse: str | Path | tuple[ArrayLike, ArrayLike]) -> Pulse:
+def _pulse(pulse: str | Path | tuple[ArrayLike, ArrayLike], units: Mapping[str, str]) -> Pulse:
     """A pulse from a text, a table or arrays."""
     if isinstance(pulse, str | Path):
-        return pulse_of(str(pulse))
+        return pulse_of(str(pulse), units)
     try:
         time, force = (np.asarray(values, dtype=np.float64) for values in pulse)
     except (TypeError, ValueError):

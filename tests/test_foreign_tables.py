@@ -1,0 +1,260 @@
+"""Tables of other programs: the same numbers in every form, or one line that says why not."""
+
+from __future__ import annotations
+
+import itertools
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import fecm
+from fecm import FecmWarning
+from fecm._measured_tables import read_table
+from fecm.location.table import strain_table
+from fecm.results.comparison import measurement_of
+from fecm.studies import StudyError
+from fecm.studies.indentation_test.measured import read_test
+from fecm.studies.rod_test.pulse_test import pulse_of
+from fecm.studies.rod_test.recordings import recorded
+from fecm.sweeps.cases import read_cases
+from tests.calls import assert_unusable, call
+from tests.decks import ROOT
+
+DECK = {"length": "mm", "force": "N", "time": "s"}
+TIME = np.linspace(0.0, 1e-3, 41)
+FORCE = 1500.0 * np.sin(np.pi * TIME / 1e-3) + 0.25
+
+HEADS = {  # names of the columns, the line of units, and sizes of the units in s and N
+    "names": (("time", "force"), None, (1.0, 1.0)),
+    "units": (("Time (ms)", "Load [kN]"), None, (1e-3, 1e3)),
+    "remarks": (("time (s)", "force (filtered) (N)"), None, (1.0, 1.0)),
+    "a line of units": (("Zeit", "Kraft"), ("(µs)", "(N)"), (1e-6, 1.0)),
+    "plain units": (("Time", "Force (filtered)"), ("ms", "kN"), (1e-3, 1e3)),
+    "none": (None, None, (1.0, 1.0)),
+}
+PREAMBLES = {
+    "no preamble": (),
+    "text": ("Rig 7", "Operator: A. Müller"),
+    "pairs": ("Specimen{s}A1", "Drop height{s}0{d}5{s}m", "", "Rate{s}1000000"),
+    "comments": ("# written by rig 7; 5 channels, 2 used",),
+}
+
+
+def document(
+    separator: str,
+    mark: str,
+    head: str,
+    preamble: str,
+    *,
+    trailing: bool = False,
+    sep: bool = False,
+) -> str:
+    """The record as a program writes it."""
+    names, units, sizes = HEADS[head]
+    rows = [
+        [f"{value / size:.9e}".replace(".", mark) for value, size in zip(row, sizes, strict=True)]
+        for row in zip(TIME.tolist(), FORCE.tolist(), strict=True)
+    ]
+    lines = [separator.join(row) for row in (names, units, *rows) if row is not None]
+    above = [line.format(s=separator, d=mark) for line in PREAMBLES[preamble]]
+    text = "\n".join([*above, *(line + separator * trailing for line in lines)]) + "\n"
+    return f"sep={separator}\n{text}" if sep else text
+
+
+@pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
+@pytest.mark.parametrize("head", HEADS)
+@pytest.mark.parametrize("preamble", PREAMBLES)
+@pytest.mark.parametrize(
+    "separator", [",", ";", "\t", " "], ids=["comma", "semicolon", "tab", "blank"]
+)
+def test_a_record_is_the_same_in_every_form(
+    tmp_path: Path, separator: str, preamble: str, head: str
+) -> None:
+    path = tmp_path / "record.csv"
+    marks = ".," if separator != "," else "."
+    ends = zip(("utf-8", "utf-8-sig", "utf-16", "cp1252"), ("\n", "\r\n", "\r", "\n"), strict=True)
+    for (mark, trailing, sep), (encoding, end) in itertools.product(
+        itertools.product(marks, (False, True), (False, True)), ends
+    ):
+        text = document(separator, mark, head, preamble, trailing=trailing, sep=sep)
+        path.write_bytes(text.replace("\n", end).encode(encoding))
+        # Without names, what is above the numbers may look like names.
+        if head == "none" and preamble in ("pairs", "text"):
+            with pytest.raises(StudyError, match=r"^[^\n]*; `columns` of time and force selects"):
+                measurement_of(path, DECK)
+            continue
+        read = measurement_of(path, DECK)
+        np.testing.assert_allclose(read.time, TIME, rtol=1e-8)
+        np.testing.assert_allclose(read.force, FORCE, rtol=1e-8)
+
+
+@pytest.mark.filterwarnings("ignore::fecm.FecmWarning")
+@pytest.mark.parametrize("head", HEADS)
+def test_a_comma_that_separates_and_marks_decimals_is_refused(tmp_path: Path, head: str) -> None:
+    path = tmp_path / "record.csv"
+    path.write_text(document(",", ",", head, "no preamble"), encoding="utf-8")
+    words = "time must increase" if head == "none" else "separate the columns by semicolons or tabs"
+    with pytest.raises(StudyError, match=rf"^[^\n]*{words}[^\n]*$"):
+        measurement_of(path, DECK)
+
+
+def test_every_reader_takes_the_same_forms(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    depth = np.linspace(0.0, 0.4, 41)
+    rows = list(zip(depth.tolist(), FORCE.tolist(), TIME.tolist(), strict=True))
+
+    def write(head: str, form: str) -> Path:
+        lines = [form.format(d, f, t).replace(".", ",") for d, f, t in rows]
+        path.write_bytes("\r\n".join(["sep=;", head, *lines]).encode("utf-16"))
+        return path
+
+    read = read_test(
+        write("Weg;depth (µm);Kraft;Load (kN);\r\n;;;;", "x;{0:e};;{1:e};"), (), ("mm", "N")
+    )
+    np.testing.assert_allclose(read.indentation, 1e-3 * depth, rtol=1e-6)
+    np.testing.assert_allclose(read.force, 1e3 * FORCE, rtol=1e-6)
+    pulse = pulse_of(str(write("Load (kN);Note;Time (ms)", "{1:e};ä;{2:e}")), DECK)
+    np.testing.assert_allclose(pulse.force(TIME * 1e-3), 1e3 * FORCE, rtol=1e-5)
+    series = recorded(write("Zeit (ms);Note;Kraft (kN)", "{2:e};ä;{1:e}"), "kraft")
+    np.testing.assert_allclose(series.values, FORCE, rtol=1e-6)
+    assert series.units == {"time": "ms"}
+    strains = strain_table(
+        write("Time (ms);Temp (°C);gage 2 (µm/m);gage 1 (%)", "{2:e};-;{0:e};{0:e}"), DECK, [1, 2]
+    )
+    assert strains.gages.tolist() == [2, 1]
+    np.testing.assert_allclose(strains.time, 1e-3 * TIME, rtol=1e-6)
+    np.testing.assert_allclose(strains.strains, [1e-6 * depth, 1e-2 * depth], rtol=1e-6)
+    path.write_bytes("sep=;\nvelocity (m/s);layup;\n1,5;[22,5/-22,5]2s;\n".encode("utf-16"))
+    assert read_cases(path, "mm-N-s") == [{"velocity": 1500.0, "layup": "[22.5/-22.5]2s"}]
+
+
+def test_columns_without_names_are_taken_in_order_with_a_note(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("0,1,\n1,2,\n2,3,\n", encoding="utf-8")
+    with pytest.warns(
+        FecmWarning, match="no names of columns: column 1 as time, column 2 as force"
+    ):
+        read = measurement_of(path, DECK)
+    assert read.force.tolist() == [1.0, 2.0, 3.0]
+    path.write_text("s,w\n0,1\n1,2\n", encoding="utf-8")
+    for reader in (lambda: measurement_of(path, DECK), lambda: pulse_of(str(path))):
+        with pytest.raises(StudyError, match="the columns are s, w; one must be named time"):
+            reader()
+
+
+@pytest.mark.parametrize(
+    ("head", "words"),
+    [
+        ("time,force,force", "one must be named force"),
+        ("time,force (N),force (N)", "one must be named force"),
+        ("time,force (N),force (kN)", ""),
+        ("time,force (lbf),force (kN)", ""),
+        ("time,force (filtered),force (raw)", "one must be named force"),
+        ("time,force,velocity (furlong)", ""),
+        ("time,force (furlong),velocity", "unknown unit of force `furlong`"),
+    ],
+)
+def test_a_repeated_name_needs_units_and_unused_columns_are_not_judged(
+    tmp_path: Path, head: str, words: str
+) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(f"{head}\n0,1,x\n1,2,\n".replace("x", "5").replace("2,\n", "2,5\n"))
+    if words:
+        with pytest.raises(StudyError, match=words):
+            measurement_of(path, DECK)
+    else:
+        size = 4.4482216152605 if "lbf" in head else 1.0
+        assert measurement_of(path, DECK).force == pytest.approx([size, 2.0 * size])
+
+
+def test_a_minus_before_a_column_changes_its_sign(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time,force\n0,-1\n1,-2\n")
+    for column in ("-force", "-2"):
+        assert measurement_of(path, DECK, ("time", column)).force.tolist() == [1.0, 2.0]
+
+
+def test_units_without_those_of_the_model_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time (ms),force\n0,1\n1,2\n")
+    with pytest.raises(StudyError, match="time is in ms, and the units of the model are not known"):
+        measurement_of(path, {})
+
+
+def test_a_pulse_is_converted_to_the_units_of_its_rod(tmp_path: Path) -> None:
+    deck = (ROOT / "fecm/examples/impact-115.inp").read_text()
+    (tmp_path / "d.inp").write_text(deck)
+    peaks = []
+    for head, size in (("time (s),force (N)", 4.4482216152605), ("time (s),force (lbf)", 1.0)):
+        rows = [(0.0, 0.0), (20e-6, 1000.0), (40e-6, 0.0)]
+        lines = [f"{t!r},{f * size!r}" for t, f in rows]
+        (tmp_path / "p.csv").write_text("\n".join([head, *lines]))
+        done = call("rod", "d.inp", "--pulse", "p.csv", "-o", "-", cwd=tmp_path)
+        peaks.append(max(float(line.split(",")[1]) for line in done.stdout.splitlines()[1:]))
+    assert peaks == pytest.approx([1000.0, 1000.0], rel=1e-9)
+
+
+def test_a_test_with_negative_forces_is_refused_until_its_sign_is_changed(tmp_path: Path) -> None:
+    a = np.concatenate([np.linspace(0.0, 1.0, 25), np.linspace(0.96, 0.2, 20)])
+    f = np.where(
+        np.arange(45) < 25, 1000.0 * a**1.5, 1000.0 * np.clip((a - 0.2) / 0.8, 0, 1) ** 2.5
+    )
+    noise = 0.01 * (-1.0) ** np.arange(45)
+    path = tmp_path / "a.csv"
+    rows = [f"{x!r},{y!r}" for x, y in zip(a.tolist(), (noise - f).tolist(), strict=True)]
+    path.write_text("\n".join(["indentation (mm),force (N)", *rows]))
+    done = call("indent", "fit", path)
+    assert_unusable(done)
+    assert "--columns changes the sign" in done.stderr
+    done = call("indent", "fit", path, "--columns", "indentation,-force")
+    assert done.exit_code == 0
+    assert float(done.stdout.split(" k ")[1].split()[0]) == pytest.approx(1000.0, rel=1e-3)
+
+
+def test_a_calibration_converts_the_transducer_to_the_unit_of_the_accelerometer(
+    tmp_path: Path,
+) -> None:
+    path = tmp_path / "a.csv"
+
+    def slope(head: str, *options: str) -> tuple[float, str]:
+        path.write_text(f"{head}\n0,0,0\n1,2,4.1\n2,4,7.9\n3,1,2\n")
+        done = call("rod", "calibrate", path, "--mass", 1, "--c-a", 1, *options)
+        assert done.exit_code == 0, done.stderr
+        return float(done.stdout.split("slope V_F/V_a")[1].split()[0]), done.stderr
+
+    plain, told = slope("time,V_F,V_a")
+    assert told == ""
+    assert slope("time,V_F (mV),V_a (mV)")[0] == plain
+    assert slope("time,V_F (mV),V_a (V)")[0] == pytest.approx(1e-3 * plain, rel=1e-5)
+    turned, told = slope("time,V_F,V_a", "--columns", "time,V_F,-V_a")
+    assert turned == -plain
+    assert "--columns time,V_F,-V_a" in told
+    path.write_text("time,V_F (mV),V_a\n0,0,0\n1,2,4.1\n2,4,7.9\n3,1,2\n")
+    done = call("rod", "calibrate", path, "--mass", 1, "--c-a", 1)
+    assert_unusable(done)
+    assert "name both units" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "path", sorted((ROOT / "fecm/examples").glob("*.csv")), ids=lambda p: p.stem
+)
+def test_the_tables_of_the_package_have_the_fields_that_a_plain_split_gives(path: Path) -> None:
+    lines = [n for n in path.read_text("utf-8").splitlines() if n and not n.startswith("#")]
+    table = read_table(path)
+    assert [table.head[1], *(row for _, row in table.rows)] == [
+        [field.strip() for field in line.split(",")] for line in lines
+    ]
+
+
+def test_a_pulse_in_milliseconds_without_a_unit_is_doubted(tmp_path: Path) -> None:
+    deck, path = ROOT / "fecm/examples/impact-115.inp", tmp_path / "p.csv"
+    rows = [(0.0, 0.0), (20e-6, 1000.0), (40e-6, 0.0)]
+    for head, scale in (("time", 1e3), ("time (ms)", 1e3), ("time", 1.0)):
+        path.write_text("\n".join([f"{head},force", *(f"{t * scale!r},{f!r}" for t, f in rows)]))
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            fecm.pulse_test(deck, path, duration=1e-4)
+        doubted = any("as in `time (ms)`" in str(one.message) for one in caught)
+        assert doubted == (head == "time" and scale == 1e3)
