@@ -66,6 +66,17 @@ def test_a_deck_of_feap_is_recognised() -> None:
         ("SOL 101\nCEND\nBEGIN BULK\n", "Nastran", "takes a mesh"),
         ("BEGIN BULK\nGRID,1,,0.,0.,0.\n", "Nastran", "takes a mesh"),
         ("*NODE\n1, 0.0, 0.0\n", "Abaqus", "takes a mesh"),
+        ("$ a plate\n$\nSOL 101\nCEND\n", "Nastran", "takes a mesh"),
+        ("NASTRAN SYSTEM(151)=1\nID A,B\nSOL 101\n", "Nastran", "takes a mesh"),
+        ("ID PLATE,TEST\nAPP DISP\nSOL 1,0\n", "Nastran", "takes a mesh"),
+        ("ASSIGN OUTPUT2='a.op2'\n\nSOL SESTATIC\n", "Nastran", "takes a mesh"),
+        ("GRID*                  1\n", "Nastran", "takes a mesh"),
+        ("$ a ball\n$\n*KEYWORD\n", "LS-DYNA", "mm-ms-kg"),
+        ("$ a ball\n*NODE\n", "LS-DYNA", "mm-ms-kg"),
+        ("** a plate\n**\n*Heading\n", "Abaqus", "takes a mesh"),
+        ("$MeshFormat\n4.1 0 8\n", "Gmsh", "takes a mesh"),
+        ("! a plate\n\nnopr\nFEAP * * plate\n", "FEAP", "the first word is FECM here"),
+        ('<?xml version="1.0" encoding="UTF-8"?>\n<elamx>\n', "eLamX", "--layup"),
     ],
 )
 def test_an_input_of_another_code_is_named_with_what_can_be_done(
@@ -75,6 +86,10 @@ def test_an_input_of_another_code_is_named_with_what_can_be_done(
     assert error.code == "E013"
     assert program in error.message
     assert hint in error.hint
+
+
+def test_a_deck_with_a_line_above_its_title_is_not_taken_for_another_programs() -> None:
+    assert "E013" not in {error.code for error in errors("$ a plate\n" + base())}
 
 
 def test_a_large_result_marks_the_macro_that_stores_most() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import warnings
 from pathlib import Path
 
 import numpy as np
@@ -256,3 +257,40 @@ def test_an_impact_in_the_units_of_an_explicit_code_is_that_in_millimetres_and_n
     np.testing.assert_allclose(other.force * 1e3, one.force, rtol=2e-5)
     np.testing.assert_allclose(other.time / 1e3, one.time, rtol=1e-12)
     assert made["kg-mm-ms"].to_text().count("mm kN ms") == 1
+
+
+@pytest.mark.parametrize(
+    ("text", "form"),
+    [
+        ('<?xml version="1.0"?>\n<elamx/>\n', "XML"),
+        ('{"AS4": {"E1": 140000}}\n', "JSON"),
+        ('[{"name": "AS4", "E1": 140000}]\n', "JSON"),
+        ("name,E1,E2\nAS4,140000,9000\n", "a table (CSV)"),
+        ("name;E1;E2\nAS4;140000;9000\n", "a table (CSV)"),
+    ],
+)
+def test_a_file_of_plies_in_another_form_is_named(tmp_path: Path, text: str, form: str) -> None:
+    (tmp_path / "plies.txt").write_text(text)
+    done = call("materials", "plies.txt", cwd=tmp_path)
+    assert done.exit_code == 2
+    assert f"this is {form}, not TOML" in done.stderr
+
+
+def test_a_mistake_in_toml_is_told_with_its_line(tmp_path: Path) -> None:
+    (tmp_path / "plies.toml").write_text('["a"]\nE1 = 1,2\n')
+    done = call("materials", "plies.toml", cwd=tmp_path)
+    assert "line 2" in done.stderr
+    assert "not TOML" not in done.stderr
+
+
+def test_moduli_in_gpa_without_their_units_are_doubted(tmp_path: Path) -> None:
+    path = tmp_path / "plies.toml"
+    ply = "E1 = 140.0\nE2 = 9.0\nG12 = 5.0\nnu12 = 0.3\ndensity = 1.6e-9\n"
+    path.write_text(f'["a"]\n{ply}')
+    with pytest.warns(fecm.FecmWarning, match=r"\[a\] E1 140 is 0.14 GPa in mm-N-s, too soft"):
+        fecm.materials(path)
+    foam = ply.replace("140.0", "70.0").replace("1.6e-9", "6e-11")
+    for text in (f'units = "mm-kN-ms"\n["a"]\n{ply.replace("e-9", "e-6")}', f'["a"]\n{foam}'):
+        path.write_text(text)
+        with warnings.catch_warnings(action="error", category=fecm.FecmWarning):
+            fecm.materials(path)

@@ -366,6 +366,11 @@ DECKS: dict[str, Deck] = {code: plate(edit) for edit, code, _ in MISTAKES.values
             "    2  90.     0.053", "    2  90.     0.010    2"
         )
     ),
+    "W562": lambda: small(
+        data=DATA_CARDS.replace("    1   0.     0.053", "    1  25.     0.030").replace(
+            "    2  90.     0.053", "    2  50.     0.046\n    3  25.     0.030"
+        )
+    ).replace("   25    4    2    2", "   25    4    3    2"),
     "W500": more(MATS),
     "W497": lambda: small(
         data=MATS + DATA_CARDS.replace("    2  90.     0.053", "    2  90.     0.053    2")

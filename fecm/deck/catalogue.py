@@ -7,6 +7,7 @@ all of them (section 3.2.2 and the input listing), and q for each indenter.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import cache
@@ -14,10 +15,11 @@ from importlib import resources
 from pathlib import Path
 
 from fecm._dataclasses import frozen
-from fecm._inputs import parsed_file, parsed_toml
+from fecm._errors import warn
+from fecm._inputs import lines_of, parsed_file, parsed_toml
 from fecm.deck.model import Allowables, Deck, Delamination, Expansion, Indentation, Ply
-from fecm.deck.unit_systems import UnitsError, convert, system_named
-from fecm.deck.units import COEFFICIENT, DENSITY, MODULUS, TOUGHNESS, unit_names
+from fecm.deck.unit_systems import UnitsError, convert, system_named, units_of
+from fecm.deck.units import COEFFICIENT, DENSITY, MODULUS, TOUGHNESS, in_si, unit_names
 
 # Units of the test standards, and the constants of steel in them.
 STANDARD = "mm-N-s"
@@ -61,6 +63,8 @@ SLOPES = ("p_plus", "p_minus")  # of Puck's criterion
 EXPANSIONS = Expansion.THERMAL
 STRENGTHS = ("XT", "XC", "YT", "YC", "S12")
 SYSTEM_OF_FILES = "mm-N-s"  # system of units of a file that names none
+# Smallest E1 of a ply, and largest density of a core, in Pa and kg/m^3.
+SOFT, LIGHT = 1e9, 800.0
 NU23 = 0.4  # of a ply whose nu23 is not known
 
 
@@ -173,7 +177,15 @@ def read_plies(text: str) -> dict[str, NamedPly]:
     the file or of a ply, is a system of units; mm-N-s if it is missing.  Raises ValueError
     if a name, value or unit cannot be meant, or the file is not TOML.
     """
-    tables = parsed_toml(text)
+    try:
+        tables = parsed_toml(text)
+    except ValueError:
+        if form := _other_form(text):
+            raise ValueError(
+                f"this is {form}, not TOML; begin each ply with a line such as "
+                '["its name"], and write E1 = 140e3 and so on below'
+            ) from None
+        raise
     units = tables.pop("units", SYSTEM_OF_FILES)
     for name, table in tables.items():
         if not isinstance(table, dict):
@@ -182,6 +194,36 @@ def read_plies(text: str) -> dict[str, NamedPly]:
     if not tables:
         raise ValueError('no plies; begin each with ["its name"]')
     return {name: _ply(name, {"units": units, **table}) for name, table in tables.items()}
+
+
+def _other_form(text: str) -> str:
+    """What a text is that is not TOML; empty if it looks like TOML with a mistake."""
+    import json  # 2 ms, only after a mistake
+
+    begin = text.lstrip()[:1]
+    if begin in ("<", "{"):
+        return {"<": "XML", "{": "JSON"}[begin]
+    try:
+        json.loads(text)
+    except ValueError:
+        first = next((one for one in lines_of(text) if one.strip() and one[0] != "#"), "")
+        is_table = "=" not in first and begin != "[" and re.search("[,;\t]", first)
+        return "a table (CSV)" if is_table else ""
+    return "JSON"
+
+
+def _doubt(ply: NamedPly) -> None:
+    """Warn if the modulus along the fibres looks like GPa in a system with another unit."""
+    units = units_of(ply.system)
+    factors = in_si(MODULUS, units), in_si(DENSITY, units)
+    if factors[0] is None or factors[1] is None:
+        return
+    e1, is_core = ply.values["E1"], ply.values["density"] * factors[1] < LIGHT
+    if e1 * factors[0] < SOFT and not is_core:
+        warn(
+            f"[{ply.name}] E1 {e1:g} is {e1 * factors[0] / 1e9:.3g} GPa in {ply.system}, too soft "
+            'for a ply; if the moduli are in GPa, write units = "mm-kN-ms", or multiply them'
+        )
 
 
 def _ply(name: str, table: Mapping[str, object]) -> NamedPly:
@@ -209,7 +251,9 @@ def _ply(name: str, table: Mapping[str, object]) -> NamedPly:
             "composites nu12 is 0.2 to 0.4"
         )
     values = {key: numbers[key] for key in KEYS if key in numbers}
-    return NamedPly(name, values, system, texts.get("source", ""), texts.get("assumed", ""))
+    ply = NamedPly(name, values, system, texts.get("source", ""), texts.get("assumed", ""))
+    _doubt(ply)
+    return ply
 
 
 def _constant(name: str, key: str, value: object) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Sequence
 from dataclasses import field
 from pathlib import Path
 
@@ -33,22 +34,32 @@ MOST_MACRO_CARDS = 100_000
 class OtherFile:
     """A file of another program."""
 
-    begins: str  # pattern of its first line
+    lines: str  # pattern of one of its first lines, or of two
     what: str
     hint: str
 
 
+FIRST_LINES = 20  # of a file, which tell its program
 TAKES_A_MESH = "`fecm new DECK --mesh FILE`, or fecm.Plate.from_mesh, takes a mesh from it"
 OTHER_FILES = (
     OtherFile(
-        r"\*keyword\b|\$#",
+        r"\*keyword\b|\$#|\$(?!meshformat).*\n\*[a-z]",
         "an input file of LS-DYNA",
         "`fecm new --units mm-ms-kg` makes a deck in its units; `--mesh FILE` takes a mesh of "
         "Gmsh, Abaqus, Nastran or VTK",
     ),
-    OtherFile(r"sol +\d|cend\b|begin +bulk\b", "an input file of Nastran", TAKES_A_MESH),
+    OtherFile(r"\$meshformat", "a mesh of Gmsh", TAKES_A_MESH),
     OtherFile(r"\*\*|\*[a-z]", "an input file of Abaqus or CalculiX", TAKES_A_MESH),
-    OtherFile(r"\$MeshFormat", "a mesh of Gmsh", TAKES_A_MESH),
+    OtherFile(
+        r"sol +\d|cend\b|begin +bulk\b|nastran\b|id +\w|init +master|assign +\w|grid\*?[ ,\t]|\$",
+        "an input file of Nastran",
+        TAKES_A_MESH,
+    ),
+    OtherFile(
+        r"<\?xml|<!doctype|<elamx",
+        "an XML file, such as eLamX writes",
+        "`fecm new DECK --layup ... --ply ...` makes a deck from its layup and material",
+    ),
     OtherFile(
         r"feap\b",
         "an input file of FEAP",
@@ -103,7 +114,7 @@ class Reader:
                     self._end(f"The file contains more than {MOST_PROBLEMS} problems.", card)
                     break
                 problems.append(self._problem(card))
-            elif not (problems or self.findings) and (other := _other_file(card)):
+            elif not (problems or self.findings) and (other := _other_file(self.cards.lines)):
                 message = f"This is {other.what}, not a deck."
                 self.findings.add("E013", message, card.place, other.hint)
                 self.findings.closed = True
@@ -323,10 +334,13 @@ class Reader:
         return tables
 
 
-def _other_file(card: Card) -> OtherFile | None:
-    """The other program whose file begins with a card; None if there is none."""
-    found = (other for other in OTHER_FILES if re.match(other.begins, card.data, re.IGNORECASE))
-    return next(found, None)
+def _other_file(lines: Sequence[str]) -> OtherFile | None:
+    """The other program whose file begins with these lines; None if there is none."""
+    text = "\n".join(line.lstrip() for line in lines[:FIRST_LINES])
+    if re.search(rf"^{TITLE}", text, re.MULTILINE):
+        return None
+    known = (o for o in OTHER_FILES if re.search(f"^(?:{o.lines})", text, re.I | re.M))
+    return next(known, None)
 
 
 def _close(word: str, known: list[str]) -> list[str]:

@@ -99,7 +99,7 @@ declare(
     "E013",
     Subject.FRAME,
     "The file is an input of another program.",
-    cause="Abaqus, CalculiX, LS-DYNA, Nastran, Gmsh and FEAP are known.",
+    cause="Abaqus, CalculiX, eLamX, FEAP, Gmsh, LS-DYNA and Nastran are known by their beginning.",
     remedy=("`fecm new --mesh FILE` takes a mesh. FEAP: [what to change](deck.md#decks-of-feap)."),
 )
 

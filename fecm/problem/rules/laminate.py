@@ -30,6 +30,7 @@ LOWEST_RATIO = 0.5  # E1/E2 of a ply whose fibres are along 1
 FIBROUS = 3.0
 LEAST_NU12, MOST_NU12 = 0.1, 0.6
 SHOWN_ANGLES = 8
+SHARES = 3  # of plies at 0, ±45 and 90 degrees
 POISSONS_RATIO = "Poisson's ratio NU12"
 
 
@@ -258,6 +259,26 @@ def thin_core(problem: Problem) -> Reports:
 
 
 @rule(
+    "W562",
+    Subject.LAMINATE,
+    "The angles look like shares in per cent.",
+    cause="25/50/25 may mean 25 % of plies at 0, 50 % at ±45 and 25 % at 90 degrees.",
+    remedy="The angle of every ply, as in `[0/45/-45/90]s`.",
+)
+def shares_as_angles(problem: Problem) -> Reports:
+    """Find three positive angles that add up to 100, alone or mirrored."""
+    for layers in problem.deck.layers.values():
+        angles = [layer.angle for layer in layers]
+        half = angles[: len(angles) // 2] if angles == angles[::-1] else []
+        for some in (angles, half):
+            if len(some) == SHARES and min(some) > 0.0 and sum(some) == 100.0:
+                listed = "/".join(f"{angle:g}" for angle in some)
+                message = f"The angles {listed} add up to 100: they look like shares in per cent."
+                yield Report(message, layers[0].place("fibre angle"), "give the angle of every ply")
+                break
+
+
+@rule(
     "W431",
     Subject.LAMINATE,
     "A fibre angle is beyond ±180.",
@@ -387,6 +408,7 @@ VALUES = (
     doubtful_poissons_ratio,
     thin_core,
     large_angle,
+    shares_as_angles,
     angles_in_radians,
     impossible_thickness,
     thick_plate,
