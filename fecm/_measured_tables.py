@@ -68,8 +68,13 @@ WORDS = {
     "indentation": ("indentation", "displacement", "extension", "stroke", "depth"),
 }
 DIMENSIONS = {
-    **{"time": "time", "force": "force", "transducer": "force", "indentation": "length"},
-    **{"V_F": "voltage", "V_a": "voltage", "strain": "strain"},
+    "time": "time",
+    "force": "force",
+    "transducer": "force",
+    "indentation": "length",
+    "V_F": "voltage",
+    "V_a": "voltage",
+    "strain": "strain",
 }
 REMARKS = {"filtered", "unfiltered", "raw", "smoothed", "corrected", "measured", "gefiltert"}
 NO_UNITS: Mapping[str, str] = MappingProxyType({})
@@ -146,7 +151,7 @@ class Table:
         """Number of the column with the first of some names that the table has."""
         for word in words:
             places = [n for n, name in enumerate(self.names) if same_name(word, name)]
-            exact = [n for n in places if self.head[1][n] == word and unit_in(word) != ""]
+            exact = [n for n in places if self.head[1][n] == word != unit_free(word)]
             if len(places) > 1:  # in several units
                 own = {n: plain_unit(self.units[n]) for n in places}
                 known = [n for n in places if own[n] and own[n] in UNITS.get(dimension, {})]

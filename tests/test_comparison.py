@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -65,6 +66,23 @@ def test_a_delay_and_an_offset_of_the_measurement_are_subtracted() -> None:
     assert half_sine().compare((time, force)).rms > 3.0
     with pytest.raises(StudyError, match="must be finite"):
         half_sine().compare((time, force), delay=math.nan)
+
+
+@pytest.mark.parametrize(("delay", "word"), [(0.45, "after"), (-0.1, "")])
+def test_a_record_that_begins_at_the_trigger_is_told_its_delay(delay: float, word: str) -> None:
+    # Half of the peak of sin(pi t) is passed at 1/6 and 5/6.
+    time = np.linspace(0.0, 1.5, 3001)
+    force = np.where(
+        (time > delay) & (time < 1.0 + delay), 10.0 * np.sin(np.pi * (time - delay)), 0
+    )
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        half_sine().compare((time, force))
+        half_sine().compare((time, force), delay=delay)
+    texts = [str(one.message) for one in caught]
+    assert len(texts) == bool(word)
+    if word:
+        assert f"measured rises 0.45 s {word} the result; a delay of 0.45" in texts[0]
 
 
 @pytest.mark.parametrize(

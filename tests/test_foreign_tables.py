@@ -169,6 +169,15 @@ def test_a_repeated_name_needs_units_and_unused_columns_are_not_judged(
         assert measurement_of(path, DECK).force == pytest.approx([size, 2.0 * size])
 
 
+def test_of_two_columns_of_one_name_the_text_in_brackets_selects(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("time,force (filtered),force (raw)\n0,1,3\n1,2,4\n")
+    for column, force in (("force (filtered)", [1.0, 2.0]), ("force (raw)", [3.0, 4.0])):
+        assert measurement_of(path, DECK, ("time", column)).force.tolist() == force
+    read = measurement_of(path, DECK, ("time", "-force (raw)"))
+    assert read.force.tolist() == [-3.0, -4.0]
+
+
 def test_a_minus_before_a_column_changes_its_sign(tmp_path: Path) -> None:
     path = tmp_path / "a.csv"
     path.write_text("time,force\n0,-1\n1,-2\n")
@@ -184,7 +193,7 @@ def test_units_without_those_of_the_model_are_refused(tmp_path: Path) -> None:
 
 
 def test_a_pulse_is_converted_to_the_units_of_its_rod(tmp_path: Path) -> None:
-    deck = (ROOT / "fecm/examples/impact-115.inp").read_text()
+    deck = fecm.examples.path("impact-patch.inp").read_text()
     (tmp_path / "d.inp").write_text(deck)
     peaks = []
     for head, size in (("time (s),force (N)", 4.4482216152605), ("time (s),force (lbf)", 1.0)):
@@ -249,7 +258,7 @@ def test_the_tables_of_the_package_have_the_fields_that_a_plain_split_gives(path
 
 
 def test_a_pulse_in_milliseconds_without_a_unit_is_doubted(tmp_path: Path) -> None:
-    deck, path = ROOT / "fecm/examples/impact-115.inp", tmp_path / "p.csv"
+    deck, path = fecm.examples.path("impact-patch.inp"), tmp_path / "p.csv"
     rows = [(0.0, 0.0), (20e-6, 1000.0), (40e-6, 0.0)]
     for head, scale in (("time", 1e3), ("time (ms)", 1e3), ("time", 1.0)):
         path.write_text("\n".join([f"{head},force", *(f"{t * scale!r},{f!r}" for t, f in rows)]))

@@ -250,8 +250,8 @@ FORMAT_OPTION = format_option(
 COLUMNS_OPTION = click.option(
     "--columns",
     type=list_of("TIME,FORCE", click.STRING, [2]),
-    help="Names or numbers (from 1) of the columns of the measurement.  [default: time; force, "
-    "load or another usual name]",
+    help="Names or numbers (from 1) of the columns of the measurement; a minus before one "
+    "changes its sign.  [default: time; force, load or another usual name]",
 )
 UNITS_OPTION = click.option(
     "--units",

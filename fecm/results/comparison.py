@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 
 from fecm._dataclasses import frozen
-from fecm._errors import StudyError
+from fecm._errors import StudyError, warn
 from fecm._measured_tables import factor, read_table
 from fecm._text import printable
 from fecm._typing import Floats
 from fecm.results.stored import Stored
+
+TRIGGER = 0.5  # time between two rises, over the time above half of the peak
 
 # A CSV file, or times and forces.
 Source = str | Path | tuple[Any, Any]
@@ -159,6 +161,22 @@ def _from_file(
     return Measurement(printable(path.name), column, time, force)
 
 
+def _doubt_trigger(stored: Stored, measured: Measurement, clock: Floats) -> None:
+    """Warn if the measured force rises much earlier or later than that of the result."""
+    own = np.append(0.0, stored[f"history/{measured.column}"])
+    if own.max() <= 0.0 or measured.force.max() <= 0.0:
+        return
+    above = own >= 0.5 * own.max()
+    rise = measured.time[(measured.force >= 0.5 * measured.force.max()).argmax()]
+    late = float(rise - clock[above.argmax()])
+    if abs(late) > TRIGGER * np.count_nonzero(above) / len(clock) * clock[-1]:
+        unit, word = stored.units.get("time", ""), "after" if late > 0.0 else "before"
+        warn(
+            f"{measured.name} rises {abs(late):.3g} {unit}".rstrip()
+            + f" {word} the result; a delay of {late:.3g} (--delay, `delay=`) removes it"
+        )
+
+
 def compare(stored: Stored, measured: Measurement) -> Comparison:
     """Compare a result's force with a measured one, at the measured times of the run.
 
@@ -176,6 +194,7 @@ def compare(stored: Stored, measured: Measurement) -> Comparison:
         )
     time, force = measured.time[there], measured.force[there]
     own = np.interp(time, clock, np.append(0.0, stored[f"history/{measured.column}"]))
+    _doubt_trigger(stored, measured, clock)
     weights = 0.5 * (np.diff(time, prepend=time[0]) + np.diff(time, append=time[-1]))
     varies = np.ptp(own) > 0.0 and np.ptp(force) > 0.0
     return Comparison(

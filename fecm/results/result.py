@@ -349,7 +349,7 @@ class Result(Stored, schema.Contact):
             converted to the deck's units if the file or `units` names those of the measurement.
         columns : sequence of str, optional
             Names or numbers (from 1) of the columns of time and force; by default the usual names,
-            such as ``"time"`` and ``"force"`` or ``"load"``.
+            such as ``"time"`` and ``"force"`` or ``"load"``.  A minus before one changes its sign.
         units : sequence of str, optional
             Units of time and force of a measurement that names none, such as ``("ms", "kN")``; by
             default the deck's.

@@ -147,7 +147,8 @@ def fit_indentation(
         Decrease of the indentation that counts as a turn, length; by default 2 % of its range, or 8
         standard deviations of its noise.
     columns : sequence of str, optional
-        Names or numbers (from 1) of the columns of indentation and force in a table.
+        Names or numbers (from 1) of the columns of indentation and force in a table; a minus before
+        one changes its sign.
     units : tuple of str, optional
         Units of length and force to which a table that names its units is converted, by default in
         and lbf, mm and N, or m and N, as the table's; of arrays, their own.
