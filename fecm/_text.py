@@ -4,10 +4,23 @@ from __future__ import annotations
 
 import sys
 
+DIGITS = 4  # of computed values that are printed; the model's errors are per cent
+
 
 def printable(text: str) -> str:
     """Escape control characters and lone surrogates, giving one line for any terminal."""
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+
+
+def significant(value: float, digits: int = DIGITS) -> str:
+    """Format a number to a few significant digits, without an exponent below a million.
+
+    Examples
+    --------
+    >>> significant(14064.6), significant(0.00184092)
+    ('14060', '0.001841')
+    """
+    return f"{float(f'{value:.{digits}g}'):.{max(digits, 6)}g}"
 
 
 def shown(value: object, width: int = 60, *, exact: bool = False) -> str:

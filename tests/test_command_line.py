@@ -47,7 +47,7 @@ def test_a_run_writes_its_result_beside_the_user_and_says_what_came_out(tmp_path
     assert [p.name for p in tmp_path.iterdir()] == ["appendix.h5"]
     for words in (
         "peak force",
-        "6.18964",
+        "6.19 ",
         "contact",
         "largest indent",
         "energy balance",

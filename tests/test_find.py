@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
@@ -47,12 +48,23 @@ def test_a_run_at_the_found_velocity_has_the_threshold_as_its_peak(tmp_path: Pat
     assert done.exit_code == 0
     found = fecm.load_sweep(tmp_path / "s.h5")
     (velocity,) = found["found_velocity"]
-    assert f"smallest found    {velocity:.8g}, " in done.stdout
+    assert f"smallest found    {velocity:.4g}, " in done.stdout
     result = fecm.run_one(deck(400).replace("   13    3     115.0", f"13,3,{velocity:.10g}"))
     assert result.force.max() == pytest.approx(result.threshold["force"], rel=1e-5)
     assert found["peak_force"][0] == pytest.approx(result.force.max(), rel=1e-8)
     # The mass of the report's rod is 1.8096e-4.
     assert found["found_energy"][0] == pytest.approx(0.5 * 1.8096e-4 * velocity**2, rel=1e-4)
+
+
+def test_the_command_that_a_summary_names_finds_the_energy_of_the_threshold(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(deck(400))
+    printed = call("run", "d.inp", cwd=tmp_path).stdout
+    (command,) = re.findall(r"fecm (sweep .*) finds the impact energy of the threshold", printed)
+    done = call(*command.replace("DECK", "d.inp").split(), cwd=tmp_path)
+    (velocity,) = fecm.sweep(deck(400), until="threshold")["found_velocity"]
+    assert f"smallest found    {velocity:.4g}, " in done.stdout
+    (tmp_path / "slow.inp").write_text(deck(400).replace("115.0", " 90.0"))
+    assert "finds the impact energy" not in call("run", "slow.inp", cwd=tmp_path).stdout
 
 
 def test_a_case_among_others_equals_a_search_of_its_own() -> None:

@@ -66,8 +66,10 @@ def test_a_run_at_the_found_velocity_has_this_exposure(tmp_path: Path) -> None:
     done = call("sweep", "d.inp", *options, cwd=tmp_path)
     assert done.exit_code == 0, done.stdout + done.stderr
     found = fecm.load_sweep(tmp_path / "s.h5")
+    command = " ".join(("fecm sweep DECK", *options[:4], "finds the impact energy of the first"))
+    assert command in call("run", "d.inp", cwd=tmp_path).stdout
     (velocity,) = found["found_velocity"]
-    assert f"smallest found    {velocity:.8g}, " in done.stdout
+    assert f"smallest found    {velocity:.4g}, " in done.stdout
     low, high = (found[name][0] for name in ("found_energy_low", "found_energy_high"))
     assert f"; finer meshes {low:.3g} to {high:.3g}" in done.stdout
     result = run(DECK.replace("     115.0", f"{velocity:10.6f}"))

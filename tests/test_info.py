@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import random
+import re
 import shutil
 from collections.abc import Callable
 from pathlib import Path
@@ -20,8 +21,10 @@ from fecm.results.groups import GROUPS
 from fecm.results.hdf5_reader import read
 from fecm.results.schema import DATASETS, GROUP_TYPES
 from tests.calls import assert_unusable, call
-from tests.decks import APPENDIX, DATA_CARDS, small
+from tests.decks import APPENDIX, DATA_CARDS, PROGRAM, small
 
+# The projectile has left the plate at the end.
+LONG = small(PROGRAM.replace(" 10\n", "400\n"), data=DATA_CARDS.replace("EXPE", "DELA\n.2,\nEXPE"))
 Edit = Callable[[h5py.File], object]
 
 
@@ -60,6 +63,33 @@ def words(path: Path) -> str:
     return "\n".join(" ".join(line.split()) for line in done.stdout.splitlines())
 
 
+@pytest.mark.parametrize(
+    "command",
+    [
+        ("run", "d.inp"),
+        ("estimate", "d.inp"),
+        ("sweep", "d.inp", "--find", "velocity", "--until", "peak_force=threshold"),
+        ("sweep", "d.inp", "--random", "velocity=normal:115,5", "--samples", "16"),
+    ],
+)
+def test_a_computed_number_has_at_most_four_digits_in_print(
+    command: tuple[str, ...], tmp_path: Path
+) -> None:
+    (tmp_path / "d.inp").write_text(LONG)
+    done = call(*command, cwd=tmp_path)
+    assert done.exit_code == 0, done.stderr
+    printed = re.sub(r"\((?:step|velocity) .*?\)|seed \d+", "", done.stdout)
+    numbers = re.findall(r"(?<![\w.])\d*\.\d+", printed)
+    assert len(numbers) > 2
+    assert [n for n in numbers if len(n.replace(".", "").lstrip("0")) > 4] == []
+
+
+def test_json_has_all_digits_of_a_computed_number(tmp_path: Path) -> None:
+    (tmp_path / "d.inp").write_text(LONG)
+    about = json.loads(call("run", "d.inp", "--format", "json", cwd=tmp_path).stdout)
+    assert about["metrics"]["peak_force"] == fecm.load(tmp_path / "d.h5").force.max()
+
+
 def test_info_tells_the_run_its_summary_and_every_dataset(tmp_path: Path) -> None:
     path = tmp_path / "appendix.h5"
     fecm.run(APPENDIX, mode="listing", output=path)
@@ -70,7 +100,7 @@ def test_info_tells_the_run_its_summary_and_every_dataset(tmp_path: Path) -> Non
         "mode listing",
         "units the deck names none",
         "steps 10, time 2e-07 to 2e-06",
-        "peak force at least 6.64198 at time 2e-06 (step 10), as the run ends in contact",
+        "peak force at least 6.642 at time 2e-06 (step 10), as the run ends in contact",
         "tape9: contact and the projectile, stored by RODP; 10 rows",
         "location = gauss",
         "elements 140x9 int32 1 to 609",

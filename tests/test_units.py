@@ -4,7 +4,19 @@ from __future__ import annotations
 
 import pytest
 
+from fecm._text import significant
 from fecm.deck.units import quantity
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (14064.6, "14060"), (0.00184092, "0.001841"), (999960.0, "1e+06"), (2.5, "2.5"),
+        (123456789.0, "1.235e+08"), (0.0, "0"), (-78.8549, "-78.85"), (float("nan"), "nan"),
+    ],
+)  # fmt: skip
+def test_a_number_of_four_digits_has_no_exponent_below_a_million(value: float, text: str) -> None:
+    assert significant(value) == text
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from fecm._text import printable
+from fecm._text import printable, significant
 from fecm.deck.model import Deck, Units
 
 # Units that are known by name, in m, N and s.
@@ -137,7 +137,7 @@ def with_prefix(unit: str, power: int) -> str:
 def quantity(value: float, unit: str, digits: int = 6) -> str:
     """A value with its unit: 20 g instead of 2e-05 N*s^2/mm, 1.5 J instead of 1500 N*mm."""
     power, name = readable(value, unit, digits)
-    return f"{value / 10.0**power:.{digits}g} {name}".rstrip()
+    return f"{significant(value / 10.0**power, digits)} {name}".rstrip()
 
 
 def readable(value: float, unit: str, digits: int = 6) -> tuple[int, str]:

@@ -11,10 +11,10 @@ from collections.abc import Iterable, Sequence
 from enum import StrEnum
 
 from fecm._dataclasses import frozen
+from fecm._text import DIGITS
 from fecm.deck.units import quantity, thousands, with_prefix
 
 UNKNOWN = "–"  # of a value that is not known
-DIGITS = 5  # of numbers on a page
 MOST_TEXT = 200_000  # characters of a listing
 SCALED = ("N", "kN", "s", "ms", "us", "µs")  # units that take a prefix
 

@@ -41,6 +41,7 @@ PLY = (
     ("g23", MODULUS),
     ("nu12", ""),
 )
+GIVEN = 5  # digits of values of the deck
 STRENGTHS = ("xt", "xc", "yt", "yc", "s12", "s13", "s23")
 LAW = (COEFFICIENT, "length", "", "")  # dimensions of the constants of EXPE
 
@@ -197,10 +198,10 @@ def _program(problem: Problem) -> Iterator[tuple[Cell, ...]]:
 
 def _in_units(deck: model.Deck, value: float, dimension: str) -> Cell:
     """A value in the units of the deck."""
-    return number(float(value), unit_of(dimension, unit_names(deck)))
+    return number(float(value), unit_of(dimension, unit_names(deck)), GIVEN)
 
 
 def _mass(deck: model.Deck, mass: float) -> str:
     """A mass in g or kg where the units are known."""
     names = unit_names(deck)
-    return mass_in_si(mass, names) or quantity(mass, unit_of(MASS, names), 5)
+    return mass_in_si(mass, names) or quantity(mass, unit_of(MASS, names), GIVEN)

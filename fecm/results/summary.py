@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fecm._text import DIGITS, significant
 from fecm._typing import Floats
 from fecm.deck.units import quantity as shown_quantity
 from fecm.deck.units import unit_of
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 
 NEAR = 0.05  # of the time of the peak, up to which a row is that of the peak
 LABEL_WIDTH = 18  # of the lines
+GIVEN = 6  # digits of values of the deck; computed ones have DIGITS
 LISTED = 6  # most contacts and frequencies listed individually
 # Parts by the caller of the run: attribute, name, and the segment of the deck that they replace.
 OWN_PARTS = (("law", "contact law", "EXPE"), ("projectile", "projectile", "PROJ"))
@@ -43,6 +45,12 @@ UNDECIDED = {
 def _line(name: str, text: str) -> str:
     """A line of the summary."""
     return f"{name:{LABEL_WIDTH}}{text}"
+
+
+def _search(what: str, until: str) -> str:
+    """Line of the command that finds the impact energy at which something is reached."""
+    command = f"fecm sweep DECK --find velocity --until {until}"
+    return _line("", f"{command} finds the impact energy of {what}")
 
 
 def summary(result: Stored) -> list[str]:
@@ -70,12 +78,14 @@ def summary(result: Stored) -> list[str]:
         lines.append(_line("membrane", text))
     if result.threshold:
         lines.append(_line("delamination", f"{_delamination(result)}{_delaminations(result)}"))
+        if math.isfinite(float(result.threshold["time"])):
+            lines.append(_search("the threshold", "peak_force=threshold"))
     lines += _exposures(result)
     if "failure/x" in result and (count := np.count_nonzero(result["failure/under_load"])):
         lines.append(_line("left out", f"{count} points under the load or at corners of supports"))
     if "modes/angular_frequency" in result:
         found = result["modes/angular_frequency"]
-        texts = ", ".join(f"{omega:.6g}" for omega in found[:LISTED])
+        texts = ", ".join(significant(omega) for omega in found[:LISTED])
         more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
         lines.append(
             _line("frequencies", f"{texts}{more} {result.unit('modes/angular_frequency')}".rstrip())
@@ -95,9 +105,10 @@ def _curved(result: Stored) -> list[str]:
     if "mesh/z" not in result:
         return []
     named = [
-        f"R{axis} {_quantity(result, one, 'length')}" for axis, one in radii_of(result).items()
+        f"R{axis} {_quantity(result, one, 'length', GIVEN)}"
+        for axis, one in radii_of(result).items()
     ]
-    rise = _quantity(result, float(np.ptp(result["mesh/z"])), "length")
+    rise = _quantity(result, float(np.ptp(result["mesh/z"])), "length", GIVEN)
     return [_line("curved panel", ", ".join([*named, f"rise {rise}"]))]
 
 
@@ -106,7 +117,7 @@ def _preload(result: Stored) -> list[str]:
     given = result.attributes_of("laminate")
     forces = {f"N_{name}": given.get(f"N0_{name}") for name in ("x", "y", "xy")}
     named = [
-        f"{name} = {_quantity(result, force, 'force/length')}"
+        f"{name} = {_quantity(result, force, 'force/length', GIVEN)}"
         for name, force in forces.items()
         if isinstance(force, float) and force
     ]
@@ -146,7 +157,7 @@ def _delaminations(result: Stored) -> str:
     kinds = [(array.dtype.kind, array.shape) for array in (band, number, interfaces)]
     if kinds != [("f", (2,)), ("i", ()), ("i", ())]:
         return ""  # a result of an older version
-    least, most = (_rounded(result, force, "force") for force in band.tolist())
+    least, most = (_quantity(result, force, "force") for force in band.tolist())
     others = {1: most, max(1, int(interfaces)): least}
     others.pop(int(number), None)
     count = "one delamination" if number == 1 else f"{number} delaminations"
@@ -161,7 +172,7 @@ def _exposures(result: Stored) -> list[str]:
     lines = []
     for exposure in largest:
         force = reached.get(exposure.criterion)
-        known = "" if force is None else f"; reaches 1 at {_rounded(result, force, 'force')}"
+        known = "" if force is None else f"; reaches 1 at {_quantity(result, force, 'force')}"
         lines.append(f"{_exposure(result, exposure)}{known}{_at_rest(exposure)}")
     count = evaluations_in_contact(result)
     if count is not None and "history/force" in result:
@@ -170,6 +181,8 @@ def _exposures(result: Stored) -> list[str]:
     is_open = is_open if verdict(largest) is Failure.OPEN else ""
     if first:
         lines.append(_line("first failure", f"{is_open}{_first_failure(result, first[0])}"))
+        if not math.isnan(first[0].force):
+            lines.append(_search("the first failure", "exposure=1"))
     elif largest and count:
         ends = " by the end of the run, which is in contact: open"
         ends = ends if result.still_in_contact else ""
@@ -188,15 +201,16 @@ def _first_failures(result: Stored) -> list[FirstFailure]:
 
 def _first_failure(result: Stored, first: FirstFailure) -> str:
     """The first failure: mode, place, time, and force and energy of an impact."""
-    rounded = partial(_rounded, result)
+    quantity = partial(_quantity, result)
     texts = [
         f"{first.mode} ({spelt(first.criterion)})",
-        f"{first.where} at ({first.x:.6g}, {first.y:.6g})",
-        f"time {rounded(first.time, 'time')}, between {first.earliest:.4g} and {first.latest:.4g}",
+        f"{first.where} at ({significant(first.x)}, {significant(first.y)})",
+        f"time {quantity(first.time, 'time')}, "
+        f"between {significant(first.earliest)} and {significant(first.latest)}",
     ]
     if not math.isnan(first.force):
-        texts.append(f"force {rounded(first.force, 'force')}")
-        texts.append(f"the projectile has given up {rounded(first.energy, 'force*length')}")
+        texts.append(f"force {quantity(first.force, 'force')}")
+        texts.append(f"the projectile has given up {quantity(first.energy, 'force*length')}")
     return ", ".join(texts)
 
 
@@ -206,7 +220,7 @@ def _exposure(result: Stored, largest: LargestExposure) -> str:
     return _line(
         spelt(largest.criterion),
         f"{least}{largest.exposure:.4g}: {largest.mode}, "
-        f"{largest.where} at ({largest.x:.6g}, {largest.y:.6g}), "
+        f"{largest.where} at ({significant(largest.x)}, {significant(largest.y)}), "
         f"time {_quantity(result, largest.time, 'time')}{_mirrors(largest)}{_band(largest)}",
     )
 
@@ -241,7 +255,7 @@ def _at_rest(largest: LargestExposure) -> str:
 def _delamination(result: Stored) -> str:
     """The threshold of delamination, and whether it is reached."""
     known = result.threshold
-    force, crossing = _rounded(result, float(known["force"]), "force"), float(known["time"])
+    force, crossing = _quantity(result, float(known["force"]), "force"), float(known["time"])
     if math.isfinite(crossing):
         return f"{force} reached at time {_quantity(result, crossing, 'time')}"
     if (end := end_of(result)) in UNDECIDED:
@@ -250,13 +264,8 @@ def _delamination(result: Stored) -> str:
     return f"{force} not reached: the peak is {margin:.1%} below"
 
 
-def _rounded(result: Stored, value: float, dimension: str) -> str:
-    """An interpolated quantity, to four digits."""
-    return _quantity(result, float(f"{value:.4g}"), dimension)
-
-
-def _quantity(result: Stored, value: float, dimension: str) -> str:
-    return shown_quantity(value, unit_of(dimension, result.units))
+def _quantity(result: Stored, value: float, dimension: str, digits: int = DIGITS) -> str:
+    return shown_quantity(value, unit_of(dimension, result.units), digits)
 
 
 def _impact(result: Stored) -> list[str]:
@@ -313,7 +322,8 @@ def _intervals(result: Stored) -> list[tuple[float, float]]:
 def _contacts(result: Stored, intervals: list[tuple[float, float]]) -> str:
     """Times of the contacts."""
     texts = [
-        f"{begin:.6g} to {_quantity(result, end, 'time')}" for begin, end in intervals[:LISTED]
+        f"{significant(begin)} to {_quantity(result, end, 'time')}"
+        for begin, end in intervals[:LISTED]
     ]
     if len(intervals) > LISTED:
         texts.append(f"and {len(intervals) - LISTED} more")
@@ -363,7 +373,7 @@ def elastic_doubt(result: Stored, peak: float) -> str:
     """Why a peak force is that of an elastic plate only; empty if it may be real."""
     beyond = []
     if result.threshold and peak > CROSSED * (force := float(result.threshold["force"])):
-        beyond.append(f"delamination is expected from {_rounded(result, force, 'force')}")
+        beyond.append(f"delamination is expected from {_quantity(result, force, 'force')}")
     if any(found.exposure > CROSSED for found in largest_exposures(result)):
         beyond.append("the first ply fails before")
     return f"elastic prediction; {', and '.join(beyond)}" if beyond else ""

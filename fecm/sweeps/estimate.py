@@ -9,6 +9,7 @@ from pathlib import Path
 from fecm._dataclasses import frozen
 from fecm._errors import warn
 from fecm._tables import aligned, html_table
+from fecm._text import DIGITS
 from fecm.api import sole_problem
 from fecm.deck.model import Deck
 from fecm.deck.units import quantity, unit_names, unit_of
@@ -147,7 +148,11 @@ class Estimate:
 
     def _text(self, value: float, dimension: str, missing: str = "-") -> str:
         """A value with its unit."""
-        return missing if math.isnan(value) else quantity(value, unit_of(dimension, self.units), 5)
+        return (
+            missing
+            if math.isnan(value)
+            else quantity(value, unit_of(dimension, self.units), DIGITS)
+        )
 
 
 def estimate(deck: str | Path | Deck) -> Estimate:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from fecm._text import significant
 from fecm.deck.units import column_name
 from fecm.sweeps.copula import pairs_of
 from fecm.sweeps.limits import THRESHOLD
@@ -47,7 +48,7 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
         own = [random.statistics[name] for name in chosen]
         rows = [[s.mean[place], s.standard_deviation[place], *s.quantiles[place]] for s in own]
         columns = [chosen, [unit(name) for name in chosen]]
-        columns += [[f"{value:.6g}" for value in row] for row in zip(*rows, strict=True)]
+        columns += [[significant(value) for value in row] for row in zip(*rows, strict=True)]
         lacking = [design.draws - int(s.draws[place]) for s in own]
         columns.append([str(count) for count in lacking] if any(lacking) else [""] * len(own))
         lines += [
@@ -69,7 +70,9 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
 
 def chance(p: float, low: float, high: float, is_open: int, lacking: int) -> str:
     """A probability, its interval and the number of draws without a value, in words."""
-    text = f"{'open' if np.isnan(p) else f'{p:.5g}'} ({low:.5g} to {high:.5g})"
+    text = (
+        f"{'open' if np.isnan(p) else significant(p)} ({significant(low)} to {significant(high)})"
+    )
     if is_open:
         text += f"; {is_open} draws are open, counted as below and as above"
     if lacking > is_open:

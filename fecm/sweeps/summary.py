@@ -8,6 +8,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fecm._text import DIGITS
 from fecm._typing import Bools
 from fecm.deck.model import Curvature, Preload, Segment
 from fecm.deck.units import quantity
@@ -22,7 +23,7 @@ from fecm.sweeps.outcome import Column
 from fecm.sweeps.stored import StoredSweep
 
 LABEL_WIDTH = 18  # of the lines of the summary
-DIGITS = 6  # of the values of a case, unless others are closer
+GIVEN = 6  # digits of the values of a case, unless others are closer
 MOST_REASONS = 5  # of failure, that the summary lists
 WEIGHED = ("mass", "rod_mass", "energy")  # values that the summary shows in g and J
 WIDE = 0.75  # share of an energy found that finer meshes leave where the load is resolved
@@ -48,14 +49,14 @@ def summary(result: StoredSweep) -> list[str]:
 
 def _extremes(result: StoredSweep) -> Iterator[str]:
     """The cases with the smallest and the largest peak, or velocity found."""
-    what, names, digits = "peak", ["peak_force"], 6
+    what, names = "peak", ["peak_force"]
     if "found_velocity" in result.summary:
-        what, names, digits = "found", ["found_velocity", "found_energy"], 8
+        what, names = "found", ["found_velocity", "found_energy"]
     shown = np.where(result.completed, result[names[0]], np.nan)
     if not np.isfinite(shown).any():
         return
     for size, case in (("smallest", np.nanargmin(shown)), ("largest", np.nanargmax(shown))):
-        texts = [quantity(result[name][case], result.unit(name), digits) for name in names]
+        texts = [quantity(result[name][case], result.unit(name), DIGITS) for name in names]
         values = ", ".join(f"{name} {_shown(result, name, int(case))}" for name in result.cases)
         given = f" ({values})" if values else ""
         label = f"{size} {what:{LABEL_WIDTH - 2 - len(size)}}"
@@ -89,12 +90,12 @@ def _shown(result: StoredSweep, name: str, case: int) -> str:
     values = result.cases[name]
     if values.dtype.kind != "f":
         return str(values[case])
-    digits = DIGITS
+    digits = GIVEN
     if result.random is None:
         size = max(abs(float(values[case])), 1e-300)
         others = np.abs(values[values != values[case]] - values[case])
         gap = float(np.min(others / size, initial=1.0))
-        digits = min(max(DIGITS, 1 - math.floor(math.log10(gap))), 17)
+        digits = min(max(GIVEN, 1 - math.floor(math.log10(gap))), 17)
     return quantity(values[case], result.unit(name) if name in WEIGHED else "", digits)
 
 
