@@ -143,7 +143,10 @@ def _fits(shown: str, line: str) -> bool:
 
 
 def updated(shown: str, printed: list[str]) -> str:
-    """The block with the lines of the output that begin as its own do, in their order."""
+    """The block with the lines of the output that begin as its own do, in their order.
+
+    A line that begins with a number is the next line of the output.
+    """
     indent = shown[: len(shown) - len(shown.lstrip())] if "$ " in shown else ""
     shown_lines = shown.split("\n")
     if GAP not in shown and len(lines_of(shown)) == len(printed):
@@ -154,7 +157,7 @@ def updated(shown: str, printed: list[str]) -> str:
         text = line.removeprefix(indent)
         start = re.split(r"[\d(]|[+-]\d", text, maxsplit=1)[0].rstrip()
         rows = [n for n, one in enumerate(printed) if n >= place and one.startswith(start)]
-        if start.strip() and rows and not text.endswith(GAP) and not text.startswith("$"):
+        if rows and text.strip() and not text.endswith(GAP) and not text.startswith("$"):
             lines.append(indent + printed[rows[0]])
             place = rows[0] + 1
         else:
