@@ -139,3 +139,14 @@ def test_the_largest_force_of_a_run_that_is_cut_off_is_not_called_a_peak(tmp_pat
     assert "largest force so far" in done.stdout
     assert "peak force  " not in done.stdout
     assert "lower bounds" in done.stderr
+
+
+def test_exposures_on_both_meshes_are_those_of_runs_on_them() -> None:
+    options = ("--damage", "--patch", "disc:10", "--dt", "5e-8", "--kinematics", "linear")
+    coarse, fine = new("4x4", *options), new("8x8", *options)
+    estimate = fecm.mesh_error(fecm.read_one(coarse))
+    pairs = ((coarse, estimate.exposures), (fine, estimate.refined_exposures))
+    for deck, exposures in pairs:
+        largest = fecm.run_one(deck)["exposures/exposure"][-1]
+        assert list(exposures.values()) == pytest.approx(largest[: len(exposures)], rel=1e-9)
+    assert list(estimate.exposures) == ["max_stress", "tsai_wu", "hashin", "puck", "interlaminar"]

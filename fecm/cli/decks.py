@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import os
 import sys
 from collections import Counter
@@ -165,6 +166,7 @@ def _print(prepared: LoadedDeck, form: Format, *, brief: bool, passes: bool) -> 
 def _compare_meshes(prepared: LoadedDeck, mode: str, form: Format) -> None:
     """Print the mesh error of the peak force of every problem."""
     # 28 ms, which a check without --mesh-error does not need.
+    from fecm.results.criteria import spelt
     from fecm.sweeps.mesh_error import bisected, compare_peaks
 
     for problem in prepared.problems:
@@ -189,6 +191,11 @@ def _compare_meshes(prepared: LoadedDeck, mode: str, form: Format) -> None:
         echo(f"  {label:22}{coarse} on {found.elements} elements")
         echo(f"    bisected            {refined} on {found.refined_elements}, {near} of the load")
         echo(f"    change              {change} ({about})")
+        for criterion, exposure in found.exposures.items():
+            finer = found.refined_exposures.get(criterion, math.nan)
+            change = f" ({finer / exposure - 1.0:+.1%})" if exposure else ""
+            values = f"{exposure:.4g}, bisected {finer:.4g}{change}"
+            echo(f"  exposure            {spelt(criterion)} {values}")
         if found.undecided:
             note("a run ends before its peak: these forces are lower bounds; take more steps")
 

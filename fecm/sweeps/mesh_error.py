@@ -1,4 +1,4 @@
-"""The mesh error of a peak force, by a second run with bisected elements around the load."""
+"""The mesh error of a peak force and of exposures, by a second run with bisected elements."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from fecm.problem.refine import RefineError, refined
 from fecm.problem.resolution import resolution
 from fecm.problem.slips import active_slips
 from fecm.results.end import OPEN_PEAKS
+from fecm.results.exposures import largest_exposures
 from fecm.results.run_metrics import end_of
 from fecm.results.sinks import MemorySink
 from fecm.results.stored import Stored
@@ -25,12 +26,13 @@ from fecm.simulation.simulation import Simulation
 from fecm.sweeps.case import CasesError
 from fecm.sweeps.checks import check_deck
 from fecm.sweeps.in_full import without_output
+from fecm.sweeps.plan import Measure
 from fecm.sweeps.timing import stable_time_step, with_time_step
 
 
 @dataclass(frozen=True)
 class MeshErrorEstimate:
-    """Peak force on a mesh and on one with bisected elements around the load.
+    """Peak force and exposures on a mesh and on one with bisected elements around the load.
 
     Attributes
     ----------
@@ -42,6 +44,8 @@ class MeshErrorEstimate:
         Elements up to here from the load are bisected: a bending wave of the contact.
     undecided : bool
         Whether a run ends before its peak: its largest force is then a lower bound of it.
+    exposures, refined_exposures : dict of str to float
+        Largest exposure by criterion, 1 at failure; empty without FAIL.
     """
 
     peak_force: float
@@ -50,6 +54,8 @@ class MeshErrorEstimate:
     refined_elements: int
     distance: float
     undecided: bool
+    exposures: dict[str, float]
+    refined_exposures: dict[str, float]
 
     @property
     def change(self) -> float:
@@ -79,7 +85,8 @@ def mesh_error(
     Returns
     -------
     MeshErrorEstimate
-        Both peak forces; their change estimates the error of the deck's mesh.
+        Peak forces and largest exposures of both; the change estimates the error of the deck's
+        mesh.
 
     Raises
     ------
@@ -146,7 +153,7 @@ def _distance(problem: Problem) -> float:
 def compare_peaks(
     problem: Problem, fine: Problem, options: RunOptions, advance: Callable[[int], object]
 ) -> MeshErrorEstimate:
-    """Run a problem and its :func:`bisected` one, and compare their peak forces.
+    """Run a problem and its :func:`bisected` one, and compare peak forces and exposures.
 
     `advance` is called with numbers of steps that were taken.  Raises DivergenceError if a motion
     grows without bound.  Raises NotEnoughMemoryError if a run needs more memory than is free.
@@ -159,12 +166,19 @@ def compare_peaks(
         refined_elements=fine.deck.control.numel,
         distance=_distance(problem),
         undecided=any(end_of(one) in OPEN_PEAKS for one in (coarse, refined)),
+        exposures=_exposures(coarse),
+        refined_exposures=_exposures(refined),
     )
+
+
+def _exposures(stored: Stored) -> dict[str, float]:
+    """Largest exposure by criterion."""
+    return {one.criterion: one.exposure for one in largest_exposures(stored)}
 
 
 def _run(problem: Problem, options: RunOptions, advance: Callable[[int], object]) -> Stored:
     """Run a problem without storing fields."""
-    plain = without_output(problem)
+    plain = without_output(problem, [Measure.FAILURE])
     check_memory(plain, solver=options.solver, in_memory=True)
     sink = MemorySink()
     observers = (lambda simulation: advance(simulation.interval),)
