@@ -237,13 +237,28 @@ def _lock(handle: int, *, wait: bool = False) -> bool:
     return True
 
 
+def make_folder(folder: Path) -> None:
+    """Make a folder named by the program itself, if there is none.
+
+    Raises OutputError if a link or a file has the name: what is written or deleted in the folder
+    must not be elsewhere.
+    """
+    try:
+        folder.mkdir()
+    except FileExistsError:
+        if folder.is_symlink() or not folder.is_dir():
+            what = "a link" if folder.is_symlink() else "not a folder"
+            raise OutputError(f"{folder} is {what}; remove it") from None
+
+
 @contextlib.contextmanager
 def held(folder: Path, message: str) -> Iterator[None]:
     """Make a folder if there is none, and lock it.
 
-    Raises OutputError with this message if another process holds the lock.
+    Raises OutputError with this message if another process holds the lock, and another one if the
+    folder can't be used, see :func:`make_folder`.
     """
-    folder.mkdir(exist_ok=True)
+    make_folder(folder)
     try:
         handle = os.open(folder, os.O_RDONLY)
     except PermissionError:  # Windows opens no folders
@@ -323,7 +338,9 @@ def _rename_exclusively(partial: Path, target: Path) -> None:
 
 
 def open_ordinary(path: Path, flags: int = os.O_RDONLY) -> BinaryIO:
-    """Open a regular file named by the program itself: no link, device or FIFO."""
+    """Open a regular file named by the program itself; OutputError for a link, device or FIFO."""
+    if path.is_symlink():
+        raise OutputError(f"{path} is a link")
     handle = os.open(path, flags | NO_FOLLOW | NO_WAIT, 0o666)
     if not stat.S_ISREG(os.fstat(handle).st_mode):
         os.close(handle)

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import contextlib
+import hashlib
+import io
 import os
+import shutil
 import signal
 import subprocess
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from fecm._files import OutputError
 from fecm.sweeps import schedule
 from fecm.sweeps.api import carry_out, problem_of
 from fecm.sweeps.batch import run
@@ -22,7 +28,7 @@ from fecm.sweeps.plan import Plan, Task, plan, tasks
 from fecm.sweeps.schedule import LOST
 from fecm.sweeps.timing import with_time_step
 from tests.calls import assert_unusable, call
-from tests.decks import model, small
+from tests.decks import DATA_CARDS, model, small
 from tests.kill_runs import SWEEP, SWEPT
 
 
@@ -88,6 +94,183 @@ def test_an_outcome_without_the_mark_of_its_sweep_is_not_taken(made: Plan, tmp_p
         PartialResults(tmp_path / "s.h5", made.fingerprint())
     again = PartialResults(tmp_path / "s.h5", made.fingerprint(), restart=True)
     assert again.get(task) is None
+
+
+def forged(
+    path: Path, change: Callable[[dict[str, Any]], object], *, compressed: bool = False
+) -> None:
+    """Change the arrays of a part, and give it the right checksum."""
+    with np.load(io.BytesIO(path.read_bytes()[:-32])) as stored:
+        arrays = dict(stored)
+    change(arrays)
+    buffer = io.BytesIO()
+    (np.savez_compressed if compressed else np.savez)(buffer, **arrays)
+    sealed(path, buffer.getvalue())
+
+
+def sealed(path: Path, data: bytes) -> None:
+    """Write data with their checksum."""
+    path.write_bytes(data + hashlib.sha256(data).digest())
+
+
+# Changes of a part of one case that leave it a right archive with a right checksum.
+FORGERIES: dict[str, Callable[[dict[str, Any]], object]] = {
+    "of no sweep": lambda a: a.pop("sweep"),  # as the version before wrote it
+    "without numbers": lambda a: a.pop("numbers"),
+    "without status": lambda a: a.pop("status"),
+    "without a peak": lambda a: a.pop("peak_force"),
+    "without columns": lambda a: [a.pop(name) for name in [*a] if name not in ("sweep", "numbers")],
+    "of two rows": lambda a: a.update(peak_force=np.zeros(2)),
+    "of no row": lambda a: a.update(peak_force=np.float64(1.0)),
+    "of texts": lambda a: a.update(peak_force=np.array(["much"])),
+    "of complex numbers": lambda a: a.update(peak_force=np.array([1j])),
+    "with a status of numbers": lambda a: a.update(status=np.zeros(1)),
+    "of negative steps": lambda a: a.update(steps=np.array([-1])),
+    "with an unknown column": lambda a: a.update({"../deck": np.zeros(1)}),
+    "of flat forces": lambda a: a.update(force=np.zeros(10)),
+    "of more forces than steps": lambda a: a.update(force=np.zeros((1, 11))),
+    "of forces of other cases": lambda a: a.update(force=np.zeros((2, 10))),
+}  # fmt: skip
+
+
+@pytest.fixture
+def stored(tmp_path: Path) -> tuple[Path, Path, bytes]:
+    """A sweep of two plates whose first one is finished: its folder, part and right result."""
+    (tmp_path / "s.inp").write_text(small())
+    problem = problem_of(tmp_path / "s.inp")
+    made = plan(problem, grid([("layup", ["[0/90]", "[90/0]"])]), history=True)
+    assert call(*SWEEP_OF_TWO, "right.h5", cwd=tmp_path).exit_code == 0
+    parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
+    task = tasks(problem, made)[0]
+    parts.put(task, run(task))
+    return tmp_path, parts.folder / "task-000000.npz", (tmp_path / "right.h5").read_bytes()
+
+
+SWEEP_OF_TWO = ("sweep", "s.inp", "--history", "--vary", "layup=[0/90],[90/0]", "-o")
+
+
+def assert_run_again(stored: tuple[Path, Path, bytes]) -> str:
+    """Resume the sweep; what it says about its part, whose cases it runs again."""
+    folder, _, right = stored
+    done = call(*SWEEP_OF_TWO, "s.h5", cwd=folder)
+    assert done.exit_code == 0, done.stderr
+    (said,) = [line for line in done.stderr.splitlines() if "its cases are run again" in line]
+    assert (folder / "s.h5").read_bytes() == right
+    assert not (folder / ".s.h5.parts").exists()
+    return said
+
+
+def test_a_sound_part_is_taken_without_a_word(stored: tuple[Path, Path, bytes]) -> None:
+    folder, _, right = stored
+    done = call(*SWEEP_OF_TWO, "s.h5", cwd=folder)
+    assert "run again" not in done.stderr
+    assert (folder / "s.h5").read_bytes() == right
+
+
+@pytest.mark.parametrize("what", FORGERIES)
+def test_a_part_with_a_right_checksum_and_wrong_content_is_run_again(
+    what: str, stored: tuple[Path, Path, bytes]
+) -> None:
+    forged(stored[1], FORGERIES[what])
+    assert "task-000000.npz" in assert_run_again(stored)
+
+
+@pytest.mark.parametrize("data", [b"", b"PK", b"\x93NUMPY", b"PK\x05\x06" + 18 * b"\0"])
+def test_a_part_that_is_no_archive_is_run_again_despite_its_checksum(
+    data: bytes, stored: tuple[Path, Path, bytes]
+) -> None:
+    sealed(stored[1], data)
+    assert_run_again(stored)
+
+
+def test_a_compressed_part_is_run_again(stored: tuple[Path, Path, bytes]) -> None:
+    forged(stored[1], lambda arrays: None, compressed=True)
+    assert "damaged" in assert_run_again(stored)
+
+
+def test_a_part_of_another_sweep_with_the_same_case_numbers_is_run_again(
+    stored: tuple[Path, Path, bytes],
+) -> None:
+    folder, part, _ = stored
+    (folder / "other.inp").write_text(small(data=DATA_CARDS.replace("115.0", " 90.0")))
+    problem = problem_of(folder / "other.inp")
+    made = plan(problem, grid([("layup", ["[0/90]", "[90/0]"])]), history=True)
+    others = PartialResults(folder / "other.h5", made.fingerprint())
+    task = tasks(problem, made)[0]
+    others.put(task, run(task))
+    shutil.copy(others.folder / part.name, part)
+    assert "belongs to another sweep" in assert_run_again(stored)
+
+
+@pytest.mark.posix
+@pytest.mark.links
+@pytest.mark.parametrize("kind", ["folder", "FIFO", "link", "device"])
+def test_a_part_that_is_no_ordinary_file_is_run_again(
+    kind: str, stored: tuple[Path, Path, bytes]
+) -> None:
+    folder, part, _ = stored
+    kept = part.rename(folder / "kept")
+    before = kept.read_bytes()
+    if kind == "folder":
+        part.mkdir()
+        (part / "file").touch()
+    elif kind == "FIFO":
+        os.mkfifo(part)
+    else:
+        part.symlink_to(kept if kind == "link" else "/dev/zero")
+    said = assert_run_again(stored)
+    assert ("is a link" if kind in ("link", "device") else "is not a regular file") in said
+    assert kept.read_bytes() == before
+
+
+@pytest.mark.posix
+@pytest.mark.links
+@pytest.mark.parametrize("kind", ["folder", "FIFO", "link", "device", "long", "deep"])
+def test_a_mark_that_is_no_ordinary_file_is_not_believed(
+    kind: str, stored: tuple[Path, Path, bytes]
+) -> None:
+    folder, part, right = stored
+    mark = part.with_name("sweep.json")
+    kept = mark.rename(folder / "kept")
+    before = kept.read_bytes()
+    if kind == "folder":
+        mark.mkdir()
+    elif kind == "FIFO":
+        os.mkfifo(mark)
+    elif kind in ("long", "deep"):
+        mark.write_bytes(2000 * b" " + before if kind == "long" else 900 * b"[")
+    else:
+        mark.symlink_to(kept if kind == "link" else "/dev/zero")
+    refused = call(*SWEEP_OF_TWO, "s.h5", cwd=folder)
+    assert_unusable(refused)
+    assert "holds the outcomes of another sweep" in refused.stderr
+    done = call(*SWEEP_OF_TWO, "s.h5", "--overwrite", cwd=folder)
+    assert done.exit_code == 0, done.stderr
+    assert (folder / "s.h5").read_bytes() == right
+    assert kept.read_bytes() == before
+
+
+@pytest.mark.links
+@pytest.mark.parametrize("overwrite", [(), ("--overwrite",)])
+def test_nothing_is_read_or_deleted_through_a_folder_of_parts_that_is_a_link(
+    overwrite: tuple[str, ...], stored: tuple[Path, Path, bytes]
+) -> None:
+    folder, part, _ = stored
+    part.parent.rename(folder / "elsewhere")
+    part.parent.symlink_to(folder / "elsewhere", target_is_directory=True)
+    before = sorted((path.name, path.read_bytes()) for path in (folder / "elsewhere").iterdir())
+    refused = call(*SWEEP_OF_TWO, "s.h5", *overwrite, cwd=folder)
+    assert_unusable(refused)
+    assert ".s.h5.parts is a link; remove it" in refused.stderr
+    after = sorted((path.name, path.read_bytes()) for path in (folder / "elsewhere").iterdir())
+    assert after == before
+
+
+def test_a_file_with_the_name_of_the_folder_of_parts_is_refused(tmp_path: Path) -> None:
+    (tmp_path / ".s.h5.parts").write_text("precious")
+    with pytest.raises(OutputError, match="is not a folder; remove it"), alone(tmp_path / "s.h5"):
+        pass
+    assert (tmp_path / ".s.h5.parts").read_text() == "precious"
 
 
 def test_two_sweeps_begun_at_once_do_not_write_the_same_parts(tmp_path: Path) -> None:
