@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import json
 import os
 import re
 import shutil
@@ -23,10 +24,11 @@ from fecm.api import load_deck
 from fecm.problem.build import RunOptions
 from fecm.problem.slips import active_slips
 from fecm.results.sinks import MemorySink
-from fecm.simulation.checkpoint import checkpoint_of
+from fecm.simulation.checkpoint import Checkpointer, checkpoint_of
 from fecm.simulation.interpreter import Interpreter
 from fecm.simulation.run import simulate
-from tests.calls import call, program
+from fecm.simulation.simulation import Simulation
+from tests.calls import Done, call, program
 from tests.decks import DATA_CARDS, LONG, LONGER, PROGRAM, small
 from tests.kill_runs import FECM, SWEEP, SWEPT, sweep_trial, trial, verdict
 from tests.stopped_runs import StoppedError, stop_at_once
@@ -142,21 +144,117 @@ def test_resuming_without_a_checkpoint_is_refused(tmp_path: Path) -> None:
     assert "there is no checkpoint d.h5.checkpoint" in done.stderr
 
 
-def test_of_two_problems_the_finished_one_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "d.inp").write_text(
-        small(stop=False) + small(PROGRAM.replace("     10", "     90"))
-    )
-    assert call("run", "d.inp", "--solver", "numpy", cwd=tmp_path).exit_code == 0
-    first, second = (tmp_path / "d.h5").read_bytes(), (tmp_path / "d-2.h5").read_bytes()
-    (tmp_path / "d-2.h5").unlink()
-    problem = load_deck((tmp_path / "d.inp").read_text()).problems[1]
-    with pytest.raises(StoppedError):
-        stop_at_once(problem, tmp_path / "d-2.h5")
-    done = call("run", "d.inp", "--solver", "numpy", "--resume", cwd=tmp_path)
+SECOND = PROGRAM.replace("     10", "     90")
+TWO = small(stop=False) + small(SECOND)
+RUN_TWO = ("run", "d.inp", "--solver", "numpy", "--checkpoint", "0")
+
+
+@pytest.fixture
+def interrupted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a run that was interrupted in the second of two problems."""
+    (tmp_path / "d.inp").write_text(TWO)
+    plain = Checkpointer.write
+
+    def write(self: Checkpointer, simulation: Simulation) -> None:
+        plain(self, simulation)
+        if (tmp_path / "d-2.h5.checkpoint").exists():
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(Checkpointer, "write", write)
+        assert call(*RUN_TWO, "--print", "p.txt", cwd=tmp_path).exit_code == 130
+    return tmp_path
+
+
+def resumed(folder: Path, *options: str) -> Done:
+    """Resume the run of two problems."""
+    return call(*RUN_TWO, "--print", "p.txt", "--resume", *options, cwd=folder)
+
+
+def results(folder: Path) -> dict[str, bytes]:
+    """Contents of the outputs of two problems, by name."""
+    names = ("d.h5", "d-2.h5", "p.txt", "p-2.txt")
+    return {name: (folder / name).read_bytes() for name in names}
+
+
+def results_of(text: str, folder: Path) -> dict[str, bytes]:
+    """Outputs of a run of this deck that nothing interrupts."""
+    folder.mkdir()
+    (folder / "d.inp").write_text(text)
+    assert call(*RUN_TWO, "--print", "p.txt", cwd=folder).exit_code == 0
+    return results(folder)
+
+
+def test_of_two_problems_the_finished_one_is_left_alone(interrupted: Path) -> None:
+    times = [(interrupted / name).stat().st_mtime_ns for name in ("d.h5", "p.txt")]
+    done = resumed(interrupted)
     assert done.exit_code == 0
     assert "d.h5 is complete" in done.stderr
-    assert (tmp_path / "d.h5").read_bytes() == first
-    assert (tmp_path / "d-2.h5").read_bytes() == second
+    assert times == [(interrupted / name).stat().st_mtime_ns for name in ("d.h5", "p.txt")]
+    assert results(interrupted) == results_of(TWO, interrupted / "whole")
+
+
+def test_a_finished_problem_whose_result_was_deleted_is_run_again(interrupted: Path) -> None:
+    (interrupted / "d.h5").unlink()
+    (interrupted / "p.txt").unlink()
+    done = resumed(interrupted)
+    assert done.exit_code == 0
+    assert "is complete" not in done.stderr
+    assert results(interrupted) == results_of(TWO, interrupted / "whole")
+
+
+def test_a_finished_problem_that_was_edited_is_not_complete(interrupted: Path) -> None:
+    edited = small(data=DATA_CARDS.replace("115.0", " 90.0"), stop=False) + small(SECOND)
+    (interrupted / "d.inp").write_text(edited)
+    before = (interrupted / "d.h5").read_bytes()
+    refused = resumed(interrupted)
+    assert refused.exit_code == 2
+    assert "Traceback" not in refused.stderr
+    assert "d.h5 is not what the interrupted run has written for problem 1" in refused.stderr
+    assert (interrupted / "d.h5").read_bytes() == before
+    done = resumed(interrupted, "--overwrite")
+    assert done.exit_code == 0
+    assert "d-2.h5 resumes after step" in done.stderr
+    assert results(interrupted) == results_of(edited, interrupted / "whole")
+
+
+@pytest.mark.parametrize("name", ["d.h5", "p.txt"])
+@pytest.mark.parametrize("data", [b"", b"of last week"])
+def test_an_empty_or_foreign_file_is_not_a_complete_result(
+    name: str, data: bytes, interrupted: Path
+) -> None:
+    (interrupted / name).write_bytes(data)
+    refused = resumed(interrupted)
+    assert refused.exit_code == 2
+    assert "Traceback" not in refused.stderr
+    assert "--overwrite runs the problem again" in refused.stderr
+    assert (interrupted / name).read_bytes() == data
+    assert resumed(interrupted, "--overwrite").exit_code == 0
+    assert results(interrupted) == results_of(TWO, interrupted / "whole")
+
+
+@pytest.mark.parametrize("change", ["damaged", "of the version before", "without fingerprints"])
+def test_a_checkpoint_that_does_not_know_what_is_finished_is_refused(
+    change: str, interrupted: Path
+) -> None:
+    path = checkpoint_of(interrupted / "d-2.h5")
+    with np.load(path) as stored:
+        arrays = dict(stored)
+    about = json.loads(arrays["about"].tobytes())
+    if change == "of the version before":
+        about["identity"]["another kind of checkpoint"] -= 1
+    about.pop("finished")
+    arrays["about"] = np.frombuffer(json.dumps(about).encode(), np.uint8)
+    with path.open("wb") as file:
+        np.savez(file, **arrays)
+    if change == "damaged":
+        path.write_bytes(path.read_bytes()[:1000])
+    refused = resumed(interrupted)
+    assert refused.exit_code == 2
+    assert "Traceback" not in refused.stderr
+    kind = "another kind of checkpoint" if change == "of the version before" else "is damaged"
+    assert kind in refused.stderr
+    assert "--overwrite without --resume discards the checkpoint" in refused.stderr
 
 
 def test_what_stands_beyond_the_interrupted_problem_is_not_taken_for_done(tmp_path: Path) -> None:

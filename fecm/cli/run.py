@@ -53,11 +53,19 @@ from fecm.problem.summary import larger_steps
 from fecm.results import hdf5_writer
 from fecm.results.exposures import LargestExposure, largest_exposures
 from fecm.results.summary import about_run
-from fecm.simulation.checkpoint import Checkpointer, CheckpointError, checkpoint_of, spool_of
+from fecm.simulation.checkpoint import (
+    Checkpointer,
+    CheckpointError,
+    checkpoint_of,
+    fingerprint,
+    finished_before,
+    spool_of,
+)
 from fecm.simulation.printout import Printer
 from fecm.simulation.run import run as simulate_run
 from fecm.simulation.simulation import Simulation
 
+STARTS_OVER = "--overwrite without --resume discards the checkpoint and starts over"
 GROUPS = {
     "Result": ("output", "overwrite", "printed", "form"),
     "Model": ("mode", "slips", "law", "criteria", "rod_mass", "rod_integrator"),
@@ -114,6 +122,15 @@ class Job:
     resumes: bool  # from the checkpoint of an interrupted run
     complete: bool  # in an interrupted run that is resumed
     overwrite: bool
+
+    @property
+    def outputs(self) -> list[Path]:
+        """Result and printed output."""
+        return _outputs(self.path, self.printed)
+
+
+def _outputs(path: Path, printed: Path | None) -> list[Path]:
+    return [path] if printed is None else [path, printed]
 
 
 @click.command(
@@ -241,13 +258,15 @@ def run(options: Options) -> None:
         raise RefusedError(f"--fail-limit needs the macro FAIL; {options.deck} has none")
 
     exceeded: list[str] = []
+    finished: list[str] = []  # fingerprints
     for number, job in enumerate(jobs):
         if number and options.form is Format.TEXT:
             echo()
         if job.complete:
             note(f"{job.path} is complete")
-            continue
-        exposures = _run_one(job, choices, options)
+        exposures = [] if job.complete else _run_one(job, choices, options, finished)
+        if len(jobs) > 1:
+            finished.append(fingerprint(job.problem, job.outputs))
         if limit is not None:
             exceeded += [
                 f"exposure {e.exposure:.4g} of {e.criterion}"
@@ -275,26 +294,53 @@ def _jobs(problems: Sequence[Problem], options: Options) -> list[Job]:
             f"{checkpoint_of(paths[interrupted[0]])} belongs to an interrupted run: --resume "
             "continues it, --overwrite starts over"
         )
-    # Outputs up to the interrupted problem belong to the run that is resumed.
+    # Outputs of problems that are complete, and of the interrupted one, belong to this run.
     resumed = interrupted[0] if options.resume else -1
-    check_outputs([*paths[resumed + 1 :], *filter(None, prints[resumed + 1 :])], options.overwrite)
-    return [
-        Job(
-            problem,
-            path,
-            print_to,
-            resumes=number == resumed,
-            complete=number < resumed and path.exists(),
-            overwrite=options.overwrite or number <= resumed,
+    before = _finished(paths[resumed]) if resumed > 0 else []
+    jobs = []
+    for number, (problem, path, print_to) in enumerate(zip(problems, paths, prints, strict=True)):
+        outputs = _outputs(path, print_to)
+        existing = [output for output in outputs if output.exists()]
+        complete = (
+            number < len(before)
+            and existing == outputs
+            and before[number] == fingerprint(problem, outputs)
         )
-        for number, (problem, path, print_to) in enumerate(
-            zip(problems, paths, prints, strict=True)
+        if number < resumed and existing and not (complete or options.overwrite):
+            raise RefusedError(
+                f"{existing[0]} is not what the interrupted run has written for problem "
+                f"{number + 1} of this deck; --overwrite runs the problem again"
+            )
+        if not complete and number != resumed:
+            check_outputs(outputs, options.overwrite)
+        jobs.append(
+            Job(
+                problem,
+                path,
+                print_to,
+                resumes=number == resumed,
+                complete=complete,
+                overwrite=options.overwrite or number == resumed,
+            )
         )
-    ]
+    return jobs
 
 
-def _run_one(job: Job, choices: RunOptions, options: Options) -> list[LargestExposure]:
-    """Run one problem of a deck into a file, print what came out and return its exposures."""
+def _finished(interrupted: Path) -> list[str]:
+    """Fingerprints of the problems that were finished before the interrupted one."""
+    try:
+        return finished_before(interrupted)
+    except CheckpointError as error:
+        raise RefusedError(f"{error}; {STARTS_OVER}") from None
+
+
+def _run_one(
+    job: Job, choices: RunOptions, options: Options, finished: Sequence[str]
+) -> list[LargestExposure]:
+    """Run one problem of a deck into a file, print what came out and return its exposures.
+
+    `finished` are the fingerprints of the problems before it.
+    """
     problem, path = job.problem, job.path
     _check_space(problem, path)
     check_memory(problem, solver=choices.solver)
@@ -302,7 +348,7 @@ def _run_one(job: Job, choices: RunOptions, options: Options) -> list[LargestExp
         stack.enter_context(signals.deferred())
         stack.enter_context(_ends(path, resumes=job.resumes))
         sink = stack.enter_context(hdf5_writer.writing(path, overwrite=job.overwrite))
-        checkpointer = Checkpointer(path, sink)
+        checkpointer = Checkpointer(path, sink, finished)
         printer = Printer()
         if job.printed is not None:
             file = stack.enter_context(writing(job.printed, overwrite=job.overwrite))
@@ -367,8 +413,7 @@ def _ends(path: Path, *, resumes: bool) -> Iterator[None]:
             f"the run diverged at step {diverged.step}: {diverged.reason}; {path} was not written"
         ) from None
     except CheckpointError as error:
-        message = f"{error}; --overwrite without --resume discards the checkpoint and starts over"
-        raise RefusedError(message) from None
+        raise RefusedError(f"{error}; {STARTS_OVER}") from None
     except _StoppedError as stopped:
         more = f"the same command with --resume continues {path}"
         echo(f"fecm: stopped after step {stopped}; {more}", err=True)

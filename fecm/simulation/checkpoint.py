@@ -13,7 +13,7 @@ import contextlib
 import os
 import time
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
@@ -26,11 +26,14 @@ from fecm._version import __version__
 from fecm.mechanics import kernels, projectile
 from fecm.mechanics.own_law import name_of
 from fecm.mechanics.stiffness_product import KERNELS
+from fecm.problem.problem import Problem
 from fecm.results.hdf5_writer import FileSink, Operation
 from fecm.results.schema import dataset_of
 from fecm.simulation.simulation import Simulation
 
-FORMAT = 5
+FORMAT = 6
+OTHER_FORMAT = "another kind of checkpoint"
+OTHER_DECK = "another deck"
 SOLVER = "another solver"
 CHUNK = 1_000_000  # bytes read at once when a spool is checked
 
@@ -58,14 +61,11 @@ def spool_of(result: Path) -> Path:
 
 def identity(simulation: Simulation) -> dict[str, Any]:
     """Properties that a run and its checkpoint must have in common, by what differs otherwise."""
-    import hashlib  # 3 ms, and few runs have a checkpoint
-
-    deck, options = simulation.problem.deck, simulation.options
-    text = deck.text or deck.to_text()
+    options = simulation.options
     return {
-        "another kind of checkpoint": FORMAT,
+        OTHER_FORMAT: FORMAT,
         "another version of fecm": __version__,
-        "another deck": hashlib.sha256(text.encode()).hexdigest(),
+        OTHER_DECK: _deck_hash(simulation.problem),
         "another mode or other slips": sorted(options.slips),
         SOLVER: simulation.model.motion.solver,
         "another mass matrix or integrator of the rod": [
@@ -79,6 +79,38 @@ def identity(simulation: Simulation) -> dict[str, Any]:
         "a run with other failure criteria": [one.name for one in options.criteria] or None,
         "a run with another choice of --print": simulation.printer.is_on,
     }
+
+
+def _deck_hash(problem: Problem) -> str:
+    """Hash of the cards of a problem."""
+    import hashlib  # 3 ms, and few runs have a checkpoint
+
+    deck = problem.deck
+    return hashlib.sha256((deck.text or deck.to_text()).encode()).hexdigest()
+
+
+def fingerprint(problem: Problem, outputs: Sequence[Path]) -> str:
+    """Hash of a problem's cards and of its outputs."""
+    import hashlib  # 3 ms, and few decks have a second problem
+
+    whole = hashlib.sha256(_deck_hash(problem).encode())
+    for path in outputs:
+        with path.open("rb") as file:
+            whole.update(hashlib.file_digest(file, "sha256").digest())
+    return whole.hexdigest()
+
+
+def finished_before(result: Path) -> list[str]:
+    """Fingerprints of the problems that were finished before the one whose run has stopped.
+
+    Raises CheckpointError if the checkpoint of `result` can't be used, OSError if it can't be read.
+    """
+    path = checkpoint_of(result)
+    with _reading(path):
+        about, _ = _read(path)
+        if about["identity"].get(OTHER_FORMAT) != FORMAT:
+            raise CheckpointError(f"{path} belongs to {OTHER_FORMAT}")
+        return [str(one) for one in about["finished"]]
 
 
 def _difference(what: str, theirs: object, own: object) -> str:
@@ -95,10 +127,11 @@ class Checkpointer:
 
     Rows are not kept in memory: they are read back from the result when they are spooled.  A spool
     without a checkpoint, which a killed run has left, is removed; the lock of `sink` shows that no
-    other run is writing it.
+    other run is writing it.  `finished` are the fingerprints of the problems before this one.
     """
 
-    def __init__(self, result: Path, sink: FileSink) -> None:
+    def __init__(self, result: Path, sink: FileSink, finished: Sequence[str] = ()) -> None:
+        self._finished = list(finished)
         self._checkpoint = checkpoint_of(result)
         self._spool = spool_of(result)
         self._sink = sink
@@ -131,6 +164,7 @@ class Checkpointer:
         values = {name: value for name, value in state.items() if name not in arrays}
         about = {
             "identity": identity(simulation),
+            "finished": self._finished,
             "spool": spooled._asdict(),
             "values": values,
         }
@@ -180,8 +214,8 @@ class Checkpointer:
         Raises CheckpointError if checkpoint or spool are missing, damaged, or belong to another
         run.  Raises OSError if they can't be read or the result can't be written.
         """
-        with self._reading():
-            about, arrays = self._read()
+        with _reading(self._checkpoint):
+            about, arrays = _read(self._checkpoint)
             theirs = about["identity"]
             for what, value in identity(simulation).items():
                 if theirs.get(what) != value:
@@ -192,25 +226,8 @@ class Checkpointer:
             self._replay(file, spooled)
         self._spooled = spooled
         self._new.clear()
-        with self._reading():
+        with _reading(self._checkpoint):
             simulation.restore({**about["values"], **arrays})
-
-    def _read(self) -> tuple[dict[str, Any], dict[str, Array]]:
-        """JSON values and arrays of the checkpoint."""
-        import json  # 2 ms
-        import zipfile  # 10 ms
-
-        if not self._checkpoint.exists():
-            raise CheckpointError(f"there is no checkpoint {self._checkpoint}")
-        with (
-            naming(self._checkpoint),
-            open_ordinary(self._checkpoint) as file,
-            np.load(file, allow_pickle=False) as stored,
-        ):
-            if any(member.compress_type != zipfile.ZIP_STORED for member in stored.zip.infolist()):
-                raise ValueError("it is compressed")
-            arrays = {name: stored[name] for name in stored.files}
-        return json.loads(arrays.pop("about").tobytes()), arrays
 
     def _replay(self, file: BinaryIO, part: SpoolPart) -> None:
         """Repeat the operations of the first part of a spool on the result."""
@@ -251,17 +268,36 @@ class Checkpointer:
                 rows = np.frombuffer(data, dtype).reshape(shape)
                 self._sink.write(entry["path"], entry["start"], rows)
 
-    @contextlib.contextmanager
-    def _reading(self) -> Iterator[None]:
-        """Turn any error in the content into a CheckpointError."""
-        try:
-            yield
-        except (CheckpointError, OSError):
-            raise
-        except Exception as error:  # a damaged file raises anything in zipfile, json and NumPy
-            raise CheckpointError(f"{self._checkpoint} is damaged ({error})") from None
-
     def clear(self) -> None:
         """Delete the checkpoint."""
         self._checkpoint.unlink(missing_ok=True)
         self._spool.unlink(missing_ok=True)
+
+
+def _read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
+    """JSON values and arrays of a checkpoint."""
+    import json  # 2 ms
+    import zipfile  # 10 ms
+
+    if not path.exists():
+        raise CheckpointError(f"there is no checkpoint {path}")
+    with (
+        naming(path),
+        open_ordinary(path) as file,
+        np.load(file, allow_pickle=False) as stored,
+    ):
+        if any(member.compress_type != zipfile.ZIP_STORED for member in stored.zip.infolist()):
+            raise ValueError("it is compressed")
+        arrays = {name: stored[name] for name in stored.files}
+    return json.loads(arrays.pop("about").tobytes()), arrays
+
+
+@contextlib.contextmanager
+def _reading(path: Path) -> Iterator[None]:
+    """Turn any error in the content of a checkpoint into a CheckpointError."""
+    try:
+        yield
+    except (CheckpointError, OSError):
+        raise
+    except Exception as error:  # a damaged file raises anything in zipfile, json and NumPy
+        raise CheckpointError(f"{path} is damaged ({error})") from None
