@@ -10,6 +10,7 @@ import numpy as np
 from fecm import examples
 from fecm._errors import FecmWarning
 from fecm.deck.model import Gages
+from fecm.deck.unit_systems import units_of
 from fecm.location.locate import locate
 from fecm.location.responses import Sampling, W, moving_plate, responses, rows_of
 from fecm.location.table import strain_table
@@ -28,7 +29,7 @@ POINTS = 150  # of the strains: 0.3 ms
 def _location() -> Sequence[Value]:
     panel = decks.panel_with_gages(30, 20)
     numbers = [gage.number for gage in panel.require(Gages).records]
-    table = strain_table(examples.path("panel-strains.csv"), {}, numbers)
+    table = strain_table(examples.path("panel-strains.csv"), units_of("mm-N-s"), numbers)
     strains = table.time[:POINTS], table.strains[:, :POINTS].T
     near = (90.0, 60.0, 140.0, 100.0)
     with warnings.catch_warnings(action="ignore", category=FecmWarning):
