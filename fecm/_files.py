@@ -58,9 +58,9 @@ def check_outputs(
 ) -> None:
     """Refuse outputs that conflict, exist, or can't be written, before the computation.
 
-    `inputs` are files that the command reads, which are never replaced; `own` other files that it
-    writes, such as checkpoints, whose names no output may have.  `allowed_by` is what the messages
-    tell the caller to use to replace a file.
+    `inputs` are files that the command reads, which are never replaced.  `own` are other files that
+    it writes, such as checkpoints: no output may have their names, which must not be too long or
+    those of folders.  `allowed_by` is what the messages tell the caller to use to replace a file.
     """
     if Path("-") in (*paths, *own):
         raise OutputError("- is a standard stream, and this needs a file; give its name")
@@ -73,6 +73,8 @@ def check_outputs(
         if taken & keys:
             raise OutputError(f"{path} is the name of two outputs; give them different names")
         taken |= keys
+    for path in own:
+        _refuse_folder(path)
     for path in paths:
         mode = _mode(path)
         _refuse_special(path, mode)
@@ -109,6 +111,23 @@ def _refuse_special(path: Path, mode: int | None) -> None:
     """Refuse to replace folders, devices, FIFOs and sockets."""
     if mode is not None and not stat.S_ISREG(mode):
         raise OutputError(f"{path} is {'a folder' if stat.S_ISDIR(mode) else 'not a regular file'}")
+
+
+def _refuse_folder(path: Path) -> None:
+    """Refuse a file of the program itself whose name a folder has, or is too long."""
+    for name in (path, partial_of(path)):
+        try:
+            mode = name.lstat().st_mode
+        except (FileNotFoundError, NotADirectoryError):
+            continue
+        except OSError as error:
+            if error.errno != errno.ENAMETOOLONG:
+                raise
+            raise OutputError(
+                f"the name {path} is too long; give the output a shorter one"
+            ) from None
+        if stat.S_ISDIR(mode):
+            raise OutputError(f"{name} is a folder; remove it, or give the output another name")
 
 
 def final(path: Path) -> Path:

@@ -274,6 +274,43 @@ def test_what_stands_beyond_the_interrupted_problem_is_not_taken_for_done(tmp_pa
     assert (tmp_path / "d-2.h5").read_bytes() == (tmp_path / "d.h5").read_bytes()
 
 
+@pytest.mark.parametrize("name", ["d.h5.checkpoint", "d.h5.spool", ".d.h5.partial.checkpoint"])
+def test_a_folder_with_the_name_of_a_checkpoint_is_refused_before_the_run(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "d.inp").write_text(small())
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "file").write_text("precious")
+    monkeypatch.setattr(Interpreter, "run", None)  # a run would fail
+    for options in ((), ("--overwrite",), ("--resume",)):
+        done = call("run", "d.inp", *options, cwd=tmp_path)
+        assert done.exit_code == 2
+        assert done.stderr.splitlines()[-1] == (
+            f"fecm: error: {name} is a folder; remove it, or give the output another name"
+        )
+    assert (tmp_path / name / "file").read_text() == "precious"
+
+
+@pytest.mark.posix
+@pytest.mark.parametrize("letter", ["x", "ü"])
+def test_an_output_whose_checkpoint_would_have_too_long_a_name_is_refused_before_the_run(
+    letter: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    most = os.pathconf(tmp_path, "PC_NAME_MAX")
+    (tmp_path / "d.inp").write_text(small(SECOND))
+    name = (most - 20) // len(letter.encode()) * letter
+    with monkeypatch.context() as patch:
+        patch.setattr(Interpreter, "run", None)
+        done = call("run", "d.inp", "-o", f"{name}.h5", cwd=tmp_path)
+    assert done.exit_code == 2
+    assert "checkpoint is too long; give the output a shorter one" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["d.inp"]
+    shorter = f"{name[:-3]}.h5"  # with room for .NAME.partial.checkpoint
+    with pytest.raises(StoppedError):
+        stop_at_once(load_deck(tmp_path / "d.inp").problems[0], tmp_path / shorter)
+    assert call("run", "d.inp", "-o", shorter, "--overwrite", cwd=tmp_path).exit_code == 0
+
+
 # Faults ------------------------------------------------------------------------------------------
 
 

@@ -256,6 +256,102 @@ def test_the_first_signal_ends_a_loop_at_its_next_macro(
     assert sorted(p.name for p in folder.iterdir()) == ["d.h5.checkpoint", "d.h5.spool", "d.inp"]
 
 
+# The program, which gets a signal from itself in a callback of HDF5 that writes a file.
+SIGNALLED_IN_HDF5 = """
+import os, signal, sys
+from fecm.__main__ import main
+from fecm.results import hdf5_writer
+
+number, name, plain = int(sys.argv.pop(1)), sys.argv.pop(1), hdf5_writer._Guarded.write
+signal.signal(number, signal.SIG_DFL)
+sent = []
+
+def write(self, data):
+    if not sent and self.name.name == name:
+        sent.append(number)
+        os.kill(os.getpid(), number)
+    return plain(self, data)
+
+hdf5_writer._Guarded.write = write
+main()
+"""
+
+
+@pytest.mark.posix
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_stops_a_case_that_is_run_in_full_and_keeps_the_sweep(
+    folder: Path, number: signal.Signals
+) -> None:
+    (folder / "d.inp").write_text(small())
+    command = ("sweep", "d.inp", "--vary", "k=1e6", "--full", "0", "-o", "s.h5")
+    arguments = (SIGNALLED_IN_HDF5, str(int(number)), ".s-0.partial.h5", *command)
+    done = python(*arguments, cwd=folder)
+    assert done.returncode == 128 + number
+    assert "case 0 was not run in full: a signal stopped the program" in done.stderr
+    assert "Traceback" not in done.stderr
+    assert "error" not in done.stderr
+    assert sorted(path.name for path in folder.iterdir()) == ["d.inp", "s.h5"]
+
+
+@pytest.mark.posix
+def test_a_signal_while_a_sweep_is_written_ends_the_program_after_it(folder: Path) -> None:
+    (folder / "d.inp").write_text(small())
+    command = ("sweep", "d.inp", "--vary", "k=1e6", "-o", "s.h5")
+    done = python(SIGNALLED_IN_HDF5, "2", ".s.partial.h5", *command, cwd=folder)
+    assert done.returncode == 130
+    assert done.stderr.splitlines()[-1] == "fecm: interrupted"
+    assert "Traceback" not in done.stderr
+    assert sorted(path.name for path in folder.iterdir()) == ["d.inp", "s.h5"]
+
+
+# A callback in which Python drops an exception, as those of imports are.
+IN_A_CALLBACK = """
+import os, signal, sys, weakref
+import fecm.cli.{module} as module
+from fecm.__main__ import main
+
+number = int(sys.argv.pop(1))
+signal.signal(number, signal.SIG_DFL)
+
+class Thing:
+    pass
+
+def function(*arguments, **options):
+    thing = Thing()
+    reference = weakref.ref(thing, lambda _: os.kill(os.getpid(), number))
+    del thing
+    print("lost")
+
+module.{name} = function
+main()
+"""
+
+
+@pytest.mark.posix
+@pytest.mark.parametrize(
+    ("module", "name", "arguments"),
+    [
+        ("report", "check_page", ("report", "d.h5")),
+        ("export", "read", ("export", "d.h5", "--to", "vtkhdf")),
+        ("run", "check_outputs", ("run", "d.inp")),  # in the program's own process
+    ],
+)
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+def test_a_signal_in_a_callback_is_not_lost(
+    module: str, name: str, arguments: tuple[str, ...], number: signal.Signals, folder: Path
+) -> None:
+    (folder / "d.inp").write_text(small())
+    (folder / "d.h5").touch()
+    code = IN_A_CALLBACK.format(module=module, name=name)
+    done = python(code, str(int(number)), *arguments, cwd=folder)
+    assert done.returncode == 128 + number
+    said = done.stderr.splitlines()
+    assert [line for line in said if line.startswith(("fecm", "Exception", "Traceback"))] == (
+        ["fecm: interrupted"] if number == signal.SIGINT else []
+    )
+    assert done.stdout == ""
+
+
 @pytest.mark.posix
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_while_the_program_starts_gives_its_exit_status(number: signal.Signals) -> None:

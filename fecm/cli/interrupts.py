@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import contextlib
+import os
 import signal
+import sys
 from collections.abc import Iterator
 from types import FrameType
+from typing import Any
 
 # Windows has no SIGHUP.
 SIGNALS = tuple(n for n in signal.Signals if n.name in ("SIGINT", "SIGTERM", "SIGHUP"))
@@ -30,6 +33,13 @@ class Signals:
                 if number in (signal.SIGINT, signal.SIGTERM) or not ignored:
                     signal.signal(number, self._handle)
             self._installed = True
+            sys.unraisablehook = self._unraisable
+
+    def restore(self) -> None:
+        """Let the signals end this process at once, as is right where another one clears up."""
+        for number in SIGNALS if self._installed else ():
+            if signal.getsignal(number) != signal.SIG_IGN:
+                signal.signal(number, signal.SIG_DFL)
 
     def ignore(self) -> None:
         """Ignore the signals while the program ends: its exit status is known."""
@@ -41,6 +51,17 @@ class Signals:
         again, self.received = bool(self.received), number
         if again or not self._deferred:
             self.heed()
+
+    def _unraisable(self, lost: Any) -> None:
+        """End the program if a finaliser or a callback has swallowed what a handler raised."""
+        if not (self.received and issubclass(lost.exc_type, KeyboardInterrupt | SystemExit)):
+            sys.__unraisablehook__(lost)
+            return
+        with contextlib.suppress(OSError, ValueError):
+            if self.received == signal.SIGINT:
+                sys.stderr.write("fecm: interrupted\n")
+            sys.stderr.flush()
+        os._exit(128 + self.received)
 
     @contextlib.contextmanager
     def deferred(self) -> Iterator[None]:

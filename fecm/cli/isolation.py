@@ -37,7 +37,7 @@ from fecm._files import clear_partials
 from fecm._memory import available, format_bytes
 from fecm._text import printable
 from fecm.cli.common import RefusedError, echo
-from fecm.cli.interrupts import SIGNALLED, SIGNALS
+from fecm.cli.interrupts import SIGNALLED, SIGNALS, signals
 from fecm.cli.streams import standard_error
 
 GB = 10**9
@@ -94,6 +94,7 @@ def fork() -> None:
     if child := os.fork():
         os.close(writing)
         _wait(child, reading)
+    signals.restore()  # the parent removes partial files
     os.close(reading)
     if sys.platform == "linux":  # it kills this process when its parent ends
         import ctypes
@@ -194,14 +195,13 @@ def _wait(child: int, pipe: int) -> NoReturn:
         signal.signal(number, handler)
     if job and (received or status < 0 or status in SIGNALLED):
         clear_partials(map(Path, job["folders"]))
-    if received:
-        if status == -signal.SIGKILL:
+    if received or -status in SIGNALS:
+        received.append(-status)
+        if received[0] == signal.SIGINT and status < 0:
             echo("fecm: interrupted", err=True)
         raise SystemExit(128 + received[0])
     if status >= 0:
         raise SystemExit(status)
-    if -status in SIGNALS:
-        raise SystemExit(128 - status)
     files = job["files"] if job else "the command"
     raise RefusedError(f"{files} can't be read: {_death(-status, job, hangs=hangs)}")
 

@@ -11,6 +11,7 @@ from fecm._dataclasses import frozen
 from fecm.cli.common import DASH, FAILED, echo, echo_json, every_minute, note
 from fecm.cli.decks import load_single
 from fecm.cli.help import typical
+from fecm.cli.interrupts import signals
 from fecm.cli.options import (
     DECK_PATH,
     FORMAT_OPTION,
@@ -136,7 +137,8 @@ def locate(options: LocateOptions) -> None:
         found = located(problem, options.strains, wanted)
     targets.draw("location:location_picture", found)
     if options.output is not None:
-        found.save(options.output, overwrite=options.overwrite)
+        with signals.deferred():
+            found.save(options.output, overwrite=options.overwrite)
         note(f"wrote {options.output}")
     note(*found.notes)
     if options.form is Format.JSON:

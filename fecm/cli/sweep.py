@@ -24,7 +24,8 @@ from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.results.hdf5_reader import read
 from fecm.results.result import result_of
-from fecm.simulation.run import simulate
+from fecm.simulation.run import run as simulate_run
+from fecm.simulation.simulation import Simulation
 from fecm.sweeps.api import carry_out, check_draws, modes_of, problem_of
 from fecm.sweeps.batch import deck_of
 from fecm.sweeps.case import Case, CasesError
@@ -356,11 +357,12 @@ def sweep(options: Options) -> None:
     parts = PartialResults(path, planned.fingerprint(), restart=options.overwrite)
     result = _carry_out(problem, planned, parts, options.workers, scheduler)
     forces = parts.forces() if options.history else ()
-    save(result, path, overwrite=options.overwrite, forces=forces)
-    if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
-        note(f"{lost} cases were lost with their workers; --overwrite runs them again")
-    else:
-        parts.clear()
+    with signals.deferred():
+        save(result, path, overwrite=options.overwrite, forces=forces)
+        if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
+            note(f"{lost} cases were lost with their workers; --overwrite runs them again")
+        else:
+            parts.clear()
 
     _print(result, path)
     _run_in_full(planned, fulls, overwrite=options.overwrite)
@@ -475,18 +477,30 @@ def _carry_out(
 
 def _run_in_full(planned: Plan, fulls: dict[int, Path], *, overwrite: bool) -> None:
     """Run chosen cases with all rows that their deck stores."""
+
+    def heed(simulation: Simulation) -> None:
+        signals.heed()
+
     for case, path in fulls.items():
         try:
             prepared = load_deck(deck_of(planned, case))
             if errors := prepared.errors(force=True):
                 raise CasesError(errors[0].message)
             with (
+                signals.deferred(),
                 every_minute(f"fecm: case {case} is run in full, {{}} min so far".format),
                 hdf5_writer.writing(path, overwrite=overwrite) as sink,
             ):
-                simulate(prepared.problems[0], sink, RunOptions(law=planned.settings.law))
+                options = RunOptions(law=planned.settings.law)
+                simulation = Simulation(prepared.problems[0], sink, options)
+                simulation.observers = (heed,)
+                simulation.on_macro = heed
+                simulate_run(simulation)
         except (CasesError, LawError, ArithmeticError) as error:
             note(f"case {case} was not run in full: {error}")
             continue
+        except (KeyboardInterrupt, SystemExit):
+            note(f"case {case} was not run in full: a signal stopped the program")
+            raise
         echo(f"  case {case:<12} {path}")
         note(*(f"case {case}: {text}" for text in result_of(read(path)).notes))
