@@ -6,6 +6,7 @@ import contextlib
 import ctypes
 import mmap
 import os
+import re
 import subprocess
 import sys
 import threading
@@ -134,6 +135,19 @@ def test_a_run_that_needs_more_than_is_free_is_refused_with_both_numbers(
     assert not output.exists()
 
 
+def test_gages_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # 4000 gages on 1008 elements took 119 MB more than none.
+    monkeypatch.setattr(fecm._memory, "available", lambda: 100 * MEGABYTE)
+    deck = tmp_path / "d.inp"
+    deck.write_text(small())
+    assert call("run", deck, "-o", tmp_path / "d.h5").exit_code == 0
+    cards = "".join(f"{n},1.,1.,.01,0.\n" for n in range(1, 4001))
+    deck.write_text(small().replace("EXPE\n", f"GAGE\n{cards}\nEXPE\n"))
+    many = call("run", deck, "-o", tmp_path / "many.h5")
+    assert many.exit_code == 2
+    assert "and 100 MB are free" in many.stderr
+
+
 def test_a_result_in_memory_counts_with_all_its_rows(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fecm._memory, "available", lambda: 100 * MEGABYTE)
     many = small().replace("LOOP         10", "LOOP      99999").replace("DISP          5", "DISP")
@@ -171,6 +185,21 @@ def test_the_estimate_of_a_sweep_bounds_what_is_measured(
         ADVANCED_BYTES * min(cases, MOST_TOGETHER) + (HISTORY_BYTES * cases if history else 0)
     )
     assert measured <= estimated <= 2 * measured
+
+
+def test_the_steps_of_a_sweep_are_those_of_its_longest_case(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(fecm._memory, "available", lambda: 50 * MEGABYTE)
+    monkeypatch.setattr("fecm.sweeps.memory.ADVANCED_BYTES", 30)
+    deck = tmp_path / "small.inp"
+    deck.write_text(small().replace("LOOP         10", "LOOP        100"))
+    options = ("--vary", "velocity=50:100:1000", "--history", "-o", tmp_path / "s.h5")
+    assert call("sweep", deck, *options, "--vary", "duration=5e-5").exit_code == 0
+    # 10,000 steps of 0.5 us, 1000 cases: (24 + 30) bytes a step and case are 540 MB.
+    long = call("sweep", deck, *options, "--overwrite", "--vary", "duration=5e-3")
+    assert long.exit_code == 2
+    assert re.search(r"the sweep takes about 5[45]\d MB", long.stderr), long.stderr
 
 
 @pytest.mark.parametrize(

@@ -14,7 +14,7 @@ import numpy as np
 
 from fecm import _memory
 from fecm.deck.macros import every, flat
-from fecm.deck.model import Projectile
+from fecm.deck.model import Gages, Projectile
 from fecm.mechanics import interpolation
 from fecm.mechanics.plate import ASSEMBLED, BLOCK, PlateModel
 from fecm.mechanics.projectile import REPORT_ELEMENTS
@@ -31,6 +31,7 @@ KEPT = 12  # bytes per entry of the element matrices that are kept
 INTEGRATED = 24  # and of one under integration, for each row of B and point
 ROWS = 8  # strains in B: six of the membrane and of bending, two of the transverse shear
 SHIFTED = 70  # bytes of EIGE's factors of a plate without coupling, over n^1.5
+GAGE = 60_000  # bytes per gage: its weights, and its strains in buffers and on the way to them
 STEP = 80  # bytes per step of the summary after a run
 STATIC = {"TANG", "EIGE"}
 
@@ -52,6 +53,8 @@ def needed_bytes(
         total += ASSEMBLED * model.entries
     if solver != CSR:
         total += _product(model, exact=exact)
+    if (gages := checked.deck.last(Gages)) is not None:
+        total += GAGE * len(gages.records)
     total += _factors(model, words)
     n = checked.mesh.number_of_equations
     if modes := max(

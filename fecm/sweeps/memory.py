@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
+
 from fecm import _memory
 from fecm.mechanics.kernels import LIBRARY
 from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
+from fecm.sweeps.case import Case, CasesError
 from fecm.sweeps.checks import check_deck
 from fecm.sweeps.in_full import stores_rows, without_output
 from fecm.sweeps.plan import MOST_TOGETHER, Plan, runs_together, tasks
@@ -16,6 +19,13 @@ from fecm.sweeps.vary import apply_case
 # whose history is stored.
 ADVANCED_BYTES = 34 if LIBRARY is None else 12
 HISTORY_BYTES = 24
+LONGER = frozenset(("duration", "dt", REFINE))  # values on which the number of steps depends
+
+
+def _steps(case: Case) -> float:
+    """Measure of the steps of a case, compared with other cases of the same names."""
+    refine, duration, dt = (float(case.get(name, 1.0)) for name in (REFINE, "duration", "dt"))
+    return refine * duration / dt if dt > 0.0 else 0.0
 
 
 def check_memory(checked: Problem, made: Plan, workers: int, *, streamed: bool = False) -> None:
@@ -25,8 +35,9 @@ def check_memory(checked: Problem, made: Plan, workers: int, *, streamed: bool =
     `streamed` to files, only those of one task are held.
     """
     settings = made.settings
-    if REFINE in made.cases[-1]:
-        checked = check_deck(apply_case(settings.deck, made.cases[-1]))
+    if not LONGER.isdisjoint(made.cases[-1]):
+        with suppress(CasesError):  # of a case that fails
+            checked = check_deck(apply_case(settings.deck, max(made.cases, key=_steps)))
     steps, cases = checked.work.steps, len(made.cases)
     at_once = min(workers, len(tasks(checked, made))) if workers > 1 else workers
     plate = checked if settings.measure else without_output(checked, settings.measures)
