@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import contextlib
+import re
 from collections.abc import Callable
 
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import fecm
@@ -73,7 +74,9 @@ def layups(draw: st.DrawFn) -> Item:
 @given(layups(), st.sampled_from(SEPARATORS))
 def test_plies_written_in_one_notation_are_read_as_these_plies(layup: Item, mark: str) -> None:
     text, found = layup
-    assert parse_layup(text.replace("|", mark)) == found
+    written = text.replace("|", mark)
+    assume(not re.search(r"\s[2-9](?![0-9.e_])", written))  # may be a lost subscript
+    assert parse_layup(written) == found
 
 
 @given(layups(), st.data())
@@ -100,6 +103,7 @@ def test_decimal_commas_are_refused_with_the_layup_that_has_points(plies: list[f
     [
         ("[22,5/-22,5]s", ["[22.5/-22.5]s", "[22/5/-22/5]s"]),
         ("[22,5 -22,5]s", ["[22.5/-22.5]s", "[22/5/-22/5]s"]),
+        ("[90 2]s", ["[90/2]s", "[90_2]s"]),
         ("[1 0/45]", ["[1/0/45]", "[10/45]"]),
         ("[0 C/90]", ["[0/C/90]", "[0C/90]"]),
         ("[(0 90) 45]", ["[(0/90)/45]", "[(0/90)45]"]),

@@ -43,6 +43,7 @@ _SUBSCRIPTS = str.maketrans("₀₁₂₃₄₅₆₇₈₉", "0123456789")
 _INSIDE = re.compile(r"(?<=[\[(/,_{±∓]) | (?=[\])/,_{}°s])")
 _AFTER_SIGN = re.compile(r"(?<=[\[(/,][+-]) ")
 _BEFORE_REPEATS = re.compile(r"(?<=[\])]) (?=[0-9ST])")  # or before a ply
+_LONE_DIGIT = re.compile(r"(?<=[0-9°]) (?=[2-9](?:[ \])]|$))")  # a small angle, or a subscript
 _DECIMAL_COMMA = re.compile(r"(?<=[0-9]),(?=[0-9])")
 
 
@@ -88,6 +89,10 @@ def parse_plies(text: str, largest: float = LARGEST_ANGLE) -> list[LayupPly]:
     if _BEFORE_REPEATS.search(compact):
         what = "has a blank between a group and what follows it"
         raise _unclear(text, what, _readings(plain, compact, largest))
+    if _LONE_DIGIT.search(compact):
+        what = "has a digit after a blank, which is an angle or a lost subscript"
+        readings = [_LONE_DIGIT.sub(mark, compact).replace(" ", "/") for mark in ("/", "_")]
+        raise _unclear(text, what, readings)
     return _parse(compact.replace(" ", "/"), largest)
 
 
