@@ -63,7 +63,7 @@ def test_info_tells_the_cases_and_what_came_out(swept: Path) -> None:
     forces = fecm.load_sweep(swept)["peak_force"]
     for line in (
         "cases 6, 3 failed",
-        f"largest peak {np.nanmax(forces):.6g} (velocity 150, layup [0/90])",
+        f"largest peak {np.nanmax(forces):.4g} (velocity 150, layup [0/90])",
         "velocity 6 float64 length/time 50 to 150",
         "layup 6 text 2 different",
         "peak_force 6 float64 force "
