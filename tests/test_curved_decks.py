@@ -179,7 +179,9 @@ def test_a_new_plate_of_a_curved_deck_has_the_supports_of_a_panel() -> None:
 # Results ------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("nx", "factor"), [(16, 1.461), (32, 1.161)])
+@pytest.mark.parametrize(
+    ("nx", "factor"), [(16, 1.461), pytest.param(32, 1.161, marks=pytest.mark.long)]
+)
 def test_the_buckling_load_of_a_coarse_curved_panel_is_an_upper_bound(
     nx: int, factor: float
 ) -> None:

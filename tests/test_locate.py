@@ -236,6 +236,7 @@ def test_the_reports_impact_with_a_rod_is_located_within_one_element() -> None:
 # Error bars ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_the_errors_of_several_seeds_are_those_of_the_covariance() -> None:
     deck, strains, _ = struck()
     seeds, squares = 10, 0.0
@@ -363,6 +364,7 @@ def test_a_force_that_has_not_ended_is_said_to_be_open() -> None:
     assert any("has not ended" in note for note in found.notes)
 
 
+@pytest.mark.long
 def test_hats_are_narrowed_where_the_strains_show_it_and_a_given_width_is_kept() -> None:
     # A thin plate has a force with a narrow peak.
     deck, strains, peak = struck("[0/90/45/45]")

@@ -49,8 +49,13 @@ def _stretching_plate() -> Sequence[Value]:
     return [middle(made) / h]
 
 
-def strip(end: str, pressure: float, others: Sequence[Segment] = STRETCHES) -> Deck:
-    """Half a strip of [0_4/90_4] in cylindrical bending, from its middle to an end with codes."""
+def strip(
+    end: str, pressure: float, others: Sequence[Segment] = STRETCHES, *, slant: float = 0.0
+) -> Deck:
+    """Half a strip of [0_4/90_4] in cylindrical bending, from its middle to an end with codes.
+
+    The lines across the strip are slanted one way and the other, by a share of an element.
+    """
     half, width = 50.0, 10.0
     grid = Grid(uniform(half, 8), uniform(width, 1))
     loads = np.zeros((grid.up, grid.across, 5))
@@ -59,7 +64,13 @@ def strip(end: str, pressure: float, others: Sequence[Segment] = STRETCHES) -> D
     loads[:, -1] = 0.0  # a value there would be a displacement
     plate = decks.material(FIBRES, 4 * (0.0,) + 4 * (90.0,), 0.25)
     held = decks.supports(grid, f"01001 11011 01001 {end} 01001")
-    return decks.deck(grid, (held, decks.forces(loads), plate, *others), NEWTON)
+    x, y = (at.ravel() for at in np.meshgrid(lines(grid.columns), lines(grid.rows)))
+    side = half / 8
+    x = x + slant * side * np.sin(np.pi * x / (2.0 * side)) * (2.0 * y / width - 1.0)
+    places = np.column_stack([x, y]).tolist()
+    cards = (NodeValues(n, 0, tuple(place)) for n, place in enumerate(places, start=1))
+    coordinates = model.Coordinates(tuple(cards)) if slant else None
+    return decks.deck(grid, (held, decks.forces(loads), plate, *others), NEWTON, coordinates)
 
 
 @case
@@ -72,6 +83,7 @@ def _cylindrical_bending() -> Sequence[Value]:
         middle(strip(pinned, -0.01)),
         middle(strip(clamped, 0.03)),
         middle(bent) / middle(linear),
+        middle(strip(pinned, 0.01, slant=0.3)),
     ]
 
 
@@ -125,6 +137,7 @@ def _stretching_impact() -> Sequence[Value]:
     )
     made = decks.deck(grid, segments, ())
     dt = rounded_time_step(critical_time_step(build_plate(made, generate(made))))
-    found = decks.result_of(replace(made, macros=decks.impact_program(dt, round(end / dt))))
+    made = replace(made, macros=decks.impact_program(dt, round(end / dt)))
+    found = decks.result_of(made)
     balance = np.abs(found.energy.balance_error).max() / found.energy.attributes["initial"]
     return [found.plate_w.max(), found.force.max(), balance]
