@@ -29,8 +29,8 @@ SOFTEST, HARDEST = 1e9, 2e12
 SOLID = (5e10, 1e12)
 STEEL_IN_SI = 2e11
 ELASTIC_POWER = 1.5  # of unloading as of loading
-# Shapes of the contact patch.
 SOFT_TIP = 0.3  # modulus of a tip over E2, below which its contact is wide
+# Shapes of the contact patch.
 PATCHES = {"disc": DISC, "hertz": HERTZ}
 
 

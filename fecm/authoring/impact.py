@@ -52,7 +52,7 @@ from fecm.deck.grid import IN_PLANE
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Control, Gage
 from fecm.deck.unit_systems import units_of
-from fecm.mechanics.laminate import SOFT_CORE
+from fecm.mechanics.laminate import are_cores
 from fecm.mechanics.points import RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.parts import projectile_segment
@@ -424,8 +424,7 @@ def _formed(
 
 def is_sandwich(plies: Plies, layers: Sequence[model.Layer]) -> bool:
     """Whether a layer is so soft in shear that it is the core of a sandwich."""
-    moduli = [plies.of(layer).ply.g13 for layer in layers]
-    return min(moduli) < SOFT_CORE * max(moduli)
+    return any(are_cores([plies.of(layer).ply for layer in layers]))
 
 
 def doubts_of_core(plies: Plies, layers: Sequence[model.Layer]) -> list[str]:

@@ -118,9 +118,7 @@ def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoR
     streams.guard_streams()
     isolation.switch.on = arguments is None
     warnings.showwarning = _show_warning
-    os.environ["MPLBACKEND"] = (
-        "agg"  # pictures are files; the environment of a notebook has its own
-    )
+    os.environ["MPLBACKEND"] = "agg"  # pictures are files, whatever a notebook's environment says
     status = _status(arguments, prog_name)
     if (error := streams.output_error()) is not None and status not in SIGNALLED:
         status = UNUSABLE

@@ -47,6 +47,12 @@ def is_fabric(ply: PlyConstants) -> bool:
     return ply.e2 > FABRIC_MODULI * ply.e1 and ply.g12 < FABRIC_SHEAR * ply.e2
 
 
+def are_cores(plies: Sequence[PlyConstants]) -> list[bool]:
+    """Which plies are so soft in shear that the others are the faces of a sandwich."""
+    stiffest = max(ply.g13 for ply in plies)
+    return [ply.g13 < SOFT_CORE * stiffest for ply in plies]
+
+
 @frozen
 class Plies:
     """Plies of a laminate, from z = -h/2 on."""
@@ -103,16 +109,14 @@ class Laminate:
     @property
     def has_core(self) -> bool:
         """Whether a ply is so soft in shear that the others are the faces of a sandwich."""
-        moduli = [ply.g13 for ply in self.plies.constants]
-        return min(moduli) < SOFT_CORE * max(moduli)
+        return any(are_cores(self.plies.constants))
 
     @property
     def struck_thickness(self) -> float:
         """Thickness of the struck face of a sandwich, from its first ply to the core, or of all."""
         if not self.has_core:
             return self.thickness
-        moduli = np.array([ply.g13 for ply in self.plies.constants])
-        core = int(np.argmax(moduli < SOFT_CORE * moduli.max()))
+        core = are_cores(self.plies.constants).index(True)
         return float(self.plies.faces[core] - self.plies.faces[0])
 
     @property

@@ -170,20 +170,13 @@ def static_stiffness(plate: PlateModel, contact: Floats) -> float:
         return math.nan
 
 
-@frozen
-class Support:
-    """How the supports carry a static unit load."""
+def static_support(plate: PlateModel, contact: Floats) -> tuple[float, float] | None:
+    """Stiffness under a static unit load on the nodes (numnp, 5), and how far its supports pull.
 
-    stiffness: float  # force per displacement under the load
-    pull: float  # sum of the forces that hold the plate down, at nodes free to rotate
-
-
-def static_support(plate: PlateModel, contact: Floats) -> Support | None:
-    """Solve for a unit load on the nodes (numnp, 5) and sum up where the supports pull.
-
-    Only nodes whose w is held and whose rotations are free count: a support of this kind stands for
-    a ring, a window or a knife edge, which can only push.  None for a plate without such nodes, and
-    for one that its supports do not hold.
+    The first is the force per displacement under the load, the second the sum of the forces that
+    hold the plate down.  Only nodes whose w is held and whose rotations are free count: a support
+    of this kind stands for a ring, a window or a knife edge, which can only push.  None for a plate
+    without such nodes, and for one that its supports do not hold.
     """
     free = plate.mesh.equations > 0
     rests = ~free[:, W] & free[:, W + 1 :].all(axis=1)
@@ -196,7 +189,7 @@ def static_support(plate: PlateModel, contact: Floats) -> Support | None:
         return None
     # The supports push against the load, and pull in its direction.
     forces = plate.internal_forces(field)[rests, W] * np.sign(contact[:, W].sum())
-    return Support(1.0 / float(load @ field[free]), float(forces[forces > 0.0].sum()))
+    return 1.0 / float(load @ field[free]), float(forces[forces > 0.0].sum())
 
 
 def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:

@@ -33,7 +33,6 @@ from fecm.simulation.simulation import Simulation
 
 FORMAT = 6
 OTHER_FORMAT = "another kind of checkpoint"
-OTHER_DECK = "another deck"
 SOLVER = "another solver"
 CHUNK = 1_000_000  # bytes read at once when a spool is checked
 
@@ -65,7 +64,7 @@ def identity(simulation: Simulation) -> dict[str, Any]:
     return {
         OTHER_FORMAT: FORMAT,
         "another version of fecm": __version__,
-        OTHER_DECK: _deck_hash(simulation.problem),
+        "another deck": _deck_hash(simulation.problem),
         "another mode or other slips": sorted(options.slips),
         SOLVER: simulation.model.motion.solver,
         "another mass matrix or integrator of the rod": [

@@ -130,12 +130,13 @@ def _pull(simulation: Simulation, result: Result) -> Iterator[str]:
     if contact is None or not force.any() or problem.deck.control.numel > MOST_SOLVED:
         return
     support = static_support(problem.moving_plate, contact)
-    if support is None or support.pull <= PULL:
+    if support is None:
         return
+    stiffness, pull = support
     peak = int(force.argmax())
-    if result["history/plate_w"][peak] * support.stiffness > STATIC * force[peak]:
+    if pull > PULL and result["history/plate_w"][peak] * stiffness > STATIC * force[peak]:
         yield (
-            f"the supports pull the plate down with {support.pull:.0%} of a static load at the "
+            f"the supports pull the plate down with {pull:.0%} of a static load at the "
             "impact; a window or a ring can only push: the plate lifts off there, is softer, and "
             "its peak force is lower"
         )

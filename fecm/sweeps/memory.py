@@ -19,13 +19,13 @@ from fecm.sweeps.vary import apply_case
 # whose history is stored.
 ADVANCED_BYTES = 34 if LIBRARY is None else 12
 HISTORY_BYTES = 24
-LONGER = frozenset(("duration", "dt", REFINE))  # values on which the number of steps depends
+LONGER = frozenset(("duration", "dt"))  # values on which the number of steps depends
 
 
 def _steps(case: Case) -> float:
     """Measure of the steps of a case, compared with other cases of the same names."""
-    refine, duration, dt = (float(case.get(name, 1.0)) for name in (REFINE, "duration", "dt"))
-    return refine * duration / dt if dt > 0.0 else 0.0
+    duration, dt = (float(case.get(name, 1.0)) for name in ("duration", "dt"))
+    return duration / dt if dt > 0.0 else 0.0
 
 
 def check_memory(checked: Problem, made: Plan, workers: int, *, streamed: bool = False) -> None:
@@ -35,7 +35,9 @@ def check_memory(checked: Problem, made: Plan, workers: int, *, streamed: bool =
     `streamed` to files, only those of one task are held.
     """
     settings = made.settings
-    if not LONGER.isdisjoint(made.cases[-1]):
+    if REFINE in made.cases[-1]:
+        checked = check_deck(apply_case(settings.deck, made.cases[-1]))
+    elif not LONGER.isdisjoint(made.cases[-1]):
         with suppress(CasesError):  # of a case that fails
             checked = check_deck(apply_case(settings.deck, max(made.cases, key=_steps)))
     steps, cases = checked.work.steps, len(made.cases)

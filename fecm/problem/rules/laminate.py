@@ -11,7 +11,7 @@ from fecm.deck import model
 from fecm.deck.layup import LARGEST_ANGLE
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.mechanics.elements import HIGHEST_ORDER
-from fecm.mechanics.laminate import SOFT_CORE
+from fecm.mechanics.laminate import are_cores
 from fecm.problem.problem import Problem
 
 THICKNESS_TOLERANCE = 1.0e-6  # difference of thicknesses that is rounding
@@ -245,17 +245,18 @@ def thin_core(problem: Problem) -> Reports:
     """Find a soft layer that is thinner than the plies of the faces."""
     plies = problem.deck.plies
     for layers in problem.deck.layers.values():
-        stiffest = max(plies[layer.material].g13 for layer in layers)
-        cores = [one for one in layers if plies[one.material].g13 < SOFT_CORE * stiffest]
-        faces = [one.thickness for one in layers if one not in cores]
-        for core in cores:
-            if core.thickness < min(faces):
+        soft = are_cores([plies[layer.material] for layer in layers])
+        thinnest = min(
+            layer.thickness for layer, is_core in zip(layers, soft, strict=True) if not is_core
+        )
+        for layer, is_core in zip(layers, soft, strict=True):
+            if is_core and layer.thickness < thinnest:
                 message = (
-                    f"The core is {core.thickness:g} thick, less than the thinnest ply of the "
-                    f"faces, {min(faces):g}."
+                    f"The core is {layer.thickness:g} thick, less than the thinnest ply of the "
+                    f"faces, {thinnest:g}."
                 )
                 hint = "the thickness of a core is in the deck's unit of length, as for plies"
-                yield Report(message, core.place("layer thickness"), hint)
+                yield Report(message, layer.place("layer thickness"), hint)
 
 
 @rule(
@@ -382,11 +383,8 @@ def thick_plate(problem: Problem) -> Reports:
         place = problem.deck.require(model.Material).integration.place("total thickness")
         card = problem.deck.last(model.Shear)
         has_equilibrium = card is not None and card.equilibrium
-        hint = (
-            "the deck has SHEA EQUI, which brings the deflection of this example to 1 % at 0.1"
-            if has_equilibrium
-            else "SHEA EQUI brings the deflection of this example to 1 % at 0.1"
-        )
+        subject = "the deck has SHEA EQUI, which" if has_equilibrium else "SHEA EQUI"
+        hint = f"{subject} brings the deflection of this example to 1 % at 0.1"
         yield Report(f"the {what}: {ERRORS}", place, hint)
 
 
