@@ -58,9 +58,9 @@ def check_outputs(
 ) -> None:
     """Refuse outputs that conflict, exist, or can't be written, before the computation.
 
-    `inputs` are files that the command reads, which are never replaced.  `own` are other files that
-    it writes, such as checkpoints: no output may have their names, which must not be too long or
-    those of folders.  `allowed_by` is what the messages tell the caller to use to replace a file.
+    `inputs` are files that the command reads; they are never replaced.  `own` are other files that
+    it writes, such as checkpoints: no output may have their names, none of them may be a folder,
+    and their names must not be too long.  Messages name `allowed_by` as the way to replace a file.
     """
     if Path("-") in (*paths, *own):
         raise OutputError("- is a standard stream, and this needs a file; give its name")

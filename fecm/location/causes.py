@@ -124,7 +124,7 @@ def likely_cause(
 
 
 def _odd_gain(fit: Fit, best: Trial, region: Region) -> tuple[int, _Shares]:
-    """The gage whose gain is farthest from those of the others, and where to begin with it."""
+    """The gage whose gain differs most from the other gains, and the start of its search."""
     free = replace(fit, gains=True)
     trial = free.refined(best, np.array([region.low, region.high]))
     apart = np.log(trial.gains) - np.median(np.log(trial.gains))
