@@ -124,6 +124,7 @@ def test_corners_of_a_window_inside_the_plate_are_found() -> None:
         fecm.RigidMass(5.5e-3),
         fecm.Contact.estimate(radius=8),
         energy="5J",
+        duration=1e-4,
         units="mm-N-s",
     )
     (problem,) = load_deck(deck).problems

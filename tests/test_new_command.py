@@ -141,11 +141,12 @@ def test_a_bare_number_that_is_small_for_an_energy_is_doubted() -> None:
 
 def test_the_patch_of_a_soft_tip_is_doubted() -> None:
     # Rubber of 20 MPa: 10 J on k = 97.8 indent by (2.5 E/k)^0.4 = 9.19, and (8 * 9.19)^(1/2) = 8.6.
-    soft = new(*THIN, "--energy", "10J", "--contact", "estimate:8,20,.48")
+    thin = (*THIN, *QUICK, "--energy", "10J")
+    soft = new(*thin, "--contact", "estimate:8,20,.48")
     assert "the tip is soft: its contact circle has a radius of up to 8.6" in soft.stderr
-    steel = new(*THIN, "--energy", "10J", "--contact", "estimate:8")
+    steel = new(*thin, "--contact", "estimate:8")
     assert "tip is soft" not in steel.stderr
-    wide = new(*THIN, "--energy", "10J", "--contact", "estimate:8,20,.48", "--patch", "disc:6")
+    wide = new(*thin, "--contact", "estimate:8,20,.48", "--patch", "disc:6")
     assert "tip is soft" not in wide.stderr
 
 
@@ -575,7 +576,7 @@ def test_a_plate_that_stretches_is_run_for_the_shorter_contact_of_its_static_cur
     ],
 )
 def test_a_title_names_plate_layup_ply_and_energy(options: tuple[str, ...], title: str) -> None:
-    assert fecm.read_one(new(*THIN, "--energy", "10J", *options).stdout).title == title
+    assert fecm.read_one(new(*THIN, *QUICK, "--energy", "10J", *options).stdout).title == title
 
 
 @pytest.mark.parametrize(
