@@ -58,7 +58,6 @@ from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.parts import projectile_segment
 
 MOST_STEPS = 1e6  # steps of a run above which the unit of its duration is doubted
-IMPOSSIBLE_STEPS = 1e8  # which a plate of very thin plies needs
 AnyProjectile = Rod | RigidMass | model.Projectile
 GagePlace = tuple[float, float, float, float]  # x, y, z and degrees
 
@@ -316,6 +315,7 @@ def author(asked: Request) -> Authored:
         raise ObjectError(f"the fixture's standard is in {STANDARD}; leave out `units`")
     laminates = laminates_of(asked.laminate, asked.zones)
     plies, in_zones = plies_of(asked.laminate, laminates, STANDARD if test else units, notes)
+    check_thickness(plies)
     strike, motion = asked.strike, _motion(asked, plies)
     if fixture is not None and test is not None:
         strike, motion = _prescribed(test, strike, motion, plies.thickness)
@@ -395,8 +395,6 @@ def author(asked: Request) -> Authored:
     dt = asked.numerics.time_step(formed.deck)
     doubts += _doubts_of_duration(motion.duration, dt, plies.system)
     deck = asked.numerics.with_program(formed.deck, dt, motion.duration)
-    if any(macro.word == "LOOP" and macro.value > IMPOSSIBLE_STEPS for macro in deck.macros):
-        check_thickness(plies)
     comments = (fixture.comment if fixture else "") + formed.comment + comment
     return Authored(deck, comments, [*notes, *formed.notes], doubts)
 
