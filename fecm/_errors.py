@@ -51,3 +51,13 @@ def warn(text: str) -> None:
     while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
         frame, level = frame.f_back, level + 1
     warnings.warn(FecmWarning(text), stacklevel=level)
+
+
+_said: set[str] = set()
+
+
+def warn_once(text: str) -> None:
+    """Warn, but not again of the same text in this process."""
+    if text not in _said:
+        warn(text)
+        _said.add(text)

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from fecm._dataclasses import frozen
-from fecm._errors import OptionsError, warn
+from fecm._errors import OptionsError, warn, warn_once
 from fecm._files import ARGUMENT, check_outputs
 from fecm._progress import once_a_minute
 from fecm._tables import html_table
@@ -396,7 +396,7 @@ def _warn_of(prepared: LoadedDeck) -> None:
     """Warn of the findings that are warnings."""
     for finding in prepared.findings:
         if finding.severity == "warning":
-            warn(finding.render(prepared.source))
+            warn_once(finding.render(prepared.source))
 
 
 def _run(

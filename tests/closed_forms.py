@@ -431,6 +431,7 @@ EXPECTED: dict[str, Sequence[float | None]] = {
     "angle-ply-plate": two_layers(angle_ply(H)),
     "forced-plate": forced(600 * 1.08e-7),
     "cylindrical-bending": (*strips(), 1.0, strips()[0]),
+    "reduced-plate": (1.0 + 0.75 * (1.0 - 0.3**2) * (1.0 / (1.0 - 0.3) + 0.5),),
     "dispersion": (None, None, math.sqrt(12.0 * 0.8e6 / 0.000148) / 0.106),
     "rod-pulse": (None, None, None, IMPULSE / (7.33e-4 * math.pi * 0.625**2 / 4.0), None),
     "rod-waves": (BAR_SPEED, 1000.0, math.pi * BAR_SPEED, math.pi * BAR_SPEED),

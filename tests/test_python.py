@@ -12,6 +12,7 @@ import re
 import shutil
 import subprocess
 import sys
+import warnings
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
@@ -182,6 +183,14 @@ def test_each_warning_of_a_deck_is_a_warning_in_python_at_the_users_line() -> No
     assert "warning[W415]" in texts[0]
     assert texts[1:] == list(result.notes)
     assert {warning.filename for warning in caught} == {__file__}
+
+
+def test_a_finding_of_a_deck_is_a_warning_once_in_a_process() -> None:
+    for times in (1, 0):
+        with warnings.catch_warnings(record=True) as caught:
+            warnings.simplefilter("always")
+            fecm.run_one(APPENDIX)
+        assert sum("warning[W415]" in str(one.message) for one in caught) == times
 
 
 def test_what_a_result_or_a_sweep_lacks_is_named_with_what_there_is(runs: Path) -> None:

@@ -15,7 +15,7 @@ import numpy as np
 from fecm._typing import Array
 from fecm.deck.mesh_cards import DOF_NAMES
 from fecm.results.blocks import row_blocks
-from fecm.results.difference import TEXT, DatasetDifference, Place
+from fecm.results.difference import TEXT, DatasetDifference, Position
 from fecm.results.hdf5_reader import Contents
 from fecm.results.schema import SCALES, Form, dataset_of
 from fecm.results.tapes import TapeText, W, last_digit
@@ -243,15 +243,15 @@ def _clock(pair: Pair) -> tuple[Source, str] | None:
     return None
 
 
-def _place(pair: Pair, index: tuple[int, ...]) -> Place:
-    """Place of a number, or of a row if only its index is given."""
+def _place(pair: Pair, index: tuple[int, ...]) -> Position:
+    """Position of a number, or of a row if only its index is given."""
     path, source = pair.path, pair.sources[0]
     if isinstance(source, TapeText) and source.lines and path == W:
         names = ("line", "column")
-        return Place(index, axes={name: i + 1 for name, i in zip(names, index, strict=False)})
+        return Position(index, axes={name: i + 1 for name, i in zip(names, index, strict=False)})
     if source.form == Form.SWEEP and path.startswith(("cases/", "summary/", "history/")):
         case, *steps = index  # cases count from 0, as in commands
-        return Place(index, steps[0] + 1 if steps else None, axes={"case": case})
+        return Position(index, steps[0] + 1 if steps else None, axes={"case": case})
     step: int | None = None
     time: float | None = None
     clock = _clock(pair)
@@ -260,7 +260,7 @@ def _place(pair: Pair, index: tuple[int, ...]) -> Place:
         row = index[0], index[0] + 1
         step = int(timed.rows(f"{group}/step", *row)[0])
         time = float(timed.rows(f"{group}/time", *row)[0])
-    return Place(index, step, time, _axes(pair, index, has_clock=clock is not None))
+    return Position(index, step, time, _axes(pair, index, has_clock=clock is not None))
 
 
 def _axes(pair: Pair, index: tuple[int, ...], *, has_clock: bool) -> dict[str, int | str]:

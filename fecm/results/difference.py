@@ -15,8 +15,8 @@ TEXT = "text"  # the type of a dataset of texts
 
 
 @frozen
-class Place:
-    """Place of a number in a dataset.
+class Position:
+    """Position of a number in a dataset.
 
     Attributes
     ----------
@@ -73,13 +73,13 @@ class DatasetDifference:
         Largest difference of equal numbers.
     largest_difference : float
         Largest difference; infinite if only one of two numbers is finite.
-    at : Place or None
+    at : Position or None
         Place of the largest difference; None if all is equal.
     values : tuple or None
         Numbers, or texts, of A and B at that place.
     differing : int
         Number of differences beyond the tolerance.
-    first : Place or None
+    first : Position or None
         First row with one; None if the rows are no instants.
     """
 
@@ -91,10 +91,10 @@ class DatasetDifference:
     scale_name: str = MAX
     tolerance: float = 0.0
     largest_difference: float = 0.0
-    at: Place | None = None
+    at: Position | None = None
     values: tuple[float, float] | tuple[str, str] | None = None
     differing: int = 0
-    first: Place | None = None
+    first: Position | None = None
 
     @property
     def holds_texts(self) -> bool:
@@ -136,7 +136,7 @@ class DatasetDifference:
             parts.append(f"first{_at(self.first)}")
         return "; ".join(parts)
 
-    def _largest_in_words(self, at: Place, values: tuple[object, object]) -> str:
+    def _largest_in_words(self, at: Position, values: tuple[object, object]) -> str:
         """The largest difference and its place."""
         quote = "`" if self.holds_texts else ""
         left, right = (f"{quote}{value}{quote}" for value in shown_apart(*values))
@@ -171,7 +171,7 @@ class DatasetDifference:
         }
 
 
-def _at(place: Place) -> str:
+def _at(place: Position) -> str:
     """A place in words, with a leading blank."""
     words = str(place)
     return f" at {words}" if words else ""

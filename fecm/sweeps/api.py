@@ -15,7 +15,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecm._errors import warn
+from fecm._errors import warn, warn_once
 from fecm._files import ARGUMENT, check_outputs
 from fecm._memory import NotEnoughMemoryError
 from fecm._processors import free
@@ -554,7 +554,7 @@ def _prepared(
         raise CasesError("give either deck or build")
     for finding in prepared.findings:
         if finding.severity == "warning":
-            warn(finding.render(prepared.source))
+            warn_once(finding.render(prepared.source))
     return prepared
 
 

@@ -12,6 +12,7 @@ from fecm.deck import model
 from fecm.deck.grid import Grid, graded, lines, uniform
 from fecm.deck.model import Deck, Impact, NodeValues, Patch, Ply, Projectile, Segment
 from fecm.mechanics.interpolation import interpolate
+from fecm.mechanics.reduced_plate import reduced_plate
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
@@ -141,3 +142,18 @@ def _stretching_impact() -> Sequence[Value]:
     found = decks.result_of(made)
     balance = np.abs(found.energy.balance_error).max() / found.energy.attributes["initial"]
     return [found.plate_w.max(), found.force.max(), balance]
+
+
+@case
+def _reduced_plate() -> Sequence[Value]:
+    """The first mode of a simply supported square plate with w = h in the middle."""
+    codes = f"{QUARTER} 10101 01110"
+    plate = decks.material(ALUMINIUM, [0.0], THICKNESS)
+    side = 200.0 * THICKNESS
+    made = decks.quarter_plate(4, plate, (), 0.0, codes, STRETCHES, side)
+    stretched = build_plate(made, generate(made))
+    load = np.zeros((len(stretched.mesh.coordinates), 5))
+    load[0, 2] = 1.0
+    mode = reduced_plate(stretched, load, 1)
+    q = np.array([[THICKNESS / mode.deflection[0]]])
+    return [float(mode.internal_forces(q)[0, 0] / (mode.stiffness[0] * q[0, 0]))]

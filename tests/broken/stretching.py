@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fecm.mechanics import membrane
+from fecm.mechanics import membrane, reduced_plate
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.membrane import Membrane, QuadraticStrains
 from tests.breaks import Breaks, changed, in_numpy, instead
@@ -51,5 +51,11 @@ BREAKS: Breaks = {
     "a strain energy without the quadratic strains' share": (
         in_numpy(changed(Membrane, "forces", lambda found: (found[0], 0.0))),
         {"stretching-impact": ("worst",)},
+    ),
+    "a quartic energy of the reduced model 2 % too large": (
+        changed(
+            reduced_plate, "_integrated", lambda found: found._replace(quartic=1.02 * found.quartic)
+        ),
+        {"reduced-plate": ("force",)},
     ),
 }  # fmt: skip
