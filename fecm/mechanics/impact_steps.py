@@ -56,6 +56,24 @@ COLUMNS = (
     "station",  # deformation of the projectile at the dof of :class:`ImpactSteps`
 )
 
+FIELDS = 4_000_000  # numbers of the displacement fields that one call of the kernels stores
+
+
+@frozen
+class Pace:
+    """How many steps are taken until the observers of a run are called."""
+
+    most: int  # steps
+    work: int  # steps times equations
+
+    def interval(self, neq: int) -> int:
+        """Steps between two calls, of a plate with a number of equations."""
+        return max(1, min(self.most, self.work // neq))
+
+
+SINGLY = Pace(most=64, work=100_000)  # where each step is a call of Python
+TOGETHER = Pace(most=4096, work=20_000_000)  # where the kernels take many
+
 
 class LawKind(IntEnum):
     """Permanent indentation of a contact law."""

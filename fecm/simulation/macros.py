@@ -14,6 +14,7 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.deck.macros import WORDS, Body, load_factor, number
 from fecm.deck.model import Macro
+from fecm.mechanics.impact_steps import FIELDS
 from fecm.mechanics.membrane import strains_of_deflection
 from fecm.mechanics.solutions import ConvergenceError, modes, reactions
 from fecm.mechanics.stiffness_product import SAFE
@@ -53,9 +54,6 @@ def proportional_load(run: Simulation, n: float) -> None:
         state.constant_factor = load_factor(tables[state.table], 0.0)
     if "prop-contact" in run.options.slips:
         state.prop_force = run.load_factor(state.clock)
-
-
-FIELDS = 4_000_000  # numbers of the displacement fields that one call of the kernels stores
 
 
 def impact_step(run: Simulation, n: int) -> None:

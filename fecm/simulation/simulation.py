@@ -12,6 +12,7 @@ import numpy as np
 from fecm._dataclasses import frozen, mutable
 from fecm._typing import Floats
 from fecm.deck.macros import load_factor
+from fecm.mechanics.impact_steps import SINGLY, TOGETHER
 from fecm.mechanics.solutions import Tangent
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.problem import Problem
@@ -25,18 +26,6 @@ from fecm.simulation.state import RunState
 if TYPE_CHECKING:
     from fecm.mechanics.exposures import FailureEnvelope
     from fecm.mechanics.failure_monitor import FailureMonitor
-
-
-@frozen
-class Pace:
-    """How often the observers are called."""
-
-    most: int  # steps between two calls
-    work: int  # steps times equations between two calls
-
-
-SINGLY = Pace(most=64, work=100_000)  # where each step is a call of Python
-TOGETHER = Pace(most=4096, work=20_000_000)  # where the kernels take many
 
 
 @frozen
@@ -77,7 +66,7 @@ class Simulation:
         self.interpreter = Interpreter(problem.program)
         pace = SINGLY if self.model.steps is None else TOGETHER
         # Steps between two calls of the observers.
-        self.interval = max(1, min(pace.most, pace.work // self.model.plate.neq))
+        self.interval = pace.interval(self.model.plate.neq)
         limit = None if options.slips else options.energy_limit
         # Without a reference to the run, which would keep it alive.
         on_block = partial(state.monitor.add, limit=limit, threshold=problem.threshold)
