@@ -18,11 +18,11 @@ import numpy as np
 from fecm.api import load_deck
 from fecm.plot import style
 from fecm.plot.kinds import Picture
-from fecm.plot.pictures import save
-from fecm.studies.estimate import LARGE, SMALL, estimate
-from fecm.sweeps.api import carry_out
+from fecm.plot.pictures import save_picture
+from fecm.studies.estimate import LARGE, SMALL, quick_estimate
+from fecm.sweeps.api import carry_out_plan
 from fecm.sweeps.plan import plan
-from fecm.verification.decks import result_of
+from fecm.verification.decks import run_of_deck
 from fecm.verification.impacts import struck_square
 
 ROOT = Path(__file__).parent.parent
@@ -40,16 +40,16 @@ def study() -> dict[str, list[float]]:
     found["ratio"] = [float(row["M/Mp"]) for row in rows]
     found["series"] = [float(row["peak exact series N"]) for row in rows]
     (problem,) = load_deck(struck_square(masses[0], END).to_text()).problems
-    swept = carry_out(problem, plan(problem, [{"rod_mass": m} for m in masses], history=False))
+    swept = carry_out_plan(problem, plan(problem, [{"rod_mass": m} for m in masses], history=False))
     found["sweep kernel"] = [float(peak) for peak in swept["peak_force"]]
     for mass, ratio, peak, time in zip(
         masses, found["ratio"], found["series"], swept["time_of_peak"], strict=True
     ):
         deck = struck_square(mass, 1.05 * float(time))
         (problem,) = load_deck(deck.to_text()).problems
-        for model in estimate(problem).models:
+        for model in quick_estimate(problem).models:
             found[model.name].append(model.impact.peak)
-        found["run"].append(float(result_of(deck).force.max()))
+        found["run"].append(float(run_of_deck(deck).force.max()))
         line = [f"{found[name][-1] / peak - 1.0:+8.1%}" for name in NAMES[:2]]
         kernel = found["sweep kernel"][len(found["run"]) - 1]
         line += [f"{value / peak - 1.0:+8.1%}" for value in (kernel, found["run"][-1])]
@@ -88,4 +88,4 @@ def picture(found: dict[str, list[float]]) -> Picture:
 
 if __name__ == "__main__":
     place = ROOT / "docs" / "damage-models.png"
-    save(picture(study()), Path(sys.argv[1]) if len(sys.argv) > 1 else place)
+    save_picture(picture(study()), Path(sys.argv[1]) if len(sys.argv) > 1 else place)

@@ -22,7 +22,7 @@ import numpy as np
 import fecm
 from fecm.plot import style
 from fecm.plot.kinds import Picture
-from fecm.plot.pictures import save
+from fecm.plot.pictures import save_picture
 
 ROOT = Path(__file__).parent.parent
 DATA = ROOT / "tests" / "data" / "measured_areas.csv"
@@ -147,4 +147,4 @@ if __name__ == "__main__":
     reached = thresholds(found)
     areas(found, reached)
     place = ROOT / "docs" / "measured-areas.png"
-    save(picture(found, reached), Path(sys.argv[1]) if len(sys.argv) > 1 else place)
+    save_picture(picture(found, reached), Path(sys.argv[1]) if len(sys.argv) > 1 else place)

@@ -16,29 +16,29 @@ from pathlib import Path
 import numpy as np
 
 from fecm.deck import Deck
-from fecm.deck.grid import Grid, Section, uniform
+from fecm.deck.grid import ElementGrid, GridSection, uniform_section
 from fecm.deck.model import Indentation, Patch, Ply, Projectile, Shear
 from fecm.plot import style
 from fecm.plot.kinds import Picture
-from fecm.plot.pictures import save
+from fecm.plot.pictures import save_picture
 from fecm.problem.generate import generate
-from fecm.problem.refine import refined
-from fecm.verification.decks import impact_program, material, result_of, struck_plate
+from fecm.problem.refine import refined_deck
+from fecm.verification.decks import impact_program, material, run_of_deck, struck_plate
 
 END = 8.0e-4
 RIGHT = (77.2, 85.4)
 KINDS = {"point force": (), "patch, 0.327 h": (Patch(), Shear(assumed=True))}
 GRIDS = {
-    "equal": Grid(uniform(6.0, 12), uniform(4.0, 8)),
-    "report's": Grid(
-        [Section(0.0, 1.5, 3), Section(1.5, 4.5, 8), Section(4.5, 6.0, 3)],
-        [Section(0.0, 0.5, 1), Section(0.5, 3.5, 8), Section(3.5, 4.0, 1)],
+    "equal": ElementGrid(uniform_section(6.0, 12), uniform_section(4.0, 8)),
+    "report's": ElementGrid(
+        [GridSection(0.0, 1.5, 3), GridSection(1.5, 4.5, 8), GridSection(4.5, 6.0, 3)],
+        [GridSection(0.0, 0.5, 1), GridSection(0.5, 3.5, 8), GridSection(3.5, 4.0, 1)],
     ),
 }
 HALVINGS = {"equal": 3, "report's": 2}
 
 
-def plate(grid: Grid) -> Deck:
+def plate(grid: ElementGrid) -> Deck:
     """Build the report's plate, hit by a rigid mass."""
     half = (0.0, 45.0, 0.0, -45.0, 0.0) * 2
     ply = Ply(0.000148, 0.3, 17.5e6, 1.15e6, 0.8e6, 0.8e6, 0.8e6)
@@ -49,7 +49,7 @@ def plate(grid: Grid) -> Deck:
 
 def peaks(deck: Deck, dt: float) -> tuple[float, float]:
     """Peak forces of the first and of the second contact (lb)."""
-    found = result_of(replace(deck, macros=impact_program(dt, round(END / dt)), text=""))
+    found = run_of_deck(replace(deck, macros=impact_program(dt, round(END / dt)), text=""))
     first = found.time < 5e-4
     return float(found.force[first].max()), float(found.force[~first].max())
 
@@ -66,7 +66,7 @@ def study() -> dict[tuple[str, str], list[tuple[int, float, float]]]:
                 rows.setdefault((mesh, kind), []).append(found)
                 print(f"{mesh:10}{kind:16}{found[0]:6}{found[1]:8.2f}{found[2]:8.2f}", flush=True)
             if level < HALVINGS[mesh]:
-                deck, dt = refined(deck, generate(deck)), dt / 2.0
+                deck, dt = refined_deck(deck, generate(deck)), dt / 2.0
     return rows
 
 
@@ -102,4 +102,4 @@ def picture(rows: dict[tuple[str, str], list[tuple[int, float, float]]]) -> Pict
 
 if __name__ == "__main__":
     place = Path(__file__).parent.parent / "docs" / "patch-mesh.png"
-    save(picture(study()), Path(sys.argv[1]) if len(sys.argv) > 1 else place)
+    save_picture(picture(study()), Path(sys.argv[1]) if len(sys.argv) > 1 else place)

@@ -26,7 +26,7 @@ from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.reader import Reader
 from fecm.problem.build import RunOptions, build_model
-from fecm.sweeps.api import problem_of
+from fecm.sweeps.api import checked_problem
 
 
 def in_columns(text: str) -> str:
@@ -82,7 +82,7 @@ def main() -> None:
                 lambda text=text: Reader(text).problems(),
                 lambda text=text: model(text),
                 deck.to_text,
-                lambda deck=deck: problem_of(deck),
+                lambda deck=deck: checked_problem(deck),
             )
             figures = "".join(f"{cost(work, options.rounds):9.3f}" for work in works)
             print(f"{deck.control.numel:10d}  {form:8}{figures}", flush=True)

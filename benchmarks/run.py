@@ -38,7 +38,7 @@ from figures import keep
 import fecm
 from fecm.api import load_deck
 from fecm.deck import Deck
-from fecm.deck.grid import Grid, Section
+from fecm.deck.grid import ElementGrid, GridSection
 from fecm.deck.macros import compile_program
 from fecm.deck.model import (
     Boundary,
@@ -60,7 +60,7 @@ from fecm.problem.generate import generate
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.results.summary import about_run
-from fecm.simulation.run import run
+from fecm.simulation.run import run_program
 from fecm.simulation.simulation import Simulation
 
 HERE = Path(__file__).parent
@@ -84,20 +84,24 @@ def refined(times: int, aside: int = 0) -> Deck:
     The impact is `aside` nodes beside the middle.
     """
     columns = [
-        Section(0.0, 1.5, 3 * times),
-        Section(1.5, 4.5, 8 * times),
-        Section(4.5, 6.0, 3 * times),
+        GridSection(0.0, 1.5, 3 * times),
+        GridSection(1.5, 4.5, 8 * times),
+        GridSection(4.5, 6.0, 3 * times),
     ]
-    rows = [Section(0.0, 0.5, times), Section(0.5, 3.5, 8 * times), Section(3.5, 4.0, times)]
-    return on_grid(Grid(columns, rows), aside)
+    rows = [
+        GridSection(0.0, 0.5, times),
+        GridSection(0.5, 3.5, 8 * times),
+        GridSection(3.5, 4.0, times),
+    ]
+    return on_grid(ElementGrid(columns, rows), aside)
 
 
 def even(count: int) -> Deck:
     """The report's plate of equal elements, so many in each direction."""
-    return on_grid(Grid([Section(0.0, 6.0, count)], [Section(0.0, 4.0, count)]))
+    return on_grid(ElementGrid([GridSection(0.0, 6.0, count)], [GridSection(0.0, 4.0, count)]))
 
 
-def on_grid(grid: Grid, aside: int = 0) -> Deck:
+def on_grid(grid: ElementGrid, aside: int = 0) -> Deck:
     """The report's plate with another mesh; the impact is `aside` nodes beside the middle."""
     deck = report()
     boundary = grid.boundary((1, 1, 0, 0, 0), {})
@@ -263,8 +267,8 @@ class Run:
 
     def take(self, steps: int) -> None:
         """Run a deck of so many steps."""
-        with hdf5_writer.writing(self.path) as sink:
-            run(Simulation(checked(self.deck, steps), sink, self.options))
+        with hdf5_writer.result_writing(self.path) as sink:
+            run_program(Simulation(checked(self.deck, steps), sink, self.options))
 
 
 class Loop(Protocol):

@@ -23,7 +23,7 @@ from fecm.authoring.mesh import InPlane
 from fecm.authoring.plate import Support
 from fecm.plot import style
 from fecm.plot.kinds import Picture
-from fecm.plot.pictures import save
+from fecm.plot.pictures import save_picture
 
 ROOT = Path(__file__).parent.parent
 THICKNESS = 2.0
@@ -160,4 +160,4 @@ def picture(table: dict[str, list[tuple[float, float, float]]]) -> Picture:
 
 if __name__ == "__main__":
     place = ROOT / "docs" / "assumptions-stretching.png"
-    save(picture(study()), Path(sys.argv[1]) if len(sys.argv) > 1 else place)
+    save_picture(picture(study()), Path(sys.argv[1]) if len(sys.argv) > 1 else place)

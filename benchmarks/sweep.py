@@ -30,11 +30,11 @@ from run import HERE, Plain, checked, report
 from run import seconds as processor_time
 
 import fecm
+from fecm.authoring.case import Case, Value
+from fecm.authoring.cases import parse_vary
+from fecm.authoring.vary import apply_case
 from fecm.mechanics import kernels
 from fecm.sweeps.batch import _prepared
-from fecm.sweeps.case import Case, Value
-from fecm.sweeps.grid import parse_vary
-from fecm.sweeps.vary import apply_case
 
 DECK = HERE.parent / "decks" / "impact-115.inp"
 VARY = ("--vary", "velocity=50:300:40", "--vary", "k=1e6:3e6:25")

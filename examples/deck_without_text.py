@@ -6,7 +6,7 @@ other.
 """
 
 import fecm
-from fecm.plot.pictures import plot
+from fecm.plot.pictures import draw_results
 
 deck = fecm.impact(
     fecm.Plate.rectangle((100, 100), (10, 10), support="clamped", grading=2.0),
@@ -25,7 +25,7 @@ print(f"{result.metrics['peak_force']:.0f} N, {1e3 * result.metrics['contact_tim
 # Any value of a deck can be changed afterwards; here the same mass hits faster.
 faster = fecm.run_one(deck.with_(velocity=2000))
 print(f"{faster.metrics['peak_force']:.0f} N at 2 m/s")
-plot("loop", {"1.5 m/s": result, "2 m/s": faster}, "faster.png", against="displacement")
+draw_results("loop", {"1.5 m/s": result, "2 m/s": faster}, "faster.png", against="displacement")
 
 # %%
 # The deck begins like this; ``Path("plate.inp").write_text(deck.to_text())`` writes it.

@@ -6,7 +6,7 @@ with these four methods is a :class:`law <fecm.Law>`.
 """
 
 import fecm
-from fecm.plot.pictures import plot
+from fecm.plot.pictures import draw_results
 
 
 class Yielding:
@@ -33,4 +33,4 @@ deck = fecm.read_one(fecm.examples.path("impact-patch.inp"))
 results = {"deck": fecm.run_one(deck), "yielding": fecm.run_one(deck, law=Yielding())}
 for name, result in results.items():
     print(f"{name}: {result.force.max():.1f} lbf")
-plot("loop", results, "laws.png")
+draw_results("loop", results, "laws.png")

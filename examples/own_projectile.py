@@ -8,7 +8,7 @@ head strikes alone at first, and the carriage follows.
 """
 
 import fecm
-from fecm.plot.pictures import plot
+from fecm.plot.pictures import draw_results
 
 
 class SpringMounted:
@@ -32,4 +32,4 @@ results = {name: fecm.run_one(deck, projectile=one) for name, one in projectiles
 for name, result in results.items():
     stored = result.energy.projectile_strain.max()
     print(f"{name}: {result.force.max():.1f} lbf, up to {stored:.3f} lbf in in the spring")
-plot("force", results, "projectiles.png")
+draw_results("force", results, "projectiles.png")

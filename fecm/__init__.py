@@ -28,17 +28,13 @@ if TYPE_CHECKING:
     from fecm.deck.model import Deck, Ply
     from fecm.deck.reader import read_deck
     from fecm.identification.identify import Identification, identify
-    from fecm.location.errors import LocateError
-    from fecm.location.file import load as load_location
     from fecm.location.locate import locate
-    from fecm.location.location import Location
+    from fecm.location.location import LocateError, Location, load_location
     from fecm.mechanics.contact_law import ContactPoint, Law
-    from fecm.mechanics.failure import Strengths
-    from fecm.mechanics.own_criterion import CriterionError, FailureCriterion
+    from fecm.mechanics.failure import CriterionError, FailureCriterion, Strengths
     from fecm.mechanics.own_law import LawError
-    from fecm.mechanics.own_projectile import LinearProjectile, ProjectileError
     from fecm.mechanics.plate_motion import DivergenceError
-    from fecm.mechanics.projectile import RigidMass, Rod
+    from fecm.mechanics.projectile import LinearProjectile, ProjectileError, RigidMass, Rod
     from fecm.problem.plate_mesh import MeshError
     from fecm.results.diff import assert_same, diff
     from fecm.results.difference import Difference
@@ -49,8 +45,7 @@ if TYPE_CHECKING:
     from fecm.sweeps.api import sweep
     from fecm.sweeps.estimate import estimate
     from fecm.sweeps.mesh_error import MeshErrorEstimate, mesh_error
-    from fecm.sweeps.result import SweepResult
-    from fecm.sweeps.result_file import load as load_sweep
+    from fecm.sweeps.result import SweepResult, load_sweep
     from fecm.verification import verify
 
 __all__ = [
@@ -116,26 +111,26 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
     _HOMES = {
         "Contact": ("fecm.authoring.contact", "Contact"),
         "ContactPoint": ("fecm.mechanics.contact_law", "ContactPoint"),
-        "CriterionError": ("fecm.mechanics.own_criterion", "CriterionError"),
+        "CriterionError": ("fecm.mechanics.failure", "CriterionError"),
         "Deck": ("fecm.deck.model", "Deck"),
         "DeckCheck": ("fecm.api", "DeckCheck"),
         "DeckError": ("fecm.deck.findings", "DeckError"),
         "Difference": ("fecm.results.difference", "Difference"),
         "DivergenceError": ("fecm.mechanics.plate_motion", "DivergenceError"),
         "ExtensionError": ("fecm._extensions", "ExtensionError"),
-        "FailureCriterion": ("fecm.mechanics.own_criterion", "FailureCriterion"),
+        "FailureCriterion": ("fecm.mechanics.failure", "FailureCriterion"),
         "Identification": ("fecm.identification.identify", "Identification"),
         "Laminate": ("fecm.authoring.laminate", "Laminate"),
         "Law": ("fecm.mechanics.contact_law", "Law"),
         "LawError": ("fecm.mechanics.own_law", "LawError"),
-        "LinearProjectile": ("fecm.mechanics.own_projectile", "LinearProjectile"),
-        "LocateError": ("fecm.location.errors", "LocateError"),
+        "LinearProjectile": ("fecm.mechanics.projectile", "LinearProjectile"),
+        "LocateError": ("fecm.location.location", "LocateError"),
         "Location": ("fecm.location.location", "Location"),
         "MeshError": ("fecm.problem.plate_mesh", "MeshError"),
         "MeshErrorEstimate": ("fecm.sweeps.mesh_error", "MeshErrorEstimate"),
         "Plate": ("fecm.authoring.plate", "Plate"),
         "Ply": ("fecm.deck.model", "Ply"),
-        "ProjectileError": ("fecm.mechanics.own_projectile", "ProjectileError"),
+        "ProjectileError": ("fecm.mechanics.projectile", "ProjectileError"),
         "Result": ("fecm.results.result", "Result"),
         "RigidMass": ("fecm.mechanics.projectile", "RigidMass"),
         "Rod": ("fecm.mechanics.projectile", "Rod"),
@@ -150,8 +145,8 @@ if not TYPE_CHECKING:  # type checkers know the names from the imports above
         "identify": ("fecm.identification.identify", "identify"),
         "impact": ("fecm.authoring.impact", "impact"),
         "load": ("fecm.results.result", "load"),
-        "load_location": ("fecm.location.file", "load"),
-        "load_sweep": ("fecm.sweeps.result_file", "load"),
+        "load_location": ("fecm.location.location", "load"),
+        "load_sweep": ("fecm.sweeps.result", "load"),
         "locate": ("fecm.location.locate", "locate"),
         "materials": ("fecm.deck.catalogue", "materials"),
         "mesh_error": ("fecm.sweeps.mesh_error", "mesh_error"),

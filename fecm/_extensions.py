@@ -7,21 +7,21 @@ from enum import StrEnum
 from fecm._errors import FecmError, did_you_mean
 
 
-class Group(StrEnum):
+class EntryPoints(StrEnum):
     """Groups of entry points that fecm looks up."""
 
     LAWS = "fecm.laws"
     CRITERIA = "fecm.criteria"
 
 
-WHAT = {Group.LAWS: "contact law", Group.CRITERIA: "failure criterion"}
+WHAT = {EntryPoints.LAWS: "contact law", EntryPoints.CRITERIA: "failure criterion"}
 
 
 class ExtensionError(FecmError, ValueError):
     """No installed package offers an object by a name, or it can't be imported."""
 
 
-def installed(group: Group, name: str) -> object:
+def installed(group: EntryPoints, name: str) -> object:
     """Load the entry point of a group by its name.
 
     Raises ExtensionError if there is none, several packages have one, or it can't be imported.

@@ -179,7 +179,7 @@ def beside(path: Path, *, overwrite: bool = True, follow: bool = True) -> Iterat
 
 
 @contextlib.contextmanager
-def writing(path: Path, *, overwrite: bool) -> Iterator[TextIO]:
+def open_for_writing(path: Path, *, overwrite: bool) -> Iterator[TextIO]:
     """Open a text file that gets its final name when it is complete."""
     with (
         beside(path, overwrite=overwrite) as partial,

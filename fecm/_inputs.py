@@ -15,7 +15,7 @@ from typing import Any, BinaryIO, TypeVar
 
 from fecm._errors import FecmError
 from fecm._files import NO_WAIT
-from fecm._memory import format_bytes, require
+from fecm._machine import format_bytes, require_memory
 
 LARGEST = 1_000_000_000  # bytes of a file; no mesh or measurement needs more
 LARGEST_SETTINGS = 1_000_000  # bytes of a file of settings, such as tolerances or plies
@@ -55,7 +55,7 @@ def read_input(path: Path, most: int = LARGEST) -> bytes:
             raise InputError(
                 f"{path} has {format_bytes(size)}; no more than {format_bytes(most)} are read"
             )
-        require(BYTES_A_BYTE * size, f"{path}: reading it")
+        require_memory(BYTES_A_BYTE * size, f"{path}: reading it")
         return file.read()
 
 

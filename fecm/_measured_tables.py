@@ -22,7 +22,7 @@ import numpy as np
 from fecm._dataclasses import frozen
 from fecm._errors import StudyError, warn
 from fecm._inputs import decoded, lines_of, read_input
-from fecm._memory import require
+from fecm._machine import require_memory
 from fecm._typing import Floats
 
 Row = tuple[int, list[str]]  # number of the line, and its fields
@@ -85,7 +85,7 @@ _SEPARATOR = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
 
 
 @frozen
-class Table:
+class MeasuredTable:
     """Rows of a file below the names and units of its columns; both are empty if it has none."""
 
     path: Path
@@ -295,7 +295,7 @@ def unit_free(name: str) -> str:
 # Reading ------------------------------------------------------------------------------------------
 
 
-def read_table(path: Path, most: int = sys.maxsize) -> Table:
+def read_table(path: Path, most: int = sys.maxsize) -> MeasuredTable:
     """Read a table; the first line contains names, and the second units, if they aren't numbers.
 
     Raises StudyError if there are more than `most` lines, or the file is not a table;
@@ -305,11 +305,11 @@ def read_table(path: Path, most: int = sys.maxsize) -> Table:
     rows, is_decimal_comma = _rows(path, most)
     skipped, named, below = _heading(rows)
     if not named:
-        return Table(path, (0, []), [], rows, is_decimal_comma)
+        return MeasuredTable(path, (0, []), [], rows, is_decimal_comma)
     head, under = rows[skipped], rows[skipped + 1][1] if below else []
     under = [field.strip("()[] ") for field in under] + [""] * len(head[1])
     units = [unit_in(name) or unit for name, unit in zip(head[1], under, strict=False)]
-    return Table(path, head, units, rows[skipped + 1 + below :], is_decimal_comma)
+    return MeasuredTable(path, head, units, rows[skipped + 1 + below :], is_decimal_comma)
 
 
 def _heading(rows: list[Row]) -> tuple[int, bool, bool]:
@@ -339,7 +339,7 @@ def _rows(path: Path, most: int) -> tuple[list[Row], bool]:
     line_count = 1 + max(data.count(b"\n"), data.count(b"\r"))
     field_count = line_count + sum(data.count(mark) for mark in (b",", b";", b"\t", b" "))
     needed = LINE_BYTES * line_count + FIELD_BYTES * field_count + COPIES * len(data)
-    require(needed, f"{path}: a table of {line_count} lines")
+    require_memory(needed, f"{path}: a table of {line_count} lines")
     every = lines_of(decoded(data, str(path)).removeprefix("\ufeff"))
     named = _SEPARATOR.fullmatch(every[0]) if every else None
     lines = [

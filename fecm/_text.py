@@ -1,8 +1,72 @@
-"""Values and foreign texts in one short line for any terminal."""
+"""Values for :func:`json.dumps`.
+
+Tables of texts: for the terminal, for notebooks, and the header of a CSV.
+
+Values and foreign texts in one short line for any terminal.
+"""
 
 from __future__ import annotations
 
+import math
 import sys
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TypeAlias
+
+Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | float | bool | None"
+
+
+def jsonable(value: object) -> Json:
+    """Convert to a value that :func:`json.dumps` writes as valid JSON.
+
+    Infinities and NaN become texts, and so does any other type.
+
+    Examples
+    --------
+    >>> jsonable({"peak": 3.5, "time": float("nan"), "slips": ("tapes",)})
+    {'peak': 3.5, 'time': 'NaN', 'slips': ['tapes']}
+    """
+    import json  # 2 ms at start, and few commands write JSON
+
+    match value:
+        case Mapping():
+            return {str(key): jsonable(item) for key, item in value.items()}
+        case list() | tuple():
+            return [jsonable(item) for item in value]
+        case float() if not math.isfinite(value):
+            return json.dumps(value)
+        case None | bool() | int() | float():
+            return value
+        case _:
+            return str(value)
+
+
+def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Lines of a table, each column as wide as its longest text."""
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
+
+
+def csv_line(texts: Iterable[str]) -> str:
+    """A line of CSV with its end; texts with commas or quotes are quoted."""
+    import csv  # only where a table is written
+    import io
+
+    line = io.StringIO()
+    csv.writer(line, lineterminator="\n").writerow(texts)
+    return line.getvalue()
+
+
+def html_table(title: str, rows: Iterable[tuple[str, str]]) -> str:
+    """Return a table of two columns with a title."""
+    from html import escape  # 1 ms, only in notebooks
+
+    cells = (
+        f"<tr><th style='text-align:left'>{escape(name)}</th>"
+        f"<td style='text-align:left'>{escape(text)}</td></tr>"
+        for name, text in rows
+    )
+    return f"<table><caption>{escape(title)}</caption>{''.join(cells)}</table>"
+
 
 DIGITS = 4  # of computed values that are printed; the model's errors are per cent
 
@@ -23,10 +87,10 @@ def significant(value: float, digits: int = DIGITS) -> str:
     return f"{float(f'{value:.{digits}g}'):.{max(digits, 6)}g}"
 
 
-def shown(value: object, width: int = 60, *, exact: bool = False) -> str:
+def short_text(value: object, width: int = 60, *, exact: bool = False) -> str:
     """Format a value in one short line; numbers to six digits, or exactly."""
     if isinstance(value, list | tuple):
-        text = "[" + ", ".join(shown(item, width, exact=exact) for item in value) + "]"
+        text = "[" + ", ".join(short_text(item, width, exact=exact) for item in value) + "]"
     elif isinstance(value, float):
         text = repr(value) if exact else f"{value:.6g}"
     else:
@@ -36,12 +100,12 @@ def shown(value: object, width: int = 60, *, exact: bool = False) -> str:
 
 def shown_apart(one: object, other: object, width: int = 60) -> tuple[str, str]:
     """Format two different values in short lines that show where they differ."""
-    short = shown(one, width), shown(other, width)
+    short = short_text(one, width), short_text(other, width)
     if short[0] != short[1]:
         return short
-    whole = [shown(value, sys.maxsize, exact=True) for value in (one, other)]
+    whole = [short_text(value, sys.maxsize, exact=True) for value in (one, other)]
     pairs = zip(*whole, strict=False)
     same = next((n for n, (a, b) in enumerate(pairs) if a != b), min(map(len, whole)))
     begin = max(0, same - width // 2)
     texts = [("…" if begin else "") + text[begin:] for text in whole]
-    return shown(texts[0], width), shown(texts[1], width)
+    return short_text(texts[0], width), short_text(texts[1], width)

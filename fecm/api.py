@@ -12,34 +12,32 @@ from fecm._dataclasses import frozen
 from fecm._errors import OptionsError, warn, warn_once
 from fecm._files import ARGUMENT, check_outputs
 from fecm._progress import once_a_minute
-from fecm._tables import html_table
+from fecm._text import html_table
 from fecm._typing import AnyFile
 from fecm.deck.findings import DeckError, Finding, Severity
 from fecm.deck.model import Deck
-from fecm.deck.reader import Reader, read_deck
-from fecm.deck.source_text import load_text
+from fecm.deck.reader import Reader, load_text, read_deck
 from fecm.mechanics.contact_law import Law
-from fecm.mechanics.own_criterion import FailureCriterion, own_criteria
+from fecm.mechanics.failure import FailureCriterion, own_criteria
 from fecm.mechanics.own_law import own_law
-from fecm.mechanics.own_projectile import LinearProjectile
 from fecm.mechanics.projectile import (
     DeckProjectile,
     Integrator,
+    LinearProjectile,
     MassMatrix,
     RodMethod,
     own_projectile,
 )
-from fecm.problem.build import ENERGY_LIMIT, RunOptions, check_options
-from fecm.problem.check import check as check_problem
-from fecm.problem.check import check_listing
-from fecm.problem.memory import check_memory
+from fecm.problem.build import ENERGY_LIMIT, RunOptions, check_run_options
+from fecm.problem.check import check_listing, check_problem
+from fecm.problem.memory import check_run_memory
 from fecm.problem.problem import Problem
 from fecm.problem.rules.quadrature import HOURGLASS
 from fecm.problem.rules.time_step import UNSTABLE
 from fecm.problem.slips import LISTING, REPORT, active_slips
-from fecm.problem.summary import ProblemSummary, summarise
+from fecm.problem.summary import ProblemSummary, deck_summary
+from fecm.results.hdf5_writer import MemorySink
 from fecm.results.result import Result, load
-from fecm.results.sinks import MemorySink
 from fecm.simulation.run import simulate
 from fecm.simulation.simulation import Simulation
 
@@ -161,7 +159,7 @@ def load_one(deck: str | Path | Deck, mode: str = REPORT) -> Problem:
 def check_loaded(loaded: LoadedDeck) -> DeckCheck:
     """Summarise the problems of a deck that was loaded, if it has no errors."""
     problems = () if loaded.errors() else loaded.problems
-    return DeckCheck(loaded.source, tuple(loaded.findings), tuple(map(summarise, problems)))
+    return DeckCheck(loaded.source, tuple(loaded.findings), tuple(map(deck_summary, problems)))
 
 
 def check(deck: str | Path | AnyFile | Deck, mode: Mode = "report") -> DeckCheck:
@@ -417,7 +415,7 @@ def _run(
     if one:
         _check_one(prepared.problems)
     for problem in prepared.problems:
-        check_options(problem, choices)
+        check_run_options(problem, choices)
     numbers = range(1, 1 + len(prepared.problems))
     paths = [] if output is None else [numbered(Path(output), number) for number in numbers]
     check_outputs(paths, overwrite, [Path(prepared.source)], allowed_by=ARGUMENT)
@@ -425,7 +423,7 @@ def _run(
     _warn_of(prepared)
     results: list[Result] = []
     for problem, path in zip_longest(prepared.problems, paths):
-        check_memory(problem, solver=choices.solver, in_memory=path is None)
+        check_run_memory(problem, solver=choices.solver, in_memory=path is None)
         title = problem.deck.title or prepared.source
         LOGGER.info("%s: %d steps", title, problem.work.steps)
         result = _run_one(problem, choices, path, progress, overwrite=overwrite)
@@ -459,9 +457,9 @@ def _run_one(
         memory = MemorySink()
         report(simulate(problem, memory, choices, [report]))
         return Result(memory.arrays, memory.texts, memory.groups)
-    from fecm.results.hdf5_writer import writing  # 25 ms with h5py
+    from fecm.results.hdf5_writer import result_writing  # 25 ms with h5py
 
-    with writing(path, overwrite=overwrite) as sink:
+    with result_writing(path, overwrite=overwrite) as sink:
         report(simulate(problem, sink, choices, [report]))
     return load(path)
 

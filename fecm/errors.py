@@ -9,34 +9,33 @@ from fecm._errors import FecmError, OptionsError, StudyError
 from fecm._extensions import ExtensionError
 from fecm._files import NoFolderError, OutputError, OutputExistsError
 from fecm._inputs import ContentError, InputError
-from fecm._memory import NotEnoughMemoryError
+from fecm._machine import NotEnoughMemoryError
+from fecm.authoring.case import CasesError
 from fecm.authoring.parameters import ObjectError
 from fecm.deck.findings import DeckError
 from fecm.deck.layup import LayupError
-from fecm.deck.outputs import RowsError
-from fecm.deck.unit_systems import UnitsError
+from fecm.deck.macros import RowsError
+from fecm.deck.units import UnitsError
 from fecm.identification.alignment import IdentifyError
-from fecm.location.errors import LocateError
+from fecm.location.location import LocateError
+from fecm.mechanics.failure import CriterionError
 from fecm.mechanics.half_space import PlyError
-from fecm.mechanics.own_criterion import CriterionError
 from fecm.mechanics.own_law import LawError
-from fecm.mechanics.own_projectile import ProjectileError
 from fecm.mechanics.plate import UnsoundPlateError
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.points import OutsideError, PatchError
+from fecm.mechanics.projectile import ProjectileError
 from fecm.mechanics.reduced_plate import ReductionError
 from fecm.mechanics.solutions import ConvergenceError, SingularStiffnessError
 from fecm.plot.kinds import LackingError, MatplotlibError, PlotError
+from fecm.problem.estimates import NoCurveError
 from fecm.problem.plate_mesh import MeshError
 from fecm.problem.refine import RefineError
-from fecm.problem.static_plate import NoCurveError
-from fecm.report.page import Jinja2Error, ReportError
+from fecm.report.content import Jinja2Error, ReportError
 from fecm.results.diff import IncomparableError
-from fecm.results.errors import ExportError, NotStoredError, ResultFileError, ResultWriteError
+from fecm.results.groups import ExportError, NotStoredError, ResultFileError, ResultWriteError
 from fecm.simulation.checkpoint import CheckpointError
-from fecm.sweeps.case import CasesError
-from fecm.sweeps.parts import DamagedPartError, OtherSweepError
-from fecm.sweeps.schedule import SchedulerError
+from fecm.sweeps.execute import DamagedPartError, OtherSweepError, SchedulerError
 from fecm.verification import UnknownCaseError
 
 __all__ = [

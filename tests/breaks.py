@@ -273,7 +273,7 @@ def of_the_first(exposures: Any) -> Any:
     return np.broadcast_to(exposures[..., :1], exposures.shape)
 
 
-def unturned(plate: laminates.Laminate) -> laminates.Laminate:
+def unturned(plate: laminates.LaminateSection) -> laminates.LaminateSection:
     """A laminate whose plies seem to lie along x."""
     return replace(plate, plies=replace(plate.plies, angles=0.0 * plate.plies.angles))
 

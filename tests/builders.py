@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from fecm.deck.model import Ply
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import gauss
-from fecm.mechanics.laminate import Laminate, laminate
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.mechanics.mesh import MeshArrays
 from fecm.mechanics.projectile import RodState
 
 Floats = NDArray[np.float64]
@@ -43,12 +43,12 @@ GENERAL_ANGLES = (0.0, 30.0, 70.0)
 GENERAL_LAYERS = (0.1, 0.05, 0.15)
 
 
-def report_plate() -> Laminate:
+def report_plate() -> LaminateSection:
     """The report's graphite/epoxy plate of 20 layers."""
     return laminate(REPORT_PLY, REPORT_ANGLES, [REPORT_LAYER] * len(REPORT_ANGLES))
 
 
-def general_plate(turned: float = 0.0) -> Laminate:
+def general_plate(turned: float = 0.0) -> LaminateSection:
     """Stack the general laminate, its fibres turned counter-clockwise by some degrees."""
     return laminate(GENERAL_PLY, [angle + turned for angle in GENERAL_ANGLES], GENERAL_LAYERS)
 
@@ -61,7 +61,7 @@ def isotropic_ply(shear_factor: float = 1.0) -> Ply:
     )
 
 
-def isotropic_plate(thickness: float, shear_factor: float = 1.0) -> Laminate:
+def isotropic_plate(thickness: float, shear_factor: float = 1.0) -> LaminateSection:
     """One layer of the isotropic ply."""
     return laminate(isotropic_ply(shear_factor), [0.0], [thickness])
 
@@ -206,7 +206,7 @@ def without_some_nodes(coordinates: Floats, elements: Ints) -> tuple[Floats, Int
 
 def with_restraints(
     coordinates: Floats, elements: Ints, restrained: Bools, values: Floats | None = None
-) -> Mesh:
+) -> MeshArrays:
     """Put a mesh together.
 
     Parameters
@@ -221,7 +221,7 @@ def with_restraints(
     free = ~restrained.ravel()
     equations = np.where(free, np.cumsum(free), 0).astype(np.int32).reshape(restrained.shape)
     forces = np.zeros(restrained.shape) if values is None else values
-    return Mesh(coordinates, elements, restrained.astype(np.int32), forces, equations)
+    return MeshArrays(coordinates, elements, restrained.astype(np.int32), forces, equations)
 
 
 def nothing(coordinates: Floats) -> Bools:

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fecm.deck import model
-from fecm.deck.grid import Grid, Section, uniform
+from fecm.deck.grid import ElementGrid, GridSection, uniform_section
 from fecm.verification import decks
 
 PLY = model.Ply(1.57e-9, 0.32, 171420.0, 9080.0, 5290.0, 5290.0, 3242.9)
@@ -28,23 +28,27 @@ IMPACT = (model.Projectile(0, 0, 2e-5), decks.elastic(5e4))
 PANELS = ((0.0, 0.0), (0.0, 1000.0), (0.0, 500.0), (500.0, 0.0))
 
 
-def mesh(along: int) -> Grid:
+def mesh(along: int) -> ElementGrid:
     """Equal elements of 3:2 sides."""
-    return Grid(uniform(SIDES[0], along), uniform(SIDES[1], along * 2 // 3))
+    return ElementGrid(uniform_section(SIDES[0], along), uniform_section(SIDES[1], along * 2 // 3))
 
 
-def fine_middle(number: int) -> Grid:
+def fine_middle(number: int) -> ElementGrid:
     """So many elements across the 40 mm in the middle, and larger ones around."""
-    return Grid(
-        [Section(0.0, 130.0, 8), Section(130.0, 170.0, number), Section(170.0, 300.0, 8)],
-        [Section(0.0, 80.0, 5), Section(80.0, 120.0, number), Section(120.0, 200.0, 5)],
+    return ElementGrid(
+        [
+            GridSection(0.0, 130.0, 8),
+            GridSection(130.0, 170.0, number),
+            GridSection(170.0, 300.0, 8),
+        ],
+        [GridSection(0.0, 80.0, 5), GridSection(80.0, 120.0, number), GridSection(120.0, 200.0, 5)],
     )
 
 
 def panel(
     radii: tuple[float, ...],
     macros: str,
-    grid: Grid | None = None,
+    grid: ElementGrid | None = None,
     *,
     others: Iterable[model.Segment] = (),
     load: float = 0.0,
@@ -58,14 +62,14 @@ def panel(
     curved = [model.Curvature(*radii)] if any(radii) else []
     plate = decks.material(PLY, angles, THICKNESS / len(angles), points=points)
     patch = model.Patch("DISC", 4.0, x, y, load)
-    held = decks.supports(grid, codes)
+    held = decks.restraints(grid, codes)
     segments = (held, plate, decks.MITC, patch, *curved, *others)
     return decks.deck(grid, segments, decks.program(macros))
 
 
 def struck(
     radii: tuple[float, ...],
-    grid: Grid,
+    grid: ElementGrid,
     dt: float,
     steps: int,
     *,

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from fecm.deck import model
-from fecm.deck.grid import Grid, boundary_cards, lines, uniform
+from fecm.deck.grid import ElementGrid, boundary_cards, grid_lines, uniform_section
 from fecm.deck.model import (
     Deck,
     ElementNodes,
@@ -76,10 +76,10 @@ def struck_rectangle(case: str, n: int, velocity: float, end: float) -> Deck:
     else:
         a, b, k = 125.0, 75.0, 5e4
         plate = decks.material(CROSS, [0.0, 90.0, 0.0, 90.0, 90.0, 0.0, 90.0, 0.0], 0.25)
-    grid = Grid(uniform(a, n), uniform(b, n))
+    grid = ElementGrid(uniform_section(a, n), uniform_section(b, n))
     middle = grid.nearest(a / 2.0, b / 2.0)[0]
     segments = (
-        decks.supports(grid, SUPPORTS[edges]),
+        decks.restraints(grid, SUPPORTS[edges]),
         Projectile(0, 0, MASS),
         Impact(middle, 3, velocity),
         Patch("HERT", 8.0, a / 2.0, b / 2.0),
@@ -98,14 +98,14 @@ def pulsed_square(n: int, pressure: float, end: float, duration: float = 20e-6) 
     w is stored at every fiftieth step.  The edges hold the displacement across them.
     """
     side = 100.0
-    grid = Grid(uniform(side / 2.0, n), uniform(side / 2.0, n))
-    places = np.array(lines(grid.columns))
-    along = decks.weights(lines(grid.columns)) * np.cos(np.pi * places / side)
+    grid = ElementGrid(uniform_section(side / 2.0, n), uniform_section(side / 2.0, n))
+    places = np.array(grid_lines(grid.columns))
+    along = decks.weights(grid_lines(grid.columns)) * np.cos(np.pi * places / side)
     loads = np.zeros((grid.up, grid.across, 5))
     loads[..., 2] = pressure * np.outer(along, along)
     loads[-1] = loads[:, -1] = 0.0  # a value there would be a displacement
     segments = (
-        decks.supports(grid, "00000 10010 01001 10101 01110"),
+        decks.restraints(grid, "00000 10010 01001 10101 01110"),
         decks.forces(loads),
         decks.MITC,
         model.Nonlinear(),

@@ -14,9 +14,9 @@ from scipy.sparse.linalg import splu
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.interpolation import interpolate
-from fecm.mechanics.laminate import Laminate
-from fecm.mechanics.membrane import Membrane
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.laminate import LaminateSection
+from fecm.mechanics.membrane import MembraneForces
+from fecm.mechanics.mesh import MeshArrays
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.points import patch_weights
 from fecm.mechanics.solutions import tangent_stiffness
@@ -91,7 +91,7 @@ def held(coordinates: Floats, edge: str, outside: tuple[Bools, Bools]) -> Bools:
 
 
 def rectangle(
-    a: float, b: float, n: int, laminate: Laminate, edge: str, m: int | None = None
+    a: float, b: float, n: int, laminate: LaminateSection, edge: str, m: int | None = None
 ) -> PlateModel:
     """Build a quarter of a rectangular plate with an edge such as ``"clamped_immovable"``."""
     coordinates, elements = quarter_mesh(a, b, n, m)
@@ -102,7 +102,7 @@ def rectangle(
     )
 
 
-def disc(radius: float, n: int, laminate: Laminate, edge: str) -> PlateModel:
+def disc(radius: float, n: int, laminate: LaminateSection, edge: str) -> PlateModel:
     """Build a quarter of a circular plate; `edge` holds all directions or none of the rim."""
     coordinates, elements = disc_mesh(radius, n)
     rim = np.isclose(np.hypot(*coordinates.T), radius)
@@ -133,13 +133,14 @@ def patch(plate: PlateModel, shape: str, radius: float) -> Floats:
     mesh = plate.mesh
     places, number, elements = _whole(mesh)
     whole = patch_weights(
-        Mesh(places, elements, np.zeros((len(places), 5), np.int32), np.zeros((len(places), 5)),
+        MeshArrays(places, elements, np.zeros((len(places), 5), np.int32),
+                   np.zeros((len(places), 5)),
              np.ones((len(places), 5), np.int32)), shape, radius, 0.0, 0.0)  # fmt: skip
     share = np.where(np.isclose(mesh.coordinates, 0.0), 0.5, 1.0).prod(axis=1)
     return np.asarray(share * whole[number])
 
 
-def _whole(mesh: Mesh) -> tuple[Floats, NDArray[np.intp], Ints]:
+def _whole(mesh: MeshArrays) -> tuple[Floats, NDArray[np.intp], Ints]:
     """The plate of a quarter: its nodes, the quarter's among them, its elements."""
     orders = (
         (1, 1, (0, 1, 2, 3, 4, 5, 6, 7, 8)),
@@ -172,7 +173,7 @@ def equilibrium(
     Load and weights are (numnp,).  Newton's method with the load's factor as an unknown.
     """
     free = plate.mesh.equations > 0
-    membrane = Membrane(plate)
+    membrane = MembraneForces(plate)
     K, support = plate.stiffness, plate.support
     fields = np.zeros((2, *free.shape))
     fields[0, :, 2], fields[1, :, 2] = load, weights

@@ -11,7 +11,7 @@ from fecm.problem.build import RunOptions
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.simulation.checkpoint import Checkpointer
-from fecm.simulation.run import run as simulate_run
+from fecm.simulation.run import run_program as simulate_run
 from fecm.simulation.simulation import Simulation
 
 
@@ -57,7 +57,7 @@ def run(
 
     problem = problem_of(text)
     names = frozenset(slips.split())
-    with hdf5_writer.writing(path) as sink:
+    with hdf5_writer.result_writing(path) as sink:
         checkpointer = Checkpointer(path, sink)
         simulation = Simulation(problem, sink, RunOptions(names, solver=solver))
         if macros:
@@ -73,7 +73,7 @@ def run(
 
 def stop_at_once(problem: Problem, path: Path) -> None:
     """Stop a run with a checkpoint, as soon as it looks up."""
-    with hdf5_writer.writing(path) as sink:
+    with hdf5_writer.result_writing(path) as sink:
         checkpointer = Checkpointer(path, sink)
 
         def look(simulation: Simulation) -> None:

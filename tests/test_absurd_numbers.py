@@ -12,7 +12,7 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck import DeckError
-from fecm.problem.summary import summarise
+from fecm.problem.summary import deck_summary
 from tests.decks import PROGRAM, small
 from tests.fuzz_decks import FORC, OWN
 
@@ -81,7 +81,7 @@ def test_the_summary_of_a_deck_with_absurd_numbers_warns_of_nothing_in_numpys_wo
     (problem,) = load_deck(text).problems
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        assert summarise(problem).lines()
+        assert deck_summary(problem).lines()
 
 
 @pytest.mark.parametrize(("dt", "code"), [("1e-300", "E515"), ("1e-15", "E515"), ("4e-7", "")])

@@ -16,12 +16,12 @@ from tests.decks import ROOT
 DIRECTIVE = re.compile(r"^\.\. auto(?!module)\w+:: (\S+)\n((?:   :.*\n)*)", re.MULTILINE)
 # Parts of the program that objects hold: nobody who uses them makes or reads one.
 HELD = {
-    "fecm.authoring.fixtures.DropWeight",
-    "fecm.deck.card.Source",
-    "fecm.results.group.Source",
+    "fecm.authoring.plate.DropWeight",
+    "fecm.deck.card.CardSource",
+    "fecm.results.groups.GroupSource",
     "fecm.results.stored.Stored",
-    "fecm.studies.indentation_test.curves.Solution",
-    "fecm.studies.waves.medium.Medium",
+    "fecm.studies.indentation_test.curves.CurveSolution",
+    "fecm.studies.waves.harmonic.Medium",
 }
 
 

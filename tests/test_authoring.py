@@ -14,7 +14,15 @@ from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.format import format_deck
-from fecm.deck.grid import Grid, graded, lines, listed, longest_at, refined, uniform
+from fecm.deck.grid import (
+    ElementGrid,
+    graded,
+    grid_lines,
+    listed_sections,
+    longest_at,
+    refined_sections,
+    uniform_section,
+)
 from fecm.deck.layup import LayupError, parse_layup
 from fecm.deck.model import (
     Allowables,
@@ -154,7 +162,7 @@ def test_a_side_is_refined_to_what_is_asked_and_not_much_further(
     length: float, count: int, part: float, share: float
 ) -> None:
     side = share * length / count
-    made = refined(length, count, part * length, 1.0, side)
+    made = refined_sections(length, count, part * length, 1.0, side)
     assert count <= len(made) < count * (1.0 - np.log(share)) + 8
     assert longest_at(made, part * length) <= side
 
@@ -231,10 +239,10 @@ def test_a_graded_side_fills_its_length_and_is_finest_at_its_centre(
 
 
 def test_the_cards_of_a_grid_generate_its_nodes() -> None:
-    grid = Grid(listed("2*0.5,1*0.25"), uniform(1.0, 2))
+    grid = ElementGrid(listed_sections("2*0.5,1*0.25"), uniform_section(1.0, 2))
     deck = Deck("", Control(35, 6, 1, 2, 5, 9), (grid.coordinates(), grid.element_cards()), ())
     mesh = generate(deck)
-    x, y = np.meshgrid(lines(grid.columns), lines(grid.rows))
+    x, y = np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows))
     np.testing.assert_allclose(
         mesh.coordinates, np.column_stack([x.ravel(), y.ravel()]), atol=1e-12
     )

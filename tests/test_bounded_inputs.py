@@ -84,7 +84,7 @@ def test_a_file_larger_than_any_that_is_meant_is_refused_before_it_is_read(tmp_p
 def test_a_file_that_memory_does_not_hold_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fecm._memory.available", lambda: 200_000_000)
+    monkeypatch.setattr("fecm._machine.available_memory", lambda: 200_000_000)
     path = tmp_path / "large.csv"
     with path.open("wb") as file:
         file.truncate(20_000_000)

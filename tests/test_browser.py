@@ -15,7 +15,7 @@ from pathlib import Path
 import pytest
 
 import fecm
-from fecm.report.page import render
+from fecm.report.content import render
 from fecm.report.report import page_of
 from tests.browser import Browser, find_browser
 from tests.calls import call

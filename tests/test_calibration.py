@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from fecm.studies.rod_test.calibration import calibrate
+from fecm.studies.rod_test.pulse_test import calibrate_transducer
 from tests.calls import assert_unusable, call
 
 Floats = NDArray[np.float64]
@@ -27,7 +27,7 @@ def outputs(noise: float = 0.0, offset: float = 0.0, seed: int = 0) -> tuple[Flo
 
 
 def test_a_clean_test_gives_the_sensitivity_it_was_made_with() -> None:
-    found = calibrate(*outputs(offset=3.0), MASS, C_A)
+    found = calibrate_transducer(*outputs(offset=3.0), MASS, C_A)
     assert found.sensitivity == pytest.approx(C_F, rel=1e-12)
     assert found.offset == pytest.approx(3.0, rel=1e-10)
     assert found.r_squared == pytest.approx(1.0, abs=1e-12)
@@ -41,7 +41,7 @@ def test_noise_leaves_the_truth_inside_the_standard_error_as_often_as_it_should(
     missed = []
     for seed in range(400):
         v_f, v_a = outputs(0.01, seed=seed)
-        found = calibrate(v_f, v_a, MASS, C_A, through_origin=through_origin)
+        found = calibrate_transducer(v_f, v_a, MASS, C_A, through_origin=through_origin)
         missed.append(abs(found.sensitivity - C_F) / found.sensitivity_error)
     # 68.3 % of a normal variable lie inside one standard error, 95.4 % inside two.
     assert np.mean(np.array(missed) < 1.0) == pytest.approx(0.683, abs=0.06)
@@ -50,7 +50,7 @@ def test_noise_leaves_the_truth_inside_the_standard_error_as_often_as_it_should(
 
 def test_the_error_is_that_of_the_textbooks_example() -> None:
     # By hand: x = 0, 1, 2, 3 and y = 0, 1, 1, 2 give 0.6 x + 0.1 with residuals -.1, .3, -.3, .1.
-    found = calibrate(np.array([0.0, 1, 1, 2]), np.array([0.0, 1, 2, 3]), 1.0, 1.0)
+    found = calibrate_transducer(np.array([0.0, 1, 1, 2]), np.array([0.0, 1, 2, 3]), 1.0, 1.0)
     assert found.slope == pytest.approx(0.6)
     assert found.offset == pytest.approx(0.1)
     assert found.slope_error == pytest.approx(np.sqrt(0.2 / 2 / 5))

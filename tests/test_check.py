@@ -15,7 +15,7 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.problem import parts, problem
-from fecm.problem.summary import summarise
+from fecm.problem.summary import deck_summary
 from tests import decks
 from tests.calls import call
 from tests.decks import APPENDIX, DATA, LONG, MESH, PROGRAM, ROOT
@@ -279,7 +279,7 @@ def test_masses_are_shown_in_grams_beside_the_decks_unit() -> None:
     shown = call("check", str(DATA / "plate-100x100x2.inp")).stdout
     assert "plate mass          3.2e-05 N*s^2/mm (32 g)" in shown
     named = re.sub("^COOR", "UNIT\nin lbf s\nCOOR", APPENDIX.read_text(), flags=re.M)
-    lines = summarise(load_deck(named).problems[0]).lines()
+    lines = deck_summary(load_deck(named).problems[0]).lines()
     (line,) = (line for line in lines if "plate mass" in line)
     assert float(line.split("(")[1].split()[0]) == pytest.approx(65.94, rel=1e-3)
     assert line.endswith(" g)")
@@ -287,13 +287,13 @@ def test_masses_are_shown_in_grams_beside_the_decks_unit() -> None:
 
 def test_every_impact_has_its_elements_per_wave_in_the_summary() -> None:
     # The report's mesh: its first peak of 78.7 lb goes down to 75.5 lb on one eight times as fine.
-    view = summarise(load_deck(APPENDIX).problems[0])
+    view = deck_summary(load_deck(APPENDIX).problems[0])
     assert view.elements_per_wave == pytest.approx(6.83, abs=0.01)
     assert view.mesh_error == pytest.approx(78.7 / 75.5 - 1.0, rel=0.5)
     assert re.search(
         r"elements per wave +6\.8 \(mesh error of the peak about", "\n".join(view.lines())
     )
-    frequencies = summarise(load_deck(ROOT / "decks" / "natural-frequencies.inp").problems[0])
+    frequencies = deck_summary(load_deck(ROOT / "decks" / "natural-frequencies.inp").problems[0])
     assert frequencies.elements_per_wave is None
 
 
@@ -356,7 +356,7 @@ def test_a_stiffness_beyond_all_range_is_found_where_the_time_step_is_left_to_th
     text = with_data(" 17500000.", "   1.E+308").replace("DT        .5E-6", "DT          0.0")
     assert codes(text) == ["E417"]
     modes = text[: text.index("MACR")] + "MACR\nLMAS\nEIGE          1\nEND\nSTOP\n"
-    assert np.isnan(summarise(load_deck(modes).problems[0]).critical_time_step)
+    assert np.isnan(deck_summary(load_deck(modes).problems[0]).critical_time_step)
 
 
 def test_a_coupled_laminate_held_in_its_plane_at_every_node_is_a_finding() -> None:
@@ -393,7 +393,7 @@ def test_the_summary_has_impact_kinematics_cure_and_threshold() -> None:
         cure=-155.0,
         giic=0.5,
     )
-    view = summarise(load_deck(deck).problems[0])
+    view = deck_summary(load_deck(deck).problems[0])
     assert (view.velocity, view.cure) == (1000.0, -155.0)
     assert view.energy == pytest.approx(1000.0, rel=1e-12)  # N*mm: 1 J
     lines = "\n".join(view.lines())

@@ -15,14 +15,14 @@ import pytest
 from fecm.api import load_deck
 from fecm.mechanics import kernels
 from fecm.results import hdf5_writer
-from fecm.results.sinks import RowBuffer
+from fecm.results.hdf5_writer import RowBuffer
 from fecm.simulation.checkpoint import (
     Checkpointer,
     CheckpointError,
     checkpoint_of,
     spool_of,
 )
-from fecm.simulation.run import run as simulate_run
+from fecm.simulation.run import run_program as simulate_run
 from fecm.simulation.simulation import Simulation
 from tests.calls import call
 from tests.decks import DATA_CARDS, MESH, small
@@ -305,7 +305,7 @@ def test_a_spool_without_a_checkpoint_is_gone_once_the_next_run_begins(tmp_path:
     path = tmp_path / "run.h5"
     with pytest.raises(StoppedError):
         run(deck(), path, 5)
-    with hdf5_writer.writing(path, overwrite=True) as sink:
+    with hdf5_writer.result_writing(path, overwrite=True) as sink:
         Checkpointer(path, sink)
         assert spool_of(path).exists()  # its checkpoint may be resumed
         checkpoint_of(path).unlink()
@@ -347,7 +347,7 @@ def test_a_checkpoint_that_can_not_be_written_leaves_the_one_before_in_force(
         if len(looks) == 70:
             raise StoppedError
 
-    with contextlib.suppress(StoppedError), hdf5_writer.writing(path) as sink:
+    with contextlib.suppress(StoppedError), hdf5_writer.result_writing(path) as sink:
         checkpointer = Checkpointer(path, sink)
         simulation = Simulation(load_deck(deck()).problems[0], sink, observers=(look,))
         simulation.interval = 1

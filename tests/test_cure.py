@@ -20,17 +20,16 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck.catalogue import MATERIALS, read_plies
-from fecm.deck.grid import lines, uniform
+from fecm.deck.grid import grid_lines, uniform_section
 from fecm.deck.layup import parse_layup
 from fecm.deck.model import Allowables, Cure, Deck, Expansion, Preload
-from fecm.mechanics.failure import CRITERIA, exposure_of, load_factor
-from fecm.mechanics.laminate import Laminate, laminate
-from fecm.mechanics.ply_stresses import PlyStresses
-from fecm.mechanics.residual_stresses import Residual, residual_stresses
+from fecm.mechanics.failure import CRITERIA, exposure_of, failure_load_factor
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.mechanics.ply_stresses import PlyStresses, Residual, residual_stresses
 from fecm.results.criteria import ALL_CRITERIA
 from fecm.results.exposures import LargestExposure, largest_exposures
 from fecm.results.metrics import EXPOSURES
-from fecm.simulation.run import run
+from fecm.simulation.run import run_program
 from fecm.simulation.simulation import Simulation
 from fecm.sweeps import in_full
 from fecm.verification import decks
@@ -46,7 +45,7 @@ ALPHA = Expansion(alpha1=0.02e-6, alpha2=22.5e-6)
 THERMAL = "CURE\n{dt:g},\n,.02E-6,22.5E-6\n\nEXPE"
 
 
-def residual(plate: Laminate, dt: float, free: Expansion = ALPHA) -> Residual:
+def residual(plate: LaminateSection, dt: float, free: Expansion = ALPHA) -> Residual:
     """Residual stresses of a laminate of one material."""
     return residual_stresses(plate, free.alpha1 * dt, free.alpha2 * dt)
 
@@ -65,7 +64,7 @@ def cases() -> dict[tuple[str, float], list[dict[str, str]]]:
 CASES = cases()
 
 
-def plate_of(rows: list[dict[str, str]]) -> Laminate:
+def plate_of(rows: list[dict[str, str]]) -> LaminateSection:
     """The laminate of some rows, two a ply."""
     z = [float(row["z_m"]) for row in rows]
     thicknesses = np.subtract(z[1::2], z[::2]).tolist()
@@ -138,12 +137,12 @@ NAMES = {"max stress": "max_stress", "Tsai-Wu": "tsai_wu", "Puck IFF or FF": "pu
 def bent(load: float, dt: float) -> fecm.Result:
     """A quarter of a simply supported square of a/h = 100 under a sinusoidal load."""
     assert STRENGTHS is not None
-    along = np.cos(np.pi * np.array(lines(uniform(0.5, 8))))
+    along = np.cos(np.pi * np.array(grid_lines(uniform_section(0.5, 8))))
     plate = decks.material(PLY, (0.0, 90.0, 90.0, 0.0), 0.0025, points=3)
     others = [decks.MITC, STRENGTHS, Cure(dt, expansions=(ALPHA,))]
     macros = decks.program("TANG FORM SOLV FAIL")
     pressure = load * np.outer(along, along)
-    return decks.result_of(decks.quarter_plate(8, plate, macros, pressure, others=others))
+    return decks.run_of_deck(decks.quarter_plate(8, plate, macros, pressure, others=others))
 
 
 @pytest.mark.parametrize(
@@ -167,11 +166,15 @@ def test_the_factor_of_a_single_stress_is_that_of_the_closed_form() -> None:
     card = Allowables(1500.0, 1500.0, 40.0, 246.0, 68.0, 68.0, 68.0)
     rest, pull = np.array([0.0, 21.0, 0.0]), np.array([0.0, 10.0, 0.0])
     for name in ("max_stress", "hashin", "puck", "tsai_wu"):
-        assert load_factor(card, CRITERIA[name], rest, pull) == pytest.approx(1.9, rel=1e-11)
-    assert load_factor(card, CRITERIA["max_stress"], rest, -pull) == pytest.approx(26.7, rel=1e-11)
+        assert failure_load_factor(card, CRITERIA[name], rest, pull) == pytest.approx(
+            1.9, rel=1e-11
+        )
+    assert failure_load_factor(card, CRITERIA["max_stress"], rest, -pull) == pytest.approx(
+        26.7, rel=1e-11
+    )
     # Where it fails at rest, and where nothing is added.
-    assert load_factor(card, CRITERIA["max_stress"], 2.0 * rest, pull) == 0.0
-    assert load_factor(card, CRITERIA["tsai_wu"], rest, 0.0 * pull) == np.inf
+    assert failure_load_factor(card, CRITERIA["max_stress"], 2.0 * rest, pull) == 0.0
+    assert failure_load_factor(card, CRITERIA["tsai_wu"], rest, 0.0 * pull) == np.inf
 
 
 # Runs --------------------------------------------------------------------------------------------
@@ -285,13 +288,13 @@ def test_summary_and_json_have_what_the_residual_stresses_contribute(tmp_path: P
 def test_the_factor_acts_on_the_load_alone_under_a_preload() -> None:
     assert STRENGTHS is not None
     plate = decks.material(PLY, (0.0, 90.0, 90.0, 0.0), 0.0025, points=3)
-    along = np.outer(*[np.cos(np.pi * np.array(lines(uniform(0.5, 4))))] * 2)
+    along = np.outer(*[np.cos(np.pi * np.array(grid_lines(uniform_section(0.5, 4))))] * 2)
 
     def largest(load: float) -> LargestExposure:
         others = [decks.MITC, STRENGTHS, Preload(2e5, 1e5), Cure(-50.0, expansions=(ALPHA,))]
         macros = decks.program("TANG FORM SOLV FAIL")
         made = decks.quarter_plate(4, plate, macros, load * along, others=others)
-        return largest_exposures(decks.result_of(made))[0]
+        return largest_exposures(decks.run_of_deck(made))[0]
 
     one = largest(5e4)
     assert one.load_factor is not None
@@ -340,7 +343,7 @@ def test_cases_that_differ_in_the_cure_alone_share_their_motion(
 
     def counted(simulation: Simulation) -> None:
         runs.append(simulation)
-        run(simulation)
+        run_program(simulation)
 
     monkeypatch.setattr(in_full, "run", counted)
     (tmp_path / "d.inp").write_text(struck(0.0).to_text())

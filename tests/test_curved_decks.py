@@ -13,16 +13,16 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import fecm
 from fecm.api import load_deck
+from fecm.authoring.case import CasesError
 from fecm.authoring.parameters import ObjectError
 from fecm.deck.model import Boundary, Curvature, Deck
 from fecm.problem.generate import generate, restraint_codes
 from fecm.problem.plate_mesh import MeshError
-from fecm.problem.summary import summarise
-from fecm.report.page import render
+from fecm.problem.summary import deck_summary
+from fecm.report.content import render
 from fecm.report.report import page_of
-from fecm.results.linear_plate import CURVED
-from fecm.results.summary import summary as summary_of
-from fecm.sweeps.case import CasesError
+from fecm.results.summary import run_summary as summary_of
+from fecm.results.validity import CURVED
 from tests.calls import call, new
 from tests.pictures import plot
 
@@ -195,7 +195,7 @@ def test_the_buckling_load_of_a_coarse_curved_panel_is_an_upper_bound(
     )
     assert "W561" in made.stderr
     (problem,) = load_deck(made.stdout).problems
-    summary = summarise(problem)
+    summary = deck_summary(problem)
     assert summary.buckling_factor == pytest.approx(factor, rel=1e-3)
     assert summary.elements_per_buckle == pytest.approx(1.73 * 2000.0**0.5 / (2000.0 / nx))
     assert f"at most {summary.buckling_factor:.4g} times the preload" in "\n".join(summary.lines())
@@ -238,7 +238,7 @@ def test_exports_have_the_surface(curved: fecm.Result, tmp_path: Path) -> None:
 def test_summaries_say_radii_and_rise(curved: fecm.Result) -> None:
     said = "curved panel      Rx 100 mm, Ry -200 mm, rise 1.375 mm"
     assert said in [line.strip() for line in summary_of(curved)]
-    summary = summarise(load_deck(curved.deck).problems[0])
+    summary = deck_summary(load_deck(curved.deck).problems[0])
     assert summary.curvature == (0.01, -0.005, 0.0)
     assert summary.rise == pytest.approx(1.125 + 0.25)
     assert "  curved panel        Rx 100 mm, Ry -200 mm, rise 1.375 mm" in summary.lines()

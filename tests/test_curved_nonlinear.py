@@ -14,7 +14,7 @@ from fecm.deck import model
 from fecm.mechanics.laminate import laminate
 from fecm.mechanics.plate import PlateModel
 from fecm.results.result import Result
-from fecm.studies.estimate import Estimate, estimate
+from fecm.studies.estimate import QuickEstimate, quick_estimate
 from fecm.verification import decks
 from tests import curved_panels
 from tests.builders import nothing, with_restraints
@@ -125,9 +125,9 @@ def test_a_hinged_roof_carries_the_published_load(thickness: float, limit: float
 
 
 def test_an_estimate_of_a_panel_that_snaps_through_ends_at_the_load_that_it_carries() -> None:
-    def found(radius: float, velocity: float) -> Estimate:
+    def found(radius: float, velocity: float) -> QuickEstimate:
         deck = struck((0.0, radius), mesh(5), 5e-7, 10, others=(NONL,), velocity=velocity)
-        return estimate(load_deck(deck).problems[0])
+        return quick_estimate(load_deck(deck).problems[0])
 
     snapped = found(-500.0, 15000.0)
     assert [one.name for one in snapped.models] == ["infinite plate", "static plate"]
@@ -145,7 +145,7 @@ def test_stresses_at_a_small_load_are_those_of_the_linear_panel(radii: tuple[flo
     """Deflections below 2e-6 mm: the squares of slopes are nothing beside w/R."""
     solved = "LOOP=5 TANG FORM SOLV CONV NEXT STRE"
     bent, linear = (
-        decks.result_of(panel(radii, solved, load=1e-4, others=others)) for others in ([NONL], [])
+        decks.run_of_deck(panel(radii, solved, load=1e-4, others=others)) for others in ([NONL], [])
     )
     for name in ("eps_xx", "eps_yy", "gamma_xy", "N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy"):
         expected = linear[f"stresses/{name}"][-1]
@@ -160,12 +160,12 @@ def test_stresses_at_a_small_load_are_those_of_the_linear_panel(radii: tuple[flo
 def stretched(radius: float, velocity: float, steps: int = 300) -> Result:
     """A panel struck so hard that it stretches, or so softly that it does not."""
     made = struck((0.0, radius), mesh(12), 5e-7, steps, others=(NONL,), velocity=velocity, every=50)
-    return decks.result_of(made)
+    return decks.run_of_deck(made)
 
 
 def test_small_deflections_are_those_of_the_linear_panel() -> None:
     one = stretched(-500.0, 0.1)
-    linear = decks.result_of(struck((0.0, -500.0), mesh(12), 5e-7, 300, velocity=0.1, every=50))
+    linear = decks.run_of_deck(struck((0.0, -500.0), mesh(12), 5e-7, 300, velocity=0.1, every=50))
     close = 1e-5 * linear.history.force.max()
     np.testing.assert_allclose(one.history.force, linear.history.force, rtol=0.0, atol=close)
 

@@ -11,11 +11,11 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck import model
-from fecm.deck.grid import Grid, uniform
+from fecm.deck.grid import ElementGrid, uniform_section
 from fecm.mechanics import kernels
 from fecm.mechanics.points import gages
 from fecm.results.result import Result
-from fecm.studies.estimate import estimate
+from fecm.studies.estimate import quick_estimate
 from fecm.verification import decks
 from tests import curved_panels
 from tests.builders import DATA, Floats, table
@@ -52,7 +52,7 @@ def mean_deflection(found: Result) -> float:
 
 @by_panel(PANELS[0], PANELS[3])
 def test_the_static_deflection_is_that_of_the_series(radii: tuple[float, float]) -> None:
-    found = decks.result_of(panel(radii, STATIC, fine_middle(8), load=1.0))
+    found = decks.run_of_deck(panel(radii, STATIC, fine_middle(8), load=1.0))
     assert mean_deflection(found) == pytest.approx(float(ROWS[radii][curved_panels.W]), rel=1.5e-3)
     assert found.tape3.w.max() == pytest.approx(float(ROWS[radii]["w"]), rel=1e-3)
 
@@ -60,7 +60,7 @@ def test_the_static_deflection_is_that_of_the_series(radii: tuple[float, float])
 @by_panel(PANELS[3])
 def test_membrane_forces_and_moments_are_those_of_the_series(radii: tuple[float, float]) -> None:
     deck = panel(radii, f"{STATIC} STRE", fine_middle(16), load=1.0, points=2)
-    found = decks.result_of(deck)
+    found = decks.run_of_deck(deck)
     away = np.hypot(found.stresses.x - SIDES[0] / 2.0, found.stresses.y - SIDES[1] / 2.0)
     nearest = away < 1.0
     assert np.count_nonzero(nearest) == 4
@@ -71,7 +71,7 @@ def test_membrane_forces_and_moments_are_those_of_the_series(radii: tuple[float,
 
 @by_panel(PANELS[2])
 def test_frequencies_are_those_of_the_series(radii: tuple[float, float]) -> None:
-    found = decks.result_of(panel(radii, "CMAS EIGE=10", mesh(24)))
+    found = decks.run_of_deck(panel(radii, "CMAS EIGE=10", mesh(24)))
     frequencies = found.modes.angular_frequency
     names = ("omega_11", "omega_12", "omega_21", "omega_13")
     wanted = [float(ROWS[radii][name]) for name in names]
@@ -94,7 +94,7 @@ def history(radii: tuple[float, float]) -> dict[str, Floats]:
 @by_panel(PANELS[2])
 def test_an_impact_is_that_of_the_series(radii: tuple[float, float]) -> None:
     dt = 2.13e-7
-    found = decks.result_of(struck(radii, mesh(60), dt, int(DURATION / dt) + 1))
+    found = decks.run_of_deck(struck(radii, mesh(60), dt, int(DURATION / dt) + 1))
     assert found.history.force.max() == pytest.approx(float(ROWS[radii][PEAK]), rel=2e-3)
     wanted = history(radii)
     for name, own in (("force", "force"), ("plate_W", "plate_w")):
@@ -109,7 +109,7 @@ def test_an_impact_is_that_of_the_series(radii: tuple[float, float]) -> None:
 
 
 def every_result(deck: model.Deck) -> dict[str, Floats]:
-    found = decks.result_of(deck)
+    found = decks.run_of_deck(deck)
     return {path: found[path] for path in found}
 
 
@@ -126,7 +126,7 @@ def test_infinite_radii_give_the_bits_of_the_flat_plate() -> None:
 
 def test_the_opposite_curvature_gives_the_same_deflection_and_reversed_membrane_forces() -> None:
     one, other = (
-        decks.result_of(
+        decks.run_of_deck(
             panel((sign * 500.0, sign * 700.0, sign * 900.0), f"{STATIC} STRE", load=1.0)
         )
         for sign in (1.0, -1.0)
@@ -139,10 +139,10 @@ def test_the_opposite_curvature_gives_the_same_deflection_and_reversed_membrane_
 
 
 def test_a_panel_turned_by_90_degrees_with_its_plies_is_the_same() -> None:
-    upright = Grid(uniform(SIDES[1], 8), uniform(SIDES[0], 12))
+    upright = ElementGrid(uniform_section(SIDES[1], 8), uniform_section(SIDES[0], 12))
     turned = tuple(90.0 - angle for angle in ANGLES)
-    one = decks.result_of(panel((500.0, 800.0, 0.0), STATIC, load=1.0))
-    other = decks.result_of(panel((800.0, 500.0, 0.0), STATIC, upright, load=1.0, angles=turned))
+    one = decks.run_of_deck(panel((500.0, 800.0, 0.0), STATIC, load=1.0))
+    other = decks.run_of_deck(panel((800.0, 500.0, 0.0), STATIC, upright, load=1.0, angles=turned))
     assert mean_deflection(other) == pytest.approx(mean_deflection(one), rel=1e-10)
 
 
@@ -150,19 +150,19 @@ def test_a_twisted_panel_is_a_saddle_turned_by_45_degrees() -> None:
     """1/Rxy along x and y is 1/R and -1/R along the diagonals, of an isotropic square."""
     ply = decks.isotropic(70e3, 0.3, 2.7e-9)
     corner = 50.0 * np.sqrt(2.0)
-    straight = Grid(uniform(100.0, 8), uniform(100.0, 8))
+    straight = ElementGrid(uniform_section(100.0, 8), uniform_section(100.0, 8))
 
     def made(points: Floats, radii: tuple[float, ...]) -> float:
         cards = tuple(model.NodeValues(n, 0, tuple(p)) for n, p in enumerate(points.tolist(), 1))
         segments = (
-            decks.supports(straight, "00000 11100 11100 11100 11100"),
+            decks.restraints(straight, "00000 11100 11100 11100 11100"),
             decks.material(ply, (0.0,), 2.0),
             decks.MITC,
             model.Patch("DISC", 10.0, 0.0, 0.0, 1.0),
             model.Curvature(*radii),
         )
         deck = decks.deck(straight, segments, decks.program(STATIC), model.Coordinates(cards))
-        return mean_deflection(decks.result_of(deck))
+        return mean_deflection(decks.run_of_deck(deck))
 
     s, t = np.meshgrid(np.linspace(-1.0, 1.0, 17), np.linspace(-1.0, 1.0, 17))
     square = 50.0 * np.stack([s.ravel(), t.ravel()], axis=1)
@@ -255,6 +255,6 @@ def test_a_layup_sweep_keeps_the_curvature() -> None:
 
 def test_the_stiffness_of_an_estimate_is_that_of_the_panel() -> None:
     (problem,) = load_deck(struck((0.0, 500.0), fine_middle(8), 2.5e-7, 10)).problems
-    stiffness = estimate(problem).stiffness
+    stiffness = quick_estimate(problem).stiffness
     wanted = float(ROWS[0.0, 500.0][curved_panels.W])
     assert 1.0 / stiffness == pytest.approx(wanted, rel=1.5e-3)

@@ -10,17 +10,16 @@ import pytest
 
 from fecm.deck import model
 from fecm.mechanics import kernels
-from fecm.mechanics.buckling import buckling_factor
-from fecm.mechanics.curvature import FLAT, Curvature, strain_of_deflection
 from fecm.mechanics.elements import gauss
 from fecm.mechanics.kernels.plate import CompiledProduct
-from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.laminate import LaminateSection
 from fecm.mechanics.membrane import strains_of_deflection
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.mechanics.points import gages
+from fecm.mechanics.solutions import buckling_factor
 from fecm.mechanics.stiffness_product import stiffness_operator
-from fecm.mechanics.strains import strains_and_resultants
+from fecm.mechanics.strains import FLAT, Curvature, strain_of_deflection, strains_and_resultants
 from fecm.mechanics.symmetry import symmetry_reduction, unreduced
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from tests.builders import (
@@ -41,7 +40,7 @@ PRELOAD = (3.0, -1.0, 0.7)
 STRAIN = np.array([2e-3, -1e-3, 3e-3])
 
 
-def free_panel(laminate: Laminate | None = None, curvature: Curvature = BENT) -> PlateModel:
+def free_panel(laminate: LaminateSection | None = None, curvature: Curvature = BENT) -> PlateModel:
     """A distorted mesh without supports."""
     coordinates, elements = distorted_square(3, 3)
     mesh = with_restraints(coordinates, elements, nothing(coordinates))

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 
 import fecm
 from fecm.deck import Deck, DeckError, Reader
+from fecm.deck.card import format_real, parse_real
 from fecm.deck.model import (
     SEGMENTS,
     Boundary,
@@ -29,7 +30,6 @@ from fecm.deck.model import (
     PrintOption,
     Segment,
 )
-from fecm.deck.numerals import format_real, parse_real
 from tests.decks import APPENDIX, DATA_CARDS, LONG, MESH, small
 
 

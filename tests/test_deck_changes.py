@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.authoring import changes
 from fecm.authoring.plate import Plate, Support
+from fecm.authoring.values import NAMES
 from fecm.deck.layup import parse_layup, parse_plies
 from fecm.deck.model import (
     Allowables,
@@ -22,8 +24,6 @@ from fecm.deck.model import (
     Projectile,
 )
 from fecm.problem.generate import generate
-from fecm.sweeps import changes
-from fecm.sweeps.values import NAMES
 from tests.decks import LONG, ROOT
 
 PLATE = fecm.Plate.rectangle((100, 80), (4, 4), support="simple")

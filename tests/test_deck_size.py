@@ -9,17 +9,15 @@ from typing import Any
 import h5py
 import pytest
 
-from fecm import _memory
-from fecm._memory import NotEnoughMemoryError
+from fecm import _machine
+from fecm._machine import NotEnoughMemoryError
 from fecm.api import load_deck
-from fecm.deck import Finding, reader, source_text, stream
-from fecm.deck.card import Card
-from fecm.deck.findings import MOST, Findings, Place
+from fecm.deck import Finding, reader, segment
+from fecm.deck.card import Card, parse_integer
+from fecm.deck.findings import MOST, CardPlace, Findings
 from fecm.deck.layup import LayupError, parse_layup
 from fecm.deck.macros import estimate_work
-from fecm.deck.numerals import parse_integer
-from fecm.deck.reader import MOST_PROBLEMS
-from fecm.deck.source_text import load_text
+from fecm.deck.reader import MOST_PROBLEMS, load_text
 from fecm.problem import generate
 from fecm.problem.rules import gages as gage_rules
 from tests.calls import assert_unusable, call
@@ -132,7 +130,7 @@ def test_blank_lines_between_segments_make_no_cards(monkeypatch: pytest.MonkeyPa
         cards += 1
         return Card(line, text)
 
-    monkeypatch.setattr(stream, "Card", counted)
+    monkeypatch.setattr(segment, "Card", counted)
     made = []
     for blanks in (0, 5000):
         cards = 0
@@ -154,7 +152,7 @@ def test_cards_that_generate_the_same_nodes_again_and_again_are_refused(
 ) -> None:
     covers, nodes = generate._Budget.covers, 0
 
-    def counted(budget: Any, count: int, place: Callable[[], Place | None]) -> bool:
+    def counted(budget: Any, count: int, place: Callable[[], CardPlace | None]) -> bool:
         nonlocal nodes
         covered = covers(budget, count, place)
         nodes += count * covered
@@ -237,8 +235,8 @@ def test_a_deck_whose_cards_exceed_the_free_memory_is_not_read(
 ) -> None:
     deck = tmp_path / "deck.inp"
     deck.write_text("1\n" * 400_000)
-    monkeypatch.setattr(source_text, "available", lambda: 300_000_000)
-    monkeypatch.setattr(_memory, "available", lambda: 300_000_000)
+    monkeypatch.setattr(reader, "available", lambda: 300_000_000)
+    monkeypatch.setattr(_machine, "available_memory", lambda: 300_000_000)
     with pytest.raises(NotEnoughMemoryError, match=r"deck\.inp: the deck takes about .* free"):
         load_text(deck)
     deck.write_text("! a comment of some length\n" + "1" * 800_000)

@@ -359,7 +359,7 @@ def test_small_blocks_of_rows_find_the_same(
     first, other = pair[0], pair[1](edit)
     whole = diff(first, other).stdout
     assert whole.count("different ") >= 3
-    monkeypatch.setattr("fecm.results.blocks.BLOCK", 1)
+    monkeypatch.setattr("fecm.results.stored.BLOCK", 1)
     assert diff(first, other).stdout == whole
 
 

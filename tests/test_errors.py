@@ -14,11 +14,13 @@ from concurrent.futures import ProcessPoolExecutor
 import pytest
 
 import fecm
-from fecm.deck.findings import DeckError, Finding, Place
+from fecm.deck.findings import CardPlace, DeckError, Finding
 from fecm.mechanics.plate_motion import DivergenceError
 from tests.decks import small
 
-FINDING = Finding("E013", "The deck has no FECM.", Place(1, 1, 8, "nonsense", "FECM"), "Begin so.")
+FINDING = Finding(
+    "E013", "The deck has no FECM.", CardPlace(1, 1, 8, "nonsense", "FECM"), "Begin so."
+)
 # Arguments of the classes that do not take one text.
 ARGUMENTS: dict[type[BaseException], tuple[object, ...]] = {
     DeckError: ([FINDING], "plate.inp"),

@@ -12,7 +12,7 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck.model import Impact
-from fecm.studies.estimate import estimate
+from fecm.studies.estimate import quick_estimate
 from tests.calls import call
 from tests.decks import MESH, PROGRAM, small
 
@@ -47,7 +47,7 @@ def test_a_model_out_of_its_range_is_marked(tmp_path: Path) -> None:
     for name, ratio in ratios.items():
         mass = ratio * plate.plate.area() * plate.laminate.mass
         text = deck(f"PROJ\n0, 0, {mass:.9g}\n\n", mesh=HELD)
-        found = estimate(load_deck(text).problems[0])
+        found = quick_estimate(load_deck(text).problems[0])
         assert found.mass_ratio == pytest.approx(ratio, rel=1e-6)
         assert [model.applies for model in found.models] == expected[name]
     (tmp_path / "d.inp").write_text(text)
@@ -58,9 +58,9 @@ def test_a_model_out_of_its_range_is_marked(tmp_path: Path) -> None:
 
 def test_a_held_plate_has_a_static_model_with_its_own_stiffness() -> None:
     (free,) = load_deck(deck()).problems
-    assert np.isnan(estimate(free).stiffness)
+    assert np.isnan(quick_estimate(free).stiffness)
     program = "TANG\nFORM\nSOLV\nDISP\n"
-    held = estimate(load_deck(deck(mesh=HELD)).problems[0])
+    held = quick_estimate(load_deck(deck(mesh=HELD)).problems[0])
     static = fecm.run_one(
         small(program, mesh=HELD).replace("EXPE", "PATC\nDISC,.2,1.,1.,1000.\nEXPE")
     )
@@ -71,13 +71,13 @@ def test_a_held_plate_has_a_static_model_with_its_own_stiffness() -> None:
 
 def test_models_reach_the_threshold_at_their_velocity() -> None:
     (problem,) = load_deck(deck("DELA\n.5,\n", mesh=HELD)).problems
-    found = estimate(problem)
+    found = quick_estimate(problem)
     for model in found.models:
         segments = tuple(
             replace(s, velocity=model.velocity) if isinstance(s, Impact) else s
             for s in problem.deck.segments
         )
-        again = estimate(replace(problem, deck=replace(problem.deck, segments=segments)))
+        again = quick_estimate(replace(problem, deck=replace(problem.deck, segments=segments)))
         (same,) = (m for m in again.models if m.name == model.name)
         assert same.impact.peak == pytest.approx(model.threshold, rel=1e-6)
 

@@ -16,10 +16,9 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.results.csv import lines
-from fecm.results.errors import ExportError
+from fecm.results.export import dataset_csv_lines, write_vtkhdf
+from fecm.results.groups import ExportError
 from fecm.results.result import Result
-from fecm.results.vtkhdf import write_vtkhdf
 from tests.builders import SQUARE, one_element
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ROOT, small
@@ -58,7 +57,7 @@ def rows(text: str) -> list[dict[str, str]]:
 
 def exported(result: Result, name: str) -> list[dict[str, str]]:
     """Rows of an exported dataset."""
-    return rows("".join(lines(result, name)))
+    return rows("".join(dataset_csv_lines(result, name)))
 
 
 # VTKHDF -----------------------------------------------------------------------------------------
@@ -245,7 +244,7 @@ def test_fields_are_written_in_long_form_with_numbers_from_one(result: Result) -
 def test_any_dataset_has_its_columns_named(
     result: Result, name: str, header: str, last: str | None
 ) -> None:
-    text = "".join(lines(result, name)).splitlines()
+    text = "".join(dataset_csv_lines(result, name)).splitlines()
     assert text[0] == header
     assert last is None or text[-1] == last
 
@@ -281,7 +280,7 @@ def test_modes_are_numbered() -> None:
 )
 def test_an_unknown_name_is_answered_with_near_ones(result: Result, name: str, hint: str) -> None:
     with pytest.raises(ExportError) as refused:
-        lines(result, name)
+        dataset_csv_lines(result, name)
     assert hint in str(refused.value)
 
 
@@ -300,7 +299,10 @@ def test_an_unknown_name_is_answered_with_near_ones(result: Result, name: str, h
     ],
 )
 def test_headers_have_the_units_that_the_deck_names(name: str, header: str) -> None:
-    assert next(lines(run(small(data=DATA_CARDS + "UNIT\nmm N s\n")), name)) == header + "\n"
+    assert (
+        next(dataset_csv_lines(run(small(data=DATA_CARDS + "UNIT\nmm N s\n")), name))
+        == header + "\n"
+    )
 
 
 def test_an_exported_force_is_a_measurement_in_the_units_of_the_deck(tmp_path: Path) -> None:
@@ -317,7 +319,7 @@ def test_an_exported_force_is_a_measurement_in_the_units_of_the_deck(tmp_path: P
 def test_a_unit_with_a_comma_stays_in_its_column(result: Result) -> None:
     arrays = {path: result[path] for path in result}
     units = {"unit_length": "m,m", "unit_force": "N", "unit_time": 's"'}
-    header, first = list(lines(Result(arrays, {}, {"": units}), "energy"))[:2]
+    header, first = list(dataset_csv_lines(Result(arrays, {}, {"": units}), "energy"))[:2]
     names, numbers = csv.reader([header, first])
     assert names[:2] == ["step", 'time (s")']
     assert names[2] == "plate_kinetic (N*m,m)"
@@ -339,7 +341,7 @@ def test_a_group_that_was_never_stored_names_its_macro() -> None:
     idle = PROGRAM.replace("RODP          5\n", "")
     result = run(small(idle, data=DATA_CARDS[DATA_CARDS.index("MATE") :]))
     with pytest.raises(ExportError, match="add RODP"):
-        lines(result, "history")
+        dataset_csv_lines(result, "history")
 
 
 def test_the_command_writes_beside_the_user_and_keeps_what_is_there(file: Path) -> None:

@@ -21,8 +21,8 @@ from fecm.mechanics.failure import (
     exposure_of,
     interlaminar,
     is_evaluated,
+    largest_modes,
     max_stress,
-    modes_of,
     puck,
     puck_limits,
     tsai_wu,
@@ -57,7 +57,7 @@ def evaluate(
 ) -> tuple[Floats, Codes]:
     """Exposure and mode of stress states."""
     candidates = criterion(ply, s1, s2, tau)
-    return exposure_of(candidates), modes_of(candidates)
+    return exposure_of(candidates), largest_modes(candidates)
 
 
 def puck_angle(ply: Strengths, s2: Floats, exposure: Floats) -> Floats:

@@ -16,18 +16,17 @@ from fecm.api import load_deck
 from fecm.deck.model import Allowables, Ply
 from fecm.mechanics import kernels
 from fecm.mechanics.elements import gauss
-from fecm.mechanics.exposures import Evaluations, FailureEnvelope, Places
-from fecm.mechanics.failure import Strengths
+from fecm.mechanics.exposures import Evaluations, FailureEnvelope, PlyPoints
+from fecm.mechanics.failure import OwnCriterion, Strengths
 from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.mechanics.kernels import failure as compiled_failure
 from fecm.mechanics.kernels.failure import CompiledMonitor
 from fecm.mechanics.laminate import laminate
-from fecm.mechanics.mesh import Mesh
-from fecm.mechanics.own_criterion import OwnCriterion
+from fecm.mechanics.mesh import MeshArrays
 from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.problem.build import build_model
-from fecm.results.sinks import MemorySink
-from fecm.simulation.run import run
+from fecm.results.hdf5_writer import MemorySink
+from fecm.simulation.run import run_program
 from fecm.simulation.simulation import Simulation
 from tests.builders import distorted_square, nothing, square, with_restraints
 from tests.test_failure_runs import failing
@@ -40,13 +39,13 @@ ANGLES = (45.0, 0.0, -45.0, 90.0, 90.0, -45.0, 0.0, 45.0)
 CURVED = (0.02, -0.01, 0.005)
 
 
-def plate(kind: int = 9, *, regular: bool = False) -> Mesh:
+def plate(kind: int = 9, *, regular: bool = False) -> MeshArrays:
     """A few elements, congruent or distorted."""
     coordinates, elements = (square if regular else distorted_square)(4, 3, kind)
     return with_restraints(coordinates, elements, nothing(coordinates))
 
 
-def fields(mesh: Mesh, count: int, *, stretched: bool) -> Floats:
+def fields(mesh: MeshArrays, count: int, *, stretched: bool) -> Floats:
     """Displacements that rise, fall and change their sign; u and v are 0 where not `stretched`."""
     draw = np.random.default_rng(7)
     found = draw.normal(size=(count, *mesh.equations.shape))
@@ -336,7 +335,7 @@ def test_ply_and_place_are_those_of_the_largest_of_all_states(case: str, stretch
     elements, points, plies = monitor.stresses.shape
     x, y = np.random.default_rng(11).random((2, elements, points))
     envelope, given = monitor.start(), fields(plate(), 3, stretched=stretches)
-    found = monitor.located(monitor.update(envelope, given, times_of(given)), Places(x, y))
+    found = monitor.located(monitor.update(envelope, given, times_of(given)), PlyPoints(x, y))
     exposure = monitor.every_state(envelope).exposure.reshape(-1, elements, points, plies, 2)
     away = np.where(monitor.counts[:, :, None, None], exposure, -1.0)
     columns = [0, 1, 2, 3, *range(5, 1 + len(exposure))]  # 4 is that of the interfaces
@@ -416,11 +415,11 @@ def test_a_restored_run_keeps_nothing_of_the_exposures_after_it() -> None:
     (problem,) = load_deck(failing()).problems
     simulation = Simulation(problem, MemorySink())
     before = simulation.save()
-    run(simulation)
+    run_program(simulation)
     first = simulation.save()
     assert np.nanmax(first["state/failure/largest/exposure"]) > 0.0
     simulation.restore(before)
-    run(simulation)
+    run_program(simulation)
     again = simulation.save()
     names = [name for name in first if name.startswith("state/failure/")]
     assert {"plies/exposure", "circle/plies/exposure"} <= {

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm._json import jsonable
+from fecm._text import jsonable
 from fecm.api import Solver
 from fecm.deck.model import Allowables, Ply
 from fecm.mechanics.elements import gauss
@@ -22,8 +22,8 @@ from fecm.mechanics.mesh import element_blocks
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import PlyStresses
 from fecm.results.exposures import largest_exposures
-from fecm.results.sinks import MemorySink
-from fecm.results.summary import about_run, summary
+from fecm.results.hdf5_writer import MemorySink
+from fecm.results.summary import about_run, run_summary
 from fecm.simulation.run import simulate
 from fecm.sweeps.in_full import without_output
 from tests.builders import nothing, rules, square, table, with_restraints
@@ -55,7 +55,7 @@ def test_a_run_of_fabrics_leaves_out_pucks_criterion_and_nothing_else(solver: So
     assert np.isnan(result["failure/puck/exposure"]).all()
     names = [one.criterion for one in largest_exposures(result)]
     assert names == ["max_stress", "tsai_wu", "hashin", "interlaminar"]
-    assert not any(line.startswith("puck") for line in summary(result))
+    assert not any(line.startswith("puck") for line in run_summary(result))
 
 
 @pytest.mark.parametrize("name", ["max stress", "Tsai-Wu"])

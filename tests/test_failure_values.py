@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.authoring.case import CasesError
 from fecm.deck.model import Allowables, Cure, Deck, Delamination, Expansion, Impact
 from fecm.results.exposures import largest_exposures
 from fecm.results.metrics import EXPOSURES
-from fecm.simulation.run import run
+from fecm.simulation.run import run_program
 from fecm.simulation.simulation import Simulation
 from fecm.sweeps import in_full
-from fecm.sweeps.case import CasesError
 from tests.calls import call
 from tests.test_find import deck as tough
 from tests.test_first_failure import WEAK, failing
@@ -49,7 +49,7 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> list[Simulation]:
 
     def counting(simulation: Simulation) -> None:
         counted.append(simulation)
-        run(simulation)
+        run_program(simulation)
 
     monkeypatch.setattr(in_full, "run", counting)
     return counted

@@ -342,7 +342,7 @@ def test_fmt_asks_before_it_replaces_another_file_and_reads_no_more_than_check(
     assert Path("other.inp").read_text() == "precious"
     assert call("fmt", "deck.inp", "-o", "./deck.inp").exit_code == 0
     assert Path("deck.inp").read_text() != UNALIGNED
-    monkeypatch.setattr("fecm.deck.source_text.LARGEST_FILE", 100)
+    monkeypatch.setattr("fecm.deck.reader.LARGEST_FILE", 100)
     done = call("fmt", "deck.inp", "--check")
     assert_unusable(done)
     assert "more than 100 bytes" in done.stderr

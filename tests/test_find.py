@@ -11,7 +11,7 @@ import pytest
 
 import fecm
 from fecm.results.metrics import FOUND
-from fecm.sweeps.find import search
+from fecm.sweeps.search import lowest_velocities
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small
 
@@ -32,7 +32,7 @@ def test_the_peak_of_a_power_law_is_found_to_1e_6() -> None:
         rounds += 1
         return np.array([factors[n] * v**1.2 for n, v in pairs])
 
-    *found, low, high = search(
+    *found, low, high = lowest_velocities(
         dict.fromkeys(range(4), 2.0), dict.fromkeys(range(4), 7.0), peaks
     ).values()
     for n, velocity in enumerate(found):

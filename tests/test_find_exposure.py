@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.authoring.case import CasesError
 from fecm.results.exposures import band_of_largest, largest_exposures
 from fecm.results.metrics import EXPOSURES
-from fecm.sweeps.case import CasesError
-from fecm.sweeps.find_in_full import ERROR, search
+from fecm.sweeps.search import LEVEL_EXCESS, velocity_at_level
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, small
 from tests.test_first_failure import failing, run
@@ -28,8 +28,8 @@ def test_the_velocity_of_a_power_law_is_found_in_a_few_runs(factor: float, power
         trials.append(velocity)
         return float(factor * velocity**power)
 
-    velocity = search(2.0, 1.5, exposure)
-    assert 1.5 <= factor * velocity**power <= 1.5 * (1.0 + ERROR)
+    velocity = velocity_at_level(2.0, 1.5, exposure)
+    assert 1.5 <= factor * velocity**power <= 1.5 * (1.0 + LEVEL_EXCESS)
     assert len(trials) <= 4
 
 
@@ -41,10 +41,10 @@ def test_a_bent_law_is_found_too_and_a_jump_is_told() -> None:
         trials += 1
         return float(max(0.1 * velocity, 0.01 * velocity**2.5))
 
-    assert bent(search(1.0, 7.0, bent)) == pytest.approx(7.0, rel=ERROR)
+    assert bent(velocity_at_level(1.0, 7.0, bent)) == pytest.approx(7.0, rel=LEVEL_EXCESS)
     assert trials <= 12
     with pytest.raises(CasesError, match="no exposure of 1: it jumps at velocity 3"):
-        search(2.0, 1.0, lambda velocity: 0.5 if velocity < 3.0 else 2.0)
+        velocity_at_level(2.0, 1.0, lambda velocity: 0.5 if velocity < 3.0 else 2.0)
 
 
 @pytest.mark.parametrize(
@@ -57,7 +57,7 @@ def test_a_bent_law_is_found_too_and_a_jump_is_told() -> None:
 )  # fmt: skip
 def test_what_is_not_reached_is_told(law: object, words: str) -> None:
     with pytest.raises(CasesError, match=words):
-        search(2.0, 1.0, law)  # type: ignore[arg-type]
+        velocity_at_level(2.0, 1.0, law)  # type: ignore[arg-type]
 
 
 def test_a_run_at_the_found_velocity_has_this_exposure(tmp_path: Path) -> None:
@@ -129,7 +129,9 @@ def test_a_run_that_leaves_the_exposure_open_is_repeated_longer() -> None:
     (steps,) = short.steps
     assert steps in (80, 160, 320)
     longer = fecm.sweep(failing(steps=int(steps)), until={"exposure": 1.0})
-    assert short["found_velocity"][0] == pytest.approx(longer["found_velocity"][0], rel=ERROR)
+    assert short["found_velocity"][0] == pytest.approx(
+        longer["found_velocity"][0], rel=LEVEL_EXCESS
+    )
 
 
 def test_few_evaluations_and_short_runs_find_no_velocity() -> None:

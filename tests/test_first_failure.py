@@ -15,8 +15,7 @@ from fecm.deck.model import Allowables
 from fecm.mechanics.exposures import FailureEnvelope, Largest, Maxima
 from fecm.mechanics.failure import CRITERIA, exposure_of
 from fecm.mechanics.ply_stresses import PlyStresses
-from fecm.results.exposures import evaluations_in_contact
-from fecm.results.first_failure import first_failures
+from fecm.results.exposures import evaluations_in_contact, first_failures
 from fecm.results.result import Result
 from tests.calls import call
 from tests.decks import DATA_CARDS, DISC, PROGRAM, small

@@ -11,13 +11,13 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
+from fecm.authoring.case import CasesError
 from fecm.cli.identify import _page
 from fecm.deck.model import Indentation
 from fecm.identification.alignment import IdentifyError
-from fecm.plot.histories import fit_picture
+from fecm.plot.histories import force_fit_picture
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import filter_of
-from fecm.sweeps.case import CasesError
 from tests.calls import Done, assert_unusable, call
 from tests.decks import PROGRAM, small
 
@@ -178,7 +178,7 @@ def test_the_filter_and_the_delay_of_the_measurement_are_part_of_the_fit() -> No
     assert found.values["k"] == pytest.approx(1.2e5, rel=1e-2)
     assert found.values["delay"] == pytest.approx(3e-5, abs=3e-7)
     assert found.share < 2e-3
-    above, below = fit_picture(found, {}).figure.axes
+    above, below = force_fit_picture(found, {}).figure.axes
     lines = (*above.lines, below.lines[0])
     for line, values in zip(lines, (found.force, found.model, found.residual), strict=True):
         np.testing.assert_array_equal(np.asarray(line.get_ydata(), dtype=float), values)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.identification.alignment import IdentifyError, level, noise, onset
-from fecm.identification.misfit import runs
+from fecm.identification.misfit import sign_runs
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import filter_of
 from tests.calls import call
@@ -292,6 +292,6 @@ def test_a_filter_that_was_not_named_is_named_with_its_rise_time() -> None:
 def test_runs_of_equal_signs_are_counted_in_standard_deviations() -> None:
     # Ten signs of each kind have 11 runs on average, with the variance 90/19.
     alternating = np.array([1.0, -1.0] * 10)
-    assert runs(alternating) == pytest.approx(9.0 / np.sqrt(90.0 / 19.0))
-    assert runs(np.sort(alternating)) == pytest.approx(-9.0 / np.sqrt(90.0 / 19.0))
-    assert runs(np.ones(20)) == 0.0
+    assert sign_runs(alternating) == pytest.approx(9.0 / np.sqrt(90.0 / 19.0))
+    assert sign_runs(np.sort(alternating)) == pytest.approx(-9.0 / np.sqrt(90.0 / 19.0))
+    assert sign_runs(np.ones(20)) == 0.0

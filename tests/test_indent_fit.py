@@ -7,9 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fecm.studies.indentation_test.constants import Fit, fit
-from fecm.studies.indentation_test.curves import Estimate
-from fecm.studies.indentation_test.output import notes
+from fecm.studies.indentation_test.constants import ContactLawFit, fit_contact_law, fit_notes
+from fecm.studies.indentation_test.curves import FittedValue
 from fecm.studies.indentation_test.turns import divide
 from tests.indentation_tests import (
     ALPHA_P,
@@ -26,7 +25,7 @@ from tests.indentation_tests import (
 ALPHA_CR = 3.16e-3
 
 
-def constants(found: Fit) -> dict[str, tuple[Estimate, float]]:
+def constants(found: ContactLawFit) -> dict[str, tuple[FittedValue, float]]:
     """Every estimate of a fit of `make_test()`, and the truth."""
     assert found.q is not None
     assert found.line is not None
@@ -54,7 +53,7 @@ def deviations(*, indentation: float, proportional: bool = False) -> dict[str, F
         random = np.random.default_rng(seed).standard_normal(len(f))
         force = f * (1.0 + 0.01 * random) if proportional else noisy(f, seed)
         path = noisy(a, 1000 + seed, indentation) if indentation else a
-        for name, (estimate, truth) in constants(fit(path, force)).items():
+        for name, (estimate, truth) in constants(fit_contact_law(path, force)).items():
             if estimate.error:  # a peak that was held has none
                 deviation = (estimate.value - truth) / estimate.error
                 found.setdefault(name, []).append(abs(deviation))
@@ -94,13 +93,13 @@ def test_errors_hold_where_the_indentation_is_noisy_too() -> None:
 
 
 def test_a_test_without_noise_gives_the_constants_themselves() -> None:
-    for estimate, truth in constants(fit(*make_test())).values():
+    for estimate, truth in constants(fit_contact_law(*make_test())).values():
         assert estimate.value == pytest.approx(truth, rel=1e-6)
 
 
 def test_a_fit_explains_what_noise_leaves() -> None:
     a, f = make_test()
-    found = fit(a, noisy(f, 0))
+    found = fit_contact_law(a, noisy(f, 0))
     assert found.scatter == pytest.approx(0.01, rel=0.05)
     for kind in ("loading", "unloading", "reloading"):
         share = found.r_squared[kind]
@@ -112,7 +111,7 @@ def test_a_larger_peak_between_two_readings_is_found_where_the_curves_meet() -> 
     a, f = make_test(points=40)
     keep = np.full(len(a), True)
     keep[np.isin(a, PEAKS)] = False  # no reading at the peaks themselves
-    for cycle, peak in zip(fit(a[keep], f[keep]).cycles, PEAKS, strict=True):
+    for cycle, peak in zip(fit_contact_law(a[keep], f[keep]).cycles, PEAKS, strict=True):
         assert cycle.alpha_m_recorded < peak - 1e-5
         assert cycle.alpha_m.value == pytest.approx(peak, rel=1e-3)
 
@@ -136,7 +135,7 @@ def test_partial_unloadings_reload_from_an_origin_of_their_own() -> None:
         ],
         axis=1,
     )
-    found = fit(a, f)
+    found = fit_contact_law(a, f)
     assert [cycle.alpha_0.value for cycle in found.cycles] == pytest.approx([left, last], rel=1e-5)
     measured = found.cycles[0].k_1_measured
     assert measured is not None
@@ -161,12 +160,12 @@ def test_a_peak_reached_twice_is_one_cycle() -> None:
     k_1 = K * (2e-3 / (2e-3 - left)) ** 1.5
     back = stretch(0.0, 2e-3, 100, lambda a: k_1 * np.maximum(a - left, 0.0) ** 1.5)
     again = np.concatenate([[a, f], back, [a[101:], f[101:]]], axis=1)
-    found = fit(again[0], noisy(again[1], 0))
+    found = fit_contact_law(again[0], noisy(again[1], 0))
     assert len(found.cycles) == 1
 
 
 def test_cycles_below_alpha_p_leave_nothing_and_do_not_bend_the_line() -> None:
-    found = fit(*make_test((3e-4, 5e-4, 2e-3, 4e-3)))
+    found = fit_contact_law(*make_test((3e-4, 5e-4, 2e-3, 4e-3)))
     assert found.line is not None
     assert found.line.elastic == (0, 1)
     assert found.line.s_p.value == pytest.approx(S_P, rel=1e-6)
@@ -174,17 +173,17 @@ def test_cycles_below_alpha_p_leave_nothing_and_do_not_bend_the_line() -> None:
 
 
 def test_hertz_own_curve_has_no_peak_in_it_and_the_recorded_one_is_taken() -> None:
-    found = fit(*make_test((2e-3,), q=1.5, s_p=0.0))
+    found = fit_contact_law(*make_test((2e-3,), q=1.5, s_p=0.0))
     assert found.q is not None
     assert found.q.value == pytest.approx(1.5, abs=1e-6)
-    assert found.cycles[0].alpha_m == Estimate(2e-3, 0.0)
+    assert found.cycles[0].alpha_m == FittedValue(2e-3, 0.0)
 
 
 def test_permanent_indentations_off_the_line_enlarge_its_errors() -> None:
     # One specimen of four stays 30 % deeper: nothing that the forces' noise could do.
     parts = [make_test((peak,), s_p=S_P * (1.3 if n == 1 else 1.0)) for n, peak in enumerate(PEAKS)]
     both = [np.concatenate([part[axis] for part in parts]) for axis in (0, 1)]
-    found = fit(both[0], noisy(both[1], 0, 1e-4))
+    found = fit_contact_law(both[0], noisy(both[1], 0, 1e-4))
     assert found.line is not None
     assert found.line.scatter > 3.0
 
@@ -192,10 +191,10 @@ def test_permanent_indentations_off_the_line_enlarge_its_errors() -> None:
 @pytest.mark.parametrize(("share", "side"), [(0.5, "above"), (1.0, ""), (1.5, "below")])
 def test_a_line_on_one_side_of_all_its_points_is_noted(share: float, side: str) -> None:
     a, f = make_test()
-    found = fit(a, noisy(f, 0))
+    found = fit_contact_law(a, noisy(f, 0))
     assert found.line is not None
     start = replace(found.line.alpha_p, value=share * found.line.alpha_p.value)
-    told = "; ".join(notes(replace(found, line=replace(found.line, alpha_p=start))))
+    told = "; ".join(fit_notes(replace(found, line=replace(found.line, alpha_p=start))))
     assert (f"is {side} all of its points" in told) is bool(side)
 
 
@@ -205,7 +204,7 @@ def test_one_unloading_tells_alpha_cr() -> None:
     up = stretch(0.0, 5e-3, 200, lambda a: K * a**1.5)
     down = stretch(5e-3, left, 200, lambda a: K / ALPHA_CR * (a - left) ** 2.5)
     a, f = np.concatenate([np.zeros((2, 1)), up, down], axis=1)
-    estimates = [fit(a, noisy(f, seed), acr=True).critical for seed in range(20)]
+    estimates = [fit_contact_law(a, noisy(f, seed), acr=True).critical for seed in range(20)]
     values = [one.alpha_cr.value for one in estimates if one is not None]
     errors = [one.alpha_cr.error for one in estimates if one is not None]
     assert len(values) == 20

@@ -16,8 +16,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results.errors import ResultFileError
-from fecm.results.groups import GROUPS
+from fecm.results.groups import GROUPS, ResultFileError
 from fecm.results.hdf5_reader import read
 from fecm.results.schema import DATASETS, GROUP_TYPES
 from tests.calls import assert_unusable, call

@@ -12,12 +12,11 @@ from fecm.api import load_deck
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.findings import Finding
 from fecm.deck.model import Allowables, Damping, Ply
-from fecm.deck.unit_systems import NAMES, convert
-from fecm.deck.units import MASS
-from fecm.mechanics.mesh import Mesh
-from fecm.problem.rules.damping import clamped_frequency
+from fecm.deck.units import MASS, NAMES, convert
+from fecm.mechanics.mesh import MeshArrays
+from fecm.problem.outline import unsupported
+from fecm.problem.rules.time_step import clamped_frequency
 from fecm.problem.rules.units import likely_unit
-from fecm.problem.span import unsupported
 from tests.decks import DATA, ROOT
 from tests.sound_plate import STRENGTHS, Edit, base, found, replaced, strengths, with_card
 
@@ -270,8 +269,8 @@ def test_the_distance_between_supports_of_a_round_window_is_its_diameter() -> No
     (problem,) = load_deck(base()).problems
     elements = np.arange(1, len(places) // 9 * 9 + 1, dtype=np.int32).reshape(-1, 9)
     values = {**vars(problem.mesh), "coordinates": places, "codes": codes, "elements": elements}
-    fields = Mesh.__dataclass_fields__
-    mesh = Mesh(**{name: values[name] for name in fields})
+    fields = MeshArrays.__dataclass_fields__
+    mesh = MeshArrays(**{name: values[name] for name in fields})
     assert unsupported(mesh, (1.0, 2.0))[0] == pytest.approx(2.0 * (6.0 - 0.2), rel=0.05)
 
 

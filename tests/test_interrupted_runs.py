@@ -23,7 +23,7 @@ import fecm
 from fecm.api import load_deck
 from fecm.problem.build import RunOptions
 from fecm.problem.slips import active_slips
-from fecm.results.sinks import MemorySink
+from fecm.results.hdf5_writer import MemorySink
 from fecm.simulation.checkpoint import Checkpointer, checkpoint_of
 from fecm.simulation.interpreter import Interpreter
 from fecm.simulation.run import simulate

@@ -19,12 +19,11 @@ from fecm.api import load_deck
 from fecm.deck.model import Deck
 from fecm.plot.pictures import draw
 from fecm.results.end import Deflection, End, LastContact, decided, ends, settled_deflection
-from fecm.results.linear_plate import LIMITS, InPlane, in_plane_of, softness
-from fecm.results.metrics import Indentation, Projectiles, summarise
-from fecm.results.summary import summary
-from fecm.results.validity import Extent, counted
+from fecm.results.metrics import IndentationMetrics, Projectiles, impact_metrics
+from fecm.results.summary import run_summary
+from fecm.results.validity import LIMITS, Extent, InPlane, counted, in_plane_of, softness
 from fecm.sweeps.result import SweepResult
-from fecm.sweeps.statistics import bounds, wilson
+from fecm.sweeps.statistics import exceedance_bounds, wilson
 from tests.builders import table
 from tests.calls import call
 from tests.decks import small
@@ -154,7 +153,9 @@ def test_a_peak_that_is_known_at_some_end_is_that_of_the_whole_run(mass: float) 
             (run["energy/plate_kinetic"] + run["energy/plate_strain"])[:steps],
             0.5 * mass * 2330.0**2,
         )
-        found = summarise(force, run.time[:steps], Indentation(none, none, none), hit, motion)
+        found = impact_metrics(
+            force, run.time[:steps], IndentationMetrics(none, none, none), hit, motion
+        )
         peak = found.columns["peak_force"][0]
         if not math.isnan(peak):
             known += 1
@@ -197,9 +198,9 @@ def test_no_interval_of_a_probability_excludes_that_of_whole_runs() -> None:
 
 def test_bounds_hold_whatever_the_open_draws_are() -> None:
     hits, count, lacking = (np.array(n, dtype=np.int64) for n in (3, 10, 4))
-    share, low, high = bounds(hits, count, lacking)
+    share, low, high = exceedance_bounds(hits, count, lacking)
     assert np.isnan(share)  # the open draws are not a random choice
-    assert bounds(hits, count, np.zeros_like(lacking))[0] == 0.3
+    assert exceedance_bounds(hits, count, np.zeros_like(lacking))[0] == 0.3
     every = [wilson(hits + more, count + lacking) for more in range(5)]
     assert low == min(lower for lower, _ in every)
     assert high == max(upper for _, upper in every)
@@ -265,14 +266,14 @@ def test_the_error_that_is_told_is_that_of_nonlinear_impacts(row: dict[str, str]
 def test_a_run_says_what_is_open_and_what_is_elastic_only() -> None:
     cut, whole = fecm.run_one(soft(3e-4)), fecm.run_one(soft().with_(velocity=2500))
     assert (cut.end, whole.end) == (End.RISING, End.OVER)
-    told = "\n".join(summary(cut))
+    told = "\n".join(run_summary(cut))
     assert "not reached by the end of the run, which is in contact: open" in told
     assert "peak force        at least" in told
     assert math.isnan(cut.metrics["peak_force"])
     assert math.isnan(float(cut.threshold["margin"]))
     assert "peak not reached" in cut.validity
     threshold = float(whole.threshold["force"])
-    told = "\n".join(summary(whole))
+    told = "\n".join(run_summary(whole))
     assert f"(elastic prediction; delamination is expected from {threshold:.4g} N" in told
     assert " absorbed (left in plate, indentation and projectile)" in told
     assert {"w > 0.3 h", "peak force > threshold"} <= set(whole.validity.split("; "))
@@ -281,7 +282,7 @@ def test_a_run_says_what_is_open_and_what_is_elastic_only() -> None:
 def test_one_place_has_one_deflection() -> None:
     run = fecm.run_one(soft())
     (note,) = [note for note in run.notes if note.startswith("the deflection")]
-    (line,) = [line for line in summary(run) if line.startswith("largest w")]
+    (line,) = [line for line in run_summary(run) if line.startswith("largest w")]
     assert float(note.split()[3]) == pytest.approx(float(line.split()[2]), rel=1e-3)
     assert "too low at the same energy" in note
     assert "unsafe" in note

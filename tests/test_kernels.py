@@ -17,21 +17,20 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.mechanics import assumed_shear, failure, impact, kernels
+from fecm.mechanics import failure, impact, kernels, strains
 from fecm.mechanics.contact_law import RELOADING, UNLOADING, VIRGIN
 from fecm.mechanics.elements import Quadrature, gauss, nodal
 from fecm.mechanics.impact_steps import COLUMNS, LawKind
-from fecm.mechanics.impact_sweep import Found, Given
+from fecm.mechanics.impact_sweep import Given, ResultRow
 from fecm.mechanics.interpolation import NDOF
 from fecm.mechanics.kernels.element_groups import ElementKind
 from fecm.mechanics.kernels.layout import LANES
-from fecm.mechanics.kernels.midplane import TYING
 from fecm.mechanics.kernels.plate import CompiledProduct
-from fecm.mechanics.kernels.strains import CompiledStrains, Strains
-from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.kernels.strains import TYING, CompiledStrains, Strains
+from fecm.mechanics.laminate import LaminateSection
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.projectile import Rod, RodState, WilsonStep
-from fecm.mechanics.rod_modes import Modes
+from fecm.mechanics.rod_modes import ProjectileModes
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.mechanics.strains import StrainField
 from fecm.mechanics.symmetry import symmetry_reduction
@@ -109,7 +108,7 @@ def test_the_product_is_numpys_for_every_family_and_rule(kind: int, coupled: boo
 @pytest.mark.parametrize("laminate", [isotropic_plate(0.1), general_plate()], ids=["B = 0", "B"])
 @pytest.mark.parametrize("orders", [(3, 2), (2, 2), (4, 3)], ids=str)
 def test_assumed_shear_strains_of_curved_elements_are_sums_along_xi_and_eta(
-    laminate: Laminate, orders: tuple[int, int]
+    laminate: LaminateSection, orders: tuple[int, int]
 ) -> None:
     """With every node moved, mid-sides and centres too, so that no slope of the mapping is 0."""
     coordinates, elements = square(5, 4)
@@ -249,7 +248,7 @@ def test_the_modes_of_a_rod_take_the_step_of_its_matrices(elements: int, tapered
     diameters = 0.02 * (1.0 + 0.5 * np.linspace(0.0, 1.0, elements) * tapered)
     rod = Rod(0.025, tuple(diameters.tolist()), 2.07e11, 7850.0)
     K, M = rod.stiffness(), rod.mass()
-    integrator, modes = WilsonStep(K, M, 2e-7), Modes.of(K, M)
+    integrator, modes = WilsonStep(K, M, 2e-7), ProjectileModes.of(K, M)
     rng = np.random.default_rng(0)
     state = RodState(np.stack([scale * rng.standard_normal(len(M)) for scale in (1e-9, 30.0, 1e6)]))
     T, h = modes.step(integrator)
@@ -299,7 +298,7 @@ def test_the_structures_of_python_lie_as_those_of_c() -> None:
 
 @compiled
 def test_the_enumerations_of_python_have_the_values_of_those_in_c() -> None:
-    enumerations = (ElementKind, LawKind, Given, Found)
+    enumerations = (ElementKind, LawKind, Given, ResultRow)
     expected = {(kind.__name__, one.name): one.value for kind in enumerations for one in kind}
     branches = {"VIRGIN": VIRGIN, "UNLOADING": UNLOADING, "RELOADING": RELOADING}
     expected |= {("Branch", name): branch for name, branch in branches.items()}
@@ -307,11 +306,10 @@ def test_the_enumerations_of_python_have_the_values_of_those_in_c() -> None:
     counts = {
         "COLUMNS": len(COLUMNS),
         "GIVEN": len(Given),
-        "FOUND": len(Found),
+        "FOUND": len(ResultRow),
         "LANES": LANES,
         "CRITERIA": len(failure.CRITERIA),
-        "TIED": 2
-        * max(len(along) * len(across) for along, across, _ in assumed_shear.TYING.values()),
+        "TIED": 2 * max(len(along) * len(across) for along, across, _ in strains.TYING.values()),
         "PASSES": impact.PASSES,
         "TYING": TYING,
     }

@@ -8,7 +8,7 @@ import pytest
 import fecm
 from fecm.deck.model import Control, Deck, Integration, Layer, Material, Ply
 from fecm.mechanics.laminate import (
-    Laminate,
+    LaminateSection,
     laminate,
     reduced_stiffness,
     transformed_shear,
@@ -174,7 +174,7 @@ def material(ply: Ply, total: float) -> Material:
     return Material(Integration(3, 3, 3, total), ply, layers)
 
 
-def laminate_of(material: Material, *, isotropic_g12: bool = False) -> Laminate:
+def laminate_of(material: Material, *, isotropic_g12: bool = False) -> LaminateSection:
     """Laminate of a deck with this MATE segment."""
     deck = Deck("", Control(4, 1, len(material.layers), 2, 5, 4), (material,), ())
     return laminates_of_deck(deck, isotropic_g12=isotropic_g12)[0]

@@ -11,10 +11,10 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import fecm
+from fecm.authoring.case import CasesError
+from fecm.authoring.vary import apply_case
 from fecm.deck.layup import LayupError, parse_layup, parse_plies
 from fecm.deck.model import Material
-from fecm.sweeps.case import CasesError
-from fecm.sweeps.vary import apply_case
 from tests.calls import call
 from tests.decks import APPENDIX
 

@@ -9,9 +9,15 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.mechanics.load_circle import CircleStresses
+from fecm.mechanics.exposures import CircleStresses
 from fecm.mechanics.mesh import element_blocks, inner_corners
-from fecm.results.exposures import Failure, LargestExposure, largest_exposures, mesh_band, verdict
+from fecm.results.exposures import (
+    FailureVerdict,
+    LargestExposure,
+    failure_verdict,
+    largest_exposures,
+    mesh_band,
+)
 from fecm.results.result import Result
 from tests.builders import report_plate, square
 
@@ -69,7 +75,7 @@ def test_the_largest_exposures_are_those_of_the_finest_mesh_within_the_band(coar
         assert one.band is not None
         assert one.band[0] < finest < one.band[1]
         assert one.exposure == pytest.approx(finest, rel=0.12)
-    assert verdict(largest_exposures(coarse)) is Failure.OPEN
+    assert failure_verdict(largest_exposures(coarse)) is FailureVerdict.OPEN
 
 
 def test_a_coarse_mesh_is_noted(coarse: Result) -> None:
@@ -80,20 +86,20 @@ def test_a_coarse_mesh_is_noted(coarse: Result) -> None:
 @pytest.mark.parametrize(
     ("exposure", "coarseness", "expected"),
     [
-        (0.9, 1.0, Failure.NOT_REACHED),
-        (0.99, 1.0, Failure.OPEN),
-        (1.03, 1.0, Failure.OPEN),
-        (1.05, 1.0, Failure.REACHED),
-        (0.8, 7.5, Failure.OPEN),
-        (0.1, 20.0, Failure.OPEN),
+        (0.9, 1.0, FailureVerdict.NOT_REACHED),
+        (0.99, 1.0, FailureVerdict.OPEN),
+        (1.03, 1.0, FailureVerdict.OPEN),
+        (1.05, 1.0, FailureVerdict.REACHED),
+        (0.8, 7.5, FailureVerdict.OPEN),
+        (0.1, 20.0, FailureVerdict.OPEN),
     ],
 )
 def test_the_verdict_is_open_where_the_band_of_the_mesh_has_1(
-    exposure: float, coarseness: float, expected: Failure
+    exposure: float, coarseness: float, expected: FailureVerdict
 ) -> None:
     band = mesh_band(exposure, "puck", coarseness)
     one = LargestExposure("puck", exposure, "inter-fibre A", 1, 0.0, 0.0, 0.0, band=band)
-    assert verdict([one]) is expected
+    assert failure_verdict([one]) is expected
 
 
 def test_the_exposure_at_a_centre_does_not_depend_on_the_points_of_stress() -> None:

@@ -13,13 +13,13 @@ import pytest
 
 import fecm
 from fecm.deck import model
-from fecm.location.mirrors import shared_symmetry
-from fecm.location.responses import Sampling, moving_plate, responses, rows_of
+from fecm.location.model import Sampling, moving_plate, responses, rows_of
+from fecm.location.prepare import shared_symmetry
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.points import gages, patch_weights
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
-from fecm.sweeps.api import problem_of
+from fecm.sweeps.api import checked_problem
 from fecm.sweeps.responses import plate_response
 from tests.panels import (
     OFF_AXIS,
@@ -94,7 +94,7 @@ def curved(deck: fecm.Deck) -> fecm.Deck:
 def test_the_run_of_a_gage_gives_the_strains_of_an_impulse(
     layup: str, shape: Callable[[fecm.Deck], fecm.Deck]
 ) -> None:
-    problem = problem_of(shape(panel(layup)))
+    problem = checked_problem(shape(panel(layup)))
     motion = PlateMotion(moving_plate(problem.plate))
     records = problem.deck.require(model.Gages).records
     read = gages(problem.mesh, records, curvature=problem.plate.curvature)
@@ -253,7 +253,7 @@ def test_the_errors_of_several_seeds_are_those_of_the_covariance() -> None:
 
 def strains_per_place_and_force(deck: fecm.Deck, found: fecm.Location) -> Floats:
     """Change of the fitted strains with x, y and the forces that are not held at 0, by runs."""
-    problem, step, dt = problem_of(deck), 0.3, 2e-7
+    problem, step, dt = checked_problem(deck), 0.3, 2e-7
     mesh, motion = problem.mesh, PlateMotion(moving_plate(problem.plate))
     read = gages(mesh, deck.require(model.Gages).records)
     sums = motion.dof_sums(read.dof_indices, read.weights)

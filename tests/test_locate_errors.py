@@ -7,8 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from fecm.location.fit import Errors, Fit, Trial
-from fecm.location.force import judged_force
+from fecm.location.fit import Errors, LocationFit, PlaceTrial, judged_force
 from tests.panels import Floats
 
 NOISE = 2e-6
@@ -21,14 +20,14 @@ def strains_of_two_gages(x: float, y: float, shift: float = 0.0) -> Floats:
 
 
 @pytest.fixture
-def pair() -> tuple[Fit, Trial]:
+def pair() -> tuple[LocationFit, PlaceTrial]:
     """A unit force at the origin."""
     design, one = strains_of_two_gages(0.0, 0.0), np.ones(1)
     model = SimpleNamespace(
         design=strains_of_two_gages, observation=SimpleNamespace(interval=1.0, count=4)
     )
-    fit = Fit(model, side=1.0)  # type: ignore[arg-type]
-    return fit, Trial(0.0, 0.0, 0.0, np.ones(2), one, design, np.zeros((2, 2)), 0.0)
+    fit = LocationFit(model, side=1.0)  # type: ignore[arg-type]
+    return fit, PlaceTrial(0.0, 0.0, 0.0, np.ones(2), one, design, np.zeros((2, 2)), 0.0)
 
 
 # The derivatives of the four strains by x, y and force are (.1, 0, 1), (0, 0, 2), (0, .2, 1) and
@@ -37,7 +36,7 @@ COVARIANCE = NOISE**2 * np.array([[112.5, 6.25], [6.25, 28.125]])
 
 
 def test_the_covariance_of_two_gages_is_the_inverse_of_their_normal_matrix(
-    pair: tuple[Fit, Trial],
+    pair: tuple[LocationFit, PlaceTrial],
 ) -> None:
     fit, trial = pair
     errors = fit.errors(trial, NOISE)
@@ -48,7 +47,7 @@ def test_the_covariance_of_two_gages_is_the_inverse_of_their_normal_matrix(
 
 
 def test_strains_of_another_model_move_the_place_and_widen_its_errors(
-    pair: tuple[Fit, Trial],
+    pair: tuple[LocationFit, PlaceTrial],
 ) -> None:
     fit, trial = pair
     moved, force = np.array([3e-5, -2e-5]), 1e-5

@@ -14,7 +14,7 @@ from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.model import Allowables, Delamination, Indentation
-from fecm.deck.unit_systems import NAMES, UnitsError, system_named
+from fecm.deck.units import NAMES, UnitsError, system_named
 from tests.calls import Done, assert_unusable, call
 
 PLATE = (

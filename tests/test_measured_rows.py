@@ -7,11 +7,11 @@ from pathlib import Path
 
 import pytest
 
-import fecm._memory
+import fecm._machine
+from fecm._machine import NotEnoughMemoryError
 from fecm._measured_tables import COPIES, FIELD_BYTES, LINE_BYTES, read_table
-from fecm._memory import NotEnoughMemoryError
-from fecm.sweeps.case import CasesError
-from fecm.sweeps.cases import read_cases
+from fecm.authoring.case import CasesError
+from fecm.authoring.cases import read_cases
 
 NAMES = ("velocity", "k", "alpha_p", "s_p", "q")
 
@@ -44,7 +44,7 @@ def test_a_table_of_short_lines_that_memory_does_not_hold_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = table(tmp_path / "cases.csv", 220_000, 1, "2")  # 0.44 MB of text
-    monkeypatch.setattr(fecm._memory, "available", lambda: 50_000_000)
+    monkeypatch.setattr(fecm._machine, "available", lambda: 50_000_000)
     with pytest.raises(NotEnoughMemoryError, match="a table of 220001 lines takes about 107 MB"):
         read_table(path)
 
@@ -52,7 +52,7 @@ def test_a_table_of_short_lines_that_memory_does_not_hold_is_refused(
 def test_a_table_of_too_many_cases_is_refused_before_its_fields_are_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("fecm.sweeps.cases.MOST_CASES", 10)
+    monkeypatch.setattr("fecm.authoring.cases.MOST_CASES", 10)
     path = table(tmp_path / "cases.csv", 11, 1, "2")
     with pytest.raises(CasesError, match="has 12 lines; at most 11 are allowed"):
         read_cases(path)

@@ -18,15 +18,15 @@ import numpy as np
 import pytest
 
 import fecm
-import fecm._memory
-import fecm.deck.source_text
+import fecm._machine
+import fecm.deck.reader
 import fecm.problem.memory
-from fecm._memory import NotEnoughMemoryError, available
+from fecm._machine import NotEnoughMemoryError, available_memory
 from fecm.api import load_deck
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.memory import needed_bytes
 from fecm.problem.parts import build_plate
-from fecm.sweeps.memory import ADVANCED_BYTES, HISTORY_BYTES
+from fecm.sweeps.checks import ADVANCED_BYTES, HISTORY_BYTES
 from fecm.sweeps.plan import MOST_TOGETHER
 from tests.calls import assert_unusable, call
 from tests.decks import small
@@ -187,7 +187,7 @@ def test_the_estimate_is_near_what_is_measured(
 def test_a_run_that_needs_more_than_is_free_is_refused_with_both_numbers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fecm._memory, "available", lambda: 2 * MEGABYTE)
+    monkeypatch.setattr(fecm._machine, "available", lambda: 2 * MEGABYTE)
     deck, output = tmp_path / "small.inp", tmp_path / "small.h5"
     deck.write_text(small().replace("DISP          5", "DISP"))
     done = call("run", deck, "-o", output)
@@ -200,7 +200,7 @@ def test_a_run_that_needs_more_than_is_free_is_refused_with_both_numbers(
 
 def test_gages_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # 4000 gages on 1008 elements took 119 MB more than none, 1000 gages 40 MB.
-    monkeypatch.setattr(fecm._memory, "available", lambda: 30 * MEGABYTE)
+    monkeypatch.setattr(fecm._machine, "available", lambda: 30 * MEGABYTE)
     deck = tmp_path / "d.inp"
     deck.write_text(small())
     assert call("run", deck, "-o", tmp_path / "d.h5").exit_code == 0
@@ -212,7 +212,7 @@ def test_gages_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_result_in_memory_counts_with_all_its_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fecm._memory, "available", lambda: 100 * MEGABYTE)
+    monkeypatch.setattr(fecm._machine, "available", lambda: 100 * MEGABYTE)
     many = small().replace("LOOP         10", "LOOP      99999").replace("DISP          5", "DISP")
     problem = load_deck(many).problems[0]
     # w and five unknowns of 25 nodes in each of the rows.
@@ -253,8 +253,8 @@ def test_the_estimate_of_a_sweep_bounds_what_is_measured(
 def test_the_steps_of_a_sweep_are_those_of_its_longest_case(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fecm._memory, "available", lambda: 50 * MEGABYTE)
-    monkeypatch.setattr("fecm.sweeps.memory.ADVANCED_BYTES", 30)
+    monkeypatch.setattr(fecm._machine, "available", lambda: 50 * MEGABYTE)
+    monkeypatch.setattr("fecm.sweeps.checks.ADVANCED_BYTES", 30)
     deck = tmp_path / "small.inp"
     deck.write_text(small().replace("LOOP         10", "LOOP        100"))
     options = ("--vary", "velocity=50:100:1000", "--history", "-o", tmp_path / "s.h5")
@@ -277,8 +277,8 @@ def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(
     free: int,
     remedy: str,
 ) -> None:
-    monkeypatch.setattr(fecm._memory, "available", lambda: free * MEGABYTE)
-    monkeypatch.setattr("fecm.sweeps.memory.ADVANCED_BYTES", 30)  # with kernels or without
+    monkeypatch.setattr(fecm._machine, "available", lambda: free * MEGABYTE)
+    monkeypatch.setattr("fecm.sweeps.checks.ADVANCED_BYTES", 30)  # with kernels or without
     deck = tmp_path / "small.inp"
     deck.write_text(small().replace("LOOP         10", "LOOP       4500"))
     vary = ("--vary", "velocity=50:100:3000", "-o", tmp_path / "s.h5")
@@ -296,7 +296,7 @@ def test_matrices_that_do_not_fit_are_refused(
 ) -> None:
     problem = load_deck(plate(tmp_path, 46, IMPACT)).problems[0]
     model = build_plate(problem.deck, problem.mesh)
-    monkeypatch.setattr(fecm._memory, "available", lambda: 101 * MEGABYTE)
+    monkeypatch.setattr(fecm._machine, "available", lambda: 101 * MEGABYTE)
     # 24 bytes for each of the 45 x 45 entries of 2116 matrices.
     told = "assemble the plate's matrices takes about 103 MB of memory, and 101 MB are free"
     with pytest.raises(NotEnoughMemoryError, match=told):
@@ -325,7 +325,7 @@ def _write_on(pipe: int) -> None:
 
 @pytest.mark.posix
 def test_a_deck_that_never_ends_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fecm.deck.source_text, "available", lambda: 12 * MEGABYTE)
+    monkeypatch.setattr(fecm.deck.reader, "available", lambda: 12 * MEGABYTE)
     endless, begin = os.pipe()
     writer = threading.Thread(target=_write_on, args=(begin,))
     writer.start()
@@ -343,20 +343,20 @@ def test_free_memory_is_the_least_of_machine_and_control_groups(
     job = tmp_path / "groups" / "batch" / "job"
     job.mkdir(parents=True)
     for name, group in (("MEMINFO", "meminfo"), ("CGROUP", "cgroup"), ("CGROUPS", "groups")):
-        monkeypatch.setattr(fecm._memory, name, tmp_path / group)
+        monkeypatch.setattr(fecm._machine, name, tmp_path / group)
     (tmp_path / "meminfo").write_text("MemTotal: 9000 kB\nMemAvailable: 4000 kB\n")
     (tmp_path / "cgroup").write_text("0::/batch/job\n")
-    assert available() == 4000 * 1024
+    assert available_memory() == 4000 * 1024
     (job / "memory.max").write_text("max\n")
     (job / "memory.current").write_text("1000000\n")
-    assert available() == 4000 * 1024
+    assert available_memory() == 4000 * 1024
     (job.parent / "memory.max").write_text("3000000\n")
     (job.parent / "memory.current").write_text("1000000\n")
-    assert available() == 2_000_000
+    assert available_memory() == 2_000_000
 
 
 def test_the_system_reports_its_free_memory() -> None:
-    free = available()
+    free = available_memory()
     assert free is not None
     assert 10 * MEGABYTE < free < 2**46
 
@@ -404,11 +404,11 @@ def test_free_memory_of_windows_and_macos_is_read_from_their_structures(
     monkeypatch: pytest.MonkeyPatch, platform: str, free: int
 ) -> None:
     monkeypatch.setattr(sys, "platform", platform)
-    monkeypatch.setattr(fecm._memory, "_of_groups", list)
+    monkeypatch.setattr(fecm._machine, "_of_groups", list)
     monkeypatch.setattr(ctypes, "CDLL", lambda name: System(fails=False))
-    assert available() == free
+    assert available_memory() == free
     monkeypatch.setattr(ctypes, "CDLL", lambda name: System(fails=True))
-    assert available() is None
+    assert available_memory() is None
 
 
 def test_rows_of_a_file_are_read_without_the_others(

@@ -17,11 +17,11 @@ from fecm.deck.model import (
     NodeValues,
     Segment,
 )
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import MeshArrays
 from fecm.problem.generate import generate
 
 
-def mesh(*segments: Segment, numnp: int = 9, numel: int = 4, nen: int = 4) -> Mesh:
+def mesh(*segments: Segment, numnp: int = 9, numel: int = 4, nen: int = 4) -> MeshArrays:
     """A mesh of these segments."""
     control = Control(numnp, numel, 1, 2, 5, nen)
     return generate(Deck("", control, segments, ()))

@@ -13,7 +13,7 @@ import fecm
 from fecm.plot.kinds import PlotError
 from fecm.plot.pictures import draw
 from fecm.results.metrics import METRICS, RATIO, SUMMARY, THRESHOLD, VERDICTS
-from fecm.results.summary import summary
+from fecm.results.summary import run_summary
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, small
 
@@ -85,7 +85,7 @@ def test_metrics_of_the_threshold_are_those_of_its_group(tmp_path: Path) -> None
     assert below["time_above"] == 0.0
     assert 0.0 < below["threshold_margin"] < 1.0
     share = f"{1.0 - missed.force.max() / missed.threshold['force']:.1%}"
-    assert f"not reached: the peak is {share} below" in "\n".join(summary(missed))
+    assert f"not reached: the peak is {share} below" in "\n".join(run_summary(missed))
 
 
 def test_a_contact_that_lasts_to_the_end_has_no_rebound(tmp_path: Path) -> None:

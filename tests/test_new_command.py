@@ -9,11 +9,11 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.cli.new import new as command
+from fecm.cli.new import new_command as command
 from fecm.deck.catalogue import MATERIALS
 from fecm.deck.model import Delamination, Impact, Material, Nonlinear, Shear
 from fecm.mechanics.solutions import Tangent, in_plane_pins, static_stiffness
-from fecm.problem.summary import summarise
+from fecm.problem.summary import deck_summary
 from tests import closed_forms
 from tests.builders import DATA
 from tests.calls import assert_unusable, call, new, new_deck
@@ -487,7 +487,7 @@ def test_check_says_how_much_equilibrium_changes_the_static_deflection() -> None
 
 def summary_of(deck: str) -> dict[str, float | None]:
     (problem,) = load_deck(deck).problems
-    values: dict[str, float | None] = json.loads(json.dumps(summarise(problem).to_dict()))
+    values: dict[str, float | None] = json.loads(json.dumps(deck_summary(problem).to_dict()))
     return values
 
 
@@ -509,7 +509,7 @@ def test_check_compares_with_equilibrium_where_that_is_cheap_and_has_a_meaning(
 ) -> None:
     monkeypatch.setattr("fecm.problem.summary.MOST_SOLVED", 150)
     (problem,) = load_deck(new(*SQUARE, *options).stdout).problems
-    view = summarise(problem)
+    view = deck_summary(problem)
     assert view.equilibrium_change is None
     lines = "\n".join(view.lines())
     assert ("shear factor " in lines) == bool(line)

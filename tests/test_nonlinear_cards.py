@@ -13,15 +13,15 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
+from fecm.authoring.vary import apply_case
 from fecm.deck import Finding
 from fecm.deck.model import Boundary, Nonlinear, Preload, Shear
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
 from fecm.studies import StudyError
-from fecm.sweeps.api import problem_of
+from fecm.sweeps.api import checked_problem
 from fecm.sweeps.plan import shares_plate
-from fecm.sweeps.vary import apply_case
 from tests.builders import DATA
 from tests.calls import assert_unusable, call
 from tests.decks import ROOT
@@ -321,5 +321,5 @@ def test_a_support_of_a_nonlinear_plate_leaves_it_free_inside() -> None:
 
 def test_nonlinear_plates_share_no_impulse_response() -> None:
     linear = fecm.impact(plate(), PLIES, MASS, LAW, kinematics="linear", **QUICK)
-    assert shares_plate(problem_of(linear))
-    assert not shares_plate(problem_of(deck()))
+    assert shares_plate(checked_problem(linear))
+    assert not shares_plate(checked_problem(deck()))

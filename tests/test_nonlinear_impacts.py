@@ -26,7 +26,7 @@ from scipy.special import ellipk
 import fecm
 from fecm.authoring.mesh import InPlane
 from fecm.results.result import Result
-from fecm.verification.decks import result_of
+from fecm.verification.decks import run_of_deck
 from tests.builders import Floats, table
 from tests.nonlinear_impacts import (
     pulsed_square,
@@ -55,7 +55,7 @@ def contact_end(found: Result) -> float:
 def struck(row: Row, n: int) -> Result:
     """The impact of a row of the table of rectangular plates."""
     velocity, end = float(row["velocity_mm_per_s"]), LONGER * float(row["contact_end_s"])
-    return result_of(struck_rectangle(row["case"], n, velocity, end))
+    return run_of_deck(struck_rectangle(row["case"], n, velocity, end))
 
 
 def rows(name: str, key: str, quick: set[tuple[str, str]]) -> list[object]:
@@ -75,7 +75,7 @@ def rows(name: str, key: str, quick: set[tuple[str, str]]) -> list[object]:
 
 def test_an_impact_of_a_ten_thousandth_of_the_velocity_is_that_of_the_linear_plate() -> None:
     made = struck_rectangle("iso_clamped_immovable", 8, 1e-4 * 2271.56, 4e-4)
-    linear, found = result_of(without_nonlinearity(made)), result_of(made)
+    linear, found = run_of_deck(without_nonlinearity(made)), run_of_deck(made)
     peak = linear.force.max()
     assert peak > 0.0
     assert np.abs(found.force - linear.force).max() < 1e-6 * peak
@@ -89,7 +89,7 @@ def test_an_impact_of_a_ten_thousandth_of_the_velocity_is_that_of_the_linear_pla
 def vibration(row: Row, n: int) -> tuple[CubicSpline, Floats, float]:
     """Deflection in the middle after a pulse, the first three times it vanishes, and its peak."""
     end = 1.01 * (float(row["zero1_s"]) + float(row["period_s_zero1_to_zero3"]))
-    found = result_of(pulsed_square(n, float(row["p0_N_per_mm2"]), end)).tape3
+    found = run_of_deck(pulsed_square(n, float(row["p0_N_per_mm2"]), end)).tape3
     w = CubicSpline(found.time, found.w[:, 0])
     zeros = w.roots(extrapolate=False)[:3]
     turns = w.derivative().roots(extrapolate=False)
@@ -196,7 +196,7 @@ CIRCULAR = [
 @pytest.mark.parametrize("row", CIRCULAR)
 def test_impacts_on_circular_plates_follow_the_axisymmetric_solution(row: Row) -> None:
     velocity, end = float(row["velocity_mm_per_s"]), LONGER * float(row["contact_end_s"])
-    found = result_of(struck_disc(row["edge"], 16, 12, velocity, end))
+    found = run_of_deck(struck_disc(row["edge"], 16, 12, velocity, end))
     assert found.force.max() == pytest.approx(float(row["peak_N"]), rel=1e-2)
     assert found.plate_w.max() == pytest.approx(float(row["W_max_mm"]), rel=2e-3)
     assert worst_balance(found) < 1e-6
@@ -209,7 +209,7 @@ def test_an_impact_on_a_coarse_disc_deflects_it_as_the_axisymmetric_solution() -
         if (row["edge"], row["target_w_over_h"]) == ("clamped_immovable", "3")
     ]
     end = 1.3 * float(row["t_peak_s"])
-    found = result_of(struck_disc(row["edge"], 8, 4, float(row["velocity_mm_per_s"]), end))
+    found = run_of_deck(struck_disc(row["edge"], 8, 4, float(row["velocity_mm_per_s"]), end))
     assert found.plate_w.max() == pytest.approx(float(row["W_max_mm"]), rel=1e-3)
     assert found.force.max() == pytest.approx(float(row["peak_N"]), rel=0.02)
 
@@ -250,7 +250,7 @@ def test_the_drop_weight_test_is_that_of_another_program_of_finite_elements(row:
         nonlinear=True,
         in_plane=WINDOWS[row["window"]],
     )
-    found = result_of(deck)
+    found = run_of_deck(deck)
     assert found.force.max() == pytest.approx(float(row["nonlinear_peak_N"]), rel=2e-4)
     assert found.plate_w.max() == pytest.approx(float(row["nonlinear_W_mm"]), rel=1e-4)
     assert worst_balance(found) < 1e-7

@@ -1,6 +1,7 @@
 """The compiled kernels of plates that stretch as they bend, and of those under a preload.
 
-What they give is compared with NumPy's product and :class:`~fecm.mechanics.membrane.Membrane`.
+What they give is compared with NumPy's product and with
+:class:`~fecm.mechanics.membrane.MembraneForces`.
 """
 
 from __future__ import annotations
@@ -15,10 +16,9 @@ import pytest
 
 import fecm
 from fecm.mechanics import kernels
-from fecm.mechanics.curvature import FLAT, Curvature
 from fecm.mechanics.kernels import membrane
 from fecm.mechanics.kernels.plate import CompiledProduct
-from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.laminate import LaminateSection
 from fecm.mechanics.plate import UNLOADED, PlateModel
 from fecm.mechanics.stiffness_product import (
     ElementProduct,
@@ -26,6 +26,7 @@ from fecm.mechanics.stiffness_product import (
     internal_force_operator,
     stiffness_operator,
 )
+from fecm.mechanics.strains import FLAT, Curvature
 from fecm.mechanics.symmetry import SymmetryReduction, symmetry_reduction, unreduced
 from tests.builders import (
     Floats,
@@ -84,7 +85,9 @@ MESHES: dict[str, Callable[[int, int, int], Mesh]] = {
 }
 
 
-def plate_of(mesh: Mesh, laminate: Laminate, *, preload: tuple[float, float, float]) -> PlateModel:
+def plate_of(
+    mesh: Mesh, laminate: LaminateSection, *, preload: tuple[float, float, float]
+) -> PlateModel:
     """A nonlinear plate whose boundary holds u, v and w."""
     coordinates, elements = mesh
     restrained = boundary(coordinates, elements) & (np.arange(5) < 3)

@@ -14,7 +14,7 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck import model
-from fecm.deck.grid import Grid, uniform
+from fecm.deck.grid import ElementGrid, uniform_section
 from fecm.mechanics import kernels
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import gauss
@@ -26,11 +26,11 @@ from fecm.mechanics.strains import strains_and_resultants
 from fecm.mechanics.stretching import Stretching
 from fecm.plot.pictures import draw
 from fecm.results.end import End
+from fecm.results.hdf5_writer import MemorySink
 from fecm.results.result import Result
-from fecm.results.sinks import MemorySink
-from fecm.results.summary import summary
+from fecm.results.summary import run_summary
 from fecm.results.validity import Extent, Judge
-from fecm.simulation import membrane, peaks
+from fecm.simulation import judge
 from fecm.simulation.run import simulate
 from fecm.simulation.simulation import Simulation
 from fecm.verification import decks
@@ -222,7 +222,7 @@ def static(case: str, deflection: str) -> tuple[dict[str, str], Result]:
     plate = decks.material(ply, (0.0,), 2.0 / SCALE)
     load, macros = float(row["load_value"]), decks.program(NEWTON)
     made = decks.quarter_plate(8, plate, macros, load, EDGES[case], (decks.MITC, NONL))
-    return row, decks.result_of(made)
+    return row, decks.run_of_deck(made)
 
 
 @pytest.mark.parametrize(
@@ -247,7 +247,7 @@ def test_the_summary_of_statics_has_the_share_of_the_membrane() -> None:
     share = found.membrane.energy[0] / found.membrane.strain_energy[0]
     assert 0.7 < share < 0.8
     line = f"membrane          {100.0 * share:.0f} % of the strain energy where it is largest"
-    assert line in summary(found)
+    assert line in run_summary(found)
 
 
 GAGES = model.Gages((model.Gage(1, 30.0, 40.0, 1.0, 20.0), model.Gage(2, 50.0, 50.0, -1.0, 0.0)))
@@ -265,14 +265,14 @@ def struck(
     thickness: float = 2.0,
 ) -> model.Deck:
     """Build a square plate (mm, N, s) of 4 x 4 elements, which a mass hits."""
-    grid = Grid(uniform(100.0, 4), uniform(100.0, 4))
+    grid = ElementGrid(uniform_section(100.0, 4), uniform_section(100.0, 4))
     ply = model.Ply(1.53e-9, 0.3, 141e3, 9700.0, 5500.0, 5500.0, 3700.0)
     plate = decks.material(ply, (0.0, 90.0, 90.0, 0.0), thickness / 4.0)
     middle = grid.nearest(50.0, 50.0)[0]
     hit = (model.Projectile(0, 0, 1e-3), model.Impact(middle, 3, velocity), decks.elastic(5e4))
     loop = f"TIME RODP={every} DISP={every} {more}"
     macros = decks.program(f"LMAS DT={dt} LOOP={steps} {loop} NEXT")
-    held, patch = decks.supports(grid, HELD), model.Patch("HERT", 8.0)
+    held, patch = decks.restraints(grid, HELD), model.Patch("HERT", 8.0)
     return decks.deck(grid, (held, patch, *hit, plate, decks.MITC, *segments), macros)
 
 
@@ -362,16 +362,16 @@ def test_the_membrane_force_of_a_preloaded_plate_contains_the_preload() -> None:
 
 def test_the_summary_has_the_share_of_the_membrane_at_the_peak() -> None:
     found = stretched()
-    (line,) = (line for line in summary(found) if line.startswith("membrane"))
+    (line,) = (line for line in run_summary(found) if line.startswith("membrane"))
     peak = found.time[found.force.argmax()]
     row = np.abs(found.membrane.time - peak).argmin()
     share = 100.0 * found.membrane.energy[row] / found.membrane.strain_energy[row]
     assert line.startswith(f"membrane          {share:.{int(share < 9.5)}f} % of the strain energy")
     assert line.endswith("at the peak")
     rare = fecm.run_one(struck(NONL, steps=60, every=50))
-    (line,) = (line for line in summary(rare) if line.startswith("membrane"))
+    (line,) = (line for line in run_summary(rare) if line.startswith("membrane"))
     assert line.endswith(f"at time {rare.membrane.time[0]:.6g}, the row nearest to the peak")
-    assert not [line for line in summary(fecm.run_one(struck(steps=5))) if "membrane" in line]
+    assert not [line for line in run_summary(fecm.run_one(struck(steps=5))) if "membrane" in line]
 
 
 def test_a_deflection_is_a_doubt_of_linear_plates_alone() -> None:
@@ -423,13 +423,13 @@ def changed(sink: MemorySink, **constants: float) -> Result:
 def doubts(dt: float = 0.0, **constants: float) -> list[str]:
     """Notes about the membrane of such a run."""
     simulation, sink = finished(dt)
-    return list(membrane.doubts(simulation, changed(sink, **constants)))
+    return list(judge.doubts(simulation, changed(sink, **constants)))
 
 
 def test_strains_of_the_membrane_count_among_the_strains() -> None:
     simulation, sink = finished()
-    assert peaks.strain(simulation, changed(sink, largest_strain=0.0)).value < 0.04
-    assert peaks.strain(simulation, changed(sink, largest_strain=0.04)).value == 0.04
+    assert judge.largest_strain(simulation, changed(sink, largest_strain=0.0)).value < 0.04
+    assert judge.largest_strain(simulation, changed(sink, largest_strain=0.04)).value == 0.04
 
 
 def test_a_membrane_force_that_brings_the_frequency_near_to_the_limit_is_noted() -> None:
@@ -474,6 +474,6 @@ def test_a_result_without_rows_of_the_membrane_has_no_line_about_it() -> None:
     }
     for name in ("time", "strain_energy"):
         lacking = {path: v for path, v in arrays.items() if path != f"membrane/{name}"}
-        assert not [line for line in summary(Result(lacking, {}, groups)) if "membrane" in line]
+        assert not [line for line in run_summary(Result(lacking, {}, groups)) if "membrane" in line]
     empty = arrays | {path: v[:0] for path, v in arrays.items() if path.startswith("membrane/")}
-    assert not [line for line in summary(Result(empty, {}, groups)) if "membrane" in line]
+    assert not [line for line in run_summary(Result(empty, {}, groups)) if "membrane" in line]

@@ -22,10 +22,10 @@ import numpy as np
 import pytest
 
 from fecm.deck.model import Ply
-from fecm.mechanics.curvature import FLAT, Curvature
-from fecm.mechanics.laminate import Laminate, laminate
-from fecm.mechanics.membrane import Membrane, quadratic_strains, tangent
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.mechanics.membrane import MembraneForces, quadratic_strains, tangent
 from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.strains import FLAT, Curvature
 from tests.builders import (
     PARALLELOGRAM,
     SKEWED,
@@ -59,14 +59,14 @@ H = 2.0
 Row = dict[str, str]
 
 
-def isotropic(nu: float = 0.3, thickness: float = H) -> Laminate:
+def isotropic(nu: float = 0.3, thickness: float = H) -> LaminateSection:
     """The tables' isotropic plate, E = 70000, with the shear factor 5/6."""
     g = 70000.0 / (2.0 + 2.0 * nu)
     plain = laminate(Ply(2.7e-9, nu, 70000.0, 70000.0, g, g, g), [0.0], [thickness])
     return replace(plain, shear=5.0 / 6.0 * plain.shear)
 
 
-def layered(*angles: float) -> Laminate:
+def layered(*angles: float) -> LaminateSection:
     """The tables' plies of 0.25 mm, with the shear factor 5/6."""
     ply = Ply(1.53e-9, 0.3, 141000.0, 9700.0, 5500.0, 5500.0, 3700.0)
     plain = laminate(ply, angles, [0.25] * len(angles))
@@ -113,7 +113,7 @@ def state(seed: int = 3) -> Floats:
 def forces_of(plate: PlateModel) -> Callable[[Floats], Floats]:
     """Internal force of an element in a field, and behind it its strain energy, (46,)."""
     (K,) = plate.stiffness_of(plate.families[0])
-    membrane = Membrane(plate)
+    membrane = MembraneForces(plate)
     nodes = plate.mesh.elements[0] - 1
 
     def force(field: Floats) -> Floats:
@@ -204,7 +204,7 @@ def test_a_constant_membrane_force_at_finite_slopes_is_exact_on_straight_sided_m
         found = quadratic_strains(family, RULES.bending, field)
         np.testing.assert_allclose(found, np.broadcast_to(quadratic[:, None, None], found.shape),
                                    rtol=1e-12)  # fmt: skip
-    forces = plate.internal_forces(field) + Membrane(plate).forces(field)[0]
+    forces = plate.internal_forces(field) + MembraneForces(plate).forces(field)[0]
     assert np.abs(forces[~held]).max() < 1e-12 * np.abs(forces).max()
 
 

@@ -13,12 +13,12 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
+from fecm.authoring.case import Case
 from fecm.deck.model import Impact
+from fecm.problem.estimates import NoCurveError, nonlinear_curve
 from fecm.problem.problem import Problem
-from fecm.problem.static_plate import NoCurveError, nonlinear_curve
-from fecm.studies.estimate import estimate, velocity_at
-from fecm.sweeps import batch, expected, in_full
-from fecm.sweeps.case import Case
+from fecm.studies.estimate import quick_estimate, velocity_at
+from fecm.sweeps import batch, execute, in_full
 from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.plan import plan, tasks
 from tests.calls import call
@@ -42,7 +42,7 @@ def problem_of(deck: str) -> Problem:
 def runs(monkeypatch: pytest.MonkeyPatch) -> list[float]:
     """Peak forces of the full runs that are taken."""
     taken: list[float] = []
-    own = in_full.alone
+    own = in_full.run_case_in_full
 
     def counted(*given: Any, **more: Any) -> Outcome:
         outcome = own(*given, **more)
@@ -122,17 +122,17 @@ def test_the_number_of_runs_and_their_time_are_told_first(tmp_path: Path) -> Non
     assert re.search(r"response: 3 cases, one full run each: about [\d.]+ s", done.stderr)
     assert "3 cases: 3 beyond the contact law" in done.stdout
     problem = problem_of(DECK)
-    searched = expected.expected(problem, plan(problem, [{}], until=50.0), 0)
+    searched = execute.expected(problem, plan(problem, [{}], until=50.0), 0)
     assert "1 case, about 5 full runs each: about " in searched
     assert searched.endswith(" s of computation")
 
 
 def test_the_expected_time_grows_with_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(expected, "_costs", lambda *_: (1.0, 0.01))  # seconds of a run, of a step
+    monkeypatch.setattr(execute, "_costs", lambda *_: (1.0, 0.01))  # seconds of a run, of a step
     problem = problem_of(DECK)
 
     def told(cases: list[dict[str, Any]], workers: int = 1, **more: Any) -> str:
-        return expected.expected(problem, plan(problem, cases, **more), workers).split("about ")[-1]
+        return execute.expected(problem, plan(problem, cases, **more), workers).split("about ")[-1]
 
     assert told([{"k": 5e4}]) == "7 s"
     assert told([{"k": 5e4 + n} for n in range(6)], 2) == "21 s by 2 workers"
@@ -189,7 +189,7 @@ def test_the_estimate_of_a_nonlinear_plate_has_a_static_row_from_its_curve(tmp_p
 
 
 def test_the_row_of_a_linear_deck_stays_alone() -> None:
-    found = estimate(problem_of(LINEAR))
+    found = quick_estimate(problem_of(LINEAR))
     assert [model.name for model in found.models] == ["infinite plate", "static plate"]
     assert found.remark == ""
 
@@ -200,7 +200,7 @@ def test_both_static_rows_of_a_small_deflection_agree_and_apply() -> None:
         replace(segment, velocity=0.02) if isinstance(segment, Impact) else segment
         for segment in problem.deck.segments
     )
-    found = estimate(replace(problem, deck=replace(problem.deck, segments=slow)))
+    found = quick_estimate(replace(problem, deck=replace(problem.deck, segments=slow)))
     _, static, nonlinear = found.models
     assert static.applies
     assert nonlinear.applies
@@ -212,11 +212,11 @@ def test_a_loaded_plate_has_no_static_curve() -> None:
     loaded = problem_of(text(PROGRAM, data=BLOW + forces(1.0)))
     with pytest.raises(NoCurveError, match="no nonlinear static plate: the deck has FORC"):
         nonlinear_curve(loaded, 1.0, np.nan)
-    found = estimate(loaded)
+    found = quick_estimate(loaded)
     assert "FORC" in found.remark
     assert [model.name for model in found.models] == ["infinite plate", "static plate"]
     heavy = problem_of(text(PROGRAM, data=BLOW.replace("2e-5", "2e-2") + forces(1.0)))
-    static = estimate(heavy).models[1]
+    static = quick_estimate(heavy).models[1]
     assert velocity_at(heavy, static.threshold) == pytest.approx(static.velocity, rel=1e-8)
 
 

@@ -17,7 +17,7 @@ import fecm
 from fecm.api import load_deck
 from fecm.deck.format import format_deck
 from fecm.deck.model import Impact, Indentation, Material, Patch
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import MeshArrays
 from fecm.mechanics.solutions import static_stiffness
 from fecm.problem.generate import generate
 from tests.builders import DATA, table
@@ -41,7 +41,7 @@ def deck_on(plate: fecm.Plate, **options: Any) -> fecm.Deck:
     return fecm.impact(plate, METAL, MASS, LAW, **QUICK | {"patch": None} | options)
 
 
-def mesh_of(plate: fecm.Plate) -> Mesh:
+def mesh_of(plate: fecm.Plate) -> MeshArrays:
     return generate(deck_on(plate, at=plate.imported and plate.imported.points[0]))
 
 
@@ -287,7 +287,7 @@ def test_every_family_fills_its_area_counter_clockwise(
         np.testing.assert_allclose(made.points[made.cells[0, 8]], 0.5)
 
 
-def grid_arrays(*names: str) -> tuple[Any, Any, Mesh]:
+def grid_arrays(*names: str) -> tuple[Any, Any, MeshArrays]:
     """Points, cells and mesh of a rectangle with simple supports at some edges."""
     edges: Any = dict.fromkeys(names, "simple")
     mesh = mesh_of(fecm.Plate.rectangle((60, 40), (4, 3), edges=edges))

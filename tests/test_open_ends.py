@@ -10,7 +10,7 @@ import pytest
 
 import fecm
 from fecm.results.result import Result
-from fecm.results.summary import summary
+from fecm.results.summary import run_summary
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, small
 
@@ -31,10 +31,10 @@ def test_a_contact_is_open_where_the_last_force_is_above_zero(
 def test_a_summary_shows_no_end_of_a_contact_that_has_none() -> None:
     open_, closed = fecm.run_one(small()), fecm.run_one(CLOSED)
     assert (open_.still_in_contact, closed.still_in_contact) == (True, False)
-    told = "\n".join(summary(open_))
+    told = "\n".join(run_summary(open_))
     assert "contact           from 5e-07, still in contact at the end" in told
     assert told.count("permanent open") == 1
-    told = "\n".join(summary(closed))
+    told = "\n".join(run_summary(closed))
     assert "still in contact" not in told
     assert "open" not in told
 
@@ -58,4 +58,4 @@ def test_a_run_without_impact_never_ends_in_contact() -> None:
     program = "LMAS\nDT        .5E-6\nLOOP          2\nTIME\nDISP\nNEXT\n"
     result = fecm.run_one(small(program, data=DATA_CARDS[DATA_CARDS.index("MATE") :]))
     assert not result.still_in_contact
-    assert summary(result) == ["largest w         0: nothing moved the plate"]
+    assert run_summary(result) == ["largest w         0: nothing moved the plate"]

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 import fecm
-from fecm.deck.unit_systems import convert
-from fecm.deck.units import COEFFICIENT, DENSITY, MASS, MODULUS, TOUGHNESS, VELOCITY
+from fecm.deck.units import COEFFICIENT, DENSITY, MASS, MODULUS, TOUGHNESS, VELOCITY, convert
 from tests.decks import ROOT
 
 DOCS = ROOT / "docs"

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fecm.mechanics.laminate import laminate
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import MeshArrays
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.points import DISC, HERTZ, PatchError, patch_weights
 from fecm.mechanics.solutions import Tangent
@@ -27,7 +27,7 @@ from tests.builders import (
 CROSS_PLY = laminate(REPORT_PLY, 5 * (0.0, 90.0) + 5 * (90.0, 0.0), [0.0053] * 20)
 
 
-def rectangle(nx: int, ny: int, a: float = 6.0, b: float = 4.0) -> Mesh:
+def rectangle(nx: int, ny: int, a: float = 6.0, b: float = 4.0) -> MeshArrays:
     """The simply supported rectangle of 9-node elements."""
     x, y = np.meshgrid(np.linspace(0.0, a, nx + 1), np.linspace(0.0, b, ny + 1))
     coordinates, elements = mesh_on(np.stack([x, y], axis=-1), 9)
@@ -39,7 +39,7 @@ def rectangle(nx: int, ny: int, a: float = 6.0, b: float = 4.0) -> Mesh:
     return with_restraints(coordinates, elements, held)
 
 
-def compliance(mesh: Mesh, weights: Floats) -> float:
+def compliance(mesh: MeshArrays, weights: Floats) -> float:
     """W per unit force, W being the weighted mean of w."""
     plate = PlateModel(mesh, CROSS_PLY, replace(rules(), assumes_shear=True))
     load = np.zeros(mesh.equations.shape)
@@ -48,7 +48,7 @@ def compliance(mesh: Mesh, weights: Floats) -> float:
     return float(free @ Tangent(plate).solve(free))
 
 
-def whole(mesh: tuple[Floats, object]) -> Mesh:
+def whole(mesh: tuple[Floats, object]) -> MeshArrays:
     coordinates, elements = mesh
     assert isinstance(elements, np.ndarray)
     return with_restraints(coordinates, elements, nothing(coordinates))

@@ -11,8 +11,8 @@ import fecm
 from fecm.deck.model import Ply
 from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
-from fecm.mechanics.laminate import Laminate, laminate
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.mechanics.mesh import MeshArrays
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.points import DISC, HERTZ, patch_weights
@@ -41,8 +41,8 @@ BALL = LinearPermanent(1.5091575e10, 1.0, 0.0, 1.5)
 
 
 def strike(
-    mesh: Mesh,
-    plate: Laminate,
+    mesh: MeshArrays,
+    plate: LaminateSection,
     weights: Floats,
     law: LinearPermanent,
     ball: tuple[float, float],

@@ -10,11 +10,10 @@ import pytest
 
 import fecm
 from fecm.results.criteria import ALL_CRITERIA
-from fecm.results.csv import lines
-from fecm.results.errors import ExportError, NotStoredError, ResultFileError
+from fecm.results.export import dataset_csv_lines, write_vtkhdf
 from fecm.results.exposures import largest_exposures
+from fecm.results.groups import ExportError, NotStoredError, ResultFileError
 from fecm.results.result import Result
-from fecm.results.vtkhdf import write_vtkhdf
 from tests.builders import REPORT_PLY, turned_stiffness
 from tests.calls import call
 from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, PROGRAM, small
@@ -96,7 +95,7 @@ def test_what_is_not_stored_is_answered_with_the_remedy_or_the_range(result: Res
 def test_the_table_of_plies_has_a_line_for_each_face_with_the_shear_of_the_element(
     result: Result,
 ) -> None:
-    header, *rows = "".join(lines(result, "plies")).splitlines()
+    header, *rows = "".join(dataset_csv_lines(result, "plies")).splitlines()
     assert header == ("step,time,element,point,ply,face,sigma_1,sigma_2,tau_12,tau_xz,tau_yz")
     assert len(rows) == 2 * 2 * 9 * 2 * 2
     step, _, element, point, ply, face, *values = rows[-3].split(",")
@@ -118,7 +117,7 @@ def test_the_table_of_plies_has_a_line_for_each_face_with_the_shear_of_the_eleme
     ],
 )
 def test_axes_of_plies_and_patch_have_their_names(result: Result, name: str, header: str) -> None:
-    assert next(lines(result, name)) == header + "\n"
+    assert next(dataset_csv_lines(result, name)) == header + "\n"
 
 
 def test_cells_have_the_stress_of_largest_magnitude_and_its_ply(

@@ -15,8 +15,8 @@ from fecm._errors import FecmWarning
 from fecm._typing import Array
 from fecm.plot.data import patches, strain_points
 from fecm.plot.kinds import MISSING, Picture, PlotError
-from fecm.plot.mesh import Support, supports
-from fecm.plot.pictures import draw, save
+from fecm.plot.mesh import Support, support_masks
+from fecm.plot.pictures import draw, save_picture
 from fecm.plot.plate import profile
 from fecm.plot.style import COLOURS, scale
 from fecm.results.result import Result
@@ -263,7 +263,7 @@ def test_mesh_marks_supports_and_the_impact_point() -> None:
     inner = "    6    1   -1   -1    0    0    0\n   20    0    1    1    0    0    0\n"
     mesh = MESH[: MESH.index("BOUN")] + f"BOUN\n{held}{inner}{simple}\n"
     result = run(small(mesh=mesh))
-    kinds = {name: np.flatnonzero(nodes) + 1 for name, nodes in supports(result).items()}
+    kinds = {name: np.flatnonzero(nodes) + 1 for name, nodes in support_masks(result).items()}
     assert kinds[Support.CLAMPED].tolist() == [1, 2, 3, 4, 5]
     assert kinds[Support.W_HELD].tolist() == [21, 22, 23, 24, 25]
     assert not len(kinds[Support.ROTATION_HELD])
@@ -288,7 +288,7 @@ def test_corners_of_a_simply_supported_plate_are_not_clamped(nodes: int, support
     if support is Support.CLAMPED:
         equations[x | y, 3:] = 0
     arrays: dict[str, Array] = {"mesh/elements": elements, "mesh/equations": equations}
-    kinds = supports(Result(arrays, {}, {}))
+    kinds = support_masks(Result(arrays, {}, {}))
     np.testing.assert_array_equal(kinds.pop(support), x | y)
     assert not any(nodes_of_kind.any() for nodes_of_kind in kinds.values())
 
@@ -435,7 +435,7 @@ def test_the_same_picture_has_the_same_bytes(result: Result, tmp_path: Path, suf
     written = []
     for name in ("a", "b"):
         path = tmp_path / f"{name}.{suffix}"
-        save(draw("force", {"small": result}), path)
+        save_picture(draw("force", {"small": result}), path)
         written.append(path.read_bytes())
     assert written[0] == written[1]
     heads = {"png": b"\x89PNG", "svg": b"<?xml", "pdf": b"%PDF"}
@@ -464,7 +464,7 @@ def test_units_and_names_are_shown_as_they_are(tmp_path: Path) -> None:
     result = fecm.load(file)
     for kind in ("loop", "energy", "line"):
         figure = draw(kind, dict.fromkeys(names, result)).figure
-        save(Picture(figure), file.with_name("x.svg"))  # parses every text
+        save_picture(Picture(figure), file.with_name("x.svg"))  # parses every text
         assert [text for text in legend_of(figure) if text in names] == names
         assert not any(text.get_parse_math() for text in figure.legends[0].get_texts())
     (axes,) = draw("mesh", {"a": result}).figure.axes

@@ -15,9 +15,9 @@ from fecm.api import load_deck
 from fecm.deck import model
 from fecm.plot.failure import NAMES
 from fecm.plot.kinds import PlotError
-from fecm.problem.summary import summarise
+from fecm.problem.summary import deck_summary
+from fecm.results.export import write_vtkhdf
 from fecm.results.result import Result
-from fecm.results.vtkhdf import write_vtkhdf
 from tests.pictures import legend_of, plot
 from tests.test_failure_runs import of_fabric
 from tests.test_several_materials import HYBRID, impact, materials, unlike
@@ -98,7 +98,7 @@ def test_vtkhdf_has_the_laminate_and_the_largest_stress_of_own_plies(
 
 def test_the_summary_of_a_deck_names_the_laminate_under_the_load() -> None:
     (problem,) = load_deck(unlike()).problems
-    summary = summarise(problem)
+    summary = deck_summary(problem)
     assert "  laminate            1, under the load" in summary.lines()
     assert summary.layers == 3
 

@@ -14,7 +14,7 @@ from fecm.plot.kinds import PlotError
 from fecm.plot.pictures import draw
 from fecm.results.exposures import largest_exposures
 from fecm.results.result import Result
-from fecm.results.summary import summary
+from fecm.results.summary import run_summary
 from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, PROGRAM, small
 from tests.pictures import legend_of, plot, run
 
@@ -211,7 +211,7 @@ def test_a_bar_per_ply_leaves_out_what_is_under_the_load(failing: Result) -> Non
     assert plate.collections[0].norm.vmax == max(expected)
     assert bars.get_ylim()[0] > bars.get_ylim()[1]  # the struck face at the top
     assert [1.0, 1.0] in [list(line.get_xdata()) for line in bars.get_lines()]
-    (line,) = (line for line in summary(failing) if line.startswith("puck"))
+    (line,) = (line for line in run_summary(failing) if line.startswith("puck"))
     value, mode = plate.get_title(loc="left").split(" (puck): ")
     assert line.split(":")[0].split()[-1] == value
     assert mode.split(",")[0] in line

@@ -10,8 +10,8 @@ import pytest
 
 from fecm.deck.model import Ply
 from fecm.mechanics.elements import gauss
-from fecm.mechanics.laminate import Laminate, laminate
-from fecm.mechanics.mesh import Mesh, element_blocks
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.mechanics.mesh import MeshArrays, element_blocks
 from fecm.mechanics.ply_stresses import (
     PlyStresses,
     equilibrium_shear_stiffness,
@@ -19,7 +19,7 @@ from fecm.mechanics.ply_stresses import (
     interlaminar_stresses,
     second_derivatives,
 )
-from fecm.mechanics.points import locate
+from fecm.mechanics.points import containing_elements
 from tests.builders import (
     DATA,
     GENERAL_ANGLES,
@@ -41,7 +41,7 @@ PAGANO = Ply(density=1.0, nu12=0.25, e1=25.0, e2=1.0, g12=0.5, g13=0.5, g23=0.2)
 SANDWICH = (0.0, 90.0, 0.0)
 
 
-def pagano(angles: tuple[float, ...] = SANDWICH, h: float = 1.0) -> Laminate:
+def pagano(angles: tuple[float, ...] = SANDWICH, h: float = 1.0) -> LaminateSection:
     return laminate(PAGANO, angles, [h / len(angles)] * len(angles))
 
 
@@ -69,7 +69,9 @@ def test_ply_stresses_are_those_of_the_handbook_to_its_printed_digits() -> None:
         ("[0/90/90/0] Pagano ply", pagano((0.0, 90.0, 90.0, 0.0))),
     ],
 )
-def test_the_shear_stiffness_of_equilibrium_is_the_closed_form(name: str, plate: Laminate) -> None:
+def test_the_shear_stiffness_of_equilibrium_is_the_closed_form(
+    name: str, plate: LaminateSection
+) -> None:
     (row,) = (row for row in table("shear_stiffness.csv") if row["laminate"] == name)
     xx, xy, yy = (float(row[f"H {ij}"]) for ij in ("xz,xz", "xz,yz", "yz,yz"))
     found = equilibrium_shear_stiffness(plate)
@@ -207,7 +209,7 @@ def test_second_derivatives_of_a_quadratic_are_exact_on_any_straight_sided_eleme
 
 def test_interlaminar_stresses_of_elements_without_nine_nodes_are_nan() -> None:
     coordinates, elements = square(2, 2, 8)
-    mesh: Mesh = with_restraints(coordinates, elements, nothing(coordinates))
+    mesh: MeshArrays = with_restraints(coordinates, elements, nothing(coordinates))
     found = PlyStresses(mesh, pagano(), gauss(2)).evaluate(np.ones((len(coordinates), 5)))
     assert np.isnan(found["tau_xz"]).all()
     assert np.isfinite(found["sigma_1"]).all()
@@ -220,11 +222,11 @@ def test_points_are_located_in_every_element_that_contains_them() -> None:
     coordinates, elements = distorted_square(4, 4)
     (family,) = element_blocks(elements, coordinates)
     points = np.random.default_rng(7).uniform(-0.1, 1.1, (200, 2))
-    members, which, xi = locate(family, points)
+    members, which, xi = containing_elements(family, points)
     inside = ((points >= 0.0) & (points <= 1.0)).all(axis=1)
     assert set(which) == set(np.flatnonzero(inside))
     values = family.shape.shape_functions(xi[:, 0], xi[:, 1], family.present)[0]
     found = np.einsum("kn,kni->ki", values, family.coordinates[members])
     np.testing.assert_allclose(found, points[which], atol=1e-12)
     node = coordinates[elements[5, 2] - 1]
-    assert len(locate(family, node[None])[0]) == 4
+    assert len(containing_elements(family, node[None])[0]) == 4

@@ -15,9 +15,11 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm import _memory
+from fecm import _machine
 from fecm.api import Solver, load_deck
-from fecm.deck.grid import Grid, uniform
+from fecm.authoring.case import Case, check_deck
+from fecm.authoring.vary import apply_case
+from fecm.deck.grid import ElementGrid, uniform_section
 from fecm.deck.model import (
     Deck,
     Impact,
@@ -28,24 +30,20 @@ from fecm.deck.model import (
     Projectile,
 )
 from fecm.mechanics import element_matrices
-from fecm.mechanics.buckling import buckling_factor
 from fecm.mechanics.failure import largest_in_plies
-from fecm.mechanics.laminate import Laminate, laminate
+from fecm.mechanics.laminate import LaminateSection, laminate
 from fecm.mechanics.mesh import element_blocks
 from fecm.mechanics.plate import UNLOADED, PlateModel
 from fecm.mechanics.ply_stresses import uniform_stresses
-from fecm.mechanics.solutions import modes
+from fecm.mechanics.solutions import buckling_factor, modes
 from fecm.mechanics.stiffness_product import stiffness_operator
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.parts import strengths_of_deck
-from fecm.problem.rules.damping import clamped_frequency
-from fecm.problem.summary import summarise
+from fecm.problem.rules.time_step import clamped_frequency
+from fecm.problem.summary import deck_summary
 from fecm.results.result import Result
-from fecm.results.summary import summary
-from fecm.studies.estimate import estimate
-from fecm.sweeps.case import Case
-from fecm.sweeps.checks import check_deck
-from fecm.sweeps.vary import apply_case
+from fecm.results.summary import run_summary
+from fecm.studies.estimate import quick_estimate
 from fecm.verification import decks
 from tests import stopped_runs
 from tests.builders import (
@@ -77,7 +75,7 @@ PLY = Ply(density=1.58e-9, nu12=0.3, e1=120e3, e2=7900.0, g12=5500.0, g13=5500.0
 ANGLES = (0.0, 90.0, 0.0, 90.0, 0.0, 0.0, 90.0, 0.0, 90.0, 0.0)
 
 
-def cross_ply() -> Laminate:
+def cross_ply() -> LaminateSection:
     """The laminate of the reference data."""
     return laminate(PLY, ANGLES, [0.269] * len(ANGLES))
 
@@ -300,10 +298,10 @@ def test_a_plate_that_moves_freely_has_the_buckling_factor_zero(n: int) -> None:
 
 
 def test_too_little_memory_for_the_buckling_load_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(_memory, "UNNOTICED", 0)
-    monkeypatch.setattr(_memory, "available", lambda: 1000)
+    monkeypatch.setattr(_machine, "UNNOTICED", 0)
+    monkeypatch.setattr(_machine, "available_memory", lambda: 1000)
     plate = replace(reference_plate(4), preload=(-1.0, 0.0, 0.0))
-    with pytest.raises(_memory.NotEnoughMemoryError, match="buckling"):
+    with pytest.raises(_machine.NotEnoughMemoryError, match="buckling"):
         buckling_factor(plate)
 
 
@@ -375,13 +373,13 @@ def test_a_preload_beyond_the_strength_of_a_ply_is_found() -> None:
 )
 def test_the_summary_has_the_buckling_load(card: str, line: str) -> None:
     (problem,) = load_deck(preloaded(card)).problems
-    assert f"  {line}" in summarise(problem).lines()
+    assert f"  {line}" in deck_summary(problem).lines()
 
 
 def test_a_plate_without_compression_has_no_line_about_buckling() -> None:
     for text in (base(), preloaded("1.0")):
         (problem,) = load_deck(text).problems
-        summary = summarise(problem)
+        summary = deck_summary(problem)
         assert summary.buckling_factor is None
         assert not any("buckling" in line for line in summary.lines())
 
@@ -456,8 +454,8 @@ def test_the_result_names_the_preload_and_gages_leave_it_out() -> None:
 def test_the_summary_of_a_run_names_the_preload() -> None:
     without, preloaded_one = runs()
     expected = "preload           N_x = 0.002 N/mm, N_y = -0.001 N/mm, N_xy = 0.0005 N/mm"
-    assert expected in summary(preloaded_one)
-    assert not any(line.startswith("preload") for line in summary(without))
+    assert expected in run_summary(preloaded_one)
+    assert not any(line.startswith("preload") for line in run_summary(without))
 
 
 @pytest.mark.parametrize("solver", ["numpy", "auto"])
@@ -536,10 +534,10 @@ TIME_STEPS = {4: 7e-7, 8: 6.8e-7, 16: 5.6e-7, 32: 3.1e-7}
 
 def struck(n: int, case: dict[str, str], duration: float) -> Deck:
     """The plate of the reference data on n x n elements, struck by a rigid mass on a disc."""
-    grid = Grid(uniform(SIDE, n), uniform(SIDE, n))
+    grid = ElementGrid(uniform_section(SIDE, n), uniform_section(SIDE, n))
     middle, _, _ = grid.nearest(SIDE / 2.0, SIDE / 2.0)
     segments = (
-        decks.supports(grid, decks.SUPPORTED),
+        decks.restraints(grid, decks.SUPPORTED),
         Projectile(0, 0, float(case["mass_t"])),
         Impact(middle, 3, float(case["velocity_mm_per_s"])),
         decks.elastic(float(case["k_N_per_mm15"])),
@@ -652,5 +650,5 @@ def series_compliance(force: float) -> float:
 @pytest.mark.parametrize("case", ["100g_biax_-0.5cr", "ball_biax_+5cr"])
 def test_the_static_stiffness_of_an_estimate_is_that_of_the_preloaded_plate(case: str) -> None:
     row = summary_of(case)
-    found = estimate(check_deck(struck(16, row, 1e-5))).stiffness
+    found = quick_estimate(check_deck(struck(16, row, 1e-5))).stiffness
     assert found == pytest.approx(1.0 / series_compliance(float(row["N0x_N_per_mm"])), rel=2e-3)

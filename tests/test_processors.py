@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from fecm import _processors
-from fecm.sweeps import schedule
+from fecm import _machine
+from fecm.sweeps import execute
 from fecm.sweeps.outcome import Outcome
 from fecm.sweeps.plan import Settings, Task
 from tests.decks import model, small
@@ -20,7 +20,7 @@ def machine(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> pytest.MonkeyPat
     """A machine of 16 processors, of which the process may use 8, without ``/proc/loadavg``."""
     monkeypatch.setattr(os, "cpu_count", lambda: 16)
     monkeypatch.setattr(os, "sched_getaffinity", lambda _: set(range(8)), raising=False)
-    monkeypatch.setattr(_processors, "LOADS", tmp_path / "loadavg")
+    monkeypatch.setattr(_machine, "LOADS", tmp_path / "loadavg")
     return monkeypatch
 
 
@@ -31,7 +31,7 @@ def test_processors_are_free_that_neither_the_load_nor_others_take(
     machine: pytest.MonkeyPatch, load: float, free: int
 ) -> None:
     machine.setattr(os, "getloadavg", lambda: (load, 0.0, 0.0), raising=False)
-    assert _processors.free() == free
+    assert _machine.free_processors() == free
 
 
 @pytest.mark.parametrize(("running", "free"), [(1, 8), (12, 5), (99, 2)])
@@ -39,13 +39,13 @@ def test_work_that_has_ended_is_no_load(
     machine: pytest.MonkeyPatch, running: int, free: int
 ) -> None:
     machine.setattr(os, "getloadavg", lambda: (14.0, 0.0, 0.0), raising=False)
-    _processors.LOADS.write_text(f"14.00 9.00 5.00 {running}/700 12345\n")
-    assert _processors.free() == free
+    _machine.LOADS.write_text(f"14.00 9.00 5.00 {running}/700 12345\n")
+    assert _machine.free_processors() == free
 
 
 def test_a_system_without_a_load_has_all_its_processors(machine: pytest.MonkeyPatch) -> None:
     machine.delattr(os, "getloadavg", raising=False)
-    assert _processors.free() == 8
+    assert _machine.free_processors() == 8
 
 
 def sent(monkeypatch: pytest.MonkeyPatch, seconds: float, most: int) -> tuple[int, int, int]:
@@ -66,9 +66,9 @@ def sent(monkeypatch: pytest.MonkeyPatch, seconds: float, most: int) -> tuple[in
         others.extend(task.number for task in tasks)
 
     monkeypatch.setattr(time, "monotonic", lambda: clock[0])
-    monkeypatch.setattr(schedule, "attempt", attempt)
-    monkeypatch.setattr(schedule, "on_workers", on_workers)
-    schedule.here_first(tasks, lambda: most, lambda *_: None, lambda: None)
+    monkeypatch.setattr(execute, "attempt", attempt)
+    monkeypatch.setattr(execute, "on_workers", on_workers)
+    execute.here_first(tasks, lambda: most, lambda *_: None, lambda: None)
     assert here + others == list(range(10))
     return len(here), len(others), workers[0]
 
@@ -90,5 +90,5 @@ def test_tasks_go_to_workers_that_are_worth_their_start(
 
 
 def test_tasks_that_cannot_be_sent_stay_here(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(schedule, "_can_be_sent", lambda _: False)
+    monkeypatch.setattr(execute, "_can_be_sent", lambda _: False)
     assert sent(monkeypatch, 5.0, 8) == (10, 0, 0)

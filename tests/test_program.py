@@ -16,8 +16,8 @@ from fecm.deck.macros import compile_program, estimate_work
 from fecm.deck.model import Macro
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.build import RunOptions
+from fecm.results.hdf5_writer import MemorySink
 from fecm.results.result import Result
-from fecm.results.sinks import MemorySink
 from fecm.simulation.interpreter import Action, Interpreter
 from fecm.simulation.run import simulate
 from tests.decks import DATA_CARDS, PROGRAM, ready, small

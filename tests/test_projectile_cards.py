@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 import fecm
 from fecm.api import load_deck
 from fecm.deck import Deck
-from fecm.deck.grid import Grid, Section
+from fecm.deck.grid import ElementGrid, GridSection
 from fecm.deck.model import (
     Control,
     Impact,
@@ -28,7 +28,7 @@ from fecm.mechanics.points import gages
 from fecm.mechanics.projectile import RigidMass, Rod, report_rod
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate, build_projectile
-from fecm.results.csv import lines
+from fecm.results.export import dataset_csv_lines
 from fecm.results.result import Result
 from tests.decks import DATA_CARDS, LONG, MESH, OWN_FINDINGS, small
 
@@ -193,7 +193,7 @@ def test_a_rigid_mass_on_a_large_thin_plate_is_the_impact_on_an_infinite_one() -
     m, v, k = 2.0e-4, 100.0, 5.0e4
     E, nu, rho, h, shear = 1.0e7, 0.3, 2.5e-4, 0.1, 5.0e7
     side, count = 12.0, 48
-    grid = Grid([Section(0.0, side, count)], [Section(0.0, side, count)])
+    grid = ElementGrid([GridSection(0.0, side, count)], [GridSection(0.0, side, count)])
     boundary = grid.boundary((1, 1, 0, 0, 0), {})
     assert boundary is not None
     ply = Ply(rho, nu, E, E, E / (2.0 * (1.0 + nu)), shear, shear)
@@ -300,7 +300,7 @@ def test_the_long_decks_gage_sees_the_wave_pass() -> None:
 
 def test_exported_gages_are_named_by_their_cards() -> None:
     result = result_of(with_segment("GAGE\n3, 0.5, 0.5, 0.04, 0.\n1, 1., 1., 0., 90.\n\n"))
-    header, *rows = (line.rstrip().split(",") for line in lines(result, "gages"))
+    header, *rows = (line.rstrip().split(",") for line in dataset_csv_lines(result, "gages"))
     assert header == ["step", "time", "gage", "strain"]
     assert [int(row[2]) for row in rows[:4]] == [3, 1, 3, 1]
     assert [float(row[3]) for row in rows] == result.gages.strain.ravel().tolist()

@@ -19,7 +19,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm._json import jsonable
+from fecm._text import jsonable
 from tests.calls import call, program
 from tests.decks import APPENDIX, DATA_CARDS, LONG, PROGRAM, small
 from tests.test_check import WRONG

@@ -20,7 +20,7 @@ from fecm.deck.model import Ply
 from fecm.mechanics import quick_models
 from fecm.mechanics.laminate import (
     SMALL_MASS,
-    Laminate,
+    LaminateSection,
     effective_rigidity,
     laminate,
     threshold_force,
@@ -33,8 +33,8 @@ from fecm.mechanics.quick_models import (
 from fecm.mechanics.solutions import static_stiffness
 from fecm.problem.contact_estimates import wave_impedance
 from fecm.results.result import Result
-from fecm.results.summary import summary
-from fecm.verification.decks import result_of
+from fecm.results.summary import run_summary
+from fecm.verification.decks import run_of_deck
 from fecm.verification.impacts import struck_square
 from tests.builders import REPORT_ANGLES, report_plate, table
 from tests.calls import call
@@ -70,7 +70,7 @@ def test_the_effective_rigidity_is_near_olssons_for_orthotropic_laminates(
     assert found >= float(row["D*"]) * (1.0 - 1e-7)  # an arithmetic-geometric mean's lower bound
 
 
-def with_stiffness(D: Sequence[Sequence[float]]) -> Laminate:
+def with_stiffness(D: Sequence[Sequence[float]]) -> LaminateSection:
     """A plate with this bending stiffness."""
     return replace(report_plate(), B=np.zeros((3, 3)), D=np.array(D))
 
@@ -242,7 +242,7 @@ def test_the_static_stiffness_of_thin_plates_is_timoshenkos(row: dict[str, str])
 def test_peaks_of_all_response_classes_are_those_of_the_series(row: dict[str, str]) -> None:
     # The file's times are twice those of its peaks.
     deck = struck_square(float(row["M kg"]), 0.55 * float(row["time"]))
-    peak = result_of(deck).force.max()
+    peak = run_of_deck(deck).force.max()
     assert peak == pytest.approx(float(row["peak exact series N"]), rel=0.02)
 
 
@@ -281,7 +281,7 @@ def test_the_threshold_is_printed_with_the_number_of_delaminations_it_assumes() 
     values = found.threshold
     assert (values["number"], values["interfaces"]) == (7, 1)
     assert list(values["band"]) == pytest.approx([values["force"] * math.sqrt(3.0)] * 2, rel=1e-12)
-    (line,) = [line for line in summary(found) if line.startswith("delamination")]
+    (line,) = [line for line in run_summary(found) if line.startswith("delamination")]
     assert line.endswith(f"(for 7 delaminations, as in DELA; {values['band'][1]:.4g} for one)")
 
 

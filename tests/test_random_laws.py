@@ -13,19 +13,20 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.results.errors import ResultFileError
-from fecm.sweeps.case import CasesError
-from fecm.sweeps.copula import correlation_of
-from fecm.sweeps.distributions import Law
-from fecm.sweeps.random import DESIGNS, Design, DesignKind, matrix
+from fecm.authoring.case import CasesError
+from fecm.results.groups import ResultFileError
+from fecm.sweeps.distributions import ValueDistribution
+from fecm.sweeps.random import DESIGNS, Design, DesignKind, correlation_of, matrix
 from tests.calls import call
 from tests.decks import DATA_CARDS, small
 
-NORMAL = Law("normal", (0.0, 1.0))
+NORMAL = ValueDistribution("normal", (0.0, 1.0))
 PAIR = {"k": "normal:2e6,1e5", "velocity": "normal:100,5"}
 
 
-def drawn(kind: DesignKind, rho: float, laws: tuple[Law, Law], samples: int) -> NDArray[Any]:
+def drawn(
+    kind: DesignKind, rho: float, laws: tuple[ValueDistribution, ValueDistribution], samples: int
+) -> NDArray[Any]:
     """Correlated draws of two laws, (2, samples)."""
     correlation = correlation_of(["a", "b"], {("a", "b"): rho})
     return matrix(
@@ -49,7 +50,12 @@ def test_correlated_normal_values_have_the_probabilities_of_quadrants(
 def test_correlated_values_keep_their_laws(kind: DesignKind) -> None:
     from scipy import stats
 
-    a, b = drawn(kind, 0.8, (Law("weibull", (2.0, 3.0)), Law("lognormal", (5.0, 0.4))), 4096)
+    a, b = drawn(
+        kind,
+        0.8,
+        (ValueDistribution("weibull", (2.0, 3.0)), ValueDistribution("lognormal", (5.0, 0.4))),
+        4096,
+    )
     assert stats.kstest(a, stats.weibull_min(3.0, scale=2.0).cdf).pvalue > 0.01
     assert stats.kstest(b, stats.lognorm(0.4, scale=5.0).cdf).pvalue > 0.01
     # Pearson (1907): the rank correlation of two normal values, which monotone laws keep
@@ -58,7 +64,7 @@ def test_correlated_values_keep_their_laws(kind: DesignKind) -> None:
 
 
 def test_a_correlated_latin_hypercube_has_one_sample_in_each_interval() -> None:
-    uniform = Law("uniform", (0.0, 64.0))
+    uniform = ValueDistribution("uniform", (0.0, 64.0))
     for values in drawn("lhs", 0.9, (uniform, uniform), 64):
         np.testing.assert_array_equal(np.sort(values.astype(int)), range(64))
 
@@ -68,7 +74,9 @@ def test_the_variance_of_a_sum_is_that_of_correlated_values() -> None:
     covariance = np.array([[4.0, 3.0, -1.0], [3.0, 9.0, 0.0], [-1.0, 0.0, 1.0]])
     sd = np.sqrt(covariance.diagonal())
     correlation = correlation_of(names, covariance / np.outer(sd, sd))
-    laws = {name: Law("normal", (0.0, size)) for name, size in zip(names, sd, strict=True)}
+    laws = {
+        name: ValueDistribution("normal", (0.0, size)) for name, size in zip(names, sd, strict=True)
+    }
     values = matrix(Design(laws, 2**14, 1, "sobol", correlation=correlation))
     weights = np.array([1.0, -2.0, 3.0])
     exact = weights @ covariance @ weights

@@ -13,9 +13,9 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.results.errors import ResultFileError
-from fecm.sweeps.case import CasesError
-from fecm.sweeps.distributions import Law
+from fecm.authoring.case import CasesError
+from fecm.results.groups import ResultFileError
+from fecm.sweeps.distributions import ValueDistribution
 from fecm.sweeps.plan import plan
 from fecm.sweeps.random import DESIGNS, Design, DesignKind, matrix, random_cases, unit_samples
 from fecm.sweeps.statistics import QUANTILES, Indices, indices, wilson
@@ -95,7 +95,7 @@ def assert_inside(found: Indices, exact: Floats) -> None:
 
 
 def ishigami(kind: DesignKind, samples: int, seed: int) -> Indices:
-    law = Law("uniform", (-np.pi, np.pi))
+    law = ValueDistribution("uniform", (-np.pi, np.pi))
     design = Design({f"x{i}": law for i in range(3)}, samples, seed, kind, sensitivity=True)
     x, y, z = matrix(design).T
     values = np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
@@ -139,17 +139,20 @@ def test_laws_are_those_of_scipy() -> None:
 
     unit = np.linspace(0.001, 0.999, 99)
     for law, exact in (
-        (Law("normal", (3.0, 0.5)), stats.norm(3.0, 0.5)),
-        (Law("lognormal", (3.0, 0.5)), stats.lognorm(0.5, scale=3.0)),
-        (Law("weibull", (3.0, 0.5)), stats.weibull_min(0.5, scale=3.0)),
-        (Law("weibull", (2.5e3, 20.0)), stats.weibull_min(20.0, scale=2.5e3)),
-        (Law("truncnormal", (3.0, 0.5, 2.9, 4.0)), stats.truncnorm(-0.2, 2.0, 3.0, 0.5)),
-        (Law("truncnormal", (0.0, 1.0, 5.0, 6.0)), stats.truncnorm(5.0, 6.0)),
-        (Law("truncnormal", (0.0, 1.0, -5.0, -4.0)), stats.truncnorm(-5.0, -4.0)),
-        (Law("uniform", (-1.0, 3.0)), stats.uniform(-1.0, 4.0)),
-        (Law("triangular", (-1.0, 0.5, 3.0)), stats.triang(0.375, -1.0, 4.0)),
-        (Law("triangular", (0.0, 0.0, 3.0)), stats.triang(0.0, 0.0, 3.0)),
-        (Law("triangular", (0.0, 3.0, 3.0)), stats.triang(1.0, 0.0, 3.0)),
+        (ValueDistribution("normal", (3.0, 0.5)), stats.norm(3.0, 0.5)),
+        (ValueDistribution("lognormal", (3.0, 0.5)), stats.lognorm(0.5, scale=3.0)),
+        (ValueDistribution("weibull", (3.0, 0.5)), stats.weibull_min(0.5, scale=3.0)),
+        (ValueDistribution("weibull", (2.5e3, 20.0)), stats.weibull_min(20.0, scale=2.5e3)),
+        (
+            ValueDistribution("truncnormal", (3.0, 0.5, 2.9, 4.0)),
+            stats.truncnorm(-0.2, 2.0, 3.0, 0.5),
+        ),
+        (ValueDistribution("truncnormal", (0.0, 1.0, 5.0, 6.0)), stats.truncnorm(5.0, 6.0)),
+        (ValueDistribution("truncnormal", (0.0, 1.0, -5.0, -4.0)), stats.truncnorm(-5.0, -4.0)),
+        (ValueDistribution("uniform", (-1.0, 3.0)), stats.uniform(-1.0, 4.0)),
+        (ValueDistribution("triangular", (-1.0, 0.5, 3.0)), stats.triang(0.375, -1.0, 4.0)),
+        (ValueDistribution("triangular", (0.0, 0.0, 3.0)), stats.triang(0.0, 0.0, 3.0)),
+        (ValueDistribution("triangular", (0.0, 3.0, 3.0)), stats.triang(1.0, 0.0, 3.0)),
     ):
         np.testing.assert_allclose(law.values(unit), exact.ppf(unit), rtol=1e-12)
 
@@ -168,7 +171,7 @@ def test_the_seed_decides_the_design(kind: DesignKind) -> None:
 
 
 def test_the_mixed_matrices_are_a_with_one_column_of_b() -> None:
-    laws = {name: Law("uniform", (0.0, 1.0)) for name in ("k", "q", "velocity")}
+    laws = {name: ValueDistribution("uniform", (0.0, 1.0)) for name in ("k", "q", "velocity")}
     a, b, *mixed = matrix(Design(laws, 16, sensitivity=True)).reshape(5, 16, 3)
     for column, found in enumerate(mixed):
         kept = [other for other in range(3) if other != column]
@@ -301,7 +304,7 @@ def test_the_cases_of_a_design_identify_an_interrupted_sweep() -> None:
     made = {
         seed: plan(problem, random_cases(design, [{}]), design=design).fingerprint()
         for seed in (0, 1)
-        for design in [Design({"k": Law("uniform", (1e6, 2e6))}, 16, seed)]
+        for design in [Design({"k": ValueDistribution("uniform", (1e6, 2e6))}, 16, seed)]
     }
     assert made[0] != made[1]
 

@@ -9,21 +9,22 @@ import pytest
 from scipy.special import ellipk
 
 from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, LinearPermanent
-from fecm.mechanics.curvature import FLAT, Curvature
-from fecm.mechanics.laminate import Laminate
-from fecm.mechanics.membrane import Membrane
+from fecm.mechanics.laminate import LaminateSection
+from fecm.mechanics.membrane import MembraneForces
 from fecm.mechanics.mesh import equation_numbers
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.points import DISC, patch_weights
-from fecm.mechanics.reduced_motion import ReducedMotion, SeriesLaw
 from fecm.mechanics.reduced_plate import (
+    ReducedMotion,
     ReducedPlate,
     ReductionError,
+    SeriesLaw,
     _moved,
     bending_modes,
     reduced_plate,
 )
 from fecm.mechanics.solutions import Tangent, modes, static_stiffness
+from fecm.mechanics.strains import FLAT, Curvature
 from tests.builders import (
     Floats,
     boundary,
@@ -39,7 +40,9 @@ from tests.nonlinear_plates import RULES
 THICKNESS = 0.02  # of the isotropic plates, on the unit square
 
 
-def on_square(lam: Laminate, *, held: bool, n: int = 4, distorted: bool = False) -> PlateModel:
+def on_square(
+    lam: LaminateSection, *, held: bool, n: int = 4, distorted: bool = False
+) -> PlateModel:
     """Simply supported unit square, its edges held in the plane or free there."""
     coordinates, elements = (distorted_square if distorted else square)(n, n)
     edge = boundary(coordinates, elements)[:, 0]
@@ -62,7 +65,7 @@ def relaxed_energy(plate: PlateModel, field: Floats) -> float:
     codes = plate.mesh.codes.copy()
     codes[:, 2:] = 1
     inner = replace(plate.mesh, codes=codes, equations=equation_numbers(codes))
-    membrane, free = Membrane(plate), plate.mesh.equations > 0
+    membrane, free = MembraneForces(plate), plate.mesh.equations > 0
 
     def forces(field: Floats) -> tuple[Floats, float]:
         quadratic, work = membrane.forces(field)
@@ -81,7 +84,7 @@ def relaxed_energy(plate: PlateModel, field: Floats) -> float:
 @pytest.mark.parametrize("curvature", [FLAT, (0.05, -0.1, 0.02)])
 @pytest.mark.parametrize("lam", [isotropic_plate(THICKNESS), general_plate()])
 def test_the_energy_is_that_of_the_elements_with_the_membrane_in_equilibrium(
-    lam: Laminate, curvature: Curvature, held: bool
+    lam: LaminateSection, curvature: Curvature, held: bool
 ) -> None:
     plate = replace(on_square(lam, held=held, distorted=True), curvature=curvature)
     plate = plate if lam.is_coupled else replace(plate, preload=(1e-5, -2e-6, 3e-6))

@@ -12,17 +12,16 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
+from fecm.authoring.case import CasesError
+from fecm.authoring.strike import strike_of
 from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.reduced_plate import ReducedPlate
 from fecm.results.metrics import RATIO
 from fecm.sweeps import api
-from fecm.sweeps.case import CasesError
 from fecm.sweeps.plan import Task, plan, tasks
-from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
-from fecm.sweeps.reduced_check import ReducedModel, count_held
+from fecm.sweeps.reduced import ReducedImpacts, ReducedModel, by_halvings, count_held, reduced
 from fecm.sweeps.responses import Hits
-from fecm.sweeps.strike import strike_of
 from tests.builders import table
 from tests.calls import call
 from tests.nonlinear_impacts import struck_rectangle

@@ -10,14 +10,14 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.deck.grid import Grid, Section
+from fecm.deck.grid import ElementGrid, GridSection
 from fecm.deck.model import Indentation, Material
 from fecm.mechanics.impact import ImpactSystem
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.results.result import Result
 from fecm.results.tapes import tape_texts
-from fecm.simulation.saved import restore, save
-from fecm.verification.decks import result_of, struck_plate
+from fecm.simulation.saved import restore, saved_values
+from fecm.verification.decks import run_of_deck, struck_plate
 from tests.decks import APPENDIX, DATA, LONG, ready
 
 Floats = NDArray[np.float64]
@@ -151,9 +151,9 @@ def test_the_rod_rings_between_the_contacts_faster_than_a_wave_goes_there_and_ba
 
 
 def test_the_reports_mesh_has_not_converged(results: dict[tuple[str, str], Result]) -> None:
-    grid = Grid(
-        [Section(0.0, 1.5, 6), Section(1.5, 4.5, 16), Section(4.5, 6.0, 6)],
-        [Section(0.0, 0.5, 2), Section(0.5, 3.5, 16), Section(3.5, 4.0, 2)],
+    grid = ElementGrid(
+        [GridSection(0.0, 1.5, 6), GridSection(1.5, 4.5, 16), GridSection(4.5, 6.0, 6)],
+        [GridSection(0.0, 0.5, 2), GridSection(0.5, 3.5, 16), GridSection(3.5, 4.0, 2)],
     )
     deck = fecm.read_one(LONG)
     law = deck.require(Indentation)
@@ -162,7 +162,7 @@ def test_the_reports_mesh_has_not_converged(results: dict[tuple[str, str], Resul
     first = coarse.force[coarse.time < 60e-6].max()
     # 2.7 % of the first peak; with four times the elements a side it is 75.90 lb.
     assert first == pytest.approx(78.69, abs=0.005)
-    assert result_of(finer).force.max() == pytest.approx(76.60, abs=0.005)
+    assert run_of_deck(finer).force.max() == pytest.approx(76.60, abs=0.005)
 
 
 def test_running_twice_gives_the_same_bytes(tmp_path: Path) -> None:
@@ -210,7 +210,7 @@ def test_a_stored_state_goes_on_as_if_nothing_had_happened() -> None:
     state = impact.start()
     for _ in range(300):  # past the first peak, so that the law has a memory
         impact.advance(state, 2e-7)
-    stored = save(state, "state")
+    stored = saved_values(state, "state")
     for _ in range(50):
         impact.advance(state, 2e-7)
     fresh = impact_of(LONG)
@@ -218,8 +218,8 @@ def test_a_stored_state_goes_on_as_if_nothing_had_happened() -> None:
     restore(again, "state", stored)
     for _ in range(50):
         fresh.advance(again, 2e-7)
-    for name, array in save(state, "state").items():
-        np.testing.assert_array_equal(save(again, "state")[name], array)
+    for name, array in saved_values(state, "state").items():
+        np.testing.assert_array_equal(saved_values(again, "state")[name], array)
 
 
 def impact_of(deck: Path) -> ImpactSystem:

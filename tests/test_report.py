@@ -15,9 +15,9 @@ from hypothesis import strategies as st
 
 import fecm
 from fecm.deck.layup import layup_text, parse_layup
-from fecm.report.page import render
+from fecm.report.content import render
 from fecm.report.report import page_of
-from fecm.results.first_failure import first_failures
+from fecm.results.exposures import first_failures
 from fecm.results.metrics import METRICS
 from fecm.results.result import Result
 from tests.calls import assert_unusable, call

@@ -12,7 +12,7 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck.rules import Rule, Subject, declare
-from fecm.problem.findings_page import all_rules, page
+from fecm.problem.findings_page import all_rules, findings_page
 from tests import decks
 from tests.builders import square
 from tests.decks import DATA, DATA_CARDS, MESH, PLY_PROGRAM, PROGRAM, ROOT, small
@@ -450,8 +450,8 @@ def test_every_code_that_is_reported_has_a_rule() -> None:
 
 def test_the_page_of_findings_is_that_of_the_rules() -> None:
     # Write it anew by: python -m fecm.problem.findings_page docs/findings.md
-    assert (ROOT / "docs" / "findings.md").read_text(encoding="utf-8") == page()
-    assert len(re.findall(r"^\| \[[EWN]\d{3}\]\{#", page(), re.MULTILINE)) == len(CODES)
+    assert (ROOT / "docs" / "findings.md").read_text(encoding="utf-8") == findings_page()
+    assert len(re.findall(r"^\| \[[EWN]\d{3}\]\{#", findings_page(), re.MULTILINE)) == len(CODES)
 
 
 @pytest.mark.parametrize("rule", all_rules(), ids=lambda rule: rule.code)

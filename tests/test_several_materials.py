@@ -21,7 +21,7 @@ import fecm
 from fecm.api import Solver, load_deck
 from fecm.deck import model
 from fecm.deck.catalogue import MATERIALS
-from fecm.deck.grid import Grid, lines, uniform
+from fecm.deck.grid import ElementGrid, grid_lines, uniform_section
 from fecm.deck.model import (
     Integration,
     LaminateNumber,
@@ -40,13 +40,13 @@ from fecm.deck.model import (
 from fecm.mechanics.failure_monitor import UNKNOWN, FailureMonitor
 from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.kernels.failure import CompiledMonitor
-from fecm.mechanics.laminate import Laminate, laminate
+from fecm.mechanics.laminate import LaminateSection, laminate
 from fecm.mechanics.mesh import equation_numbers
 from fecm.mechanics.ply_stresses import (
     PlyStresses,
     equilibrium_shear_stiffness,
+    residual_stresses,
 )
-from fecm.mechanics.residual_stresses import residual_stresses
 from fecm.mechanics.symmetry import symmetry_reduction
 from fecm.results.result import Result
 from fecm.verification import decks
@@ -100,7 +100,7 @@ def materials(*plies: Ply) -> Materials:
 def bent(name: str, theory: str, words: str) -> Result:
     """Run a quarter of a plate of 16 x 16 elements under q = cos cos, its origin in the middle."""
     plies, layup, side = PLATES[name]
-    along = np.cos(np.pi / side * np.array(lines(uniform(side / 2.0, 8))))
+    along = np.cos(np.pi / side * np.array(grid_lines(uniform_section(side / 2.0, 8))))
     made = decks.quarter_plate(
         8,
         material(plies[0], layup),
@@ -109,7 +109,7 @@ def bent(name: str, theory: str, words: str) -> Result:
         others=[THEORIES[theory], materials(*plies[1:])],
         side=side,
     )
-    return decks.result_of(made)
+    return decks.run_of_deck(made)
 
 
 CASES = [(name, theory) for name in PLATES for theory in THEORIES]
@@ -162,7 +162,7 @@ def test_a_plate_of_several_materials_vibrates_as_naviers_solution(name: str, th
     assert found.modes.angular_frequency[0] == pytest.approx(expected, rel=1e-4)
 
 
-def laminate_of(name: str) -> Laminate:
+def laminate_of(name: str) -> LaminateSection:
     """Laminate of a case."""
     plies, layup, _ = PLATES[name]
     chosen = [plies[number - 1] for _, _, number in layup]
@@ -247,7 +247,7 @@ def strip(row: dict[str, str], *others: model.Segment) -> tuple[Floats, Floats]:
     """Deflections and rotations of a simply supported strip under a line force in the middle."""
     e, g, left, _, length, width, force, *_ = map(float, row.values())
     ply = Ply(1.0, 0.0, e, e, e / 2.0, g, g)
-    grid = Grid(uniform(length, 16), uniform(width, 1))
+    grid = ElementGrid(uniform_section(length, 16), uniform_section(width, 1))
     loads = np.zeros((grid.up, grid.across, 5))
     share = np.array([1.0, 4.0, 1.0]) / 6.0  # of the line in its nodes
     loads[:, grid.across // 2, 2] = force * share
@@ -255,7 +255,7 @@ def strip(row: dict[str, str], *others: model.Segment) -> tuple[Floats, Floats]:
     made = decks.deck(
         grid,
         (
-            decks.supports(grid, "11001 11101 11001 11101 11001"),
+            decks.restraints(grid, "11001 11101 11001 11101 11001"),
             decks.forces(loads),
             Shear(assumed=True),
             plate,
@@ -263,7 +263,7 @@ def strip(row: dict[str, str], *others: model.Segment) -> tuple[Floats, Floats]:
         ),
         decks.DEFLECTION,
     )
-    field = decks.result_of(made).tape3.displacement[0].reshape(grid.up, grid.across, 5)
+    field = decks.run_of_deck(made).tape3.displacement[0].reshape(grid.up, grid.across, 5)
     return field[:, :, 2], field[:, :, 3]
 
 
@@ -299,14 +299,14 @@ def impact(
     steps: int = 40,
 ) -> model.Deck:
     """A simply supported plate of 4 x 4 elements under a rigid mass, in mm, N and s."""
-    grid = Grid(uniform(60.0, 4), uniform(60.0, 4))
+    grid = ElementGrid(uniform_section(60.0, 4), uniform_section(60.0, 4))
     middle = grid.nearest(30.0, 30.0)[0]
     named = MATERIALS["IM7/8552"]
     strengths = named.allowables("mm-N-s")
     program = decks.program(f"LMAS DT=2e-7 LOOP={steps} TIME RODP=10 {words} NEXT")
     given = {type(one) for one in others}
     segments = (
-        decks.supports(grid, "00000 11101 11110 11101 11110"),
+        decks.restraints(grid, "00000 11101 11110 11101 11110"),
         Shear(assumed=True),
         model.Projectile(0, 0, 2e-3),
         model.Impact(middle, 3, 2000.0),

@@ -15,9 +15,8 @@ import pytest
 from scipy.optimize import brentq
 
 from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.quick_models import curved_plate, static_plate
+from fecm.mechanics.quick_models import StaticCurve, curved_plate, static_curve, static_plate
 from fecm.mechanics.solutions import ConvergenceError
-from fecm.mechanics.static_curve import StaticCurve, static_curve
 from tests.builders import Floats, table
 from tests.nonlinear_plates import disc, patch, rectangle
 from tests.test_nonlinear_statics import LAMINATES, isotropic
@@ -111,7 +110,7 @@ def test_a_step_too_long_for_newtons_method_is_halved() -> None:
 
 
 def test_a_curve_that_is_never_enough_is_an_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fecm.mechanics.static_curve.MOST_STEPS", 4)
+    monkeypatch.setattr("fecm.mechanics.quick_models.MOST_STEPS", 4)
     plate = rectangle(100.0, 100.0, 1, LAMINATES["iso"], "clamped_movable")
     with pytest.raises(ConvergenceError, match="not long enough after"):
         static_curve(plate, contact_of(plate, "HERT", 10.0), 1e-6, lambda *_: False)

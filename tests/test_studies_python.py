@@ -18,7 +18,7 @@ from tests.test_estimate import HELD, deck
 
 MODULES = (
     "fecm.deck.catalogue",
-    "fecm.deck.unit_systems",
+    "fecm.deck.units",
     "fecm.studies.indentation_test.study",
     "fecm.studies.rod_test.study",
     "fecm.studies.waves.study",

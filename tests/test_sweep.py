@@ -21,24 +21,26 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.api import load_deck
+from fecm.authoring.case import Case, CasesError
+from fecm.authoring.cases import grid_cases, parse_vary, read_cases
+from fecm.authoring.vary import apply_case
 from fecm.deck import Deck
-from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, LinearPermanent, stacked
+from fecm.mechanics.contact_law import (
+    ContactPoint,
+    HystereticLaw,
+    LinearPermanent,
+    stack_parameters,
+)
 from fecm.mechanics.plate_motion import AppliedForce
 from fecm.problem.build import build_model
 from fecm.problem.parts import build_law, build_projectile
-from fecm.sweeps import schedule
-from fecm.sweeps.api import carry_out, problem_of
-from fecm.sweeps.case import Case, CasesError
-from fecm.sweeps.cases import read_cases
-from fecm.sweeps.convolution import Convolution
-from fecm.sweeps.grid import grid, parse_vary
+from fecm.sweeps import execute
+from fecm.sweeps.api import carry_out_plan, checked_problem
+from fecm.sweeps.execute import LOST, OtherSweepError, PartialResults, on_workers
 from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.parts import OtherSweepError, PartialResults
 from fecm.sweeps.plan import Task, plan, shares_plate, tasks
-from fecm.sweeps.responses import plate_response
+from fecm.sweeps.responses import Convolution, plate_response
 from fecm.sweeps.result import SweepResult
-from fecm.sweeps.schedule import LOST, on_workers
-from fecm.sweeps.vary import apply_case
 from tests.calls import Done, call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, model, small
 
@@ -124,7 +126,7 @@ def test_the_law_of_many_cases_is_the_law_of_each() -> None:
             strict=True,
         )
     ]
-    together = HystereticLaw(stacked(measured))
+    together = HystereticLaw(stack_parameters(measured))
     memory, last = together.start(), ContactPoint(np.zeros(15), np.zeros(15))
     alone = [(HystereticLaw(c), HystereticLaw(c).start(), ContactPoint(0.0, 0.0)) for c in measured]
     a = np.zeros(15)
@@ -205,7 +207,7 @@ def test_cases_of_velocity_and_patch_equal_their_full_runs() -> None:
     vary = {"velocity": [60.0, 115.0], "patch": [0.1, 0.5]}
     found = fecm.sweep(deck, vary, history=True)
     assert found.force is not None
-    for force, case in zip(found.force, grid(list(vary.items())), strict=True):
+    for force, case in zip(found.force, grid_cases(list(vary.items())), strict=True):
         patch = f"HERT,{case['patch']}\n"
         cards = DATA_CARDS.replace("     115.0", f"{case['velocity']:10.1f}")
         result = full(model(small(STEPS, data=shear.replace("HERT\n", patch) + cards)))
@@ -236,7 +238,7 @@ def test_a_layup_keeps_the_plys_thickness_and_a_thickness_scales_all() -> None:
 def test_a_plate_with_other_loads_is_run_whole() -> None:
     load = "FORC\n    8    0       0.0       0.0       1.0\n\n"
     deck = model(small(STEPS, data=load + DATA_CARDS))
-    problem = problem_of(deck)
+    problem = checked_problem(deck)
     assert not shares_plate(problem)
     found = fecm.sweep(deck, {"velocity": [50.0, 100.0]}, history=True)
     assert found.force is not None
@@ -281,7 +283,7 @@ def test_what_is_no_variation_is_refused(text: str) -> None:
 
 
 def test_a_grid_has_every_combination_once_and_a_table_its_rows(tmp_path: Path) -> None:
-    cases = grid([("velocity", [1.0, 2.0]), ("k", [3.0, 4.0, 5.0])])
+    cases = grid_cases([("velocity", [1.0, 2.0]), ("k", [3.0, 4.0, 5.0])])
     assert [(c["velocity"], c["k"]) for c in cases] == [
         (v, k) for v in (1.0, 2.0) for k in (3.0, 4.0, 5.0)
     ]
@@ -332,8 +334,8 @@ def children() -> list[int]:
 @pytest.mark.long
 @pytest.mark.linux
 def test_a_worker_that_dies_costs_time_only() -> None:
-    problem = problem_of(model(small(STEPS)))
-    made = plan(problem, grid([("layup", list(LAYUPS))]), history=True)
+    problem = checked_problem(model(small(STEPS)))
+    made = plan(problem, grid_cases([("layup", list(LAYUPS))]), history=True)
     killed: list[int] = []
 
     def kill(task: Task, outcome: object) -> None:
@@ -341,7 +343,7 @@ def test_a_worker_that_dies_costs_time_only() -> None:
             killed.append(children()[-1])
             os.kill(killed[0], signal.SIGKILL)
 
-    shared = carry_out(problem, made, workers=2, done=kill)
+    shared = carry_out_plan(problem, made, workers=2, done=kill)
     assert killed
     assert_same(shared, serial())
 
@@ -353,10 +355,10 @@ def die(task: Task) -> Outcome:
 
 @pytest.mark.long
 def test_tasks_whose_workers_always_die_end_as_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    problem = problem_of(model(small()))
-    made = plan(problem, grid([("layup", ["[0]", "[90]"])]))
-    monkeypatch.setattr(schedule, "attempt", die)
-    monkeypatch.setattr(schedule, "DEATHS", 1)
+    problem = checked_problem(model(small()))
+    made = plan(problem, grid_cases([("layup", ["[0]", "[90]"])]))
+    monkeypatch.setattr(execute, "attempt", die)
+    monkeypatch.setattr(execute, "DEATHS", 1)
     lost: dict[int, str] = {}
 
     def note(task: Task, outcome: Outcome) -> None:
@@ -403,8 +405,8 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
     cluster: tuple[str, list[subprocess.Popen[bytes]]],
 ) -> None:
     address, workers = cluster
-    problem = problem_of(model(small(STEPS)))
-    made = plan(problem, grid([("layup", list(LAYUPS))]), history=True)
+    problem = checked_problem(model(small(STEPS)))
+    made = plan(problem, grid_cases([("layup", list(LAYUPS))]), history=True)
     finished: list[int] = []
 
     def kill(task: Task, outcome: object) -> None:
@@ -412,7 +414,7 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
         if len(finished) == 5:
             workers[0].kill()
 
-    found = carry_out(problem, made, scheduler=address, done=kill)
+    found = carry_out_plan(problem, made, scheduler=address, done=kill)
     assert workers[0].poll() is not None or workers[0].wait(10) is not None
     assert sorted(finished) == list(range(16))
     assert_same(found, serial())
@@ -420,8 +422,8 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
 
 def test_a_scheduler_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("distributed")
-    monkeypatch.setattr(schedule, "PATIENCE", 0.5)
-    with pytest.raises(schedule.SchedulerError, match="127"):
+    monkeypatch.setattr(execute, "PATIENCE", 0.5)
+    with pytest.raises(execute.SchedulerError, match="127"):
         fecm.sweep(model(small()), {"k": [1e6]}, scheduler="tcp://127.0.0.1:9")
 
 
@@ -430,8 +432,8 @@ def test_a_scheduler_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatc
 
 def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     deck, layups = model(small()), LAYUPS[:8]
-    problem = problem_of(deck)
-    made = plan(problem, grid([("layup", list(layups))]), history=True)
+    problem = checked_problem(deck)
+    made = plan(problem, grid_cases([("layup", list(layups))]), history=True)
     path = tmp_path / "sweep.h5"
     begun: list[int] = []
 
@@ -441,14 +443,14 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        carry_out(problem, made, parts=PartialResults(path, made.fingerprint()), done=stop)
+        carry_out_plan(problem, made, parts=PartialResults(path, made.fingerprint()), done=stop)
     again = PartialResults(path, made.fingerprint())
     before = [task.number for task in tasks(problem, made) if again.get(task) is not None]
     assert before == begun
     # A part that is not whole is run again.
     (again.folder / "task-000002.npz").write_bytes(b"PK\x03\x04 and no more")
     notes: list[str] = []
-    found = carry_out(problem, made, parts=again, note=notes.append)
+    found = carry_out_plan(problem, made, parts=again, note=notes.append)
     forces = [force for _, force in again.forces() if force is not None]
     at_once = fecm.sweep(deck, {"layup": layups}, history=True)
     assert_same(replace(found, force=np.vstack(forces)), at_once)
@@ -462,7 +464,7 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
 SIGNALLED = """
 import os, signal
 from fecm.__main__ import main
-from fecm.sweeps.parts import PartialResults
+from fecm.sweeps.execute import PartialResults
 
 plain, stored = PartialResults.put, []
 
@@ -574,7 +576,7 @@ def test_a_closing_terminal_does_not_end_the_resource_tracker() -> None:
     """Without its first tracker, multiprocessing prints tracebacks about semaphores."""
     script = (
         "from multiprocessing import resource_tracker\n"
-        "from fecm.sweeps.schedule import start_resource_tracker\n"
+        "from fecm.sweeps.execute import start_resource_tracker\n"
         "start_resource_tracker()\n"
         "pid = resource_tracker._resource_tracker._pid\n"
         "print(open(f'/proc/{pid}/status').read())\n"

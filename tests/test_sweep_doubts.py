@@ -11,10 +11,10 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
+from fecm.authoring.case import Case
+from fecm.authoring.vary import apply_case
 from fecm.problem.problem import Problem
-from fecm.sweeps.case import Case
-from fecm.sweeps.doubts import JUDGED, doubtful_values
-from fecm.sweeps.vary import apply_case
+from fecm.sweeps.checks import JUDGED, doubtful_values
 from tests.sound_plate import base, replaced, with_card
 
 
@@ -109,7 +109,7 @@ def test_only_the_extremes_of_a_name_are_judged(monkeypatch: pytest.MonkeyPatch)
         applied.append(case)
         return apply_case(deck, case)
 
-    monkeypatch.setattr("fecm.sweeps.doubts.apply_case", apply)
+    monkeypatch.setattr("fecm.sweeps.checks.apply_case", apply)
     (problem,) = load_deck(short()).problems
     cases: list[Case] = [{"velocity": 1000.0 + n, "k": 4e4 + n} for n in range(10_000)]
     assert doubtful_values(problem, cases) == []

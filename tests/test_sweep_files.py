@@ -15,7 +15,7 @@ import pytest
 
 import fecm
 from fecm.sweeps.result import SweepResult
-from fecm.sweeps.summary import summary
+from fecm.sweeps.summary import sweep_summary
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM
 from tests.decks import small as small_of
@@ -83,7 +83,7 @@ def test_values_in_the_summary_have_the_digits_that_tell_cases_apart() -> None:
     ):
         cases = {"k": k, "velocity": np.full(3, velocity)}
         columns = {"peak_force": np.array([1.0, 5.0, 2.0]), "status": np.full(3, "ok")}
-        lines = summary(SweepResult(cases, columns, np.ones(3), np.ones(3)))
+        lines = sweep_summary(SweepResult(cases, columns, np.ones(3), np.ones(3)))
         assert any(shown in line for line in lines), lines
 
 

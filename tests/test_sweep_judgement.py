@@ -11,15 +11,15 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.authoring.vary import apply_case
 from fecm.deck import Deck
-from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent, stacked
+from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent, stack_parameters
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import RigidMass
 from fecm.results.metrics import SUMMARY
 from fecm.sweeps import batch
 from fecm.sweeps.outcome import Status
 from fecm.sweeps.responses import Hits, Impacts, TipSteps, balance_errors, by_numpy, impacts
-from fecm.sweeps.vary import apply_case
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, PROGRAM, small
 
@@ -83,7 +83,7 @@ def test_cases_together_keep_the_energy_as_well_as_their_runs_do(
 def test_a_force_with_no_projectile_behind_it_is_an_error_of_the_balance() -> None:
     mass, dt, steps = RigidMass(1.8e-4), 5e-7, 400
     kind = np.zeros(1, dtype=np.intp)
-    law = HystereticLaw(stacked([LinearPermanent(1.9e6, 1.0, 0.0, 2.0)]))
+    law = HystereticLaw(stack_parameters([LinearPermanent(1.9e6, 1.0, 0.0, 2.0)]))
     tips = TipSteps(Hits([mass], kind, np.ones(1), law, np.array([100.0])), dt, steps)
     found, work = by_numpy(np.zeros(steps), 1e-6, tips)
     assert found.error[0] < 1e-4

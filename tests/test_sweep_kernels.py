@@ -11,12 +11,12 @@ import pytest
 import fecm
 from fecm._typing import Floats
 from fecm.api import load_deck
+from fecm.authoring.case import Case
 from fecm.mechanics import kernels
 from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
 from fecm.mechanics.projectile import RigidMass
 from fecm.problem.build import RunOptions, build_model
 from fecm.sweeps import batch, responses
-from fecm.sweeps.case import Case
 from fecm.sweeps.responses import plate_response
 from fecm.sweeps.result import SweepResult
 from tests.test_kernels import compiled

@@ -15,8 +15,8 @@ import fecm
 from fecm._errors import FecmWarning
 from fecm.plot.kinds import PlotError
 from fecm.plot.pictures import draw
+from fecm.sweeps.files import save_sweep
 from fecm.sweeps.result import SweepResult
-from fecm.sweeps.result_writer import save
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM, small
 from tests.pictures import OF_RUNS, footer_of
@@ -49,7 +49,7 @@ def layups() -> SweepResult:
 @pytest.fixture
 def file(plane: SweepResult, tmp_path: Path) -> Path:
     """The plane's file."""
-    save(plane, tmp_path / "plane.h5")
+    save_sweep(plane, tmp_path / "plane.h5")
     return tmp_path / "plane.h5"
 
 
@@ -341,7 +341,7 @@ def test_the_line_of_doubtful_cases_begins_with_their_mark_and_is_not_cut(
 ) -> None:
     doubtful = plane["velocity"] > 60.0
     words = "beyond the linear plate and a few other limits of the model (w > 0.3 h)"
-    monkeypatch.setattr("fecm.plot.map_contents.beyond", lambda _, rows: {words: doubtful[rows]})
+    monkeypatch.setattr("fecm.plot.maps.beyond", lambda _, rows: {words: doubtful[rows]})
     figure = plot(plane, over=over, where=where)
     *_, marks = (line for line in figure.axes[0].get_lines() if line.get_marker() == marker)
     count = len(data_of(marks)[0])
@@ -445,7 +445,7 @@ def test_the_command_draws_a_map_without_being_asked_for_its_kind(
 
 
 def test_a_command_notes_failed_cases(plane: SweepResult, tmp_path: Path) -> None:
-    save(some_failed(plane, 3), tmp_path / "holed.h5")
+    save_sweep(some_failed(plane, 3), tmp_path / "holed.h5")
     done = call("plot", tmp_path / "holed.h5", "-o", tmp_path / "map.png")
     assert done.exit_code == 0
     assert done.stderr == (

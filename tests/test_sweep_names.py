@@ -12,17 +12,16 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm.authoring.case import Case, CasesError
+from fecm.authoring.cases import parse_vary, read_cases
+from fecm.authoring.values import VARIABLES, Changes
+from fecm.authoring.vary import apply_case
 from fecm.deck import Deck
 from fecm.deck.model import Impact, Indentation, Material, Patch
 from fecm.problem.generate import generate
 from fecm.results.exposures import largest_exposures
 from fecm.sweeps import batch
-from fecm.sweeps.case import Case, CasesError
-from fecm.sweeps.cases import read_cases
-from fecm.sweeps.grid import parse_vary
-from fecm.sweeps.summary import summary
-from fecm.sweeps.values import VARIABLES, Changes
-from fecm.sweeps.vary import apply_case
+from fecm.sweeps.summary import sweep_summary
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, model, small
 
@@ -187,7 +186,7 @@ def test_places_that_can_not_be_hit_are_cases_with_a_reason() -> None:
     np.testing.assert_array_equal(found["hit_x"], [50.0] * 4 + [np.nan] * 4)
     np.testing.assert_array_equal(found["peak_force"][:2], found["peak_force"][2:4])
     assert found.unit("hit_x") == "mm"
-    (line,) = [line for line in summary(found) if line.startswith("moved")]
+    (line,) = [line for line in sweep_summary(found) if line.startswith("moved")]
     assert line == "moved             2: to the nearest node, up to 2.236 mm away"
     patched = fecm.sweep(new(), {"at": places})
     assert patched["hit_x"][:2].tolist() == [50.0, 49.0]

@@ -18,15 +18,20 @@ import numpy as np
 import pytest
 
 from fecm._files import OutputError
-from fecm.sweeps import schedule
-from fecm.sweeps.api import carry_out, problem_of
-from fecm.sweeps.batch import run
-from fecm.sweeps.grid import grid
+from fecm.authoring.cases import grid_cases
+from fecm.authoring.timing import with_time_step
+from fecm.sweeps import execute
+from fecm.sweeps.api import carry_out_plan, checked_problem
+from fecm.sweeps.batch import run_task
+from fecm.sweeps.execute import (
+    LOST,
+    DamagedPartError,
+    OtherSweepError,
+    PartialResults,
+    exclusive_result,
+)
 from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.parts import DamagedPartError, OtherSweepError, PartialResults, alone
 from fecm.sweeps.plan import Plan, Task, plan, tasks
-from fecm.sweeps.schedule import LOST
-from fecm.sweeps.timing import with_time_step
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, model, small
 from tests.kill_runs import SWEEP, SWEPT
@@ -35,13 +40,15 @@ from tests.kill_runs import SWEEP, SWEPT
 @pytest.fixture
 def made() -> Plan:
     """Two plates."""
-    return plan(problem_of(model(small())), grid([("layup", ["[0/90]", "[90/0]"])]), history=True)
+    return plan(
+        checked_problem(model(small())), grid_cases([("layup", ["[0/90]", "[90/0]"])]), history=True
+    )
 
 
 def test_a_part_with_any_byte_changed_or_cut_off_is_damaged(made: Plan, tmp_path: Path) -> None:
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
-    task = tasks(problem_of(made.settings.deck), made)[0]
-    parts.put(task, run(task))
+    task = tasks(checked_problem(made.settings.deck), made)[0]
+    parts.put(task, run_task(task))
     (path,) = parts.folder.glob("task-*.npz")
     data = path.read_bytes()
     found = parts.get(task)
@@ -61,12 +68,12 @@ def test_cases_lost_with_their_workers_are_not_stored_as_finished(
     made: Plan, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def attempt(task: Task) -> Outcome:
-        return run(task) if task.number else Outcome.failed(dict.fromkeys(task.numbers, LOST))
+        return run_task(task) if task.number else Outcome.failed(dict.fromkeys(task.numbers, LOST))
 
-    monkeypatch.setattr(schedule, "attempt", attempt)
+    monkeypatch.setattr(execute, "attempt", attempt)
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
-    problem = problem_of(made.settings.deck)
-    found = carry_out(problem, made, parts=parts)
+    problem = checked_problem(made.settings.deck)
+    found = carry_out_plan(problem, made, parts=parts)
     assert found.completed.tolist() == [False, True]
     assert [parts.get(task) is None for task in tasks(problem, made)] == [True, False]
 
@@ -87,8 +94,8 @@ def test_a_sweep_that_was_killed_before_its_first_plate_was_done_begins_again(
 
 def test_an_outcome_without_the_mark_of_its_sweep_is_not_taken(made: Plan, tmp_path: Path) -> None:
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
-    (task, *_) = tasks(problem_of(made.settings.deck), made)
-    parts.put(task, run(task))
+    (task, *_) = tasks(checked_problem(made.settings.deck), made)
+    parts.put(task, run_task(task))
     (parts.folder / "sweep.json").unlink()
     with pytest.raises(OtherSweepError, match="another sweep"):
         PartialResults(tmp_path / "s.h5", made.fingerprint())
@@ -137,12 +144,12 @@ FORGERIES: dict[str, Callable[[dict[str, Any]], object]] = {
 def stored(tmp_path: Path) -> tuple[Path, Path, bytes]:
     """A sweep of two plates whose first one is finished: its folder, part and right result."""
     (tmp_path / "s.inp").write_text(small())
-    problem = problem_of(tmp_path / "s.inp")
-    made = plan(problem, grid([("layup", ["[0/90]", "[90/0]"])]), history=True)
+    problem = checked_problem(tmp_path / "s.inp")
+    made = plan(problem, grid_cases([("layup", ["[0/90]", "[90/0]"])]), history=True)
     assert call(*SWEEP_OF_TWO, "right.h5", cwd=tmp_path).exit_code == 0
     parts = PartialResults(tmp_path / "s.h5", made.fingerprint())
     task = tasks(problem, made)[0]
-    parts.put(task, run(task))
+    parts.put(task, run_task(task))
     return tmp_path, parts.folder / "task-000000.npz", (tmp_path / "right.h5").read_bytes()
 
 
@@ -193,11 +200,11 @@ def test_a_part_of_another_sweep_with_the_same_case_numbers_is_run_again(
 ) -> None:
     folder, part, _ = stored
     (folder / "other.inp").write_text(small(data=DATA_CARDS.replace("115.0", " 90.0")))
-    problem = problem_of(folder / "other.inp")
-    made = plan(problem, grid([("layup", ["[0/90]", "[90/0]"])]), history=True)
+    problem = checked_problem(folder / "other.inp")
+    made = plan(problem, grid_cases([("layup", ["[0/90]", "[90/0]"])]), history=True)
     others = PartialResults(folder / "other.h5", made.fingerprint())
     task = tasks(problem, made)[0]
-    others.put(task, run(task))
+    others.put(task, run_task(task))
     shutil.copy(others.folder / part.name, part)
     assert "belongs to another sweep" in assert_run_again(stored)
 
@@ -268,7 +275,10 @@ def test_nothing_is_read_or_deleted_through_a_folder_of_parts_that_is_a_link(
 
 def test_a_file_with_the_name_of_the_folder_of_parts_is_refused(tmp_path: Path) -> None:
     (tmp_path / ".s.h5.parts").write_text("precious")
-    with pytest.raises(OutputError, match="is not a folder; remove it"), alone(tmp_path / "s.h5"):
+    with (
+        pytest.raises(OutputError, match="is not a folder; remove it"),
+        exclusive_result(tmp_path / "s.h5"),
+    ):
         pass
     assert (tmp_path / ".s.h5.parts").read_text() == "precious"
 
@@ -278,7 +288,7 @@ def test_two_sweeps_begun_at_once_do_not_write_the_same_parts(tmp_path: Path) ->
     deck, result = tmp_path / "s.inp", tmp_path / "s.h5"
     deck.write_text(small())
     command = ("sweep", deck, "--vary", "k=1e6", "-o", result)
-    with alone(result):
+    with exclusive_result(result):
         refused = call(*command)
         assert_unusable(refused)
         assert "s.h5 is being computed by another process" in refused.stderr

@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
+from fecm.authoring.case import CasesError
 from fecm.deck.model import Deck, Patch
-from fecm.sweeps.case import CasesError
 from fecm.sweeps.convergence import Convergence, convergence
 from fecm.sweeps.result import SweepResult
 from tests.builders import REPORT_PLY, table

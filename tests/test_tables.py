@@ -14,12 +14,11 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck.card import Card, FieldKind, Fields, layout
+from fecm.deck.card import Card, FieldKind, Fields, _formatted, format_real, layout
 from fecm.deck.findings import Findings
 from fecm.deck.format import format_deck
 from fecm.deck.mesh_cards import Boundary, Coordinates, Elements, Forces
 from fecm.deck.model import Control, Deck
-from fecm.deck.numerals import _formatted, format_real
 from fecm.deck.reader import Reader, read_deck
 from fecm.deck.segment import NumberedSegment
 from fecm.deck.table import Table, TableReader, write_rows
@@ -180,7 +179,7 @@ def test_sound_lines_are_not_read_card_by_card(free: bool, monkeypatch: pytest.M
         read.append(card.line)
         return read_values(card, *rest, **options)
 
-    monkeypatch.setattr("fecm.deck.stream.read_values", counted)
+    monkeypatch.setattr("fecm.deck.segment.read_values", counted)
     line = "{}, 0, {!r}, {!r}" if free else "{:5d}    0{:10.8f}{:10.7f}"
     places = np.random.default_rng(5).random((500, 2)).tolist()
     Reader(

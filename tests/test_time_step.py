@@ -14,10 +14,14 @@ from scipy.sparse.linalg import eigsh
 
 from fecm.api import load_deck
 from fecm.mechanics import element_matrices, kernels, time_step
-from fecm.mechanics.element_bounds import eigenvalue_bounds
 from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.time_step import critical_time_step, safe_time_step, taken_time_step
+from fecm.mechanics.time_step import (
+    critical_time_step,
+    eigenvalue_bounds,
+    safe_time_step,
+    taken_time_step,
+)
 
 from .builders import (
     distorted_square,

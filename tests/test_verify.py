@@ -16,8 +16,8 @@ from fecm.mechanics import element_matrices
 from fecm.mechanics import laminate as laminates
 from fecm.mechanics.contact_law import LinearPermanent
 from fecm.problem.generate import generate
-from fecm.verification import CASES, carry_out, chosen, stretching
-from fecm.verification.case import HEAD, Case, Check, Label, Row, cells, page
+from fecm.verification import CASES, chosen, compute_rows, stretching
+from fecm.verification.case import HEAD, Case, Check, Label, Row, cells, verification_page
 from fecm.verification.decks import report_impact
 from tests import closed_forms
 from tests.builders import DATA
@@ -41,7 +41,7 @@ def check_of(case: str, quantity: str) -> Check:
 @pytest.fixture(scope="module")
 def rows() -> list[Row]:
     """Every row, computed once."""
-    return [row for one in CASES for row in carry_out(one)]
+    return [row for one in CASES for row in compute_rows(one)]
 
 
 def test_every_row_is_within_its_tolerance(rows: list[Row]) -> None:
@@ -54,7 +54,7 @@ def test_the_page_is_made_from_the_cases(rows: list[Row]) -> None:
         lines = [line.split(" | ") for line in text.splitlines()]
         return [cells[:3] + cells[5:] if len(cells) == 8 else cells for cells in lines]
 
-    assert fixed(PAGE.read_text()) == fixed(page(rows))
+    assert fixed(PAGE.read_text()) == fixed(verification_page(rows))
     assert "**" not in PAGE.read_text().partition("## ")[2]  # no row of it has failed
 
 
@@ -111,7 +111,7 @@ def test_a_case_that_can_not_be_computed_says_why_and_fails(
 
 
 def test_a_list_names_the_cases_without_computing_them(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("fecm.cli.verify.carry_out", None)
+    monkeypatch.setattr("fecm.cli.verify.compute_rows", None)
     done = call("verify", "--list")
     assert [line.split()[0] for line in done.stdout.splitlines()] == [one.name for one in CASES]
     told = json.loads(call("verify", "--list", "patch", "--format", "json").stdout)
@@ -129,7 +129,7 @@ def test_what_can_not_be_meant_is_refused() -> None:
 def test_numbers_that_are_missing_or_not_finite_are_never_within() -> None:
     check = Check("x", 1.0, "nowhere", 0.1, "")
     for given in ([], [math.nan], [math.inf], [1.0, 1.0]):
-        (row,) = carry_out(Case("made", "", (check,), lambda given=given: given))  # type: ignore[misc]
+        (row,) = compute_rows(Case("made", "", (check,), lambda given=given: given))  # type: ignore[misc]
         assert not row.within
         assert cells(row)[-1] == "FAILED"
 
@@ -143,7 +143,7 @@ def test_of_a_field_the_value_farthest_from_the_expected_one_counts() -> None:
         ((2.0 * shape, shape), 2.0),
         ((2.0 * shape - [0.0, 0.3, 0.1], shape), 1.7),
     ):
-        (row,) = carry_out(Case("made", "", (check,), lambda given=given: [given]))  # type: ignore[misc]
+        (row,) = compute_rows(Case("made", "", (check,), lambda given=given: [given]))  # type: ignore[misc]
         assert row.got == pytest.approx(got, nan_ok=True)
 
 
@@ -298,7 +298,7 @@ def test_the_series_of_two_layers_are_mindlins_where_both_are_the_same_isotropic
 
 def test_locking_of_shear_order_3_shows_in_the_thin_plate() -> None:
     (bending,) = chosen(["static-bending"])
-    thin = {row.check.quantity: row.error for row in carry_out(bending)}
+    thin = {row.check.quantity: row.error for row in compute_rows(bending)}
     assert abs(thin["w in the middle, thin"]) < 1e-5
     assert -2e-3 < thin["w in the middle, thin, L2 = 3"] < -2e-4
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fecm.verification import CASES, carry_out, chosen
+from fecm.verification import CASES, chosen, compute_rows
 from fecm.verification.case import Label
 from tests.broken import (
     curved,
@@ -94,7 +94,7 @@ def test_broken_physics_is_seen(
     BREAKS[name][0](monkeypatch)
     (one,) = chosen([case])
     with np.errstate(all="ignore"):
-        found = carry_out(one)
+        found = compute_rows(one)
     for beginning in quantities:
         rows = [row for row in found if row.check.quantity.startswith(beginning)]
         assert rows, f"no quantity of {case} begins with {beginning}"

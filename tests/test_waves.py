@@ -10,7 +10,7 @@ import pytest
 from numpy.polynomial import Polynomial
 
 from fecm.deck.model import Ply
-from fecm.mechanics.laminate import Laminate, laminate
+from fecm.mechanics.laminate import LaminateSection, laminate
 from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from tests.builders import (
     GENERAL_PLY,
@@ -133,7 +133,7 @@ def test_the_transverse_shear_factor_puts_the_cut_off_frequency_right() -> None:
 # A laminate that is coupled in every way, against a determinant of its own -----------------------
 
 
-def entries(plate: Laminate, angle: float, k: float | None) -> list[list[Polynomial]]:
+def entries(plate: LaminateSection, angle: float, k: float | None) -> list[list[Polynomial]]:
     """Equations 2-22 and 2-23 for a plane wave as polynomials in c^2, scaled by 1/k^2.
 
     Unknowns u, v, phi_x h, phi_y h, w in the plate's axes, w a quarter of a period ahead.  Without
@@ -236,7 +236,7 @@ def test_the_longest_flexural_wave_bends_the_plate_without_shear_or_membrane_for
 # Invariances ------------------------------------------------------------------------------------
 
 
-def seen_from(plate: Laminate, shift: float) -> Medium:
+def seen_from(plate: LaminateSection, shift: float) -> Medium:
     """The same plate with its displacements taken at the distance `shift` from the midplane."""
     moved = replace(
         plate,

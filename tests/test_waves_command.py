@@ -239,7 +239,7 @@ def drawn(axes: Any) -> list[Any]:
 
 def test_the_picture_of_dispersion_shows_scaled_velocities_and_frequencies() -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot.waves import dispersion_picture
+    from fecm.plot.studies import dispersion_picture
 
     medium = Medium(report_plate())
     curves = [dispersion(medium, angle, np.linspace(0.5, 20.0, 40)) for angle in (0.0, 90.0)]
@@ -261,7 +261,7 @@ def test_the_picture_of_dispersion_shows_scaled_velocities_and_frequencies() -> 
 
 def test_the_picture_of_speeds_is_polar_and_in_the_decks_units() -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot.waves import speeds_picture
+    from fecm.plot.studies import speeds_picture
 
     surfaces = WaveSurfaces(Medium(report_plate()))
     units = {"length": "in", "force": "lbf", "time": "s"}
@@ -276,7 +276,7 @@ def test_the_picture_of_speeds_is_polar_and_in_the_decks_units() -> None:
 
 def test_the_picture_of_fronts_shows_circle_rays_fronts_and_cusps() -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot.waves import fronts_picture
+    from fecm.plot.studies import fronts_picture
 
     surfaces = WaveSurfaces(Medium(report_plate()))
     times = (2e-6, 1e-5)

@@ -6,9 +6,9 @@ import math
 from collections.abc import Sequence
 
 from fecm._dataclasses import frozen
-from fecm.authoring.fixtures import DropWeight
-from fecm.authoring.laminate import Plies
+from fecm.authoring.laminate import DeckPlies
 from fecm.authoring.parameters import ObjectError, check_numbers, check_positive
+from fecm.authoring.plate import DropWeight
 from fecm.deck.catalogue import (
     CONTACTS,
     STANDARD,
@@ -17,8 +17,7 @@ from fecm.deck.catalogue import (
     NamedContact,
 )
 from fecm.deck.model import Indentation, Layer, Patch
-from fecm.deck.unit_systems import convert, units_of
-from fecm.deck.units import MODULUS, in_si
+from fecm.deck.units import MODULUS, convert, in_si, units_of
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
 from fecm.mechanics.points import DISC, HERTZ
@@ -48,7 +47,7 @@ class Sphere:
         given = ", ".join(f"{name}={value!r}" for name, value in values if value is not None)
         return f"Contact.estimate({given})"
 
-    def law(self, plies: Plies, layers: Sequence[Layer]) -> tuple[Indentation, str]:
+    def law(self, plies: DeckPlies, layers: Sequence[Layer]) -> tuple[Indentation, str]:
         """Law of contact with layers, and comment lines which say how k was computed."""
         if self.radius is None:
             raise ObjectError("the `contact` estimate needs the sphere's radius")
@@ -210,13 +209,13 @@ def parse_patch(text: str) -> Patch | None:
 AnyContact = Indentation | NamedContact | Sphere | str
 
 
-def law_of(
-    contact: AnyContact | None, plies: Plies, layers: Sequence[Layer]
+def indentation_law(
+    contact: AnyContact | None, plies: DeckPlies, layers: Sequence[Layer]
 ) -> tuple[Indentation, str]:
     """Indentation law in the units of the deck, and comment lines about one that is estimated."""
     match contact:
         case str():
-            return law_of(Contact.named(contact), plies, layers)
+            return indentation_law(Contact.named(contact), plies, layers)
         case Indentation():
             return Indentation(*contact.values(), contact.word), ""
         case Sphere():

@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 from dataclasses import replace
 
-from fecm.authoring.fixtures import Fixture
-from fecm.authoring.laminate import Plies
+from fecm.authoring.laminate import DeckPlies
 from fecm.authoring.parameters import ObjectError
+from fecm.authoring.plate import Fixture
 from fecm.deck import model
-from fecm.deck.unit_systems import units_of
-from fecm.deck.units import in_si, unit_of
+from fecm.deck.units import in_si, unit_of, units_of
 from fecm.problem.parts import build_projectile
 
 # Energy per thickness in J/mm below which a number without a unit is doubted.
@@ -24,14 +23,14 @@ def energy_of(deck: model.Deck) -> float:
     return 0.5 * mass * velocity**2
 
 
-def said_energy(deck: model.Deck, plies: Plies) -> str:
+def said_energy(deck: model.Deck, plies: DeckPlies) -> str:
     """Kinetic energy of the projectile, in joule where the units are known."""
     energy = energy_of(deck)
     joule = in_si("force*length", units_of(plies.system) if plies.system else {})
     return f"{energy * joule:.4g} J" if joule else f"{energy:.4g}"
 
 
-def energy_note(deck: model.Deck, plies: Plies, *, per_thickness: bool) -> str:
+def energy_note(deck: model.Deck, plies: DeckPlies, *, per_thickness: bool) -> str:
     """Say energy and velocity of the projectile."""
     energy, velocity = energy_of(deck), deck.require(model.Impact).velocity
     names = units_of(plies.system) if plies.system else {}
@@ -44,7 +43,7 @@ def energy_note(deck: model.Deck, plies: Plies, *, per_thickness: bool) -> str:
 
 
 def doubts_of_energy(
-    deck: model.Deck, fixture: Fixture | None, plies: Plies, *, is_bare: bool
+    deck: model.Deck, fixture: Fixture | None, plies: DeckPlies, *, is_bare: bool
 ) -> list[str]:
     """Doubt an energy that is far below a standard's, or a bare number that is small for one.
 

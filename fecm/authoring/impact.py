@@ -1,4 +1,7 @@
-"""The deck of an impact from plate, laminate, projectile and contact."""
+"""Title of a new deck: plate, layup, ply and energy.
+
+The deck of an impact from plate, laminate, projectile and contact.
+"""
 
 from __future__ import annotations
 
@@ -14,36 +17,36 @@ from fecm.authoring.contact import (
     Sphere,
     doubts_of_soft_tip,
     doubts_of_sphere,
-    law_of,
+    indentation_law,
 )
-from fecm.authoring.energy import doubts_of_energy, energy_note, energy_of, with_energy
-from fecm.authoring.fixtures import DropWeight
-from fecm.authoring.kinematics import (
-    AUTO as AUTO_KINEMATICS,
-)
-from fecm.authoring.kinematics import (
-    Formed,
-    Kinematics,
-    kinematics_of,
-    with_kinematics,
-)
+from fecm.authoring.energy import doubts_of_energy, energy_note, energy_of, said_energy, with_energy
 from fecm.authoring.laminate import (
+    DeckPlies,
     Laminate,
     Layup,
-    Plies,
     check_thickness,
-    cured,
+    cure_segment,
     damages,
-    plies_of,
+    deck_plies,
     strengths_of,
     system_asked,
     toughness,
 )
-from fecm.authoring.mesh import AnyMesh, InPlane, Membrane, curvature_of, placed, supported
-from fecm.authoring.numerics import AUTO, FULL, MITC, Numerics, Quadrature
+from fecm.authoring.mesh import AnyMesh, InPlane, MembraneSupport, curvature_of, placed, supported
+from fecm.authoring.numerics import (
+    AUTO,
+    AUTO_KINEMATICS,
+    FULL,
+    MITC,
+    Formed,
+    Kinematics,
+    Numerics,
+    Quadrature,
+    kinematics_of,
+    with_kinematics,
+)
 from fecm.authoring.parameters import ObjectError, check_kind, check_positive, in_units, is_finite
-from fecm.authoring.plate import Plate
-from fecm.authoring.title import default_title
+from fecm.authoring.plate import DropWeight, Plate
 from fecm.authoring.zones import Zone, laminates_of, placed_zones
 from fecm.deck import model
 from fecm.deck.catalogue import STANDARD, SYSTEM, NamedContact
@@ -51,11 +54,42 @@ from fecm.deck.findings import DeckError
 from fecm.deck.grid import IN_PLANE
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Control, Gage
-from fecm.deck.unit_systems import units_of
+from fecm.deck.units import units_of
 from fecm.mechanics.laminate import are_cores
 from fecm.mechanics.points import RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.parts import projectile_segment
+
+LONGEST_LAYUP = 60  # characters; a longer one is replaced by the number of plies
+
+
+def default_title(plate: Plate, laminate: Laminate, deck: model.Deck, plies: DeckPlies) -> str:
+    """Title such as ``D7136 [45/0/-45/90]3s IM7/8552, 10 J``."""
+    names = dict.fromkeys(named.name for _, named in plies.named)
+    words = (_plate(plate), _layup(laminate), " + ".join(names))
+    return f"{' '.join(filter(None, words))}, {said_energy(deck, plies)}"
+
+
+def _plate(plate: Plate) -> str:
+    if plate.fixture is not None:
+        return plate.fixture.name
+    if plate.size is None:
+        return "plate"
+    x, y = plate.size
+    return f"plate {x:g}x{y:g}"
+
+
+def _layup(laminate: Laminate) -> str:
+    """The layup as the literature writes it, ``[45/0/-45/90]3s``."""
+    plies = [f"{ply.angle:g}{ply.name if len(ply.name) == 1 else ''}" for ply in laminate.plies]
+    count, symmetric = len(plies), ""
+    if count % 2 == 0 and plies == plies[::-1]:
+        count, symmetric = count // 2, "s"
+    unit = next(n for n in range(1, count + 1) if plies[:count] == plies[:n] * (count // n))
+    repeated = f"{count // unit}" if count > unit else ""
+    layup = f"[{'/'.join(plies[:unit])}]{repeated}{symmetric}"
+    return layup if len(layup) <= LONGEST_LAYUP else f"{len(plies)} plies"
+
 
 MOST_STEPS = 1e6  # steps of a run above which the unit of its duration is doubted
 AnyProjectile = Rod | RigidMass | model.Projectile
@@ -63,7 +97,7 @@ GagePlace = tuple[float, float, float, float]  # x, y, z and degrees
 
 
 @frozen
-class Strike:
+class ImpactParameters:
     """What hits the plate, how fast and where."""
 
     projectile: AnyProjectile | None = None
@@ -79,7 +113,7 @@ class Request:
 
     plate: Plate
     laminate: Laminate
-    strike: Strike
+    strike: ImpactParameters
     numerics: Numerics
     units: str | None = None
     in_plane: InPlane | None = None
@@ -281,7 +315,7 @@ def impact(
         Request(
             plate,
             laminate,
-            Strike(projectile, contact, velocity, energy, at),
+            ImpactParameters(projectile, contact, velocity, energy, at),
             Numerics(patch, shear, shear_factor, duration, dt, every, plies, failure, damage),
             units=units,
             in_plane=in_plane,
@@ -314,7 +348,7 @@ def author(asked: Request) -> Authored:
     if test is not None and units not in (None, STANDARD):
         raise ObjectError(f"the fixture's standard is in {STANDARD}; leave out `units`")
     laminates = laminates_of(asked.laminate, asked.zones)
-    plies, in_zones = plies_of(asked.laminate, laminates, STANDARD if test else units, notes)
+    plies, in_zones = deck_plies(asked.laminate, laminates, STANDARD if test else units, notes)
     check_thickness(plies)
     strike, motion = asked.strike, _motion(asked, plies)
     if fixture is not None and test is not None:
@@ -336,7 +370,7 @@ def author(asked: Request) -> Authored:
     mesh, node, patch = placed(asked.plate, plies, strike.at, patch, doubts)
     zones = placed_zones(asked.zones, in_zones, mesh, node, doubts)
     struck = plies.layups[zones.struck - MATERIAL]
-    law, comment = law_of(strike.contact, plies, struck)
+    law, comment = indentation_law(strike.contact, plies, struck)
     if comment:
         notes.append(
             f"k = {law.k:g} is estimated from the ply's constants (fecm indent estimate) for an "
@@ -363,7 +397,7 @@ def author(asked: Request) -> Authored:
         patch,
         _gages(asked.gages),
         *damage,
-        cured(plies, asked.cure),
+        cure_segment(plies, asked.cure),
         law,
         asked.numerics.shear_segment(),
         curvature_of(asked.radius_x, asked.radius_y),
@@ -400,11 +434,11 @@ def author(asked: Request) -> Authored:
 
 
 def _formed(
-    asked: Request, plain: model.Deck, mesh: AnyMesh, plies: Plies, *, nonlinear: bool
+    asked: Request, plain: model.Deck, mesh: AnyMesh, plies: DeckPlies, *, nonlinear: bool
 ) -> Formed:
     """The deck with its supports, and with NONL for a nonlinear plate."""
     notes: list[str] = []
-    membrane = Membrane.of(
+    membrane = MembraneSupport.of(
         curved=plain.has(model.Curvature), stretches=nonlinear or plies.is_coupled
     )
     boundary, comment = supported(asked.plate, mesh, asked.in_plane, notes, membrane)
@@ -420,12 +454,12 @@ def _formed(
     return Formed(replace(plain, segments=tuple(segments)), comment, notes)
 
 
-def is_sandwich(plies: Plies, layers: Sequence[model.Layer]) -> bool:
+def is_sandwich(plies: DeckPlies, layers: Sequence[model.Layer]) -> bool:
     """Whether a layer is so soft in shear that it is the core of a sandwich."""
     return any(are_cores([plies.of(layer).ply for layer in layers]))
 
 
-def doubts_of_core(plies: Plies, layers: Sequence[model.Layer]) -> list[str]:
+def doubts_of_core(plies: DeckPlies, layers: Sequence[model.Layer]) -> list[str]:
     """Doubt an estimated k of a sandwich."""
     if not is_sandwich(plies, layers):
         return []
@@ -454,7 +488,7 @@ def _check_choice(name: str, value: str | None, choices: Sequence[str | None]) -
         raise ObjectError(f"`{name}` is {value!r}, none of {known}")
 
 
-def _motion(asked: Request, plies: Plies) -> Motion:
+def _motion(asked: Request, plies: DeckPlies) -> Motion:
     """Velocity, energy and duration in the units of the deck."""
     strike, numerics, system = asked.strike, asked.numerics, plies.system
     motion = Motion(
@@ -473,8 +507,8 @@ def _motion(asked: Request, plies: Plies) -> Motion:
 
 
 def _prescribed(
-    test: DropWeight, strike: Strike, motion: Motion, thickness: float
-) -> tuple[Strike, Motion]:
+    test: DropWeight, strike: ImpactParameters, motion: Motion, thickness: float
+) -> tuple[ImpactParameters, Motion]:
     """What a standard has in place of what is not given."""
     if motion.velocity is None and motion.energy is None:
         motion = motion._replace(energy=test.energy * thickness)
@@ -491,7 +525,9 @@ def _doubt_of_thickness(name: str, test: DropWeight, thickness: float) -> str:
     return f"{name} is for laminates of {limits}; this one has {thickness:.4g} mm"
 
 
-def _check_complete(asked: Request, strike: Strike, motion: Motion, system: str | None) -> None:
+def _check_complete(
+    asked: Request, strike: ImpactParameters, motion: Motion, system: str | None
+) -> None:
     """Raise ObjectError if projectile, velocity or duration is missing."""
     if strike.projectile is None and system not in (None, SYSTEM):
         raise ObjectError(
@@ -504,7 +540,7 @@ def _check_complete(asked: Request, strike: Strike, motion: Motion, system: str 
         raise ObjectError("`duration` is missing")
 
 
-def _units(asked: Request, plies: Plies) -> model.Units | None:
+def _units(asked: Request, plies: DeckPlies) -> model.Units | None:
     """UNIT segment; the report's decks have none."""
     if plies.system is None or (plies.system == SYSTEM and asked.units is None):
         return None
@@ -518,7 +554,7 @@ def _projectile(projectile: AnyProjectile | None) -> model.Projectile | None:
     return projectile
 
 
-def _preload(asked: Request, plies: Plies) -> model.Preload | None:
+def _preload(asked: Request, plies: DeckPlies) -> model.Preload | None:
     """PREL segment of a membrane force, if there is one."""
     if asked.preload is None:
         return None

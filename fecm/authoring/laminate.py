@@ -12,7 +12,7 @@ import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm._errors import did_you_mean
-from fecm._tables import html_table
+from fecm._text import html_table
 from fecm._typing import Floats
 from fecm.authoring.parameters import ObjectError, check_numbers, check_positive
 from fecm.deck import catalogue
@@ -39,10 +39,9 @@ from fecm.deck.model import (
     Ply,
     Segment,
 )
-from fecm.deck.unit_systems import UnitsError, system_named, units_of
-from fecm.deck.units import MODULUS, in_si, unit_of
+from fecm.deck.units import MODULUS, UnitsError, in_si, system_named, unit_of, units_of
 from fecm.mechanics.laminate import ROUNDING, EngineeringConstants
-from fecm.mechanics.laminate import Laminate as Stiffness
+from fecm.mechanics.laminate import LaminateSection as Stiffness
 from fecm.mechanics.laminate import laminate as stiffness_of
 from fecm.problem.check import check_segment
 from fecm.problem.parts import laminates_of_deck
@@ -267,7 +266,7 @@ class Bound(NamedTuple):
         return self.named.nu23 if self.named else catalogue.NU23
 
 
-class Plies(NamedTuple):
+class DeckPlies(NamedTuple):
     """Laminates in the units of a deck: that of the plate, and those of its zones."""
 
     layups: tuple[tuple[Layer, ...], ...]
@@ -330,9 +329,9 @@ class Plies(NamedTuple):
         return made
 
 
-def plies_of(
+def deck_plies(
     laminate: Laminate, zones: Sequence[Laminate], units: str | None, notes: list[str]
-) -> tuple[Plies, list[int]]:
+) -> tuple[DeckPlies, list[int]]:
     """Laminates of a plate, by default in the units of the first named ply, and those of its zones.
 
     Equal laminates have one number.
@@ -370,7 +369,7 @@ def plies_of(
     ]
     different = list(dict.fromkeys(layups))
     in_zones = [different.index(one) + MATERIAL for one in layups[1:]]
-    return Plies(tuple(different), tuple(materials), system), in_zones
+    return DeckPlies(tuple(different), tuple(materials), system), in_zones
 
 
 def stiffness_of_laminate(
@@ -380,7 +379,7 @@ def stiffness_of_laminate(
 
     Raises ObjectError if the laminate is incomplete or impossible.
     """
-    plies, _ = plies_of(laminate, (), system_asked(units), notes)
+    plies, _ = deck_plies(laminate, (), system_asked(units), notes)
     control = Control(0, 0, len(plies.layups[0]), 2, 5, 4)
     deck = Deck("", control, tuple(plies.segments()), ())
     findings = Findings()
@@ -459,7 +458,7 @@ def _note_of_thickness(own: float, named: NamedPly, system: str | None) -> str:
     return f"the plies are {own:g} {unit} thick, as {named.name} is listed"
 
 
-def check_thickness(plies: Plies) -> None:
+def check_thickness(plies: DeckPlies) -> None:
     """Raise ObjectError if plies are thinner than any, and say in which unit they seem to be."""
     names = units_of(plies.system) if plies.system else {}
     unit = in_si("length", names)
@@ -477,7 +476,7 @@ def toughness(giic: float | None) -> list[Segment]:
     return [] if giic is None else [Delamination(toughness=giic)]
 
 
-def strengths_of(plies: Plies) -> Allowables:
+def strengths_of(plies: DeckPlies) -> Allowables:
     """ALLO segment of named plies, of which one at least has strengths."""
     found, lacking = _strengths(plies)
     if not found:
@@ -486,7 +485,7 @@ def strengths_of(plies: Plies) -> Allowables:
     return replace(found[0], others=tuple(found[1:]))
 
 
-def _strengths(plies: Plies) -> tuple[list[Allowables], dict[str, str]]:
+def _strengths(plies: DeckPlies) -> tuple[list[Allowables], dict[str, str]]:
     """Strengths of named plies, and what the others lack, by name."""
     found: list[Allowables] = []
     lacking: dict[str, str] = {}
@@ -502,20 +501,20 @@ def _strengths(plies: Plies) -> tuple[list[Allowables], dict[str, str]]:
     return found, lacking
 
 
-def toughness_of(plies: Plies) -> float:
+def toughness_of(plies: DeckPlies) -> float:
     """Least toughness G_IIc of named plies."""
     if found := _toughnesses(plies):
         return min(found)
     raise ObjectError("no named ply with GIIc")
 
 
-def _toughnesses(plies: Plies) -> list[float]:
+def _toughnesses(plies: DeckPlies) -> list[float]:
     """Toughness G_IIc of the named plies that have it."""
     known = [named.delamination(plies.system) for _, named in plies.named if plies.system]
     return [one.toughness for one in known if one]
 
 
-def damages(plies: Plies, giic: float | None, notes: list[str]) -> list[Segment]:
+def damages(plies: DeckPlies, giic: float | None, notes: list[str]) -> list[Segment]:
     """Strengths and least toughness of named plies; notes what they do not have."""
     if plies.system is None or not plies.named:
         raise ObjectError("`damage` needs a named ply with strengths or toughness")
@@ -544,7 +543,7 @@ def _expanding() -> list[str]:
     return [name for name, ply in MATERIALS.items() if ply.expansion is not None]
 
 
-def cured(plies: Plies, cure: float | str | None) -> Cure | None:
+def cure_segment(plies: DeckPlies, cure: float | str | None) -> Cure | None:
     """CURE segment of named plies for a change of temperature, or for ``"177:20"``."""
     if cure is None:
         return None

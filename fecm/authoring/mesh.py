@@ -7,11 +7,11 @@ from dataclasses import replace
 from enum import Enum, auto
 from typing import Literal, NamedTuple, Self
 
-from fecm.authoring.laminate import Plies
-from fecm.authoring.parameters import ObjectError, is_finite, pair
+from fecm.authoring.laminate import DeckPlies
+from fecm.authoring.parameters import ObjectError, is_finite, number_pair
 from fecm.authoring.plate import MOST, Plate
 from fecm.deck import grid as grids
-from fecm.deck.grid import Grid, Section, held_in_plane
+from fecm.deck.grid import ElementGrid, GridSection, held_in_plane
 from fecm.deck.model import Boundary, Curvature, Patch
 from fecm.problem.plate_mesh import PlateMesh
 
@@ -30,7 +30,7 @@ HELD_WORDS = {
     "tangential": "the displacement along the edge (SS3)",
 }
 
-AnyMesh = Grid | PlateMesh
+AnyMesh = ElementGrid | PlateMesh
 
 
 class Placed(NamedTuple):
@@ -43,14 +43,14 @@ class Placed(NamedTuple):
 
 def placed(
     plate: Plate,
-    plies: Plies,
+    plies: DeckPlies,
     at: tuple[float, float] | None,
     patch: Patch | None,
     doubts: list[str],
 ) -> Placed:
     """Mesh, node that is hit, and patch; adds what was changed in them to `doubts`."""
-    place = None if at is None else pair("at", at)
-    mesh = plate.imported or grid_of(plate, place, None if patch is None else patch.radius)
+    place = None if at is None else number_pair("at", at)
+    mesh = plate.imported or plate_grid(plate, place, None if patch is None else patch.radius)
     low, high = mesh.extent
     side = min(high[0] - low[0], high[1] - low[1])
     if plies.thickest >= side:
@@ -81,7 +81,7 @@ def placed(
 
 def _doubts_of_refinement(plate: Plate, mesh: AnyMesh, patch: Patch | None) -> list[str]:
     """Whether a rectangle has other numbers of elements than were given."""
-    if not isinstance(mesh, Grid) or plate.mesh is None or plate.fixture is not None:
+    if not isinstance(mesh, ElementGrid) or plate.mesh is None or plate.fixture is not None:
         return []
     if patch is None or patch.radius is None:
         return []
@@ -95,7 +95,7 @@ def _doubts_of_refinement(plate: Plate, mesh: AnyMesh, patch: Patch | None) -> l
     ]
 
 
-def grid_of(plate: Plate, at: tuple[float, float] | None, radius: float | None) -> Grid:
+def plate_grid(plate: Plate, at: tuple[float, float] | None, radius: float | None) -> ElementGrid:
     """Grid of a rectangular plate, refined to the radius of a patch.
 
     With a fixture, size and mesh are those of its window.
@@ -110,7 +110,7 @@ def grid_of(plate: Plate, at: tuple[float, float] | None, radius: float | None) 
         )
         if plate.fixture:
             columns, rows = grids.framed(columns, whole[0]), grids.framed(rows, whole[1])
-    grid = Grid(columns, rows)
+    grid = ElementGrid(columns, rows)
     if max(grid.across, grid.up) // 2 > MOST or grid.elements > MOST_ELEMENTS:
         raise ObjectError(
             f"the mesh would have {grid.elements} elements; at most {MOST_ELEMENTS}, and {MOST} "
@@ -121,12 +121,12 @@ def grid_of(plate: Plate, at: tuple[float, float] | None, radius: float | None) 
 
 def _sections(
     length: float, count: int, centre: float, grading: float, radius: float | None
-) -> list[Section]:
+) -> list[GridSection]:
     """Elements in one direction."""
     if grading > 1.0:
         made = grids.graded(length, count, centre, grading)
     else:
-        made = grids.uniform(length, count)
+        made = grids.uniform_section(length, count)
     if radius is None or grids.longest_at(made, centre) <= radius:
         return made
     if radius < LEAST_RADIUS * length:
@@ -134,7 +134,7 @@ def _sections(
             f"the mesh is not refined to a radius of {radius:g}, less than {LEAST_RADIUS:g} times "
             f"the plate's side of {length:g}; give `columns` and `rows`"
         )
-    return grids.refined(length, count, centre, grading, radius)
+    return grids.refined_sections(length, count, centre, grading, radius)
 
 
 class Supported(NamedTuple):
@@ -144,7 +144,7 @@ class Supported(NamedTuple):
     comment: str
 
 
-class Membrane(Enum):
+class MembraneSupport(Enum):
     """Why u and v of a plate move."""
 
     AT_REST = auto()  # they are zero
@@ -174,10 +174,14 @@ def curvature_of(radius_x: float | None, radius_y: float | None) -> Curvature | 
 
 
 def supported(
-    plate: Plate, mesh: AnyMesh, in_plane: InPlane | None, notes: list[str], membrane: Membrane
+    plate: Plate,
+    mesh: AnyMesh,
+    in_plane: InPlane | None,
+    notes: list[str],
+    membrane: MembraneSupport,
 ) -> Supported:
     """Supports of a plate; u and v are held everywhere where they are zero."""
-    if membrane is Membrane.AT_REST:
+    if membrane is MembraneSupport.AT_REST:
         if in_plane is not None:
             notes.append(
                 "`in_plane` has no effect: the laminate is not coupled and the plate flat and "
@@ -186,9 +190,9 @@ def supported(
         everywhere, in_plane = (1, 1, 0, 0, 0), HELD
     else:
         everywhere = (0, 0, 0, 0, 0)
-        of_edges = TANGENTIAL if membrane is Membrane.CURVED else HELD
+        of_edges = TANGENTIAL if membrane is MembraneSupport.CURVED else HELD
         in_plane = in_plane or (FREE if plate.fixture else of_edges)
-    if membrane is Membrane.CURVED:
+    if membrane is MembraneSupport.CURVED:
         notes.append(_note_of_curved(plate, in_plane))
     if isinstance(mesh, PlateMesh):
         return Supported(mesh.supported(everywhere, plate.supports, in_plane=in_plane), "")

@@ -10,8 +10,7 @@ from types import UnionType
 from typing import TypeGuard
 
 from fecm._errors import FecmError
-from fecm.deck.unit_systems import units_of
-from fecm.deck.units import MASS, MODULUS, in_si, unit_in_si
+from fecm.deck.units import MASS, MODULUS, in_si, unit_in_si, units_of
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 
@@ -100,7 +99,7 @@ def in_units(name: str, value: object, dimension: str, system: str | None) -> fl
     return float(f"{float(match[1]) * known / own:.9g}")
 
 
-def pair(name: str, value: Sequence[float]) -> tuple[float, float]:
+def number_pair(name: str, value: Sequence[float]) -> tuple[float, float]:
     """Two numbers of a parameter."""
     try:
         x, y = map(float, value)

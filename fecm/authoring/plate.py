@@ -1,7 +1,11 @@
-"""Mesh and supports of a plate."""
+"""Fixtures of drop-weight tests: a plate on the edges of a window.
+
+Mesh and supports of a plate.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import field, fields, replace
 from pathlib import Path
@@ -10,13 +14,72 @@ from typing import Literal, Self
 from numpy.typing import ArrayLike
 
 from fecm._dataclasses import frozen
-from fecm._tables import html_table
-from fecm.authoring.fixtures import Fixture, parse_fixture
-from fecm.authoring.parameters import ObjectError, check_positive, pair
+from fecm._text import html_table
+from fecm.authoring.parameters import ObjectError, check_positive, number_pair
 from fecm.deck import grid as grids
-from fecm.deck.grid import EDGES, SUPPORTS, Section
+from fecm.deck.grid import EDGES, SUPPORTS, GridSection
 from fecm.problem import plate_mesh
 from fecm.problem.plate_mesh import BOUNDARY, GridLike, MeshLike, PlateMesh
+
+CUSTOM = "window:LXxLY,WXxWY"
+
+
+@frozen
+class DropWeight:
+    """What a test standard prescribes besides its fixture, in mm, N, s and t."""
+
+    mass: float  # of the rigid projectile
+    radius: float
+    energy: float  # impact energy per thickness, force
+    thinnest: float  # limits of the laminate's thickness, length
+    thickest: float
+    least_energy: float = 100.0  # per thickness, below which a unit is probably mistaken, force
+
+    def allows(self, thickness: float) -> bool:
+        """Whether a laminate's thickness is in the range of the standard."""
+        return self.thinnest <= round(thickness, 9) <= self.thickest
+
+
+@frozen
+class Fixture:
+    """A plate on the edges of a window in its middle."""
+
+    name: str
+    # Sides of the plate and of the window, length.
+    size: tuple[float, float]
+    window: tuple[float, float]
+    test: DropWeight | None = None  # what the standard prescribes; None for a custom fixture
+
+    @property
+    def comment(self) -> str:
+        """Comment lines of a deck."""
+        (lx, ly), (wx, wy) = self.size, self.window
+        return (
+            f"! Fixture {self.name}: a plate of {lx:g} x {ly:g}, w = 0 along the edges of a "
+            f"window of {wx:g} x {wy:g}.\n"
+            "! Clamps and lift-off are not modelled.\n"
+        )
+
+
+# ASTM D7136/D7136M: 5.5 kg, hemisphere of 16 mm diameter, 6.7 J per mm of thickness.
+D7136 = DropWeight(mass=5.5e-3, radius=8.0, energy=6700.0, thinnest=4.0, thickest=6.0)
+FIXTURES = {"D7136": Fixture("D7136", (150.0, 100.0), (125.0, 75.0), D7136)}
+
+
+def parse_fixture(text: str) -> Fixture:
+    """Fixture of a name, or of ``window:LXxLY,WXxWY``, smaller than the plate."""
+    if text in FIXTURES:
+        return FIXTURES[text]
+    number = r"\s*(\d+\.?\d*|\.\d+)\s*"
+    match = re.fullmatch(f"window:{number}[xX×]{number},{number}[xX×]{number}", text)
+    if match is None:
+        raise ObjectError(f"{text!r} is not a fixture: {', '.join(FIXTURES)} or {CUSTOM}")
+    lx, ly, wx, wy = map(float, match.groups())
+    if not (0.0 < wx < lx < 1e30 and 0.0 < wy < ly < 1e30):
+        message = f"the window of {wx:g} x {wy:g} is not smaller than the plate of {lx:g} x {ly:g}"
+        raise ObjectError(message)
+    return Fixture("window", (lx, ly), (wx, wy))
+
 
 MOST = 2000  # elements in one direction
 # Elements of the window where the mesh does not give them, and their grading.
@@ -52,8 +115,8 @@ class Plate:
     size: tuple[float, float] | None = None
     mesh: tuple[int, int] | None = None
     grading: float = 1.0
-    columns: tuple[Section, ...] = field(default=(), repr=False)
-    rows: tuple[Section, ...] = field(default=(), repr=False)
+    columns: tuple[GridSection, ...] = field(default=(), repr=False)
+    rows: tuple[GridSection, ...] = field(default=(), repr=False)
     fixture: Fixture | None = None
     imported: PlateMesh | None = None
 
@@ -120,15 +183,15 @@ class Plate:
             if size or mesh or grading != 1.0:
                 raise ObjectError("`columns` and `rows` replace `size`, `mesh` and `grading`")
             try:
-                x_sections, y_sections = grids.listed(columns), grids.listed(rows)
+                x_sections, y_sections = grids.listed_sections(columns), grids.listed_sections(rows)
                 return cls(supports, columns=tuple(x_sections), rows=tuple(y_sections))
             except ValueError as error:
                 raise ObjectError(f"`columns` and `rows`: {error}") from None
         if columns or rows or size is None or mesh is None:
             raise ObjectError("give `size` and `mesh`, or `columns` and `rows`")
-        x, y = pair("size", size)
+        x, y = number_pair("size", size)
         check_positive(size=min(x, y))
-        nx, ny = pair("mesh", mesh)
+        nx, ny = number_pair("mesh", mesh)
         if not all(1 <= n <= MOST and n == int(n) for n in (nx, ny)):
             raise ObjectError(f"`mesh` is {mesh!r}, not two numbers of elements from 1 to {MOST}")
         return cls(supports, (x, y), (int(nx), int(ny)), float(grading))

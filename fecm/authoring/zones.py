@@ -14,7 +14,7 @@ from fecm.authoring.mesh import AnyMesh
 from fecm.authoring.parameters import ObjectError
 from fecm.deck import model
 from fecm.deck.material_cards import MATERIAL
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.mesh import MeshArrays
 from fecm.problem.generate import generate
 from fecm.problem.plate_mesh import PlateMesh
 
@@ -26,7 +26,7 @@ Place = str | Sequence[float]
 Zone = tuple[Place, Layup | Laminate]
 
 
-class Zones(NamedTuple):
+class ElementLaminates(NamedTuple):
     """Laminates of the elements of a plate."""
 
     struck: int  # number of the laminate under the load
@@ -44,13 +44,13 @@ def laminates_of(laminate: Laminate, zones: Sequence[Zone]) -> list[Laminate]:
 
 def placed_zones(
     zones: Sequence[Zone], laminates: Sequence[int], mesh: AnyMesh, node: int, doubts: list[str]
-) -> Zones:
+) -> ElementLaminates:
     """Elements of zones, the later ones over the earlier; `laminates` are the numbers of theirs.
 
     A rectangle has the elements whose centres lie in it; one whose edge cuts elements is doubted.
     """
     if not zones:
-        return Zones(MATERIAL, None)
+        return ElementLaminates(MATERIAL, None)
     control = model.Control(mesh.nodes, mesh.elements, 1, 2, 5, mesh.most_nodes)
     made = generate(model.Deck("", control, (mesh.coordinates(), mesh.element_cards()), ()))
     numbers = np.full(mesh.elements, MATERIAL)
@@ -59,7 +59,7 @@ def placed_zones(
         numbers[inside] = laminate
     struck = int(numbers[(made.elements == node).any(axis=1)][0])
     records = _runs(numbers)
-    return Zones(struck, model.Zones(records) if records else None)
+    return ElementLaminates(struck, model.Zones(records) if records else None)
 
 
 def _group(mesh: AnyMesh, name: str) -> Indices:
@@ -74,7 +74,7 @@ def _group(mesh: AnyMesh, name: str) -> Indices:
     return surfaces[name]
 
 
-def _rectangle(mesh: Mesh, place: Sequence[float], doubts: list[str]) -> Bools:
+def _rectangle(mesh: MeshArrays, place: Sequence[float], doubts: list[str]) -> Bools:
     """Which elements have their centres in a rectangle."""
     try:
         x0, y0, x1, y1 = map(float, place)

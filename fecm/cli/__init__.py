@@ -75,7 +75,7 @@ class LazyGroup(click.Group):
             return None
         if command.isolated and not ctx.resilient_parsing:
             isolation.fork()
-        found: click.Command = getattr(import_module(command.module), cmd_name)
+        found: click.Command = getattr(import_module(command.module), f"{cmd_name}_command")
         return found
 
     def resolve_command(

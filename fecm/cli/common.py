@@ -12,10 +12,9 @@ from pathlib import Path
 import click
 
 from fecm._errors import FecmError
-from fecm._files import writing
-from fecm._json import jsonable
+from fecm._files import open_for_writing
 from fecm._progress import MINUTE
-from fecm._text import printable
+from fecm._text import jsonable, printable
 
 # Exit statuses.
 FAILED = 1  # a check
@@ -120,7 +119,7 @@ def every_minute(line: Callable[[int], str]) -> Iterator[None]:
 def write_text(path: Path, text: str, *, overwrite: bool) -> None:
     """Write a complete text file, or print it, on a terminal with control characters escaped."""
     if path != DASH:
-        with writing(path, overwrite=overwrite) as file:
+        with open_for_writing(path, overwrite=overwrite) as file:
             file.write(text)
     elif sys.stdout.isatty():
         echo(text.removesuffix("\n"))

@@ -29,10 +29,9 @@ from fecm.cli.common import (
     progress,
     write_text,
 )
-from fecm.cli.help import typical
-from fecm.cli.options import FILE_PATH, MODE_OPTION, Format, format_option
+from fecm.cli.options import FILE_PATH, MODE_OPTION, Format, format_option, typical
 from fecm.deck.findings import DeckError, Finding
-from fecm.deck.source_text import load_text
+from fecm.deck.reader import load_text
 from fecm.deck.units import unit_names, unit_of
 from fecm.problem.build import RunOptions
 from fecm.problem.problem import Problem
@@ -116,7 +115,9 @@ def _failures(decks: Sequence[Path], work: Callable[[Path], None]) -> list[Excep
     help="Run DECK twice, with its elements and with those around the load bisected, and "
     "compare the peak forces.",
 )
-def check(decks: tuple[Path, ...], mode: str, form: Format, strict: bool, mesh_error: bool) -> None:
+def check_command(
+    decks: tuple[Path, ...], mode: str, form: Format, strict: bool, mesh_error: bool
+) -> None:
     """Check decks without running them; print their findings and a summary.
 
     A DECK of - is standard input.  Of several decks, those that pass have one line each instead of
@@ -284,7 +285,9 @@ def _location(deck: Path, finding: Finding) -> dict[str, Any]:
     "--check", "only_check", is_flag=True, help="Write nothing; exit with 1 if a deck would change."
 )
 @option("--overwrite", is_flag=True, help="Replace an existing FILE other than DECK.")
-def fmt(decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrite: bool) -> None:
+def fmt_command(
+    decks: tuple[Path, ...], output: Path | None, only_check: bool, overwrite: bool
+) -> None:
     """Align the columns of decks and put a ruler above each kind of card.
 
     The model, comments, blank cards and line ends stay as they are.  What is written is UTF-8.  A

@@ -14,7 +14,6 @@ from fecm._dataclasses import frozen
 from fecm._inputs import parsed_toml
 from fecm._text import printable
 from fecm.cli.common import FAILED, echo_json
-from fecm.cli.help import typical
 from fecm.cli.isolation import reads
 from fecm.cli.options import (
     FORMAT_OPTION,
@@ -25,6 +24,7 @@ from fecm.cli.options import (
     assignment,
     collected,
     file_of,
+    typical,
 )
 from fecm.results.diff import diff as compare
 
@@ -40,7 +40,7 @@ class Tolerances:
 
 
 @frozen
-class Options:
+class DiffOptions:
     """Arguments and options of ``fecm diff``."""
 
     a: Path
@@ -154,8 +154,8 @@ def _tolerances(text: str) -> Tolerances:
 @option("--brief", is_flag=True, help="Print only names of differences and the verdict.")
 @FORMAT_OPTION
 @reads("a", "b")
-@collected(Options)
-def diff(options: Options) -> None:
+@collected(DiffOptions)
+def diff_command(options: DiffOptions) -> None:
     """Compare two results dataset by dataset.
 
     A and B are result files or folders of tapes, or both results of sweeps.

@@ -8,8 +8,7 @@ import click
 
 from fecm.cli.common import echo, echo_json, note
 from fecm.cli.decks import load_single
-from fecm.cli.help import typical
-from fecm.cli.options import DECK_PATH, FORMAT_OPTION, Format
+from fecm.cli.options import DECK_PATH, FORMAT_OPTION, Format, typical
 from fecm.sweeps.estimate import estimate_problem
 
 
@@ -21,7 +20,7 @@ from fecm.sweeps.estimate import estimate_problem
 )
 @click.argument("deck", type=DECK_PATH)
 @FORMAT_OPTION
-def estimate(deck: Path, form: Format) -> None:
+def estimate_command(deck: Path, form: Format) -> None:
     """Estimate the impact of DECK by quick models, and compare them with the run.
 
     The infinite plate is for small masses, the static plate for large ones, that of a deck with

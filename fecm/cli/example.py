@@ -9,8 +9,7 @@ import click
 from fecm import examples
 from fecm._files import check_outputs
 from fecm.cli.common import DASH, echo, write_text
-from fecm.cli.help import typical
-from fecm.cli.options import FILE_PATH, Parsed
+from fecm.cli.options import FILE_PATH, Parsed, typical
 
 
 @click.command(
@@ -29,7 +28,7 @@ from fecm.cli.options import FILE_PATH, Parsed
     help="File to write; - is standard output.  [default: NAME]",
 )
 @click.option("--overwrite", is_flag=True, help="Replace an existing FILE.")
-def example(name: str | None, output: Path | None, overwrite: bool) -> None:
+def example_command(name: str | None, output: Path | None, overwrite: bool) -> None:
     """List the example decks and tables; with NAME, write that one."""
     if name is None:
         if output or overwrite:

@@ -8,15 +8,14 @@ import click
 
 from fecm._files import check_outputs
 from fecm.cli.common import DASH, RefusedError, echo, note
-from fecm.cli.help import typical
 from fecm.cli.isolation import reads
-from fecm.cli.options import DECK_PATH, FILE_PATH, NAMED_PATH
+from fecm.cli.options import DECK_PATH, FILE_PATH, NAMED_PATH, typical
 from fecm.cli.outputs import write_lines
-from fecm.results import csv
-from fecm.results.errors import ExportError
+from fecm.results import export as csv
 from fecm.results.export import ExportFormat
-from fecm.results.export import export as write
-from fecm.results.hdf5_reader import Contents, read
+from fecm.results.export import export_result as write
+from fecm.results.groups import ExportError
+from fecm.results.hdf5_reader import FileContents, read
 from fecm.results.result import load, result_of
 from fecm.results.schema import Form
 from fecm.results.tapes import tape_texts, write_tapes
@@ -80,7 +79,7 @@ def tapes(result: Path, directory: Path, overwrite: bool) -> None:
 )
 @click.option("--overwrite", is_flag=True, help="Replace an existing file.")
 @reads("result")
-def export(
+def export_command(
     result: Path, target: str, output: Path | None, dataset: str | None, overwrite: bool
 ) -> None:
     """Write RESULT, of a run or of a sweep, in the format of another program.
@@ -105,7 +104,9 @@ def export(
         if is_sweep:
             _write_sweep(contents, target, name, path, overwrite=overwrite)
         elif path == DASH:
-            write_lines(csv.lines(result_of(contents), name, note), path, overwrite=overwrite)
+            write_lines(
+                csv.dataset_csv_lines(result_of(contents), name, note), path, overwrite=overwrite
+            )
         else:
             form = ExportFormat(target)
             asked = name if form is ExportFormat.CSV else ""
@@ -117,14 +118,14 @@ def export(
 
 
 def _write_sweep(
-    contents: Contents, target: str, name: str, path: Path, *, overwrite: bool
+    contents: FileContents, target: str, name: str, path: Path, *, overwrite: bool
 ) -> None:
     """Write a table of a sweep."""
     if target != ExportFormat.CSV:
         raise ExportError("a sweep has no fields; --to csv writes its cases")
     # 50 ms, which the result of a run does not need.
-    from fecm.sweeps.csv import csv_lines
-    from fecm.sweeps.result_file import sweep_of
+    from fecm.sweeps.files import csv_lines
+    from fecm.sweeps.result import sweep_of
 
     cases = sweep_of(contents, history=name == "history")
     write_lines(csv_lines(cases, name), path, overwrite=overwrite)

@@ -10,7 +10,6 @@ from click import option
 from fecm._dataclasses import frozen
 from fecm.cli.common import DASH, FAILED, echo, echo_json, every_minute, note
 from fecm.cli.decks import load_single
-from fecm.cli.help import typical
 from fecm.cli.options import (
     COLUMNS_OPTION,
     DECK_PATH,
@@ -23,20 +22,21 @@ from fecm.cli.options import (
     Parsed,
     collected,
     list_of,
+    typical,
 )
 from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
 from fecm.deck.model import Deck
 from fecm.deck.units import readable, unit_names, unit_of
-from fecm.identification.identify import CARDS, FREE, Identification, fit
+from fecm.identification.identify import CARDS, FREE, Identification, fit_deck
 from fecm.mechanics.own_law import own_law
-from fecm.report.page import check_page
+from fecm.report.content import check_page
 from fecm.results.comparison import Measurement, measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
 
 
 @frozen
-class Options:
+class IdentifyOptions:
     """Arguments and options of ``fecm identify``."""
 
     deck: Path
@@ -99,8 +99,8 @@ class Options:
 )
 @option("--overwrite", is_flag=True, help="Replace existing files.")
 @FORMAT_OPTION
-@collected(Options)
-def identify(options: Options) -> None:
+@collected(IdentifyOptions)
+def identify_command(options: IdentifyOptions) -> None:
     """Fit parameters of the impact of DECK to a measured contact force.
 
     MEASURED.csv has the columns time and force (or load), which are converted to the deck's units
@@ -138,7 +138,7 @@ def identify(options: Options) -> None:
         raise SystemExit(FAILED)
 
 
-def _fit(deck: Deck, measured: Measurement, options: Options) -> Identification:
+def _fit(deck: Deck, measured: Measurement, options: IdentifyOptions) -> Identification:
     """Fit, and say once a minute how many forces have been computed."""
     forces = 0
 
@@ -148,7 +148,7 @@ def _fit(deck: Deck, measured: Measurement, options: Options) -> Identification:
 
     with every_minute(lambda minutes: f"fecm: {forces} trial forces after {minutes} min"):
         law = own_law(options.law)
-        return fit(deck, measured, options.free, options.sensor, law, computed)
+        return fit_deck(deck, measured, options.free, options.sensor, law, computed)
 
 
 def _document(found: Identification) -> dict[str, object]:

@@ -12,7 +12,6 @@ from click import option
 
 from fecm._dataclasses import frozen
 from fecm.cli.common import RefusedError, echo, note
-from fecm.cli.help import Group, typical
 from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options
 from fecm.cli.options import (
     DECK_PATH,
@@ -22,19 +21,19 @@ from fecm.cli.options import (
     SYSTEM,
     Finite,
     Format,
+    HelpGroup,
     OneOf,
     collected,
     list_of,
-    stacked,
+    stack_options,
+    typical,
 )
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.deck import catalogue
 from fecm.deck.catalogue import CONTACTS
 from fecm.deck.model import Deck, Indentation
-from fecm.deck.reader import Reader
-from fecm.deck.source_text import load_text
-from fecm.deck.unit_systems import convert
-from fecm.deck.units import KNOWN, unit_names
+from fecm.deck.reader import Reader, load_text
+from fecm.deck.units import KNOWN, convert, unit_names
 from fecm.mechanics import contact_law
 from fecm.mechanics.contact_law import LinearPermanent, YangSunPermanent, hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
@@ -42,14 +41,14 @@ from fecm.problem.check import check_segment
 from fecm.problem.parts import build_constants
 from fecm.studies import StudyError
 from fecm.studies.indentation_test.curves import LIMITS_Q
-from fecm.studies.indentation_test.measured import read_test
 from fecm.studies.indentation_test.study import fit_law
+from fecm.studies.indentation_test.turns import read_test
 
 PARAMETERS = ("acr", "columns", "units")  # of fits, which messages name
 
 
-@click.group(cls=Group)
-def indent() -> None:
+@click.group(cls=HelpGroup)
+def indent_command() -> None:
     """Indentation tests and the law of contact (the report's chapter 3)."""
 
 
@@ -67,11 +66,12 @@ class FitOptions:
     form: Format
 
 
-@indent.command(
+@indent_command.command(
+    "fit",
     epilog=typical(
         "fecm indent fit indentation-test.csv --plot fit.png",
         "fecm indent fit indentation-test.csv --unit mm,N --acr",
-    )
+    ),
 )
 @click.argument("test", type=DECK_PATH, metavar="TEST.csv")
 @option(
@@ -105,7 +105,7 @@ class FitOptions:
 @outputs("test", table=False)
 @FORMAT_OPTION
 @collected(FitOptions)
-def fit(options: FitOptions) -> None:
+def fit_command(options: FitOptions) -> None:
     """Fit the indentation law to a test, and print its parameters and EXPE card.
 
     TEST.csv has the columns indentation and force, with rows in the order of measurement: first
@@ -162,7 +162,7 @@ class CurveOptions:
     targets: OutputPaths
 
 
-@indent.command(
+@indent_command.command(
     epilog=typical(
         "fecm indent curve impact-patch.inp --path 1.5e-3,0,2.5e-3,0 -o path.csv",
         "fecm indent curve impact-patch.inp --rigidity --q 2.5 --plot rigidity.png",
@@ -321,13 +321,13 @@ class CardOptions:
         click.echo(json.dumps({"k": k, **others, "card": law}) if form is Format.JSON else law)
 
 
-SPHERE = stacked(
+SPHERE = stack_options(
     option("--radius", type=float, required=True, help="Radius of the sphere."),
     option("--es", "e_s", type=float, required=True, help="Young's modulus of the sphere."),
     option("--nus", "nu_s", type=float, required=True, help="Poisson's ratio of the sphere."),
     collected(SphereOptions, "sphere"),
 )
-CARD = stacked(
+CARD = stack_options(
     option(
         "--alpha-p",
         type=NOT_NEGATIVE,
@@ -353,7 +353,7 @@ CARD = stacked(
 )
 
 
-@indent.command(
+@indent_command.command(
     epilog=typical(
         "fecm indent hertz --radius 0.25 --es 30e6 --nus 0.3 --et 1.15e6",
         "fecm indent hertz --radius 8 --es 207000 --nus 0.3 --et 11400 --format json",
@@ -380,13 +380,14 @@ def hertz(sphere: SphereOptions, e_t: float, card: CardOptions, form: Format) ->
     card.print(k, form)
 
 
-@indent.command(
+@indent_command.command(
+    "estimate",
     epilog=typical(
         'fecm indent estimate --layup "[0/90]4s" --ply-thickness .131 --material IM7/8552 '
         "--units mm-N-s --radius 8 --es 207000 --nus 0.3",
         'fecm indent estimate --layup "[0/90]4s" --ply-thickness .25 '
         "--ply 1.6e-9,.3,140000,9000,5000,5000,3000 --radius 8 --es 207000 --nus 0.3",
-    )
+    ),
 )
 @laminate_options(required=True, thickness_required=True)
 @option(
@@ -397,7 +398,7 @@ def hertz(sphere: SphereOptions, e_t: float, card: CardOptions, form: Format) ->
 @SPHERE
 @CARD
 @FORMAT_OPTION
-def estimate(
+def estimate_k_command(
     laminate: LaminateOptions,
     nu23: float | None,
     sphere: SphereOptions,
@@ -426,11 +427,12 @@ def estimate(
     card.print(k, form, modulus=modulus, k_by_e2=by_e2)
 
 
-@indent.command(
+@indent_command.command(
+    "contacts",
     epilog=typical(
         "fecm indent contacts",
         "fecm indent contacts report-0.5 --units mm-N-s",
-    )
+    ),
 )
 @click.argument("name", type=OneOf(list(CONTACTS)), metavar="[NAME]", required=False)
 @option(
@@ -441,7 +443,7 @@ def estimate(
     help="Units of the parameters.",
 )
 @FORMAT_OPTION
-def contacts(name: str | None, units: str, form: Format) -> None:
+def contacts_command(name: str | None, units: str, form: Format) -> None:
     """List the named laws of `fecm new --contact`, or print the EXPE card of one."""
     for contact in [CONTACTS[name]] if name else list(CONTACTS.values()):
         law = contact.converted(units)

@@ -12,19 +12,16 @@ import click
 import numpy as np
 
 from fecm._inputs import lines_of
-from fecm._tables import aligned
-from fecm._text import printable, shown
+from fecm._text import aligned, printable, short_text
 from fecm._version import __version__
 from fecm.cli.common import echo_json
-from fecm.cli.help import typical
 from fecm.cli.isolation import reads
-from fecm.cli.options import FORMAT_OPTION, NAMED_PATH, Format
+from fecm.cli.options import FORMAT_OPTION, NAMED_PATH, Format, typical
 from fecm.deck.units import declared_units
-from fecm.results.description import describe_groups
-from fecm.results.hdf5_reader import Contents, read
+from fecm.results.hdf5_reader import FileContents, read
 from fecm.results.result import result_of
 from fecm.results.schema import Form
-from fecm.results.summary import about_run
+from fecm.results.summary import about_run, describe_groups
 
 # Attributes of the file that are keys of the JSON output, of runs and of others.
 RUN_KEYS = ("title", "mode", "slips", "fecm_version", "format", "format_version")
@@ -43,7 +40,7 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
     import h5py
     import scipy
 
-    from fecm._processors import available
+    from fecm._machine import available_processors
     from fecm.mechanics import kernels
 
     for name, text in (
@@ -53,7 +50,7 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
         ("NumPy", np.__version__),
         ("SciPy", scipy.__version__),
         ("h5py", f"{h5py.__version__}, HDF5 {h5py.version.hdf5_version}"),
-        ("cores", str(available())),
+        ("cores", str(available_processors())),
     ):
         click.echo(f"{name:9} {text}")
     context.exit()
@@ -77,7 +74,7 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
 )
 @FORMAT_OPTION
 @reads("result")
-def info(result: Path, form: Format) -> None:
+def info_command(result: Path, form: Format) -> None:
     """Describe units, summary and every dataset of RESULT, of a run, a sweep or a location."""
     contents = read(result, *Form)
     with contents.held():
@@ -88,14 +85,14 @@ def info(result: Path, form: Format) -> None:
         click.echo("\n".join(_page(about)))
 
 
-def _about(contents: Contents) -> dict[str, Any]:
+def _about(contents: FileContents) -> dict[str, Any]:
     """What is shown, under the keys of the JSON output."""
     if contents.form == Form.SWEEP:
         extent = _about_sweep(contents)
     elif contents.form == Form.LOCATION:
         # 5 ms, which the result of a run does not need.
-        from fecm.location.file import location_of
-        from fecm.location.summary import lines as summary_lines
+        from fecm.location.location import location_of
+        from fecm.location.summary import location_lines as summary_lines
 
         extent = {"summary": summary_lines(location_of(contents))}
     else:
@@ -119,17 +116,16 @@ def _about(contents: Contents) -> dict[str, Any]:
     }
 
 
-def _about_sweep(contents: Contents) -> dict[str, Any]:
+def _about_sweep(contents: FileContents) -> dict[str, Any]:
     """Number of cases, and the summary."""
     # 48 ms, which the result of a run does not need.
-    from fecm.sweeps.random_tables import tables
-    from fecm.sweeps.result_file import sweep_of
-    from fecm.sweeps.summary import summary
+    from fecm.sweeps.result import sweep_of
+    from fecm.sweeps.summary import sweep_summary, tables
 
     sweep = sweep_of(contents, history=False)
     random = [] if sweep.random is None else tables(sweep.random, sweep.unit)
     failed = len(sweep) - int(sweep.completed.sum())
-    return {"cases": len(sweep), "failed": failed, "summary": [*summary(sweep), *random]}
+    return {"cases": len(sweep), "failed": failed, "summary": [*sweep_summary(sweep), *random]}
 
 
 def _page(about: Mapping[str, Any]) -> list[str]:
@@ -157,7 +153,7 @@ def _page(about: Mapping[str, Any]) -> list[str]:
         ("units", units or "the deck names none"),
         *extent,
         *(("note", text) for text in about.get("notes", ())),
-        *((name, shown(value)) for name, value in about["attributes"].items()),
+        *((name, short_text(value)) for name, value in about["attributes"].items()),
     ]
     lines = [printable(str(about["title"] or "(no title)"))]
     lines += [f"  {printable(name):17} {printable(str(value))}" for name, value in rows]
@@ -177,7 +173,7 @@ def _group(group: Mapping[str, Any]) -> list[str]:
         head += f": {printable(group['description'])}"
     if group["rows"] is not None:
         head += f"; {group['rows']} row{'s' * (group['rows'] != 1)}"
-    attributes = [f"{printable(name)} = {shown(v)}" for name, v in group["attributes"].items()]
+    attributes = [f"{printable(name)} = {short_text(v)}" for name, v in group["attributes"].items()]
     datasets = aligned([_cells(dataset) for dataset in group["datasets"]])
     return [head, *(f"  {text}" for text in (*attributes, *datasets))]
 

@@ -34,7 +34,7 @@ from types import FrameType, SimpleNamespace
 from typing import Any, NamedTuple, NoReturn, TypeVar
 
 from fecm._files import clear_partials
-from fecm._memory import available, format_bytes
+from fecm._machine import available_memory, format_bytes
 from fecm._text import printable
 from fecm.cli.common import RefusedError, echo
 from fecm.cli.interrupts import SIGNALLED, SIGNALS, signals
@@ -121,7 +121,7 @@ def reads(*names: str) -> Callable[[Command], Command]:
 
             given = (values[name] for name in names)
             files = [f for value in given for f in (value if isinstance(value, tuple) else [value])]
-            limits = limits_for(sum(map(_size, files)), available())
+            limits = limits_for(sum(map(_size, files)), available_memory())
             label = printable(" or ".join(map(str, dict.fromkeys(files))))
             named = [values.get(name) for name in ("output", "directory")]  # it may write there
             own = [path for path in named if isinstance(path, Path)]

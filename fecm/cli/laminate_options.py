@@ -21,7 +21,7 @@ from fecm.cli.options import (
     collected,
     file_of,
     list_of,
-    stacked,
+    stack_options,
 )
 from fecm.deck.catalogue import MATERIALS, NamedPly, read_plies
 from fecm.deck.layup import LayupPly, parse_plies
@@ -120,7 +120,7 @@ def laminate_options(
 ) -> Callable[[Decorated], Decorated]:
     """Add the options of a laminate, whose object is the parameter `laminate`."""
     own = "" if thickness_required else "  [default: that of a named ply]"
-    return stacked(
+    return stack_options(
         option(
             "--layup",
             type=Parsed(parse_plies, "LAYUP"),

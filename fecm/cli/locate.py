@@ -10,7 +10,6 @@ from click import option
 from fecm._dataclasses import frozen
 from fecm.cli.common import DASH, FAILED, echo, echo_json, every_minute, note
 from fecm.cli.decks import load_single
-from fecm.cli.help import typical
 from fecm.cli.interrupts import signals
 from fecm.cli.options import (
     DECK_PATH,
@@ -21,12 +20,13 @@ from fecm.cli.options import (
     Format,
     collected,
     list_of,
+    typical,
 )
 from fecm.cli.outputs import OutputPaths
 from fecm.location.locate import located
 from fecm.location.location import Location
-from fecm.location.prepare import Options
-from fecm.location.summary import lines, values
+from fecm.location.prepare import LocationSettings
+from fecm.location.summary import location_lines, values
 
 
 @frozen
@@ -111,7 +111,7 @@ class LocateOptions:
 @option("--overwrite", is_flag=True, help="Replace existing files.")
 @FORMAT_OPTION
 @collected(LocateOptions)
-def locate(options: LocateOptions) -> None:
+def locate_command(options: LocateOptions) -> None:
     """Find place and force history of an impact on the plate of DECK from strain gages.
 
     STRAINS.csv has the columns time and those of the gages (GAGE) of the deck, by their numbers or
@@ -123,7 +123,7 @@ def locate(options: LocateOptions) -> None:
         options.output or DASH, options.picture, options.overwrite, options.deck, options.strains
     )
     problem = load_single(options.deck, "locate")
-    wanted = Options(
+    wanted = LocationSettings(
         options.region,
         options.grid,
         options.basis,
@@ -144,7 +144,7 @@ def locate(options: LocateOptions) -> None:
     if options.form is Format.JSON:
         echo_json(document(found))
     else:
-        echo("\n".join(lines(found)))
+        echo("\n".join(location_lines(found)))
     if not found.accepted:
         raise SystemExit(FAILED)
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 import click
 
 from fecm.cli.common import echo, echo_json
-from fecm.cli.help import typical
 from fecm.cli.laminate_options import PLIES
-from fecm.cli.options import FORMAT_OPTION, SYSTEM, Format
+from fecm.cli.options import FORMAT_OPTION, SYSTEM, Format, typical
 from fecm.deck.catalogue import EXPANSIONS, STRENGTHS, NamedPly
 from fecm.deck.catalogue import materials as named_plies
 
@@ -31,7 +30,7 @@ LINES = (
     "--units", type=SYSTEM, help="Units of the constants.  [default: those of each ply's source]"
 )
 @FORMAT_OPTION
-def materials(plies: dict[str, NamedPly] | None, units: str | None, form: Format) -> None:
+def materials_command(plies: dict[str, NamedPly] | None, units: str | None, form: Format) -> None:
     """List the named plies of `fecm new`, or those of a file, with their sources.
 
     With --format json, each ply is a JSON object on a line, null where a constant is not known.

@@ -14,34 +14,42 @@ from fecm._dataclasses import frozen
 from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.authoring.contact import Sphere, parse_patch
-from fecm.authoring.fixtures import CUSTOM, FIXTURES
-from fecm.authoring.impact import Authored, Request, Strike, author
-from fecm.authoring.kinematics import LIMIT, Kinematics, kinematics_of
+from fecm.authoring.impact import Authored, ImpactParameters, Request, author
 from fecm.authoring.mesh import InPlane
-from fecm.authoring.numerics import AUTO, FULL, MITC, Numerics, Quadrature
+from fecm.authoring.numerics import (
+    AUTO,
+    FULL,
+    LIMIT,
+    MITC,
+    Kinematics,
+    Numerics,
+    Quadrature,
+    kinematics_of,
+)
 from fecm.authoring.parameters import ObjectError
-from fecm.authoring.plate import Plate, Support
+from fecm.authoring.plate import CUSTOM, FIXTURES, Plate, Support
 from fecm.authoring.zones import Zone
 from fecm.cli import new_values
 from fecm.cli.common import DASH, RefusedError, echo, note, write_text
-from fecm.cli.help import GroupedCommand, typical
 from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options, unique
 from fecm.cli.options import (
     FILE_PATH,
     POSITIVE,
     Finite,
+    GroupedCommand,
     Parsed,
     assignment,
     collected,
     list_of,
+    typical,
 )
 from fecm.deck.catalogue import (
     NamedContact,
 )
 from fecm.deck.format import format_deck
 from fecm.deck.grid import IN_PLANE, SUPPORTS
+from fecm.deck.macros import RowsOfPlies
 from fecm.deck.model import Deck, Indentation, Material, Nonlinear, Patch, Ply, Shear
-from fecm.deck.outputs import RowsOfPlies
 from fecm.mechanics.points import DISC, RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.plate_mesh import BOUNDARY
@@ -83,7 +91,7 @@ GROUPS = {
 
 
 @frozen
-class Options:
+class NewOptions:
     """Argument and options of ``fecm new``."""
 
     output: Path
@@ -178,7 +186,7 @@ class Options:
 )
 @option(
     "--mesh",
-    type=Parsed(new_values.mesh, "NXxNY|FILE"),
+    type=Parsed(new_values.mesh_of_text, "NXxNY|FILE"),
     help="Elements along x and y, as in 14x10; or a mesh, Gmsh's .msh or another that meshio "
     "reads, with groups of lines for --edge.",
 )
@@ -367,8 +375,8 @@ class Options:
     "strengths.  [default with --damage: as --every]",
 )
 @option("--overwrite", is_flag=True, help="Replace an existing deck.")
-@collected(Options)
-def new(options: Options) -> None:
+@collected(NewOptions)
+def new_command(options: NewOptions) -> None:
     """Write a deck that is ready to run from plate, layup, supports and impact.
 
     DECK is the file to write; - is standard output.
@@ -401,7 +409,7 @@ def new(options: Options) -> None:
         echo(output)
 
 
-def _author(options: Options, given: Collection[str]) -> Authored:
+def _author(options: NewOptions, given: Collection[str]) -> Authored:
     """Deck of the options of ``fecm new``; `given` are those on the command line."""
     plate = options.plate(given)
     prescribed = plate.fixture is not None and plate.fixture.test is not None
@@ -413,7 +421,7 @@ def _author(options: Options, given: Collection[str]) -> Authored:
         Request(
             plate,
             laminate.authored(options.ply_of, options.core),
-            Strike(
+            ImpactParameters(
                 options.projectile,
                 contact if law is None else Indentation(*law),
                 options.velocity,

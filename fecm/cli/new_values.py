@@ -45,7 +45,7 @@ def contact(text: str) -> NamedContact | Sphere:
     return CONTACTS[text]
 
 
-def mesh(text: str) -> tuple[int, int] | Path:
+def mesh_of_text(text: str) -> tuple[int, int] | Path:
     """Numbers of elements, or the file of a mesh."""
     if re.fullmatch(r"[\s\d.+-]+[xX×][\s\d.+-]+", text):
         counts = list_of("14x10", click.IntRange(1, MOST), [2], "[xX×]")(text)

@@ -11,13 +11,13 @@ from typing import Any
 
 import click
 
-from fecm._files import check_outputs, writing
-from fecm._tables import csv_line
+from fecm._files import check_outputs, open_for_writing
+from fecm._text import csv_line
 from fecm.cli.common import DASH, RefusedError, note
-from fecm.cli.options import FILE_PATH, NAMED_PATH, Decorated, stacked
+from fecm.cli.options import FILE_PATH, NAMED_PATH, Decorated, stack_options
 from fecm.deck.units import column_name, unit_of
 from fecm.plot.kinds import SUFFIXES
-from fecm.plot.pictures import imported, require_matplotlib, save
+from fecm.plot.pictures import imported, require_matplotlib, save_picture
 
 _OUTPUT = click.option(
     "-o",
@@ -50,7 +50,7 @@ def outputs(source: str = "", *, table: bool = True) -> Callable[[Decorated], De
         ) -> None:
             function(**values, targets=OutputPaths(output, picture, overwrite, values.get(source)))
 
-        return stacked(*([_OUTPUT] if table else []), _PLOT, _OVERWRITE)(command)
+        return stack_options(*([_OUTPUT] if table else []), _PLOT, _OVERWRITE)(command)
 
     return decorate
 
@@ -72,7 +72,7 @@ class OutputPaths:
     def draw(self, place: str, *data: Any) -> None:
         """Write the picture that a function of :mod:`fecm.plot`, ``module:name``, makes of data."""
         if self.picture is not None:
-            save(imported(place)(*data), self.picture, overwrite=self._overwrite)
+            save_picture(imported(place)(*data), self.picture, overwrite=self._overwrite)
             note(f"drew {self.picture}")
 
     def write(
@@ -97,5 +97,5 @@ def write_lines(lines: Iterable[str], path: Path, *, overwrite: bool) -> None:
     if path == DASH:
         sys.stdout.writelines(lines)
         return
-    with writing(path, overwrite=overwrite) as file:
+    with open_for_writing(path, overwrite=overwrite) as file:
         file.writelines(lines)

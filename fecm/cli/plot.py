@@ -15,7 +15,6 @@ from fecm._errors import FecmWarning
 from fecm._files import check_outputs
 from fecm._text import printable
 from fecm.cli.common import CheckFailedError, RefusedError, echo, note, progress
-from fecm.cli.help import typical
 from fecm.cli.isolation import reads
 from fecm.cli.options import (
     COLUMNS_OPTION,
@@ -28,11 +27,12 @@ from fecm.cli.options import (
     assignment,
     collected,
     list_of,
+    typical,
 )
 from fecm.mechanics.failure import CRITERIA
-from fecm.plot.kinds import KINDS, Kind, LackingError, Picture
-from fecm.plot.pictures import check_options, check_suffix, draw, options_of, save
-from fecm.results.hdf5_reader import Contents, read
+from fecm.plot.kinds import KINDS, LackingError, Picture, PictureKind
+from fecm.plot.pictures import check_picture_options, check_suffix, draw, options_of, save_picture
+from fecm.results.hdf5_reader import FileContents, read
 from fecm.results.metrics import COLUMNS
 from fecm.results.result import Result, result_of
 from fecm.results.schema import Form
@@ -53,7 +53,7 @@ def _by_name(_: Any, __: Any, pairs: tuple[tuple[str, str], ...]) -> dict[str, s
 
 
 @frozen
-class PictureOptions:
+class PlotOptions:
     """Options of kinds of pictures, with the names that their functions give them."""
 
     at: tuple[tuple[float, float], ...]
@@ -188,13 +188,13 @@ class PictureOptions:
 )
 @option("--overwrite", is_flag=True, help="Replace existing pictures.")
 @reads("results")
-@collected(PictureOptions, "asked")
-def plot(
+@collected(PlotOptions, "asked")
+def plot_command(
     results: tuple[Path, ...],
     kinds: tuple[str, ...],
     output: Path | None,
     overwrite: bool,
-    asked: PictureOptions,
+    asked: PlotOptions,
 ) -> None:
     """Draw the report's figures from one or more RESULTs, or the map of a sweep.
 
@@ -205,7 +205,7 @@ def plot(
     drawn = {name: _loaded(read(path, *Form)) for name, path in named(results).items()}
     first = next(iter(drawn.values()))
     chosen = list(dict.fromkeys(kinds)) or [_usual(first)]
-    check_options(chosen, options)
+    check_picture_options(chosen, options)
     paths = _paths(results[0], chosen, output)
     folder = output if output is not None and output not in paths.values() else None
     if folder is None or folder.is_dir():
@@ -217,7 +217,7 @@ def plot(
         folder.mkdir(parents=True, exist_ok=True)
     for kind, picture in pictures.items():
         with progress(kind, len(picture.frames)) as advance:
-            save(picture, paths[kind], overwrite=overwrite, advance=advance)
+            save_picture(picture, paths[kind], overwrite=overwrite, advance=advance)
         echo(paths[kind])
     if lacking:
         raise CheckFailedError(
@@ -225,16 +225,16 @@ def plot(
         )
 
 
-def _usual(first: Result | SweepResult | Location) -> Kind:
+def _usual(first: Result | SweepResult | Location) -> PictureKind:
     """Kind of picture that is drawn unless others are asked for."""
     if isinstance(first, Result):
-        return Kind.FORCE
+        return PictureKind.FORCE
     # 46 ms, which results of runs do not need.
     from fecm.sweeps.result import SweepResult
 
     if isinstance(first, SweepResult):
-        return Kind.EXCEEDANCE if first.random else Kind.MAP
-    return Kind.LOCATION
+        return PictureKind.EXCEEDANCE if first.random else PictureKind.MAP
+    return PictureKind.LOCATION
 
 
 def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path]:
@@ -259,22 +259,22 @@ def named(paths: tuple[Path, ...]) -> dict[str, Path]:
     return dict(zip(names, paths, strict=True))
 
 
-def run_or_sweep(contents: Contents) -> Result | SweepResult:
+def run_or_sweep(contents: FileContents) -> Result | SweepResult:
     """The result of a run, or of a sweep without its forces."""
     if contents.form == Form.RUN:
         return result_of(contents)
     # 46 ms, which results of runs do not need.
-    from fecm.sweeps.result_file import sweep_of
+    from fecm.sweeps.result import sweep_of
 
     return sweep_of(contents, history=False)
 
 
-def _loaded(contents: Contents) -> Result | SweepResult | Location:
+def _loaded(contents: FileContents) -> Result | SweepResult | Location:
     """The result of a run or a sweep, or a located impact."""
     if contents.form != Form.LOCATION:
         return run_or_sweep(contents)
     # 12 ms, which other results do not need.
-    from fecm.location.file import location_of
+    from fecm.location.location import location_of
 
     return location_of(contents)
 

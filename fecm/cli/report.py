@@ -8,11 +8,10 @@ import click
 from click import option
 
 from fecm.cli.common import RefusedError, echo
-from fecm.cli.help import typical
 from fecm.cli.isolation import reads
-from fecm.cli.options import NAMED_PATH
+from fecm.cli.options import NAMED_PATH, typical
 from fecm.cli.plot import named, run_or_sweep
-from fecm.report.page import check_page
+from fecm.report.content import check_page
 from fecm.results.hdf5_reader import read
 from fecm.results.schema import Form
 
@@ -34,7 +33,9 @@ from fecm.results.schema import Form
 @option("--open", "opens", is_flag=True, help="Open the page in the browser.")
 @option("--overwrite", is_flag=True, help="Replace an existing page.")
 @reads("results")
-def report(results: tuple[Path, ...], output: Path | None, opens: bool, overwrite: bool) -> None:
+def report_command(
+    results: tuple[Path, ...], output: Path | None, opens: bool, overwrite: bool
+) -> None:
     """Write one HTML page about RESULT: of a run, of a sweep, or of several runs side by side.
 
     The page is self-contained: verdict, range of the model, numbers, pictures, model, checksums

@@ -13,7 +13,6 @@ from fecm._dataclasses import frozen
 from fecm._measured_tables import read_table
 from fecm.cli.common import DASH, RefusedError, note
 from fecm.cli.decks import load_valid
-from fecm.cli.help import Group, typical
 from fecm.cli.options import (
     DECK_PATH,
     FORMAT_OPTION,
@@ -21,9 +20,11 @@ from fecm.cli.options import (
     SYSTEM,
     Finite,
     Format,
+    HelpGroup,
     Parsed,
     collected,
     list_of,
+    typical,
 )
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.mechanics.projectile import (
@@ -38,10 +39,9 @@ from fecm.mechanics.projectile import (
 )
 from fecm.studies import StudyError
 from fecm.studies.rod_test import pulse_test
-from fecm.studies.rod_test.calibration import calibrate as fit_sensitivity
-from fecm.studies.rod_test.filters import Filter, filter_of
-from fecm.studies.rod_test.recordings import recorded
-from fecm.studies.rod_test.study import Struck, rod_of, strike, uniform
+from fecm.studies.rod_test.filters import Filter, filter_of, recorded
+from fecm.studies.rod_test.pulse_test import calibrate_transducer as fit_sensitivity
+from fecm.studies.rod_test.study import Struck, rod_of, simulate_rod_test, uniform_rod
 
 FILTER_HELP = (
     "first-order:RISE or moving-average:RISE, with the time RISE from 10 to 90 % of the "
@@ -50,7 +50,7 @@ FILTER_HELP = (
 )
 
 
-class _PulseGroup(Group):
+class _PulseGroup(HelpGroup):
     """A group whose default command is ``pulse``."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
@@ -61,7 +61,7 @@ class _PulseGroup(Group):
 
 
 @click.group(cls=_PulseGroup)
-def rod() -> None:
+def rod_command() -> None:
     """The projectile's rod by itself: response to a pulse, filters, calibration.
 
     `fecm rod [DECK] --pulse ...` is short for `fecm rod pulse [DECK] --pulse ...`.
@@ -100,7 +100,7 @@ class PulseOptions:
     targets: OutputPaths
 
 
-@rod.command(
+@rod_command.command(
     epilog=typical(
         "fecm rod impact-patch.inp --pulse gauss:1000,200e-6,40e-6 --plot pulse.png",
         "fecm rod impact-patch.inp --pulse pulse.csv --station .25 --station .5 -o forces.csv",
@@ -179,7 +179,7 @@ def pulse(options: PulseOptions) -> None:
     Force is positive in compression.
     """
     struck = _uniform(options.shape) if options.deck is None else _of_deck(options)
-    found = strike(
+    found = simulate_rod_test(
         struck,
         pulse_test.pulse_of(options.pulse, struck.units),
         options.dt,
@@ -191,7 +191,7 @@ def pulse(options: PulseOptions) -> None:
     )
     targets = options.targets
     targets.draw("studies:pulse_picture", found, found.filtered, found.units)
-    columns, rows = pulse_test.table(found, found.filtered)
+    columns, rows = pulse_test.pulse_table(found, found.filtered)
     targets.write(columns, found.units, rows)
     if targets.table != DASH:
         click.echo(found)
@@ -205,7 +205,7 @@ def _uniform(shape: Shape) -> Struck:
         missing = ", ".join(f"--{name}" for name in needed if name not in shape.given())
         raise click.UsageError(f"the rod lacks {missing}; or name a deck with a rod")
     elements = shape.elements or REPORT_ELEMENTS
-    return uniform(Rod.cylinder(length, diameter, modulus, density, elements), shape.units)
+    return uniform_rod(Rod.cylinder(length, diameter, modulus, density, elements), shape.units)
 
 
 def _of_deck(options: PulseOptions) -> Struck:
@@ -220,7 +220,7 @@ def _of_deck(options: PulseOptions) -> Struck:
     return rod_of(problems[0].deck)
 
 
-@rod.command(
+@rod_command.command(
     "filter",
     epilog=typical(
         "fecm rod filter impact-patch.h5 --filter first-order:10e-6 -o filtered.csv",
@@ -251,11 +251,12 @@ def filter_(history: Path, transducer: Filter, column: str | None, targets: Outp
     targets.write(dimensions, dict(series.units), columns[series.first :].tolist())
 
 
-@rod.command(
+@rod_command.command(
+    "calibrate",
     epilog=typical(
         "fecm rod calibrate calibration-test.csv --mass 2.862e-3 --c-a 1e-5",
         "fecm rod calibrate calibration-test.csv --mass 2.862e-3 --c-a 1e-5 --plot fit.png",
-    )
+    ),
 )
 @click.argument("test", type=DECK_PATH, metavar="TEST.csv")
 @option("--mass", type=POSITIVE, required=True, help="Mass of the target.")
@@ -273,7 +274,7 @@ def filter_(history: Path, transducer: Filter, column: str | None, targets: Outp
 @option("--through-origin", is_flag=True, help="Fit a line without an offset.")
 @FORMAT_OPTION
 @outputs("test", table=False)
-def calibrate(
+def calibrate_command(
     test: Path,
     mass: float,
     c_a: float,

@@ -12,12 +12,11 @@ import click
 from click import option
 
 from fecm._dataclasses import frozen
-from fecm._files import check_outputs, writing
-from fecm._memory import format_bytes
+from fecm._files import check_outputs, open_for_writing
+from fecm._machine import format_bytes
 from fecm.api import numbered
 from fecm.cli.common import CheckFailedError, RefusedError, echo, echo_json, note, progress
 from fecm.cli.decks import load_valid
-from fecm.cli.help import GroupedCommand, typical
 from fecm.cli.interrupts import signals
 from fecm.cli.options import (
     DECK_PATH,
@@ -28,10 +27,12 @@ from fecm.cli.options import (
     POSITIVE,
     Finite,
     Format,
+    GroupedCommand,
     OneOf,
     collected,
+    typical,
 )
-from fecm.mechanics.own_criterion import CriterionError, own_criteria
+from fecm.mechanics.failure import CriterionError, own_criteria
 from fecm.mechanics.own_law import LawError, own_law
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.projectile import (
@@ -45,8 +46,8 @@ from fecm.mechanics.projectile import (
 )
 from fecm.mechanics.solutions import SingularStiffnessError
 from fecm.mechanics.stiffness_product import AUTO, SOLVERS
-from fecm.problem.build import ENERGY_LIMIT, RunOptions, check_options
-from fecm.problem.memory import check_memory
+from fecm.problem.build import ENERGY_LIMIT, RunOptions, check_run_options
+from fecm.problem.memory import check_run_memory
 from fecm.problem.problem import Problem
 from fecm.problem.slips import NAMES, active_slips
 from fecm.problem.summary import larger_steps
@@ -62,7 +63,7 @@ from fecm.simulation.checkpoint import (
     spool_of,
 )
 from fecm.simulation.printout import Printer
-from fecm.simulation.run import run as simulate_run
+from fecm.simulation.run import run_program as simulate_run
 from fecm.simulation.simulation import Simulation
 
 STARTS_OVER = "--overwrite without --resume discards the checkpoint and starts over"
@@ -76,7 +77,7 @@ GROUPS = {
 
 
 @frozen
-class Options:
+class RunOptionsOfCommand:
     """Argument and options of ``fecm run``."""
 
     deck: Path
@@ -238,8 +239,8 @@ def _outputs(path: Path, printed: Path | None) -> list[Path]:
     help="Also write the printed output of the original program.",
 )
 @FORMAT_OPTION
-@collected(Options)
-def run(options: Options) -> None:
+@collected(RunOptionsOfCommand)
+def run_command(options: RunOptionsOfCommand) -> None:
     """Run every problem in DECK and write its result.
 
     The result of a second problem goes to OUT-2.h5, and so on.  An interrupted run leaves a
@@ -251,7 +252,7 @@ def run(options: Options) -> None:
         raise click.UsageError(str(error)) from None
     problems = load_valid(options.deck, "; nothing was run", options.mode, force=options.force)
     for problem in problems:
-        check_options(problem, choices)
+        check_run_options(problem, choices)
     jobs = _jobs(problems, options)
     limit = options.fail_limit
     if limit is not None and not any(problem.work.passes["FAIL"] for problem in problems):
@@ -277,7 +278,7 @@ def run(options: Options) -> None:
         raise CheckFailedError(f"{'; '.join(exceeded)}: more than the limit of {limit:g}")
 
 
-def _jobs(problems: Sequence[Problem], options: Options) -> list[Job]:
+def _jobs(problems: Sequence[Problem], options: RunOptionsOfCommand) -> list[Job]:
     """The problems with their files, which are checked."""
     count = len(problems)
     first, printed = options.output or Path(f"{options.deck.stem}.h5"), options.printed
@@ -335,7 +336,7 @@ def _finished(interrupted: Path) -> list[str]:
 
 
 def _run_one(
-    job: Job, choices: RunOptions, options: Options, finished: Sequence[str]
+    job: Job, choices: RunOptions, options: RunOptionsOfCommand, finished: Sequence[str]
 ) -> list[LargestExposure]:
     """Run one problem of a deck into a file, print what came out and return its exposures.
 
@@ -343,15 +344,15 @@ def _run_one(
     """
     problem, path = job.problem, job.path
     _check_space(problem, path)
-    check_memory(problem, solver=choices.solver)
+    check_run_memory(problem, solver=choices.solver)
     with contextlib.ExitStack() as stack:
         stack.enter_context(signals.deferred())
         stack.enter_context(_ends(path, resumes=job.resumes))
-        sink = stack.enter_context(hdf5_writer.writing(path, overwrite=job.overwrite))
+        sink = stack.enter_context(hdf5_writer.result_writing(path, overwrite=job.overwrite))
         checkpointer = Checkpointer(path, sink, finished)
         printer = Printer()
         if job.printed is not None:
-            file = stack.enter_context(writing(job.printed, overwrite=job.overwrite))
+            file = stack.enter_context(open_for_writing(job.printed, overwrite=job.overwrite))
             printer = Printer(file)
         advance = stack.enter_context(progress("fecm", problem.work.steps))
         on_step, on_macro = _observers(checkpointer, options.interval, advance)

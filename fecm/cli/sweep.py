@@ -11,11 +11,23 @@ from click import option
 from fecm._dataclasses import frozen
 from fecm._files import check_outputs
 from fecm.api import load_deck
+from fecm.authoring.case import Case, CasesError, Limit, parse_exceed
+from fecm.authoring.cases import grid_cases, parse_vary, read_cases
+from fecm.authoring.values import NAMES
 from fecm.cli.common import FAILED, RefusedError, echo, every_minute, note, progress
 from fecm.cli.decks import count_findings
-from fecm.cli.help import GroupedCommand, typical
 from fecm.cli.interrupts import signals
-from fecm.cli.options import DECK_PATH, LAW_OPTION, NAMED_PATH, OneOf, Parsed, collected, list_of
+from fecm.cli.options import (
+    DECK_PATH,
+    LAW_OPTION,
+    NAMED_PATH,
+    GroupedCommand,
+    OneOf,
+    Parsed,
+    collected,
+    list_of,
+    typical,
+)
 from fecm.deck.catalogue import system_of
 from fecm.deck.findings import DeckError
 from fecm.mechanics.own_law import LawError, own_law
@@ -24,23 +36,24 @@ from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.results.hdf5_reader import read
 from fecm.results.result import result_of
-from fecm.simulation.run import run as simulate_run
+from fecm.simulation.run import run_program as simulate_run
 from fecm.simulation.simulation import Simulation
-from fecm.sweeps.api import carry_out, check_draws, modes_of, problem_of
-from fecm.sweeps.batch import deck_of
-from fecm.sweeps.case import Case, CasesError
-from fecm.sweeps.cases import read_cases
-from fecm.sweeps.convergence import table as table_of
-from fecm.sweeps.copula import Pair, correlation_of, parse_correlation
-from fecm.sweeps.distributions import FORMS, Law, parse_random
-from fecm.sweeps.doubts import doubtful_values, freed, unused_values
-from fecm.sweeps.expected import expected
-from fecm.sweeps.find import Until, parse_until
-from fecm.sweeps.grid import grid, parse_vary
-from fecm.sweeps.limits import Limit, parse_exceed
-from fecm.sweeps.memory import check_memory
+from fecm.sweeps.api import carry_out_plan, check_draws, checked_problem, reduced_mode_count
+from fecm.sweeps.batch import case_deck
+from fecm.sweeps.checks import check_sweep_memory, doubtful_values, freed, unused_values
+from fecm.sweeps.convergence import convergence_lines as table_of
+from fecm.sweeps.convergence import refined_cases
+from fecm.sweeps.distributions import FORMS, ValueDistribution, parse_random
+from fecm.sweeps.execute import (
+    LOST,
+    PartialResults,
+    SchedulerError,
+    address_in,
+    exclusive_result,
+    expected,
+)
+from fecm.sweeps.files import save_sweep
 from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.parts import PartialResults, alone
 from fecm.sweeps.plan import (
     MEASURES,
     MODES,
@@ -57,18 +70,17 @@ from fecm.sweeps.random import (
     DESIGNS,
     Design,
     DesignKind,
+    Pair,
+    correlation_of,
     cost,
     design_of,
     doubt,
+    parse_correlation,
     random_cases,
 )
-from fecm.sweeps.random_tables import tables
-from fecm.sweeps.refine import refined_cases
 from fecm.sweeps.result import SweepResult
-from fecm.sweeps.result_writer import save
-from fecm.sweeps.schedule import LOST, SchedulerError, address_in
-from fecm.sweeps.summary import remarks, summary, verdict
-from fecm.sweeps.values import NAMES
+from fecm.sweeps.search import Until, parse_until
+from fecm.sweeps.summary import remarks, sweep_summary, sweep_verdict, tables
 
 NAMED = [f"{name}=" for name in NAMES]  # for the shell's completion
 
@@ -91,14 +103,14 @@ GROUPS = {
 
 
 @frozen
-class Options:
+class SweepOptions:
     """Argument and options of ``fecm sweep``; those of :func:`fecm.sweep` have its names."""
 
     deck: Path
     vary: tuple[str, ...]
     cases: Path | None  # table of the cases
     refine: tuple[int, ...] | None
-    random: tuple[tuple[str, Law], ...]
+    random: tuple[tuple[str, ValueDistribution], ...]
     correlation: tuple[tuple[Pair, float], ...]
     samples: int | None
     seed: int | None
@@ -304,8 +316,8 @@ def _checked_vary(text: str) -> str:
     help="Exit with 0 even if cases failed, or probabilities are open.",
 )
 @option("--overwrite", is_flag=True, help="Replace existing results.")
-@collected(Options)
-def sweep(options: Options) -> None:
+@collected(SweepOptions)
+def sweep_command(options: SweepOptions) -> None:
     """Run DECK many times with varied parameters.
 
     Cases that differ only in the projectile, its velocity or the indentation law share one run of
@@ -331,7 +343,7 @@ def sweep(options: Options) -> None:
         extra=(Measure.DEFLECTION,) if options.refine else options.measure,
         design=design,
         limits=options.exceed,
-        modes=modes_of(options.model, options.modes),
+        modes=reduced_mode_count(options.model, options.modes),
         law=own_law(options.law),
     )
     check_draws(planned)
@@ -344,7 +356,7 @@ def sweep(options: Options) -> None:
         told = cost(cases, design, shared=shared, motions=motions)
         note(*filter(None, (doubt(design), told)))
     here = options.workers if scheduler is None else 0
-    check_memory(problem, planned, 1 if here is None else here, streamed=True)
+    check_sweep_memory(problem, planned, 1 if here is None else here, streamed=True)
     if count := freed(tasks(problem, planned)):
         note(
             f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the deck "
@@ -353,12 +365,12 @@ def sweep(options: Options) -> None:
     if planned.settings.modes is None and problem.plate.nonlinear:
         note(expected(problem, planned, here))
 
-    click.get_current_context().with_resource(alone(path))
+    click.get_current_context().with_resource(exclusive_result(path))
     parts = PartialResults(path, planned.fingerprint(), restart=options.overwrite)
     result = _carry_out(problem, planned, parts, options.workers, scheduler)
     forces = parts.forces() if options.history else ()
     with signals.deferred():
-        save(result, path, overwrite=options.overwrite, forces=forces)
+        save_sweep(result, path, overwrite=options.overwrite, forces=forces)
         if lost := sum(status.startswith(LOST) for status in result["status"].tolist()):
             note(f"{lost} cases were lost with their workers; --overwrite runs them again")
         else:
@@ -369,7 +381,7 @@ def sweep(options: Options) -> None:
     if result.random is not None:
         note(*result.random.notes)
     note(*remarks(result))
-    echo(verdict(result))
+    echo(sweep_verdict(result))
     is_open = result.random is not None and result.random.exceedance.open.any()
     if (is_open or not result.completed.all()) and not options.allow_failed:
         raise SystemExit(FAILED)
@@ -378,14 +390,14 @@ def sweep(options: Options) -> None:
 def _problem(deck: Path) -> Problem:
     """The checked problem of the deck, whose findings go to standard error if it has errors."""
     try:
-        return problem_of(deck)
+        return checked_problem(deck)
     except DeckError as error:
         echo(error, err=True)
         errors = [finding for finding in error.findings if finding.severity == "error"]
         raise RefusedError(f"{count_findings(errors)}; nothing was run") from None
 
 
-def _cases(problem: Problem, options: Options) -> tuple[list[Case], Design | None]:
+def _cases(problem: Problem, options: SweepOptions) -> tuple[list[Case], Design | None]:
     """Cases of the sweep, and the design of random ones."""
     if options.refine:
         return refined_cases(problem, options.refine), None
@@ -393,7 +405,7 @@ def _cases(problem: Problem, options: Options) -> tuple[list[Case], Design | Non
     if options.cases is not None:
         given = read_cases(options.cases, system)
     else:
-        given = grid([parse_vary(text, system) for text in options.vary])
+        given = grid_cases([parse_vary(text, system) for text in options.vary])
     if not options.random:
         return given, None
     laws = dict(options.random)
@@ -410,7 +422,7 @@ def _cases(problem: Problem, options: Options) -> tuple[list[Case], Design | Non
     return random_cases(design, given), design
 
 
-def _full_runs(options: Options, count: int) -> dict[int, Path]:
+def _full_runs(options: SweepOptions, count: int) -> dict[int, Path]:
     """Result files of the cases that are also run in full, by their numbers."""
     chosen = tuple(dict.fromkeys(options.full or ()))
     if chosen and max(chosen) >= count:
@@ -422,7 +434,10 @@ def _full_runs(options: Options, count: int) -> dict[int, Path]:
 def _print(result: SweepResult, path: Path) -> None:
     """Print title, summary and the tables of a study of the mesh or of random values."""
     echo(result.title or "sweep")
-    for line in (*summary(result), *table_of(result.cases, result.summary, result.convergence)):
+    for line in (
+        *sweep_summary(result),
+        *table_of(result.cases, result.summary, result.convergence),
+    ):
         echo(f"  {line}")
     for line in () if result.random is None else tables(result.random, result.unit):
         echo(f"  {line}".rstrip())
@@ -457,7 +472,7 @@ def _carry_out(
                 signals.heed()
                 advance(0)
 
-            return carry_out(
+            return carry_out_plan(
                 problem,
                 planned,
                 workers=workers,
@@ -483,13 +498,13 @@ def _run_in_full(planned: Plan, fulls: dict[int, Path], *, overwrite: bool) -> N
 
     for case, path in fulls.items():
         try:
-            prepared = load_deck(deck_of(planned, case))
+            prepared = load_deck(case_deck(planned, case))
             if errors := prepared.errors(force=True):
                 raise CasesError(errors[0].message)
             with (
                 signals.deferred(),
                 every_minute(f"fecm: case {case} is run in full, {{}} min so far".format),
-                hdf5_writer.writing(path, overwrite=overwrite) as sink,
+                hdf5_writer.result_writing(path, overwrite=overwrite) as sink,
             ):
                 options = RunOptions(law=planned.settings.law)
                 simulation = Simulation(prepared.problems[0], sink, options)

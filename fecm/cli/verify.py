@@ -8,10 +8,9 @@ from itertools import chain, tee
 import click
 
 from fecm.cli.common import CheckFailedError, RefusedError
-from fecm.cli.help import typical
-from fecm.cli.options import FORMAT_OPTION, Format
-from fecm.verification import carry_out, chosen
-from fecm.verification.case import page, table
+from fecm.cli.options import FORMAT_OPTION, Format, typical
+from fecm.verification import chosen, compute_rows
+from fecm.verification.case import table_lines, verification_page
 
 
 @click.command(
@@ -24,7 +23,7 @@ from fecm.verification.case import page, table
 @click.option("--list", "listing", is_flag=True, help="List the cases without computing them.")
 @click.option("--markdown", is_flag=True, help="Write the page of the documentation instead.")
 @FORMAT_OPTION
-def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: Format) -> None:
+def verify_command(cases: tuple[str, ...], listing: bool, markdown: bool, form: Format) -> None:
     """Compare this program with closed forms and the literature.
 
     By default all cases are computed.  The exit status is 1 if a row is beyond its tolerance.
@@ -42,16 +41,16 @@ def verify(cases: tuple[str, ...], listing: bool, markdown: bool, form: Format) 
             click.echo(f"{one.name.ljust(width)}  {one.title}")
         return
     # The same rows twice: for the output as they are computed, and for the verdict.
-    rows, kept = tee(chain.from_iterable(map(carry_out, wanted)))
+    rows, kept = tee(chain.from_iterable(map(compute_rows, wanted)))
     if markdown:
-        click.echo(page(rows), nl=False)
+        click.echo(verification_page(rows), nl=False)
     elif form is Format.JSON:
         found = list(rows)
         values = [row.to_dict() for row in found]
         told = {"ok": all(row.within for row in found), "rows": values}
         click.echo(json.dumps(told, ensure_ascii=False, allow_nan=False))
     else:
-        for line in table(wanted, rows):  # the table grows while the rows are computed
+        for line in table_lines(wanted, rows):  # the table grows while the rows are computed
             click.echo(line)
     fine = [row.within for row in kept]
     bad, count = fine.count(False), f"{len(fine)} row{'s' * (len(fine) != 1)}"

@@ -15,17 +15,18 @@ from fecm._dataclasses import frozen
 from fecm.authoring.parameters import ObjectError
 from fecm.cli.common import RefusedError, note
 from fecm.cli.decks import load_valid
-from fecm.cli.help import Group, typical
 from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options
 from fecm.cli.options import (
     DECK_PATH,
     NOT_NEGATIVE,
     POSITIVE,
     Finite,
+    HelpGroup,
     Parsed,
     collected,
     list_of,
-    stacked,
+    stack_options,
+    typical,
 )
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.deck.units import VELOCITY
@@ -89,7 +90,7 @@ def _is_number(text: str) -> bool:
 
 
 @frozen
-class Source:
+class LaminateSource:
     """Where a laminate comes from: a deck, or options."""
 
     deck: Path | None
@@ -125,7 +126,7 @@ class Source:
 
 
 # The argument and the options of all three commands.
-_SHARED = stacked(
+_SHARED = stack_options(
     click.argument("deck", type=DECK_PATH, required=False),
     laminate_options(required=False),
     option(
@@ -138,7 +139,7 @@ _SHARED = stacked(
         "pi^2/12 = 0.822467 the cut-off frequencies are exact.",
     ),
     outputs("deck"),
-    collected(Source, "source"),
+    collected(LaminateSource, "source"),
 )
 
 STEP = option(
@@ -157,12 +158,13 @@ def _normals(step: float) -> list[float]:
     return [n * step for n in range(count)] + [min(360.0, count * step)]
 
 
-@click.group(cls=Group)
-def waves() -> None:
+@click.group(cls=HelpGroup)
+def waves_command() -> None:
     """Waves in the laminate of a DECK, or of a layup: the report's chapter 2, for any laminate."""
 
 
-@waves.command(
+@waves_command.command(
+    "dispersion",
     cls=_ListCommand,
     epilog=typical(
         "fecm waves dispersion impact-patch.inp --angle 0 45 90 --plot dispersion.png",
@@ -188,8 +190,11 @@ def waves() -> None:
     help="N wavelengths at equal distances, in thicknesses.",
 )
 @_SHARED
-def dispersion(
-    angles: tuple[float, ...], wavelengths: tuple[float, ...], source: Source, targets: OutputPaths
+def dispersion_command(
+    angles: tuple[float, ...],
+    wavelengths: tuple[float, ...],
+    source: LaminateSource,
+    targets: OutputPaths,
 ) -> None:
     """Phase velocity and frequency of all modes against wavelength (figures 2.4, 2.5)."""
     _bound(5 * len(angles) * len(wavelengths))
@@ -218,7 +223,7 @@ def dispersion(
     targets.write(dimensions, waves.units, rows)
 
 
-@waves.command(
+@waves_command.command(
     epilog=typical(
         "fecm waves speeds impact-patch.inp -o speeds.csv",
         "fecm waves speeds impact-patch.inp --plot speeds.png",
@@ -226,7 +231,7 @@ def dispersion(
 )
 @STEP
 @_SHARED
-def speeds(step: float, source: Source, targets: OutputPaths) -> None:
+def speeds(step: float, source: LaminateSource, targets: OutputPaths) -> None:
     """Normal velocities of the five wave fronts (figures 2.7, 2.8)."""
     _bound(360.0 / step)
     waves = source.waves()
@@ -237,7 +242,7 @@ def speeds(step: float, source: Source, targets: OutputPaths) -> None:
     targets.write({"angle_deg": "", **dict.fromkeys(fronts.modes, VELOCITY)}, waves.units, rows)
 
 
-@waves.command(
+@waves_command.command(
     cls=_ListCommand,
     epilog=typical(
         "fecm waves fronts impact-patch.inp --time 10e-6 -o fronts.csv",
@@ -266,7 +271,7 @@ def fronts(
     times: tuple[float, ...],
     radius: float | None,
     step: float,
-    source: Source,
+    source: LaminateSource,
     targets: OutputPaths,
 ) -> None:
     """Front positions and rays (figures 2.9 to 2.12); cusps go to standard error."""

@@ -1,7 +1,7 @@
 """Decks: cards in, a typed model out, and back."""
 
-from fecm.deck.findings import DeckError, Finding, Findings, Place
+from fecm.deck.findings import CardPlace, DeckError, Finding, Findings
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, read_deck
 
-__all__ = ["Deck", "DeckError", "Finding", "Findings", "Place", "Reader", "read_deck"]
+__all__ = ["CardPlace", "Deck", "DeckError", "Finding", "Findings", "Reader", "read_deck"]

@@ -1,21 +1,118 @@
-"""Cards: one line of a deck, cut into fields.
+"""Numbers and words as Fortran reads and writes them in the columns of a card.
+
+Cards: one line of a deck, cut into fields.
 
 Columns are counted from 1 and both ends of a field belong to it.  A card with a comma is read as
 values separated by commas, in the same order; everything from ``!`` on is a comment.
+
+Records: the values of one card as a plain typed object, which compares without the card.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from functools import cache
+from functools import cache, lru_cache
+from typing import Any, ClassVar, Self
 
 from fecm._dataclasses import frozen
-from fecm.deck.findings import Place
-from fecm.deck.numerals import format_real
+from fecm.deck.findings import CardPlace
+
+LONGEST = 100  # characters of the longest number that is read
+WITHOUT_LETTER = 10  # least columns of a field whose exponent may be written without its letter
+# No two parts of a pattern match the same characters, so that a mismatch takes linear time.
+_INTEGER = re.compile(r"[+-]?[0-9]+")
+_REAL = re.compile(
+    r"(?P<mantissa>[+-]?(?:[0-9]+(?:\.[0-9]*)?|\.[0-9]+))"
+    r"(?:[EeDd](?P<marked>[+-]?[0-9]+)|(?P<bare>[+-][0-9]+))?"
+)
+
+
+def capitals(word: str) -> str:
+    """A word without the blanks around it, in capitals.
+
+    Letters beyond ASCII stay as they are: the capitals of some are two letters, and the word would
+    outgrow its field.
+    """
+    return "".join(c.upper() if c.isascii() else c for c in word.strip())
+
+
+def parse_integer(text: str) -> int | None:
+    """Read an integer without blanks, or None; the caller limits its length."""
+    return int(text) if _INTEGER.fullmatch(text) else None
+
+
+def parse_real(text: str) -> float | None:
+    """Read an F field without blanks; None if it is not a number.
+
+    Understands every Fortran form: ``45.``, ``.2E-6``, ``1.5D+3``, ``1.5-3``.  A number beyond the
+    range of double precision is infinite.  The caller limits the length to :data:`LONGEST`
+    characters.
+    """
+    if (match := _REAL.fullmatch(text)) is None:
+        return None
+    exponent = match["marked"] or match["bare"] or "0"
+    return float(f"{match['mantissa']}e{exponent}")
+
+
+def format_real(value: float, width: int) -> str | None:
+    """Write a finite number into `width` columns so that reading it gives the same number again.
+
+    The most readable form that fits, not padded; None if none fits.  Only fields of ten columns or
+    more get an exponent without its letter: 2.5E-7 as ``25-8`` is hard to read.
+    """
+    numeral = repr(value)
+    mantissa, has_exponent, _ = numeral.partition("e")
+    is_finite = "n" not in numeral  # neither nan nor inf
+    if is_finite and not has_exponent and len(numeral) < width:
+        return numeral
+    digits = mantissa.lstrip("-").replace(".", "").strip("0")
+    if is_finite and len(digits) > width:
+        return None
+    return _formatted(numeral, width)
+
+
+@lru_cache(4096)
+def _formatted(numeral: str, width: int) -> str | None:
+    """Write the number of a numeral of Python into `width` columns; decks repeat their numbers."""
+    for letter in ("E", "") if width >= WITHOUT_LETTER else ("E",):
+        forms = list(_forms(numeral, letter))
+        for room in (width - 1, width):  # with a blank between two numbers if it fits
+            for text in forms:
+                if len(text) <= room:
+                    return text
+    return None
+
+
+def _forms(numeral: str, letter: str) -> Iterator[str]:
+    """Forms of a number, the most readable first, with `letter` before an exponent."""
+    from decimal import Decimal  # 0.8 ms, and only what writes decks needs it
+
+    number = Decimal(numeral).normalize()
+    sign, numerals, exponent = number.as_tuple()
+    if not isinstance(exponent, int):  # infinite or no number
+        raise ValueError(f"{numeral} can't be written on a card")
+    if not number:
+        exponent = 0
+    minus = "-" if sign else ""
+    digits = "".join(map(str, numerals))
+    if -20 < exponent < 20:
+        fixed = format(abs(number), "f")
+        whole = "." not in fixed
+        forms = (f"{fixed}.0", f"{fixed}.") if whole else (fixed, fixed.removeprefix("0"))
+        yield from (minus + form for form in forms)
+    marked = "" if letter else "+"
+    for before in (1, *range(2, len(digits) + 1), 0):
+        power = exponent + len(digits) - before
+        if power or letter:
+            yield f"{minus}{digits[:before]}.{digits[before:]}{letter}{power:{marked}d}"
+    if not letter:
+        yield f"{minus}{digits}{exponent:+d}" if exponent else f"{minus}{digits}"
+
 
 Value = int | float | str
 BLANK = ""  # value of a blank field that has a default
@@ -113,9 +210,9 @@ class Card:
         return "," in self.data
 
     @property
-    def place(self) -> Place:
+    def place(self) -> CardPlace:
         """Place of the entire card."""
-        return Place(self.line, 1, max(1, len(self.data)), self.text)
+        return CardPlace(self.line, 1, max(1, len(self.data)), self.text)
 
     def cut(self, fields: Fields) -> list[tuple[int, str]]:
         """First column and text of every field, in fixed or in free format.
@@ -136,19 +233,19 @@ class Card:
 
 
 @frozen
-class Source:
+class CardSource:
     """Source of a record: its card and the fields of the card."""
 
     card: Card
     fields: Fields = ()
 
-    def place(self, name: str = "") -> Place:
+    def place(self, name: str = "") -> CardPlace:
         """Place of the field `name`, or of the entire card without a name."""
         for field, (first, text) in zip(self.fields, self.card.cut(self.fields), strict=False):
             if field.name == name:
                 last = first + max(1, len(text)) - 1
                 columns = f"col {first}" if first == last else f"cols {first}-{last}"
-                return Place(self.card.line, first, last, self.card.text, f"{columns}: {name}")
+                return CardPlace(self.card.line, first, last, self.card.text, f"{columns}: {name}")
         return self.card.place
 
 
@@ -184,3 +281,70 @@ def _free(value: Value) -> str:
         raise ValueError(f"{value} can't be written on a card")
     digits, exponential, exponent = repr(float(value)).partition("e")
     return f"{digits}E{int(exponent)}" if exponential else digits
+
+
+@frozen
+class Record:
+    """Values of one card, as attributes in the card's order."""
+
+    # The card; None for a record built in Python.
+    source: CardSource | None = dataclasses.field(
+        default=None, compare=False, repr=False, kw_only=True
+    )
+    fields: ClassVar[Fields]
+    packed: ClassVar[slice | None] = None  # values of the card that one attribute holds as a tuple
+    optional: ClassVar[int] = 0  # number of last values that are not written where they are 0
+
+    @classmethod
+    def from_row(cls, values: Sequence[Value], source: CardSource | None) -> Self:
+        """Build the record from a card's values; a blank takes the attribute's default."""
+        arguments: list[Any] = list(values)  # of the types of the class's attributes
+        if cls.packed is not None:
+            arguments[cls.packed] = [tuple(arguments[cls.packed])]
+        if BLANK not in arguments:
+            return cls(*arguments, source=source)
+        names = (attribute.name for attribute in dataclasses.fields(cls)[1:])
+        given = {n: value for n, value in zip(names, arguments, strict=False) if value != BLANK}
+        return cls(**given, source=source)
+
+    def row(self) -> list[Value]:
+        """Values in the card's order; a blank for an attribute that is None."""
+        row: list[Value] = []
+        for attribute in dataclasses.fields(self)[1:]:  # the first is the source
+            value = getattr(self, attribute.name)
+            if isinstance(value, tuple):
+                row.extend(value)
+            else:
+                row.append(BLANK if value is None else value)
+        return row
+
+    def to_card(self, fields: Fields | None = None) -> str:
+        """Text of the card; `fields` where they depend on the control card."""
+        written = fields or self.fields
+        values = self.row()[: len(written)]
+        least = len(written) - self.optional
+        while len(values) > least and not values[-1]:
+            values.pop()
+        return write_card(written[: len(values)], values)
+
+    def place(self, name: str = "") -> CardPlace | None:
+        """Place of the field `name` in the deck, or of the entire card without a name."""
+        return self.source.place(name) if self.source else None
+
+
+@frozen
+class Control(Record):
+    """Control card: 6I5."""
+
+    # Numbers of nodes, elements and layers.
+    numnp: int
+    numel: int
+    layers: int
+    # Spatial dimensions, dofs per node, largest number of nodes per element.
+    ndm: int
+    ndf: int
+    nen: int
+
+    fields: ClassVar[Fields] = layout(
+        "I5 NUMNP", "I5 NUMEL", "I5 LAYER", "I5 NDM", "I5 NDF", "I5 NEN"
+    )

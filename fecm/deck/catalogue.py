@@ -18,8 +18,18 @@ from fecm._dataclasses import frozen
 from fecm._errors import warn
 from fecm._inputs import lines_of, parsed_file, parsed_toml
 from fecm.deck.model import Allowables, Deck, Delamination, Expansion, Indentation, Ply
-from fecm.deck.unit_systems import UnitsError, convert, system_named, units_of
-from fecm.deck.units import COEFFICIENT, DENSITY, MODULUS, TOUGHNESS, in_si, unit_names
+from fecm.deck.units import (
+    COEFFICIENT,
+    DENSITY,
+    MODULUS,
+    TOUGHNESS,
+    UnitsError,
+    convert,
+    in_si,
+    system_named,
+    unit_names,
+    units_of,
+)
 
 # Units of the test standards, and the constants of steel in them.
 STANDARD = "mm-N-s"

@@ -30,7 +30,7 @@ class Severity(StrEnum):
 SEVERITIES = {"E": Severity.ERROR, "W": Severity.WARNING, "N": Severity.NOTE}  # by a code's letter
 
 
-class Place(NamedTuple):
+class CardPlace(NamedTuple):
     """Place of a value: line, first and last column, and the card's text."""
 
     line: int
@@ -57,7 +57,7 @@ class Finding(NamedTuple):
 
     code: str
     message: str
-    place: Place | None = None
+    place: CardPlace | None = None
     hint: str = ""
 
     @property
@@ -98,7 +98,7 @@ class Finding(NamedTuple):
         return "\n".join("".join(c if c.isprintable() else "·" for c in line) for line in lines)
 
 
-def _marked_card(place: Place) -> list[str]:
+def _marked_card(place: CardPlace) -> list[str]:
     """The card with its line number, and a caret under the field."""
     card = place.text.rstrip()
     begin, last = 0, place.last
@@ -126,7 +126,7 @@ class Findings:
         self.error_count: int = 0
         self.closed: bool = False  # whether no more findings are kept, so that reading can stop
 
-    def add(self, code: str, message: str, place: Place | None = None, hint: str = "") -> None:
+    def add(self, code: str, message: str, place: CardPlace | None = None, hint: str = "") -> None:
         """Add a finding; after :data:`MOST` errors report that there are more, and close."""
         is_error = code.startswith("E")
         self.counts[code] += 1

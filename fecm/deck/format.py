@@ -9,11 +9,10 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from fecm.deck.card import BLANK, Card, Fields, Value, write_card
+from fecm.deck.card import BLANK, Card, Fields, Value, capitals, write_card
 from fecm.deck.findings import DeckError
 from fecm.deck.macros import Macro, without_points
 from fecm.deck.model import SEGMENTS, STOP
-from fecm.deck.numerals import capitals
 from fecm.deck.reader import Reader
 
 COMMENT = "!"

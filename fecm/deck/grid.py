@@ -63,7 +63,7 @@ def held_in_plane(support: str, in_plane: str) -> str:
 
 
 @frozen
-class Section:
+class GridSection:
     """A run of equally long elements in one direction."""
 
     start: float  # coordinates of its ends (length)
@@ -71,14 +71,14 @@ class Section:
     elements: int  # number of elements
 
 
-def uniform(length: float, elements: int) -> list[Section]:
+def uniform_section(length: float, elements: int) -> list[GridSection]:
     """One section of equal elements."""
-    return [Section(0.0, length, elements)]
+    return [GridSection(0.0, length, elements)]
 
 
-def listed(text: str) -> list[Section]:
+def listed_sections(text: str) -> list[GridSection]:
     """Sections from a list of counts and sizes, ``3*0.5,8*0.375,3*0.5``, or a ValueError."""
-    sections: list[Section] = []
+    sections: list[GridSection] = []
     start = 0.0
     for part in text.split(","):
         match = re.fullmatch(r"\s*(\d{1,6})\s*[*x]\s*([0-9.eE+-]+)\s*", part)
@@ -86,12 +86,12 @@ def listed(text: str) -> list[Section]:
         if match is None or int(match[1]) < 1 or not 0.0 < size < math.inf:
             raise ValueError(f"`{part.strip()}` is not COUNT*SIZE, as in 3*0.5,8*0.375,3*0.5")
         end = start + int(match[1]) * size
-        sections.append(Section(start, round_to(end, end), int(match[1])))
+        sections.append(GridSection(start, round_to(end, end), int(match[1])))
         start = sections[-1].end
     return sections
 
 
-def graded(length: float, elements: int, centre: float, ratio: float) -> list[Section]:
+def graded(length: float, elements: int, centre: float, ratio: float) -> list[GridSection]:
     """Elements that shrink towards `centre`, a corner of elements, each side in a geometric series.
 
     `ratio` is that of the largest to the smallest element of a side.
@@ -110,18 +110,18 @@ def graded(length: float, elements: int, centre: float, ratio: float) -> list[Se
         steps = _series(centre, left, ratio)[::-1]
         steps += _series(length - centre, elements - left, ratio)
     inner = [round_to(total, length) for total in accumulate(steps[:-1])]
-    return [Section(start, end, 1) for start, end in pairwise([0.0, *inner, length])]
+    return [GridSection(start, end, 1) for start, end in pairwise([0.0, *inner, length])]
 
 
-def longest_at(sections: Sequence[Section], place: float) -> float:
+def longest_at(sections: Sequence[GridSection], place: float) -> float:
     """Length of the longest element at a place; 0 beside the sections."""
     here = (s for s in sections if s.start <= place <= s.end)
     return max(((s.end - s.start) / s.elements for s in here), default=0.0)
 
 
-def refined(
+def refined_sections(
     length: float, elements: int, centre: float, ratio: float, side: float
-) -> list[Section]:
+) -> list[GridSection]:
     """Graded elements that are at most `side` long at `centre`.
 
     There are `elements` of them or as many more as that takes; the ratio of the largest to the
@@ -137,15 +137,15 @@ def refined(
     return graded(length, elements + bisect_left(counts, True, key=fits), centre, ratio)
 
 
-def framed(inner: Sequence[Section], length: float) -> list[Section]:
+def framed(inner: Sequence[GridSection], length: float) -> list[GridSection]:
     """Elements of a centred window, with lines of nodes at its edges, and like ones beside it."""
     start = (length - inner[-1].end) / 2.0
     ends = [round_to(start + section.end, length) for section in inner]
     starts = [round_to(start, length), *ends]
     sizes = [(section.end - section.start) / section.elements for section in inner]
     before, after = (max(LEAST_BESIDE, math.ceil(start / size)) for size in (sizes[0], sizes[-1]))
-    middle = map(Section, starts, ends, (section.elements for section in inner))
-    return [Section(0.0, starts[0], before), *middle, Section(ends[-1], length, after)]
+    middle = map(GridSection, starts, ends, (section.elements for section in inner))
+    return [GridSection(0.0, starts[0], before), *middle, GridSection(ends[-1], length, after)]
 
 
 def _series(length: float, count: int, ratio: float) -> list[float]:
@@ -160,7 +160,7 @@ def round_to(value: float, scale: float) -> float:
     return round(value, DIGITS - math.floor(math.log10(scale)))
 
 
-def lines(sections: Sequence[Section]) -> list[float]:
+def grid_lines(sections: Sequence[GridSection]) -> list[float]:
     """Coordinates of the lines of nodes: two per element, and the last."""
     found: list[float] = []
     for section in sections:
@@ -171,12 +171,12 @@ def lines(sections: Sequence[Section]) -> list[float]:
 
 
 @frozen
-class Grid:
+class ElementGrid:
     """A grid of 9-node elements; node numbers run along x first."""
 
     # Sections along x and along y.
-    columns: list[Section]
-    rows: list[Section]
+    columns: list[GridSection]
+    rows: list[GridSection]
     most_nodes: ClassVar[int] = 9  # nodes per element
 
     @property
@@ -206,7 +206,7 @@ class Grid:
 
     def nearest(self, x: float, y: float) -> tuple[int, float, float]:
         """Number and place of the node nearest to a point."""
-        xs, ys = lines(self.columns), lines(self.rows)
+        xs, ys = grid_lines(self.columns), grid_lines(self.rows)
         i = min(range(len(xs)), key=lambda k: abs(xs[k] - x))
         j = min(range(len(ys)), key=lambda k: abs(ys[k] - y))
         return 1 + i + j * self.across, xs[i], ys[j]
@@ -214,7 +214,7 @@ class Grid:
     def coordinates(self) -> Coordinates:
         """COOR cards: one for the beginning of every section in every line of nodes."""
         records: list[NodeValues] = []
-        for line, y in enumerate(lines(self.rows)):
+        for line, y in enumerate(grid_lines(self.rows)):
             node = 1 + line * self.across
             y = round_to(y, self.rows[-1].end)
             for section in self.columns:
@@ -285,9 +285,9 @@ class Grid:
         return boundary_cards(codes.reshape(self.nodes, -1))
 
 
-def _nearest_lines(sections: Sequence[Section], side: float) -> tuple[int, int]:
+def _nearest_lines(sections: Sequence[GridSection], side: float) -> tuple[int, int]:
     """Numbers of the lines of nodes nearest to both ends of a side in the middle."""
-    places = np.array(lines(sections))
+    places = np.array(grid_lines(sections))
     ends = ((sections[-1].end + distance) / 2.0 for distance in (-side, side))
     first, last = (int(np.abs(places - end).argmin()) for end in ends)
     return first, last

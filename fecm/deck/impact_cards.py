@@ -7,10 +7,8 @@ from dataclasses import replace
 from typing import ClassVar, Self
 
 from fecm._dataclasses import frozen
-from fecm.deck.card import Card, Fields, layout
-from fecm.deck.record import Control, Record
-from fecm.deck.segment import Segment
-from fecm.deck.stream import CardStream
+from fecm.deck.card import Card, Control, Fields, Record, layout
+from fecm.deck.segment import CardStream, Segment
 
 
 @frozen

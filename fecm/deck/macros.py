@@ -2,6 +2,8 @@
 
 A pass is the number of times that the innermost loop has been entered at its head, from 1; outside
 any loop it is 1.  LOOP 0 runs once.
+
+What a macro program stores, and how often.
 """
 
 from __future__ import annotations
@@ -9,14 +11,15 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from enum import Enum, auto
+from numbers import Integral
 from typing import ClassVar, NamedTuple
 
 from fecm._dataclasses import frozen
-from fecm.deck.card import Fields, Value, layout
+from fecm._errors import FecmError
+from fecm.deck.card import Fields, Record, Value, layout, parse_real
 from fecm.deck.findings import Findings
-from fecm.deck.numerals import parse_real
-from fecm.deck.record import Record
 
 NESTING = 64  # deepest nesting of loops
 MOST_MACROS = 10**9  # a program of more macros would run for days
@@ -83,7 +86,7 @@ def load_factor(table: LoadTable, clock: float) -> float:
     return a1 + a2 * clock + a3 * math.sin(a4 * clock + a5) ** max(table.exponent, 1)
 
 
-class Number(Enum):
+class MacroNumber(Enum):
     """What the number of a macro is."""
 
     COUNT = auto()  # an integer, at least 0
@@ -98,7 +101,7 @@ class Word:
 
     name: str  # up to four letters
     meaning: str  # its effect, in one sentence
-    value: Number | None = None
+    value: MacroNumber | None = None
     # Words that must come before; of several in one tuple, one.
     needs: tuple[tuple[str, ...], ...] = ()
     inside: bool = False  # whether it belongs inside a loop
@@ -111,14 +114,14 @@ EXPLICIT = (("LMAS",), ("DT",))  # what a step of central differences needs
 WORDS = {
     word.name: word
     for word in (
-        Word("LOOP", "Repeats the macros up to its NEXT N times.", Number.COUNT),
+        Word("LOOP", "Repeats the macros up to its NEXT N times.", MacroNumber.COUNT),
         Word("NEXT", "Ends a loop."),
-        Word("DT", "Sets the time step; 0 takes 0.9 of the critical one.", Number.TIME_STEP),
+        Word("DT", "Sets the time step; 0 takes 0.9 of the critical one.", MacroNumber.TIME_STEP),
         Word("TIME", "Advances the clock by DT."),
         Word(
             "PROP",
             "Reads a proportional load from a card after END, or evaluates it again.",
-            Number.COUNT,
+            MacroNumber.COUNT,
         ),
         Word("LMAS", "Forms the lumped mass."),
         Word("CMAS", "Forms the consistent mass."),
@@ -129,7 +132,7 @@ WORDS = {
             "Solves for the displacement that removes the residual.",
             needs=(("TANG",), ("FORM",)),
         ),
-        Word("TOL", "Sets the tolerance of CONV.", Number.TOLERANCE),
+        Word("TOL", "Sets the tolerance of CONV.", MacroNumber.TOLERANCE),
         Word(
             "CONV",
             "Leaves the loop once the solution has converged.",
@@ -137,27 +140,27 @@ WORDS = {
             inside=True,
         ),
         Word("REAC", "Stores and prints the reactions.", needs=(A_SOLUTION,)),
-        Word("EIGE", "Finds the N lowest natural modes.", Number.EVERY, needs=(A_MASS,)),
+        Word("EIGE", "Finds the N lowest natural modes.", MacroNumber.EVERY, needs=(A_MASS,)),
         Word("EXCD", "Takes one step of central differences.", needs=EXPLICIT),
         Word(
             "RODP",
             "Takes one impact step; stores contact and strains at every N-th step.",
-            Number.EVERY,
+            MacroNumber.EVERY,
             needs=EXPLICIT,
         ),
-        Word("DISP", "Stores displacements at every N-th pass of the loop.", Number.EVERY),
+        Word("DISP", "Stores displacements at every N-th pass of the loop.", MacroNumber.EVERY),
         Word(
             "STRE",
             "Stores and prints strains and stress resultants at every N-th pass.",
-            Number.EVERY,
+            MacroNumber.EVERY,
         ),
         Word(
             "PLYS",
             "Stores ply stresses at every N-th pass, in the M elements nearest to the load or all.",
-            Number.EVERY,
+            MacroNumber.EVERY,
             second=True,
         ),
-        Word("FAIL", "Evaluates the failure criteria at every N-th pass.", Number.EVERY),
+        Word("FAIL", "Evaluates the failure criteria at every N-th pass.", MacroNumber.EVERY),
         Word("CHEC", "Reports mesh and storage."),
     )
 }
@@ -181,9 +184,9 @@ def every(macro: Macro) -> int:
     return max(1, int(macro.value))
 
 
-def number(macro: Macro) -> float:
+def macro_number(macro: Macro) -> float:
     """Meaning of a macro's number: its N if it has one, otherwise the number on the card."""
-    return every(macro) if WORDS[macro.word].value is Number.EVERY else macro.value
+    return every(macro) if WORDS[macro.word].value is MacroNumber.EVERY else macro.value
 
 
 class _OpenLoop(NamedTuple):
@@ -281,11 +284,13 @@ def _check_value(word: Word, macro: Macro, findings: Findings) -> None:
         findings.add("E505", f"{word.name} {must}.", macro.place("second value"))
     value = macro.value
     match word.value:
-        case Number.COUNT | Number.EVERY if not (0 <= value <= MOST_MACROS and value.is_integer()):
+        case MacroNumber.COUNT | MacroNumber.EVERY if not (
+            0 <= value <= MOST_MACROS and value.is_integer()
+        ):
             must = f"whole number from 0 to {MOST_MACROS:g}"
-        case Number.TIME_STEP if value < 0:
+        case MacroNumber.TIME_STEP if value < 0:
             must = "positive time step"
-        case Number.TOLERANCE if value <= 0:
+        case MacroNumber.TOLERANCE if value <= 0:
             must = "positive tolerance"
         case _:
             return
@@ -364,3 +369,119 @@ def _executed(body: Body, count: int = 1, outer: int = 1) -> Iterator[tuple[Macr
             yield item.macro, item.count, outer * count
         else:
             yield item, count, outer
+
+
+HISTORY = "RODP"
+FIELDS = "DISP"
+PLIES = "PLYS"
+FAILURE = "FAIL"
+PLY_ROWS = 20  # rows of ply stresses where their number is not given: they are large
+
+# Steps between stored rows: a number, True for a default, False for no rows.
+Rows = int | bool
+# The same, or the number and that of the elements nearest to the load.
+RowsOfPlies = Rows | tuple[int, int]
+
+
+class RowsError(FecmError, ValueError):
+    """A program can't store what it is asked for."""
+
+
+@frozen
+class _Output:
+    """A macro that stores rows."""
+
+    word: str
+    rows: Rows
+    nearest: int | None = None  # elements nearest to the load
+
+    def changed(self, old: Macro) -> Macro:
+        """A macro of the program with the new numbers."""
+        value = old.value if self.rows is True else float(self.rows)
+        second = old.second if self.nearest is None else float(self.nearest)
+        return replace(old, value=value, second=second, source=None)
+
+    def macro(self, passes: int, step: int) -> Macro:
+        """A new macro for a loop of some passes, where RODP stores every `step` steps."""
+        default = max(1, passes // PLY_ROWS) if self.word == PLIES else min(step, passes)
+        value = default if self.rows is True else self.rows
+        return Macro(self.word, value=float(value), second=float(self.nearest or 0))
+
+
+def with_outputs(
+    macros: Sequence[Macro],
+    *,
+    every: int | None = None,
+    plies: RowsOfPlies | None = None,
+    failure: Rows | None = None,
+) -> tuple[Macro, ...]:
+    """Macros that store other rows; what is None stays as it is.
+
+    `every` is the number of RODP and DISP, `plies` that of PLYS and `failure` that of FAIL.  A
+    macro that the program lacks is put at the end of each loop that takes steps, or at the end of a
+    program without such a loop.  True stores failure with the rows of RODP, and about
+    :data:`PLY_ROWS` rows of ply stresses; a macro that is there keeps its number.
+
+    Raises RowsError if a number is not positive and whole.
+    """
+    made = list(macros)
+    if every is not None:
+        rows = _count("every", every)
+        for new in (_Output(HISTORY, rows), _Output(FIELDS, rows)):
+            made = [new.changed(macro) if macro.word == new.word else macro for macro in made]
+    for output in (_of_failure(failure), _of_plies(plies)):
+        if output is not None:
+            made = _with_output(made, output)
+    return tuple(made)
+
+
+def _of_plies(given: RowsOfPlies | None) -> _Output | None:
+    if given is None:
+        return None
+    if not isinstance(given, tuple):
+        return _Output(PLIES, _rows("plies", given))
+    if len(given) != 2:
+        raise RowsError(f"`plies` is {given!r}, not a number of steps and one of elements")
+    return _Output(PLIES, _rows("plies", given[0]), _count("plies", given[1]))
+
+
+def _of_failure(given: Rows | None) -> _Output | None:
+    return None if given is None else _Output(FAILURE, _rows("failure", given))
+
+
+def _rows(name: str, value: object) -> Rows:
+    return value if isinstance(value, bool) else _count(name, value)
+
+
+def _count(name: str, value: object) -> int:
+    """A number of steps or elements."""
+    if isinstance(value, Integral) and not isinstance(value, bool) and (count := int(value)) > 0:
+        return count
+    raise RowsError(f"`{name}` is {value!r}, not a whole number above 0")
+
+
+def _with_output(macros: Sequence[Macro], output: _Output) -> list[Macro]:
+    """Add a macro that stores rows, change its number, or remove it."""
+    if output.rows is False:
+        return [macro for macro in macros if macro.word != output.word]
+    if any(macro.word == output.word for macro in macros):
+        return [output.changed(m) if m.word == output.word else m for m in macros]
+    step = next((every(macro) for macro in macros if macro.word == HISTORY), 1)
+    made: list[Macro] = []
+    loops: list[int] = []  # passes of the open ones
+    stepping: set[int] = set()  # depths of those that take steps
+    for macro in macros:
+        depth = len(loops)
+        if macro.word == "LOOP":
+            loops.append(max(1, int(macro.value)))
+        elif macro.word in STEPS and loops:
+            stepping.add(depth)
+        elif macro.word == "NEXT" and loops:
+            passes = loops.pop()
+            if depth in stepping:
+                made.append(output.macro(passes, step))
+            stepping.discard(depth)
+        made.append(macro)
+    if len(made) == len(macros):
+        made.append(output.macro(1, 1))
+    return made

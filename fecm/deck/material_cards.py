@@ -8,10 +8,18 @@ from itertools import compress
 from typing import ClassVar, Self
 
 from fecm._dataclasses import frozen
-from fecm.deck.card import BLANK, Card, Fields, Source, Value, layout, write_card
-from fecm.deck.record import Control, Record
-from fecm.deck.segment import Segment
-from fecm.deck.stream import CardStream
+from fecm.deck.card import (
+    BLANK,
+    Card,
+    CardSource,
+    Control,
+    Fields,
+    Record,
+    Value,
+    layout,
+    write_card,
+)
+from fecm.deck.segment import CardStream, Segment
 
 MATERIAL = 1  # number of the material and of the laminate of MATE
 
@@ -109,7 +117,7 @@ class Material(Segment, keyword="MATE"):
             layers = read_layers(head, cards, cards.control.layers, said)
         if integration is None or ply is None or layers is None:
             return None
-        return cls(integration, ply, layers, source=Source(head))
+        return cls(integration, ply, layers, source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
@@ -161,7 +169,7 @@ class Shear(Segment, keyword="SHEA"):
         assumed, equilibrium = (word in words for word in cls.WORDS)
         following = cards.peek()
         if words and (following is None or following.is_keyword or following.is_blank):
-            return cls(assumed=assumed, equilibrium=equilibrium, source=Source(head))
+            return cls(assumed=assumed, equilibrium=equilibrium, source=CardSource(head))
         found = cards.single(head, cls)
         return found and replace(found, assumed=assumed, equilibrium=equilibrium)
 
@@ -208,7 +216,7 @@ class Allowables(Segment, keyword="ALLO"):
     constants: ClassVar[Fields] = layout("F10? F12*", "F10? p+", "F10? p-")
 
     @classmethod
-    def from_row(cls, values: Sequence[Value], source: Source | None) -> Self:
+    def from_row(cls, values: Sequence[Value], source: CardSource | None) -> Self:
         """Build the strengths of a material from its first card or from both."""
         count = len(cls.fields)
         *given, s12, s13, s23 = values[:count]
@@ -293,7 +301,7 @@ class Nonlinear(Segment, keyword="NONL"):
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self:
         """Read the keyword card, which is all there is."""
-        return cls(source=Source(head))
+        return cls(source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's card."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 from typing import ClassVar
 
 from fecm._dataclasses import frozen
-from fecm.deck.card import Fields, layout
-from fecm.deck.record import Control, Record
+from fecm.deck.card import Control, Fields, Record, layout
 from fecm.deck.segment import NumberedSegment
 
 AXES = ("x", "y", "z")

@@ -13,7 +13,8 @@ from textwrap import shorten
 from typing import TYPE_CHECKING, TypeVar, Unpack
 
 from fecm._dataclasses import frozen
-from fecm._tables import html_table
+from fecm._text import html_table
+from fecm.deck.card import Control, Record
 from fecm.deck.impact_cards import Impact, Indentation, Patch, Projectile, RodDiameter
 from fecm.deck.macros import LoadTable, Macro
 from fecm.deck.material_cards import (
@@ -42,7 +43,6 @@ from fecm.deck.mesh_cards import (
     NodeValues,
 )
 from fecm.deck.output_cards import Gage, Gages, Page, PrintOption, Units
-from fecm.deck.record import Control, Record
 from fecm.deck.segment import NumberedSegment, Segment
 from fecm.deck.zone_cards import (
     LaminateNumber,
@@ -56,7 +56,7 @@ from fecm.deck.zone_cards import (
 )
 
 if TYPE_CHECKING:
-    from fecm.sweeps.changes import Values
+    from fecm.authoring.changes import Values
 
 __all__ = [
     "Allowables", "Boundary", "Control", "Coordinates", "Cure", "Curvature", "Damping",
@@ -220,7 +220,7 @@ class Deck(Record):
         >>> "PROJ" in deck.with_(projectile=fecm.RigidMass(1e-4)).to_text()
         True
         """
-        from fecm.sweeps.changes import with_values  # the one module that climbs
+        from fecm.authoring.changes import with_values  # the one module that climbs
 
         return with_values(self, values)
 
@@ -264,11 +264,11 @@ class Deck(Record):
         >>> [macro.value for macro in deck.with_program("LMAS\nEIGE,3").macros]
         [0.0, 3.0]
         """
-        from fecm.deck.outputs import with_outputs  # 1 ms, and only what changes programs needs it
+        from fecm.deck.macros import with_outputs  # 1 ms, and only what changes programs needs it
 
         deck = self
         if isinstance(macros, str):
-            from fecm.sweeps.changes import with_cards
+            from fecm.authoring.changes import with_cards
 
             deck = with_cards(self, macros)
         elif macros is not None:

@@ -6,10 +6,8 @@ from collections.abc import Iterator
 from typing import ClassVar, Self
 
 from fecm._dataclasses import frozen
-from fecm.deck.card import Card, Fields, Source, layout
-from fecm.deck.record import Control, Record
-from fecm.deck.segment import NumberedSegment, Segment
-from fecm.deck.stream import CardStream
+from fecm.deck.card import Card, CardSource, Control, Fields, Record, layout
+from fecm.deck.segment import CardStream, NumberedSegment, Segment
 
 
 @frozen
@@ -54,7 +52,7 @@ class Units(Segment, keyword="UNIT"):
         """Read the card of the three names."""
         card = cards.take()
         if card is not None and len(names := card.words) == len(cls.NAMES):
-            return cls(*names, source=Source(card))
+            return cls(*names, source=CardSource(card))
         if card is not None and cards.begins_segment(card):
             cards.give_back()
 
@@ -86,7 +84,7 @@ class PrintOption(Segment, keyword="PRIN"):
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self:
         """Read the keyword card, which is all there is."""
-        return cls(head.keyword == cls.keyword, source=Source(head))
+        return cls(head.keyword == cls.keyword, source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's card."""
@@ -106,4 +104,4 @@ class Page(Segment, keyword="PAGE"):
     def read(cls, head: Card, cards: CardStream) -> Self:
         """Read the card's first four columns."""
         card = cards.take()
-        return cls("" if card is None else card.data[:4].rstrip(), source=Source(head))
+        return cls("" if card is None else card.data[:4].rstrip(), source=CardSource(head))

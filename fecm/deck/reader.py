@@ -1,4 +1,7 @@
-"""The card reader: a deck's text in, its models and all errors out, not just the first."""
+"""Text of a deck: from a file or a stream, or given as it is.
+
+The card reader: a deck's text in, its models and all errors out, not just the first.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +12,66 @@ from dataclasses import field
 from pathlib import Path
 
 from fecm._dataclasses import frozen, mutable
+from fecm._errors import OptionsError
+from fecm._inputs import InputError, decoded
+from fecm._machine import NotEnoughMemoryError, available_memory, format_bytes, require_memory
 from fecm._typing import AnyFile
-from fecm.deck.card import Card, Source
-from fecm.deck.findings import DeckError, Place
+from fecm.deck.card import Card, CardSource, Control, capitals
+from fecm.deck.findings import CardPlace, DeckError
 from fecm.deck.macros import LoadTable, Macro
 from fecm.deck.mesh_cards import DOF_NAMES, NODES_AN_ELEMENT
 from fecm.deck.model import END, MACROS, SEGMENTS, STOP, TITLE, Deck, Segment
-from fecm.deck.numerals import capitals
-from fecm.deck.record import Control
-from fecm.deck.source_text import load_text
-from fecm.deck.stream import CardStream
+from fecm.deck.segment import CardStream
+
+LARGEST_FILE = 1_000_000_000  # no deck needs more bytes
+# Largest memory of a deck per byte of text and per line, measured at 10 MB.
+BYTES_A_BYTE = 12
+BYTES_A_LINE = 1100
+FIRST = 4096  # number of bytes that identify a binary file
+HDF5 = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
+INLINE = "<text>"  # name of a deck that is given as text, or in a stream without a name
+
+
+def load_text(path_or_text: str | Path | AnyFile) -> tuple[str, str]:
+    """Text and name of a deck, see :func:`fecm.read_deck`.
+
+    Raises OptionsError if it is no path, text or open file.
+    """
+    if isinstance(path_or_text, str) and ("\n" in path_or_text or not path_or_text.strip()):
+        return path_or_text, INLINE
+    if isinstance(path_or_text, str | Path):
+        with Path(path_or_text).open("rb") as file:
+            return _text(file, str(path_or_text)), str(path_or_text)
+    if not hasattr(path_or_text, "read"):
+        raise OptionsError(
+            f"a deck is a path, a text, an open file or a Deck, not {path_or_text!r}"
+        )
+    name = getattr(path_or_text, "name", None)
+    name = name if isinstance(name, str) else INLINE
+    return _text(path_or_text, name), name
+
+
+def _text(file: AnyFile, path: str) -> str:
+    """Text of a deck, which may be an endless pipe; see :func:`decoded`."""
+    free = available_memory()
+    most = LARGEST_FILE if free is None else min(LARGEST_FILE, free // BYTES_A_BYTE)
+    begin = _read(file, FIRST)
+    if begin.startswith(HDF5):
+        raise InputError(f"{path} is an HDF5 file, not a deck; `fecm info {path}` shows a result")
+    decoded(begin, path)
+    data = begin + _read(file, max(0, most + 1 - len(begin)))
+    if len(data) > most:
+        raise NotEnoughMemoryError(f"{path}: a deck of more than {format_bytes(most)} is not read")
+    lines = data.count(b"\n") + data.count(b"\r") - data.count(b"\r\n")
+    require_memory(BYTES_A_BYTE * len(data) + BYTES_A_LINE * lines, f"{path}: the deck")
+    return decoded(data, path)
+
+
+def _read(file: AnyFile, size: int) -> bytes:
+    """Bytes of a file that is open as bytes or as text."""
+    data = file.read(size)
+    return data.encode("utf-8", "surrogateescape") if isinstance(data, str) else data
+
 
 CONTROL_CARD = "(6I5): NUMNP, NUMEL, LAYER, NDM, NDF, NEN"
 # Largest number of nodes or elements, and of layers; anything beyond is certainly a typo.
@@ -152,7 +205,7 @@ class Reader:
             macros=tuple(macros),
             tables=tuple(tables),
             text="\n".join([*self.cards.text_since(first), STOP, ""]),
-            source=Source(title),
+            source=CardSource(title),
         )
         return ParsedProblem(deck, unsound)
 
@@ -239,7 +292,7 @@ class Reader:
             self.cards.unsound.update(near)
             message = f"`{card.data.split()[0]}` is not a keyword here."
             hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
-            place = Place(card.line, 1, min(4, len(card.data)), card.text)
+            place = CardPlace(card.line, 1, min(4, len(card.data)), card.text)
             self.findings.add("E005", message, place, hint)
         elif card.data.lstrip()[:1].isalpha():
             word = card.data.split()[0]

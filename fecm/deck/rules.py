@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable, Iterator
 from enum import StrEnum
 from typing import NamedTuple, ParamSpec, TypeAlias
 
-from fecm.deck.findings import Finding, Findings, Place
+from fecm.deck.findings import CardPlace, Finding, Findings
 
 P = ParamSpec("P")
 
@@ -47,7 +47,7 @@ class Report(NamedTuple):
     """A fault found by a rule: the finding without its code."""
 
     message: str
-    place: Place | None = None
+    place: CardPlace | None = None
     hint: str = ""
 
 

@@ -1,21 +1,190 @@
-"""Segments: a keyword card and the data that follow it, how they are read and how written."""
+"""The cards of a file in their order, from which the segments take theirs.
+
+Segments: a keyword card and the data that follow it, how they are read and how written.
+"""
 
 from __future__ import annotations
 
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, cast
 
 from fecm._dataclasses import frozen
-from fecm.deck.card import Card, Fields, Source
-from fecm.deck.record import Control, Record
-from fecm.deck.stream import CardStream
-from fecm.deck.table import Table, write_rows
+from fecm._inputs import lines_of
+from fecm.deck.card import Card, CardSource, Control, Fields, Record, Value
+from fecm.deck.findings import Findings
+from fecm.deck.table import Table, TableReader, write_rows
+from fecm.deck.values import read_values
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
+
 _R = TypeVar("_R", bound=Record)
+
+
+class CardStream:
+    """Cards in the order of the file, without the lines that are comments.
+
+    Parameters
+    ----------
+    text : str
+        The deck.
+    keywords : collection of str
+        Keywords that end the data of a segment.
+    blanks_are_zeros : bool
+        Whether blanks inside numbers are read as the zeros that they were on the report's machine.
+    keeps_values : bool
+        Whether :attr:`read` keeps the fields and values of every card.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        keywords: Collection[str],
+        *,
+        blanks_are_zeros: bool = False,
+        keeps_values: bool = False,
+    ) -> None:
+        self.lines: list[str] = lines_of(text.removeprefix("\ufeff"))
+        numbered = enumerate(self.lines, start=1)
+        self._cards = [(n, line) for n, line in numbered if not line.startswith("!")]
+        self._keywords = frozenset(keywords)
+        self._blanks_are_zeros = blanks_are_zeros
+        self._keeps_values = keeps_values
+        self.position: int = 0  # number of cards taken
+        self.findings: Findings = Findings()
+        self.read: dict[int, tuple[Fields, Sequence[Value]]] = {}  # by line number
+        self.control: Control  # of the problem that is read, once its control card was
+        # Keywords of the problem's segments with unreadable cards.
+        self.unsound: set[str] = set()
+
+    @property
+    def at_end(self) -> bool:
+        """Whether every card was taken."""
+        return self.position == len(self._cards)
+
+    @property
+    def last(self) -> Card | None:
+        """The last card of the file; None if it has none."""
+        return Card(*self._cards[-1]) if self._cards else None
+
+    def text_since(self, position: int) -> list[str]:
+        """Lines of the cards taken since a position."""
+        return [line.rstrip() for _, line in self._cards[position : self.position]]
+
+    def begins_segment(self, card: Card) -> bool:
+        """Whether a card is the keyword card of a segment, or ends the segments."""
+        return card.keyword in self._keywords
+
+    def take(self) -> Card | None:
+        """The next card; None at the end of the file or when findings are closed."""
+        if self.at_end or self.findings.closed:
+            return None
+        self.position += 1
+        return Card(*self._cards[self.position - 1])
+
+    def take_filled(self) -> Card | None:
+        """The next card that is not blank, or None as in :meth:`take`."""
+        while not self.at_end and not self._cards[self.position][1].strip():
+            self.position += 1
+        while (card := self.take()) is not None and card.is_blank:
+            pass
+        return card
+
+    def give_back(self) -> None:
+        """Return the last card to the stream."""
+        self.position -= 1
+
+    def peek(self) -> Card | None:
+        """The next card as :meth:`take` gives it, which stays in the stream."""
+        if (card := self.take()) is not None:
+            self.give_back()
+        return card
+
+    def take_data(self) -> Card | None:
+        """The next card; None where that is a keyword card, which stays, or as in :meth:`take`."""
+        card = self.take()
+        if card is None or not card.is_keyword:
+            return card
+        self.give_back()
+        return None
+
+    def skip_data(self) -> None:
+        """Skip cards up to the next keyword."""
+        while self.take_data() is not None:
+            pass
+
+    def row(self, card: Card, fields: Fields) -> tuple[list[Value], CardSource] | None:
+        """Values of a card and their source; None after an error, which is reported."""
+        values = read_values(card, fields, self.findings, blanks_are_zeros=self._blanks_are_zeros)
+        if values is None:
+            return None
+        if self._keeps_values:
+            self.read[card.line] = (fields, values)
+        return values, CardSource(card, fields)
+
+    def record(self, card: Card, kind: type[_R], fields: Fields | None = None) -> _R | None:
+        """Record of a card; None after an error, which is reported."""
+        row = self.row(card, fields or kind.fields)
+        return None if row is None else kind.from_row(*row)
+
+    def single(self, head: Card, kind: type[_R], fields: Fields | None = None) -> _R | None:
+        """Record of a segment's mandatory card; None if it is missing or unreadable."""
+        card = self.take_data()
+        if card is None and head.keyword not in self.unsound:
+            message = f"A card of {head.keyword} is missing."
+            hint = f"its fields are {', '.join(field.name for field in fields or kind.fields)}"
+            self.findings.add("E008", message, (self.peek() or head).place, hint)
+        record = None if card is None else self.record(card, kind, fields)
+        if record is None:
+            self.unsound.add(head.keyword)
+        return record
+
+    def until_blank(self, head: Card, kind: type[_R]) -> tuple[_R, ...]:
+        """Records of a segment's cards up to a blank card."""
+        found: list[_R] = []
+        while (card := self.take_data()) is not None and not card.is_blank:
+            if (record := self.record(card, kind)) is None:
+                self.unsound.add(head.keyword)
+            else:
+                found.append(record)
+        self.end(head, card)
+        return tuple(found)
+
+    def table(
+        self, head: Card, kind: type[_R], fields: Fields, is_last: Callable[[_R], bool]
+    ) -> Table[_R]:
+        """Records of cards of numbers up to a blank card, or up to one that is the last."""
+        reader = TableReader(fields)
+        self._take_table(reader)
+        while (card := self.take_data()) is not None and not card.is_blank:
+            if (row := self.row(card, fields)) is None:
+                self.unsound.add(head.keyword)
+            else:
+                reader.add((card.line, card.text), [float(value) for value in row[0]])
+            self._take_table(reader)
+        found = Table(kind, fields, reader.values, reader.lines)
+        if not (found and is_last(found[-1])):
+            self.end(head, card)
+        return found
+
+    def _take_table(self, reader: TableReader) -> None:
+        """Take the cards that are read in a block, if any."""
+        if self.findings.closed:
+            return
+        count = reader.take(self._cards, self.position)
+        self.position += count
+        if self._keeps_values:
+            self.read.update(reader.last_rows(count))
+
+    def end(self, head: Card, card: Card | None) -> None:
+        """Report that no blank card ends a segment, if `card`, which should be one, is None."""
+        if card is None:
+            following = self.peek()
+            message = f"The {head.keyword} cards are not ended by a blank card."
+            hint = f"put a blank card {'before this one' if following else 'at the end'}"
+            self.findings.add("E007", message, (following or head).place, hint)
 
 
 @frozen
@@ -78,7 +247,7 @@ class NumberedSegment(Segment, Generic[_R]):
         fields = cls.card_fields(control)
         found = cards.table(head, cls.record, fields, lambda r: cls.is_last(r, control))
         # No class variable can have the type of the class's parameter.
-        return cls(cast("Table[_R]", found), source=Source(head))
+        return cls(cast("Table[_R]", found), source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""

@@ -13,9 +13,17 @@ from functools import cache, cached_property
 from itertools import pairwise
 from typing import TypeVar, overload
 
-from fecm.deck.card import Card, Field, FieldKind, Fields, Source, Value, in_free_format
-from fecm.deck.numerals import format_real
-from fecm.deck.record import Record
+from fecm.deck.card import (
+    Card,
+    CardSource,
+    Field,
+    FieldKind,
+    Fields,
+    Record,
+    Value,
+    format_real,
+    in_free_format,
+)
 
 _R = TypeVar("_R", bound=Record)
 Line = tuple[int, str]  # a line's number in the file, and its text
@@ -72,7 +80,7 @@ class Table(Sequence[_R]):
             return tuple(self[i] for i in range(*index.indices(len(self))))
         i = range(len(self))[index]
         (row,) = _rows(self.fields, self.values[i * self.width : (i + 1) * self.width])
-        source = Source(Card(*self._lines[i]), self.fields) if self._lines else None
+        source = CardSource(Card(*self._lines[i]), self.fields) if self._lines else None
         return self.kind.from_row(row, source)
 
     def __eq__(self, other: object) -> bool:

@@ -7,9 +7,19 @@ import sys
 from itertools import pairwise
 
 from fecm._dataclasses import frozen
-from fecm.deck.card import BLANK, Card, Field, FieldKind, Fields, Source, Value
-from fecm.deck.findings import Findings, Place
-from fecm.deck.numerals import LONGEST, parse_integer, parse_real
+from fecm.deck.card import (
+    BLANK,
+    LONGEST,
+    Card,
+    CardSource,
+    Field,
+    FieldKind,
+    Fields,
+    Value,
+    parse_integer,
+    parse_real,
+)
+from fecm.deck.findings import CardPlace, Findings
 
 LARGEST_INTEGER = 2**31 - 1
 # Looking a member up in its enumeration would take a tenth of the time of reading a deck.
@@ -29,7 +39,7 @@ def read_values(
         column = card.data.index("\t") + 1
         message = "The card has a tab, so its columns are ambiguous."
         hint = "write blanks instead of tabs"
-        findings.add("E103", message, Place(card.line, column, column, card.text), hint)
+        findings.add("E103", message, CardPlace(card.line, column, column, card.text), hint)
         return None
     is_free = card.is_free
     if not is_free:
@@ -40,7 +50,7 @@ def read_values(
     if not _ends_with_its_fields(card, fields, findings):
         return None
 
-    source = Source(card, fields)
+    source = CardSource(card, fields)
     texts = [text for _, text in card.cut(fields)] + [""] * len(fields)
     zeros = blanks_are_zeros and not is_free
     values: list[Value] = []
@@ -68,7 +78,7 @@ def _ends_with_its_fields(card: Card, fields: Fields, findings: Findings) -> boo
         return True
 
     end = len(card.data)
-    place = Place(card.line, end - len(surplus) + 1, end, card.text)
+    place = CardPlace(card.line, end - len(surplus) + 1, end, card.text)
     if card.is_free:
         message = f"`{surplus}` follows the last of the card's {len(fields)} values."
         findings.add("E106", message, place, _hint_of_separators(card, fields))
@@ -78,7 +88,7 @@ def _ends_with_its_fields(card: Card, fields: Fields, findings: Findings) -> boo
     return True
 
 
-def _word(field: Field, text: str, source: Source, findings: Findings) -> str | None:
+def _word(field: Field, text: str, source: CardSource, findings: Findings) -> str | None:
     """A word of a field, or None after reporting that it is too long."""
     word = text.rstrip()
     if len(word) <= field.width:
@@ -89,7 +99,7 @@ def _word(field: Field, text: str, source: Source, findings: Findings) -> str | 
 
 
 def _number(
-    field: Field, text: str, source: Source, findings: Findings, *, blanks_are_zeros: bool
+    field: Field, text: str, source: CardSource, findings: Findings, *, blanks_are_zeros: bool
 ) -> Value | None:
     """A field's number, :data:`BLANK` where a blank has a default, or None after an error."""
     is_integer = field.kind is INTEGER
@@ -123,7 +133,7 @@ def _number(
     return value
 
 
-def _report_no_number(field: Field, text: str, source: Source, findings: Findings) -> None:
+def _report_no_number(field: Field, text: str, source: CardSource, findings: Findings) -> None:
     is_integer = field.kind is INTEGER
     squeezed = text.replace(" ", "")
     hint = ""
@@ -138,7 +148,7 @@ def _report_no_number(field: Field, text: str, source: Source, findings: Finding
 
 
 def _report_blank(
-    field: Field, text: str, padded: float | None, source: Source, findings: Findings
+    field: Field, text: str, padded: float | None, source: CardSource, findings: Findings
 ) -> None:
     """Report a blank that changes a number; `padded` is the number with a zero in its place."""
     written = text.strip()
@@ -217,7 +227,7 @@ def _report_misplaced(found: _Misplaced, card: Card, fields: Fields, findings: F
     first, last = found.first, found.last
     touched = [f for f in fields if f.first <= last and f.last >= first]
     names = ", ".join(f"cols {f.first}-{f.last}: {f.name}" for f in touched)
-    place = Place(card.line, first, last, card.text, names)
+    place = CardPlace(card.line, first, last, card.text, names)
     hint = (
         _hint_of_separators(card, fields)
         or _hint_of_length(card, fields, last - first + 1, found.width)

@@ -6,11 +6,9 @@ from collections.abc import Iterator
 from typing import ClassVar, Self
 
 from fecm._dataclasses import frozen
-from fecm.deck.card import Card, Fields, Source, layout
+from fecm.deck.card import Card, CardSource, Control, Fields, Record, layout
 from fecm.deck.material_cards import Layer, Ply, read_layers
-from fecm.deck.record import Control, Record
-from fecm.deck.segment import NumberedSegment, Segment
-from fecm.deck.stream import CardStream
+from fecm.deck.segment import CardStream, NumberedSegment, Segment
 
 
 @frozen
@@ -53,7 +51,7 @@ class Materials(Segment, keyword="MATS"):
             else:
                 found.append(NumberedPly(number, ply))
         cards.end(head, card)
-        return cls(tuple(found), source=Source(head))
+        return cls(tuple(found), source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""
@@ -120,7 +118,7 @@ class Laminates(Segment, keyword="LAMS"):
                 return None
             found.append(NumberedLaminate(number, layers))
         cards.end(head, card)
-        return cls(tuple(found), source=Source(head))
+        return cls(tuple(found), source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
         """Text of the segment's cards."""

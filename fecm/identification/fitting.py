@@ -12,17 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
+from fecm.authoring.case import Case
+from fecm.authoring.strike import Strike
+from fecm.authoring.values import check_names
+from fecm.authoring.vary import strike_of_case
 from fecm.deck.model import Deck
 from fecm.identification.alignment import IdentifyError, contact_points
 from fecm.mechanics.contact_law import Law
 from fecm.results.comparison import Measurement
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Filter
-from fecm.sweeps.case import Case
-from fecm.sweeps.find import Runs
-from fecm.sweeps.strike import Strike
-from fecm.sweeps.values import check_names
-from fecm.sweeps.vary import strike
+from fecm.sweeps.search import Runs
 
 DELAY = "delay"  # measured time at which the approach of the projectile ends in a contact
 OFFSET = "offset"  # measured force without a contact
@@ -43,10 +43,10 @@ def fitted(deck: Deck, values: Mapping[str, float]) -> Strike:
     """Return the strike of a deck with values, without those of the record."""
     case: Case = {name: v for name, v in values.items() if name not in OF_RECORD}
     check_names(case)
-    return strike(deck, case)
+    return strike_of_case(deck, case)
 
 
-class Model(NamedTuple):
+class ForceModel(NamedTuple):
     """Contact forces of a deck with trial values, all from one response of the plate."""
 
     deck: Deck
@@ -104,7 +104,7 @@ class Scaling:
 
 
 @dataclass(frozen=True)
-class Solution:
+class FittedPoints:
     """Parameters of least squares, and the points that were fitted."""
 
     scaling: Scaling
@@ -144,9 +144,9 @@ def share_lost(force: Floats, inside: NDArray[np.bool_]) -> float:
     return float(np.mean(~inside[loaded]))
 
 
-def solve(
-    model: Model, measured: Measurement, scaling: Scaling, x: Floats, evaluations: int
-) -> Solution | None:
+def fit_parameters(
+    model: ForceModel, measured: Measurement, scaling: Scaling, x: Floats, evaluations: int
+) -> FittedPoints | None:
     """Fit parameters from x; the delay selects the points that the run of the deck has.
 
     None if these are fewer than :data:`POINTS`.
@@ -171,13 +171,13 @@ def solve(
 
 
 def _least_squares(
-    model: Model,
+    model: ForceModel,
     measured: Measurement,
     inside: NDArray[np.bool_],
     scaling: Scaling,
     x0: Floats,
     evaluations: int,
-) -> Solution:
+) -> FittedPoints:
     from scipy.optimize import least_squares  # takes 0.2 s to import
 
     time, force = measured.time[inside], measured.force[inside]
@@ -201,7 +201,7 @@ def _least_squares(
         ftol=SETTLED**2 / len(time),
         xtol=1e-7,
     )
-    return Solution(
+    return FittedPoints(
         scaling=scaling,
         x=found.x,
         time=time,
@@ -214,19 +214,19 @@ def _least_squares(
     )
 
 
-def covariance(found: Solution) -> Floats:
+def covariance(found: FittedPoints) -> Floats:
     """Covariance of the scaled parameters; IdentifyError if the residual doesn't determine them."""
     names, peak = list(found.scaling.start), float(np.abs(found.force).max())
     jac = found.jacobian / peak
     columns = np.sqrt(np.sum(jac**2, axis=0))
     if idle := [n for n, c in zip(names, columns, strict=True) if c < NO_EFFECT * len(jac) ** 0.5]:
-        text = f"the force does not depend on {listed(idle)} here"
+        text = f"the force does not depend on {join_names(idle)} here"
         hint = f"leave {'it' if len(idle) == 1 else 'them'} out of the free parameters"
         raise IdentifyError(f"{text} (does the indentation reach alpha_p?); {hint}")
     _, singular, right = np.linalg.svd(jac / columns, full_matrices=False)
     if singular[-1] < SINGULAR:
         both = [n for n, share in zip(names, right[-1], strict=True) if abs(share) > SHARE]
-        text = f"a combination of {listed(both)} (singular value {singular[-1]:.1g})"
+        text = f"a combination of {join_names(both)} (singular value {singular[-1]:.1g})"
         hint = "give one of them the known value in the deck and leave it out"
         raise IdentifyError(f"the force determines only {text}; {hint}")
     root = right.T / singular / columns[:, None]
@@ -238,16 +238,18 @@ def covariance(found: Solution) -> Floats:
         hint = (
             "the standard error is above 100 %; set known values in the deck, and do not fit them"
         )
-        raise IdentifyError(f"the measurement does not determine {listed(vague)}: {hint}")
+        raise IdentifyError(f"the measurement does not determine {join_names(vague)}: {hint}")
     return found_covariance
 
 
-def listed(names: Sequence[str]) -> str:
+def join_names(names: Sequence[str]) -> str:
     """Names with commas and an `and`."""
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
-def bounds(name: str, start: float, sizes: Mapping[str, float]) -> tuple[float, float, float]:
+def parameter_bounds(
+    name: str, start: float, sizes: Mapping[str, float]
+) -> tuple[float, float, float]:
     """Size of a parameter (0: exponential) and bounds of its x.
 
     `sizes` are a time of the delay, a force of the offset and an indentation of alpha_p.

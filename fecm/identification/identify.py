@@ -13,6 +13,8 @@ import numpy as np
 
 from fecm._errors import warn
 from fecm._typing import Floats
+from fecm.authoring.strike import strike_of
+from fecm.authoring.values import dimension_of
 from fecm.deck.model import Deck, Impact, Indentation, Nonlinear, Projectile
 from fecm.deck.units import unit_names, unit_of
 from fecm.identification.alignment import IdentifyError, check_measured, lags
@@ -24,42 +26,40 @@ from fecm.identification.fitting import (
     OF_RECORD,
     OFFSET,
     POINTS,
-    Model,
+    FittedPoints,
+    ForceModel,
     Scaling,
-    Solution,
-    bounds,
     covariance,
     during_run,
+    fit_parameters,
     fitted,
+    parameter_bounds,
     share_lost,
-    solve,
 )
 from fecm.identification.misfit import (
     coloured,
     is_runs_few,
-    neighbours,
+    neighbour_correlation,
     plate_errors,
     proposal,
-    runs,
+    sign_runs,
     undescribed,
     wrong_model,
 )
 from fecm.mechanics.contact_law import Law
-from fecm.mechanics.own_law import name_of, own_law
+from fecm.mechanics.own_law import law_name, own_law
 from fecm.mechanics.projectile import RigidMass
 from fecm.problem.parts import build_projectile
 from fecm.results.comparison import Measurement, measurement_of
-from fecm.results.errors import NotStoredError
-from fecm.results.pictures import report
+from fecm.results.groups import NotStoredError
+from fecm.results.pictures import report_results
 from fecm.results.validity import MEANING, Reason, reasons_of
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Filter, filter_of
-from fecm.sweeps.api import problem_of
+from fecm.sweeps.api import checked_problem
 from fecm.sweeps.batch import runs_of
-from fecm.sweeps.find import Runs
 from fecm.sweeps.plan import check_law, shares_plate
-from fecm.sweeps.strike import strike_of
-from fecm.sweeps.values import dimension_of
+from fecm.sweeps.search import Runs
 
 CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
     **dict.fromkeys(("velocity", "energy"), Impact),
@@ -178,7 +178,7 @@ class Identification:
         --------
         >>> found.report("impact.html")  # doctest: +SKIP
         """
-        report({"the measurement": self}, path, overwrite=overwrite)
+        report_results({"the measurement": self}, path, overwrite=overwrite)
 
     def cards(self) -> str:
         """Cards of the deck with fitted values."""
@@ -256,7 +256,7 @@ def identify(
     measured = measurement_of((time, force), {})
     known = filter_of(filter) if isinstance(filter, str) else filter
     names = (free,) if isinstance(free, str) else tuple(free)
-    found = fit(problem_of(deck).deck, measured, names, known, own_law(law))
+    found = fit_deck(checked_problem(deck).deck, measured, names, known, own_law(law))
     for text in found.notes:
         warn(text)
     return found
@@ -265,7 +265,7 @@ def identify(
 @lru_cache(maxsize=4)
 def _shared(deck: Deck) -> Runs:
     """The function that runs cases of a deck by one response of its plate."""
-    problem = problem_of(deck)
+    problem = checked_problem(deck)
     if problem.deck.has(Nonlinear):
         raise StudyError(
             "identify needs a linear plate, and the deck has NONL; fit a test at an energy that "
@@ -278,7 +278,7 @@ def _shared(deck: Deck) -> Runs:
     return runs_of(problem)
 
 
-def fit(
+def fit_deck(
     deck: Deck,
     measured: Measurement,
     free: Sequence[str],
@@ -297,7 +297,7 @@ def fit(
         check_law(law, free)
     units = unit_names(deck)
     sensor = None if sensor is None else sensor.in_unit(units.get("time", ""))
-    model = Model(deck, _shared(deck), sensor, law, computed)
+    model = ForceModel(deck, _shared(deck), sensor, law, computed)
     clock, own = model.histories([{}])
     width = check_measured(measured, clock, own[:, 0], units)
     if len(measured.time) < POINTS:
@@ -307,16 +307,16 @@ def fit(
     depth = (own.max() / deck.require(Indentation).k) ** (2.0 / 3.0)
     sizes = {DELAY: width, OFFSET: UNIT_OFFSET * float(own.max()), "alpha_p": depth}
 
-    def best(names: Sequence[str], by: Model = model) -> Solution | None:
+    def best(names: Sequence[str], by: ForceModel = model) -> FittedPoints | None:
         """The best fit of all starts of the delay; None if the run of the deck is too short."""
         known = {name: _start(deck, name) for name in names}
         trials = [{**known, DELAY: lag} for lag in starts] if DELAY in names else [known]
         scalings, x = [_scaling(one, sizes) for one in trials], np.zeros(len(names))
         chosen = 0
         if len(scalings) > 1:
-            short = [solve(by, measured, one, x, FIRST_EVALUATIONS) for one in scalings]
+            short = [fit_parameters(by, measured, one, x, FIRST_EVALUATIONS) for one in scalings]
             chosen = min(range(len(short)), key=lambda n: _rank(short[n]))
-        found = solve(by, measured, scalings[chosen], x, MOST_EVALUATIONS)
+        found = fit_parameters(by, measured, scalings[chosen], x, MOST_EVALUATIONS)
         return None if found is None or found.lost > LOST else found
 
     found = best(free)
@@ -326,7 +326,7 @@ def fit(
             raise IdentifyError(wrong_model("the fit shifts the run away from the contact"))
         raise StudyError(f"{measured.name}: {_outside(free, starts[0], width, units)}")
 
-    def filtered(filter: Filter) -> Solution | None:
+    def filtered(filter: Filter) -> FittedPoints | None:
         """The best fit of a run behind a filter."""
         return best(free, model._replace(sensor=filter))
 
@@ -341,7 +341,7 @@ def fit(
 
 
 def _identification(
-    model: Model, measured: Measurement, found: Solution, cov: Floats, fault: str
+    model: ForceModel, measured: Measurement, found: FittedPoints, cov: Floats, fault: str
 ) -> Identification:
     """Values, errors and notes of a fit; `fault` is why it is not accepted."""
     deviation = np.sqrt(np.diagonal(cov))
@@ -368,19 +368,19 @@ def _identification(
         plate_errors=plates,
         deck=fitted(model.deck, rounded).deck(),
         notes=(),
-        law="" if model.law is None else name_of(model.law),
+        law="" if model.law is None else law_name(model.law),
     )
     notes = filter(None, (fault, *_notes(made, found, measured, model)))
     return replace(made, notes=tuple(notes))
 
 
-def _rank(found: Solution | None) -> tuple[bool, float]:
+def _rank(found: FittedPoints | None) -> tuple[bool, float]:
     """Order of fits: those with the points of the contact, then by their residuals."""
     return (True, math.inf) if found is None else (found.lost > LOST, found.variance)
 
 
 def _scaling(start: dict[str, float], sizes: Mapping[str, float]) -> Scaling:
-    size, low, high = np.array([bounds(n, v, sizes) for n, v in start.items()]).T
+    size, low, high = np.array([parameter_bounds(n, v, sizes) for n, v in start.items()]).T
     return Scaling(start, size, low, high)
 
 
@@ -411,7 +411,7 @@ def _start(deck: Deck, name: str) -> float:
 
 
 def _notes(
-    found: Identification, solution: Solution, given: Measurement, model: Model
+    found: Identification, solution: FittedPoints, given: Measurement, model: ForceModel
 ) -> Iterator[str]:
     """Reasons to doubt the values: those of the fit, and those of the run of the fitted deck."""
     if not found.converged:
@@ -426,12 +426,12 @@ def _notes(
         text = f"{names[i]} and {names[j]} have the correlation {found.correlation[i, j]:.4f}"
         yield f"{text}: their values can hardly be told apart"
     if coloured(solution):
-        near = neighbours(found.residual)
+        near = neighbour_correlation(found.residual)
         text = "the model does not describe the measurement down to its noise"
         text = f"{text}, and the standard errors are too small"
         yield f"neighbouring residuals have the correlation {near:.2f}: {text}"
     elif is_runs_few(solution):
-        far = -runs(found.residual)
+        far = -sign_runs(found.residual)
         yield (
             f"the residual changes its sign too seldom for independent errors ({far:.1f} standard "
             "deviations of a runs test): the model does not describe the measurement down to its "

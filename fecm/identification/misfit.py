@@ -10,11 +10,18 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._typing import Floats
+from fecm.authoring.vary import apply_case
 from fecm.deck.model import Deck, Material
 from fecm.deck.units import unit_of
-from fecm.identification.fitting import DELAY, OF_RECORD, OFFSET, Model, Solution, listed
+from fecm.identification.fitting import (
+    DELAY,
+    OF_RECORD,
+    OFFSET,
+    FittedPoints,
+    ForceModel,
+    join_names,
+)
 from fecm.studies.rod_test.filters import Filter, FilterKind
-from fecm.sweeps.vary import apply_case
 
 FEW_RUNS = -4.0  # standard deviations of the number of runs of equal signs in a residual
 RISES = np.geomspace(3e-3, 0.3, 14)  # of filters that are tried, over the time of the contact
@@ -38,12 +45,12 @@ PERCENT = 0.01  # the relative change whose effect is reported
 PROPERTIES = ("thickness", "e1")
 
 
-def neighbours(residual: Floats) -> float:
+def neighbour_correlation(residual: Floats) -> float:
     """Correlation of neighbouring residuals."""
     return float(residual[1:] @ residual[:-1] / (residual @ residual))
 
 
-def runs(residual: Floats) -> float:
+def sign_runs(residual: Floats) -> float:
     """Number of runs of equal signs, in standard deviations from that of independent errors.
 
     Wald and Wolfowitz 1940; 0 if all signs are equal.
@@ -62,16 +69,16 @@ def runs(residual: Floats) -> float:
     return float((number - mean) / math.sqrt(variance))
 
 
-def coloured(found: Solution) -> bool:
+def coloured(found: FittedPoints) -> bool:
     """Whether the residual has a shape, and is not as small as the errors of arithmetic."""
-    return not _faint(found) and neighbours(found.residual) > COLOURED
+    return not _faint(found) and neighbour_correlation(found.residual) > COLOURED
 
 
-def _faint(found: Solution) -> bool:
+def _faint(found: FittedPoints) -> bool:
     return math.sqrt(found.variance) <= FAINT * float(found.force.max())
 
 
-def undescribed(found: Solution, units: dict[str, str]) -> str:
+def undescribed(found: FittedPoints, units: dict[str, str]) -> str:
     """Say that the model does not describe the data; empty if it does."""
     if _faint(found) or _describes(found.residual, found.force):
         return ""
@@ -90,14 +97,14 @@ def wrong_model(why: str) -> str:
 
 def _describes(residual: Floats, force: Floats) -> bool:
     share = float(residual @ residual) / (len(force) * float(np.var(force)))
-    shaped = neighbours(residual) > COLOURED
+    shaped = neighbour_correlation(residual) > COLOURED
     return share < 1.0 and (share <= UNDESCRIBED or not shaped)
 
 
 # A delay or an offset that was left out -----------------------------------------------------------
 
 
-class Trial(NamedTuple):
+class LargerFit(NamedTuple):
     """A fit with more parameters."""
 
     added: dict[str, float]  # values of the added parameters
@@ -118,10 +125,10 @@ class Trial(NamedTuple):
 
 
 def proposal(
-    model: Model,
-    found: Solution,
-    refit: Callable[[], Solution | None],
-    filtered: Callable[[Filter], Solution | None],
+    model: ForceModel,
+    found: FittedPoints,
+    refit: Callable[[], FittedPoints | None],
+    filtered: Callable[[Filter], FittedPoints | None],
     units: dict[str, str],
 ) -> tuple[str, str]:
     """Propose to fit a delay or an offset too, or to name a filter; and a note of a likely filter.
@@ -149,11 +156,11 @@ def _rms(residual: Floats) -> float:
 
 
 def _of_record(
-    model: Model,
-    found: Solution,
-    refit: Callable[[], Solution | None],
+    model: ForceModel,
+    found: FittedPoints,
+    refit: Callable[[], FittedPoints | None],
     units: dict[str, str],
-) -> tuple[Trial | None, str]:
+) -> tuple[LargerFit | None, str]:
     """A delay or an offset that explains the residual, and the proposal; empty without."""
     before = found.residual
     missing = [name for name in (OFFSET, DELAY) if name not in found.scaling.start]
@@ -165,7 +172,7 @@ def _of_record(
         if trial.explains(before, found.force):
             return trial, _told(trial, before, units)
     if DELAY in missing and coloured(found) and (other := refit()) is not None:
-        trial = Trial({DELAY: other.values[DELAY]}, other.residual, certain=True)
+        trial = LargerFit({DELAY: other.values[DELAY]}, other.residual, certain=True)
         if trial.explains(before, other.force):
             return trial, _told(trial, before, units)
     if OFFSET in missing and (level := _out_of_contact(model, found)):
@@ -176,8 +183,8 @@ def _of_record(
 
 
 def _filter(
-    model: Model, found: Solution, filtered: Callable[[Filter], Solution | None]
-) -> tuple[Trial | None, Filter]:
+    model: ForceModel, found: FittedPoints, filtered: Callable[[Filter], FittedPoints | None]
+) -> tuple[LargerFit | None, Filter]:
     """The fit with the likeliest filter of first order; None if it is no better than by chance."""
     none = Filter(FilterKind.FIRST_ORDER, 0.0)
     if model.sensor is not None or _faint(found):
@@ -206,15 +213,15 @@ def _filter(
     other = filtered(sensor)
     if other is None or _rms(other.residual) >= _rms(found.residual):
         return None, sensor
-    return Trial({}, other.residual, certain=fall > CERTAIN**2), sensor
+    return LargerFit({}, other.residual, certain=fall > CERTAIN**2), sensor
 
 
-def is_runs_few(found: Solution) -> bool:
+def is_runs_few(found: FittedPoints) -> bool:
     """Whether the residual changes its sign less often than chance explains."""
-    return not _faint(found) and runs(found.residual) < FEW_RUNS
+    return not _faint(found) and sign_runs(found.residual) < FEW_RUNS
 
 
-def _linear(model: Model, found: Solution, names: Sequence[str]) -> Trial:
+def _linear(model: ForceModel, found: FittedPoints, names: Sequence[str]) -> LargerFit:
     """Add parameters to the linearised fit."""
     columns = {OFFSET: np.ones(len(found.time))}
     if DELAY in names:
@@ -233,25 +240,25 @@ def _linear(model: Model, found: Solution, names: Sequence[str]) -> Trial:
     variance = float(rest @ rest) / (len(rest) - len(x))
     errors = np.sqrt(variance * np.sum(root**2, axis=1)) / size
     certain = bool(np.all(np.abs(x[old:]) > CERTAIN * errors[old:]))
-    return Trial(dict(zip(names, x[old:].tolist(), strict=True)), rest, certain)
+    return LargerFit(dict(zip(names, x[old:].tolist(), strict=True)), rest, certain)
 
 
-def _told(trial: Trial, before: Floats, units: dict[str, str]) -> str:
+def _told(trial: LargerFit, before: Floats, units: dict[str, str]) -> str:
     values = [
         f"{name} {value:.3g} {unit_of(OF_RECORD[name], units)}".rstrip()
         for name, value in trial.added.items()
     ]
-    effect = f"with {listed(values)} {_fall(trial, before, units)}"
-    return f"fit {listed(list(trial.added))} too: {effect}; the values given here are biased"
+    effect = f"with {join_names(values)} {_fall(trial, before, units)}"
+    return f"fit {join_names(list(trial.added))} too: {effect}; the values given here are biased"
 
 
-def _fall(trial: Trial, before: Floats, units: dict[str, str]) -> str:
+def _fall(trial: LargerFit, before: Floats, units: dict[str, str]) -> str:
     """How much smaller the residual of a trial is."""
     force = f"{_rms(trial.residual):.3g} {unit_of('force', units)}".rstrip()
     return f"the rms of the residual falls from {_rms(before):.3g} to {force}"
 
 
-def _out_of_contact(model: Model, found: Solution) -> float:
+def _out_of_contact(model: ForceModel, found: FittedPoints) -> float:
     """Median force before the contact, or after it; 0 if it is noise, or there is no such time.
 
     After the contact the force must have no shape, which another model could explain.
@@ -269,7 +276,9 @@ def _out_of_contact(model: Model, found: Solution) -> float:
     deviation = float(np.median(np.abs(force - level))) / 0.6745
     error = 1.2533 * deviation / math.sqrt(len(force))  # of a median
     least = max(CERTAIN * error, SMALL * float(found.force.max()))
-    shaped = quiet is not before and deviation > 0.0 and neighbours(force - level) > COLOURED
+    shaped = (
+        quiet is not before and deviation > 0.0 and neighbour_correlation(force - level) > COLOURED
+    )
     return level if abs(level) > least and not shaped else 0.0
 
 
@@ -277,7 +286,7 @@ def _out_of_contact(model: Model, found: Solution) -> float:
 
 
 def plate_errors(
-    model: Model, found: Solution, runs: Callable[[Deck], Model]
+    model: ForceModel, found: FittedPoints, runs: Callable[[Deck], ForceModel]
 ) -> dict[str, dict[str, float]]:
     """Changes of the fitted values with 1 % more thickness, or E1, of the plate in the deck.
 

@@ -1,4 +1,7 @@
-"""Least squares for the place and the history of a force that is nowhere negative."""
+"""Least squares for the place and the history of a force that is nowhere negative.
+
+What of a fitted force the strains determine, and its contact.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +14,7 @@ import numpy as np
 from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm._typing import Bools, Floats
-from fecm.location.model import StrainModel
-from fecm.location.observation import triangular
+from fecm.location.model import StrainModel, triangular
 
 NEGLIGIBLE = 1e-9  # norm of a hat's strains over the largest, below which it is left out
 PASSES = 40  # of the Gauss-Newton iteration
@@ -24,7 +26,7 @@ MOST_TURN = 1.0  # change of the logarithm of a gain in a pass
 SINGULAR = 1e-12  # least singular value of the scaled Jacobian
 
 
-class Trial(NamedTuple):
+class PlaceTrial(NamedTuple):
     """Force at a place, and its misfit."""
 
     x: float
@@ -63,7 +65,7 @@ class Errors(NamedTuple):
 
 
 @frozen
-class Fit:
+class LocationFit:
     """Least squares of a model, and what is fitted besides place and force."""
 
     model: StrainModel
@@ -71,7 +73,7 @@ class Fit:
     shift: bool = False
     gains: bool = False
 
-    def at(self, x: float, y: float, shift: float = 0.0, gains: Floats | None = None) -> Trial:
+    def at(self, x: float, y: float, shift: float = 0.0, gains: Floats | None = None) -> PlaceTrial:
         """Best force at a place.
 
         Raises PatchError or OutsideError if the force is not on the plate.
@@ -83,9 +85,9 @@ class Fit:
         force = non_negative(basis, seen.values.ravel())
         residual = seen.values - own[:, None] * (design @ force)
         square = float((residual**2).sum() + seen.left.sum())
-        return Trial(x, y, shift, own, force, design, residual, square)
+        return PlaceTrial(x, y, shift, own, force, design, residual, square)
 
-    def halved(self) -> Fit | None:
+    def halved(self) -> LocationFit | None:
         """The fit with hats of half the width; None if strains or responses are too few."""
         parts, odd = divmod(self.model.width // self.model.unit, 2)
         if odd or not parts:
@@ -96,17 +98,17 @@ class Fit:
             return None
         return replace(self, model=half)
 
-    def deviation(self, trial: Trial) -> float:
+    def deviation(self, trial: PlaceTrial) -> float:
         """Standard deviation of the residual."""
         seen = self.model.observation
         parameters = self._others(trial) + int(trial.active.sum())
         return math.sqrt(trial.square / max(1, seen.count - parameters))
 
-    def _others(self, trial: Trial) -> int:
+    def _others(self, trial: PlaceTrial) -> int:
         """Number of fitted parameters besides the force."""
         return 2 + self.shift + self.gains * (len(trial.gains) - 1)
 
-    def jacobian(self, trial: Trial) -> Floats:
+    def jacobian(self, trial: PlaceTrial) -> Floats:
         """Strains per x, y, shift, gains, as far as they are fitted, and active hat.
 
         (values, parameters); the gains change without their product.
@@ -121,7 +123,7 @@ class Fit:
         others = np.stack([column.ravel() for column in columns], axis=1)
         return np.hstack([others, trial.basis[:, trial.active]])
 
-    def _slope(self, trial: Trial, dx: float, dy: float, dt: float) -> Floats:
+    def _slope(self, trial: PlaceTrial, dx: float, dy: float, dt: float) -> Floats:
         """Strains per length or time in one direction, (gages, rows).
 
         Central differences; at an edge of the plate one-sided ones, and 0 between two edges.
@@ -137,7 +139,7 @@ class Fit:
             ends.append(trial.gains[:, None] * (design @ trial.force))
         return np.asarray((ends[0] - ends[1]) / (max(reach, 1.0) * (dx + dy + dt)))
 
-    def refined(self, start: Trial, box: Floats) -> Trial:
+    def refined(self, start: PlaceTrial, box: Floats) -> PlaceTrial:
         """Gauss-Newton iteration from a trial; the place stays in a box, lowest and highest."""
         best = start
         for _ in range(PASSES):
@@ -153,7 +155,7 @@ class Fit:
                 break
         return best
 
-    def _lower(self, best: Trial, change: Floats, box: Floats) -> Trial | None:
+    def _lower(self, best: PlaceTrial, change: Floats, box: Floats) -> PlaceTrial | None:
         """A trial with a smaller misfit along a change; None if there is none."""
         for halving in range(HALVINGS):
             part = 0.5**halving
@@ -174,7 +176,7 @@ class Fit:
                 return found
         return None
 
-    def errors(self, trial: Trial, noise: float, change: Floats | None = None) -> Errors:
+    def errors(self, trial: PlaceTrial, noise: float, change: Floats | None = None) -> Errors:
         """Standard errors by the Cramer-Rao bound, with a standard deviation of the strains.
 
         `change` are the strains by which another model of the plate, with less error, differs,
@@ -233,3 +235,94 @@ def ratios(gages: int) -> Floats:
     """Orthonormal changes of the logarithms of gains that keep their sum, (gages - 1, gages)."""
     rows = np.tri(gages - 1, gages) - np.diag(np.arange(1.0, gages), 1)[: gages - 1]
     return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
+
+
+UNCERTAIN = 5.0  # standard deviation of a force that is not determined, over the usual one
+USUAL = 25.0  # percentile of the standard deviations that is the usual one
+FEWEST = 3  # hats whose impulse shows the end of the contact
+REST = 1.0 / 3.0  # time without an impulse after the contact, over the time of the contact
+CLEAR = 3.0  # standard deviations of a force or an impulse that is not 0
+ONSET = 0.1  # share of the peak that a force passes at its beginning
+DRAWS = 2000  # of the bias of a peak
+
+
+def is_determined(error: Floats) -> Bools:
+    """Whether a force is determined at the peaks of hats, by its standard errors there.
+
+    A force shortly before the end of the record has hardly reached a gage: its standard error is
+    far above those of the others.
+    """
+    return np.asarray(error <= UNCERTAIN * float(np.percentile(error, USUAL)))
+
+
+class Force(NamedTuple):
+    """A fitted force as far as it is determined."""
+
+    determined: Bools  # (hats,)
+    sd: Floats  # (hats,)
+    determined_until: float
+    peak: float
+    peak_sd: float
+    peak_bias: float  # how much the largest of noisy values is too high on average
+    time_of_peak: float
+    end: float | None  # of the contact
+    impulse: float
+    impulse_sd: float
+
+
+def judged_force(time: Floats, force: Floats, errors: Errors, basis: float) -> Force:
+    """Judge a force and its errors at the peaks of hats.
+
+    What is determined, and the end of the contact, follow from the noise; the standard deviations
+    include the change of the force with the strains of another model.
+    """
+    error, covariance, change = errors.force, errors.covariance, errors.force_change
+    sd = np.hypot(error, change)
+    determined = is_determined(error)
+    known = np.where(determined, force, 0.0)
+    both = covariance * np.outer(determined, determined)
+    top = int(known.argmax())
+    last = int(np.flatnonzero(determined)[-1])
+    end = _end(known[: last + 1], both, top)
+    variance = float(both[:end, :end].sum()) + float((change * determined)[:end].sum()) ** 2
+    return Force(
+        determined=determined,
+        sd=sd,
+        determined_until=float(time[last]),
+        peak=float(known[top]),
+        peak_sd=float(sd[top]),
+        peak_bias=_bias(known, both),
+        time_of_peak=float(time[top]),
+        end=None if end is None else float(time[end]),
+        impulse=basis * float(known[:end].sum()),
+        impulse_sd=basis * math.sqrt(max(0.0, variance)),
+    )
+
+
+def _end(force: Floats, covariance: Floats, top: int) -> int | None:
+    """First hat after which the force has no impulse beyond its noise; None if there is none.
+
+    The force may be small for long, and each of its values below its noise.  Their sums show it:
+    that of no number of hats that follow, for a third of the time of the contact, may be beyond
+    its standard error.
+    """
+    first = int(np.argmax(force > ONSET * force[top]))
+    for hat in range(top + 1, len(force)):
+        length = max(FEWEST, math.ceil(REST * (hat - first)))
+        if hat + length > len(force):
+            return None
+        window = slice(hat, hat + length)
+        sums = np.cumsum(force[window])
+        # Variances of the sums of the first 1, 2, ... hats.
+        variances = np.diagonal(covariance[window, window].cumsum(axis=0).cumsum(axis=1))
+        if (sums <= CLEAR * np.sqrt(np.maximum(variances, 0.0))).all():
+            return hat
+    return None
+
+
+def _bias(force: Floats, covariance: Floats) -> float:
+    """Mean difference of the largest of forces with errors from the largest without."""
+    squares, axes = np.linalg.eigh(covariance)
+    root = axes * np.sqrt(np.maximum(squares, 0.0))
+    draws = np.random.default_rng(0).normal(size=(DRAWS, len(force))) @ root.T
+    return max(0.0, float((force + draws).max(axis=1).mean() - force.max()))

@@ -12,18 +12,15 @@ from fecm._errors import FecmError, StudyError, warn
 from fecm._typing import Floats
 from fecm.deck.model import Deck, Gages, Nonlinear
 from fecm.deck.units import unit_names
-from fecm.location.causes import BETTER, Cause, likely_cause
-from fecm.location.finer_mesh import EXTRAPOLATED, finer_strains
-from fecm.location.fit import Fit, Trial
-from fecm.location.force import judged_force
+from fecm.location.fit import LocationFit, PlaceTrial, judged_force
 from fecm.location.location import Location
-from fecm.location.observation import interpolation
-from fecm.location.prepare import Options, Timing, prepared
-from fecm.location.search import Found, Region, best_fits, is_wide, narrowed
+from fecm.location.model import interpolation
+from fecm.location.prepare import EXTRAPOLATED, LocationSettings, Timing, finer_strains, prepared
+from fecm.location.search import Region, SearchResult, best_fits, is_wide, narrowed
 from fecm.location.table import StrainSource, StrainTable, strain_table
-from fecm.location.verdict import is_doubtful, judged
+from fecm.location.verdict import BETTER, Cause, is_doubtful, judged, likely_cause
 from fecm.problem.problem import Problem
-from fecm.sweeps.api import problem_of
+from fecm.sweeps.api import checked_problem
 
 CERTAIN = 2.0  # fall of the misfit by which no other cause is tried
 
@@ -105,14 +102,14 @@ def locate(
     box = None if region is None else tuple(map(float, region))
     if box is not None and len(box) != 4:
         raise StudyError(f"region has {len(box)} numbers; it takes x0, y0, x1, y1")
-    options = Options(box, grid, basis, noise, shift, gains, mass, mesh_error)
-    found = located(problem_of(deck), strains, options)
+    options = LocationSettings(box, grid, basis, noise, shift, gains, mass, mesh_error)
+    found = located(checked_problem(deck), strains, options)
     for text in found.notes:
         warn(text)
     return found
 
 
-def located(problem: Problem, strains: StrainSource, options: Options) -> Location:
+def located(problem: Problem, strains: StrainSource, options: LocationSettings) -> Location:
     """Locate an impact on the plate of a checked deck; see :func:`locate`."""
     options.check()
     deck = problem.deck
@@ -144,13 +141,13 @@ def located(problem: Problem, strains: StrainSource, options: Options) -> Locati
 class Searched(NamedTuple):
     """Fit and best trial of the search, before hats are narrowed."""
 
-    fit: Fit
-    best: Trial
+    fit: LocationFit
+    best: PlaceTrial
     region: Region
 
 
 def _cause(
-    problem: Problem, table: StrainTable, options: Options, searched: Searched
+    problem: Problem, table: StrainTable, options: LocationSettings, searched: Searched
 ) -> Cause | None:
     """What may be wrong with strains that the model does not describe."""
     fit, best, region = searched
@@ -173,9 +170,9 @@ def _cause(
 def _location(
     problem: Problem,
     table: StrainTable,
-    options: Options,
-    fitted: tuple[Fit, Timing],
-    minima: Found,
+    options: LocationSettings,
+    fitted: tuple[LocationFit, Timing],
+    minima: SearchResult,
 ) -> Location:
     """Errors, verdict and notes of a fit."""
     (fit, times), found = fitted, minima.best
@@ -232,7 +229,7 @@ def _location(
 
 
 def _finer_mesh(
-    problem: Problem, table: StrainTable, fitted: tuple[Fit, Timing], found: Trial
+    problem: Problem, table: StrainTable, fitted: tuple[LocationFit, Timing], found: PlaceTrial
 ) -> Floats | None:
     """Error of the strains by the deck's mesh, (gages, rows); None if it is unknown."""
     fit, times = fitted

@@ -1,8 +1,16 @@
-"""The place and the force of an impact, as strain gages show them."""
+"""Errors of the location of an impact.
+
+Writes locations into HDF5 files.
+
+The place and the force of an impact, as strain gages show them.
+
+Reads locations from HDF5 files.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -11,16 +19,93 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._arrays import read_only
-from fecm._errors import OptionsError
-from fecm._typing import Bools, Floats
+from fecm._errors import FecmError, OptionsError
+from fecm._files import ARGUMENT, check_outputs
+from fecm._typing import AnyFile, Array, Bools, Floats
+from fecm._version import __version__
 from fecm.deck.model import Deck
 from fecm.deck.units import unit_names, unit_of
-from fecm.location.writer import DATASETS, save
-from fecm.results.errors import NotStoredError
-from fecm.results.pictures import plot
+from fecm.results import schema
+from fecm.results.groups import NotStoredError, ResultFileError
+from fecm.results.pictures import plot_results
+from fecm.results.schema import Dataset
+from fecm.results.stored import deck_in
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
+
+    from fecm.results.hdf5_reader import FileContents
+
+
+class LocateError(FecmError):
+    """The strains do not determine the place of the impact."""
+
+    exit_code = 1
+
+
+GROUPS = {
+    "locate": "place of the impact",
+    "locate/force": "fitted force at the peaks of its hats",
+    "locate/gages": "gages whose strains were fitted",
+    "locate/strains": "measured and fitted strains",
+}
+# Datasets by the attribute of a location.
+DATASETS = {
+    "place": Dataset("locate/place", ("ndm",), "place of the impact", "length"),
+    "covariance": Dataset("locate/covariance", (2, 2), "covariance of the place", "length^2"),
+    "candidates": Dataset(
+        "locate/candidates", ("candidates", "ndm"), "places that were tried first", "length"
+    ),
+    "candidate_misfit": Dataset(
+        "locate/misfit", ("candidates",), "misfit there over that of the place found"
+    ),
+    "time": Dataset("locate/force/time", ("rows",), "time", "time"),
+    "force": Dataset("locate/force/value", ("rows",), "fitted contact force", "force"),
+    "force_sd": Dataset("locate/force/sd", ("rows",), "its standard deviation", "force"),
+    "determined": Dataset(
+        "locate/force/determined", ("rows",), "1 if the strains determine the force", "", "i1"
+    ),
+    "gages": Dataset("locate/gages/number", ("gages",), "number of every gage", "", "i4"),
+    "gage_places": Dataset("locate/gages/place", ("gages", "ndm"), "its place", "length"),
+    "gains": Dataset("locate/gages/gain", ("gages",), "its gain; 1 if it was not fitted"),
+    "sd_gains": Dataset("locate/gages/gain_sd", ("gages",), "standard deviation of the gain"),
+    "strain_time": Dataset("locate/strains/time", ("rows",), "measured time", "time"),
+    "strains": Dataset("locate/strains/measured", ("rows", "gages"), "measured strain"),
+    "fitted": Dataset("locate/strains/fitted", ("rows", "gages"), "fitted strain"),
+}
+BY_TIME = ("strains", "fitted")  # arrays with the gages first
+
+
+def save_location(
+    path: Path,
+    arrays: Mapping[str, Array],
+    attributes: Mapping[str, Mapping[str, Any]],
+    deck_text: str,
+    *,
+    overwrite: bool,
+) -> None:
+    """Write the arrays of a location, by its attributes, and the attributes of groups.
+
+    Those of the file itself are under ``""``.
+    """
+    from fecm.results.hdf5_writer import result_writing  # h5py takes 60 ms to import
+
+    check_outputs([path], overwrite, allowed_by=ARGUMENT)
+    about = {
+        "format": schema.Form.LOCATION.value,
+        "format_version": schema.FORMAT_VERSION,
+        "fecm_version": __version__,
+    }
+    with result_writing(path, overwrite=overwrite) as sink:
+        sink.attributes("", about | dict(attributes[""]))
+        sink.text("deck", deck_text, "the cards of the deck of the plate")
+        for group, text in GROUPS.items():
+            sink.attributes(group, {"description": text, **attributes.get(group, {})})
+        for name, dataset in DATASETS.items():
+            values = arrays[name].T if name in BY_TIME else arrays[name]
+            sink.create(dataset, values.shape)
+            sink.write(dataset.path, 0, values)
+
 
 # Physical dimensions of the attributes; those of pure numbers are not here.
 DIMENSIONS = {
@@ -252,7 +337,7 @@ class Location:
         ImportError
             If matplotlib is not installed.
         """
-        return plot("location", {"the impact": self}, path, None, overwrite=overwrite)
+        return plot_results("location", {"the impact": self}, path, None, overwrite=overwrite)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write a file as ``fecm locate -o`` does, which :func:`fecm.load_location` reads.
@@ -272,7 +357,7 @@ class Location:
             If it can't be written.
         """
         arrays = {name: getattr(self, name) for name in DATASETS if name != "place"}
-        save(
+        save_location(
             Path(path),
             {**arrays, "place": np.array([self.x, self.y])},
             {
@@ -303,3 +388,84 @@ class Location:
         """Attributes of these names that are not None."""
         values = {name: getattr(self, name) for name in names}
         return {name: value for name, value in values.items() if value is not None}
+
+
+def load_location(path: str | Path | AnyFile) -> Location:
+    """Read a location that ``fecm locate -o`` or :meth:`Location.save` wrote.
+
+    Parameters
+    ----------
+    path : str, Path or file
+        HDF5 file, or one that is open as bytes.
+
+    Raises
+    ------
+    ResultFileError
+        If the file is not a location, or damaged.
+    OSError
+        If it can't be opened.
+    """
+    from fecm.results.hdf5_reader import read  # h5py takes 60 ms to import
+
+    return location_of(read(path, schema.Form.LOCATION))
+
+
+def location_of(contents: FileContents) -> Location:
+    """Create a location from the contents of its file; ResultFileError if it is incomplete."""
+    try:
+        arrays = _arrays(contents)
+        place, force = (contents.groups[name] for name in ("locate", "locate/force"))
+        names = [f"second_{name}" for name in Candidate._fields]
+        second = Candidate(*(_number(place, n) for n in names)) if names[0] in place else None
+        notes = contents.attributes.get("notes", ())
+        made = Location(
+            **{name: values for name, values in arrays.items() if name != "place"},
+            x=float(arrays["place"][0]),
+            y=float(arrays["place"][1]),
+            **{name: _number(force, name) for name in OF_FORCE},
+            **_optional(force, OPTIONAL),
+            **_optional(place, ("mass", "mesh_error")),
+            second=second,
+            **{name: _number(place, name) for name in ("noise", "misfit", "shift", "sd_shift")},
+            noise_given=bool(place["noise_given"]),
+            accepted=bool(place["accepted"]),
+            notes=tuple(map(str, notes)) if isinstance(notes, list) else (),
+            deck=deck_in(contents.texts.get("deck", "")),
+        )
+    except (KeyError, ValueError, TypeError) as error:
+        raise ResultFileError(f"{contents.path}: the location is incomplete ({error})") from None
+    return made
+
+
+def _arrays(contents: FileContents) -> dict[str, Any]:
+    """Arrays by the attribute of a location; KeyError or ValueError if one is missing or wrong."""
+    sizes: dict[object, int] = {"ndm": 2, 2: 2}
+    arrays: dict[str, Any] = {}
+    for name, dataset in DATASETS.items():
+        values: Array = contents[dataset.path]
+        kinds = "iu" if dataset.dtype.startswith("i") else "f"
+        axes = [(dataset.group, axis) if axis == "rows" else axis for axis in dataset.shape]
+        fits = values.ndim == len(axes) and all(
+            sizes.setdefault(axis, size) == size
+            for axis, size in zip(axes, values.shape, strict=False)
+        )
+        if not fits or not values.size or values.dtype.kind not in kinds:
+            raise ValueError(dataset.path)
+        if not np.isfinite(values).all():
+            raise ValueError(f"{dataset.path} is not finite")
+        arrays[name] = values.T if name in BY_TIME else values
+    arrays["determined"] = arrays["determined"] != 0
+    return arrays
+
+
+def _optional(attributes: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:
+    """Finite floats among attributes by name, None for those that are missing."""
+    return {name: _number(attributes, name) if name in attributes else None for name in names}
+
+
+def _number(attributes: Mapping[str, Any], name: str) -> Any:
+    """A finite float among attributes; ValueError if it is none."""
+    value = float(attributes[name])
+    if not math.isfinite(value):
+        raise ValueError(name)
+    return value

@@ -1,27 +1,128 @@
-"""Strains of gages as functions of the place and the history of a force."""
+"""Measured strains as observations of functions that are known at equally spaced samples.
+
+Strains of gages as functions of the place and the history of a force.
+
+Strains of gages per force at every node, by reciprocity.
+
+The strain of a gage is b u, with the row b of its strain-displacement relation.  The plate is
+linear and its mass diagonal, so that u after n steps is P_n(M^-1 K) M^-1 g for an impulse on the
+nodal shares g, with a polynomial P_n: a symmetric matrix.  The strain after an impulse on g is
+therefore the sum of g times the displacement after an impulse on b.  One run a gage gives the
+strains of an impulse anywhere.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
 from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats, Indices
-from fecm.location.observation import Observation, interpolation
 from fecm.mechanics.elements import Quadrature
-from fecm.mechanics.interpolation import local_shape_functions
-from fecm.mechanics.mesh import Mesh, element_blocks
-from fecm.mechanics.points import OutsideError, locate, patch_weights
+from fecm.mechanics.impact import ImpactConditions, ImpactSystem
+from fecm.mechanics.impact_steps import ImpactSteps, can_step
+from fecm.mechanics.interpolation import NDOF, local_shape_functions
+from fecm.mechanics.mesh import MeshArrays, element_blocks
+from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.plate_motion import AppliedForce, PlateMotion
+from fecm.mechanics.points import GageArray, OutsideError, containing_elements, patch_weights
+from fecm.mechanics.projectile import RigidMass
+from fecm.mechanics.symmetry import restrain_resting_dofs
+from fecm.sweeps.responses import NO_FORCE
+
+BLOCK = 128  # rows that are reduced together: small enough for BLAS to use one thread
+ON_SAMPLE = 1e-3  # distance of a time from a sample, over their interval, that is rounding
+MANY = 1.5  # observations per sample from which on they are reduced
+# Samples around a time in cubic interpolation.
+STENCIL = np.array([-1, 0, 1, 2])
+
+
+@frozen
+class Observation:
+    """Measured strains and the functions' values that they observe.
+
+    Many points are replaced by as many rows as there are samples, by an orthogonal transformation:
+    the sum of the squares of a residual is that of the rows plus `left`.
+    """
+
+    values: Floats  # (gages, rows)
+    left: Floats  # (gages,): squares that no function can describe
+    points: int  # measured times
+    step: float  # usual time between two of them
+    interval: float  # between two samples
+    # Samples of the rows, (rows,), or values of the rows per sample, (rows, samples).
+    rows: Indices | Floats
+
+    @property
+    def count(self) -> int:
+        """Number of measured strains."""
+        return len(self.values) * self.points
+
+    def of(self, samples: Floats) -> Floats:
+        """Rows of functions with samples, (..., samples): (..., rows)."""
+        return samples[..., self.rows] if self.rows.ndim == 1 else samples @ self.rows.T
+
+
+def observe(time: Floats, strains: Floats, interval: float, count: int) -> Observation:
+    """Observe functions with `count` samples from time 0 on by strains, (gages, points)."""
+    places, step = time / interval, float(np.median(np.diff(time)))
+    near = np.round(places)
+    if (np.abs(places - near) < ON_SAMPLE).all() and near[0] >= 0.0:
+        rows: Indices | Floats = near.astype(np.intp)
+        return Observation(strains, np.zeros(len(strains)), len(time), step, interval, rows)
+    matrix = interpolation(places, count)
+    left = np.zeros(len(strains))
+    if len(time) > MANY * count:
+        factor = triangular(np.column_stack([matrix, strains.T]))
+        matrix, values = factor[:count, :count], factor[:count, count:].T
+        left = (factor[count:, count:] ** 2).sum(axis=0)
+        return Observation(values, left, len(time), step, interval, matrix)
+    return Observation(strains, left, len(time), step, interval, matrix)
+
+
+def interpolation(places: Floats, count: int) -> Floats:
+    """Cubic interpolation between samples at places, counted in samples, (places, samples).
+
+    The functions are 0 before their first sample.
+    """
+    before = np.floor(places)
+    part = places - before
+    weights = np.stack(
+        [
+            -part * (part - 1.0) * (part - 2.0) / 6.0,
+            (part + 1.0) * (part - 1.0) * (part - 2.0) / 2.0,
+            -(part + 1.0) * part * (part - 2.0) / 2.0,
+            (part + 1.0) * part * (part - 1.0) / 6.0,
+        ]
+    )
+    matrix = np.zeros((len(places), count))
+    for offset, weight in zip(STENCIL, weights, strict=True):
+        at = before.astype(np.intp) + offset
+        inside = np.flatnonzero((at >= 0) & (at < count))
+        matrix[inside, at[inside]] += weight[inside]
+    return matrix
+
+
+def triangular(matrix: Floats) -> Floats:
+    """Triangular factor of a matrix with the same inner products of columns."""
+    factor = np.zeros((0, matrix.shape[1]))
+    step = max(BLOCK, matrix.shape[1])
+    for start in range(0, len(matrix), step):
+        part = np.vstack([factor, matrix[start : start + step]])
+        factor = np.asarray(np.linalg.qr(part, mode="r"))
+    return factor
 
 
 @frozen
 class Footprint:
     """Where a contact force acts: on a circle, or on a point without one."""
 
-    mesh: Mesh
+    mesh: MeshArrays
     shape: str  # ``"DISC"`` or ``"HERT"``; empty for a point
     radius: float  # length; 0 for a point
     held: Bools  # (nodes,): whether w is restrained
@@ -38,14 +139,14 @@ class Footprint:
         return np.asarray(np.where(self.held, 0.0, made))
 
 
-def point_weights(mesh: Mesh, x: float, y: float) -> Floats:
+def point_weights(mesh: MeshArrays, x: float, y: float) -> Floats:
     """Shape functions at a point, (nodes,): shares of the nodes in a unit force on it.
 
     Raises OutsideError if the point is not on the plate.
     """
     point, weights = np.array([[x, y]]), np.zeros(len(mesh.coordinates))
     for family in element_blocks(mesh.elements, mesh.coordinates):
-        members, _, xi = locate(family, point)
+        members, _, xi = containing_elements(family, point)
         if len(members):
             rule = Quadrature(xi[:1, 0], xi[:1, 1], np.ones(1))
             values, _ = local_shape_functions(family.take(members[:1]), rule)
@@ -138,3 +239,84 @@ class StrainModel:
     def strains(self, x: float, y: float, shift: float, force: Floats) -> Floats:
         """Samples of the strains of a force, (gages, samples)."""
         return np.asarray(np.einsum("h,ghs->gs", force, self.every_hat(x, y, shift)))
+
+
+W = 2  # dof of the deflection
+ROWS = 16  # sampled fields of all dofs that are in memory at the same time
+
+
+@frozen
+class Sampling:
+    """Time steps, samples and force of a run."""
+
+    dt: float  # time step
+    every: int  # steps between two samples
+    count: int  # samples, from time 0 on
+    width: int  # samples from the start of the force to its peak, and from there to its end
+
+    @property
+    def interval(self) -> float:
+        """Time between two samples."""
+        return self.every * self.dt
+
+    def hat(self) -> Floats:
+        """Force at the start of every step until it is 0 again: it rises to 1 and falls."""
+        rise = np.arange(self.width * self.every) / (self.width * self.every)
+        return np.concatenate([rise, 1.0 - rise])
+
+
+def moving_plate(plate: PlateModel) -> PlateModel:
+    """The plate under forces across it alone, without the deck's nodal loads."""
+    mesh = replace(plate.mesh, forces=np.zeros_like(plate.mesh.forces))
+    return restrain_resting_dofs(replace(plate, mesh=mesh), None)
+
+
+def rows_of(gages: GageArray, nodes: int) -> Floats:
+    """Strain of every gage per displacement of every dof, (gages, nodes, 5)."""
+    rows = np.zeros((len(gages.numbers), nodes * NDOF))
+    for row, at, weights in zip(rows, gages.dof_indices, gages.weights, strict=False):
+        np.add.at(row, at, weights)
+    return rows.reshape(-1, nodes, NDOF)
+
+
+def deflections(motion: PlateMotion, row: Floats, sampling: Sampling) -> Iterator[Floats]:
+    """Deflection of every node, (rows, nodes), at the samples after time 0, some at a time.
+
+    The nodal forces are the row of a gage, (nodes, 5), times the force of the sampling.
+    """
+    load = motion.load(row)
+    system = ImpactSystem(motion, RigidMass(1.0), NO_FORCE, ImpactConditions(load, 0.0))
+    state, dt = system.start(), sampling.dt
+    force, last = sampling.hat(), (sampling.count - 1) * sampling.every
+    by_kernels = can_step(system)
+    stepped = min(len(force), last) if by_kernels else last
+    for step in range(stepped):
+        applied = AppliedForce(load, float(force[step])) if step < len(force) else None
+        motion.advance(state.plate, dt, 0.0, applied)
+        if not (step + 1) % sampling.every:
+            yield motion.field(state.plate, 0.0)[None, :, W]
+    burst = ImpactSteps(system, None, 0, 1) if by_kernels else None
+    while burst is not None and state.plate.step < last:
+        steps = min(ROWS * sampling.every, last - state.plate.step)
+        stored = np.arange(sampling.every - 1, steps, sampling.every)
+        yield burst.take(state, dt, steps, stored).fields[:, :, W]
+
+
+def responses(
+    motion: PlateMotion,
+    rows: Floats,
+    nodes: Indices,
+    sampling: Sampling,
+    dtype: DTypeLike = np.float32,
+) -> NDArray[np.floating]:
+    """Strains of gages per force at some nodes, (gages, nodes, samples).
+
+    `rows` are those of :func:`rows_of`.  The force is that of the sampling.
+    """
+    found = np.zeros((len(rows), len(nodes), sampling.count), dtype)
+    for row, into in zip(rows, found, strict=True):
+        first = 1
+        for fields in deflections(motion, row, sampling):
+            into[:, first : first + len(fields)] = fields[:, nodes].T
+            first += len(fields)
+    return found

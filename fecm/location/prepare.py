@@ -1,38 +1,137 @@
-"""The model of the strains of a table: samples, hats of the force, responses of the plate."""
+"""Places that gages can't tell apart: images under a symmetry of the plate that gages share.
+
+The model of the strains of a table: samples, hats of the force, responses of the plate.
+
+Strains on a mesh of elements half as long, which show the error of the deck's mesh.
+"""
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._errors import StudyError
+from fecm._dataclasses import frozen
+from fecm._errors import FecmError, StudyError
+from fecm._machine import require_memory
 from fecm._measured_tables import UNITS, plain_unit
-from fecm._memory import require
 from fecm._typing import Floats, Indices
 from fecm.deck import model
 from fecm.deck.macros import flat
 from fecm.deck.model import Deck, Gages
 from fecm.deck.units import unit_names
-from fecm.location.errors import LocateError
-from fecm.location.fit import Fit
-from fecm.location.mirrors import shared_symmetry
-from fecm.location.model import Footprint, StrainModel
-from fecm.location.observation import observe
-from fecm.location.responses import ROWS, Sampling, W, moving_plate, responses, rows_of
+from fecm.location.fit import LocationFit
+from fecm.location.location import LocateError
+from fecm.location.model import (
+    ROWS,
+    Footprint,
+    Sampling,
+    StrainModel,
+    W,
+    moving_plate,
+    observe,
+    responses,
+    rows_of,
+)
 from fecm.location.search import BEFORE, Region
 from fecm.location.table import StrainTable
 from fecm.mechanics.interpolation import NDOF
-from fecm.mechanics.mesh import longest_sides
+from fecm.mechanics.mesh import MeshArrays, longest_sides
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.points import RADIUS_PER_THICKNESS, gages
+from fecm.mechanics.symmetry import images
 from fecm.mechanics.time_step import critical_time_step, taken_time_step
+from fecm.problem.generate import generate
+from fecm.problem.parts import build_plate
 from fecm.problem.problem import Problem
-from fecm.sweeps.api import problem_of
+from fecm.problem.refine import refined_deck
+from fecm.sweeps.api import checked_problem
+from fecm.sweeps.responses import plate_response
+
+SAME = 1e-9  # relative difference of equal stiffnesses and rows
+
+
+@frozen
+class Symmetry:
+    """A symmetry of a plate."""
+
+    name: str  # in messages
+    flip: tuple[float, float]  # factors of x and y from the centre
+
+    @property
+    def is_mirror(self) -> bool:
+        """Whether it reverses angles, and is not the half turn."""
+        return self.flip[0] != self.flip[1]
+
+    @property
+    def signs(self) -> Floats:
+        """Signs of u, v, w, theta_x, theta_y of the image, (5,)."""
+        x, y = self.flip
+        return np.array([x, y, 1.0, x, y])
+
+
+SYMMETRIES = (
+    Symmetry("mirror across the middle of x", (-1.0, 1.0)),
+    Symmetry("mirror across the middle of y", (1.0, -1.0)),
+    Symmetry("half turn about the centre", (-1.0, -1.0)),
+)
+
+
+def shared_symmetry(plate: PlateModel, rows: Floats) -> Symmetry | None:
+    """A symmetry of plate, supports and laminates that leaves every gage's reading; None without.
+
+    `rows` are the strains of the gages per displacement, (gages, nodes, 5).
+    """
+    for one in SYMMETRIES:
+        nodes = images(plate.mesh.coordinates, one.flip)
+        if nodes is None or not _maps(plate, one, nodes):
+            continue
+        turned = one.signs * rows[:, nodes]
+        if np.abs(turned - rows).max() <= SAME * np.abs(rows).max():
+            return one
+    return None
+
+
+def _maps(plate: PlateModel, one: Symmetry, nodes: Indices) -> bool:
+    """Whether a symmetry of the nodes maps elements, supports, laminates and loads too."""
+    mesh = plate.mesh
+    if ((mesh.codes != 0) != (mesh.codes[nodes] != 0)).any():
+        return False
+    if one.is_mirror and not _unturned(plate):
+        return False
+    numbers = np.zeros(len(mesh.elements), int)
+    if plate.laminate_numbers is not None:
+        numbers = plate.laminate_numbers
+    return np.array_equal(_elements(mesh, numbers, None), _elements(mesh, numbers, nodes))
+
+
+def _elements(mesh: MeshArrays, numbers: Indices, nodes: Indices | None) -> Floats:
+    """Sorted nodes and laminate of every element, in one order; with images for its nodes."""
+    own = mesh.elements.astype(np.intp)
+    if nodes is not None:
+        own = np.where(own > 0, nodes[own - 1] + 1, 0)
+    every = np.column_stack([np.sort(own, axis=1), numbers])
+    return np.asarray(every[np.lexsort(every.T[::-1])])
+
+
+def _unturned(plate: PlateModel) -> bool:
+    """Whether laminates, preload and curvature are those of reversed angles."""
+    for laminate in plate.laminates:
+        for matrix in (laminate.A, laminate.B, laminate.D):
+            scale = SAME * np.abs(laminate.A if matrix is laminate.B else matrix).max()
+            if matrix is laminate.B:
+                scale *= laminate.thickness
+            if np.abs(matrix[:2, 2]).max() > scale:
+                return False
+        if abs(laminate.shear[0, 1]) > SAME * np.abs(laminate.shear).max():
+            return False
+    return plate.preload[2] == 0.0 and plate.curvature[2] == 0.0
+
 
 FEWEST_STEPS, MOST_STEPS = 10.0, 1e5  # critical time steps in a record
 MOST_PERIODS = 50.0  # fundamental periods in a record
@@ -46,7 +145,7 @@ LATE = 0.5  # largest first time over the length of the record
 SEARCHED, GIVEN = 4, 2
 
 
-class Options(NamedTuple):
+class LocationSettings(NamedTuple):
     """Options of a location; see :func:`locate`."""
 
     region: tuple[float, float, float, float] | None = None
@@ -77,7 +176,7 @@ class Timing(NamedTuple):
     samples: int
 
 
-def timing(table: StrainTable, options: Options) -> Timing:
+def timing(table: StrainTable, options: LocationSettings) -> Timing:
     """Samples and hats for a table; StudyError if it is too coarse for them."""
     name, time = table.name, table.time
     origin = min(0.0, float(time[0]))
@@ -121,7 +220,9 @@ def _interval(time: Floats, basis: float) -> float:
     return spacing / math.ceil(spacing * SAMPLES / basis)
 
 
-def prepared(problem: Problem, table: StrainTable, options: Options) -> tuple[Fit, Region, Timing]:
+def prepared(
+    problem: Problem, table: StrainTable, options: LocationSettings
+) -> tuple[LocationFit, Region, Timing]:
     """The model of the strains, and the region in which the place is sought."""
     own = timing(table, options)
     footprint = _footprint(problem)
@@ -131,7 +232,7 @@ def prepared(problem: Problem, table: StrainTable, options: Options) -> tuple[Fi
     seen = observe(table.time - own.origin, table.strains, own.interval, own.samples)
     made = StrainModel(footprint, seen, nodes, found, own.unit, own.width, own.length)
     side = float(np.median(longest_sides(problem.mesh.elements, problem.mesh.coordinates)))
-    return Fit(made, side, options.shift, options.gains), region, own
+    return LocationFit(made, side, options.shift, options.gains), region, own
 
 
 def _footprint(problem: Problem) -> Footprint:
@@ -151,7 +252,7 @@ def _shared(
 ) -> tuple[Indices, NDArray[np.floating]]:
     """Nodes of a region and the responses of gages there, which another table may need too."""
     interval, unit, count = samples
-    problem = problem_of(deck)
+    problem = checked_problem(deck)
     mesh, plate = problem.mesh, moving_plate(problem.plate)
     every = {card.number: card for card in deck.require(Gages).records}
     cards = [every[number] for number in numbers]
@@ -168,7 +269,7 @@ def _shared(
     nodes = region.nodes(mesh)
     stored = 4 * len(numbers) * len(nodes) * count
     fields = 2 * 8 * NDOF * ROWS * len(mesh.coordinates)
-    require(stored + fields, f"the responses of {len(numbers)} gages at {len(nodes)} nodes")
+    require_memory(stored + fields, f"the responses of {len(numbers)} gages at {len(nodes)} nodes")
     motion = PlateMotion(plate, damping=problem.damping)
     return nodes, responses(motion, rows, nodes, sampling)
 
@@ -233,3 +334,47 @@ def _refuse_mirrors(
         f"({one[0]:.4g}, {one[1]:.4g}) and one at ({other[0]:.4g}, {other[1]:.4g}) give the same "
         "strains; add a gage off its axis"
     )
+
+
+# Error of the deck's mesh over the difference of both meshes: errors fall with the square of the
+# elements' side.
+EXTRAPOLATED = 4.0 / 3.0
+
+
+def finer_strains(
+    problem: Problem,
+    numbers: list[int],
+    place: tuple[float, float],
+    history: tuple[Floats, Floats],
+    footprint: Footprint,
+    times: Timing,
+) -> Floats | None:
+    """Samples of the strains of gages on a mesh of elements half as long, (gages, samples).
+
+    The force acts at a place on the area of a footprint on the deck's mesh; its history is times
+    from 0 on, and the forces then.  Returns None if an element can't be bisected, or the finer
+    plate can't be run.
+    """
+    try:
+        deck = refined_deck(problem.deck, problem.mesh)
+        mesh = generate(deck)
+        plate = moving_plate(build_plate(deck, mesh))
+        held = np.asarray(mesh.codes[:, W] != 0)
+        weights = replace(footprint, mesh=mesh, held=held).weights(*place)
+        longest = taken_time_step(critical_time_step(plate))
+    except FecmError:
+        return None
+    every = math.ceil(times.interval / longest * (1.0 - 1e-9))
+    dt, count = times.interval / every, (times.samples - 1) * every
+    cards = {record.number: record for record in deck.require(model.Gages).records}
+    read = gages(mesh, [cards[number] for number in numbers], curvature=plate.curvature)
+    motion = PlateMotion(plate, damping=problem.damping)
+    load = np.zeros((len(mesh.coordinates), 5))
+    load[:, W] = weights
+    sums = motion.dof_sums(read.dof_indices, read.weights)
+    _, impulse = plate_response(motion, motion.load(load), dt, count, sums)
+    force = np.interp(dt * np.arange(count), *history, right=0.0)
+    size = 2 * count
+    spectrum = np.fft.rfft(impulse, size) * np.fft.rfft(force, size)
+    strains = np.fft.irfft(spectrum, size)[:, :count]
+    return np.hstack([np.zeros((len(numbers), 1)), strains[:, every - 1 :: every]])

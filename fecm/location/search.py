@@ -11,11 +11,9 @@ import numpy as np
 from fecm._dataclasses import frozen
 from fecm._errors import FecmError, StudyError
 from fecm._typing import Floats, Indices
-from fecm.location.errors import LocateError
-from fecm.location.fit import Fit, Trial
-from fecm.location.force import is_determined
-from fecm.location.location import Candidate
-from fecm.mechanics.mesh import Mesh, longest_sides
+from fecm.location.fit import LocationFit, PlaceTrial, is_determined
+from fecm.location.location import Candidate, LocateError
+from fecm.mechanics.mesh import MeshArrays, longest_sides
 
 CANDIDATES = 126  # by default, about
 MOST_CANDIDATES = 10_000
@@ -37,7 +35,9 @@ class Region:
     corners: tuple[float, float, float, float]
 
     @classmethod
-    def of(cls, mesh: Mesh, radius: float, asked: tuple[float, float, float, float] | None) -> Self:
+    def of(
+        cls, mesh: MeshArrays, radius: float, asked: tuple[float, float, float, float] | None
+    ) -> Self:
         """The rectangle that was asked for, or that in which the circle is on the plate's one."""
         places = mesh.coordinates[mesh.used]
         low, high = places.min(axis=0) + radius, places.max(axis=0) - radius
@@ -81,7 +81,7 @@ class Region:
         )
         return x, y
 
-    def nodes(self, mesh: Mesh) -> Indices:
+    def nodes(self, mesh: MeshArrays) -> Indices:
         """Nodes of the elements that a force in the region may act on, sorted."""
         margin = 1.5 * float(longest_sides(mesh.elements, mesh.coordinates).max())
         margin += max(0.0, float((self.low - mesh.coordinates[mesh.used].min(axis=0)).min()))
@@ -95,10 +95,10 @@ class Region:
         return bool(((place <= self.low + margin) | (place >= self.high - margin)).any())
 
 
-class Found(NamedTuple):
+class SearchResult(NamedTuple):
     """The best fit, another minimum, and the candidates, (k, 2), with their misfits, (k,)."""
 
-    best: Trial
+    best: PlaceTrial
     second: Candidate | None
     candidates: Floats
     misfit: Floats
@@ -122,7 +122,7 @@ class Scan:
         return [(float(self.x[i]), float(self.y[j])) for i, j in places]
 
 
-def best_fits(fit: Fit, region: Region, pitch: float | None) -> Found:
+def best_fits(fit: LocationFit, region: Region, pitch: float | None) -> SearchResult:
     """Find the minima of the misfit.
 
     Raises LocateError if the strains of no candidate are those of a force.
@@ -138,7 +138,7 @@ def best_fits(fit: Fit, region: Region, pitch: float | None) -> Found:
     others = [r for r in refined if math.hypot(r.x - best.x, r.y - best.y) > apart]
     least = max(best.square, np.finfo(float).tiny)
     there = np.isfinite(scan.squares)
-    return Found(
+    return SearchResult(
         best,
         Candidate(others[0].x, others[0].y, math.sqrt(others[0].square / least))
         if others
@@ -148,7 +148,9 @@ def best_fits(fit: Fit, region: Region, pitch: float | None) -> Found:
     )
 
 
-def narrowed(fit: Fit, found: Found, region: Region, noise: float | None) -> tuple[Fit, Found]:
+def narrowed(
+    fit: LocationFit, found: SearchResult, region: Region, noise: float | None
+) -> tuple[LocationFit, SearchResult]:
     """Fit place and force with narrower hats, from the minimum of wider ones.
 
     A force of straight lines is off by the curvature of the true one, which moves the place.  Hats
@@ -166,21 +168,21 @@ def narrowed(fit: Fit, found: Found, region: Region, noise: float | None) -> tup
     return fit, found._replace(best=best)
 
 
-def is_wide(fit: Fit, best: Trial, noise: float | None) -> bool:
+def is_wide(fit: LocationFit, best: PlaceTrial, noise: float | None) -> bool:
     """Whether hats of half the width describe the strains better than by chance."""
     if (half := fit.halved()) is None:
         return False
     return falls(half, best, half.at(best.x, best.y, best.shift, best.gains), noise)
 
 
-def falls(half: Fit, wide: Trial, narrow: Trial, noise: float | None) -> bool:
+def falls(half: LocationFit, wide: PlaceTrial, narrow: PlaceTrial, noise: float | None) -> bool:
     """Whether the misfit falls from wide to narrow hats by more than chance."""
     added = max(1, int(narrow.active.sum()) - int(wide.active.sum()))
     variance = (noise or half.deviation(narrow)) ** 2
     return wide.square - narrow.square > variance * (added + CHANCE * math.sqrt(2.0 * added))
 
 
-def _scanned(fit: Fit, x: Floats, y: Floats, shift: float) -> Scan:
+def _scanned(fit: LocationFit, x: Floats, y: Floats, shift: float) -> Scan:
     """Misfits at the candidates of columns x and rows y."""
     squares, pushed = np.full((len(x), len(y)), math.inf), False
     for i, j in np.ndindex(squares.shape):
@@ -198,7 +200,7 @@ def _scanned(fit: Fit, x: Floats, y: Floats, shift: float) -> Scan:
     return Scan(x, y, shift, squares)
 
 
-def _beginning(fit: Fit, x: Floats, y: Floats, box: Floats) -> float:
+def _beginning(fit: LocationFit, x: Floats, y: Floats, box: Floats) -> float:
     """Time at which the force begins, which may be before time 0.
 
     A force that may act much earlier fits as well as one that begins with its first hat.  The last

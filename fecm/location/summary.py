@@ -12,7 +12,7 @@ DIGITS = 5
 BIASED = 0.1  # bias of a peak over its standard deviation, from which on it is shown
 
 
-def lines(found: Location) -> list[str]:
+def location_lines(found: Location) -> list[str]:
     """Lines about a location, in the deck's units."""
 
     def shown(name: str, value: float) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fecm._dataclasses import frozen
 from fecm._errors import StudyError, warn
-from fecm._measured_tables import Table, factor, read_table, same_name, unit_free, unit_in
+from fecm._measured_tables import MeasuredTable, factor, read_table, same_name, unit_free, unit_in
 from fecm._text import printable
 from fecm._typing import Floats
 
@@ -180,7 +180,7 @@ def _from_file(path: Path, units: Mapping[str, str], numbers: Sequence[int]) -> 
 
 
 def _from_long(
-    table: Table, name: str, units: Mapping[str, str], numbers: Sequence[int]
+    table: MeasuredTable, name: str, units: Mapping[str, str], numbers: Sequence[int]
 ) -> StrainTable:
     """A row for every time and gage, as ``fecm export`` writes them."""
     time, gage, strain = table.columns(("time", "gage", "strain"), units=units).values()

@@ -1,19 +1,297 @@
-"""Whether a location is to be trusted."""
+"""Likely causes of strains that the model does not describe: exchanged gages, signs, gains, zeros.
+
+Every cause is tried at the candidate places and at the place of the strains as they are, with the
+hats of the search, and the likeliest ones at the place that they lead to.  Each gage counts by the
+share of its squares that is left, so that a gage with a wrong factor does not outweigh the others.
+A cause whose effect shows in the sum of the squares of all gages, and not in the noise of the weak
+ones, is named too.  A gain that stands out when the gains of all gages are fitted is tried in any
+case: a gain of 1.3 may hide in the noise, and its fall of the misfit is small.
+
+Whether a location is to be trusted.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import combinations
+from typing import NamedTuple
 
 import numpy as np
 
+from fecm._dataclasses import frozen
+from fecm._errors import FecmError
+from fecm._typing import Floats
 from fecm.deck.units import unit_of
 from fecm.identification.misfit import COLOURED
-from fecm.location.causes import Cause
-from fecm.location.force import CLEAR
+from fecm.location.fit import CLEAR, LocationFit, PlaceTrial
 from fecm.location.location import Location
 from fecm.location.search import Region
+
+BETTER = 1.5  # fall of the misfit by which a cause is named
+SLIGHT = 1.1  # fall by which a gain is named that is far from those of the other gages
+DISTINCT = 1.15  # such a gain over the others, or its inverse
+REFINED = 3  # causes, with the least shares at the candidates, for which a place is searched
+PLACES = 6  # candidates, with the least squares of coefficients of any sign, for forces
+RIDGE = 1e-10  # of the normal equations, over their largest diagonal
+MOST = 12  # gages whose exchanges are tried: those with the largest shares left
+PASSES = 4  # of place and gain, one after the other
+LEAST = 1e-12  # share of the squares that is rounding
+FEWEST = 3  # gages, for one of them to have a gain of its own
+ROUND = (10.0, 100.0, 1e3, 1e6)  # factors of another unit
+NEAR = 0.2  # relative distance from them
+
+
+@frozen
+class Cause:
+    """What may be wrong, and by which factor the misfit is smaller without it."""
+
+    text: str  # with a verb
+    remedy: str
+    ratio: float
+
+    def __str__(self) -> str:
+        return f"{self.text} the strains {self.ratio:.2g} times better; {self.remedy}"
+
+
+class _Hypothesis(NamedTuple):
+    """A hypothesis about the gages of the model."""
+
+    text: str
+    remedy: str
+    columns: tuple[int, ...]  # of the table, by gage
+    signs: tuple[float, ...]
+    gain: int = -1  # gage whose gain is free
+    zero: int = -1  # gage whose zero is free
+
+
+class _Products(NamedTuple):
+    """Inner products at a place."""
+
+    place: tuple[float, float]
+    hats: Floats  # (gages, hats, hats): of the design
+    both: Floats  # (gages, columns, hats): of design and strains
+    ones: Floats  # (gages, hats): of design and a constant
+    level: Floats  # (columns,): of strains and a constant
+    squares: Floats  # (columns,): of the strains
+    norm: float  # square of the constant
+
+    def without_zero(self, gage: int) -> tuple[Floats, Floats, float]:
+        """Those of a gage whose mean is subtracted: design, design and strains, strains."""
+        ones, level = self.ones[gage], self.level[gage]
+        hats = self.hats[gage] - np.outer(ones, ones) / self.norm
+        both = self.both[gage, gage] - ones * level / self.norm
+        return hats, both, float(self.squares[gage] - level**2 / self.norm)
+
+
+class _Shares(NamedTuple):
+    """Shares of the squares of every gage that a force at a place leaves, (gages,)."""
+
+    left: Floats
+    place: tuple[float, float]
+    factor: float  # of the gage whose gain is free: measured over computed strains
+    level: float  # of the gage whose zero is free
+
+
+def likely_cause(
+    fit: LocationFit, best: PlaceTrial, region: Region, pitch: float | None, names: list[int]
+) -> Cause | None:
+    """The cause without which the strains are explained best; None if none of them is clear.
+
+    `best` is the fit of the strains as they are, `names` are the numbers of the gages in messages.
+    """
+    places = [*_products(fit, _candidates(region, pitch, best))]
+    gages = len(names)
+    plain = _Hypothesis("", "", tuple(range(gages)), (1.0,) * gages)
+    worst = sorted(np.argsort(-_least(places, plain).left, kind="stable")[:MOST].tolist())
+    hypotheses = _hypotheses(plain, worst, names)
+    tried = [(hypothesis, _least(places, hypothesis)) for hypothesis in hypotheses]
+    tried.sort(key=lambda pair: float(pair[1].left.sum()))
+    before = _unexplained(fit, best)
+    found: list[Cause] = []
+    likely = tried[:REFINED]
+    if gages >= FEWEST:
+        odd, shares = _odd_gain(fit, best, region)
+        likely = [(h, shares) for h, _ in tried if h.gain == odd]
+        likely += [pair for pair in tried if pair[0].gain != odd][:REFINED]
+    for hypothesis, shares in likely:
+        left, factor, level = _refined(fit, region, hypothesis, shares)
+        text = hypothesis.text
+        if hypothesis.gain >= 0:
+            text = f"gage {names[hypothesis.gain]}, divided by {_rounded(factor)}, explains"
+        if hypothesis.zero >= 0:
+            text = f"gage {names[hypothesis.zero]} less {level:.2g} explains"
+        ratio = float(np.sqrt((before / np.maximum(left, LEAST)).max()))
+        distinct = hypothesis.gain >= 0 and max(factor, 1.0 / factor) > DISTINCT
+        if ratio >= (SLIGHT if distinct else BETTER):
+            found.append(Cause(text, hypothesis.remedy, ratio))
+    return max(found, key=lambda one: one.ratio, default=None)
+
+
+def _odd_gain(fit: LocationFit, best: PlaceTrial, region: Region) -> tuple[int, _Shares]:
+    """The gage whose gain differs most from the other gains, and the start of its search."""
+    free = replace(fit, gains=True)
+    trial = free.refined(best, np.array([region.low, region.high]))
+    apart = np.log(trial.gains) - np.median(np.log(trial.gains))
+    odd = int(np.abs(apart).argmax())
+    place, factor = (trial.x, trial.y), float(np.exp(apart[odd]))
+    return odd, _Shares(np.zeros(len(apart)), place, factor, 0.0)
+
+
+def _unexplained(fit: LocationFit, trial: PlaceTrial) -> Floats:
+    """What a fit leaves: sum of the shares of every gage, and share of the sum of all squares."""
+    seen = fit.model.observation
+    squares = np.maximum((seen.values**2).sum(axis=1) + seen.left, np.finfo(float).tiny)
+    rest = (trial.residual**2).sum(axis=1) + seen.left
+    return np.array([(rest / squares).sum(), rest.sum() / squares.sum()])
+
+
+def _refined(
+    fit: LocationFit, region: Region, hypothesis: _Hypothesis, shares: _Shares
+) -> tuple[Floats, float, float]:
+    """What is left at the place of a hypothesis, as :func:`_unexplained`; factor and level there.
+
+    The gage of the hypothesis alone has another factor: with free gains of all gages, every one of
+    them would explain the strains as well as the right one.
+    """
+    seen, factor, level = fit.model.observation, shares.factor, shares.level
+    columns, signs = list(hypothesis.columns), np.array(hypothesis.signs)[:, None]
+    one = seen.of(np.ones(fit.model.responses.shape[2]))
+    box = np.array([region.low, region.high])
+    place, shift, gains = shares.place, 0.0, None
+    passes = PASSES if hypothesis.gain >= 0 else 1
+    while True:
+        values, left = signs * seen.values[columns], seen.left[columns]
+        if hypothesis.gain >= 0:
+            values[hypothesis.gain] /= factor
+            left[hypothesis.gain] /= factor**2
+        if hypothesis.zero >= 0:
+            values[hypothesis.zero] -= level * one
+        corrected = replace(seen, values=values, left=left)
+        own = replace(fit, model=replace(fit.model, observation=corrected))
+        trial = own.refined(own.at(*place, shift, gains), box)
+        place, shift, gains = (trial.x, trial.y), trial.shift, trial.gains
+        passes -= 1
+        if not passes:
+            break
+        given = values[hypothesis.gain]
+        computed = given - trial.residual[hypothesis.gain]
+        factor *= max(float(given @ computed), LEAST) / max(float(computed @ computed), LEAST)
+    if hypothesis.zero >= 0:
+        level += float(trial.residual[hypothesis.zero] @ one) / float(one @ one)
+        values[hypothesis.zero] = seen.values[hypothesis.zero] - level * one
+        trial = own.at(trial.x, trial.y, trial.shift, trial.gains)
+    return _unexplained(own, trial), factor, level
+
+
+def _hypotheses(plain: _Hypothesis, worst: list[int], names: list[int]) -> Iterator[_Hypothesis]:
+    """Every hypothesis: signs, exchanges, gains and zeros."""
+    gages = len(names)
+    opposite = tuple(-sign for sign in plain.signs)
+    check = "check the signs of the gages"
+    yield plain._replace(text="the other sign of all gages explains", remedy=check, signs=opposite)
+    for gage, name in enumerate(names):
+        signs = tuple(-1.0 if n == gage else 1.0 for n in range(gages))
+        text = f"gage {name} with the other sign explains"
+        yield plain._replace(text=text, remedy="check its sign and direction", signs=signs)
+        yield plain._replace(remedy="subtract its reading at rest", zero=gage)
+        if gages >= FEWEST:
+            remedy = "compare its unit and its gain with those of the other gages"
+            yield plain._replace(remedy=remedy, gain=gage)
+    for one, other in combinations(worst, 2):
+        columns = list(plain.columns)
+        columns[one], columns[other] = other, one
+        text = f"gages {names[one]} and {names[other]} exchanged explain"
+        remedy = "compare the order of the columns with that of the gages"
+        yield plain._replace(text=text, remedy=remedy, columns=tuple(columns))
+
+
+def _candidates(region: Region, pitch: float | None, best: PlaceTrial) -> list[tuple[float, float]]:
+    """Candidates of the search, after the place of the strains as they are.
+
+    A gain, a zero or a sign of one of several gages hardly moves the place, and the candidates are
+    too far from it to tell which gage has it.
+    """
+    x, y = region.grid(pitch)
+    return [(best.x, best.y), *((u, v) for u in x.tolist() for v in y.tolist())]
+
+
+def _products(fit: LocationFit, candidates: list[tuple[float, float]]) -> Iterator[_Products]:
+    """Inner products at the candidates."""
+    seen = fit.model.observation
+    values = seen.values
+    one = seen.of(np.ones(fit.model.responses.shape[2]))
+    squares = np.maximum((values**2).sum(axis=1) + seen.left, np.finfo(float).tiny)
+    level = values @ one
+    for place in candidates:
+        try:
+            design = fit.model.design(*place)
+        except FecmError:  # a hole or a notch
+            continue
+        turned = np.ascontiguousarray(design.swapaxes(1, 2))  # (gages, hats, rows)
+        both = (turned @ values.T).swapaxes(1, 2)
+        yield _Products(
+            place, turned @ design, both, turned @ one, level, squares, float(one @ one)
+        )
+
+
+def _normal(at: _Products, hypothesis: _Hypothesis) -> tuple[Floats, Floats]:
+    """Normal equations of the force, weighted by the squares of every gage's strains."""
+    matrix, vector = np.zeros(at.hats.shape[1:]), np.zeros(at.hats.shape[1])
+    for gage, (column, sign) in enumerate(zip(hypothesis.columns, hypothesis.signs, strict=True)):
+        if gage == hypothesis.gain:
+            continue
+        hats, both, square = at.hats[gage], at.both[gage, column], float(at.squares[column])
+        if gage == hypothesis.zero:
+            hats, both, square = at.without_zero(gage)
+        matrix += hats / square
+        vector += sign / square * both
+    matrix[np.diag_indices(len(matrix))] += RIDGE * float(np.diagonal(matrix).max()) + LEAST
+    return matrix, vector
+
+
+def _least(places: list[_Products], hypothesis: _Hypothesis) -> _Shares:
+    """Shares that are left at the best of the candidates."""
+    from scipy.optimize import nnls  # takes 0.2 s to import
+
+    normals = [_normal(at, hypothesis) for at in places]
+    factors = np.linalg.cholesky(np.array([matrix for matrix, _ in normals]))
+    vectors = np.array([vector for _, vector in normals])
+    roots = np.linalg.solve(factors, vectors[:, :, None])[:, :, 0]
+    described = (roots**2).sum(axis=1)  # squares, by coefficients of any sign
+    found = []
+    for place in np.argsort(-described, kind="stable")[:PLACES].tolist():
+        force = nnls(factors[place].T, roots[place], maxiter=30 * len(roots[place]))[0]
+        found.append(_shares(places[place], hypothesis, force))
+    return min(found, key=lambda shares: float(shares.left.sum()))
+
+
+def _shares(at: _Products, hypothesis: _Hypothesis, force: Floats) -> _Shares:
+    """Shares of the squares that a force leaves."""
+    left, factor, level = np.ones(len(hypothesis.columns)), 1.0, 0.0
+    for gage, (column, sign) in enumerate(zip(hypothesis.columns, hypothesis.signs, strict=True)):
+        hats, both, square = at.hats[gage], at.both[gage, column], float(at.squares[column])
+        if gage == hypothesis.zero:
+            level = float(at.level[gage] - at.ones[gage] @ force) / at.norm
+            hats, both, square = at.without_zero(gage)
+        computed, product = float(force @ hats @ force), sign * float(both @ force)
+        if gage == hypothesis.gain:
+            if product > 0.0 and computed > 0.0:
+                factor = product / computed
+                left[gage] = 1.0 - product**2 / (computed * square)
+        else:
+            left[gage] = (computed - 2.0 * product + square) / square
+    return _Shares(np.maximum(left, 0.0), at.place, factor, level)
+
+
+def _rounded(factor: float) -> str:
+    """A factor, or the factor of a unit that it is near to."""
+    for size in (*ROUND, *(1.0 / one for one in ROUND)):
+        if abs(factor / size - 1.0) < NEAR:
+            return f"{size:g}"
+    return f"{factor:.3g}"
+
 
 RIVAL = 1.1  # misfit ratio of a place that can hardly be told from the first
 NOT_DESCRIBED = 1.5  # misfit over the noise
@@ -26,7 +304,7 @@ VAGUE = 0.25  # standard deviation of a place over the side of the region
 
 def is_doubtful(found: Location) -> bool:
     """Whether the model does not describe the strains down to their noise."""
-    bad = found.misfit > NOT_DESCRIBED or neighbours(found) > COLOURED
+    bad = found.misfit > NOT_DESCRIBED or residual_correlation(found) > COLOURED
     return bad or found.misfit > likely_misfit(found) or bool(undescribed_gages(found))
 
 
@@ -59,7 +337,7 @@ def judged(found: Location, region: Region, wide: bool, cause: Cause | None) -> 
 
 def _serious(found: Location, region: Region) -> Iterator[str]:
     """Reasons not to accept a location."""
-    near = neighbours(found)
+    near = residual_correlation(found)
     compare = "compare supports, laminate, patch, mesh and gages with those of the test"
     share = float(((found.strains - found.fitted) ** 2).sum() / (found.strains**2).sum())
     if found.misfit > NOT_DESCRIBED:
@@ -113,7 +391,7 @@ def _remarks(found: Location, wide: bool) -> Iterator[str]:
             f"a force every {half} describes the strains better: its error is not in the standard "
             "deviations; take a smaller basis"
         )
-    near = neighbours(found)
+    near = residual_correlation(found)
     if likely_misfit(found) < found.misfit <= NOT_DESCRIBED:
         yield (
             f"the residual is {found.misfit:.3g} times the noise, which chance does not explain: "
@@ -137,7 +415,7 @@ def _remarks(found: Location, wide: bool) -> Iterator[str]:
         yield f"the force has not ended at {until}: the impulse is at least that until then"
 
 
-def neighbours(found: Location) -> float:
+def residual_correlation(found: Location) -> float:
     """Correlation of residuals that follow each other."""
     rest = found.strains - found.fitted
     size = float((rest**2).sum())

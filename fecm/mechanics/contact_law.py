@@ -100,7 +100,7 @@ class ContactParameters(ABC, Generic[Number]):
 
     def of_cases(self: ContactParameters[Floats], cases: Indices) -> ContactParameters[Floats]:
         """Select some cases."""
-        return stacked([self], lambda values: values[0][cases])
+        return stack_parameters([self], lambda values: values[0][cases])
 
     @overload
     def loading(self, indentation: Number) -> Number: ...
@@ -184,7 +184,7 @@ def power_curve(
     return f * ((a - b) / w) ** p if a > b else 0.0
 
 
-def stacked(
+def stack_parameters(
     records: Sequence[Any], function: Callable[[list[Any]], Any] = np.array
 ) -> ContactParameters[Floats]:
     """Parameters of many cases, all of one class, as arrays: a function of the values of each."""

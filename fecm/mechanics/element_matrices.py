@@ -12,8 +12,7 @@ import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm._typing import Floats
-from fecm.mechanics import assumed_shear
-from fecm.mechanics.curvature import FLAT, Curvature, strain_of_deflection
+from fecm.mechanics import strains
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import (
     NDOF,
@@ -22,8 +21,9 @@ from fecm.mechanics.interpolation import (
     jacobian_determinants,
     local_shape_functions,
 )
-from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.laminate import LaminateSection
 from fecm.mechanics.mesh import ElementBlock
+from fecm.mechanics.strains import FLAT, Curvature, strain_of_deflection
 
 
 @frozen
@@ -35,7 +35,7 @@ class IntegrationRules:
     shear: Quadrature
     strains: Quadrature  # points of the stored strains
     transposed_jacobian: bool = False  # transpose the inverse Jacobian (the slip ``jacobian``)
-    # Take the transverse shear strains of :mod:`~fecm.mechanics.assumed_shear`.
+    # Take the transverse shear strains of :mod:`~fecm.mechanics.strains`.
     assumes_shear: bool = False
 
 
@@ -74,12 +74,12 @@ def transverse_shear(
     """B matrix of transverse shear strains, (ne, npt, 2, 5 nn), and its points' areas, (ne, npt).
 
     `at` is the interpolation at the points of bending, which are often those of shear too.
-    :mod:`~fecm.mechanics.assumed_shear` has its own points.
+    :mod:`~fecm.mechanics.strains` has its own points.
     """
     if rules.assumes_shear:
-        rule = assumed_shear.quadrature(family)
+        rule = strains.quadrature(family)
         jxw = jacobian_determinants(family, rule) * rule.weights
-        return assumed_shear.strain_matrix(family, rule), jxw
+        return strains.strain_matrix(family, rule), jxw
     if rules.shear is not rules.bending:
         at = interpolate(family, rules.shear, transposed_jacobian=rules.transposed_jacobian)
     return _transverse_shear(at), at.jxw
@@ -96,7 +96,7 @@ def _integrate(B: Floats, C: Floats, jxw: Floats) -> Floats:
 
 def stiffness(
     family: ElementBlock,
-    laminate: Laminate,
+    laminate: LaminateSection,
     rules: IntegrationRules,
     curvature: Curvature = FLAT,
 ) -> Floats:
@@ -137,7 +137,7 @@ def lumped_shares(values: Floats, areas: Floats) -> Floats:
 
 def lumped_mass(
     family: ElementBlock,
-    laminate: Laminate,
+    laminate: LaminateSection,
     rule: Quadrature,
     determinants: Floats | None = None,
 ) -> Floats:
@@ -156,7 +156,7 @@ def lumped_mass(
     return np.asarray(share[:, :, None] * inertia)
 
 
-def consistent_mass(family: ElementBlock, laminate: Laminate, rule: Quadrature) -> Floats:
+def consistent_mass(family: ElementBlock, laminate: LaminateSection, rule: Quadrature) -> Floats:
     """Consistent element mass matrices, M_p of equation 4-14 (the listing's MASS01).
 
     The integral of N_i N_j times the mass per area rho h for u, v and w, and times the rotary

@@ -24,17 +24,17 @@ from fecm.mechanics import failure
 from fecm.mechanics.exposures import (
     NOWHERE,
     TIE,
+    CircleStresses,
     Evaluations,
     FailureEnvelope,
     Largest,
     Maxima,
-    Places,
+    PlyPoints,
     first_of_largest,
 )
+from fecm.mechanics.failure import OwnCriterion, with_own
 from fecm.mechanics.laminate import PlyConstants, is_fabric
-from fecm.mechanics.load_circle import CircleStresses
-from fecm.mechanics.own_criterion import OwnCriterion, with_own
-from fecm.mechanics.ply_stresses import PlyStresses, Zone
+from fecm.mechanics.ply_stresses import ElementZone, PlyStresses
 from fecm.mechanics.strains import Rows
 
 # Points per matrix product: so few that BLAS uses one thread.
@@ -122,7 +122,7 @@ class ZoneCriteria:
 
     def __init__(
         self,
-        zone: Zone,
+        zone: ElementZone,
         points: Rows,
         strengths: Sequence[failure.Strengths | None],
         initial: Floats | None,
@@ -356,7 +356,7 @@ class FailureMonitor:
             on_circle.mode[-1] = envelope.interfaces.mode.flat[number]
         return on_circle
 
-    def circle_columns(self, envelope: FailureEnvelope, places: Places) -> dict[str, Array]:
+    def circle_columns(self, envelope: FailureEnvelope, places: PlyPoints) -> dict[str, Array]:
         """Largest exposures on the circle, (criteria,) each; empty without a circle.
 
         With their times, and the number of points of the circle that have them.
@@ -449,7 +449,7 @@ class FailureMonitor:
         mode = failure.MODES.index("interlaminar shear")
         interfaces.mode[place] = np.where(higher, mode, interfaces.mode[place])
 
-    def located(self, found: Evaluations, places: Places) -> dict[str, Array]:
+    def located(self, found: Evaluations, places: PlyPoints) -> dict[str, Array]:
         """Columns of evaluations with the plies and places of the largest exposures.
 
         The ply of an interface is the one above it, its place the centre of its element, or the
@@ -515,7 +515,7 @@ class FailureMonitor:
             added -= zone.at_rest[:, number] - zone.residual[:, number]
             if strengths is not None:
                 at_rest = zone.at_rest[:, number]
-                factors[name] = failure.load_factor(strengths, criterion, at_rest, added)
+                factors[name] = failure.failure_load_factor(strengths, criterion, at_rest, added)
         return factors
 
     def _state(self, state: int) -> tuple[ZoneCriteria, int]:
@@ -567,4 +567,4 @@ class FailureMonitor:
                 point, state = np.nonzero(larger)
                 at = (number, block[point], run.states.start + state)
                 exposures[at], times[at] = exposure[larger], time
-                modes[at] = failure.modes_of(candidates, np.flatnonzero(larger), self.modes)
+                modes[at] = failure.largest_modes(candidates, np.flatnonzero(larger), self.modes)

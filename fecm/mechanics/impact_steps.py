@@ -29,7 +29,7 @@ from fecm.mechanics.impact import ImpactState, ImpactSystem
 from fecm.mechanics.kernels import LIBRARY, Doubles, Longs, Structure
 from fecm.mechanics.kernels.plate import CompiledProduct
 from fecm.mechanics.plate_motion import DivergenceError, DofSums, PlateState, PointLoad, Sums
-from fecm.mechanics.rod_modes import Modes
+from fecm.mechanics.rod_modes import ProjectileModes
 
 # Records of a step, in the order of structures.h.
 COLUMNS = (
@@ -90,7 +90,7 @@ class KernelLaw(NamedTuple, Generic[Number]):
     slope: float | Number  # s_p of equation 3-8
 
 
-class Law(Structure):
+class LawStruct(Structure):
     """Constants of the contact law."""
 
     _fields_ = (
@@ -102,7 +102,7 @@ class Law(Structure):
     )
 
 
-class History(Structure):
+class HistoryStruct(Structure):
     """:class:`~fecm.mechanics.contact_law.LoadingHistory`, by the same names."""
 
     _fields_ = tuple((name, c_double) for name in LoadingHistory._fields)
@@ -114,7 +114,7 @@ class Point(Structure):
     _fields_ = tuple((name, c_double) for name in ContactPoint._fields)
 
 
-class Rod(Structure):
+class RodStruct(Structure):
     """Projectile, and its step as in :class:`~fecm.mechanics.projectile.RodIntegrator`.
 
     The arrays:
@@ -147,7 +147,7 @@ class Rod(Structure):
     )
 
 
-class Impact(Structure):
+class ImpactStruct(Structure):
     """Contact, projectile, load, gages, and records of the steps.
 
     The arrays, with those that the kernel writes last:
@@ -167,15 +167,15 @@ class Impact(Structure):
     """
 
     _fields_ = (
-        ("law", Law),
+        ("law", LawStruct),
         # State before the steps, and after them.
-        ("memory", History),
+        ("memory", HistoryStruct),
         ("contact", Point),
         ("plate_w", c_double),  # the plate's displacement in the contact law
         ("work", c_double),  # of the contact force on the indentation
         ("time", c_double),
         ("unconverged", c_int64),  # steps whose contact iteration did not converge
-        ("rod", Rod),
+        ("rod", RodStruct),
         ("dt2", c_double),  # square of the plate's time step
         ("loaded", c_int64),
         ("entry", Longs),
@@ -228,7 +228,7 @@ class Burst:
     fields: Floats  # (rows, numnp, 5): displacement fields of the stored steps
 
 
-def supports(system: ImpactSystem) -> bool:
+def can_step(system: ImpactSystem) -> bool:
     """Whether the kernels can take the steps of a system."""
     motion, contact, law = system.motion, system.contact, system.law
     return (
@@ -254,7 +254,7 @@ class ImpactSteps:
         self._system, self._threads = system, threads
         self._product = product = cast(CompiledProduct, system.motion.product)
         self._plate = product.plate
-        self._modes = Modes.of(system.rod_stiffness, system.rod_mass, system.rod.rigid)
+        self._modes = ProjectileModes.of(system.rod_stiffness, system.rod_mass, system.rod.rigid)
         self._tip_shape = np.ascontiguousarray(self._modes.shapes[0])
         self._station = self._modes.shapes[station].copy()
         self._station[0] = 0.0
@@ -306,13 +306,15 @@ class ImpactSteps:
         columns["plate_strain"] = 0.5 * (columns["strain"] - columns["quadratic"])
         return Burst(columns, written.strains, self._product.fields(written.fields))
 
-    def _impact(self, state: ImpactState, dt: float, stored: Indices, written: Written) -> Impact:
+    def _impact(
+        self, state: ImpactState, dt: float, stored: Indices, written: Written
+    ) -> ImpactStruct:
         """What the kernel needs besides the plate, and where it writes."""
         law = self._system.law
         assert isinstance(law, HystereticLaw)  # as `supports` has found
         integrator = self._system.rod_step(dt)
         T, h = self._modes.step(integrator)
-        rod = Rod(
+        rod = RodStruct(
             dt=integrator.dt,
             theta=integrator.theta,
             weight_before=integrator.weights[0],
@@ -328,9 +330,11 @@ class ImpactSteps:
             tip=state.rod.tip,
         )
         gages, gage_dofs = self._gage_entry.shape
-        return Impact(
-            law=Law(k=law.constants.k, q=law.constants.q, **kernel_law(law.constants)._asdict()),
-            memory=History(**state.memory._asdict()),
+        return ImpactStruct(
+            law=LawStruct(
+                k=law.constants.k, q=law.constants.q, **kernel_law(law.constants)._asdict()
+            ),
+            memory=HistoryStruct(**state.memory._asdict()),
             contact=Point(**state.contact._asdict()),
             plate_w=state.plate_w,
             work=state.contact_work,
@@ -363,7 +367,7 @@ class ImpactSteps:
         plate.set_scale(state.dt2)
         plate.structure.damping = 0.5 * self._system.motion.damping * dt
 
-    def _leave(self, state: ImpactState, impact: Impact) -> None:
+    def _leave(self, state: ImpactState, impact: ImpactStruct) -> None:
         """Copy the contact and the vectors of the kernels into a state."""
         memory = impact.memory
         state.memory = LoadingHistory(

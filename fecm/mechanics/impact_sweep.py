@@ -14,7 +14,7 @@ from fecm._typing import Floats
 from fecm.mechanics.impact_steps import LawKind
 from fecm.mechanics.kernels import LIBRARY, Doubles, Structure, floats
 from fecm.mechanics.projectile import RodIntegrator
-from fecm.mechanics.rod_modes import Modes
+from fecm.mechanics.rod_modes import ProjectileModes
 
 
 class Given(IntEnum):
@@ -28,7 +28,7 @@ class Given(IntEnum):
     FACTOR = 5  # mass and stiffness over those of the projectile
 
 
-class Found(IntEnum):
+class ResultRow(IntEnum):
     """Rows of what is found of each case."""
 
     DEEPEST = 0  # largest indentation
@@ -83,8 +83,8 @@ class Sweep(Structure):
     )
 
 
-def sweep(
-    modes: Modes,
+def sweep_impacts(
+    modes: ProjectileModes,
     step: RodIntegrator,
     law: LawKind,
     response: Floats,

@@ -26,7 +26,7 @@ PAIRS = 1_000_000  # compared at a time
 
 
 @frozen
-class Sides:
+class ElementSides:
     """Sides of elements, each once for every element that has it.
 
     Attributes
@@ -43,9 +43,9 @@ class Sides:
     between: AnyInts
     elements: Indices
 
-    def take(self, members: Bools) -> Sides:
+    def take(self, members: Bools) -> ElementSides:
         """Select some sides."""
-        return Sides(self.ends[members], self.between[members], self.elements[members])
+        return ElementSides(self.ends[members], self.between[members], self.elements[members])
 
     @property
     def nodes(self) -> AnyInts:
@@ -53,17 +53,17 @@ class Sides:
         return np.hstack([self.ends, self.between])
 
 
-def sides_of_cells(cells: Indices, corners: int) -> Sides:
+def sides_of_cells(cells: Indices, corners: int) -> ElementSides:
     """Sides of cells, (m, k), of rows of corners and perhaps of the middles of their sides."""
     ends = np.stack([cells[:, :corners], np.roll(cells[:, :corners], -1, axis=1)], axis=2)
     between = cells[:, corners : 2 * corners]
     if not between.shape[1]:
         between = np.full((len(cells), corners), -1)
     elements = np.repeat(np.arange(len(cells)), corners)
-    return Sides(ends.reshape(-1, 2), between.reshape(-1, 1), elements)
+    return ElementSides(ends.reshape(-1, 2), between.reshape(-1, 1), elements)
 
 
-def sides_of(blocks: Sequence[ElementBlock], elements: Ints) -> Sides:
+def sides_of(blocks: Sequence[ElementBlock], elements: Ints) -> ElementSides:
     """Sides of the elements of a deck, (numel, nen), whose node numbers count from 1."""
     ends, between, rows = [], [], []
     for block in blocks:
@@ -76,7 +76,7 @@ def sides_of(blocks: Sequence[ElementBlock], elements: Ints) -> Sides:
             ends.append(nodes[:, [side, (side + 1) % corners]])
             between.append(np.column_stack([*inner, *[0 * nodes[:, 0]] * (2 - len(inner))]))
             rows.append(block.rows)
-    return Sides(np.concatenate(ends) - 1, np.concatenate(between) - 1, np.concatenate(rows))
+    return ElementSides(np.concatenate(ends) - 1, np.concatenate(between) - 1, np.concatenate(rows))
 
 
 def representatives(count: int, pairs: Indices) -> Indices:
@@ -87,23 +87,23 @@ def representatives(count: int, pairs: Indices) -> Indices:
     return kept
 
 
-def merged(sides: Sides, pairs: Indices) -> Sides:
+def merged(sides: ElementSides, pairs: Indices) -> ElementSides:
     """Sides with one node for those in the same place."""
     if not len(pairs):
         return sides
     kept = representatives(int(sides.nodes.max()) + 1, pairs)
     kept = np.append(kept, -1)  # of nodes that are absent
-    return Sides(kept[sides.ends], kept[sides.between], sides.elements)
+    return ElementSides(kept[sides.ends], kept[sides.between], sides.elements)
 
 
-def _shortest(sides: Sides, places: Floats) -> float:
+def _shortest(sides: ElementSides, places: Floats) -> float:
     """Length of the shortest side that has one."""
     x, y = (places[sides.ends[:, 1]] - places[sides.ends[:, 0]]).T
     lengths = np.hypot(x, y)
     return float(lengths[lengths > 0.0].min(initial=np.inf))
 
 
-def coincident(places: Floats, sides: Sides) -> Indices:
+def coincident(places: Floats, sides: ElementSides) -> Indices:
     """Pairs of rows of nodes that are no distance apart beside the shortest side, (m, 2)."""
     distance = SAME * _shortest(sides, places)
     along = places @ SLANT
@@ -121,7 +121,7 @@ def coincident(places: Floats, sides: Sides) -> Indices:
     return np.concatenate(found)
 
 
-def hanging_nodes(sides: Sides, places: Floats) -> tuple[Indices, Indices]:
+def hanging_nodes(sides: ElementSides, places: Floats) -> tuple[Indices, Indices]:
     """Nodes inside a side of an element that lacks them.
 
     Returns rows of nodes and of these elements, one of each for every side.
@@ -143,7 +143,7 @@ def hanging_nodes(sides: Sides, places: Floats) -> tuple[Indices, Indices]:
     return np.concatenate(found_nodes), np.concatenate(found_elements)
 
 
-def _is_unmatched(sides: Sides, count: int) -> Bools:
+def _is_unmatched(sides: ElementSides, count: int) -> Bools:
     """Which sides no other element has with the same nodes."""
     ends, between = np.sort(sides.ends, axis=1), np.sort(sides.between, axis=1) + 1
     keys = ends[:, 0].astype(np.int64) * count + ends[:, 1]
@@ -156,7 +156,7 @@ def _is_unmatched(sides: Sides, count: int) -> Bools:
     return unmatched
 
 
-def _is_inside(rim: Sides, side: Indices, node: Indices, places: Floats) -> Bools:
+def _is_inside(rim: ElementSides, side: Indices, node: Indices, places: Floats) -> Bools:
     """Whether nodes lie inside sides that do not have them; a mid-side node may curve a side."""
     start, end = places[rim.ends[side, 0]], places[rim.ends[side, 1]]
     place, chord = places[node], end - start

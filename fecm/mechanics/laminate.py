@@ -54,7 +54,7 @@ def are_cores(plies: Sequence[PlyConstants]) -> list[bool]:
 
 
 @frozen
-class Plies:
+class PlyStack:
     """Plies of a laminate, from z = -h/2 on."""
 
     angles: Floats  # (n,): fibre angles in degrees
@@ -81,7 +81,7 @@ class EngineeringConstants(NamedTuple):
 
 
 @frozen
-class Laminate:
+class LaminateSection:
     """Stiffness and inertia of a laminate, per area."""
 
     # (3, 3): extensional, coupling and bending stiffness (equation 2-18): force/length, force,
@@ -97,7 +97,7 @@ class Laminate:
     # Integral of density times z, mass/length: it couples u and theta_x, and is left out.
     coupling_inertia: float
     thickness: float  # total thickness
-    plies: Plies
+    plies: PlyStack
 
     @property
     def unlike_interfaces(self) -> int:
@@ -137,7 +137,7 @@ class Laminate:
         stiffness = self.D - self.B @ np.linalg.solve(self.A, self.B)
         return _constants(stiffness * 12.0 / self.thickness**3)
 
-    def without_small_entries(self) -> Laminate:
+    def without_small_entries(self) -> LaminateSection:
         """Set entries of A, B, D below 1e-6, but not rounding errors, to 0: the listing's CNPD."""
         scale = ROUNDING * np.abs(self.A).max()
 
@@ -193,7 +193,7 @@ def laminate(
     angles: Sequence[float],
     thicknesses: Sequence[float],
     total: float | None = None,
-) -> Laminate:
+) -> LaminateSection:
     """Stack plies, equations 2-18, 2-19 and 2-24.
 
     Parameters
@@ -216,7 +216,7 @@ def laminate(
     shears = np.array([transformed_shear(p.g13, p.g23, angle) for p, angle in layers])
     h = np.float64(faces[-1] - faces[0] if total is None else total)
     mean, second, first = _mean_densities(plies, faces)
-    return Laminate(
+    return LaminateSection(
         A=(bars * (upper - lower)).sum(axis=0),
         B=(bars * (upper**2 - lower**2)).sum(axis=0) / 2.0,
         D=(bars * (upper**3 - lower**3)).sum(axis=0) / 3.0,
@@ -226,7 +226,7 @@ def laminate(
         rotary_inertia=float(second * h**3 / 12.0),
         coupling_inertia=float(first * h**2),
         thickness=float(h),
-        plies=Plies(np.array(angles, dtype=float), faces, bars, shears, plies),
+        plies=PlyStack(np.array(angles, dtype=float), faces, bars, shears, plies),
     )
 
 
@@ -249,7 +249,7 @@ def _mean_densities(plies: Sequence[PlyConstants], faces: Floats) -> tuple[float
 SMALL_MASS = 1.213
 
 
-def effective_rigidity(laminate: Laminate) -> float:
+def effective_rigidity(laminate: LaminateSection) -> float:
     """Bending stiffness D* of the isotropic plate of equal response to a point force.
 
     D* = [mean over theta of D(theta)^(-1/2)]^(-2), force*length, where D(theta) is D11 in axes

@@ -2,7 +2,7 @@
 
 A plate whose midplane slopes are not small stretches by eps_q = (w,x^2/2, w,y^2/2, w,x w,y).  The
 membrane force is N = N0 + A (eps_l + eps_q) + B kappa, where eps_l is the linear strain of u and v,
-and of w/R in a curved plate (:mod:`~fecm.mechanics.curvature`).
+and of w/R in a curved plate (:mod:`~fecm.mechanics.strains`).
 The internal force f is the gradient of the strain energy
 
     U = 1/2 int (eps A eps + 2 eps B kappa + kappa D kappa + gamma S gamma) dA
@@ -13,7 +13,7 @@ rotations: the error of the strains is about the square of the slope.
 
 Membrane locking.  In an element w,x^2 is quadratic in x and eps_l only linear, so that a plate that
 bends without stretching would be too stiff.  The quadratic strains are therefore taken at the tying
-points of the assumed shear strains (:mod:`~fecm.mechanics.assumed_shear`) and interpolated between
+points of the assumed shear strains (:mod:`~fecm.mechanics.strains`) and interpolated between
 them.  Their components are covariant, along the base vectors x,xi and x,eta of the element's
 centre: e_11 = w,1^2/2, e_22 = w,2^2/2, e_12 = w,1 w,2, with w,a the slope along base vector a.
 e_11 is taken at xi = +-1/sqrt(3), eta = 0, +-sqrt(3/5), e_22 the other way round, e_12 at
@@ -30,8 +30,7 @@ import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
-from fecm.mechanics import assumed_shear
-from fecm.mechanics.curvature import strain_of_deflection
+from fecm.mechanics import strains as assumed_shear
 from fecm.mechanics.element_matrices import membrane_and_bending
 from fecm.mechanics.elements import Quadrature, gauss
 from fecm.mechanics.interpolation import (
@@ -41,10 +40,10 @@ from fecm.mechanics.interpolation import (
     jacobian,
     local_shape_functions,
 )
-from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.laminate import LaminateSection
 from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.strains import StrainField
+from fecm.mechanics.strains import StrainField, strain_of_deflection
 
 # Elements of a block: their arrays fit the cache.
 BLOCK = 256
@@ -52,7 +51,7 @@ BLOCK = 256
 TYING = 6
 
 
-def supports(family: ElementBlock) -> bool:
+def has_tied_membrane(family: ElementBlock) -> bool:
     """Whether the elements of a block have tied membrane strains: those with nine nodes."""
     return family.shape.nodes == 9 and family.nodes.shape[1] == 9
 
@@ -189,10 +188,10 @@ class _Elements:
     values: Floats  # (points, 9)
     inverse: Floats  # (2, 2, points, ne): Jacobian's inverse, dxi_a/dx_i in row i and column a
     tied: QuadraticStrains
-    laminate: Laminate
+    laminate: LaminateSection
 
 
-class Membrane:
+class MembraneForces:
     """Internal forces of the quadratic strains: f(u) - K u.
 
     `weights` (numel,) are numbers of elements that each represents, 1 by default; those of weight 0

@@ -32,7 +32,7 @@ PARALLEL = 1.0e-2  # sides whose directions differ by less form no corner
 
 
 @frozen
-class Mesh:
+class MeshArrays:
     """Nodes, elements, restraints and nodal forces of a problem."""
 
     coordinates: Floats  # (numnp, 2): length; NaN for undefined nodes
@@ -66,7 +66,7 @@ def equation_numbers(codes: Ints) -> Ints:
     return np.where(free, np.cumsum(free), 0).astype(np.int32).reshape(codes.shape)
 
 
-def rigid_deflections(mesh: Mesh) -> Floats:
+def rigid_deflections(mesh: MeshArrays) -> Floats:
     """Orthonormal basis of w, (numnp, n), of the rigid motions that the supports allow."""
     used = mesh.used
     place = mesh.coordinates[used, :2] - mesh.coordinates[used, :2].mean(axis=0)

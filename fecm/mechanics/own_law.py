@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from fecm._dataclasses import frozen
 from fecm._errors import FecmError
-from fecm._extensions import Group, installed
+from fecm._extensions import EntryPoints, installed
 from fecm._typing import Floats
 from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, Law
 from fecm.mechanics.impact_steps import knows
@@ -112,7 +112,7 @@ def own_law(given: Law | str | None) -> Law | None:
     law: Any = given
     name = type(given).__name__
     if isinstance(given, str):
-        name, law = given, installed(Group.LAWS, given)
+        name, law = given, installed(EntryPoints.LAWS, given)
         if isinstance(law, type) or not hasattr(law, "trial"):
             law = _made(name, law)
     elif isinstance(given, OwnLaw) or (isinstance(given, HystereticLaw) and knows(given.constants)):
@@ -142,7 +142,7 @@ def _made(name: str, factory: Any) -> object:
         ) from error
 
 
-def name_of(law: Law) -> str:
+def law_name(law: Law) -> str:
     """Name of a law that a user has given, for messages and results."""
     return law.name if isinstance(law, OwnLaw) else type(law).__name__
 

@@ -15,16 +15,15 @@ import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm._errors import FecmError
-from fecm._memory import require
+from fecm._machine import require_memory
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics import element_matrices
-from fecm.mechanics.curvature import FLAT, Curvature
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, jacobian_determinants
-from fecm.mechanics.laminate import Laminate
-from fecm.mechanics.mesh import ElementBlock, Mesh, element_blocks, rigid_deflections
-from fecm.mechanics.strains import Rows, StrainField
+from fecm.mechanics.laminate import LaminateSection
+from fecm.mechanics.mesh import ElementBlock, MeshArrays, element_blocks, rigid_deflections
+from fecm.mechanics.strains import FLAT, Curvature, Rows, StrainField
 
 if TYPE_CHECKING:
     from scipy import sparse
@@ -48,13 +47,13 @@ class UnsoundPlateError(FecmError, ArithmeticError):
 class PlateModel:
     """The discrete plate: M a + f(u) = P, with f(u) = K u unless it is nonlinear."""
 
-    mesh: Mesh
-    laminate: Laminate
+    mesh: MeshArrays
+    laminate: LaminateSection
     rules: IntegrationRules
     # Uniform initial membrane force N0_x, N0_y, N0_xy, force/length; tension is positive.
     preload: tuple[float, float, float] = UNLOADED
     nonlinear: bool = False  # whether stretching follows from bending, see membrane.py
-    others: tuple[Laminate, ...] = ()  # laminates beside the first
+    others: tuple[LaminateSection, ...] = ()  # laminates beside the first
     # (numel,): number from 0 of the laminate of every element; without it, all have the first.
     laminate_numbers: Indices | None = None
     curvature: Curvature = FLAT  # 1/R_x, 1/R_y, 1/R_xy of a shallow panel, 1/length
@@ -65,12 +64,12 @@ class PlateModel:
         return self.mesh.number_of_equations
 
     @property
-    def laminates(self) -> tuple[Laminate, ...]:
+    def laminates(self) -> tuple[LaminateSection, ...]:
         """The laminates, in the order of their numbers."""
         return (self.laminate, *self.others)
 
     @property
-    def rows_by_laminate(self) -> list[tuple[Laminate, Rows]]:
+    def rows_by_laminate(self) -> list[tuple[LaminateSection, Rows]]:
         """The laminates with the rows of their elements; all rows of a single one."""
         numbers = self.laminate_numbers
         if numbers is None:
@@ -83,7 +82,7 @@ class PlateModel:
         thickness = np.array([[laminate.thickness] for laminate in self.laminates])
         return thickness if self.laminate_numbers is None else thickness[self.laminate_numbers]
 
-    def laminate_of(self, family: ElementBlock) -> Laminate:
+    def laminate_of(self, family: ElementBlock) -> LaminateSection:
         """Laminate of the elements of a block."""
         return self.laminates[family.laminate]
 
@@ -190,7 +189,7 @@ class PlateModel:
         from scipy import sparse  # 0.16 s, which most runs don't need
 
         neq, ndof = self.neq, self._numbers.size
-        require(ASSEMBLED * self.entries, "to assemble the plate's matrices")
+        require_memory(ASSEMBLED * self.entries, "to assemble the plate's matrices")
         total = sparse.csr_array((neq, ndof))
         for dofs, matrices in self._element_matrices(matrices_of, congruent=congruent):
             rows = np.broadcast_to(dofs[:, :, None], matrices.shape)

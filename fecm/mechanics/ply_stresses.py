@@ -4,28 +4,39 @@ z runs from the struck face, -h/2, to h/2; ply 1 is at the struck face.  Stresse
 its own axes; interlaminar shear stresses are in the axes of the plate.  Both are linear in the
 midplane strains eps and the curvatures kappa, eps(z) = eps + z kappa, or in their derivatives.
 An initial membrane force N0 adds the constant strain A^-1 N0.
+
+Residual stresses of plies that cannot expand freely: cure and moisture.
+
+A ply that changes its temperature by dT and its moisture by dC would strain by
+e = (alpha_1, alpha_2, 0) dT + (beta_1, beta_2, 0) dC in its own axes.  The cured laminate is free:
+
+    [N; M] = sum over plies of int Qbar e (1, z) dz,
+    (eps0, kappa) = [A B; B D]^-1 [N; M],
+    sigma_r = T Qbar (eps0 + z kappa - e)
+
+(Hahn and Pagano 1975; Tsai and Hahn 1980, chapter 8).  The stresses sigma_r have no resultants, so
+that they change neither the motion nor the force of an impact.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats, Indices
-from fecm.mechanics.curvature import FLAT, Curvature, strain_of_deflection
 from fecm.mechanics.elements import Quadrature, gauss
 from fecm.mechanics.interpolation import interpolate, inverse_jacobian, local_shape_functions
-from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.laminate import LaminateSection
 from fecm.mechanics.membrane import QuadraticStrains
-from fecm.mechanics.mesh import ElementBlock, Ints, Mesh, element_blocks
-from fecm.mechanics.strains import Rows
+from fecm.mechanics.mesh import ElementBlock, Ints, MeshArrays, element_blocks
+from fecm.mechanics.strains import FLAT, Curvature, Rows, strain_of_deflection
 
 
-def in_plane_stresses(laminate: Laminate) -> Floats:
+def in_plane_stresses(laminate: LaminateSection) -> Floats:
     """Stresses sigma_1, sigma_2, tau_12 of every ply, T Qbar (eps + z kappa), (plies, 2, 3, 6).
 
     At the lower and the upper z of each ply, per unit of eps_xx, eps_yy, gamma_xy (force/area) and
@@ -46,7 +57,7 @@ def in_plane_stresses(laminate: Laminate) -> Floats:
     return np.concatenate(parts, axis=3)
 
 
-def _moments(laminate: Laminate, z: Floats) -> Floats:
+def _moments(laminate: LaminateSection, z: Floats) -> Floats:
     """Integrals of Qbar and Qbar zeta from the struck face to z, (2, n, 3, 3)."""
     plies = laminate.plies
 
@@ -62,7 +73,7 @@ def _moments(laminate: Laminate, z: Floats) -> Floats:
     return below[:, at] + integrals(plies.faces[at], z, plies.stiffness[at])
 
 
-def interlaminar_stresses(laminate: Laminate) -> tuple[Floats, Floats]:
+def interlaminar_stresses(laminate: LaminateSection) -> tuple[Floats, Floats]:
     """Shear stresses tau_xz, tau_yz from the equilibrium of the plies, without inertia.
 
     Integrated from the struck face: tau_xz,z = -sigma_x,x - tau_xy,y and
@@ -88,7 +99,7 @@ def interlaminar_stresses(laminate: Laminate) -> tuple[Floats, Floats]:
     return stresses - share[:, :, None, None, None] * residual, residual
 
 
-def equilibrium_shear_stiffness(laminate: Laminate) -> Floats:
+def equilibrium_shear_stiffness(laminate: LaminateSection) -> Floats:
     """Transverse shear stiffness of equal energy under the stresses of equilibrium, force/length.
 
     (2, 2), order xz, yz.  In cylindrical bending in x and in y without membrane forces H^-1 is the
@@ -136,21 +147,21 @@ def second_derivatives(family: ElementBlock) -> Floats:
 
 
 # Laminates with the rows of their elements.
-Zones = Sequence[tuple[Laminate, Rows]]
+Zones = Sequence[tuple[LaminateSection, Rows]]
 
 
 @frozen
-class Zone:
+class ElementZone:
     """Stresses per strain of the plies of some elements."""
 
-    laminate: Laminate
+    laminate: LaminateSection
     rows: Rows  # of its elements among those of the stresses
     in_plane: Floats
     interlaminar: Floats
     residual: Floats
 
     @classmethod
-    def of(cls, laminate: Laminate, rows: Rows) -> Self:
+    def of(cls, laminate: LaminateSection, rows: Rows) -> Self:
         """Those of a laminate."""
         return cls(laminate, rows, in_plane_stresses(laminate), *interlaminar_stresses(laminate))
 
@@ -175,8 +186,8 @@ class PlyStresses:
 
     def __init__(
         self,
-        mesh: Mesh,
-        laminate: Laminate | Zones,
+        mesh: MeshArrays,
+        laminate: LaminateSection | Zones,
         rule: Quadrature,
         members: Indices | None = None,
         initial: Floats | None = None,
@@ -188,8 +199,8 @@ class PlyStresses:
         self.initial = initial
         self.members = np.arange(len(mesh.elements)) if members is None else members
         elements = mesh.elements[self.members]
-        zones = [(laminate, slice(None))] if isinstance(laminate, Laminate) else laminate
-        self.zones = [Zone.of(one, _among(self.members, rows)) for one, rows in zones]
+        zones = [(laminate, slice(None))] if isinstance(laminate, LaminateSection) else laminate
+        self.zones = [ElementZone.of(one, _among(self.members, rows)) for one, rows in zones]
         most = max(zone.plies for zone in self.zones)
         # Numbers of elements, points of an element, and plies.
         self.shape = (len(elements), len(rule.xi), most)
@@ -329,6 +340,74 @@ def is_complete(elements: Ints) -> Bools:
     return np.asarray(nodes[:, :9].all(axis=1) & ~nodes[:, 9:].any(axis=1))
 
 
-def uniform_stresses(laminate: Laminate, strain: Floats) -> Floats:
+def uniform_stresses(laminate: LaminateSection, strain: Floats) -> Floats:
     """Stresses of the plies, (plies, 2, 3), under a uniform midplane strain, (3,)."""
     return np.asarray(in_plane_stresses(laminate)[..., :3] @ strain)
+
+
+class Residual(NamedTuple):
+    """Free laminate after a change of temperature and moisture."""
+
+    stresses: Floats  # (plies, 2, 3): sigma_1, sigma_2, tau_12 at both faces of each ply
+    strain: Floats  # (3,): midplane strain eps_xx, eps_yy, gamma_xy
+    curvature: Floats  # (3,): kappa_x, kappa_y, kappa_xy, 1/length
+
+
+def free_strains(
+    laminate: LaminateSection, along: Floats | float, across: Floats | float
+) -> Floats:
+    """Free strains xx, yy, xy of the plies in the laminate's axes, (plies, 3).
+
+    `along` and `across` the fibres, of all plies or (plies,).
+    """
+    angles = np.deg2rad(laminate.plies.angles)
+    m, n = np.cos(angles), np.sin(angles)
+    return np.stack(
+        [
+            m * m * along + n * n * across,
+            n * n * along + m * m * across,
+            2.0 * m * n * (along - across),
+        ],
+        axis=1,
+    )
+
+
+def residual_stresses(
+    laminate: LaminateSection, along: Floats | float, across: Floats | float
+) -> Residual:
+    """Residual stresses of a free laminate whose plies would strain by `along` and `across`.
+
+    NaN of a laminate without stiffness.
+
+    Parameters
+    ----------
+    laminate : Laminate
+    along, across : float or ndarray (plies,)
+        Free strains alpha dT + beta dC along and across the fibres, of all plies or of each.
+
+    Examples
+    --------
+    Two plies of T300/5208 at 0 and 90 degrees, cooled by 100 K, in MPa:
+
+    >>> from fecm.deck.catalogue import MATERIALS
+    >>> from fecm.mechanics.laminate import laminate
+    >>> ply = MATERIALS["T300/5208"].converted("mm-N-s")
+    >>> plate = laminate(ply, (0.0, 90.0, 90.0, 0.0), [0.125] * 4)
+    >>> residual_stresses(plate, -2e-6, -2.25e-3).stresses[0, 0].round(2)
+    array([-21.27,  21.27,   0.  ])
+    """
+    free = free_strains(laminate, along, across)
+    plies = laminate.plies
+    stress = np.einsum("pij,pj->pi", plies.stiffness, free)  # force/area per ply
+    lower, upper = plies.faces[:-1, None], plies.faces[1:, None]
+    N = (stress * (upper - lower)).sum(axis=0)
+    M = (stress * (upper**2 - lower**2)).sum(axis=0) / 2.0
+    ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
+    try:
+        mean = np.linalg.solve(ABD, np.concatenate([N, M]))
+    except np.linalg.LinAlgError:
+        mean = np.full(6, np.nan)
+    # T Qbar (eps0 + z kappa) of the laminate, less T Qbar e of the ply.
+    per_strain = in_plane_stresses(laminate)
+    total = per_strain @ mean - np.einsum("pfij,pj->pfi", per_strain[..., :3], free)
+    return Residual(total, mean[:3], mean[3:])

@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm._typing import Floats, Indices
-from fecm.mechanics.curvature import FLAT, Curvature, strain_of_deflection
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, interpolate
-from fecm.mechanics.mesh import ElementBlock, Mesh, element_blocks
+from fecm.mechanics.mesh import ElementBlock, MeshArrays, element_blocks
+from fecm.mechanics.strains import FLAT, Curvature, strain_of_deflection
 
 # Tolerance, in local coordinates, for points on the edge of an element.
 MARGIN = 1.0e-6
@@ -26,7 +26,7 @@ INSIDE = 1.0 - 1.0e-9
 PASSES = 50
 
 
-def locate(family: ElementBlock, points: Floats) -> tuple[Indices, Indices, Floats]:
+def containing_elements(family: ElementBlock, points: Floats) -> tuple[Indices, Indices, Floats]:
     """Find every element of a block that contains one of the points, (n, 2), edges included.
 
     Positions of the elements in the block (k,), their points (k,), and the points' local
@@ -119,7 +119,7 @@ class PatchError(FecmError, ValueError):
     """The patch is not entirely on the plate."""
 
 
-def patch_weights(mesh: Mesh, shape: str, radius: float, x: float, y: float) -> Floats:
+def patch_weights(mesh: MeshArrays, shape: str, radius: float, x: float, y: float) -> Floats:
     """Nodal weights of w, (numnp,), of a unit pressure on a circle; their sum is 1.
 
     Raises PatchError if a part of the circle is not on the plate.
@@ -159,7 +159,7 @@ def _summed(
         points = np.stack([x + r * np.cos(sector), y + r * np.sin(sector)], axis=-1).reshape(-1, 2)
         found = np.zeros(len(points), dtype=bool)
         for family in families:
-            members, which, xi = locate(family, points)
+            members, which, xi = containing_elements(family, points)
             # A point on a common edge counts once.
             which, first = np.unique(which, return_index=True)
             fresh = ~found[which]
@@ -232,7 +232,7 @@ class GageArray:
 
 
 def gages(
-    mesh: Mesh,
+    mesh: MeshArrays,
     records: Sequence[GagePlace],
     *,
     transposed_jacobian: bool = False,
@@ -269,7 +269,7 @@ def _functional(
     found = [
         (family.take(np.array([member])), Quadrature(at[:1], at[1:], np.ones(1)))
         for family in families
-        for member, _, at in zip(*locate(family, point), strict=True)
+        for member, _, at in zip(*containing_elements(family, point), strict=True)
     ]
     if not found:
         raise OutsideError(f"gage {gage.number} at ({gage.x:g}, {gage.y:g}) is not on the plate")

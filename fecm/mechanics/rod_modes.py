@@ -16,7 +16,7 @@ EQUAL = 1e-10
 
 
 @frozen
-class Modes:
+class ProjectileModes:
     """Natural modes of a projectile, of unit modal mass; the first is its rigid motion."""
 
     shapes: Floats  # (n, modes)
@@ -24,7 +24,7 @@ class Modes:
     weights: Floats  # (n, modes): the mass matrix times the shapes
 
     @classmethod
-    def of(cls, K: Floats, m: Floats, rigid: Floats | None = None) -> Modes:
+    def of(cls, K: Floats, m: Floats, rigid: Floats | None = None) -> ProjectileModes:
         """Modes of a free projectile.
 
         `rigid` has the dofs of a unit rigid displacement, (n,), by default those of a rod.

@@ -20,7 +20,7 @@ from fecm._typing import Floats, Indices
 from fecm.mechanics import kernels
 from fecm.mechanics.kernels import membrane
 from fecm.mechanics.kernels.plate import CompiledProduct
-from fecm.mechanics.membrane import Membrane
+from fecm.mechanics.membrane import MembraneForces
 from fecm.mechanics.mesh import distinct
 from fecm.mechanics.plate import PlateModel, R, StiffnessOperator, pieces
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
@@ -216,7 +216,7 @@ class NonlinearProduct(StiffnessOperator):
     ) -> None:
         self._linear = linear
         self._kept = kept
-        self._membrane = Membrane(plate, kept.weights.astype(float))
+        self._membrane = MembraneForces(plate, kept.weights.astype(float))
         self._pieces = pieces(kept.count)
         self.size = linear.size
         self.prescribed: Floats | None = None
@@ -300,7 +300,7 @@ def internal_force_operator(
 
     The kernels have the membrane of a plate without prescribed displacements.
     """
-    if plate.nonlinear and resolved(solver) == KERNELS and membrane.supports(plate):
+    if plate.nonlinear and resolved(solver) == KERNELS and membrane.has_kernel_membrane(plate):
         prescribed = plate.mesh.forces[reduced.sign == 0.0]
         if not prescribed.any():
             threads = 1 if workers is None else workers.count

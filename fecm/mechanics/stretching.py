@@ -17,21 +17,21 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._typing import Bools, Floats
-from fecm.mechanics import assumed_shear
-from fecm.mechanics.curvature import strain_of_deflection
+from fecm.mechanics import strains as assumed_shear
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import interpolate, jacobian_determinants
 from fecm.mechanics.membrane import QuadraticStrains
 from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import strains_of
-from fecm.mechanics.points import locate
+from fecm.mechanics.points import containing_elements
+from fecm.mechanics.strains import strain_of_deflection
 
 # Elements of a block.
 BLOCK = 1024
 
 
-class Stretch(NamedTuple):
+class MidplaneField(NamedTuple):
     """Midplane of a plate in a displacement field.
 
     The largest values are those at the points of quadrature.
@@ -121,7 +121,7 @@ class Stretching:
             self._sheared.append((plate.strain_field(rule), family.rows, area, shear))
         self._at_load = [] if load is None else _elements_at(plate, load)
 
-    def evaluate(self, field: Floats) -> Stretch:
+    def evaluate(self, field: Floats) -> MidplaneField:
         """Evaluate a displacement field, (numnp, 5)."""
         energies, largest = np.zeros(3), np.full(3, -np.inf)
         for part, near in self._parts:
@@ -131,7 +131,7 @@ class Stretching:
         membrane, bending, preload = energies.tolist()
         slope, strain, force = largest.tolist()
         force_at_load, moment_at_load = self._under_load(field)
-        return Stretch(
+        return MidplaneField(
             energy=membrane,
             strain_energy=membrane + bending + preload + self._shear_energy(field),
             preload_energy=preload,
@@ -202,5 +202,5 @@ def _elements_at(plate: PlateModel, place: tuple[float, float]) -> list[_Element
     return [
         _Elements(plate, family.take(np.array([member])), Quadrature(xi[:1], xi[1:], np.ones(1)))
         for family in plate.families
-        for member, _, xi in zip(*locate(family, np.array([place])), strict=True)
+        for member, _, xi in zip(*containing_elements(family, np.array([place])), strict=True)
     ]

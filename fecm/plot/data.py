@@ -16,8 +16,7 @@ from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.mesh import ElementBlock, element_blocks
 from fecm.plot.kinds import LackingError, PlotError
-from fecm.results.errors import NotStoredError, ResultFileError
-from fecm.results.missing import remedy
+from fecm.results.groups import NotStoredError, ResultFileError, remedy
 from fecm.results.plies import points_of, rows_at
 from fecm.results.result import Result
 
@@ -25,7 +24,7 @@ LARGEST = 1e100  # larger numbers are refused: axes fail long before numbers ove
 MANY = 2000  # meshes with more elements are drawn with fewer points per element
 
 
-def require(result: Result, name: str, *paths: str, padded: bool = False) -> list[Array]:
+def require_datasets(result: Result, name: str, *paths: str, padded: bool = False) -> list[Array]:
     """Datasets of a result.
 
     Raises LackingError if one is missing (the message names the macro that stores it) or empty,
@@ -52,7 +51,7 @@ def require(result: Result, name: str, *paths: str, padded: bool = False) -> lis
 
 def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
     """Elements, and x and y of all nodes (length), which do not lie on a line along an axis."""
-    elements, coordinates = require(result, name, "mesh/elements", "mesh/coordinates")
+    elements, coordinates = require_datasets(result, name, "mesh/elements", "mesh/coordinates")
     coordinates = coordinates[:, :2]
     extent = np.ptp(coordinates, axis=0)
     if not (extent > 1e-9 * np.abs(coordinates).max()).all():
@@ -62,7 +61,7 @@ def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
     return elements, coordinates
 
 
-def deck_of(result: Result, name: str) -> Deck:
+def result_deck(result: Result, name: str) -> Deck:
     """Model of a result's deck."""
     try:
         return result.deck
@@ -89,7 +88,7 @@ def struck(result: Result, name: str) -> Floats:
     patch = circle(result, name)
     if patch is not None:
         return patch[0][None]
-    impact = deck_of(result, name).last(Impact)
+    impact = result_deck(result, name).last(Impact)
     nodes = [] if impact is None else [impact.node - 1]
     coordinates = result["mesh/coordinates"][:, :2]
     if impact is not None and not 1 <= impact.node <= len(coordinates):
@@ -110,7 +109,7 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
 
     If the contact ends within the run, these lie before its end.
     """
-    (stored,) = require(result, name, "tape3/time")
+    (stored,) = require_datasets(result, name, "tape3/time")
     if not times:
         end = contact_end(result)
         rows = int(np.searchsorted(stored, end)) or len(stored)
@@ -186,7 +185,7 @@ def reach(result: Result, name: str, thickness: float) -> float:
 
 def strain_points(result: Result, name: str) -> Floats:
     """Coordinates of the points of tape8, (numel, npt, 2), length."""
-    (stored,) = require(result, name, "tape8/kappa_x")
+    (stored,) = require_datasets(result, name, "tape8/kappa_x")
     elements, _ = mesh_of(result, name)
     at_nodes = result.tape8.attributes.get("location") == "nodes"
     try:

@@ -20,7 +20,7 @@ from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import CRITERIA, UNIDIRECTIONAL
 from fecm.mechanics.failure_monitor import UNKNOWN
 from fecm.plot import style
-from fecm.plot.data import deck_of, mesh_of, require, struck
+from fecm.plot.data import mesh_of, require_datasets, result_deck, struck
 from fecm.plot.kinds import Picture, PlotError, Width
 from fecm.plot.plate import aspect, mark_impact
 from fecm.problem.parts import rules
@@ -58,7 +58,7 @@ TICKS = 16  # numbers on the axis of the plies at most
 
 
 @frozen
-class Exposures:
+class DrawnExposures:
     """What is drawn of a result."""
 
     under_load: Bools  # (numel, points): mask of the points that are left out
@@ -110,7 +110,7 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: Width =
     if has_circle:
         entries["circle around the load"] = Line2D([], [], **CIRCLE)
     style.legend(figure, list(entries.values()), list(entries))
-    if text := style.open_ends(results):
+    if text := style.open_ends_note(results):
         bars.set_title(f"{text}: lower bounds", loc="right", fontsize=7.0)
     _warn_of_load(name, found.under_load)
     return Picture(figure)
@@ -166,11 +166,11 @@ def _warn_of_load(name: str, under_load: Bools) -> None:
     )
 
 
-def _exposures(result: Result, name: str, quantity: str) -> Exposures:
+def _exposures(result: Result, name: str, quantity: str) -> DrawnExposures:
     """Largest exposures by one criterion or by all."""
     if quantity and quantity not in NAMES:
         raise PlotError(f"there is no criterion {quantity!r}; there are {', '.join(NAMES)}")
-    (near,) = require(result, name, "failure/under_load")
+    (near,) = require_datasets(result, name, "failure/under_load")
     under = near != 0
     whole = np.broadcast_to(near_load(result, BETWEEN), under.shape)  # elements
     over_plies: dict[str, Floats] = {}
@@ -183,7 +183,7 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
             if not quantity:
                 continue
             raise PlotError(f"{criterion} is not evaluated for the plies of {name}")
-        (values,) = require(result, name, path, padded=True)
+        (values,) = require_datasets(result, name, path, padded=True)
         if np.isnan(values).all():
             if criterion == BETWEEN and not quantity:
                 continue  # no interface of two plies with strengths
@@ -204,7 +204,7 @@ def _exposures(result: Result, name: str, quantity: str) -> Exposures:
     between = largest[0].criterion == BETWEEN
     shown = [field for criterion, field in fields.items() if (criterion == BETWEEN) == between]
     left_out = whole if between else under
-    return Exposures(left_out, _known(np.max(shown, axis=0)), over_plies, largest)
+    return DrawnExposures(left_out, _known(np.max(shown, axis=0)), over_plies, largest)
 
 
 def _known(exposures: Floats) -> Floats:
@@ -214,7 +214,7 @@ def _known(exposures: Floats) -> Floats:
 
 def _cells(result: Result, name: str, count: int) -> Floats:
     """Corners of the part of the element around each point, (numel, points, 4, 2), length."""
-    rule = rules(deck_of(result, name).require(Material))[2]
+    rule = rules(result_deck(result, name).require(Material))[2]
     if len(rule.xi) != count:
         raise PlotError(
             f"{name} has exposures at {count} points of an element, its deck has {len(rule.xi)}"
@@ -240,7 +240,7 @@ def outline(cells: Floats) -> Floats:
     return np.asarray(sides[index[times == 1]])
 
 
-def _map(axes: Axes, cells: Floats, found: Exposures) -> None:
+def _map(axes: Axes, cells: Floats, found: DrawnExposures) -> None:
     """One cell per point."""
     outside = ~found.under_load
     values = found.over_plate[outside]
@@ -261,13 +261,13 @@ def _map(axes: Axes, cells: Floats, found: Exposures) -> None:
     low, high = cells.min(axis=(0, 1, 2)), cells.max(axis=(0, 1, 2))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
     what = "the interfaces" if found.worst.criterion == BETWEEN else "the plies"
-    scale, label = style.Scale(1.0, ""), f"Largest exposure of {what}"
+    scale, label = style.AxisScale(1.0, ""), f"Largest exposure of {what}"
     bar = style.colour_bar(axes, drawn, scale, label, MaxNLocator(5))
     if peak >= 1.0:
         bar.ax.axvline(1.0, **LIMIT)
 
 
-def _bars(axes: Axes, found: Exposures) -> dict[str, Artist]:
+def _bars(axes: Axes, found: DrawnExposures) -> dict[str, Artist]:
     """Draw a bar per ply, the struck face at the top, and one per interface between them.
 
     Returns the entries of the legend.

@@ -1,4 +1,7 @@
-"""Pictures against time, and force against indentation (the report's figures 4.18, 4.19)."""
+"""Pictures against time, and force against indentation (the report's figures 4.18, 4.19).
+
+Pictures of surface strains against time (the report's figures 4.12 to 4.17).
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,12 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from matplotlib.lines import Line2D
 
+from fecm._errors import warn
 from fecm._typing import Array
+from fecm.deck.model import Material
 from fecm.plot import data, style
-from fecm.plot.kinds import Against, Picture, PlotError, Width
-from fecm.results.comparison import Source, compare, measurement_of
+from fecm.plot.kinds import Against, Face, Picture, PlotError, Width
+from fecm.results.comparison import Source, compare_force, measurement_of
 from fecm.results.result import Result
 
 if TYPE_CHECKING:
@@ -21,12 +26,13 @@ if TYPE_CHECKING:
 
     from fecm.identification.identify import Identification
 
+
 Results = Mapping[str, Result]
 
 POINTS = 200  # measured points drawn one by one at most
 
 
-class Forces(NamedTuple):
+class DrawnForces(NamedTuple):
     """Forces of a run; those of the transducer of a rigid mass are the contact forces."""
 
     time: Array
@@ -57,7 +63,7 @@ ENERGIES = {
 }
 
 
-def time_axis(axes: Axes, clock: style.Scale, times: Iterable[Array]) -> None:
+def time_axis(axes: Axes, clock: style.AxisScale, times: Iterable[Array]) -> None:
     """Label the axis of time, and end it with the longest history."""
     clock.name(axes.xaxis, "Time")
     axes.set_xlim(0.0, max(float(array[-1]) for array in times))
@@ -65,7 +71,7 @@ def time_axis(axes: Axes, clock: style.Scale, times: Iterable[Array]) -> None:
 
 def _mark_open_ends(axes: Axes, results: Results, width: Width) -> None:
     """Say above a graph that contacts last to the end; name the results unless all do."""
-    if text := style.open_ends(results):
+    if text := style.open_ends_note(results):
         text = textwrap.fill(text, int(style.LETTERS * style.WIDTHS[width]))
         axes.set_title(text, loc="right", fontsize=style.FOOTER).set_parse_math(False)
 
@@ -95,7 +101,10 @@ def force(
         )
     style.limit_count(len(results), "forces")
     paths = ("history/time", "history/force", "history/transducer")
-    drawn = {name: Forces(*data.require(result, name, *paths)) for name, result in results.items()}
+    drawn = {
+        name: DrawnForces(*data.require_datasets(result, name, *paths))
+        for name, result in results.items()
+    }
     times = [one.time for one in drawn.values()]
     limits = _thresholds(results)
     sizes = [values for one in drawn.values() for values in (one.contact, one.transducer)]
@@ -119,14 +128,14 @@ def force(
             axes[0].plot([], [], label=measured.name, **look)  # for the legend
         ax.plot(measured.time, measured.force, label=measured.name, **look)
         for name, result in results.items():
-            compared = compare(result, measured)
+            compared = compare_force(result, measured)
             notes.append(f"{measured.quantity} of {name} against {measured.name}: {compared}")
     style.lines_legend(figure, axes[0])
     return Picture(figure, notes=notes)
 
 
 def _draw_forces(
-    drawn: Mapping[str, Forces], pound: style.Scale, width: Width
+    drawn: Mapping[str, DrawnForces], pound: style.AxisScale, width: Width
 ) -> tuple[Figure, list[Axes]]:
     """Draw the forces of one result in one graph, of several above the transducers."""
     colours = style.colours()
@@ -151,7 +160,7 @@ def _draw_forces(
 
 
 def _mark_thresholds(
-    axes: Axes, limits: Mapping[str, float], names: Sequence[str], pound: style.Scale
+    axes: Axes, limits: Mapping[str, float], names: Sequence[str], pound: style.AxisScale
 ) -> None:
     """Draw thresholds, and name their results unless all have the same one."""
     colours = dict(zip(names, style.colours(), strict=False))
@@ -175,7 +184,7 @@ def _measured_look(time: Array) -> style.Look:
 
 
 @style.styled
-def fit_picture(found: Identification, units: Mapping[str, str]) -> Picture:
+def force_fit_picture(found: Identification, units: Mapping[str, str]) -> Picture:
     """Measured and fitted force above, the residual below with plus and minus its rms."""
     clock = style.scale_in(units, "time", found.time)
     figure, (above, below) = style.panels("column", 2, sharex=True, tall=0.6)
@@ -220,7 +229,7 @@ def loop(results: Results, *, against: Against | None = None, width: Width = "co
     column, sign, label = AGAINST[against]
     drawn = {}
     for name, result in results.items():
-        x, values = data.require(result, name, f"history/{column}", "history/force")
+        x, values = data.require_datasets(result, name, f"history/{column}", "history/force")
         drawn[name] = np.append(0.0, sign * x), np.append(0.0, values)
     # Without force the bodies move apart.
     touched = np.concatenate([[0.0], *(x[force > 0.0] for x, force in drawn.values())])
@@ -250,7 +259,7 @@ def energy(results: Results, *, width: Width = "column") -> Picture:
         del energies["projectile_strain"]
         energies["projectile_kinetic"] = "projectile"
     paths = ("energy/time", *(f"energy/{column}" for column in energies))
-    drawn = {name: data.require(result, name, *paths) for name, result in results.items()}
+    drawn = {name: data.require_datasets(result, name, *paths) for name, result in results.items()}
     times = [columns[0] for columns in drawn.values()]
     clock = style.scale_of(results, "time", times)
     parts = [values for columns in drawn.values() for values in columns[1:]]
@@ -287,7 +296,118 @@ def _membrane(axes: Axes, results: Results) -> Line2D | None:
     ((name, result),) = results.items()
     if "membrane/energy" not in result:
         return None
-    time, values = data.require(result, name, "membrane/time", "membrane/energy")
+    time, values = data.require_datasets(result, name, "membrane/time", "membrane/energy")
     colour = style.colours()[len(ENERGIES)]
     (points,) = axes.plot(time, values, color=colour, ls="none", marker=".", ms=3.0)
     return points
+
+
+AXES = {0.0: "x", 90.0: "y"}  # names of directions (degrees)
+
+
+def strain_picture(
+    results: Results,
+    *,
+    at: Sequence[tuple[float, float]] = (),
+    gages: Sequence[float] = (0.0, 90.0),
+    face: Face = "far",
+    width: Width = "column",
+) -> Picture:
+    """Surface strain z κ, or curvature, in given directions at given points against time.
+
+    At an angle θ from the x-axis κ = κx cos² θ + κy sin² θ + κxy sin θ cos θ, with the engineering
+    twist κxy.  At a node it is the mean of the adjacent elements.
+
+    The points `at` (length) are by default the one with the largest bending strain outside the
+    load; `gages` are degrees from the x-axis; `face` is ``"far"`` (z = h/2), ``"struck"``
+    (z = -h/2), or ``"curvature"``.
+    """
+    lines: dict[str, tuple[Array, Array]] = {}
+    for name, result in results.items():
+        for label, values in _strains(result, name, at, gages, face).items():
+            text = f"{name}, {label}" if len(results) > 1 else label
+            lines[text] = data.require_datasets(result, name, "tape8/time")[0], values
+    if len(lines) > len(style.COLOURS):
+        raise PlotError(
+            f"{len(lines)} lines can't be told apart in one picture; ask for fewer points, "
+            f"directions or results, at most {len(style.COLOURS)} in all"
+        )
+    times, values_of = zip(*lines.values(), strict=True)
+    if face == "curvature":
+        shown, name = style.scale_of(results, "1/length", values_of), "Curvature"
+    else:
+        stretches = any(map(_may_stretch, results.values()))
+        what = "Bending strain" if stretches else "Strain"
+        shown, name = style.scale(style.largest_absolute(*values_of), ""), f"{what}, {face} face"
+    figure, (axes,) = style.panels(width)
+    for (label, (time, values)), colour in zip(lines.items(), style.colours(), strict=False):
+        axes.plot(time, values, color=colour, label=label)
+    shown.name(axes.yaxis, name)
+    time_axis(axes, style.scale_of(results, "time", times), times)
+    style.lines_legend(figure, axes)
+    return Picture(figure)
+
+
+def _strains(
+    result: Result, name: str, at: Sequence[tuple[float, float]], gages: Sequence[float], face: Face
+) -> dict[str, Array]:
+    """Histories of one result, by point and direction."""
+    columns = data.require_datasets(
+        result, name, "tape8/kappa_x", "tape8/kappa_y", "tape8/kappa_xy"
+    )
+    points = data.strain_points(result, name)
+    layers = data.result_deck(result, name).require(Material).layers
+    thickness = sum(layer.thickness for layer in layers)
+    places = [np.array(place) for place in at]
+    if not places:
+        outside = _distance(result, name, points) >= data.reach(result, name, thickness)
+        places = [_most_strained(columns, points, outside)]
+    match face:
+        case "curvature":
+            symbol, height = "κ", 1.0
+        case "far":
+            symbol, height = "ε", thickness / 2.0
+        case _:
+            symbol, height = "ε", -thickness / 2.0
+    if face != "curvature" and _may_stretch(result):
+        warn(
+            f"the midplane of {name} may stretch; its strains are not stored, and the picture "
+            "shows those of bending alone"
+        )
+    found: dict[str, Array] = {}
+    for place in places:
+        there = data.nearest(points, place, name)
+        x, y = points[there].mean(axis=0)
+        kappa_x, kappa_y, kappa_xy = (column[:, there].mean(axis=1) for column in columns)
+        for angle in gages:
+            c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
+            values = height * (c * c * kappa_x + s * s * kappa_y + s * c * kappa_xy)
+            direction = AXES.get(angle, f" {angle:g}°")
+            found[f"{symbol}{direction} at {x:.4g}, {y:.4g}"] = values
+    return found
+
+
+def _may_stretch(result: Result) -> bool:
+    """Whether a point of the midplane can move in the plane."""
+    return bool(result["mesh/equations"][:, :2].any())
+
+
+def _distance(result: Result, name: str, points: Array) -> Array:
+    """Distance of points, (..., 2), from the load; infinite without a load."""
+    load = data.struck(result, name)
+    if not len(load):
+        return np.full(points.shape[:-1], np.inf)
+    return np.asarray(np.hypot(*np.moveaxis(points - load[0], -1, 0)))
+
+
+def _most_strained(curvatures: Sequence[Array], points: Array, outside: Array) -> Array:
+    """Place, (2,), of the largest principal curvature of all rows, outside the load if possible.
+
+    Of equal ones, as of a symmetric plate, the place with the largest x, then y.
+    """
+    x, y, xy = curvatures
+    largest = (np.abs(x + y) + np.hypot(x - y, xy)).max(axis=0)
+    if outside.any():
+        largest = np.where(outside, largest, -1.0)
+    equal = largest >= largest.max() * (1.0 - 1e-9)
+    return np.array(max(points[equal].round(12).tolist()))

@@ -42,7 +42,7 @@ class Picture:
     notes: Sequence[str] = ()
 
 
-class Kind(StrEnum):
+class PictureKind(StrEnum):
     """Names of the kinds of pictures."""
 
     FORCE = auto()
@@ -83,36 +83,48 @@ class Drawing:
 
 
 KINDS: dict[str, Drawing] = {
-    Kind.FORCE: Drawing("histories:force", Shows.RUNS, "contact force and transducer against time"),
-    Kind.LOOP: Drawing(
+    PictureKind.FORCE: Drawing(
+        "histories:force", Shows.RUNS, "contact force and transducer against time"
+    ),
+    PictureKind.LOOP: Drawing(
         "histories:loop", Shows.RUNS, "contact force against indentation or displacement"
     ),
-    Kind.ENERGY: Drawing(
+    PictureKind.ENERGY: Drawing(
         "histories:energy", Shows.RUNS, "energies of plate and projectile against time"
     ),
-    Kind.STRAIN: Drawing("strains:strain", Shows.RUNS, "surface strain at points against time"),
-    Kind.THICKNESS: Drawing(
+    PictureKind.STRAIN: Drawing(
+        "strains:strain", Shows.RUNS, "surface strain at points against time"
+    ),
+    PictureKind.THICKNESS: Drawing(
         "thickness:thickness", Shows.RUN, "ply stresses through the thickness of an element"
     ),
-    Kind.FAILURE: Drawing(
+    PictureKind.FAILURE: Drawing(
         "failure:failure", Shows.RUN, "largest exposures over the plate and of every ply"
     ),
-    Kind.LINE: Drawing(
+    PictureKind.LINE: Drawing(
         "plate:line", Shows.RUNS, "deflection along a line through the impact point"
     ),
-    Kind.CONTOUR: Drawing("plate:contour", Shows.RUN, "deflection of the plate, seen from above"),
-    Kind.SURFACE: Drawing("surface:surface", Shows.RUN, "the deflected plate"),
-    Kind.MESH: Drawing("mesh:mesh", Shows.RUN, "mesh, supports, impact point and contact patch"),
-    Kind.ANIMATION: Drawing("surface:animation", Shows.RUN, "the moving plate", (".gif",)),
-    Kind.MAP: Drawing(
+    PictureKind.CONTOUR: Drawing(
+        "plate:contour", Shows.RUN, "deflection of the plate, seen from above"
+    ),
+    PictureKind.SURFACE: Drawing("surface:surface", Shows.RUN, "the deflected plate"),
+    PictureKind.MESH: Drawing(
+        "mesh:mesh", Shows.RUN, "mesh, supports, impact point and contact patch"
+    ),
+    PictureKind.ANIMATION: Drawing("surface:animation", Shows.RUN, "the moving plate", (".gif",)),
+    PictureKind.MAP: Drawing(
         "maps:parameter_map", Shows.SWEEP, "a quantity of a sweep over its parameters"
     ),
-    Kind.EXCEEDANCE: Drawing(
+    PictureKind.EXCEEDANCE: Drawing(
         "random_sweep:exceedance", Shows.SWEEP, "probabilities of a random sweep"
     ),
-    Kind.SENSITIVITY: Drawing("random_sweep:sensitivity", Shows.SWEEP, "indices of a random sweep"),
-    Kind.SCATTER: Drawing("random_sweep:scatter", Shows.SWEEP, "a quantity over the random values"),
-    Kind.LOCATION: Drawing(
+    PictureKind.SENSITIVITY: Drawing(
+        "random_sweep:sensitivity", Shows.SWEEP, "indices of a random sweep"
+    ),
+    PictureKind.SCATTER: Drawing(
+        "random_sweep:scatter", Shows.SWEEP, "a quantity over the random values"
+    ),
+    PictureKind.LOCATION: Drawing(
         "location:location", Shows.LOCATION, "place, force and strains that locate found"
     ),
 }
@@ -123,7 +135,7 @@ Face = Literal["far", "struck", "curvature"]
 Direction = Literal["x", "y"]
 
 
-class Options(TypedDict, total=False):
+class PictureOptions(TypedDict, total=False):
     """Options of pictures; each kind takes some of them, as its function's docstring says."""
 
     width: Width

@@ -105,7 +105,7 @@ def _cells(found: Location, size: float) -> Floats:
     return np.asarray(found.candidates[:, None] + 0.46 * sides * CORNERS)
 
 
-def _draw_map(axes: Axes, found: Location, outline: Floats, place: style.Scale) -> None:
+def _draw_map(axes: Axes, found: Location, outline: Floats, place: style.AxisScale) -> None:
     """Misfit of the candidates, the gages, and the places found on the plate."""
     extent = np.ptp(outline.reshape(-1, 2), axis=0)
     axes.add_collection(LineCollection(list(outline), colors="0.3", linewidths=0.8))
@@ -128,7 +128,7 @@ def _draw_map(axes: Axes, found: Location, outline: Floats, place: style.Scale) 
     place.name(axes.xaxis, "$x$")
     place.name(axes.yaxis, "$y$")
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2, borderaxespad=0.8)
-    ratio = style.Scale(1.0, "")
+    ratio = style.AxisScale(1.0, "")
     bar = style.colour_bar(
         axes, cells, ratio, "Misfit over that of the place found", MaxNLocator(6), aspect=40.0
     )
@@ -162,7 +162,7 @@ def _draw_gages(axes: Axes, found: Location, length: float) -> None:
         )
 
 
-def _draw_zoom(axes: Axes, found: Location, place: style.Scale) -> None:
+def _draw_zoom(axes: Axes, found: Location, place: style.AxisScale) -> None:
     """The place and its ellipse, enlarged; distances from the place found."""
     ellipse = found.ellipse(0.95) - np.array([found.x, found.y])
     axes.set_title("95 % confidence region", loc="left")
@@ -213,7 +213,7 @@ def _draw_force(axes: Axes, found: Location) -> None:
 
 def _draw_strains(axes: list[Axes], found: Location) -> None:
     """Measured and fitted strains, a graph per gage, all with the same axes."""
-    micro = style.scale(style.peak(found.strains, found.fitted), "")
+    micro = style.scale(style.largest_absolute(found.strains, found.fitted), "")
     clock = style.scale_in(found.units, "time", found.strain_time)
     largest = max(float(values.max()) for values in (found.strains, found.fitted))
     least = min(float(values.min()) for values in (found.strains, found.fitted))

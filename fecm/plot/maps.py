@@ -1,19 +1,461 @@
-"""Maps of a sweep: a quantity of every case over one or two varying parameters."""
+"""Contents of a map of a sweep: what varies, what is shown, and what is marked.
+
+Maps of a sweep over two parameters: cells with contour lines, or coloured points.
+
+Maps of a sweep over one parameter: points, curves by the texts of another, rows of texts.
+
+Maps of a sweep: a quantity of every case over one or two varying parameters.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import cast
+from collections.abc import Collection, Mapping, Sequence
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
+from matplotlib.colors import BoundaryNorm, Normalize
 from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
 
-from fecm._typing import Bools
-from fecm.plot import map_fields, map_graphs, style
-from fecm.plot.kinds import Picture, Width
-from fecm.plot.map_contents import MOST_CURVES, Contents, Graph, choose
-from fecm.plot.sweep_data import Where, counts
+from fecm._dataclasses import frozen
+from fecm._errors import warn
+from fecm._typing import Array, Bools, Floats, Indices
+from fecm.plot import style
+from fecm.plot.kinds import Picture, PlotError, Width
+from fecm.plot.sweep_data import (
+    DrawnVariable,
+    Where,
+    beyond,
+    case_counts,
+    case_rows,
+    ended,
+    names_in_words,
+    parameter_values,
+    quantity_of,
+    variable_of,
+)
 from fecm.sweeps.result import SweepResult
+
+if TYPE_CHECKING:
+    from matplotlib import collections
+    from matplotlib.axes import Axes
+
+
+MOST_CURVES = len(style.COLOURS)
+THRESHOLD = "delamination threshold"
+LEVEL_COLOUR = style.COLOURS[1]  # among colours
+# Looks of a level among curves, and of the points from a level on.
+LEVEL: style.Look = {"color": "0.2", "linestyle": style.DASHED, "linewidth": 1.1}
+RING: style.Look = {"ms": 4.2, "mfc": "none", "mec": LEVEL_COLOUR}
+
+
+@frozen
+class MarkedLevel:
+    """A value of the quantity to mark."""
+
+    value: float
+    is_threshold: bool = False  # of delamination
+
+    @property
+    def name(self) -> str:
+        """What the value is."""
+        return THRESHOLD if self.is_threshold else "level"
+
+
+@frozen
+class MapContents:
+    """Contents of a map."""
+
+    over: list[DrawnVariable]  # one or two parameters
+    shown: DrawnVariable  # quantity; NaN where a case has none
+    levels: list[MarkedLevel]
+    title: str  # values that select the cases; empty for all cases
+    other: DrawnVariable | None  # second varying parameter of a map over one
+    beyond: dict[str, Bools]  # by what they are: masks of the cases beyond the range of the model
+    ended: dict[str, Bools]  # the same of the cases whose contact is not over
+    # (cases,): delamination thresholds, if they differ and peak forces are shown; else empty.
+    thresholds: Floats
+
+
+@frozen
+class Graph:
+    """Axes, and what lies along them."""
+
+    axes: Axes
+    x: DrawnVariable
+    y: DrawnVariable
+
+    def label(self) -> None:
+        """Label the axes, but for texts in rows."""
+        self.x.mark(self.axes.xaxis)
+        if not self.y.ticks:
+            self.y.mark(self.axes.yaxis)
+
+
+class ValueGrid(NamedTuple):
+    """A quantity on a full grid of two parameters."""
+
+    x: Array  # (nx,), ascending
+    y: Array  # (ny,), ascending
+    values: np.ma.MaskedArray[tuple[int, ...], np.dtype[np.float64]]  # (ny, nx); masked: no value
+
+
+def value_grid(x: DrawnVariable, y: DrawnVariable, values: Floats) -> ValueGrid | None:
+    """Values of all cases as a full grid; None if the cases do not form one."""
+    columns, column = np.unique(x.values, return_inverse=True)
+    rows, row = np.unique(y.values, return_inverse=True)
+    places = row * len(columns) + column
+    if not np.array_equal(np.sort(places), np.arange(len(columns) * len(rows))):
+        return None
+    ordered = values[np.argsort(places)].reshape(len(rows), len(columns))
+    return ValueGrid(columns, rows, np.ma.masked_invalid(ordered))
+
+
+def choose(
+    sweep: SweepResult,
+    name: str,
+    *,
+    quantity: str,
+    over: Sequence[str],
+    where: Where,
+    level: Sequence[float],
+) -> MapContents:
+    """Select the contents of a map; warn of cases without a value.
+
+    Raises PlotError if the options do not fit the sweep, or no case remains.
+    """
+    rows = case_rows(sweep, name, where)
+    axes, other = _parameters(sweep, name, rows, over)
+    shown = quantity_of(sweep, name, rows, quantity)
+    levels = {value: MarkedLevel(value) for value in level}
+    thresholds: Floats = np.empty(0)
+    if shown.name == "peak_force" and "threshold_force" in sweep.summary:
+        thresholds = sweep["threshold_force"][rows]
+        highest = float(np.nanmax(thresholds))
+        if highest - np.nanmin(thresholds) <= 1e-9 * highest:
+            levels[highest] = MarkedLevel(highest, is_threshold=True)
+            thresholds = np.empty(0)
+    low, high = shown.range
+    for value in level:
+        if not low <= value <= high:
+            warn(
+                f"the level {value:g} is outside the picture's values, which range from {low:g} "
+                f"to {high:g}"
+            )
+    return MapContents(
+        over=axes,
+        shown=shown,
+        levels=list(levels.values()),
+        title=", ".join(f"{held} {_text(sweep, held, rows[0])}" for held in where),
+        other=other,
+        beyond=beyond(sweep, rows),
+        ended=ended(sweep, rows),
+        thresholds=thresholds,
+    )
+
+
+def _parameters(
+    sweep: SweepResult, name: str, rows: Indices, over: Sequence[str]
+) -> tuple[list[DrawnVariable], DrawnVariable | None]:
+    """Parameters of the axes, and the other one of a map over one; refuse hidden cases."""
+    varying = [n for n, values in sweep.cases.items() if len(np.unique(values[rows])) > 1]
+    axes = [
+        variable_of(sweep, parameter, sweep[parameter][rows])
+        for parameter in _names_of_axes(sweep, name, varying, over)
+    ]
+    others = [parameter for parameter in varying if parameter not in [axis.name for axis in axes]]
+    if not others:
+        return axes, None
+
+    vary = f"{names_in_words(others)} {'varies' if len(others) == 1 else 'vary'} too"
+    selects = f"--where {others[0]}=VALUE selects some of"
+    if len(axes) > 1:
+        points = np.column_stack([axis.values for axis in axes])
+        if len(np.unique(points, axis=0)) < len(points):
+            raise PlotError(f"{vary}, so that cases would hide one another; {selects} them")
+        return axes, None
+    other = variable_of(sweep, others[0], sweep[others[0]][rows])
+    if len(others) > 1 or len(other.ticks) > MOST_CURVES:
+        both = f"--over {axes[0].name},{others[0]} draws over both"
+        raise PlotError(f"{vary}; {selects} the cases, {both}")
+    return axes, other
+
+
+def _names_of_axes(
+    sweep: SweepResult, name: str, varying: list[str], asked: Sequence[str]
+) -> list[str]:
+    """One or two parameters of the axes."""
+    for parameter in asked:
+        if parameter not in varying and len(parameter_values(sweep, name, parameter)):
+            raise PlotError(f"{parameter} does not vary among the cases; a map needs one that does")
+    over = list(dict.fromkeys(asked)) or varying
+    if not over:
+        raise PlotError(f"nothing varies in {name}: all cases are equal")
+    if len(over) > 2:
+        raise PlotError(
+            f"a map has at most two axes, and {names_in_words(over)} vary; choose with "
+            "--over NAME or "
+            "NAME,NAME"
+        )
+    return over
+
+
+def _text(sweep: SweepResult, name: str, row: int) -> str:
+    """A value for a title."""
+    value = sweep[name][row]
+    if isinstance(value, str):
+        return str(value)
+    return style.scale(abs(float(value)), sweep.unit(name)).show(float(value))
+
+
+MANY = 10_000  # more cells or points are stored as an image in vector formats
+CONTOUR_LINES = 8  # approximately
+SHADES = 256  # of a colour map
+LEVEL_WIDTH = 1.2
+# Looks of the contour lines of levels, and of the numbers on contour lines.
+CONTOUR: style.Look = {
+    "colors": LEVEL_COLOUR,
+    "linestyles": [style.DASHED],
+    "linewidths": LEVEL_WIDTH,
+}
+NUMBER: style.Look = {"fontsize": 6.0, "inline_spacing": 2}
+
+
+def draw_field(graph: Graph, contents: MapContents) -> None:
+    """Draw the quantity by colours: cells if the cases form a full grid, else points."""
+    graph.label()
+    levels = [level.value for level in contents.levels]
+    grid = value_grid(graph.x, graph.y, contents.shown.values)
+    if grid is None:
+        _draw_points(graph, contents.shown, levels)
+    else:
+        _draw_cells(graph.axes, grid, contents.shown, levels, in_rows=bool(graph.y.ticks))
+
+
+def _draw_cells(
+    axes: Axes, grid: ValueGrid, shown: DrawnVariable, levels: Collection[float], *, in_rows: bool
+) -> None:
+    """Draw one cell per case, with contour lines unless the rows are texts."""
+    drawn = axes.pcolormesh(
+        *grid,
+        shading="nearest",
+        cmap=style.SEQUENTIAL,
+        norm=norm_of(shown),
+        edgecolor="face",
+        linewidth=0.1,
+        rasterized=grid.values.size > MANY,
+    )
+    draw_bar(axes, drawn, shown, levels)
+    if in_rows:
+        for level in levels:
+            _mark_crossings(axes, grid, level)
+        return
+
+    low, high = float(grid.values.min()), float(grid.values.max())
+    form = style.Multiple(shown.scale.factor)
+    if not shown.whole and low < high:
+        ticks = MaxNLocator(CONTOUR_LINES).tick_values(low, high)
+        apart = 0.3 * np.diff(ticks).min()  # the numbers of near lines would collide
+        inner = [
+            tick
+            for tick in ticks
+            if low < tick < high and all(abs(tick - level) > apart for level in levels)
+        ]
+        lines = axes.contour(*grid, inner, colors="white", linewidths=0.5)
+        axes.clabel(lines, fmt=form, **NUMBER)
+    inside = sorted({level for level in levels if low < level < high})
+    if inside:
+        lines = axes.contour(*grid, inside, **CONTOUR)
+        axes.clabel(lines, colors="white", fmt=form, **NUMBER)
+
+
+def _mark_crossings(axes: Axes, grid: ValueGrid, level: float) -> None:
+    """Mark where a row crosses a level, interpolated linearly between cases."""
+    x = grid.x
+    for row, values in zip(grid.y, grid.values.filled(np.nan) - level, strict=True):
+        before, after = values[:-1], values[1:]
+        passed = np.isfinite(before + after) & ((before < 0.0) != (after < 0.0))
+        share = before[passed] / (before[passed] - after[passed])
+        at = x[:-1][passed] + share * np.diff(x)[passed]
+        axes.vlines(at, row - 0.5, row + 0.5, color=LEVEL_COLOUR, linewidth=LEVEL_WIDTH)
+
+
+def _draw_points(graph: Graph, shown: DrawnVariable, levels: Collection[float]) -> None:
+    """Draw one coloured point per case; those above the lowest level have an edge."""
+    fine = np.isfinite(shown.values)
+    values = shown.values[fine]
+    drawn = graph.axes.scatter(
+        graph.x.values[fine],
+        graph.y.values[fine],
+        c=values,
+        s=14.0,
+        cmap=style.SEQUENTIAL,
+        norm=norm_of(shown),
+        linewidths=0.0,
+        rasterized=len(values) > MANY,
+    )
+    if levels:
+        drawn.set_linewidth(np.where(values >= min(levels), 0.9, 0.0).tolist())
+        drawn.set_edgecolor(LEVEL_COLOUR)
+    draw_bar(graph.axes, drawn, shown, levels)
+
+
+def norm_of(shown: DrawnVariable) -> Normalize:
+    """Colour scale of the values; counts have one colour each."""
+    low, high = shown.range
+    if shown.whole and high - low < SHADES - 1:
+        return BoundaryNorm(np.arange(low - 0.5, high + 1.0), SHADES)
+    return Normalize(low, high)
+
+
+def draw_bar(
+    axes: Axes, drawn: collections.Collection, shown: DrawnVariable, levels: Collection[float]
+) -> None:
+    """Draw the colour bar, with lines at levels."""
+    locator = MaxNLocator(6, integer=shown.whole)
+    bar = style.colour_bar(axes, drawn, shown.scale, shown.label, locator)
+    low, high = drawn.get_clim()
+    for level in levels:
+        if low <= level <= high:
+            bar.ax.axvline(level, color=LEVEL_COLOUR, linewidth=1.5)
+
+
+def mark_threshold_contours(graph: Graph, contents: MapContents) -> None:
+    """Mark the delamination thresholds of cases whose plates differ."""
+    axes, x, y = graph.axes, graph.x, graph.y
+    above = contents.shown.values - contents.thresholds
+    grid = value_grid(x, y, above)
+    if grid is None:
+        at = above >= 0.0
+        axes.plot(x.values[at], y.values[at], "o", label=f"from {THRESHOLD} on", **RING)
+    elif grid.values.min() < 0.0 < grid.values.max():
+        if y.ticks:
+            _mark_crossings(axes, grid, 0.0)
+        else:
+            axes.contour(*grid, [0.0], **CONTOUR)
+        name_level(graph, THRESHOLD)
+
+
+def name_level(graph: Graph, text: str) -> None:
+    """Name the lines of a level in the legend."""
+    line = style.SOLID if graph.y.ticks else style.DASHED
+    graph.axes.plot([], [], color=LEVEL_COLOUR, ls=line, lw=LEVEL_WIDTH, label=text)
+
+
+def name_levels(graph: Graph, contents: MapContents) -> list[str]:
+    """Name levels in the legend; return the note of a threshold that no colour reaches."""
+    shown, notes = contents.shown, []
+    low, high = shown.range
+    in_cells = value_grid(graph.x, graph.y, shown.values) is not None
+    lowest = min((level.value for level in contents.levels), default=0.0)
+    for level in contents.levels:
+        text = f"{level.name} {shown.scale.show(level.value)}"
+        inside = low < level.value < high
+        if inside and in_cells:
+            name_level(graph, text)
+        elif inside and level.value == lowest:
+            graph.axes.plot([], [], "o", label=f"from {text} on", **RING)
+        elif not inside and level.is_threshold:
+            side = "below" if high <= level.value else "above"
+            notes.append(f"all values of {shown.name} are {side} the {text}")
+    return notes
+
+
+MARKERS = "osD^vP*"
+
+
+def draw_curves(
+    x: DrawnVariable, texts: DrawnVariable, contents: MapContents, width: Width
+) -> Graph:
+    """Draw a curve of the quantity over x for each text."""
+    _, (axes,) = style.panels(width, tall=1.15)
+    looks = zip(texts.ticks, style.colours(), MARKERS, strict=False)
+    for here, (text, colour, marker) in zip(runs_in_order(x, texts), looks, strict=True):
+        values = contents.shown.values[here]
+        if not np.isnan(values).all():  # else they have failed
+            axes.plot(x.values[here], values, marker=marker, color=colour, ms=2.2, label=text)
+    graph = Graph(axes, x, contents.shown)
+    _finish(graph, contents)
+    return graph
+
+
+def draw_points(graph: Graph, contents: MapContents) -> None:
+    """Draw a point per case, coloured by the other parameter or joined to a curve."""
+    axes, x, y = graph.axes, graph.x, graph.y
+    if contents.other is not None:
+        drawn = axes.scatter(
+            x.values,
+            y.values,
+            c=contents.other.values,
+            s=9.0,
+            cmap=style.SEQUENTIAL,
+            norm=norm_of(contents.other),
+            linewidths=0.0,
+        )
+        draw_bar(axes, drawn, contents.other, [])
+    elif x is contents.shown:
+        axes.plot(x.values, y.values, "o", color=style.colours()[0], ms=3.5)
+    else:
+        (order,) = runs_in_order(x, None)
+        axes.plot(x.values[order], y.values[order], "o-", color=style.colours()[0], ms=2.5)
+    _finish(graph, contents)
+
+
+def runs_in_order(x: DrawnVariable, texts: DrawnVariable | None) -> list[Indices]:
+    """Cases in the order of x: those of every text, or all."""
+    order = np.argsort(x.values, kind="stable")
+    if texts is None:
+        return [order]
+    return [order[texts.values[order] == row] for row in range(len(texts.ticks))]
+
+
+def _finish(graph: Graph, contents: MapContents) -> None:
+    """Label the axes and mark the levels; the axis of the quantity begins at zero if it can."""
+    axes, shown = graph.axes, contents.shown
+    across = graph.x is shown
+    graph.label()
+    for level in contents.levels:
+        look = LEVEL | {"label": f"{level.name} {shown.scale.show(level.value)}"}
+        if not level.is_threshold:
+            look["linestyle"] = style.DOTTED
+        if across:
+            axes.axvline(level.value, **look)
+        else:
+            axes.axhline(level.value, **look)
+    lowest, highest = shown.range
+    if lowest >= 0.0:
+        thresholds = [level.value for level in contents.levels if level.is_threshold]
+        end = 1.05 * max(highest, *thresholds, 0.0) or 1.0  # with room for the markers
+        if across:
+            axes.set_xlim(0.0, end)
+        else:
+            axes.set_ylim(0.0, end)
+    if across:
+        axes.grid(axis="y", linewidth=0.4, color="0.85")
+        axes.set_axisbelow(True)
+
+
+def mark_threshold_curves(graph: Graph, contents: MapContents) -> None:
+    """Mark the delamination thresholds of cases whose plates differ."""
+    axes, x, y = graph.axes, graph.x, graph.y
+    thresholds = contents.thresholds
+    highest = 1.05 * float(np.nanmax(thresholds))
+    if x is contents.shown:
+        axes.set_xlim(right=max(axes.get_xlim()[1], highest))
+        axes.plot(thresholds, y.values, "|", color="0.2", ms=11.0, label=THRESHOLD)
+        return
+
+    axes.set_ylim(top=max(axes.get_ylim()[1], highest))
+    parameters = [*contents.over, contents.other]
+    texts = next((one for one in parameters if one is not None and one.ticks), None)
+    if texts is None and contents.other is not None:
+        axes.plot(x.values, thresholds, "_", color="0.2", label=THRESHOLD)
+        return
+    axes.plot([], [], label=THRESHOLD, **LEVEL)  # for the legend
+    for row, here in enumerate(runs_in_order(x, texts)):
+        look = LEVEL | ({"color": style.colours()[row]} if texts else {})
+        axes.plot(x.values[here], thresholds[here], **look)
+
 
 # Heights of a row of texts, of everything around the rows, and of a colour bar (in).
 ROW = 0.17
@@ -56,8 +498,8 @@ def parameter_map(
     ]
     style.footer(graph.axes, lines)
     if len(contents.thresholds):
-        (map_fields if by_colours else map_graphs).mark_thresholds(graph, contents)
-    notes = map_fields.name_levels(graph, contents) if by_colours else []
+        (mark_threshold_contours if by_colours else mark_threshold_curves)(graph, contents)
+    notes = name_levels(graph, contents) if by_colours else []
     if contents.title:
         graph.axes.set_title(contents.title, loc="left")
     figure = cast(Figure, graph.axes.figure)
@@ -65,7 +507,7 @@ def parameter_map(
     return Picture(figure, notes=notes)
 
 
-def _draw(contents: Contents, width: Width) -> Graph:
+def _draw(contents: MapContents, width: Width) -> Graph:
     """Draw the values: over one parameter as a graph, over two by colours or as curves."""
     shown, other = contents.shown, contents.other
     x, y = contents.over if len(contents.over) > 1 else (contents.over[0], shown)
@@ -74,7 +516,7 @@ def _draw(contents: Contents, width: Width) -> Graph:
 
     texts = other if y is shown else y  # of the curves
     if x is not shown and texts is not None and 0 < len(texts.ticks) <= MOST_CURVES:
-        return map_graphs.draw_curves(x, texts, contents, width)
+        return draw_curves(x, texts, contents, width)
 
     if y.ticks:  # in rows, the first at the top
         bar = 0.0 if x is shown and other is None else BAR
@@ -86,9 +528,9 @@ def _draw(contents: Contents, width: Width) -> Graph:
         _, (axes,) = style.panels(width, tall=1.0 if y is shown else 1.35)
     graph = Graph(axes, x, y)
     if len(contents.over) > 1:
-        map_fields.draw_field(graph, contents)
+        draw_field(graph, contents)
     else:
-        map_graphs.draw_points(graph, contents)
+        draw_points(graph, contents)
     return graph
 
 
@@ -97,4 +539,4 @@ def _mark_cases(graph: Graph, masks: Mapping[str, Bools], look: style.Look, sign
     if masks:
         some = np.logical_or.reduce(list(masks.values()))
         graph.axes.plot(graph.x.values[some], graph.y.values[some], **look)
-    return counts(masks, f"{sign} ")
+    return case_counts(masks, f"{sign} ")

@@ -40,7 +40,7 @@ MARKS: dict[Support, style.Look] = {
 }
 
 
-def supports(result: Result) -> dict[Support, Bools]:
+def support_masks(result: Result) -> dict[Support, Bools]:
     """Masks of the nodes held against bending, by kind of support; each (numnp,)."""
     held = result["mesh/equations"][:, 2:5] == 0
     w, rotations = held[:, 0], held[:, 1:]
@@ -60,7 +60,7 @@ def supports(result: Result) -> dict[Support, Bools]:
     }
 
 
-def mesh(
+def mesh_picture(
     results: Mapping[str, Result],
     *,
     at: Sequence[tuple[float, float]] = (),
@@ -68,7 +68,7 @@ def mesh(
 ) -> Picture:
     """Elements, supports, impact point, contact patch, and points to mark (`at`)."""
     ((name, result),) = results.items()
-    coordinates, _ = data.require(result, name, "mesh/coordinates", "mesh/elements")
+    coordinates, _ = data.require_datasets(result, name, "mesh/coordinates", "mesh/elements")
     cut = data.patches(result, 4, name)
     place = style.scale_of(results, "length", [coordinates])
     low, high = cut.points.min(axis=0), cut.points.max(axis=0)
@@ -78,7 +78,7 @@ def mesh(
     _colour_laminates(axes, result, name, cut)
     sides = [cut.points[edge] for edge in cut.edges]
     axes.add_collection(LineCollection(sides, colors="0.4", linewidths=0.4))
-    for support, nodes in supports(result).items():
+    for support, nodes in support_masks(result).items():
         if nodes.any():
             x, y = coordinates[nodes, :2].T
             axes.plot(x, y, ls="none", clip_on=False, label=support, **MARKS[support])
@@ -95,9 +95,9 @@ def mesh(
     return Picture(figure)
 
 
-def _curved(result: Result, name: str, place: style.Scale) -> str:
+def _curved(result: Result, name: str, place: style.AxisScale) -> str:
     """Title of a curved panel, which is seen from above: its radii and its rise."""
-    (z,) = data.require(result, name, "mesh/z")
+    (z,) = data.require_datasets(result, name, "mesh/z")
     named = [f"$R_{{{axis}}}$ {place.show(radius)}" for axis, radius in radii_of(result).items()]
     return ", ".join(["curved", *named, f"rise {place.show(float(np.ptp(z)))}"])
 
@@ -106,7 +106,7 @@ def _colour_laminates(axes: Axes, result: Result, name: str, cut: data.Patches) 
     """Fill the elements with a colour of their laminate, where there are several."""
     if "mesh/laminate" not in result:
         return
-    (of_elements,) = data.require(result, name, "mesh/laminate")
+    (of_elements,) = data.require_datasets(result, name, "mesh/laminate")
     rows = np.concatenate([block.rows for block, _ in cut.parts])
     numbers = np.unique(of_elements)
     shades = colormaps[style.SEQUENTIAL](np.linspace(1.0, 0.25, len(numbers)))
@@ -127,6 +127,6 @@ def _mark_load(axes: Axes, result: Result, name: str) -> None:
     if len(where):
         in_patch = data.circle(result, name) is not None
         mark: style.Look = {"marker": "+"} if in_patch else {"marker": "X", "mec": "white"}
-        mark["label"] = "impact" if data.deck_of(result, name).has(Impact) else "load"
+        mark["label"] = "impact" if data.result_deck(result, name).has(Impact) else "load"
         axes.plot(*where.T, color=style.COLOURS[1], ms=6.0, mew=0.5, ls="", clip_on=False, **mark)
     draw_circle(axes, result, name, color=style.COLOURS[1], label="contact patch")

@@ -22,10 +22,10 @@ from fecm._files import ARGUMENT, beside, check_outputs
 from fecm.plot.kinds import (
     KINDS,
     MISSING,
-    Kind,
     MatplotlibError,
-    Options,
     Picture,
+    PictureKind,
+    PictureOptions,
     PlotError,
     Shows,
 )
@@ -48,12 +48,14 @@ ANIMATION = ".gif"
 FRAMES_PER_SECOND = 15
 
 
-def kind_named(name: str) -> Kind:
+def kind_named(name: str) -> PictureKind:
     """Return the kind of this name, or raise a PlotError."""
     try:
-        return Kind(name)
+        return PictureKind(name)
     except ValueError:
-        others = did_you_mean(name, list(Kind)) or f"; the kinds are {', '.join(Kind)}"
+        others = (
+            did_you_mean(name, list(PictureKind)) or f"; the kinds are {', '.join(PictureKind)}"
+        )
         raise PlotError(f"unknown kind of picture {name!r}{others}") from None
 
 
@@ -86,7 +88,7 @@ def options_of(kind: str) -> list[str]:
     return options
 
 
-def check_options(kinds: Iterable[str], options: Iterable[str]) -> None:
+def check_picture_options(kinds: Iterable[str], options: Iterable[str]) -> None:
     """Refuse options that none of these kinds of picture takes."""
     kinds = list(kinds)
     taken = {option for kind in kinds for option in options_of(kind)}
@@ -122,7 +124,9 @@ def _source(result: Result | SweepResult | Location) -> str:
     return SOURCES[Shows.SWEEP if isinstance(result, SweepResult) else Shows.LOCATION]
 
 
-def _check_source(kind: Kind, results: Mapping[str, Result | SweepResult | Location]) -> None:
+def _check_source(
+    kind: PictureKind, results: Mapping[str, Result | SweepResult | Location]
+) -> None:
     """Refuse a result that this kind can't show, such as that of a sweep for a kind of runs."""
     for name, result in results.items():
         what = _source(result)
@@ -136,7 +140,7 @@ def draw(
     kind: str,
     results: Mapping[str, Result | SweepResult | Location],
     style: Mapping[str, Any] | None = None,
-    **options: Unpack[Options],
+    **options: Unpack[PictureOptions],
 ) -> Picture:
     """Draw a picture of the kind from results by their names in the legend, and the kind's options.
 
@@ -147,7 +151,7 @@ def draw(
     chosen = kind_named(kind)
     if len(results) > 1 and KINDS[chosen].shows is not Shows.RUNS:
         raise PlotError(f"the kind {kind} shows one result; {len(results)} were given")
-    check_options([chosen], options)
+    check_picture_options([chosen], options)
     _check_source(chosen, results)
     # 0.3 s, and an extra that may be absent; so in the functions below.
     import matplotlib
@@ -159,14 +163,14 @@ def draw(
         return function_of(kind)(results, **options)
 
 
-def plot(
+def draw_results(
     kind: str,
     results: Mapping[str, Result | SweepResult | Location],
     path: str | Path | None = None,
     ax: Axes | None = None,
     *,
     overwrite: bool = False,
-    **options: Unpack[Options],
+    **options: Unpack[PictureOptions],
 ) -> Axes:
     """Draw one or more results: in a file, on given axes, or on a new figure of pyplot.
 
@@ -205,7 +209,7 @@ def plot(
     --------
     >>> plot("loop", {"lumped": one, "consistent": other}, "rods.pdf")  # doctest: +SKIP
     """
-    if kind not in list(Kind) and any(
+    if kind not in list(PictureKind) and any(
         isinstance(result, Container) and kind in result for result in results.values()
     ):
         raise PlotError(f"{kind} is no kind of picture but a quantity: give quantity={kind!r}")
@@ -215,7 +219,7 @@ def plot(
         check_suffix(kind, Path(path))
         check_outputs([Path(path)], overwrite, allowed_by=ARGUMENT)
         picture = draw(kind, results, **options)
-        save(picture, Path(path), overwrite=overwrite)
+        save_picture(picture, Path(path), overwrite=overwrite)
         return picture.figure.axes[0]
     function_of(kind)  # without matplotlib, this says what to install
     from matplotlib import pyplot
@@ -246,7 +250,7 @@ def check_suffix(kind: str, path: Path) -> None:
         raise PlotError(f"{path}: the kind {kind} is written as {' or '.join(suffixes)}")
 
 
-def save(
+def save_picture(
     picture: Picture,
     path: Path,
     *,

@@ -10,14 +10,13 @@ import numpy as np
 from fecm._dataclasses import frozen
 from fecm._typing import Indices
 from fecm.plot.kinds import LackingError, Picture, PlotError, Width
-from fecm.plot.map_contents import LEVEL
+from fecm.plot.maps import LEVEL
 from fecm.plot.style import WIDTHS, Look, colours, footer, legend, limit_count, lines_legend, panels
-from fecm.plot.sweep_data import Where, beyond, case_rows, counts, quantity_of, variable_of
-from fecm.sweeps.random_result import RandomResult
-from fecm.sweeps.random_tables import chance
+from fecm.plot.sweep_data import Where, beyond, case_counts, case_rows, quantity_of, variable_of
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.statistics import Indices as SobolIndices
-from fecm.sweeps.statistics import bounds
+from fecm.sweeps.statistics import RandomResult, exceedance_bounds
+from fecm.sweeps.summary import chance
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,7 +56,7 @@ class Draws:
 
     def say_doubts(self, axes: Axes) -> None:
         """Count the draws beyond the range of the model below a graph."""
-        footer(axes, counts(beyond(self.sweep, np.concatenate(list(self.rows.values())))))
+        footer(axes, case_counts(beyond(self.sweep, np.concatenate(list(self.rows.values())))))
 
 
 def _draws(results: Sweeps, where: Where | None) -> Draws:
@@ -107,7 +106,7 @@ def exceedance(
         axes.plot(values, above, color=colour, label=label or "_")
         for limit in limits:
             hits = np.array((values > limit).sum())
-            p, low, high = map(float, bounds(hits, np.array(count), np.array(open_ends)))
+            p, low, high = map(float, exceedance_bounds(hits, np.array(count), np.array(open_ends)))
             centre = p if np.isfinite(p) else (low + high) / 2.0
             interval = [[centre - low], [high - centre]]
             marker = "o" if np.isfinite(p) else "none"  # draws are open: only the interval is known

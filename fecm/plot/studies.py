@@ -1,31 +1,49 @@
-"""Pictures of tests: indentation (the report's figures 3.2 to 3.19), the rod (4.5 to 4.9)."""
+"""Pictures of tests: indentation (the report's figures 3.2 to 3.19), the rod (4.5 to 4.9).
+
+Pictures of waves in a laminate (the report's figures 2.4 to 2.12).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, cast
 
 import numpy as np
+from matplotlib.lines import Line2D
 
 from fecm._typing import Floats
 from fecm.deck.units import unit_of
 from fecm.plot import style
 from fecm.plot.kinds import Picture
-from fecm.studies.indentation_test.constants import Fit
-from fecm.studies.indentation_test.turns import Kind
-from fecm.studies.rod_test.calibration import Calibration
-from fecm.studies.rod_test.pulse_test import RodHistory
+from fecm.plot.style import (
+    COLOURS,
+    DASHED,
+    DOTTED,
+    SOLID,
+    Look,
+    Multiple,
+    limit_count,
+    panels,
+    scale_in,
+    styled,
+)
+from fecm.studies.indentation_test.constants import ContactLawFit
+from fecm.studies.indentation_test.turns import StretchKind
+from fecm.studies.rod_test.pulse_test import Calibration, RodHistory
+from fecm.studies.waves import FRONTS, MODES, Dispersion, Medium, WaveSurfaces
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
+    from matplotlib.projections.polar import PolarAxes
     from matplotlib.typing import LineStyleType
 
-COLOUR_OF = dict(zip(Kind, style.COLOURS, strict=False))
+
+COLOUR_OF = dict(zip(StretchKind, style.COLOURS, strict=False))
 POINTS = 100
 
 
-class Line(NamedTuple):
+class GraphLine(NamedTuple):
     """A line of a graph."""
 
     label: str
@@ -35,8 +53,8 @@ class Line(NamedTuple):
 
 
 @style.styled
-def fit_picture(
-    indentation: Floats, force: Floats, found: Fit, units: Mapping[str, str]
+def indentation_fit_picture(
+    indentation: Floats, force: Floats, found: ContactLawFit, units: Mapping[str, str]
 ) -> Picture:
     """Points of a test with the fitted curves, and permanent against largest indentation."""
     both = len(found.cycles) > 1
@@ -47,9 +65,9 @@ def fit_picture(
         figure, axes = style.panels("column", ratio=ratio)
     curves, p = found.solution.curves, found.solution.scaled
     labels = {
-        Kind.LOADING: "first loading",
-        Kind.FALLING: "unloading",
-        Kind.RISING: "reloading",
+        StretchKind.LOADING: "first loading",
+        StretchKind.FALLING: "unloading",
+        StretchKind.RISING: "reloading",
     }
     for number, stretch in enumerate(curves.division.stretches):
         colour, a = COLOUR_OF[stretch.kind], indentation[stretch.rows]
@@ -59,7 +77,7 @@ def fit_picture(
         )
         if number in curves.numbers(stretch.kind) and len(a):
             top = float(a.max())
-            if stretch.kind is Kind.FALLING:  # begin at the turning point
+            if stretch.kind is StretchKind.FALLING:  # begin at the turning point
                 top = max(top, found.solution.values[curves.layout.corners[stretch.begin]])
             x = np.linspace(max(0.0, a.min()), top, POINTS)
             y = curves.force * curves.stretch(p, number, x / curves.length)
@@ -75,7 +93,7 @@ def fit_picture(
     return Picture(figure)
 
 
-def _permanent(axes: Axes, found: Fit, length: style.Scale) -> None:
+def _permanent(axes: Axes, found: ContactLawFit, length: style.AxisScale) -> None:
     """Permanent against largest indentation (figure 3.6)."""
     pairs = [(cycle.alpha_m, cycle.alpha_0) for cycle in found.cycles]
     x, y, down, across = np.array([(m.value, o.value, o.error, m.error) for m, o in pairs]).T
@@ -124,7 +142,7 @@ def rigidity_picture(
 def _against_time(
     axes: Axes,
     time: Floats,
-    lines: Sequence[Line],
+    lines: Sequence[GraphLine],
     name: str,
     dimension: str,
     units: Mapping[str, str],
@@ -147,18 +165,18 @@ def pulse_picture(
     `filtered` are the filtered forces at the stations, (rows, stations).
     """
     figure, (above, below) = style.panels("column", 2, sharex=True)
-    forces = [Line("applied", history.applied, style.COLOURS[-1], style.DOTTED)]
+    forces = [GraphLine("applied", history.applied, style.COLOURS[-1], style.DOTTED)]
     for number, x in enumerate(history.stations):
         colour = style.COLOURS[number % (len(style.COLOURS) - 1)]
         place = f"at {x:.4g} {unit_of('length', dict(units))}".rstrip()
-        forces.append(Line(place, history.forces[:, number], colour))
+        forces.append(GraphLine(place, history.forces[:, number], colour))
         if filtered is not None:
             values = filtered[:, number]
-            forces.append(Line(f"{place}, filtered", values, colour, style.DASHED))
+            forces.append(GraphLine(f"{place}, filtered", values, colour, style.DASHED))
     _against_time(above, history.time, forces, "Force", "force", units)
     above.set_xlabel("")
     ends = [
-        Line(label, values, colour, line_style)
+        GraphLine(label, values, colour, line_style)
         for label, values, colour, line_style in zip(
             ("struck end", "middle", "far end"),
             history.accelerations.T,
@@ -183,7 +201,7 @@ def filter_picture(
     """
     figure, (axes,) = style.panels("column")
     looks = zip(named.items(), style.COLOURS, strict=False)
-    lines = [Line(name, values, colour) for (name, values), colour in looks]
+    lines = [GraphLine(name, values, colour) for (name, values), colour in looks]
     name = "Force" if dimension == "force" else next(reversed(list(named)[:-1])).capitalize()
     _against_time(axes, time, lines, style.literal(name), dimension, units)
     style.lines_legend(figure, axes)
@@ -206,7 +224,7 @@ def calibration_picture(
     handles += right.plot(v_a, v_f, "o", color=style.COLOURS[0], ms=2.0)
     ends = np.array([min(0.0, float(v_a.min())), max(0.0, float(v_a.max()))])
     handles += right.plot(ends, found.offset + found.slope * ends, color=style.COLOURS[-1])
-    peaks = float(time[-1]), style.peak(v_f), style.peak(v_a)
+    peaks = float(time[-1]), style.largest_absolute(v_f), style.largest_absolute(v_a)
     clock, f_scale, a_scale = map(style.scale, peaks, units)
     clock.name(left.xaxis, "Time")
     f_scale.name(left.yaxis, "$V_F$")
@@ -217,4 +235,109 @@ def calibration_picture(
     style.legend(figure, handles, labels)
     for text in figure.legends[0].get_texts():
         text.set_parse_math(True)
+    return Picture(figure)
+
+
+AROUND = np.arange(1441) / 4.0  # directions of the normals, degrees
+RAYS = 45.0  # degrees between the normals of the rays
+WORDS = {name: name.replace("_", " ").replace("in plane", "in-plane") for name in (*MODES, *FRONTS)}
+# A style per mode.
+DASHCUSPTED: LineStyleType = (0, (7, 1.5, 1, 1.5))
+DASHCUSPCUSPTED: LineStyleType = (0, (7, 1.5, 1, 1.5, 1, 1.5))
+DASHES = (SOLID, DASHED, DOTTED, DASHCUSPTED, DASHCUSPCUSPTED)
+CUSP: Look = {"ls": "", "marker": "o", "ms": 3.0, "mfc": "white", "mec": "black", "mew": 0.6}
+
+
+@styled
+def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
+    """Phase velocities and frequencies of all modes against the wavelength.
+
+    Velocities are divided by the transverse shear velocity, frequencies by that velocity over the
+    thickness, as in figures 2.4 and 2.5.  The axes end just above the in-plane modes and the
+    cut-off.
+    """
+    limit_count(len(curves), "directions")
+    unit = medium.shear_velocity
+    velocities = [curve.phase_velocity / unit for curve in curves]
+    frequencies = [c.angular_frequency * medium.laminate.thickness / unit for c in curves]
+    figure, axes = panels("full", 1, 2, ratio=0.66)
+    for curve, colour, *both in zip(curves, COLOURS, velocities, frequencies, strict=False):
+        for ax, values in zip(axes, both, strict=True):
+            for column, dashes in zip(values.T, DASHES, strict=True):
+                ax.plot(curve.wavelength, column, color=colour, ls=dashes)
+    angles = [f"{curve.angle:g}°" for curve in curves]
+    colours = [Line2D([], [], color=colour) for colour in COLOURS[: len(curves)]]
+    figure.legend(colours, angles, loc="outside upper left", ncols=4)
+    modes = [Line2D([], [], color="0.3", ls=dashes) for dashes in DASHES]
+    words = [WORDS[mode] for mode in MODES]
+    figure.legend(modes, words, loc="outside upper right", ncols=5, handlelength=2.6)
+    longest = max(float(curve.wavelength[-1]) for curve in curves)
+    for ax in axes:
+        ax.set(xlim=(0.0, longest), xlabel="Wavelength $\\lambda/h$")
+    top = 1.15 * max(float(values[:, 3:].max()) for values in velocities)
+    axes[0].set(ylim=(0.0, top), ylabel="Phase velocity $c/c_s$")
+    top = 2.6 * max(float(values[-1, 1:3].max()) for values in frequencies)
+    axes[1].set(ylim=(0.0, top), ylabel="Frequency $\\omega h/c_s$")
+    return Picture(figure)
+
+
+@styled
+def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
+    """Polar graphs of the normal velocities of in-plane and flexural fronts."""
+    fronts = surfaces.fronts(AROUND)
+    speed = scale_in(units, "length/time", fronts.velocity)
+    figure, axes = panels("full", 1, 2, ratio=1.16, projection="polar")
+    figure.set_layout_engine("constrained")
+    graphs = cast("list[PolarAxes]", axes)
+    for place, (front, colour) in enumerate(zip(FRONTS, COLOURS, strict=False)):
+        curve = np.deg2rad(fronts.normal), fronts.velocity[:, place]
+        graphs[0 if place < 2 else 1].plot(*curve, color=colour, label=WORDS[front])
+    for ax, title in zip(graphs, ("In-plane fronts", "Flexural fronts"), strict=True):
+        ax.set_title(speed.label(f"{title}: normal velocity"))
+        ax.set_rlim(0.0, 1.06 * float(fronts.velocity.max()))
+        ax.yaxis.set_major_formatter(Multiple(speed.factor))
+        ax.set_rlabel_position(112.5)
+        ax.tick_params(labelsize=6.5, pad=1)
+        ax.grid(lw=0.4, color="0.8")
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.07), ncols=3)
+    return Picture(figure)
+
+
+@styled
+def fronts_picture(
+    surfaces: WaveSurfaces, times: Sequence[float], radius: float, units: Mapping[str, str]
+) -> Picture:
+    """Fronts at several times with rays and cusps, one graph per mode."""
+    limit_count(len(times), "times")
+    fronts, some = surfaces.fronts(AROUND), surfaces.fronts(np.arange(0.0, 360.0, RAYS))
+    places = [fronts.positions(time, radius) for time in times]
+    ends = some.positions(0.0, radius), some.positions(max(times), radius)
+    turns = [surfaces.cusps(time, radius) for time in times]
+    length = scale_in(units, "length", *places)
+    clock = scale_in(units, "time", np.array(times))
+    around = np.linspace(0.0, 2.0 * np.pi, 181)
+    circle = radius * np.cos(around), radius * np.sin(around)
+    figure, axes = panels("full", 2, 3, ratio=0.95)
+    for mode, ax in enumerate(axes[:5]):
+        ax.plot(*circle, color="0.4", ls=DOTTED)
+        for start, end in zip(*(at[:, mode] for at in ends), strict=True):
+            ax.plot(*zip(start, end, strict=True), color="0.6", lw=0.5)
+        for at, colour in zip(places, COLOURS, strict=False):
+            ax.plot(*at[:, mode].T, color=colour)
+        dots = [(c.x, c.y) for found in turns for c in found if c.mode == FRONTS[mode]]
+        ax.plot(*np.reshape(dots, (-1, 2)).T, **CUSP)
+        ax.set_title(WORDS[FRONTS[mode]])
+        ax.locator_params(nbins=5)
+        ax.set_aspect("equal")
+        length.name(ax.xaxis, "$x$")
+        length.name(ax.yaxis, "$y$")
+    axes[5].set_axis_off()
+    handles = [Line2D([], [], color=colour) for _, colour in zip(times, COLOURS, strict=False)]
+    labels = [clock.show(time) for time in times]
+    handles += [Line2D([], [], color="0.4", ls=DOTTED), Line2D([], [], color="0.6", lw=0.5)]
+    labels += ["time 0", f"rays, normals {RAYS:g}° apart"]
+    if any(turns):
+        handles.append(Line2D([], [], **CUSP))
+        labels.append("cusps")
+    axes[5].legend(handles, labels, loc="center")
     return Picture(figure)

@@ -139,7 +139,7 @@ class Multiple(Formatter):
 
 
 @frozen
-class Scale:
+class AxisScale:
     """Scale of an axis: factor of the numbers at its ticks, and text of the unit."""
 
     factor: float
@@ -165,7 +165,7 @@ class Scale:
         return f"{self.factor * value:.4g}{times} {self.shown}".rstrip()
 
 
-def scale(peak: float, unit: str) -> Scale:
+def scale(peak: float, unit: str) -> AxisScale:
     """Scale for numbers up to `peak`, in powers of 1000; none for numbers near 1.
 
     Some units take a prefix (800 µs), others follow the power (1.3, 10⁻³ in).
@@ -174,39 +174,39 @@ def scale(peak: float, unit: str) -> Scale:
     if 1e-100 < peak < math.inf and not (1.0 if unit in PREFIXED else 0.1) <= peak < 1e4:
         power = thousands(peak)
     if name := with_prefix(unit, power):
-        return Scale(10.0**-power, name)
+        return AxisScale(10.0**-power, name)
     text = f"{unit[2:]}⁻¹" if unit.startswith("1/") else unit
     text = re.sub(r"\^(\d+)(?![\d.])", lambda found: found[1].translate(_SUPERSCRIPTS), text)
     power_of_ten = f"10{str(power).translate(_SUPERSCRIPTS)} " if power else ""
-    return Scale(10.0**-power, f"{power_of_ten}{text.replace('*', '·')}".strip())
+    return AxisScale(10.0**-power, f"{power_of_ten}{text.replace('*', '·')}".strip())
 
 
-def open_ends(results: Mapping[str, Result]) -> str:
+def open_ends_note(results: Mapping[str, Result]) -> str:
     """Say that contacts last to the end; name the results unless all do.  Empty if none does."""
     named = [name for name, result in results.items() if result.still_in_contact]
     which = f" ({', '.join(named)})" if len(named) < len(results) else ""
     return f"still in contact at the end{which}" if named else ""
 
 
-def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Array]) -> Scale:
+def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Array]) -> AxisScale:
     """Scale for arrays of one dimension, in the results' unit if all name it; units must agree."""
     units = {name: unit_of(dimension, result.units) for name, result in results.items()}
     named = {unit: name for name, unit in units.items() if unit}
     if len(named) > 1:
         units_in = " and ".join(f"{unit} in {name}" for unit, name in named.items())
         raise PlotError(f"the results can't share axes: the unit of {dimension} is {units_in}")
-    return scale(peak(*arrays), "" if "" in units.values() else next(iter(named)))
+    return scale(largest_absolute(*arrays), "" if "" in units.values() else next(iter(named)))
 
 
-def peak(*arrays: Array) -> float:
+def largest_absolute(*arrays: Array) -> float:
     """Largest finite absolute value of arrays; 0 if there is none."""
     finite = (np.abs(array[np.isfinite(array)]) for array in arrays)
     return max((float(values.max(initial=0.0)) for values in finite), default=0.0)
 
 
-def scale_in(units: Mapping[str, str], dimension: str, *arrays: Array) -> Scale:
+def scale_in(units: Mapping[str, str], dimension: str, *arrays: Array) -> AxisScale:
     """Scale for arrays of one dimension, in named units."""
-    return scale(peak(*arrays), unit_of(dimension, dict(units)))
+    return scale(largest_absolute(*arrays), unit_of(dimension, dict(units)))
 
 
 def limit_count(count: int, what: str, most: int = len(COLOURS)) -> None:
@@ -295,7 +295,7 @@ def _figure_of(target: Axes, count: int, *, solid: bool) -> Figure:
 def colour_bar(
     axes: Axes | Sequence[Axes],
     drawn: Collection,
-    shown: Scale,
+    shown: AxisScale,
     name: str,
     locator: Locator,
     *,

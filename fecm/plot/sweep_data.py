@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from fecm._dataclasses import frozen
 from fecm._errors import did_you_mean, warn
 from fecm._typing import Array, Bools, Indices
+from fecm.authoring.values import NAMES, VARIABLES, ValueKind
 from fecm.plot import style
 from fecm.plot.kinds import PlotError
 from fecm.results.metrics import COLUMNS, VERDICTS
@@ -18,7 +19,6 @@ from fecm.results.metrics import INTEGERS as COUNTS
 from fecm.results.validity import MEANING, Reason, counted
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.summary import reasons
-from fecm.sweeps.values import NAMES, VARIABLES, Kind
 
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
@@ -36,7 +36,7 @@ LABELS = {
     "yc": "$Y_C$", "s12": "$S_{12}$", "s13": "$S_{13}$", "s23": "$S_{23}$",
     "max_indentation": "Largest indentation",
 }  # fmt: skip
-_NUMBERS_OF_NODES = (name for name, one in VARIABLES.items() if one.kind is Kind.INTEGER)
+_NUMBERS_OF_NODES = (name for name, one in VARIABLES.items() if one.kind is ValueKind.INTEGER)
 INTEGERS = (*_NUMBERS_OF_NODES, *COUNTS)
 STILL = "still in contact at the end"
 ENDED = "contact not over at the end"
@@ -44,11 +44,11 @@ Where = Mapping[str, float | str]  # values of parameters, by name, that select 
 
 
 @frozen
-class Variable:
+class DrawnVariable:
     """A parameter or quantity of cases, shown by an axis or by colours."""
 
     name: str
-    scale: style.Scale
+    scale: style.AxisScale
     values: Array  # (cases,): numbers; for texts their positions in `ticks`
     ticks: tuple[str, ...] = ()  # texts in the order of the cases; empty for numbers
 
@@ -76,16 +76,20 @@ class Variable:
             axis.set_major_locator(MaxNLocator(integer=True))
 
 
-def variable_of(sweep: SweepResult, name: str, values: Array) -> Variable:
+def variable_of(sweep: SweepResult, name: str, values: Array) -> DrawnVariable:
     """Variable of a parameter's or a quantity's values; counts are not scaled."""
-    plain = style.Scale(1.0, "")
+    plain = style.AxisScale(1.0, "")
     if values.dtype.kind == "U":
         ticks = tuple(dict.fromkeys(values.tolist()))
         places = {text: place for place, text in enumerate(ticks)}
-        return Variable(name, plain, np.array([places[text] for text in values.tolist()]), ticks)
+        return DrawnVariable(
+            name, plain, np.array([places[text] for text in values.tolist()]), ticks
+        )
     if name in INTEGERS:
-        return Variable(name, plain, values)
-    return Variable(name, style.scale(style.peak(values), sweep.unit(name)), values)
+        return DrawnVariable(name, plain, values)
+    return DrawnVariable(
+        name, style.scale(style.largest_absolute(values), sweep.unit(name)), values
+    )
 
 
 def case_rows(sweep: SweepResult, name: str, where: Where) -> Indices:
@@ -98,7 +102,7 @@ def case_rows(sweep: SweepResult, name: str, where: Where) -> Indices:
         else:
             kept &= _nearest_numbers(values, wanted, f"{name} has no {parameter} {wanted}")
     if not kept.any():
-        raise PlotError(f"{name} has no case with these values of {listed(where)}")
+        raise PlotError(f"{name} has no case with these values of {names_in_words(where)}")
     return np.flatnonzero(kept)
 
 
@@ -106,7 +110,7 @@ def _equal_texts(values: Array, wanted: float | str, otherwise: str) -> Bools:
     """Mask of the cases with a text; begin the refusal of another with `otherwise`."""
     chosen = np.asarray(values == str(wanted))
     if not chosen.any():
-        raise PlotError(f"{otherwise}; there is {listed(dict.fromkeys(values))}")
+        raise PlotError(f"{otherwise}; there is {names_in_words(dict.fromkeys(values))}")
     return chosen
 
 
@@ -126,17 +130,19 @@ def _nearest_numbers(values: Array, wanted: float | str, otherwise: str) -> Bool
 def parameter_values(sweep: SweepResult, name: str, parameter: str) -> Array:
     """Values of a parameter, (cases,); refuse one that the sweep does not have."""
     if parameter not in sweep.cases:
-        raise PlotError(f"{name} has no parameter {parameter}; it has {listed(sweep.cases)}")
+        raise PlotError(
+            f"{name} has no parameter {parameter}; it has {names_in_words(sweep.cases)}"
+        )
     return sweep.cases[parameter]
 
 
-def listed(names: Iterable[object]) -> str:
+def names_in_words(names: Iterable[object]) -> str:
     """Join names in words."""
     *most, last = map(str, names)
     return f"{', '.join(most)} and {last}" if most else last
 
 
-def quantity_of(sweep: SweepResult, name: str, rows: Indices, quantity: str) -> Variable:
+def quantity_of(sweep: SweepResult, name: str, rows: Indices, quantity: str) -> DrawnVariable:
     """Quantity to show of cases, NaN where a case has none; warn of cases that lack it.
 
     The default is the velocity found, or else the peak force.
@@ -144,7 +150,7 @@ def quantity_of(sweep: SweepResult, name: str, rows: Indices, quantity: str) -> 
     quantity = quantity or ("found_velocity" if "found_velocity" in sweep.summary else "peak_force")
     known = [name for name in sweep.summary if name not in VERDICTS]
     if quantity not in known:
-        others = did_you_mean(quantity, known) or f"; the sweep has {listed(known)}"
+        others = did_you_mean(quantity, known) or f"; the sweep has {names_in_words(known)}"
         raise PlotError(f"unknown quantity {quantity}{others}")
     fine = sweep.completed[rows]
     values = np.where(fine, sweep[quantity][rows].astype(float), np.nan)
@@ -195,6 +201,6 @@ def ended(sweep: SweepResult, rows: Indices) -> dict[str, Bools]:
     return {what: mask} if mask.any() else {}
 
 
-def counts(masks: Mapping[str, Bools], sign: str = "") -> list[str]:
+def case_counts(masks: Mapping[str, Bools], sign: str = "") -> list[str]:
     """Lines for below a picture: how many cases are what."""
     return [f"{sign}{what}: {mask.sum()} of {len(mask)} cases" for what, mask in masks.items()]

@@ -12,12 +12,12 @@ import numpy as np
 from fecm._errors import warn
 from fecm._typing import Array, Floats
 from fecm.mechanics.mesh import element_blocks, element_centres
-from fecm.mechanics.points import locate
+from fecm.mechanics.points import containing_elements
 from fecm.plot import style
-from fecm.plot.data import mesh_of, on_plate, reach, require
+from fecm.plot.data import mesh_of, on_plate, reach, require_datasets
 from fecm.plot.kinds import Picture, PlotError, Width
-from fecm.results.errors import NotStoredError, ResultFileError
-from fecm.results.plies import IN_PLANE, INTERLAMINAR, Plies, cure_stress_of, rows_at
+from fecm.results.groups import NotStoredError, ResultFileError
+from fecm.results.plies import IN_PLANE, INTERLAMINAR, PlyResults, cure_stress_of, rows_at
 from fecm.results.result import Result
 
 THIN = 0.6  # width of the line of residual stresses
@@ -90,7 +90,7 @@ def thickness(
     return Picture(figure)
 
 
-def _stresses(plies: Plies, point: int, result: Result) -> list[Stress]:
+def _stresses(plies: PlyResults, point: int, result: Result) -> list[Stress]:
     """Stresses at a point; those between the plies only where they are computed."""
     faces = plies.z[:, ::2]
     residual: list[Array | None] = [None] * 3
@@ -114,11 +114,11 @@ def _stresses(plies: Plies, point: int, result: Result) -> list[Stress]:
 
 def _chosen(
     result: Result, name: str, at: Sequence[tuple[float, float]], times: Sequence[float]
-) -> tuple[Plies, int]:
+) -> tuple[PlyResults, int]:
     """Plies of one element at one time, and the number of the point in it, from 0."""
     if len(at) > 1 or len(times) > 1:
         raise PlotError("the kind thickness shows one point at one time; give --at and --time once")
-    sigma, stored, numbers, near = require(
+    sigma, stored, numbers, near = require_datasets(
         result,
         name,
         "plies/sigma_1",
@@ -148,7 +148,7 @@ def _chosen(
     return _own(plies), int(point)
 
 
-def _own(plies: Plies) -> Plies:
+def _own(plies: PlyResults) -> PlyResults:
     """The plies of one element, without those that only other laminates have."""
     if plies.z.ndim == 2:
         return plies
@@ -165,7 +165,9 @@ def _nearest_element(mesh: tuple[Array, Floats], numbers: Array, at: Floats, nam
     on_plate(coordinates, at, name)
     distance = np.hypot(*(element_centres(elements, coordinates) - at).T)
     blocks = element_blocks(elements, coordinates)
-    inside = np.concatenate([block.rows[locate(block, at[None])[0]] for block in blocks])
+    inside = np.concatenate(
+        [block.rows[containing_elements(block, at[None])[0]] for block in blocks]
+    )
     if len(inside):
         return int(inside[distance[inside].argmin()])
     nearest = int(distance.argmin())
@@ -176,7 +178,7 @@ def _nearest_element(mesh: tuple[Array, Floats], numbers: Array, at: Floats, nam
     return nearest
 
 
-def _warn(result: Result, name: str, plies: Plies) -> None:
+def _warn(result: Result, name: str, plies: PlyResults) -> None:
     """Say what limits the stresses of an element."""
     element = f"element {plies.element[0]} of {name}"
     if plies.under_load[0]:

@@ -10,17 +10,17 @@ import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm._errors import OptionsError
-from fecm._processors import free
+from fecm._machine import free_processors
 from fecm._typing import Bools, Indices
 from fecm.deck import model
 from fecm.deck.macros import flat, moves_only
 from fecm.mechanics import contact_law
+from fecm.mechanics.failure import OwnCriterion
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
-from fecm.mechanics.impact_steps import ImpactSteps, supports
+from fecm.mechanics.impact_steps import ImpactSteps, can_step
 from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.kernels.strains import CompiledStrains
-from fecm.mechanics.mesh import Ints, Mesh
-from fecm.mechanics.own_criterion import OwnCriterion
+from fecm.mechanics.mesh import Ints, MeshArrays
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import Load, PlateMotion
 from fecm.mechanics.ply_stresses import PlyStresses
@@ -42,9 +42,9 @@ from fecm.problem.parts import (
 from fecm.problem.problem import ContactPatch, Problem
 
 if TYPE_CHECKING:
-    from fecm.mechanics.exposures import Places
+    from fecm.mechanics.exposures import PlyPoints
     from fecm.mechanics.failure_monitor import FailureMonitor
-    from fecm.mechanics.residual_stresses import Residual
+    from fecm.mechanics.ply_stresses import Residual
     from fecm.mechanics.stretching import Stretching
 
 ENERGY_LIMIT = 0.1  # relative error of the energy balance that ends a run
@@ -84,7 +84,7 @@ class RunOptions:
             raise OptionsError(f"energy_limit is {self.energy_limit:g}; it must be positive")
 
 
-def check_options(problem: Problem, options: RunOptions) -> None:
+def check_run_options(problem: Problem, options: RunOptions) -> None:
     """Raise OptionsError if a problem lacks what an option needs, or has what it excludes."""
     if options.criteria and not problem.work.passes["FAIL"]:
         names = ", ".join(one.name for one in options.criteria)
@@ -120,7 +120,7 @@ class ImpactModel:
     patch: ContactPatch | None
     plies: PlyStresses | None  # elements whose ply stresses are stored; None without PLYS
     failure: FailureMonitor | None  # failure criteria; None without FAIL
-    stress_places: Places | None  # of the points of these stresses; None without PLYS and FAIL
+    stress_places: PlyPoints | None  # of the points of these stresses; None without PLYS and FAIL
     # (numel, points): where plate theory does not hold; None without PLYS and FAIL.
     under_load: Bools | None
     # Residual stresses of the plies of each laminate; None without CURE.
@@ -154,9 +154,9 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     stress_points = plate.strain_field(problem.rules[2])
     places = under_load = None
     if {"PLYS", "FAIL"} & {macro.word for macro in flat(problem.program)}:
-        from fecm.mechanics.exposures import Places  # 1 ms, for stresses of plies only
+        from fecm.mechanics.exposures import PlyPoints  # 1 ms, for stresses of plies only
 
-        places = Places(*stress_points.places(mesh.coordinates))
+        places = PlyPoints(*stress_points.places(mesh.coordinates))
         under_load = problem.under_load(places.x, places.y)
     plies, failure = _stresses(problem, plate, motion, cure, chosen.criteria, under_load)
     read, station = (
@@ -164,7 +164,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         build_station(deck, rod, slips, is_own=chosen.projectile is not None),
     )
     steps = None
-    if impact is not None and supports(impact):
+    if impact is not None and can_step(impact):
         sums = None if read is None else motion.dof_sums(read.dof_indices, read.weights)
         steps = ImpactSteps(impact, sums, station.dof, workers.count)
     return ImpactModel(
@@ -190,7 +190,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     )
 
 
-def _mesh_with_rods_force(problem: Problem, slips: frozenset[str]) -> tuple[Mesh, float]:
+def _mesh_with_rods_force(problem: Problem, slips: frozenset[str]) -> tuple[MeshArrays, float]:
     """The mesh, and the share of the contact force that acts on it, 1 but for ``rod-force``.
 
     With that slip a FORC card may have replaced the unit force of ROD's dof, or added to it.
@@ -205,7 +205,9 @@ def _mesh_with_rods_force(problem: Problem, slips: frozenset[str]) -> tuple[Mesh
     return replace(problem.mesh, forces=forces), share
 
 
-def _plates(problem: Problem, mesh: Mesh, slips: frozenset[str]) -> tuple[PlateModel, PlateModel]:
+def _plates(
+    problem: Problem, mesh: MeshArrays, slips: frozenset[str]
+) -> tuple[PlateModel, PlateModel]:
     """The plate, and the plate with only the dofs free that the program moves."""
     if not slips & PLATE_SLIPS:
         return problem.plate, problem.moving_plate
@@ -223,7 +225,7 @@ def _motion(
     if moves_only(problem.program) and chosen.solver != CSR:
         reduced = symmetry_reduction(mobile, problem.contact)
     count = mobile.neq if reduced is None else reduced.count
-    workers = Workers(chosen.threads or (free() if count >= WORTH_SHARING else 1))
+    workers = Workers(chosen.threads or (free_processors() if count >= WORTH_SHARING else 1))
     return PlateMotion(mobile, chosen.solver, reduced, workers, problem.damping), workers
 
 
@@ -275,9 +277,9 @@ def _stresses(
         plies = made(rows)
     if "FAIL" in words:
         # Modules for FAIL only, 1 ms.
+        from fecm.mechanics.exposures import CircleStresses
         from fecm.mechanics.failure_monitor import Around, FailureMonitor
         from fecm.mechanics.kernels.failure import CompiledMonitor
-        from fecm.mechanics.load_circle import CircleStresses
 
         kind = CompiledMonitor if motion.solver == KERNELS else FailureMonitor
         strengths = strengths_of_deck(problem.deck)
@@ -309,7 +311,7 @@ def _stresses(
     return plies, failure
 
 
-def _gages(problem: Problem, mesh: Mesh, plate: PlateModel) -> GageArray | None:
+def _gages(problem: Problem, mesh: MeshArrays, plate: PlateModel) -> GageArray | None:
     """The strain gages; None without a GAGE segment."""
     if (cards := problem.deck.last(model.Gages)) is None:
         return None

@@ -20,12 +20,11 @@ from fecm.problem.generate import generate, rod_diameters
 from fecm.problem.parts import W, has_assumed_shear, is_curved
 from fecm.problem.problem import Problem
 from fecm.problem.rules import (
-    buckling,
+    cards,
     contact,
     cure,
     curvature,
     damage,
-    damping,
     gages,
     impact,
     laminate,
@@ -36,8 +35,6 @@ from fecm.problem.rules import (
     program,
     projectile,
     quadrature,
-    segments,
-    shear,
     time_step,
     units,
     zones,
@@ -61,7 +58,9 @@ ALONE: tuple[type[model.Segment], ...] = (
 ELEMENT_ERRORS = ("E303", "E304", "E305")  # after which the numbers of elements mean nothing
 
 
-def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) -> Problem | None:
+def check_problem(
+    problem: ParsedProblem, findings: Findings, *, listing: bool = False
+) -> Problem | None:
     """Check a problem, in listing mode or not; None without a control card."""
     deck, unsound = problem.deck, problem.unsound
     if deck is None:
@@ -72,7 +71,7 @@ def check(problem: ParsedProblem, findings: Findings, *, listing: bool = False) 
         return findings.error_count == before and not unsound
 
     compiled = compile_program(deck.macros, findings)
-    apply(segments.OF_SEGMENTS, findings, deck, unsound)
+    apply(cards.OF_SEGMENTS, findings, deck, unsound)
     checked = _generated(deck, compiled, unsound, findings, listing=listing)
     _check_each_segment(checked, findings, unsound)
     with np.errstate(all="ignore"):  # numbers out of range end in a finding
@@ -161,7 +160,7 @@ def check_segment(segment: model.Segment, findings: Findings) -> None:
         case model.Delamination():
             apply(damage.OF_DELAMINATION, findings, segment)
         case model.Damping():
-            apply(damping.OF_DAMPING, findings, segment)
+            apply(time_step.OF_DAMPING, findings, segment)
         case model.Preload():
             apply(preload.ALONE, findings, segment)
         case model.Curvature():
@@ -171,7 +170,7 @@ def check_segment(segment: model.Segment, findings: Findings) -> None:
         case model.Projectile():
             _check_projectile(segment, findings)
         case model.Shear():
-            apply(shear.OF_SHEAR, findings, segment)
+            apply(laminate.OF_SHEAR, findings, segment)
         case model.Units():
             apply(units.OF_NAMES, findings, segment)
 
@@ -221,7 +220,7 @@ def _check_run(checked: Problem, findings: Findings, sound: Callable[[], bool]) 
             apply(nonlinear.OF_SYMMETRY, findings, checked)
         if is_curved(checked.deck):
             apply(curvature.OF_SUPPORTS, findings, checked)
-        apply_first(buckling.OF_PRELOAD, findings, checked)
+        apply_first(preload.OF_BUCKLING, findings, checked)
         check_values(checked, findings)
         if time_step.takes_steps(checked):
             apply(time_step.OF_CONTACT, findings, checked)
@@ -235,7 +234,7 @@ def _check_time_step(checked: Problem, findings: Findings) -> None:
     """Compare every DT with the plate's critical time step, and with the rate of the damping."""
     if not time_step.takes_steps(checked):
         return
-    apply((*time_step.OF_ROUNDING, *damping.OF_TIME_STEP), findings, checked)
+    apply((*time_step.OF_ROUNDING, *time_step.OF_TIME_STEP), findings, checked)
     apply_first(time_step.OF_PLATE, findings, checked)
 
 
@@ -257,7 +256,7 @@ def check_values(checked: Problem, findings: Findings) -> None:
         apply(impact.NEIGHBOURS, findings, checked)
         apply(projectile.VALUES, findings, checked)
         apply(impact.VALUES, findings, checked)
-    apply_first(damping.VALUES, findings, checked)
+    apply_first(time_step.VALUES, findings, checked)
     apply_first(damage.STRENGTHS, findings, checked)
     apply(damage.VALUES, findings, checked)
     apply(cure.VALUES, findings, checked)

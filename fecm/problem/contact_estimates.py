@@ -10,7 +10,7 @@ import numpy as np
 from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.deck import model
-from fecm.mechanics.laminate import Laminate, effective_rigidity
+from fecm.mechanics.laminate import LaminateSection, effective_rigidity
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.stiffness_product import SAFE
@@ -23,7 +23,7 @@ from fecm.problem.parts import build_constants, build_projectile
 CLAMPED = 1.0 / (64.0 * 0.0056)
 
 
-def wave_impedance(laminate: Laminate) -> float:
+def wave_impedance(laminate: LaminateSection) -> float:
     """Force over velocity of a point of an infinite plate, 8 (m D*)^(1/2) (force*time/length)."""
     return 8.0 * math.sqrt(laminate.mass * effective_rigidity(laminate))
 

@@ -13,7 +13,7 @@ import fecm.deck.reader_rules
 import fecm.problem.check  # noqa: F401
 from fecm.deck.rules import RULES, Rule, Subject
 
-__all__ = ["RULES", "all_rules", "page"]
+__all__ = ["RULES", "all_rules", "findings_page"]
 
 HEAD = """\
 # Findings
@@ -30,7 +30,7 @@ def all_rules() -> list[Rule]:
     return sorted(RULES.values(), key=lambda rule: (rule.code[1:], "EWN".index(rule.code[0])))
 
 
-def page() -> str:
+def findings_page() -> str:
     """Text of the page in Markdown: a table for each subject."""
     lines = [HEAD]
     for subject in Subject:
@@ -46,4 +46,4 @@ def _row(rule: Rule) -> str:
 
 
 if __name__ == "__main__":
-    Path(sys.argv[1]).write_text(page(), encoding="utf-8")
+    Path(sys.argv[1]).write_text(findings_page(), encoding="utf-8")

@@ -12,7 +12,7 @@ import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
-from fecm.deck.findings import Findings, Place
+from fecm.deck.findings import CardPlace, Findings
 from fecm.deck.model import (
     Boundary,
     Coordinates,
@@ -27,7 +27,7 @@ from fecm.deck.model import (
     Record,
 )
 from fecm.deck.table import Table
-from fecm.mechanics.mesh import Ints, Mesh, equation_numbers
+from fecm.mechanics.mesh import Ints, MeshArrays, equation_numbers
 
 # Nodes that cards may generate or reset.
 GENERATED_PER_NODE = 10  # per node of the deck
@@ -41,7 +41,7 @@ class _Budget:
         self._limit = self._left = GENERATED_PER_NODE * nodes + GENERATED
         self._findings = findings
 
-    def covers(self, count: int, place: Callable[[], Place | None]) -> bool:
+    def covers(self, count: int, place: Callable[[], CardPlace | None]) -> bool:
         """Take `count` nodes off the budget; report the first card that exceeds it."""
         exceeded = self._left < 0
         self._left -= count
@@ -52,7 +52,9 @@ class _Budget:
         return self._left >= 0
 
 
-def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool = False) -> Mesh:
+def generate(
+    deck: Deck, findings: Findings | None = None, *, unit_force: bool = False
+) -> MeshArrays:
     """Generate nodes, elements, restraints and forces as the listing's GENVEC and PMESH do.
 
     The mesh is complete if there were no findings.  With `unit_force` the force of ROD's dof is set
@@ -78,7 +80,7 @@ def generate(deck: Deck, findings: Findings | None = None, *, unit_force: bool =
             forces[segment.node - 1, segment.dof - 1] = 1.0
         elif isinstance(segment, Elements):
             _step(elements, segment.records, noted)
-    return Mesh(coordinates, elements, codes, forces, equation_numbers(codes))
+    return MeshArrays(coordinates, elements, codes, forces, equation_numbers(codes))
 
 
 def restraint_codes(
@@ -124,7 +126,7 @@ class _Cards:
     values: Floats | Ints  # (cards, values)
     records: Sequence[Record]
 
-    def place(self, card: int, field: str) -> Place | None:
+    def place(self, card: int, field: str) -> CardPlace | None:
         """Place of a field of a card."""
         return self.records[card].place(field)
 
@@ -255,7 +257,7 @@ def _fill(elements: Ints, cards: _Cards, card: int, end: int) -> None:
     elements[number : end - 1] = generated
 
 
-def place_of_element(deck: Deck, number: int) -> Place | None:
+def place_of_element(deck: Deck, number: int) -> CardPlace | None:
     """Place of the card that defines or generates an element."""
     if (segment := deck.last(Elements)) is None:
         return None

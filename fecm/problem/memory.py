@@ -12,7 +12,7 @@ import math
 
 import numpy as np
 
-from fecm import _memory
+from fecm import _machine
 from fecm.deck.macros import every, flat
 from fecm.deck.model import Gages, Projectile
 from fecm.mechanics import interpolation
@@ -24,7 +24,7 @@ from fecm.mechanics.stiffness_product import AUTO, CSR, KERNELS, WORTH_GROUPING,
 from fecm.mechanics.strains import STRAINS
 from fecm.mechanics.time_step import PART
 from fecm.problem.problem import Problem
-from fecm.results.sinks import RowBuffer
+from fecm.results.hdf5_writer import RowBuffer
 
 NODE = 800  # bytes per node: mesh, state, fields, buffered rows
 PLACE = 60  # bytes per dof of an element: its indices, its forces, and the matrix that sums them
@@ -81,10 +81,10 @@ def needed_bytes(
     return total + held + STEP * checked.work.steps + 5 * RowBuffer.BYTES
 
 
-def check_memory(checked: Problem, *, solver: str = AUTO, in_memory: bool = False) -> None:
+def check_run_memory(checked: Problem, *, solver: str = AUTO, in_memory: bool = False) -> None:
     """Raise NotEnoughMemoryError for a run that needs more memory than is free."""
     remedy = "write it to a file, or store fewer rows" if in_memory else "take a coarser mesh"
-    _memory.check(
+    _machine.check_available_memory(
         "the run",
         lambda exact: needed_bytes(checked, solver=solver, in_memory=in_memory, exact=exact),
         lambda free: remedy,

@@ -1,19 +1,58 @@
-"""Sides of a plate's elements: its outline, its holes, and what lies outside its supports."""
+"""Distance between the supports of a plate.
+
+Sides of a plate's elements: its outline, its holes, and what lies outside its supports.
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from fecm._dataclasses import frozen
 from fecm._typing import Bools, Indices
-from fecm.mechanics.mesh import Ints, Mesh, element_blocks
+from fecm.mechanics.mesh import Ints, MeshArrays, element_blocks, extent
 from fecm.problem.parts import W
+
+# Most nodes whose distances are compared.
+FREE = 3000
+SUPPORTED = 300
+
+
+class Span(NamedTuple):
+    """Length to compare the thickness with."""
+
+    length: float
+    name: str  # what it is, in messages
+
+
+def unsupported(mesh: MeshArrays, load: tuple[float, float] | None) -> Span:
+    """Distance between supports that counts for bending.
+
+    Diameter of the largest circle around a node that has no node with restrained w in it and
+    reaches the load, if there is one: the shorter distance between two supported sides, the
+    diameter of a round window, twice the length of a cantilever.  Without supports the shorter
+    side of the plate.
+    """
+    places, held = mesh.coordinates[mesh.used], mesh.codes[mesh.used, W] != 0
+    free, supports = places[~held], places[held]
+    if not len(supports) or not len(free):
+        low, high = extent(places)
+        return Span(float((high - low).min()), "plate's shorter side")
+    free = free[:: -(-len(free) // FREE)]
+    supports = supports[:: -(-len(supports) // SUPPORTED)]
+    radii = np.hypot(*(free[:, None, :] - supports).transpose(2, 0, 1)).min(axis=1)
+    if load is not None:
+        reaching = np.hypot(*(free - load).T) <= radii
+        radii = radii[reaching] if reaching.any() else radii
+    return Span(2.0 * float(radii.max()), "distance between supports")
+
 
 MID_SIDES = 4  # column of the node between the first two corners
 
 
 @frozen
-class Sides:
+class PlateSides:
     """Sides of all elements, each once for every element that has it.
 
     Attributes
@@ -37,7 +76,7 @@ class Sides:
     is_held: Bools
 
 
-def element_sides(mesh: Mesh) -> Sides:
+def element_sides(mesh: MeshArrays) -> PlateSides:
     """Sides of the elements of a mesh."""
     corners, rows, held = [], [], []
     # Node 0 stands for an absent one, which does not decide.
@@ -54,10 +93,10 @@ def element_sides(mesh: Mesh) -> Sides:
     ends, elements = np.concatenate(corners), np.concatenate(rows)
     keys = ends[:, 0].astype(np.int64) * (len(mesh.coordinates) + 1) + ends[:, 1]
     _, numbers, counts = np.unique(keys, return_inverse=True, return_counts=True)
-    return Sides(ends, elements, numbers, counts[numbers] == 1, np.concatenate(held))
+    return PlateSides(ends, elements, numbers, counts[numbers] == 1, np.concatenate(held))
 
 
-def holes(mesh: Mesh) -> int:
+def holes(mesh: MeshArrays) -> int:
     """Count the holes of a plate: closed parts of its outline beyond one for each piece."""
     sides = element_sides(mesh)
     pieces, _ = _parts(len(mesh.elements), *_neighbours(sides, np.ones_like(sides.is_held)))
@@ -67,7 +106,7 @@ def holes(mesh: Mesh) -> int:
     return loops - pieces
 
 
-def outside_supports(mesh: Mesh) -> Bools:
+def outside_supports(mesh: MeshArrays) -> Bools:
     """Which elements lie outside the supports, as the rim of a plate on a window does.
 
     Lines of supports divide a plate into parts.  A part lies outside if no support holds its
@@ -94,7 +133,7 @@ def outside_supports(mesh: Mesh) -> Bools:
     return np.asarray((has_free_outline & ~has_held_outline)[part])
 
 
-def _neighbours(sides: Sides, passable: Bools) -> tuple[Indices, Indices]:
+def _neighbours(sides: PlateSides, passable: Bools) -> tuple[Indices, Indices]:
     """Rows of the two elements at every shared side that is passable."""
     shared = np.flatnonzero(passable & ~sides.is_outline)
     shared = shared[np.argsort(sides.numbers[shared], kind="stable")]

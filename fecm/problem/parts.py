@@ -15,11 +15,10 @@ from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Deck, RodDiameter
 from fecm.mechanics import contact_law
 from fecm.mechanics.contact_law import Number
-from fecm.mechanics.curvature import FLAT
 from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
-from fecm.mechanics.laminate import Laminate, laminate
-from fecm.mechanics.mesh import Ints, Mesh
+from fecm.mechanics.laminate import LaminateSection, laminate
+from fecm.mechanics.mesh import Ints, MeshArrays
 from fecm.mechanics.plate import UNLOADED, PlateModel
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
 from fecm.mechanics.projectile import (
@@ -32,10 +31,11 @@ from fecm.mechanics.projectile import (
     Transducer,
     report_rod,
 )
+from fecm.mechanics.strains import FLAT
 from fecm.problem.generate import rod_diameters
 
 if TYPE_CHECKING:
-    from fecm.mechanics.residual_stresses import Residual
+    from fecm.mechanics.ply_stresses import Residual
 
 # Dofs, from 0.
 W = 2
@@ -54,7 +54,7 @@ def rules(material: model.Material) -> tuple[Quadrature, Quadrature, Quadrature]
     return gauss(bending), gauss(shear), points
 
 
-def build_plate(deck: Deck, mesh: Mesh, slips: frozenset[str] = frozenset()) -> PlateModel:
+def build_plate(deck: Deck, mesh: MeshArrays, slips: frozenset[str] = frozenset()) -> PlateModel:
     """Build the plate of a deck with the active slips."""
     bending, shear, points = rules(deck.require(model.Material))
     first, *others = laminates_of_deck(deck, isotropic_g12="g12" in slips)
@@ -155,7 +155,7 @@ def _laminate_of(
     thickness: float | None,
     *,
     isotropic_g12: bool,
-) -> Laminate:
+) -> LaminateSection:
     chosen = [plies[layer.material] for layer in layers]
     if isotropic_g12:
         chosen = [_with_isotropic_g12(ply) if ply.e1 == ply.e2 else ply for ply in chosen]
@@ -168,14 +168,14 @@ def _with_isotropic_g12(ply: model.Ply) -> model.Ply:
     return replace(ply, g12=ply.e1 / (2.0 * (1.0 + ply.nu12)))
 
 
-def laminates_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> list[Laminate]:
+def laminates_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> list[LaminateSection]:
     """Laminates of a deck with its shear correction factor, that of MATE first.
 
     Raises LookupError without a MATE segment.
     """
     shear = deck.last(model.Shear) or model.Shear()
     material, plies = deck.require(model.Material), deck.plies
-    found: list[Laminate] = []
+    found: list[LaminateSection] = []
     for number, layers in deck.layers.items():
         total = material.integration.thickness if number == MATERIAL else None
         plain = _laminate_of(layers, plies, total, isotropic_g12=isotropic_g12)
@@ -184,11 +184,13 @@ def laminates_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> list[Lamina
     return found
 
 
-def residuals_of_deck(deck: Deck, laminates: Sequence[Laminate]) -> tuple[Residual, ...] | None:
+def residuals_of_deck(
+    deck: Deck, laminates: Sequence[LaminateSection]
+) -> tuple[Residual, ...] | None:
     """Residual stresses of the plies of each laminate of a deck; None without a CURE segment."""
     if (cure := deck.last(model.Cure)) is None:
         return None
-    from fecm.mechanics.residual_stresses import residual_stresses  # 0.3 ms, for CURE only
+    from fecm.mechanics.ply_stresses import residual_stresses  # 0.3 ms, for CURE only
 
     found: list[Residual] = []
     for layers, own in zip(deck.layers.values(), laminates, strict=True):

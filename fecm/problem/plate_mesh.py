@@ -35,8 +35,7 @@ from fecm.mechanics.joints import (
     representatives,
     sides_of_cells,
 )
-from fecm.problem.gmsh import physical_groups
-from fecm.problem.nastran import NastranError, read_nastran
+from fecm.problem.mesh_readers import NastranError, physical_groups, read_nastran
 
 Integers = NDArray[np.int_]
 # Kinds of cells by their number of nodes: meshio's name, which is that of the corners' number too.

@@ -15,11 +15,11 @@ from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, move
 from fecm.deck.model import Deck
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import CRITERIA, PlyExposure, largest_in_plies
-from fecm.mechanics.joints import Sides, coincident, sides_of
-from fecm.mechanics.laminate import Laminate, effective_rigidity, threshold_force
+from fecm.mechanics.joints import ElementSides, coincident, sides_of
+from fecm.mechanics.laminate import LaminateSection, effective_rigidity, threshold_force
 from fecm.mechanics.mesh import (
     ElementBlock,
-    Mesh,
+    MeshArrays,
     element_blocks,
     element_centres,
     extent,
@@ -28,19 +28,17 @@ from fecm.mechanics.mesh import (
 )
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.ply_stresses import uniform_stresses
-from fecm.mechanics.points import RADIUS_PER_THICKNESS, locate, patch_weights
+from fecm.mechanics.points import RADIUS_PER_THICKNESS, containing_elements, patch_weights
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.symmetry import half_turn_images, restrain_resting_dofs
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.contact_estimates import ContactStep, contact_step
-from fecm.problem.outline import outside_supports
+from fecm.problem.outline import Span, outside_supports, unsupported
 from fecm.problem.parts import W, build_plate, residuals_of_deck, rules, strengths_of_deck
-from fecm.problem.span import Span, unsupported
-from fecm.results.linear_plate import in_plane_of
-from fecm.results.validity import Judge
+from fecm.results.validity import Judge, in_plane_of
 
 if TYPE_CHECKING:
-    from fecm.mechanics.residual_stresses import Residual
+    from fecm.mechanics.ply_stresses import Residual
 
 
 @frozen
@@ -71,7 +69,7 @@ class Problem:
     """A checked problem; each part is built once, when it is first needed."""
 
     deck: Deck
-    mesh: Mesh
+    mesh: MeshArrays
     program: Body  # the macro program with nested loops
 
     def __getstate__(self) -> dict[str, object]:
@@ -89,7 +87,7 @@ class Problem:
         return element_blocks(self.mesh.elements, self.mesh.coordinates)
 
     @cached_property
-    def sides(self) -> Sides:
+    def sides(self) -> ElementSides:
         """Sides of the elements."""
         return sides_of(self.families, self.mesh.elements)
 
@@ -120,7 +118,7 @@ class Problem:
         return build_plate(self.deck, self.mesh)
 
     @property
-    def laminate(self) -> Laminate:
+    def laminate(self) -> LaminateSection:
         """The laminate of report mode under the load, with the shear correction factor."""
         return self.plate.laminates[self.laminate_number]
 
@@ -143,7 +141,7 @@ class Problem:
         rows = [
             int(family.rows[member])
             for family in self.families
-            for member in locate(family, np.array([place]))[0].tolist()
+            for member in containing_elements(family, np.array([place]))[0].tolist()
         ]
         return self._laminate_numbers[min(rows, default=0)]
 
@@ -174,7 +172,7 @@ class Problem:
         """Factor on the preload at which the plate buckles; infinite if that is far away."""
         if not self.plate.is_compressed:
             return math.inf
-        from fecm.mechanics.buckling import buckling_factor  # 0.3 ms, for PREL only
+        from fecm.mechanics.solutions import buckling_factor  # 0.3 ms, for PREL only
 
         return buckling_factor(self.plate)
 
@@ -286,7 +284,7 @@ class Problem:
         if self.patch is None:
             return 0.0
         place = np.array([[self.patch.x, self.patch.y]])
-        rows = [block.rows[locate(block, place)[0]] for block in self.families]
+        rows = [block.rows[containing_elements(block, place)[0]] for block in self.families]
         return float(self._longest_sides[np.concatenate(rows)].max(initial=0.0))
 
     @cached_property

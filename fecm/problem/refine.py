@@ -21,7 +21,7 @@ from fecm.deck.model import (
     Forces,
     Segment,
 )
-from fecm.mechanics.mesh import Ints, Mesh, element_blocks
+from fecm.mechanics.mesh import Ints, MeshArrays, element_blocks
 
 # Corners at the ends of each side, and the local coordinate that runs along it.
 _SIDES = ((0, 1), (1, 2), (2, 3), (3, 0))
@@ -32,7 +32,7 @@ class RefineError(FecmError, ValueError):
     """A mesh cannot be bisected."""
 
 
-def refined(deck: Deck, mesh: Mesh, marked: Bools | None = None) -> Deck:
+def refined_deck(deck: Deck, mesh: MeshArrays, marked: Bools | None = None) -> Deck:
     """Bisect elements of a deck with a mesh in both directions: all, or those marked, (numel,).
 
     Old nodes keep their numbers.  A new node is restrained where all nodes of its side, or of its
@@ -60,7 +60,7 @@ def refined(deck: Deck, mesh: Mesh, marked: Bools | None = None) -> Deck:
     return _rebuilt(deck, mesh, nodes, sorted(elements))
 
 
-def _split_sides(mesh: Mesh, marked: Bools) -> Bools:
+def _split_sides(mesh: MeshArrays, marked: Bools) -> Bools:
     """Whether each element is bisected along xi and along eta, (numel, 2)."""
     ends = np.sort(mesh.elements[:, _SIDES], axis=2)
     _, side = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
@@ -79,7 +79,7 @@ def _split_sides(mesh: Mesh, marked: Bools) -> Bools:
 class _Nodes:
     """Old and new nodes: coordinates, restraint codes and prescribed values."""
 
-    def __init__(self, mesh: Mesh) -> None:
+    def __init__(self, mesh: MeshArrays) -> None:
         self._mesh = mesh
         self._known: dict[Hashable, int] = {}
         self.coordinates = list(mesh.coordinates)
@@ -116,7 +116,9 @@ def _node_cards(values: Floats | Bools) -> Floats:
     return np.column_stack((np.arange(1, count + 1), np.zeros(count), values))
 
 
-def _rebuilt(deck: Deck, mesh: Mesh, nodes: _Nodes, elements: list[tuple[int, list[int]]]) -> Deck:
+def _rebuilt(
+    deck: Deck, mesh: MeshArrays, nodes: _Nodes, elements: list[tuple[int, list[int]]]
+) -> Deck:
     """The deck with other nodes and elements, each on a card of its own."""
     control = replace(deck.control, numnp=len(nodes.coordinates), numel=len(elements))
     children = np.zeros((len(elements), mesh.elements.shape[1]))

@@ -9,23 +9,22 @@ from dataclasses import replace
 import numpy as np
 
 from fecm._dataclasses import frozen
-from fecm._memory import format_bytes
+from fecm._machine import format_bytes
 from fecm._typing import Floats
 from fecm.deck.macros import flat
 from fecm.deck.model import Cure, Impact, Shear
 from fecm.deck.units import MASS, mass_in_si, unit_names, unit_of
 from fecm.deck.units import quantity as said_quantity
-from fecm.mechanics.curvature import surface
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
 from fecm.mechanics.solutions import SingularStiffnessError, compliance
 from fecm.mechanics.stiffness_product import SAFE
+from fecm.mechanics.strains import midplane_height
 from fecm.mechanics.time_step import taken_time_step
+from fecm.problem.estimates import MOST_SOLVED, resolution, said_error
 from fecm.problem.parts import W, build_projectile
 from fecm.problem.problem import Problem
-from fecm.problem.resolution import resolution, said_error
-from fecm.problem.rules.buckling import FEWEST_ELEMENTS
-from fecm.problem.static_plate import MOST_SOLVED
+from fecm.problem.rules.preload import FEWEST_ELEMENTS
 
 ROOM = 0.6  # share of the critical time step below which the step that DT 0 takes is shown
 LABEL_WIDTH = 20  # of the lines of a summary, at least
@@ -227,7 +226,7 @@ class ProblemSummary:
             velocity = quantity(self.velocity, "length/time")
             lines.insert(-1, f"  impact              {velocity}, {energy}")
         if self.buckling_factor is not None:
-            from fecm.mechanics.buckling import FAR  # 0.3 ms, for PREL only
+            from fecm.mechanics.solutions import FAR  # 0.3 ms, for PREL only
 
             far = math.isinf(self.buckling_factor)
             times = f"more than {FAR:g}" if far else f"{self.buckling_factor:.4g}"
@@ -257,7 +256,7 @@ class ProblemSummary:
         return "the plate is not held: no static deflection to compare with SHEA EQUI"
 
 
-def summarise(problem: Problem) -> ProblemSummary:
+def deck_summary(problem: Problem) -> ProblemSummary:
     """Summarise a problem without errors."""
     deck, plate, laminate = problem.deck, problem.plate, problem.laminate
     resolved = resolution(problem) if problem.has_impact else None
@@ -306,7 +305,7 @@ def summarise(problem: Problem) -> ProblemSummary:
 
 def _rise(plate: PlateModel) -> float:
     """Difference of the largest and the least height of a curved panel, length."""
-    return float(np.ptp(surface(plate.mesh.coordinates[plate.mesh.used], plate.curvature)))
+    return float(np.ptp(midplane_height(plate.mesh.coordinates[plate.mesh.used], plate.curvature)))
 
 
 def _matrix(name: str, values: Floats, unit: str) -> list[str]:

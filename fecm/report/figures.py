@@ -1,22 +1,31 @@
-"""Pictures of results inside a page."""
+"""Pictures of results inside a page.
+
+Picture of a laminate: its plies with their angles, the struck face on top.
+"""
 
 from __future__ import annotations
 
 import base64
 import io
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from matplotlib import colormaps, rc_context
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
 
-from fecm.plot.kinds import Kind, PlotError
+from fecm.deck.model import Layer
+from fecm.plot.kinds import PictureKind, PlotError
 from fecm.plot.pictures import draw
-from fecm.report.content import Block, Picture, shown
+from fecm.plot.style import RC, panels
+from fecm.report.content import PageBlock, PagePicture, value_with_unit
 from fecm.results.result import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
 
 LARGEST = 150_000  # bytes of a drawing in lines, above which it becomes pixels
 DOTS = 200  # of pixels, per inch
@@ -44,69 +53,106 @@ def _bytes(figure: Figure, form: str) -> bytes:
 
 
 def drawn(
-    kind: Kind,
+    kind: PictureKind,
     results: Mapping[str, Any],
     caption: str,
     alternative: str = "",
     *,
     wide: bool = False,
     **options: Any,
-) -> Iterator[Block]:
+) -> Iterator[PageBlock]:
     """A picture of a kind; nothing if the results lack what it shows."""
     with warnings.catch_warnings(action="ignore"):
         try:
             picture = draw(kind, results, **options)
         except PlotError:
             return
-    yield Picture(inside(picture.figure), alternative or caption, caption, wide)
+    yield PagePicture(inside(picture.figure), alternative or caption, caption, wide)
 
 
-def of_runs(results: Mapping[str, Result]) -> Iterator[Block]:
+def of_runs(results: Mapping[str, Result]) -> Iterator[PageBlock]:
     """Histories of one or more runs in the same pictures."""
-    histories: tuple[tuple[Kind, str, dict[str, Any]], ...] = (
-        (Kind.FORCE, "Contact force against time.", {}),
-        (Kind.LOOP, "Contact force against indentation.", {"against": "indentation"}),
+    histories: tuple[tuple[PictureKind, str, dict[str, Any]], ...] = (
+        (PictureKind.FORCE, "Contact force against time.", {}),
+        (PictureKind.LOOP, "Contact force against indentation.", {"against": "indentation"}),
         (
-            Kind.LOOP,
+            PictureKind.LOOP,
             "Contact force against the displacement of the projectile.",
             {"against": "displacement"},
         ),
-        (Kind.ENERGY, "Energies of plate and projectile against time.", {}),
-        (Kind.STRAIN, "Surface strain against time.", {}),
+        (PictureKind.ENERGY, "Energies of plate and projectile against time.", {}),
+        (PictureKind.STRAIN, "Surface strain against time.", {}),
     )
     for kind, caption, options in histories:
         yield from drawn(kind, results, _with_peaks(kind, caption, results), **options)
 
 
-def _with_peaks(kind: Kind, caption: str, results: Mapping[str, Result]) -> str:
+def _with_peaks(kind: PictureKind, caption: str, results: Mapping[str, Result]) -> str:
     """A caption with the peak forces of the results."""
-    if kind != Kind.FORCE:
+    if kind != PictureKind.FORCE:
         return caption
     peaks = []
     for name, result in results.items():
         if "history/force" in result and len(force := result["history/force"]):
-            size = shown(float(force.max()), result.unit("force"))
+            size = value_with_unit(float(force.max()), result.unit("force"))
             peaks.append(f"{name}: {size}" if len(results) > 1 else size)
     return f"{caption[:-1]}; largest force {', '.join(peaks)}." if peaks else caption
 
 
-def of_run(name: str, result: Result) -> Iterator[Block]:
+def of_run(name: str, result: Result) -> Iterator[PageBlock]:
     """Pictures of the plate of one run."""
     results = {name: result}
     if "history/plate_w" in result and "tape3/time" in result and len(result["tape3/time"]):
         time = float(result["history/time"][result["history/plate_w"].argmax()])
         stored = result["tape3/time"]
         near = float(stored[np.abs(stored - time).argmin()])
-        said = shown(near, result.unit("time"), 4)
+        said = value_with_unit(near, result.unit("time"), 4)
         caption = f"Deflection at the stored time nearest to its peak, {said}"
-        yield from drawn(Kind.CONTOUR, results, f"{caption}.", times=[near])
+        yield from drawn(PictureKind.CONTOUR, results, f"{caption}.", times=[near])
     yield from drawn(
-        Kind.FAILURE,
+        PictureKind.FAILURE,
         results,
         "Largest exposures over time: of the worst ply on the plate, and of every ply. "
         "Hatched points under the load are left out.",
         wide=True,
         width="full",
     )
-    yield from drawn(Kind.THICKNESS, results, "Ply stresses through the thickness.")
-    yield from drawn(Kind.MESH, results, "Mesh, supports, impact point and contact patch.")
+    yield from drawn(PictureKind.THICKNESS, results, "Ply stresses through the thickness.")
+    yield from drawn(PictureKind.MESH, results, "Mesh, supports, impact point and contact patch.")
+
+
+PERIOD = 180.0  # degrees after which a fibre direction repeats
+MOST_NAMED = 40  # plies that are labelled one by one
+PLY_HEIGHT = 0.13  # of a label (in)
+WIDTH = 3.5  # of the figure (in)
+HEIGHTS = (1.5, 5.5)  # smallest and largest height of the plies (in)
+
+
+def stack(layers: Sequence[Layer], names: Mapping[int, str]) -> Figure:
+    """Draw the plies from the struck face on, as high as they are thick.
+
+    `names` are those of the materials, by number; they are left out if there is one.
+    """
+    edges = np.concatenate([[0.0], np.cumsum([layer.thickness for layer in layers])])
+    several = len({layer.material for layer in layers}) > 1
+    height = float(np.clip(len(layers) * PLY_HEIGHT, *HEIGHTS)) + 0.3
+    colours = colormaps["twilight"]
+    with rc_context(RC):
+        figure, (axes,) = panels("column", ratio=height / WIDTH)
+        for layer, top, bottom in zip(layers, edges[:-1], edges[1:], strict=True):
+            colour = colours(0.15 + 0.7 * (layer.angle % PERIOD) / PERIOD)
+            axes.add_patch(
+                Rectangle((0.0, top), 1.0, bottom - top, fc=colour, ec="white", lw=0.5, alpha=0.6)
+            )
+            if len(layers) <= MOST_NAMED:
+                label = f"{layer.angle:g}°"
+                if several:
+                    label = f"{label}  {names.get(layer.material, layer.material)}"
+                middle = 0.5 * (top + bottom)
+                axes.text(0.5, middle, label, va="center", ha="center", fontsize=6.5)
+        axes.set_xlim(0.0, 1.0)
+        axes.set_ylim(edges[-1], 0.0)
+        axes.set_xticks([])
+        axes.spines["bottom"].set_visible(False)
+        axes.set_ylabel("depth from the struck face")
+    return figure

@@ -26,9 +26,15 @@ from fecm.deck.units import (
 from fecm.mechanics.projectile import RigidMass
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
-from fecm.report.content import Block, Cell, Number, Picture, number, table
-from fecm.report.figures import inside
-from fecm.report.stack import stack
+from fecm.report.content import (
+    Cell,
+    PageBlock,
+    PagePicture,
+    ShownNumber,
+    number_with_unit,
+    page_table,
+)
+from fecm.report.figures import inside, stack
 from fecm.results.result import Result
 from fecm.results.summary import radii_of
 
@@ -46,21 +52,21 @@ STRENGTHS = ("xt", "xc", "yt", "yc", "s12", "s13", "s23")
 LAW = (COEFFICIENT, "length", "", "")  # dimensions of the constants of EXPE
 
 
-def of_problem(result: Result, problem: Problem) -> Iterator[Block]:
+def of_problem(result: Result, problem: Problem) -> Iterator[PageBlock]:
     """Tables and pictures of a problem."""
     deck = problem.deck
-    yield from table(_plate(result, problem), caption="Plate")
+    yield from page_table(_plate(result, problem), caption="Plate")
     for number_of, layers in deck.layers.items():
         layup = layup_text([layer.angle for layer in layers])
         name = f"Laminate {number_of}: {layup}" if len(deck.layers) > 1 else f"Laminate {layup}"
         words = f"{name}, {len(layers)} plies, the struck face on top."
-        yield Picture(inside(stack(layers, material_names(deck))), words, words)
+        yield PagePicture(inside(stack(layers, material_names(deck))), words, words)
     yield from _materials(deck)
-    yield from table(_impact(result, deck), caption="Projectile and contact")
-    yield from table(_program(problem), caption="Program")
+    yield from page_table(_impact(result, deck), caption="Projectile and contact")
+    yield from page_table(_program(problem), caption="Program")
 
 
-def extent(problem: Problem) -> str:
+def plate_extent(problem: Problem) -> str:
     """Extent of the plate."""
     unit = unit_of("length", unit_names(problem.deck))
     low, high = (f(problem.mesh.coordinates[:, :2], axis=0) for f in (np.min, np.max))
@@ -70,16 +76,16 @@ def extent(problem: Problem) -> str:
 
 def _plate(result: Result, problem: Problem) -> Iterator[tuple[Cell, ...]]:
     """Plate, mesh, supports and what loads it."""
-    from fecm.plot.mesh import supports
+    from fecm.plot.mesh import support_masks
 
     deck, plate = problem.deck, problem.plate
     in_units = partial(_in_units, deck)
-    yield "extent", extent(problem)
+    yield "extent", plate_extent(problem)
     yield "thickness", in_units(problem.laminate.thickness, "length")
     control = deck.control
     yield "mesh", f"{control.numel} elements of up to {control.nen} nodes, {control.numnp} nodes"
     if "mesh/equations" in result:
-        held = {str(name): int(nodes.sum()) for name, nodes in supports(result).items()}
+        held = {str(name): int(nodes.sum()) for name, nodes in support_masks(result).items()}
         texts = [f"{count} nodes {name}" for name, count in held.items() if count]
         yield "supports", ", ".join(texts) or "none: the plate is free"
     for axis, radius in radii_of(result).items():
@@ -89,7 +95,7 @@ def _plate(result: Result, problem: Problem) -> Iterator[tuple[Cell, ...]]:
         yield "rise of the curved panel", rise
     yield "kinematics", "von Kármán: stretches as it bends" if plate.nonlinear else "linear"
     mass = plate.total_mass()
-    yield "mass", Number(mass, _mass(deck, mass))
+    yield "mass", ShownNumber(mass, _mass(deck, mass))
     for name, force in zip(("N0x", "N0y", "N0xy"), plate.preload, strict=True):
         if force:
             yield f"preload {name}", in_units(force, "force/length")
@@ -107,7 +113,7 @@ def _rounded(matrix: np.ndarray) -> np.ndarray:
     return np.where(np.abs(matrix) < 1e-9 * max(1.0, np.abs(matrix).max()), 0.0, matrix)
 
 
-def _materials(deck: model.Deck) -> Iterator[Block]:
+def _materials(deck: model.Deck) -> Iterator[PageBlock]:
     """Constants and strengths of the plies of every material."""
     plies = dict(sorted(deck.plies.items()))
     names = _headings(deck)
@@ -118,7 +124,7 @@ def _materials(deck: model.Deck) -> Iterator[Block]:
         (name, *(_in_units(deck, getattr(ply, name), dimension) for ply in plies.values()))
         for name, dimension in PLY
     ]
-    yield from table(rows, header, "Ply constants")
+    yield from page_table(rows, header, "Ply constants")
     if (strengths := deck.last(model.Allowables)) is None:
         return
     given = {one.material: one for one in (strengths, *strengths.others)}
@@ -129,7 +135,7 @@ def _materials(deck: model.Deck) -> Iterator[Block]:
         (name, *(_in_units(deck, getattr(one, name), MODULUS) for one in given.values()))
         for name in STRENGTHS
     ]
-    yield from table(rows, header, "Ply strengths")
+    yield from page_table(rows, header, "Ply strengths")
 
 
 def _headings(deck: model.Deck) -> dict[int, str]:
@@ -171,7 +177,7 @@ def _impact(result: Result, deck: model.Deck) -> Iterator[tuple[Cell, ...]]:
     if hits is None or law is None:
         return
     yield "projectile", hits.name
-    yield "mass", Number(hits.mass, _mass(deck, hits.mass))
+    yield "mass", ShownNumber(hits.mass, _mass(deck, hits.mass))
     yield "velocity", in_units(hits.velocity, "length/time")
     yield "energy", in_units(hits.energy, "force*length")
     if own := result.attributes.get("law"):
@@ -190,7 +196,7 @@ def _impact(result: Result, deck: model.Deck) -> Iterator[tuple[Cell, ...]]:
 def _program(problem: Problem) -> Iterator[tuple[Cell, ...]]:
     """Time steps and the words of the macro program."""
     steps = [m.value for m in flat(problem.program) if m.word == "DT"]
-    yield "impact steps", Number(problem.work.steps, str(problem.work.steps))
+    yield "impact steps", ShownNumber(problem.work.steps, str(problem.work.steps))
     if steps:
         yield "time step", _in_units(problem.deck, max(steps), "time")
     yield "macros", " ".join(dict.fromkeys(m.word for m in flat(problem.program)))
@@ -198,7 +204,7 @@ def _program(problem: Problem) -> Iterator[tuple[Cell, ...]]:
 
 def _in_units(deck: model.Deck, value: float, dimension: str) -> Cell:
     """A value in the units of the deck."""
-    return number(float(value), unit_of(dimension, unit_names(deck)), GIVEN)
+    return number_with_unit(float(value), unit_of(dimension, unit_names(deck)), GIVEN)
 
 
 def _mass(deck: model.Deck, mass: float) -> str:

@@ -8,9 +8,8 @@ from pathlib import Path
 
 from fecm._files import OPTION
 from fecm.identification.identify import Identification
-from fecm.report.content import Page
+from fecm.report.content import ReportError, ReportPage, check_page, write
 from fecm.report.identification import identification_page
-from fecm.report.page import ReportError, check_page, write
 from fecm.report.run import run_page
 from fecm.report.sweep import sweep_page
 from fecm.results.result import Result
@@ -25,7 +24,9 @@ def digest(path: Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
 
-def page_of(results: Mapping[str, Reported], digests: Mapping[str, str] | None = None) -> Page:
+def page_of(
+    results: Mapping[str, Reported], digests: Mapping[str, str] | None = None
+) -> ReportPage:
     """Page about the results of one or more runs, of one sweep, or of one fit, by their names.
 
     Raises ReportError if a sweep or a fit is not alone.
@@ -50,6 +51,6 @@ def write_report(
     overwrite: bool,
     allowed_by: str = OPTION,
 ) -> None:
-    """Write the page about results; see :func:`page_of` and :func:`fecm.report.page.write`."""
+    """Write the page about results; see :func:`page_of` and :func:`fecm.report.content.write`."""
     check_page(path, overwrite, allowed_by=allowed_by)
     write(page_of(results, digests), path, overwrite=overwrite)

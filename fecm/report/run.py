@@ -15,27 +15,32 @@ from fecm.problem.problem import Problem
 from fecm.report import figures
 from fecm.report.content import (
     UNKNOWN,
-    Block,
     Cell,
     Judgement,
     Judgements,
-    Level,
-    Number,
-    Page,
-    Section,
+    PageBlock,
+    PageSection,
+    ReportPage,
+    ShownNumber,
+    TrustLevel,
     listing,
-    notes,
-    number,
+    note_list,
+    number_with_unit,
+    page_table,
     sections,
-    shown,
-    table,
+    value_with_unit,
     worst,
 )
-from fecm.report.model import extent, impactor, of_problem
-from fecm.report.trust import judgements, problem_of
+from fecm.report.model import impactor, of_problem, plate_extent
+from fecm.report.trust import deck_problem, judgements
 from fecm.results.criteria import spelt
-from fecm.results.exposures import Failure, largest_exposures, verdict
-from fecm.results.first_failure import first_failures, threshold_energy
+from fecm.results.exposures import (
+    FailureVerdict,
+    failure_verdict,
+    first_failures,
+    largest_exposures,
+    threshold_energy,
+)
 from fecm.results.metrics import INTEGERS, METRICS
 from fecm.results.result import Result
 from fecm.results.summary import (
@@ -44,17 +49,17 @@ from fecm.results.summary import (
     elastic_doubt,
     later_contact,
     radii_of,
-    summary,
+    run_summary,
 )
 
 WORDS = {
-    Level.WITHIN: "All quantities are within the range of the model.",
-    Level.DOUBTFUL: "Some quantities are doubtful: see Trust.",
-    Level.OUTSIDE: "Some quantities are outside the range of the model: see Trust.",
+    TrustLevel.WITHIN: "All quantities are within the range of the model.",
+    TrustLevel.DOUBTFUL: "Some quantities are doubtful: see Trust.",
+    TrustLevel.OUTSIDE: "Some quantities are outside the range of the model: see Trust.",
 }
 
 
-def run_page(results: Mapping[str, Result], digests: Mapping[str, str]) -> Page:
+def run_page(results: Mapping[str, Result], digests: Mapping[str, str]) -> ReportPage:
     """Page about the results of one or more runs.
 
     Parameters
@@ -64,12 +69,12 @@ def run_page(results: Mapping[str, Result], digests: Mapping[str, str]) -> Page:
     digests : mapping of str to str
         SHA-256 of the files of results, by name; those in memory have none.
     """
-    loaded = {name: problem_of(result) for name, result in results.items()}
+    loaded = {name: deck_problem(result) for name, result in results.items()}
     problems = {name: problem for name, (problem, _) in loaded.items()}
     judged = {name: list(judgements(result, problems[name])) for name, result in results.items()}
     level = worst(one for some in judged.values() for one in some)
-    if level is Level.WITHIN and any(result.notes for result in results.values()):
-        level = Level.DOUBTFUL
+    if level is TrustLevel.WITHIN and any(result.notes for result in results.values()):
+        level = TrustLevel.DOUBTFUL
     if len(results) == 1:
         ((name, result),) = results.items()
         title = result.title or name
@@ -81,7 +86,9 @@ def run_page(results: Mapping[str, Result], digests: Mapping[str, str]) -> Page:
         verdict = [*said, WORDS[level]]
         body = _several(results, problems, judged)
     provenance = _provenance(results, digests)
-    return Page(title, tuple(verdict), level, (*body, *sections([("Provenance", provenance)])))
+    return ReportPage(
+        title, tuple(verdict), level, (*body, *sections([("Provenance", provenance)]))
+    )
 
 
 def _single(
@@ -90,12 +97,12 @@ def _single(
     problem: Problem | None,
     warnings: list[str],
     judged: list[Judgement],
-) -> tuple[Section, ...]:
+) -> tuple[PageSection, ...]:
     """Sections about one result."""
     named = {name: result}
-    trust: list[Block] = [Judgements(tuple(judged))] if judged else []
-    trust += notes(result.notes, "Notes of the run")
-    trust += notes(warnings, "Warnings about the deck")
+    trust: list[PageBlock] = [Judgements(tuple(judged))] if judged else []
+    trust += note_list(result.notes, "Notes of the run")
+    trust += note_list(warnings, "Warnings about the deck")
     return sections(
         [
             ("Trust", trust),
@@ -110,13 +117,13 @@ def _several(
     results: Mapping[str, Result],
     problems: Mapping[str, Problem | None],
     judged: Mapping[str, list[Judgement]],
-) -> tuple[Section, ...]:
+) -> tuple[PageSection, ...]:
     """Sections about several results, a column each."""
-    trust: list[Block] = []
+    trust: list[PageBlock] = []
     for name, result in results.items():
-        doubts = tuple(one for one in judged[name] if one.level is not Level.WITHIN)
+        doubts = tuple(one for one in judged[name] if one.level is not TrustLevel.WITHIN)
         trust += [Judgements(doubts, caption=name)] if doubts else []
-        trust += notes(result.notes, f"Notes of {name}")
+        trust += note_list(result.notes, f"Notes of {name}")
     models = {name: _model_row(one, problems[name]) for name, one in results.items()}
     names = list(dict.fromkeys(key for row in models.values() for key in row))
     rows = [(key, *(row.get(key, UNKNOWN) for row in models.values())) for key in names]
@@ -125,15 +132,15 @@ def _several(
             ("Trust", trust),
             ("Results", _results(results)),
             ("Pictures", _common_pictures(results)),
-            ("Model", table(rows, ("quantity", *results))),
+            ("Model", page_table(rows, ("quantity", *results))),
         ]
     )
 
 
-def _common_pictures(results: Mapping[str, Result]) -> list[Block]:
+def _common_pictures(results: Mapping[str, Result]) -> list[PageBlock]:
     """Histories of all results in the same pictures, which need the same units."""
     if len({tuple(one.units.items()) for one in results.values()}) > 1:
-        return notes(["The results have different units: they have no pictures in common."])
+        return note_list(["The results have different units: they have no pictures in common."])
     return list(figures.of_runs(results))
 
 
@@ -144,11 +151,11 @@ def _model_row(result: Result, problem: Problem | None) -> dict[str, Cell]:
     deck, units = problem.deck, unit_names(problem.deck)
     layers = deck.require(model.Material).layers
     row: dict[str, Cell] = {
-        "plate": extent(problem),
-        "thickness": number(problem.laminate.thickness, unit_of("length", units)),
+        "plate": plate_extent(problem),
+        "thickness": number_with_unit(problem.laminate.thickness, unit_of("length", units)),
         "layup": layup_text([layer.angle for layer in layers]),
         "kinematics": "von Kármán" if problem.plate.nonlinear else "linear",
-        "elements": Number(deck.control.numel, str(deck.control.numel)),
+        "elements": ShownNumber(deck.control.numel, str(deck.control.numel)),
     }
     if radii := radii_of(result):
         unit = unit_of("length", units)
@@ -157,9 +164,9 @@ def _model_row(result: Result, problem: Problem | None) -> dict[str, Cell]:
     if (hits := impactor(result, deck)) is not None:
         weight = mass_in_si(hits.mass, units) or f"{hits.mass:.5g}"
         row["projectile"] = hits.name
-        row["projectile mass"] = Number(hits.mass, weight)
-        row["velocity"] = number(hits.velocity, unit_of("length/time", units))
-        row["energy"] = number(hits.energy, unit_of("force*length", units))
+        row["projectile mass"] = ShownNumber(hits.mass, weight)
+        row["velocity"] = number_with_unit(hits.velocity, unit_of("length/time", units))
+        row["energy"] = number_with_unit(hits.energy, unit_of("force*length", units))
     return row
 
 
@@ -201,7 +208,7 @@ def _sentence(result: Result, problem: Problem | None) -> str:
             )
         parts.append(text)
     elif largest := largest_exposures(result):
-        is_open = verdict(largest) is Failure.OPEN
+        is_open = failure_verdict(largest) is FailureVerdict.OPEN
         open_words = "; finer meshes may (open)" if is_open else ""
         parts.append(f"no ply reaches an exposure of 1 on this mesh{open_words}")
     if problem is None:
@@ -222,23 +229,23 @@ def _scene(result: Result, problem: Problem) -> str:
     layup = layup_text([layer.angle for layer in deck.require(model.Material).layers])
     thickness = f"{problem.laminate.thickness:.4g} {unit_of('length', units)}".rstrip()
     return (
-        f"A mass of {weight} at {speed} ({energy}) on a plate of {extent(problem)}, "
+        f"A mass of {weight} at {speed} ({energy}) on a plate of {plate_extent(problem)}, "
         f"{thickness} of {layup}"
     )
 
 
-def _results(results: Mapping[str, Result]) -> list[Block]:
+def _results(results: Mapping[str, Result]) -> list[PageBlock]:
     """Metrics of impacts, or what the summary says of a result without impact."""
     if any(result.metrics for result in results.values()):
         return _metrics(results)
-    blocks: list[Block] = []
+    blocks: list[PageBlock] = []
     for name, result in results.items():
-        lines = ((line[:LABEL_WIDTH].strip(), line[LABEL_WIDTH:]) for line in summary(result))
-        blocks += table(lines, caption=f"Summary of {name}" if len(results) > 1 else "Summary")
+        lines = ((line[:LABEL_WIDTH].strip(), line[LABEL_WIDTH:]) for line in run_summary(result))
+        blocks += page_table(lines, caption=f"Summary of {name}" if len(results) > 1 else "Summary")
     return blocks
 
 
-def _metrics(results: Mapping[str, Result]) -> list[Block]:
+def _metrics(results: Mapping[str, Result]) -> list[PageBlock]:
     """Impact metrics with a column for each result."""
     metrics = {name: result.metrics for name, result in results.items()}
     rows: list[tuple[Cell, ...]] = []
@@ -253,11 +260,13 @@ def _metrics(results: Mapping[str, Result]) -> list[Block]:
             value = float(metrics[name].get(key, math.nan))
             whole = key in INTEGERS and math.isfinite(value)
             unit = unit_of(dimension, result.units)
-            cells.append(Number(value, f"{value:.0f}") if whole else number(value, unit))
+            cells.append(
+                ShownNumber(value, f"{value:.0f}") if whole else number_with_unit(value, unit)
+            )
         if key == "peak_force":
             description = f"{description}{_elastic_peaks(results)}"
         rows.append((key.replace("_", " "), *cells, description))
-    return table(rows, ("metric", *(results if len(results) > 1 else ("value",)), "meaning"))
+    return page_table(rows, ("metric", *(results if len(results) > 1 else ("value",)), "meaning"))
 
 
 def _elastic_peaks(results: Mapping[str, Result]) -> str:
@@ -277,38 +286,38 @@ def _lower_bound(result: Result) -> Cell:
     """Largest force of a run whose peak is open."""
     if result.end not in UNDECIDED:
         return UNKNOWN
-    return number(float(result["history/force"].max()), unit_of("force", result.units))
+    return number_with_unit(float(result["history/force"].max()), unit_of("force", result.units))
 
 
-def _threshold(result: Result) -> list[Block]:
+def _threshold(result: Result) -> list[PageBlock]:
     """Threshold of delamination with its band."""
     known = result.threshold
     if not known:
         return []
     unit = unit_of("force", result.units)
     rows: list[tuple[Cell, ...]] = [
-        ("threshold force", number(float(known["force"]), unit)),
+        ("threshold force", number_with_unit(float(known["force"]), unit)),
         ("number of delaminations", str(known.get("number", UNKNOWN))),
     ]
     if np.shape(known.get("band", 0)) == (2,):
-        low, high = (number(float(force), unit) for force in known["band"])
+        low, high = (number_with_unit(float(force), unit) for force in known["band"])
         rows += [
             ("one delamination in each interface of unlike plies", low),
             ("a single delamination", high),
         ]
     reached = float(known["time"])
     if math.isfinite(reached):
-        rows.append(("reached at time", number(reached, unit_of("time", result.units))))
+        rows.append(("reached at time", number_with_unit(reached, unit_of("time", result.units))))
         rows.append(
             (
                 "given up by then",
-                number(threshold_energy(result), unit_of("force*length", result.units)),
+                number_with_unit(threshold_energy(result), unit_of("force*length", result.units)),
             )
         )
-    return table(rows, caption="Delamination threshold")
+    return page_table(rows, caption="Delamination threshold")
 
 
-def _criteria(result: Result) -> list[Block]:
+def _criteria(result: Result) -> list[PageBlock]:
     """Largest exposure and first failure of every criterion."""
     length, time, force = (unit_of(name, result.units) for name in ("length", "time", "force"))
     first = {one.criterion: one for one in first_failures(result)}
@@ -318,21 +327,21 @@ def _criteria(result: Result) -> list[Block]:
         rows.append(
             (
                 spelt(one.criterion),
-                number(one.exposure),
+                number_with_unit(one.exposure),
                 one.mode,
                 one.where,
-                number(one.x, length),
-                number(one.y, length),
-                number(one.time, time),
-                UNKNOWN if reached is None else number(reached.time, time),
-                UNKNOWN if reached is None else number(reached.force, force, 4),
+                number_with_unit(one.x, length),
+                number_with_unit(one.y, length),
+                number_with_unit(one.time, time),
+                UNKNOWN if reached is None else number_with_unit(reached.time, time),
+                UNKNOWN if reached is None else number_with_unit(reached.force, force, 4),
             )
         )
     header = ("criterion", "exposure", "mode", "where", "x", "y", "time")
-    return table(rows, (*header, "1 at time", "1 at force"), "Largest exposures")
+    return page_table(rows, (*header, "1 at time", "1 at force"), "Largest exposures")
 
 
-def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> Iterator[Block]:
+def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> Iterator[PageBlock]:
     """Version, solver and checksums, and the decks."""
     import hashlib
 
@@ -346,7 +355,7 @@ def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> It
     }
     if digests:
         rows["result, SHA-256"] = [digests.get(name, "in memory") for name in results]
-    yield from table(
+    yield from page_table(
         ((key, *cells) for key, cells in rows.items()),
         ("", *results) if len(results) > 1 else (),
         "" if len(results) > 1 else "Versions and checksums",
@@ -357,4 +366,4 @@ def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> It
 
 def _said(result: Result, value: float, dimension: str) -> str:
     """A quantity in four digits."""
-    return shown(float(value), unit_of(dimension, result.units), 4)
+    return value_with_unit(float(value), unit_of(dimension, result.units), 4)

@@ -9,34 +9,32 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 
 from fecm.deck.units import quantity, short_name, unit_of
-from fecm.plot.kinds import Kind
+from fecm.plot.kinds import PictureKind
 from fecm.report import figures
 from fecm.report.content import (
     UNKNOWN,
-    Block,
     Cell,
     Judgement,
     Judgements,
-    Level,
-    Number,
-    Page,
+    PageBlock,
+    ReportPage,
+    ShownNumber,
+    TrustLevel,
     listing,
-    notes,
-    number,
+    note_list,
+    number_with_unit,
+    page_table,
     sections,
     share,
-    shown,
-    table,
+    value_with_unit,
     worst,
 )
 from fecm.results.metrics import RATIO, VERDICTS, described
 from fecm.results.validity import MEANING, Reason, counted
 from fecm.sweeps.random import Design
-from fecm.sweeps.random_result import RandomResult
-from fecm.sweeps.random_tables import MAIN, chance
 from fecm.sweeps.result import SweepResult
-from fecm.sweeps.statistics import QUANTILES
-from fecm.sweeps.summary import verdict
+from fecm.sweeps.statistics import QUANTILES, RandomResult
+from fecm.sweeps.summary import MAIN, chance, sweep_verdict
 
 FOUND = "found_velocity"
 PEAK = "peak_force"
@@ -47,28 +45,28 @@ MOST_VALUES = 8  # different values of a name that are listed one by one
 MOST_COMBINATIONS = 12  # of varied values, whose statistics are listed
 
 
-def sweep_page(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> Page:
+def sweep_page(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> ReportPage:
     """Page about the result of a sweep; `digests` is the SHA-256 of its file, by its name."""
     judged = list(_judgements(sweep))
     level = worst(judged)
     drawn = [] if sweep.random is None else _random(sweep, sweep.random)
     body = sections(
         [
-            ("Trust", [Judgements(tuple(judged)), *notes(sweep.notes, "Notes of the sweep")]),
+            ("Trust", [Judgements(tuple(judged)), *note_list(sweep.notes, "Notes of the sweep")]),
             ("Varied values", _varied(sweep)),
             ("Results", [*_extremes(sweep), *_convergence(sweep), *_reduced(sweep), *drawn]),
             ("Pictures", _pictures(name, sweep)),
             ("Provenance", _provenance(name, sweep, digests)),
         ]
     )
-    return Page(sweep.title or name, tuple(_sentences(sweep)), level, body)
+    return ReportPage(sweep.title or name, tuple(_sentences(sweep)), level, body)
 
 
 def _sentences(sweep: SweepResult) -> Iterator[str]:
     """What was varied, and what came of it."""
     what = FOUND if FOUND in sweep.summary else PEAK
     names = ", ".join(sweep.cases) or "nothing"
-    yield f"A sweep over {names}; {verdict(sweep)}."
+    yield f"A sweep over {names}; {sweep_verdict(sweep)}."
     if (random := sweep.random) is not None and not random.combinations:
         found = random.exceedance
         for row, (quantity, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
@@ -80,7 +78,7 @@ def _sentences(sweep: SweepResult) -> Iterator[str]:
     values = _fine(sweep, what)
     if np.isfinite(values).any():
         unit = sweep.unit(what)
-        ends = [shown(float(end), unit) for end in (np.nanmin(values), np.nanmax(values))]
+        ends = [value_with_unit(float(end), unit) for end in (np.nanmin(values), np.nanmax(values))]
         known = int(np.isfinite(values).sum())
         some = f" in the {known} of {len(values)} cases that have it" if known < len(values) else ""
         yield f"{what.replace('_', ' ').capitalize()}: {' to '.join(ends)}{some}."
@@ -96,24 +94,30 @@ def _judgements(sweep: SweepResult) -> Iterator[Judgement]:
     count = len(sweep)
     failed = int((~sweep.completed).sum())
     valid = int((sweep.validity == "ok").sum())
-    level = Level.WITHIN if valid == count else Level.DOUBTFUL
+    level = TrustLevel.WITHIN if valid == count else TrustLevel.DOUBTFUL
     words = "" if valid == count else f"{count - valid} doubtful or failed; the reasons follow"
-    yield Judgement(level, "cases without a doubt", Number(valid, f"{valid} of {count}"), words)
+    yield Judgement(
+        level, "cases without a doubt", ShownNumber(valid, f"{valid} of {count}"), words
+    )
     if failed:
         reasons = Counter(sweep["status"][~sweep.completed].tolist()).most_common(3)
         words = "; ".join(f"{times}: {reason}" for reason, times in reasons)
-        yield Judgement(Level.OUTSIDE, "failed", Number(failed, f"{failed} of {count}"), words)
+        yield Judgement(
+            TrustLevel.OUTSIDE, "failed", ShownNumber(failed, f"{failed} of {count}"), words
+        )
     for reason, some in counted(sweep.validity):
         cases = int(some.sum())
-        level = Level.DOUBTFUL if reason in ELASTIC else Level.OUTSIDE
-        yield Judgement(level, str(reason), Number(cases, f"{cases} of {count}"), MEANING[reason])
+        level = TrustLevel.DOUBTFUL if reason in ELASTIC else TrustLevel.OUTSIDE
+        yield Judgement(
+            level, str(reason), ShownNumber(cases, f"{cases} of {count}"), MEANING[reason]
+        )
     if still := int(sweep.still_in_contact.sum()):
         words = "what comes after the end is open"
-        size = Number(still, f"{still} of {count}")
-        yield Judgement(Level.DOUBTFUL, "still in contact at the end", size, words)
+        size = ShownNumber(still, f"{still} of {count}")
+        yield Judgement(TrustLevel.DOUBTFUL, "still in contact at the end", size, words)
 
 
-def _varied(sweep: SweepResult) -> list[Block]:
+def _varied(sweep: SweepResult) -> list[PageBlock]:
     """Names, numbers and ranges of the values of the cases."""
     laws = {} if sweep.random is None else sweep.random.design.laws
     rows: list[tuple[Cell, ...]] = []
@@ -127,12 +131,12 @@ def _varied(sweep: SweepResult) -> list[Block]:
             said = ", ".join(texts[:MOST_VALUES]) + (", …" if len(texts) > MOST_VALUES else "")
         else:
             said = f"{values.min():.6g} to {values.max():.6g}"
-        count = Number(len(different), str(len(different)))
+        count = ShownNumber(len(different), str(len(different)))
         rows.append((name, count, said, short_name(unit) or UNKNOWN))
-    return table(rows, ("name", "different values", "values", "unit"))
+    return page_table(rows, ("name", "different values", "values", "unit"))
 
 
-def _extremes(sweep: SweepResult) -> list[Block]:
+def _extremes(sweep: SweepResult) -> list[PageBlock]:
     """The cases with the smallest and the largest value of every quantity."""
     rows: list[tuple[Cell, ...]] = []
     for name, column in sweep.summary.items():
@@ -143,29 +147,35 @@ def _extremes(sweep: SweepResult) -> list[Block]:
             continue
         low, high = int(np.nanargmin(values)), int(np.nanargmax(values))
         unit = sweep.unit(name)
-        cells = [_case(sweep, low), number(float(values[low]), unit)]
+        cells = [_case(sweep, low), number_with_unit(float(values[low]), unit)]
         if values[high] > values[low]:
-            cells += [_case(sweep, high), number(float(values[high]), unit)]
+            cells += [_case(sweep, high), number_with_unit(float(values[high]), unit)]
         else:
-            cells += ["all cases", number(float(values[high]), unit)]
+            cells += ["all cases", number_with_unit(float(values[high]), unit)]
             cells[0] = "all cases"
         rows.append((name.replace("_", " "), cells[1], cells[0], cells[3], cells[2]))
     header = ("quantity", "smallest", "case", "largest", "case")
-    return table(rows, header, "Smallest and largest values of the cases that were run")
+    return page_table(rows, header, "Smallest and largest values of the cases that were run")
 
 
-def _convergence(sweep: SweepResult) -> list[Block]:
+def _convergence(sweep: SweepResult) -> list[PageBlock]:
     """Order, limit and error band of the quantities of a refinement study."""
     rows: list[tuple[Cell, ...]] = []
     for name, one in sweep.convergence.items():
         unit, finest = sweep.unit(name), float(sweep[name][-1])
-        sizes = (number(finest, unit), number(one.limit, unit), number(one.band, unit))
-        rows.append((name.replace("_", " "), *sizes, number(one.order, digits=3), one.remark))
+        sizes = (
+            number_with_unit(finest, unit),
+            number_with_unit(one.limit, unit),
+            number_with_unit(one.band, unit),
+        )
+        rows.append(
+            (name.replace("_", " "), *sizes, number_with_unit(one.order, digits=3), one.remark)
+        )
     header = ("quantity", "finest mesh", "limit", "band, ±", "observed order", "remark")
-    return table(rows, header, "Convergence with the mesh and the time step")
+    return page_table(rows, header, "Convergence with the mesh and the time step")
 
 
-def _reduced(sweep: SweepResult) -> list[Block]:
+def _reduced(sweep: SweepResult) -> list[PageBlock]:
     """Full runs beside the reduced model."""
     found = sweep.reduced
     if found is None:
@@ -176,7 +186,7 @@ def _reduced(sweep: SweepResult) -> list[Block]:
         for case, *pair in zip(found.columns["case"], *differences, strict=True)
     ]
     caption = f"Reduced model with {found.modes} modes: differences from full runs"
-    return table(rows, ("case", "peak force", "deflection"), caption)
+    return page_table(rows, ("case", "peak force", "deflection"), caption)
 
 
 def _case(sweep: SweepResult, case: int) -> str:
@@ -201,15 +211,15 @@ def _drawn(sweep: SweepResult, design: Design) -> Iterator[tuple[str, str]]:
         yield "cases", f"{len(sweep)}, all runs, also for indices and combinations"
 
 
-def _random(sweep: SweepResult, random: RandomResult) -> Iterator[Block]:
+def _random(sweep: SweepResult, random: RandomResult) -> Iterator[PageBlock]:
     """Design, statistics, probabilities and sensitivity indices of a random sweep."""
     design = random.design
-    yield from table(
+    yield from page_table(
         [
             ("design", str(design.kind)),
-            ("samples", Number(design.samples, str(design.samples))),
+            ("samples", ShownNumber(design.samples, str(design.samples))),
             *_drawn(sweep, design),
-            ("seed", Number(design.seed, str(design.seed))),
+            ("seed", ShownNumber(design.seed, str(design.seed))),
         ],
         caption="Random sweep",
     )
@@ -221,43 +231,47 @@ def _random(sweep: SweepResult, random: RandomResult) -> Iterator[Block]:
         yield from _exceedance(sweep, random, place, f"Probabilities{label}")
         yield from _indices(sweep, random, place, label)
     if count > MOST_COMBINATIONS:
-        yield from notes([f"{count - MOST_COMBINATIONS} more combinations are in the file"])
+        yield from note_list([f"{count - MOST_COMBINATIONS} more combinations are in the file"])
 
 
 def _statistics(
     sweep: SweepResult, random: RandomResult, place: tuple[int, ...], caption: str
-) -> list[Block]:
+) -> list[PageBlock]:
     """Mean, standard deviation and quantiles of the most important quantities."""
     rows: list[tuple[Cell, ...]] = []
     for name in (name for name in MAIN if name in random.statistics):
         own, unit = random.statistics[name], sweep.unit(name)
         values = [own.mean[place], own.standard_deviation[place], *own.quantiles[place]]
         draws = int(own.draws[place])
-        cells = [number(float(value), unit) for value in values]
-        rows.append((name.replace("_", " "), *cells, Number(draws, str(draws))))
+        cells = [number_with_unit(float(value), unit) for value in values]
+        rows.append((name.replace("_", " "), *cells, ShownNumber(draws, str(draws))))
     quantiles = [f"{100 * q:g} %" for q in QUANTILES]
-    return table(rows, ("quantity", "mean", "std. dev.", *quantiles, "draws"), caption)
+    return page_table(rows, ("quantity", "mean", "std. dev.", *quantiles, "draws"), caption)
 
 
 def _exceedance(
     sweep: SweepResult, random: RandomResult, place: tuple[int, ...], caption: str
-) -> list[Block]:
+) -> list[PageBlock]:
     """Probabilities that quantities exceed limits, with their intervals."""
     found = random.exceedance
     rows: list[tuple[Cell, ...]] = []
     for row, (name, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
         p, low, high, draws, is_open = (float(values[(*place, row)]) for values in found[2:])
-        level = "its threshold" if np.isnan(limit) else number(float(limit), sweep.unit(str(name)))
-        counts = [Number(value, f"{value:.0f}") for value in (draws, is_open)]
+        level = (
+            "its threshold"
+            if np.isnan(limit)
+            else number_with_unit(float(limit), sweep.unit(str(name)))
+        )
+        counts = [ShownNumber(value, f"{value:.0f}") for value in (draws, is_open)]
         chances = [share(value, 4) for value in (p, low, high)]
         rows.append((str(name).replace("_", " "), level, *chances, *counts))
     header = ("quantity", "exceeds", "probability", "from", "to (95 %)", "draws", "open")
-    return table(rows, header, caption)
+    return page_table(rows, header, caption)
 
 
 def _indices(
     sweep: SweepResult, random: RandomResult, place: tuple[int, ...], label: str
-) -> Iterator[Block]:
+) -> Iterator[PageBlock]:
     """Sobol' indices of the most important quantity."""
     name = next((name for name in MAIN if name in random.sensitivity), None)
     if name is None:
@@ -267,35 +281,37 @@ def _indices(
     for law, first, total, *intervals in zip(random.design.laws, *columns, strict=True):
         cells: list[Cell] = []
         for value, (low, high) in zip((first, total), intervals, strict=True):
-            cells += [number(value, digits=4), f"{low:.4g} to {high:.4g}"]
+            cells += [number_with_unit(value, digits=4), f"{low:.4g} to {high:.4g}"]
         rows.append((law, *cells))
     header = ("value", "first-order index", "95 %", "total index", "95 %")
-    yield from table(rows, header, f"Sensitivity of {name.replace('_', ' ')}{label}")
+    yield from page_table(rows, header, f"Sensitivity of {name.replace('_', ' ')}{label}")
 
 
-def _pictures(name: str, sweep: SweepResult) -> Iterator[Block]:
+def _pictures(name: str, sweep: SweepResult) -> Iterator[PageBlock]:
     """The map of a sweep; of a random one probabilities, indices and scatter."""
     named = {name: sweep}
     what = described(FOUND if FOUND in sweep.summary else PEAK).capitalize()
     if sweep.random is not None:
-        yield from figures.drawn(Kind.EXCEEDANCE, named, f"{what}: probability of exceedance.")
-        yield from figures.drawn(Kind.SENSITIVITY, named, f"{what}: sensitivity indices.")
-        yield from figures.drawn(Kind.SCATTER, named, f"{what} over the random values.")
+        yield from figures.drawn(
+            PictureKind.EXCEEDANCE, named, f"{what}: probability of exceedance."
+        )
+        yield from figures.drawn(PictureKind.SENSITIVITY, named, f"{what}: sensitivity indices.")
+        yield from figures.drawn(PictureKind.SCATTER, named, f"{what} over the random values.")
         return
-    yield from figures.drawn(Kind.MAP, named, f"{what} over the varied values.")
+    yield from figures.drawn(PictureKind.MAP, named, f"{what} over the varied values.")
 
 
-def _provenance(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> Iterator[Block]:
+def _provenance(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> Iterator[PageBlock]:
     """Checksums, time steps, and the deck."""
     text = sweep.deck_text
     unit = unit_of("time", sweep.units)
-    steps = [shown(dt, unit) for dt in np.unique(sweep.dt).tolist()]
+    steps = [value_with_unit(dt, unit) for dt in np.unique(sweep.dt).tolist()]
     rows: list[tuple[Cell, ...]] = [
-        ("cases", Number(len(sweep), str(len(sweep)))),
+        ("cases", ShownNumber(len(sweep), str(len(sweep)))),
         ("size of the time step", ", ".join(steps[:4]) + (", …" if len(steps) > 4 else "")),
         ("deck, SHA-256", hashlib.sha256(text.encode()).hexdigest()),
     ]
     if name in digests:
         rows.append(("result, SHA-256", digests[name]))
-    yield from table(rows, caption="Checksums")
+    yield from page_table(rows, caption="Checksums")
     yield listing("The deck", text)

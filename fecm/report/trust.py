@@ -9,26 +9,42 @@ import numpy as np
 
 from fecm.api import load_deck
 from fecm.deck.macros import flat
+from fecm.problem.estimates import ENOUGH_PER_WAVE, said_error
 from fecm.problem.problem import Problem
-from fecm.problem.resolution import ENOUGH_PER_WAVE, said_error
 from fecm.problem.slips import LISTING
-from fecm.problem.summary import summarise
-from fecm.report.content import UNKNOWN, Cell, Judgement, Level, Number, number, share
+from fecm.problem.summary import deck_summary
+from fecm.report.content import (
+    UNKNOWN,
+    Cell,
+    Judgement,
+    ShownNumber,
+    TrustLevel,
+    number_with_unit,
+    share,
+)
 from fecm.results.criteria import spelt
 from fecm.results.end import End
-from fecm.results.errors import ResultFileError
 from fecm.results.exposures import (
     FEWEST,
-    Failure,
+    FailureVerdict,
     evaluations_in_contact,
+    failure_verdict,
     largest_exposures,
-    verdict,
 )
-from fecm.results.linear_plate import CURVED
+from fecm.results.groups import ResultFileError
 from fecm.results.metrics import MOBILITY
 from fecm.results.result import Result
 from fecm.results.summary import UNDECIDED
-from fecm.results.validity import BENT, CROSSED, INDENTATION, SLOPE, STRAIN, Reason, reasons_of
+from fecm.results.validity import (
+    BENT,
+    CROSSED,
+    CURVED,
+    INDENTATION,
+    SLOPE,
+    STRAIN,
+    Reason,
+    reasons_of,
+)
 
 # Errors of the energy balance, relative to the energy put in, up to which it is fine.
 BALANCED = 1e-3
@@ -37,31 +53,31 @@ NOTABLE_SHEAR = 0.02
 SLOPES = "membrane/largest_slope"  # of a nonlinear plate, at the stored rows
 SO_FAR = "so far: the run ends before its peak"
 ENDS = {
-    End.OVER: (Level.WITHIN, "contact over", ""),
+    End.OVER: (TrustLevel.WITHIN, "contact over", ""),
     End.PASSED: (
-        Level.DOUBTFUL,
+        TrustLevel.DOUBTFUL,
         "in contact, peak passed",
         "what comes after the end is open: permanent indentation, rebound, energies",
     ),
     End.RISING: (
-        Level.OUTSIDE,
+        TrustLevel.OUTSIDE,
         "in contact, peak not reached",
         "the largest force is a lower bound of the peak; take more steps",
     ),
     End.BETWEEN: (
-        Level.OUTSIDE,
+        TrustLevel.OUTSIDE,
         "between two contacts",
         "the projectile still approaches: the largest force is a lower bound; take more steps",
     ),
     End.AGAIN: (
-        Level.OUTSIDE,
+        TrustLevel.OUTSIDE,
         "may touch again",
         "the projectile leaves slowly: the largest force is a lower bound; take more steps",
     ),
 }
 
 
-def problem_of(result: Result) -> tuple[Problem | None, list[str]]:
+def deck_problem(result: Result) -> tuple[Problem | None, list[str]]:
     """The problem of a result's deck, None if it can't be read, and the warnings about it."""
     try:
         loaded = load_deck(result.deck, result.mode)  # the text of a file could be another's path
@@ -78,11 +94,13 @@ def judgements(result: Result, problem: Problem | None) -> Iterator[Judgement]:
     reasons = reasons_of(result.validity)
     if problem is None:
         words = "the result holds no deck that can be read: mesh and limits are not judged"
-        yield Judgement(Level.DOUBTFUL, "deck", UNKNOWN, words)
+        yield Judgement(TrustLevel.DOUBTFUL, "deck", UNKNOWN, words)
     if result.notes and not result.validity:  # without impact, or of an older version
         count = len(result.notes)
         words = "what the run itself says of its range; see the notes"
-        yield Judgement(Level.OUTSIDE, "notes of the run", Number(count, str(count)), words)
+        yield Judgement(
+            TrustLevel.OUTSIDE, "notes of the run", ShownNumber(count, str(count)), words
+        )
     if result.end is not None:
         level, said, words = ENDS[result.end]
         yield Judgement(level, "end of the run", said, words)
@@ -106,18 +124,18 @@ def _reached(result: Result, problem: Problem, reasons: list[str]) -> Iterator[J
     if result.attributes_of("history").get(MOBILITY):
         if bent:
             words = "less the rigid motion of the plate; see the notes"
-            yield Judgement(Level.OUTSIDE, "deflection", f"beyond {limits.limit} h", words)
+            yield Judgement(TrustLevel.OUTSIDE, "deflection", f"beyond {limits.limit} h", words)
     else:
-        size = Number(w, f"{w:.3g} h")
+        size = ShownNumber(w, f"{w:.3g} h")
         if problem.plate.nonlinear:
             words = "the plate is nonlinear (von Kármán); its slope is the limit"
-            yield Judgement(Level.WITHIN, "deflection under the load", size, words)
+            yield Judgement(TrustLevel.WITHIN, "deflection under the load", size, words)
         else:
             words = f"a linear plate holds up to {limits.limit} h with these supports"
             if bent:
                 words = f"{words}; {limits.softness(max(w, limits.limit))}"
                 words = f"{words}; {CURVED}" if limits.curved else words
-            level = Level.OUTSIDE if bent else Level.WITHIN
+            level = TrustLevel.OUTSIDE if bent else TrustLevel.WITHIN
             yield Judgement(level, "deflection under the load", size, words)
     for reason, name, what, limit in (
         (Reason.STEEP, "slope", "the theory holds", f"up to {SLOPE}"),
@@ -126,27 +144,27 @@ def _reached(result: Result, problem: Problem, reasons: list[str]) -> Iterator[J
         if reason == Reason.STEEP and not problem.plate.nonlinear:
             continue
         beyond = reason in reasons
-        level = Level.OUTSIDE if beyond else Level.WITHIN
+        level = TrustLevel.OUTSIDE if beyond else TrustLevel.WITHIN
         place: Cell = "beyond the limit" if beyond else "below the limit"
         words = f"{what} {limit}"
         if reason == Reason.STEEP and SLOPES in result:
             largest = float(result[SLOPES].max(initial=0.0))
-            place = Number(largest, f"{largest:.3g}")
+            place = ShownNumber(largest, f"{largest:.3g}")
         elif beyond:
             words = f"{words}; the notes of the run have its size"
         yield Judgement(level, name, place, words)
     depth = float(result["history/indentation"].max(initial=0.0)) / limits.indented
-    level = Level.OUTSIDE if Reason.SOFT in reasons else Level.WITHIN
+    level = TrustLevel.OUTSIDE if Reason.SOFT in reasons else TrustLevel.WITHIN
     of_face = " of the struck face" if limits.struck else ""
     words = f"the contact law of a half-space holds up to {INDENTATION:g} h{of_face}"
-    yield Judgement(level, "indentation", Number(depth, f"{depth:.3g} h"), words)
+    yield Judgement(level, "indentation", ShownNumber(depth, f"{depth:.3g} h"), words)
 
 
 def _failure(result: Result) -> Iterator[Judgement]:
     """Exposures of the plies, and how often they were evaluated."""
     largest = largest_exposures(result)
     if not largest:
-        yield Judgement(Level.UNJUDGED, "failure of plies", UNKNOWN, "the deck has no FAIL")
+        yield Judgement(TrustLevel.UNJUDGED, "failure of plies", UNKNOWN, "the deck has no FAIL")
         return
     top = max(largest, key=lambda one: one.exposure)
     broken = top.exposure > CROSSED
@@ -155,18 +173,18 @@ def _failure(result: Result) -> Iterator[Judgement]:
     )
     if is_open := result.end in UNDECIDED and not broken:
         words = f"{words}; {SO_FAR}"
-    decided = verdict(largest) is not Failure.OPEN
+    decided = failure_verdict(largest) is not FailureVerdict.OPEN
     if not decided:
         words = f"{words}; finer meshes may decide otherwise: open"
-    level = Level.DOUBTFUL if broken or is_open or not decided else Level.WITHIN
-    yield Judgement(level, "largest exposure", number(top.exposure, digits=4), words)
+    level = TrustLevel.DOUBTFUL if broken or is_open or not decided else TrustLevel.WITHIN
+    yield Judgement(level, "largest exposure", number_with_unit(top.exposure, digits=4), words)
     count = evaluations_in_contact(result)
     if count is not None and "history/force" in result:
         few = count < FEWEST
         yield Judgement(
-            Level.DOUBTFUL if few else Level.WITHIN,
+            TrustLevel.DOUBTFUL if few else TrustLevel.WITHIN,
             "evaluations of FAIL during contact",
-            Number(count, str(count)),
+            ShownNumber(count, str(count)),
             f"below {FEWEST} the largest exposure may be missed" if few else "",
         )
 
@@ -176,36 +194,40 @@ def _threshold(result: Result) -> Iterator[Judgement]:
     if "history/force" not in result:
         return
     if not result.threshold:
-        yield Judgement(Level.UNJUDGED, "delamination", UNKNOWN, "the deck has no DELA")
+        yield Judgement(TrustLevel.UNJUDGED, "delamination", UNKNOWN, "the deck has no DELA")
         return
     ratio = float(result["history/force"].max(initial=0.0)) / float(result.threshold["force"])
     crossed = ratio > CROSSED
     is_open = result.end in UNDECIDED and not crossed
     words = "the run is elastic above the threshold" if crossed else SO_FAR if is_open else ""
-    level = Level.DOUBTFUL if crossed or is_open else Level.WITHIN
-    yield Judgement(level, "largest force over the threshold", number(ratio, digits=3), words)
+    level = TrustLevel.DOUBTFUL if crossed or is_open else TrustLevel.WITHIN
+    yield Judgement(
+        level, "largest force over the threshold", number_with_unit(ratio, digits=3), words
+    )
 
 
 def _mesh(problem: Problem) -> Iterator[Judgement]:
     """Mesh, time step, contact patch and shear stiffness."""
-    summary = summarise(problem)
+    summary = deck_summary(problem)
     if (count := summary.elements_per_wave) is not None:
         coarse = count < ENOUGH_PER_WAVE
         words = f"{ENOUGH_PER_WAVE} are enough for a peak"
         if summary.mesh_error is not None:
             words = f"{words}; {said_error(summary.mesh_error)}"
-        level = Level.DOUBTFUL if coarse else Level.WITHIN
-        yield Judgement(level, "elements per bending wave", number(count, digits=3), words)
+        level = TrustLevel.DOUBTFUL if coarse else TrustLevel.WITHIN
+        yield Judgement(
+            level, "elements per bending wave", number_with_unit(count, digits=3), words
+        )
     steps = [m.value for m in flat(problem.program) if m.word == "DT" and m.value > 0.0]
     if steps and math.isfinite(critical := summary.critical_time_step):
         ratio = max(steps) / critical
-        level = Level.WITHIN if ratio < 1.0 else Level.OUTSIDE
+        level = TrustLevel.WITHIN if ratio < 1.0 else TrustLevel.OUTSIDE
         yield Judgement(level, "time step", share(ratio), "of the critical one")
     if problem.contact is not None:
         yield _load(problem)
     if summary.equilibrium_change is not None:
         change = summary.equilibrium_change
-        level = Level.DOUBTFUL if abs(change) > NOTABLE_SHEAR else Level.WITHIN
+        level = TrustLevel.DOUBTFUL if abs(change) > NOTABLE_SHEAR else TrustLevel.WITHIN
         words = (
             "change of the static deflection by the shear stiffness from equilibrium (SHEA EQUI), "
             "which the deck leaves out"
@@ -218,9 +240,9 @@ def _load(problem: Problem) -> Judgement:
     name, patch = "contact force", problem.patch
     if patch is None:
         words = "the peak depends on the element under a point force; PATC gives it a size"
-        return Judgement(Level.DOUBTFUL, name, "at a point", words)
+        return Judgement(TrustLevel.DOUBTFUL, name, "at a point", words)
     ratio = patch.radius / problem.laminate.thickness
-    return Judgement(Level.WITHIN, name, Number(ratio, f"on a radius of {ratio:.3g} h"))
+    return Judgement(TrustLevel.WITHIN, name, ShownNumber(ratio, f"on a radius of {ratio:.3g} h"))
 
 
 def _numerical(result: Result) -> Iterator[Judgement]:
@@ -228,21 +250,21 @@ def _numerical(result: Result) -> Iterator[Judgement]:
     initial = result.attributes_of("energy").get("initial")
     if "energy/balance_error" in result and isinstance(initial, float) and initial > 0.0:
         worst = float(np.abs(result["energy/balance_error"]).max(initial=0.0)) / initial
-        level = Level.WITHIN if worst < BALANCED else Level.DOUBTFUL
-        size: Cell = Number(worst, f"{worst:.2g}")
+        level = TrustLevel.WITHIN if worst < BALANCED else TrustLevel.DOUBTFUL
+        size: Cell = ShownNumber(worst, f"{worst:.2g}")
         words = "largest error, of the energy put in"
         yield Judgement(level, "energy balance", size, words)
     count = result.attributes_of("history").get("unsettled_steps")
     if count:
         words = "the contact iteration did not converge; a smaller DT helps"
-        yield Judgement(Level.DOUBTFUL, "steps", Number(float(count), str(count)), words)
+        yield Judgement(TrustLevel.DOUBTFUL, "steps", ShownNumber(float(count), str(count)), words)
 
 
 def _mode(result: Result) -> Iterator[Judgement]:
     """Slips of the printed program that are active."""
     if result.mode == LISTING:
         words = "the printed program of 1982 with its slips, not the text of the report"
-        yield Judgement(Level.DOUBTFUL, "mode", "listing", words)
+        yield Judgement(TrustLevel.DOUBTFUL, "mode", "listing", words)
     elif result.slips:
         words = "active slips of the printed program of 1982"
-        yield Judgement(Level.DOUBTFUL, "slips", ", ".join(result.slips), words)
+        yield Judgement(TrustLevel.DOUBTFUL, "slips", ", ".join(result.slips), words)

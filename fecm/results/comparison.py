@@ -177,7 +177,7 @@ def _doubt_trigger(stored: Stored, measured: Measurement, clock: Floats) -> None
         )
 
 
-def compare(stored: Stored, measured: Measurement) -> Comparison:
+def compare_force(stored: Stored, measured: Measurement) -> Comparison:
     """Compare a result's force with a measured one, at the measured times of the run.
 
     Raises StudyError if the result has no impact, or fewer than two times are in both.

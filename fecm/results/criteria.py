@@ -40,11 +40,11 @@ def where(criterion: str, ply: int, materials: Sequence[str] = ()) -> str:
     >>> where("interlaminar", 3, ["2024-T3", "E-glass/MY750"])
     'interface of plies 3 (2024-T3) and 4 (E-glass/MY750)'
     """
-    words = plies_of(criterion, ply, materials)
+    words = plies_in_words(criterion, ply, materials)
     return f"interface of {words}" if criterion == INTERLAMINAR else words
 
 
-def plies_of(criterion: str, ply: int, materials: Sequence[str] = ()) -> str:
+def plies_in_words(criterion: str, ply: int, materials: Sequence[str] = ()) -> str:
     """The ply, or the plies of the interface, in words."""
     numbers = [ply, ply + 1] if criterion == INTERLAMINAR else [ply]
     names = [f" ({name})" for name in materials] or [""] * len(numbers)

@@ -7,8 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 from fecm._dataclasses import frozen
-from fecm._tables import html_table
-from fecm._text import printable, shown_apart
+from fecm._text import html_table, printable, shown_apart
 
 MAX = "max"  # the usual scale of differences, in words
 TEXT = "text"  # the type of a dataset of texts

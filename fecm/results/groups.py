@@ -1,8 +1,40 @@
-"""Groups of a run's result: what each holds, and the macro that stores it."""
+"""Errors of results: files that can't be read or written, and data that a result lacks.
+
+Groups of a run's result: what each holds, and the macro that stores it.
+
+Messages about datasets that a result does not have: similar names, or what stores them.
+
+A group of a result: its datasets as attributes.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Any, Protocol
+
 from fecm._dataclasses import frozen
+from fecm._errors import FecmError
+from fecm._text import html_table
+from fecm._typing import Array
+
+
+class ResultFileError(FecmError, ValueError):
+    """A file is not a readable result."""
+
+
+class NotStoredError(AttributeError, KeyError, ResultFileError):
+    """A result lacks a requested dataset."""
+
+    def __str__(self) -> str:
+        return str(self.args[0])
+
+
+class ResultWriteError(FecmError, OSError):
+    """A result can't be written."""
+
+
+class ExportError(FecmError, ValueError):
+    """A result lacks the data for an export, or the request is invalid."""
 
 
 @frozen
@@ -42,3 +74,137 @@ GROUPS = {
     "modes": GroupInfo("natural modes, found by EIGE", "EIGE"),
 }
 STORED_BY = {name: info.macro for name, info in GROUPS.items() if info.macro}
+
+
+def not_stored(asked: str, paths: Collection[str]) -> str:
+    """Message about a path that is no dataset of a result: what is, or what stores it."""
+    if members := sorted(path for path in paths if path.startswith(f"{asked}/")):
+        return f"{asked} is a group, not a dataset; its datasets are {', '.join(members)}"
+    group = asked.partition("/")[0]
+    known = any(path.startswith(f"{group}/") for path in paths)
+    more = suggestion(asked, paths) if known else remedy(asked) or suggestion(asked, paths)
+    return f"there is no {asked} in this result{more}"
+
+
+def suggestion(asked: str, paths: Iterable[str]) -> str:
+    """End of a message about a missing dataset or group: similar names, or the groups."""
+    import difflib  # 1 ms, only after a mistake
+
+    known = sorted({name for path in paths for name in (path, path.rpartition("/")[0])} - {""})
+    last_parts = [name.rpartition("/")[2] for name in known]
+    close = difflib.get_close_matches(asked, last_parts, n=3) if "/" not in asked else []
+    alike = [name for name, last in zip(known, last_parts, strict=True) if last in (asked, *close)]
+    if alike := alike or difflib.get_close_matches(asked, known, n=3):
+        return f"; did you mean {' or '.join(alike)}?"
+    groups = sorted({name.partition("/")[0] for name in known})
+    return f"; there are {', '.join(groups)}" if groups else ""
+
+
+def remedy(path: str) -> str:
+    """End of a message about a missing dataset: what stores it; empty if no macro does."""
+    macro = STORED_BY.get(path.partition("/")[0])
+    return f"; add {macro} to the deck's program and run it again" if macro else ""
+
+
+Attributes = Mapping[str, Any]  # of a group: what HDF5 may hold
+
+
+class GroupSource(Protocol):
+    """The result that a group belongs to."""
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Names of the units."""
+
+    def unit(self, name: str) -> str:
+        """Unit of a dataset."""
+
+    def attributes_of(self, group: str) -> dict[str, Any]:
+        """Attributes of a group."""
+
+    def __iter__(self) -> Iterator[str]:
+        """Paths of all datasets."""
+
+    def __contains__(self, name: str) -> bool:
+        """Whether there is a dataset of this path."""
+
+    def __getitem__(self, name: str) -> Array:
+        """A dataset by its path."""
+
+
+class ResultGroup:
+    """The datasets of one group: ``result.tape3.w`` is ``result.tape3["w"]``.
+
+    Parameters
+    ----------
+    name : str
+        Path of the group.
+    source : Source
+        The result.
+    """
+
+    def __init__(self, name: str, source: GroupSource) -> None:
+        self._name = name
+        self._source = source
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Attributes of the group."""
+        return self._source.attributes_of(self._name)
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Names of the units of length, force and time; empty if the deck names none."""
+        return self._source.units
+
+    def unit(self, name: str) -> str:
+        """Unit of a dataset; empty for a pure number, or if the deck names no units.
+
+        Raises
+        ------
+        NotStoredError
+            If there is no such dataset; a KeyError.
+        """
+        return self._source.unit(f"{self._name}/{name}")
+
+    def __getitem__(self, name: str) -> Array:
+        """A dataset by its name in the group."""
+        return self._source[f"{self._name}/{name}"]
+
+    def __contains__(self, name: str) -> bool:
+        return f"{self._name}/{name}" in self._source
+
+    def __iter__(self) -> Iterator[str]:
+        """Iterate over the names of the datasets in the group, and in groups inside it."""
+        return iter(self.keys())
+
+    def keys(self) -> list[str]:
+        """Names of the datasets in the group, and in groups inside it."""
+        head = f"{self._name}/"
+        return [p.removeprefix(head) for p in self._source if p.startswith(head)]
+
+    if not TYPE_CHECKING:  # so that a misspelt name is a type error
+
+        def __getattr__(self, name):
+            if name.startswith("_"):
+                raise AttributeError(name)
+            if name in self:
+                return self[name]
+            if any(other.startswith(f"{name}/") for other in self):
+                return ResultGroup(f"{self._name}/{name}", self._source)
+            raise NotStoredError(not_stored(f"{self._name}/{name}", list(self._source)))
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *{name.partition("/")[0] for name in self}]
+
+    def _shapes(self) -> dict[str, str]:
+        """Shapes of the datasets by their names."""
+        return {name: str(self[name].shape) for name in self}
+
+    def __repr__(self) -> str:
+        shapes = ", ".join(f"{name} {shape}" for name, shape in self._shapes().items())
+        return f"<{self._name}: {shapes}>"
+
+    def _repr_html_(self) -> str:
+        """Table of the datasets, for notebooks."""
+        return html_table(self._name, self._shapes().items())

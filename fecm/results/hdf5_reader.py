@@ -4,6 +4,8 @@
 external storage, through which HDF5 would read other files, are refused before any dataset is read.
 Any error of the library on a damaged file becomes a
 :class:`~fecm.results.schema.ResultFileError`.
+
+Checks of a file's contents against the schema.
 """
 
 from __future__ import annotations
@@ -20,10 +22,13 @@ import h5py
 import numpy as np
 
 from fecm._errors import OptionsError
+from fecm._text import short_text
 from fecm._typing import AnyFile, Array
-from fecm.results.errors import NotStoredError, ResultFileError
-from fecm.results.missing import not_stored
-from fecm.results.schema import FORMAT_VERSION, Form
+from fecm.results.criteria import OWN_CRITERIA, criteria_of
+from fecm.results.exposures import AT_REST, LOAD_FACTOR
+from fecm.results.groups import NotStoredError, ResultFileError, not_stored
+from fecm.results.metrics import MOBILITY
+from fecm.results.schema import FIXED, FORMAT_VERSION, Form, dataset_of
 
 ELEMENTS = "mesh/elements"
 COORDINATES = "mesh/coordinates"
@@ -45,7 +50,7 @@ DECK = re.compile(rb"\A[^\0]*^ *FECM\b", re.IGNORECASE | re.MULTILINE)
 PACKED = 2000  # upper bound of the compression of HDF5's filters; deflate reaches 1032
 
 
-class Contents(Mapping[str, Array]):
+class FileContents(Mapping[str, Array]):
     """Contents of a result file: its datasets by path, read on demand."""
 
     def __init__(
@@ -143,7 +148,7 @@ def _troubles(path: Path) -> Iterator[None]:
         raise ResultFileError(f"{path}: not a readable HDF5 file ({message})") from None
 
 
-def read(source: str | Path | AnyFile, *forms: str) -> Contents:
+def read(source: str | Path | AnyFile, *forms: str) -> FileContents:
     """List the contents of a result file of one of these formats; by default that of a run.
 
     A file that is open is read into memory.  Raises ResultFileError if it is not an HDF5 file, or
@@ -174,7 +179,7 @@ def read(source: str | Path | AnyFile, *forms: str) -> Contents:
         if version != FORMAT_VERSION:
             raise ResultFileError(f"{path}: format version {version} is not {FORMAT_VERSION}")
         _check_links(path, file)
-        contents = Contents(path, attributes, in_memory)
+        contents = FileContents(path, attributes, in_memory)
         names: list[str | bytes] = []
         file.visit(names.append)
         size = len(in_memory.getbuffer()) if in_memory else path.stat().st_size
@@ -209,7 +214,7 @@ def _check_links(path: Path, file: h5py.File) -> None:
         raise ResultFileError(f"{path}: {link[0]} is {what}; links are not followed")
 
 
-def _list(contents: Contents, file_size: int, name: str, item: Any) -> None:
+def _list(contents: FileContents, file_size: int, name: str, item: Any) -> None:
     """Add a group or dataset of a file to its contents.
 
     `item` is HDF5's own handle: opening all as h5py's objects would take twice as long.
@@ -277,3 +282,70 @@ def _text(value: str | bytes) -> str:
     """Text with undecodable bytes replaced, so that it can be printed."""
     raw = value.encode("utf-8", "surrogateescape") if isinstance(value, str) else value
     return raw.decode("utf-8", "replace")
+
+
+def shape_error(
+    shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str], criteria: int
+) -> str:
+    """Message about the first dataset with a wrong shape or type; empty if there is none.
+
+    `criteria` is the number of failure criteria.  The others are by path; kinds are NumPy's
+    letters: ``"f"``, ``"i"``, ``"u"`` or ``"b"``.
+    """
+    sizes: dict[str | int, tuple[int, str]] = {n: (s, "every result") for n, s in FIXED.items()}
+    sizes["criteria"] = (criteria, "this result")
+    for path, shape in shapes.items():
+        if (dataset := dataset_of(path, len(shape))) is None:
+            continue
+        if kinds[path] not in ("f" if dataset.dtype.startswith("f") else "iu"):
+            return f"{path} has the wrong type: expected {dataset.dtype}"
+        if len(shape) != len(dataset.shape):
+            return f"{path} has the shape {shape}, not ({', '.join(map(str, dataset.shape))})"
+        for name, size in zip(dataset.shape, shape, strict=True):
+            known = (name, "every result") if isinstance(name, int) else (size, path)
+            key = f"{dataset.group} {name}" if name == "rows" else name
+            expected, source = sizes.setdefault(key, known)
+            if size != expected:
+                return f"{path} has the shape {shape}, but {name} is {expected} in {source}"
+    return ""
+
+
+# Attributes that are numbers, and lists of texts, by group.  A result without those of history and
+# energy only lacks its summary.
+NUMBERS = {
+    "energy": ("initial",),
+    "history": ("permanent_indentation", "unsettled_steps", MOBILITY),
+    "threshold": ("force", "time", "margin"),
+    "patch": ("x", "y", "radius"),
+}
+TEXTS = {"failure": ("modes", OWN_CRITERIA)}
+COMPLETE = ("threshold",)  # groups that have all of these attributes
+
+
+def attribute_error(groups: Mapping[str, Mapping[str, Any]]) -> str:
+    """Message about the first attribute of a wrong type or missing; empty if there is none.
+
+    Attributes are by group and name.
+    """
+    criteria = criteria_of(groups.get("failure", {}))
+    numbers = NUMBERS | {f"failure/{name}": (AT_REST, LOAD_FACTOR) for name in criteria}
+    for table, fits, what in ((numbers, _is_number, "a number"), (TEXTS, _is_texts, "texts")):
+        for group, names in table.items():
+            found = groups.get(group, {})
+            missing = [name for name in names if name not in found]
+            if group in groups and group in COMPLETE and missing:
+                return f"{group} has no attribute {missing[0]}"
+            for name in names:
+                if name in found and not fits(found[name]):
+                    return (
+                        f"the attribute {name} of {group} is {short_text(found[name])}, not {what}"
+                    )
+    return ""
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+def _is_texts(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(text, str) for text in value)

@@ -120,7 +120,7 @@ MOBILITY = "rigid_mobility"  # attribute of a run whose plate is not held; see `
 PART = 16  # cases whose forces stay in the cache
 
 
-class Indentation(NamedTuple):
+class IndentationMetrics(NamedTuple):
     """Largest, last and permanent indentation of cases (length)."""
 
     largest: Floats
@@ -151,10 +151,10 @@ class Metrics(NamedTuple):
         return settled_deflection(self.end, self.plate, is_held=self.is_held)
 
 
-def summarise(
+def impact_metrics(
     force: Floats,
     times: Floats,
-    indentation: Indentation,
+    indentation: IndentationMetrics,
     projectiles: Projectiles,
     plate: Deflection,
     threshold: float | Floats | None = None,

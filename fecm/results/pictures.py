@@ -29,7 +29,7 @@ RunKind = Literal[
 SweepKind = Literal["map", "exceedance", "sensitivity", "scatter"]
 
 
-def plot(
+def plot_results(
     kind: str,
     results: Mapping[str, Any],
     path: str | Path | None,
@@ -38,14 +38,14 @@ def plot(
     overwrite: bool,
     **options: Any,
 ) -> Axes:
-    """Draw results by their names in the legend; see :func:`fecm.plot.pictures.plot`."""
+    """Draw results by their names in the legend; see :func:`fecm.plot.pictures.draw_results`."""
     # The one import that climbs: whoever draws nothing can do without the room of pictures.
     from fecm.plot import pictures
 
-    return pictures.plot(kind, results, path, ax, overwrite=overwrite, **options)
+    return pictures.draw_results(kind, results, path, ax, overwrite=overwrite, **options)
 
 
-def report(results: Mapping[str, Any], path: str | Path, *, overwrite: bool) -> None:
+def report_results(results: Mapping[str, Any], path: str | Path, *, overwrite: bool) -> None:
     """Write the page about results by their names; see :func:`fecm.report.report.write_report`."""
     # As above: whoever hands nothing on can do without the room of reports.
     from fecm.report.report import write_report

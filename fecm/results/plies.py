@@ -14,8 +14,7 @@ from fecm.deck.model import Deck, Layer, Material, Ply
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.mesh import element_blocks
-from fecm.results.errors import NotStoredError, ResultFileError
-from fecm.results.missing import remedy
+from fecm.results.groups import NotStoredError, ResultFileError, remedy
 from fecm.results.schema import CURE_STRESS, PlyRows
 from fecm.results.stored import Stored
 
@@ -24,7 +23,7 @@ INTERLAMINAR = ("tau_xz", "tau_yz")
 
 
 @frozen
-class Plies:
+class PlyResults:
     """Stresses and strains of plies, in the deck's units.
 
     In-plane values are in the axes of the ply, at the points of each element and both faces of each
@@ -88,7 +87,7 @@ class PlyGroup(PlyRows):
         self,
         time: float | Sequence[float] | None = None,
         elements: int | Sequence[int] | None = None,
-    ) -> Plies:
+    ) -> PlyResults:
         """Stresses and strains ply by ply.
 
         Parameters
@@ -139,7 +138,7 @@ class PlyGroup(PlyRows):
             count=chosen["sigma_1"].shape[2],
             at_nodes=material.integration.points < 0,
         )
-        return Plies(
+        return PlyResults(
             step=stored["plies/step"][rows],
             time=times[rows],
             element=numbers[members],

@@ -7,14 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from fecm._errors import warn
-from fecm._tables import html_table
+from fecm._text import html_table
 from fecm._typing import AnyFile, Floats
 from fecm.deck.model import Deck
 from fecm.results import schema
 from fecm.results.end import End
-from fecm.results.errors import NotStoredError, ResultFileError
-from fecm.results.group import Group
-from fecm.results.missing import not_stored
+from fecm.results.groups import NotStoredError, ResultFileError, ResultGroup, not_stored
 from fecm.results.run_metrics import end_of, metrics_of
 from fecm.results.stored import Stored
 
@@ -26,13 +24,13 @@ if TYPE_CHECKING:
 
     from fecm.deck.findings import Finding
     from fecm.results.comparison import Comparison
-    from fecm.results.first_failure import FirstFailure
-    from fecm.results.hdf5_reader import Contents
+    from fecm.results.exposures import FirstFailure
+    from fecm.results.hdf5_reader import FileContents
     from fecm.results.pictures import RunKind
     from fecm.results.plies import PlyGroup
 
 
-class Result(Stored, schema.Contact):
+class Result(Stored, schema.ContactRows):
     """Result of a run.
 
     Every dataset is available as ``result["tape3/w"]`` and ``result.tape3.w``; the columns of the
@@ -61,21 +59,21 @@ class Result(Stored, schema.Contact):
     step: schema.Ints
     time: Floats
     plate_w: Floats
-    mesh: schema.Mesh
+    mesh: schema.MeshGroup
     laminate: schema.LaminateStiffness
     tape3: schema.Tape3
     tape8: schema.Tape8
     tape9: schema.Tape9
-    history: schema.History
+    history: schema.HistoryRows
     energy: schema.Energy
     gages: schema.GageGroup
-    membrane: schema.Membrane
+    membrane: schema.MembraneRows
     stresses: schema.Stresses
     patch: schema.PatchGroup
-    failure: schema.Failure
-    exposures: schema.Exposures
+    failure: schema.FailureGroup
+    exposures: schema.ExposureRows
     reactions: schema.Reactions
-    modes: schema.Modes
+    modes: schema.ModeRows
 
     findings: tuple[Finding, ...] = ()
 
@@ -92,7 +90,7 @@ class Result(Stored, schema.Contact):
 
         Empty without FAIL, or if all exposures stay below 1.
         """
-        from fecm.results.first_failure import first_failures  # 1 ms, for FAIL only
+        from fecm.results.exposures import first_failures  # 1 ms, for FAIL only
 
         return first_failures(self)
 
@@ -130,7 +128,7 @@ class Result(Stored, schema.Contact):
         NotStoredError
             If the run has no impact step; a KeyError.
         """
-        from fecm.results.conversions import dataframe  # 1 ms, which a run does not need
+        from fecm.results.export import dataframe  # 1 ms, which a run does not need
 
         return dataframe(self)
 
@@ -145,7 +143,7 @@ class Result(Stored, schema.Contact):
         >>> tree = result.to_xarray()  # doctest: +SKIP
         >>> tree["tape3"].w.sel(time=1e-4, method="nearest").max()  # doctest: +SKIP
         """
-        from fecm.results.conversions import datatree  # 1 ms, which a run does not need
+        from fecm.results.export import datatree  # 1 ms, which a run does not need
 
         return datatree(self)
 
@@ -177,9 +175,9 @@ class Result(Stored, schema.Contact):
         >>> grid.warp_by_vector("displacement", factor=20.0).plot(scalars="sigma_2")
         ... # doctest: +SKIP
         """
-        from fecm.results.conversions import grid  # 1 ms, which a run does not need
+        from fecm.results.export import pyvista_grid  # 1 ms, which a run does not need
 
-        return grid(self, time)
+        return pyvista_grid(self, time)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write the result as a file, such as one of a run in memory.
@@ -203,9 +201,9 @@ class Result(Stored, schema.Contact):
         >>> import fecm
         >>> fecm.run_one("decks/appendix.inp").save("appendix.h5", overwrite=True)
         """
-        from fecm.results.hdf5_writer import save  # h5py takes 30 ms
+        from fecm.results.hdf5_writer import save_result  # h5py takes 30 ms
 
-        save(self, Path(path), overwrite=overwrite)
+        save_result(self, Path(path), overwrite=overwrite)
 
     def export(
         self,
@@ -244,10 +242,10 @@ class Result(Stored, schema.Contact):
         >>> result.export("impact-patch.vtkhdf")
         >>> result.export("curvature.csv", "tape8/kappa_x")
         """
-        from fecm.results.export import export, format_of  # h5py takes 30 ms
+        from fecm.results.export import export_result, format_of  # h5py takes 30 ms
 
         file = Path(path)
-        export(self, file, format_of(file, to), dataset, warn, overwrite=overwrite)
+        export_result(self, file, format_of(file, to), dataset, warn, overwrite=overwrite)
 
     def plot(
         self,
@@ -297,10 +295,10 @@ class Result(Stored, schema.Contact):
         >>> ax = result.plot("force", width="full")  # doctest: +SKIP
         >>> ax.plot(time, force, ".")  # doctest: +SKIP
         """
-        from fecm.results.pictures import plot  # which a run does not need
+        from fecm.results.pictures import plot_results  # which a run does not need
 
         named = {self.title or "the result": self}
-        return plot(kind, named, path, ax, overwrite=overwrite, **options)
+        return plot_results(kind, named, path, ax, overwrite=overwrite, **options)
 
     def report(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write an HTML page to hand on, as ``fecm report`` does.
@@ -327,9 +325,9 @@ class Result(Stored, schema.Contact):
         --------
         >>> result.report("impact.html")  # doctest: +SKIP
         """
-        from fecm.results.pictures import report  # which a run does not need
+        from fecm.results.pictures import report_results  # which a run does not need
 
-        report({self.title or "the result": self}, path, overwrite=overwrite)
+        report_results({self.title or "the result": self}, path, overwrite=overwrite)
 
     def compare(
         self,
@@ -372,10 +370,10 @@ class Result(Stored, schema.Contact):
         --------
         >>> print(result.compare("shot-3.csv"))  # doctest: +SKIP
         """
-        from fecm.results.comparison import compare, measurement_of  # 4 ms at start
+        from fecm.results.comparison import compare_force, measurement_of  # 4 ms at start
 
         given = measurement_of(measured, self.units, columns, units)
-        return compare(self, given.corrected(delay, offset))
+        return compare_force(self, given.corrected(delay, offset))
 
     if not TYPE_CHECKING:  # so that a misspelt name is a type error
 
@@ -385,7 +383,7 @@ class Result(Stored, schema.Contact):
             if f"history/{name}" in self._arrays:
                 return self[f"history/{name}"]
             if any(path.startswith(f"{name}/") for path in self._arrays):
-                return schema.GROUP_TYPES.get(name, Group)(name, self)
+                return schema.GROUP_TYPES.get(name, ResultGroup)(name, self)
             raise NotStoredError(not_stored(name, self._arrays))
 
     def __dir__(self) -> list[str]:
@@ -398,9 +396,9 @@ class Result(Stored, schema.Contact):
         return f"<fecm result {self.title!r}, {self.mode} mode, {steps} steps>"
 
     def __str__(self) -> str:
-        from fecm.results.summary import page  # 4 ms at start
+        from fecm.results.summary import run_text  # 4 ms at start
 
-        return "\n".join(page(self))
+        return "\n".join(run_text(self))
 
     def _repr_html_(self) -> str:
         """Table of the metrics, for notebooks; without an impact of the datasets."""
@@ -437,14 +435,14 @@ def load(path: str | Path | AnyFile) -> Result:
     return result_of(read(path))
 
 
-def result_of(contents: Contents, model: Deck | None = None) -> Result:
+def result_of(contents: FileContents, model: Deck | None = None) -> Result:
     """Build a run's result from the contents of its file, and the deck's model where it is known.
 
     Raises ResultFileError if a dataset has the wrong shape or type, or an attribute the wrong type.
     """
     # 1 ms, which the result of a run itself does not need.
-    from fecm.results.checks import attribute_error, shape_error
     from fecm.results.criteria import criteria_of
+    from fecm.results.hdf5_reader import attribute_error, shape_error
 
     kinds = {name: dtype.kind for name, dtype in contents.dtypes.items()}
     criteria = len(criteria_of(contents.groups.get("failure", {})))

@@ -9,15 +9,15 @@ import numpy as np
 
 from fecm.deck.model import Impact
 from fecm.results.end import Deflection, End, time_to_decide
-from fecm.results.errors import ResultFileError
+from fecm.results.groups import ResultFileError
 from fecm.results.metrics import (
     INTEGERS,
     METRICS,
     MOBILITY,
-    Indentation,
+    IndentationMetrics,
     Metrics,
     Projectiles,
-    summarise,
+    impact_metrics,
 )
 from fecm.results.stored import Stored
 
@@ -45,7 +45,7 @@ def _summarised(stored: Stored) -> Metrics | None:
         stored[f"history/{name}"] for name in ("force", "time", "indentation")
     )
     history = stored.attributes_of("history")
-    depths = Indentation(
+    depths = IndentationMetrics(
         largest=indentation.max(keepdims=True, initial=0.0),
         last=indentation[-1:],
         permanent=np.array([_number(history.get("permanent_indentation"))]),
@@ -53,7 +53,7 @@ def _summarised(stored: Stored) -> Metrics | None:
     initial = _number(stored.attributes_of("energy").get("initial"))
     velocity = np.float64(_impact_velocity(stored))
     with np.errstate(all="ignore"):
-        return summarise(
+        return impact_metrics(
             force[:, None],
             time,
             depths,

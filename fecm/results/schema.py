@@ -18,7 +18,7 @@ from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.deck.mesh_cards import AXES, DOF_NAMES
 from fecm.results.criteria import ALL_CRITERIA
-from fecm.results.group import Group
+from fecm.results.groups import ResultGroup
 
 Ints = NDArray[np.int64]
 Int32s = NDArray[np.int32]
@@ -85,14 +85,14 @@ _Interlaminar = Annotated[
 ]
 
 
-class Rows(Group):
+class Rows(ResultGroup):
     """Rows with the number of steps taken, and the time."""
 
     step: Annotated[Ints, "rows", "number of time steps taken"]
     time: Annotated[Floats, "rows", "time integrated up to the row's state", "time"]
 
 
-class Contact:
+class ContactRows:
     """Contact and projectile, a value per row."""
 
     force: Annotated[Floats, "rows", "contact force, positive in compression", "force"]
@@ -107,10 +107,10 @@ class Contact:
     acceleration: Annotated[Floats, "rows", "acceleration of the impacted end", "length/time^2"]
 
 
-CONTACT = tuple(Contact.__annotations__)
+CONTACT = tuple(ContactRows.__annotations__)
 
 
-class Mesh(Group):
+class MeshGroup(ResultGroup):
     """The finite element mesh."""
 
     coordinates: Annotated[Floats, "numnp ndm", "nodal coordinates", "length"]
@@ -126,7 +126,7 @@ class Mesh(Group):
     ]
 
 
-class LaminateStiffness(Group):
+class LaminateStiffness(ResultGroup):
     """Stiffness of the laminate per area; of several, each has a group of its number in it."""
 
     A: Annotated[Floats, "3 3", "extensional stiffness, order xx, yy, xy", "force/length"]
@@ -157,11 +157,11 @@ class Tape8(Rows):
     gamma_xz: Annotated[_Strain, "transverse shear strain w,x - theta_x"]
 
 
-class Tape9(Contact, Rows):
+class Tape9(ContactRows, Rows):
     """Contact and projectile, stored by RODP."""
 
 
-class History(Contact, Rows):
+class HistoryRows(ContactRows, Rows):
     """Contact and projectile at every step."""
 
     plate_w: Annotated[
@@ -195,7 +195,7 @@ class GageGroup(Rows):
     strain: Annotated[Floats, "rows gages", "normal strain of every gage in its direction"]
 
 
-class Membrane(Rows):
+class MembraneRows(Rows):
     """Stretching of a nonlinear plate, at the rows of tape8; without impact at those of tape3."""
 
     energy: Annotated[
@@ -243,7 +243,7 @@ class Stresses(Rows):
     Q_y: Annotated[_Stress, "transverse shear force", "force/length"]
 
 
-class PatchGroup(Group):
+class PatchGroup(ResultGroup):
     """Nodal weights of the contact force."""
 
     node: Annotated[Int32s, "patch_nodes", "node numbers from 1 that share the contact force"]
@@ -282,7 +282,7 @@ class PlyRows(Rows):
     ]
 
 
-class Exposure(Group):
+class Exposure(ResultGroup):
     """Largest exposures of a criterion, with their times and modes; `Failure` names the sizes."""
 
     exposure: Annotated[Floats, "", "largest exposure over time"]
@@ -293,7 +293,7 @@ class Exposure(Group):
 _PlyExposure = Annotated[Exposure, "numel npp layers faces"]
 
 
-class CircleExposures(Group):
+class CircleExposures(ResultGroup):
     """Largest exposures on the circle of the patch's radius + h/2 around the load."""
 
     exposure: Annotated[Floats, "", "largest exposure on the circle over time"]
@@ -305,7 +305,7 @@ class CircleExposures(Group):
     points: Annotated[Int32s, "", "number of points on the circle that have it"]
 
 
-class Failure(Group):
+class FailureGroup(ResultGroup):
     """Largest exposures over time, found by FAIL."""
 
     x: Annotated[Floats, "numel npp", "x of every point of every element", "length"]
@@ -327,7 +327,7 @@ class Failure(Group):
     circle: Annotated[CircleExposures, "criteria"]
 
 
-class Exposures(Rows):
+class ExposureRows(Rows):
     """Largest exposure so far of each criterion outside the load, at every evaluation of FAIL."""
 
     exposure: Annotated[Floats, "rows criteria", "largest exposure so far, outside the load"]
@@ -350,7 +350,7 @@ class Reactions(Rows):
     ]
 
 
-class Modes(Rows):
+class ModeRows(Rows):
     """Natural modes, found by EIGE."""
 
     number: Annotated[Ints, "rows", "number of the mode, from 1"]
@@ -359,27 +359,27 @@ class Modes(Rows):
 
 
 # Types of the groups; `threshold` has attributes only.
-GROUP_TYPES: dict[str, type[Group]] = {
-    "mesh": Mesh,
+GROUP_TYPES: dict[str, type[ResultGroup]] = {
+    "mesh": MeshGroup,
     "laminate": LaminateStiffness,
     "tape3": Tape3,
     "tape8": Tape8,
     "tape9": Tape9,
-    "history": History,
+    "history": HistoryRows,
     "energy": Energy,
     "gages": GageGroup,
-    "membrane": Membrane,
+    "membrane": MembraneRows,
     "stresses": Stresses,
     "patch": PatchGroup,
     "plies": PlyRows,
-    "failure": Failure,
-    "exposures": Exposures,
+    "failure": FailureGroup,
+    "exposures": ExposureRows,
     "reactions": Reactions,
-    "modes": Modes,
+    "modes": ModeRows,
 }
 
 
-def _datasets(group: str, kind: type[Group], outer: str = "") -> Iterator[Dataset]:
+def _datasets(group: str, kind: type[ResultGroup], outer: str = "") -> Iterator[Dataset]:
     """Datasets of a group, of these sizes unless they have their own."""
     for base in reversed(kind.__mro__):
         for name, column in getattr(base, "__annotations__", {}).items():

@@ -1,4 +1,6 @@
-"""What a run has stored: datasets by path, attributes of groups, and the deck.
+"""Blocks of rows, in which datasets are read that may be larger than the memory.
+
+What a run has stored: datasets by path, attributes of groups, and the deck.
 
 :class:`~fecm.results.result.Result` adds to it what can be computed from them.
 """
@@ -6,6 +8,7 @@
 from __future__ import annotations
 
 import functools
+import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
@@ -14,11 +17,19 @@ from fecm._typing import Array
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader
 from fecm.deck.units import declared_units, unit_of
-from fecm.results.errors import NotStoredError, ResultFileError
-from fecm.results.group import Attributes
+from fecm.results.groups import Attributes, NotStoredError, ResultFileError, not_stored
 from fecm.results.metrics import METRICS, VALIDITY
-from fecm.results.missing import not_stored
 from fecm.results.schema import KINEMATICS, Kinematics, dataset_of
+
+BLOCK = 4_000_000  # bytes
+
+
+def row_blocks(shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
+    """First and last + 1 row of the blocks in which a dataset is read; a number is one row."""
+    rows = shape[0] if shape else 1
+    step = max(1, BLOCK // (8 * max(1, math.prod(shape[1:]))))
+    for start in range(0, rows, step):
+        yield start, min(start + step, rows)
 
 
 class Stored:

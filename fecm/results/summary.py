@@ -1,8 +1,12 @@
-"""Summary of a run: in a few lines, and as values for `fecm info`."""
+"""Description of a result file: its groups and datasets.
+
+Summary of a run: in a few lines, and as values for `fecm info`.
+"""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -15,18 +19,86 @@ from fecm.deck.units import unit_of
 from fecm.results.criteria import spelt
 from fecm.results.end import End
 from fecm.results.exposures import (
-    Failure,
+    FailureVerdict,
     LargestExposure,
     evaluations_in_contact,
+    failure_verdict,
     largest_exposures,
-    verdict,
 )
+from fecm.results.groups import GROUPS
 from fecm.results.run_metrics import end_of, metrics_of
-from fecm.results.stored import Stored
+from fecm.results.schema import DATASETS
+from fecm.results.stored import Stored, row_blocks
 from fecm.results.validity import CROSSED
 
 if TYPE_CHECKING:
-    from fecm.results.first_failure import FirstFailure
+    from fecm.results.exposures import FirstFailure
+    from fecm.results.hdf5_reader import FileContents
+
+
+def describe_groups(contents: FileContents) -> list[dict[str, Any]]:
+    """Describe the groups and datasets of a result file, of a run or of a sweep.
+
+    Of each group ``name`` (empty for the file itself), ``description``, ``rows`` (stored instants,
+    or None), ``attributes`` and ``datasets``; of each dataset ``name`` (its path), ``shape``,
+    ``dtype`` (``"text"`` for texts), ``description``, ``dimension``, ``unit``, ``min`` and ``max``
+    of the finite numbers (None without any), ``not_finite`` and, for texts, the number of
+    ``different`` ones.
+    """
+    members: dict[str, list[dict[str, Any]]] = {name: [] for name in contents.groups}
+    for path in _sorted(contents, DATASETS):
+        members.setdefault(path.rpartition("/")[0], []).append(_describe(contents, path))
+    groups: list[dict[str, Any]] = []
+    for name in _sorted(members, GROUPS):
+        attributes = dict(contents.groups.get(name, {})) if name else {}
+        description = str(attributes.pop("description", ""))
+        rows, *_ = contents.shapes.get(f"{name}/step") or (None,)
+        groups.append(
+            {
+                "name": name,
+                "description": description,
+                "rows": rows,
+                "attributes": attributes,
+                "datasets": members[name],
+            }
+        )
+    return groups
+
+
+def _sorted(names: Iterable[str], known: Iterable[str]) -> list[str]:
+    """Known names in their order, then others by name."""
+    order = {name: number for number, name in enumerate(known)}
+    return sorted(names, key=lambda name: (order.get(name, len(order)), name))
+
+
+def _describe(contents: FileContents, path: str) -> dict[str, Any]:
+    """Shape, type, attributes and range of one dataset."""
+    attributes, texts = contents.attributes_of(path), contents.lists.get(path)
+    minimum, maximum, not_finite = (None, None, 0) if texts is not None else _range(contents, path)
+    return {
+        "name": path,
+        "shape": contents.shapes[path],
+        "dtype": str(contents.dtypes[path]) if texts is None else "text",
+        **{key: str(attributes.get(key, "")) for key in ("description", "dimension", "unit")},
+        "min": minimum,
+        "max": maximum,
+        "not_finite": not_finite,
+        "different": None if texts is None else len(set(texts)),
+    }
+
+
+def _range(contents: FileContents, path: str) -> tuple[float | None, float | None, int]:
+    """Minimum and maximum of the finite numbers, and number of others, by blocks of rows."""
+    minimum, maximum, not_finite = math.inf, -math.inf, 0
+    for start, stop in row_blocks(contents.shapes[path]):
+        block = contents.rows(path, start, stop)
+        finite = np.isfinite(block)
+        not_finite += int(block.size - np.count_nonzero(finite))
+        if finite.any():
+            minimum = min(minimum, block[finite].min().item())
+            maximum = max(maximum, block[finite].max().item())
+    return (minimum, maximum, not_finite) if minimum <= maximum else (None, None, not_finite)
+
 
 NEAR = 0.05  # of the time of the peak, up to which a row is that of the peak
 LABEL_WIDTH = 18  # of the lines
@@ -53,7 +125,7 @@ def _search(what: str, until: str) -> str:
     return _line("", f"{command} finds the impact energy of {what}")
 
 
-def summary(result: Stored) -> list[str]:
+def run_summary(result: Stored) -> list[str]:
     """Summarise a result, in the deck's units."""
     quantity = partial(_quantity, result)
     lines = [
@@ -178,7 +250,7 @@ def _exposures(result: Stored) -> list[str]:
     if count is not None and "history/force" in result:
         lines.append(_line("evaluations", f"{count} of FAIL during contact"))
     is_open = "open, as finer meshes may decide otherwise; on this mesh "
-    is_open = is_open if verdict(largest) is Failure.OPEN else ""
+    is_open = is_open if failure_verdict(largest) is FailureVerdict.OPEN else ""
     if first:
         lines.append(_line("first failure", f"{is_open}{_first_failure(result, first[0])}"))
         if not math.isnan(first[0].force):
@@ -194,7 +266,7 @@ def _first_failures(result: Stored) -> list[FirstFailure]:
     """When each criterion first reaches an exposure of 1; empty without FAIL."""
     if "exposures/exposure" not in result:
         return []
-    from fecm.results.first_failure import first_failures  # 1 ms, for FAIL only
+    from fecm.results.exposures import first_failures  # 1 ms, for FAIL only
 
     return first_failures(result)
 
@@ -379,9 +451,9 @@ def elastic_doubt(result: Stored, peak: float) -> str:
     return f"elastic prediction; {', and '.join(beyond)}" if beyond else ""
 
 
-def page(result: Stored) -> list[str]:
+def run_text(result: Stored) -> list[str]:
     """Title, summary and notes: what ``fecm run`` prints."""
-    lines = [*(_missing(result) or summary(result)), *(_line("note", n) for n in result.notes)]
+    lines = [*(_missing(result) or run_summary(result)), *(_line("note", n) for n in result.notes)]
     return [result.title or "(no title)", *(f"  {line}" for line in lines)]
 
 
@@ -397,7 +469,7 @@ def about_run(result: Stored) -> dict[str, Any]:
         "validity": result.validity,
         "notes": list(result.notes),
         "metrics": {} if missing else _metrics(result),
-        "summary": missing or summary(result),
+        "summary": missing or run_summary(result),
     }
 
 
@@ -405,7 +477,7 @@ def _metrics(result: Stored) -> dict[str, Any]:
     """Impact metrics, and those of FAIL under ``failure``."""
     if "failure/x" not in result:
         return metrics_of(result)
-    from fecm.results.first_failure import failure_metrics  # 1 ms, for FAIL only
+    from fecm.results.exposures import failure_metrics  # 1 ms, for FAIL only
 
     return {**metrics_of(result), "failure": failure_metrics(result)}
 

@@ -22,7 +22,7 @@ import numpy as np
 from fecm._dataclasses import frozen
 from fecm._files import beside
 from fecm._typing import Array, Floats
-from fecm.results.errors import ResultFileError
+from fecm.results.groups import ResultFileError
 from fecm.results.result import Result
 from fecm.results.schema import CONTACT
 

@@ -24,7 +24,7 @@ from fecm._files import beside, naming, open_ordinary, packed, sync
 from fecm._typing import Array
 from fecm._version import __version__
 from fecm.mechanics import kernels, projectile
-from fecm.mechanics.own_law import name_of
+from fecm.mechanics.own_law import law_name
 from fecm.mechanics.stiffness_product import KERNELS
 from fecm.problem.problem import Problem
 from fecm.results.hdf5_writer import FileSink, Operation
@@ -71,9 +71,9 @@ def identity(simulation: Simulation) -> dict[str, Any]:
             options.rod_method.mass,
             options.rod_method.integrator,
         ],
-        "a run with another contact law": None if options.law is None else name_of(options.law),
+        "a run with another contact law": None if options.law is None else law_name(options.law),
         "a run with another projectile": (
-            None if options.projectile is None else projectile.name_of(options.projectile)
+            None if options.projectile is None else projectile.projectile_name(options.projectile)
         ),
         "a run with other failure criteria": [one.name for one in options.criteria] or None,
         "a run with another choice of --print": simulation.printer.is_on,

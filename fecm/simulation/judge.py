@@ -1,17 +1,26 @@
-"""Reasons to doubt the result of a finished run: notes for its reader, and its validity."""
+"""Largest deflection, strain and indentation of a finished run, and where and when they occur.
+
+Notes about the membrane force of a nonlinear plate: its time step, and the threshold of DELA.
+
+Reasons to doubt the result of a finished run: notes for its reader, and its validity.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from typing import NamedTuple
 
 import numpy as np
 
 from fecm._dataclasses import frozen
-from fecm.deck.units import in_si
+from fecm._typing import Array, Floats
+from fecm.deck.model import Gages
+from fecm.deck.units import in_si, quantity, unit_of
 from fecm.mechanics.mesh import rigid_deflections
+from fecm.mechanics.points import shortest_side
 from fecm.mechanics.solutions import static_support
-from fecm.problem.static_plate import MOST_SOLVED
+from fecm.problem.estimates import MOST_SOLVED
 from fecm.results.criteria import spelt
 from fecm.results.end import LATE, OPEN_ENDS, OPEN_PEAKS, End
 from fecm.results.exposures import (
@@ -20,13 +29,228 @@ from fecm.results.exposures import (
     count_evaluations,
     largest_exposures,
 )
-from fecm.results.linear_plate import REMEDY, TOO_SOFT, unsafe
 from fecm.results.result import Result
 from fecm.results.run_metrics import steps_to_decide
-from fecm.results.validity import BENT, CROSSED, INDENTATION, SLOPE, STRAIN, Reason, joined
-from fecm.simulation import membrane, peaks
-from fecm.simulation.peaks import Peak
+from fecm.results.stored import row_blocks
+from fecm.results.validity import (
+    BENT,
+    CROSSED,
+    INDENTATION,
+    REMEDY,
+    SLOPE,
+    STRAIN,
+    TOO_SOFT,
+    Reason,
+    joined,
+    unsafe,
+)
 from fecm.simulation.simulation import Simulation
+
+BENDING = ("kappa_x", "kappa_y", "kappa_xy")
+MEMBRANE = ("eps_xx", "eps_yy", "gamma_xy")
+
+
+class RunPeak(NamedTuple):
+    """Largest value of a quantity, and when and where it occurs."""
+
+    value: float
+    time: float
+    # Place; NaN where it is not known.
+    x: float = math.nan
+    y: float = math.nan
+
+
+NO_PEAK = RunPeak(0.0, 0.0, 0.0, 0.0)
+
+
+def largest_deflection(simulation: Simulation, result: Result) -> RunPeak:
+    """Largest deflection, less the rigid motions of a plate that is not held."""
+    return max(_deflections(simulation, result), default=NO_PEAK)
+
+
+def largest_strain(simulation: Simulation, result: Result) -> RunPeak:
+    """Largest principal strain of both faces, away from the load, and of gages.
+
+    Zero if no strain of the elements comes near :data:`~fecm.results.validity.STRAIN`.
+    """
+    stored = [
+        *_face_strains(simulation, result, "tape8"),
+        *_face_strains(simulation, result, "stresses"),
+        *_gage_strains(simulation, result),
+        *_of_membrane(result, "largest_strain"),
+    ]
+    return max(stored, default=NO_PEAK)
+
+
+def largest_slope(result: Result) -> RunPeak:
+    """Largest slope of a nonlinear plate at its stored rows."""
+    return max(_of_membrane(result, "largest_slope"), default=NO_PEAK)
+
+
+def membrane_force(result: Result) -> RunPeak:
+    """Largest principal membrane force of a nonlinear plate at its stored rows."""
+    return max(_of_membrane(result, "largest_force"), default=NO_PEAK)
+
+
+def largest_indentation(simulation: Simulation, result: Result) -> RunPeak:
+    """Largest indentation in contact."""
+    return max(_indentations(simulation, result), default=NO_PEAK)
+
+
+def _deflections(simulation: Simulation, result: Result) -> Iterator[RunPeak]:
+    """Peaks of the deflections that are stored: of all nodes by DISP, under the load at steps."""
+    problem = simulation.problem
+    free = rigid_deflections(problem.mesh)
+    x, y = problem.mesh.coordinates[:, :2].T
+    place = problem.load_place
+    by_step = place is not None and not free.size and "history/plate_w" in result
+    # Under the load the deflection is that of the summary, the mean over the patch.
+    under = problem.under_load(x, y) & by_step
+    for times, (w,) in _blocks(result, "tape3", ["w"]):
+        bent = np.abs(w - (w @ free) @ free.T)
+        yield _peak(np.where(under, 0.0, bent), times, x, y)
+    if place is not None and by_step:
+        for times, (w,) in _blocks(result, "history", ["plate_w"]):
+            yield _peak_at(np.abs(w), times, place)
+
+
+def _indentations(simulation: Simulation, result: Result) -> Iterator[RunPeak]:
+    if (place := simulation.problem.load_place) is not None:
+        for times, (force, alpha) in _blocks(result, "history", ["force", "indentation"]):
+            yield _peak_at(np.where(force > 0.0, alpha, 0.0), times, place)
+
+
+def _face_strains(simulation: Simulation, result: Result, group: str) -> Iterator[RunPeak]:
+    """Peaks of the strains of a group, `tape8` without membrane strains or `stresses`.
+
+    With the uniform strain of the preload.
+    """
+    model, problem = simulation.model, simulation.problem
+    half = model.plate.thicknesses / 2.0
+    preload = model.plate.preload_strain if model.plate.is_preloaded else np.zeros(3)
+    has_membrane = group == "stresses"
+    points = model.stress_points if has_membrane else model.strains
+    names = [*MEMBRANE, *BENDING] if has_membrane else [*BENDING]
+    for times, values in _blocks(result, group, names):
+        sizes = [max(part.max(), -part.min()) for part in values]
+        if np.abs(preload).sum() + sum(sizes[:-3]) + half.max() * sum(sizes[-3:]) < STRAIN:
+            continue  # a bound, as few runs come near the limit
+        membrane = values[:-3] or [np.zeros(())] * 3
+        curvature = [half * kappa for kappa in values[-3:]]
+        middle = [m + initial for m, initial in zip(membrane, preload, strict=True)]
+        x, y = points.places(problem.mesh.coordinates)
+        near = problem.under_load(x, y)
+        for side in (1.0, -1.0):
+            xx, yy, xy = (m + side * k for m, k in zip(middle, curvature, strict=True))
+            largest = 0.5 * (np.abs(xx + yy) + np.hypot(xx - yy, xy))
+            yield _peak(np.where(near | ~np.isfinite(largest), 0.0, largest), times, x, y)
+
+
+def _gage_strains(simulation: Simulation, result: Result) -> Iterator[RunPeak]:
+    if (cards := simulation.problem.deck.last(Gages)) is not None:
+        x, y = np.array([(gage.x, gage.y) for gage in cards.records]).T
+        for times, (values,) in _blocks(result, "gages", ["strain"]):
+            yield _peak(np.abs(values), times, x, y)
+
+
+def _of_membrane(result: Result, name: str) -> Iterator[RunPeak]:
+    """Peaks of the rows of ``membrane``, whose places are not stored."""
+    for times, (values,) in _blocks(result, "membrane", [name]):
+        row = int(values.argmax())
+        yield RunPeak(float(values[row]), float(times[row]))
+
+
+def _blocks(
+    result: Result, group: str, names: Iterable[str]
+) -> Iterator[tuple[Floats, list[Floats]]]:
+    """Times and datasets of a group, block by block; nothing if they are not stored."""
+    paths = [f"{group}/{name}" for name in names]
+    if paths[-1] in result:
+        times = result[f"{group}/time"]
+        shape = (len(times), *result.rows(paths[-1], 0, 1).shape[1:])
+        for start, stop in row_blocks(shape):
+            yield times[start:stop], [result.rows(path, start, stop) for path in paths]
+
+
+def _peak(values: Floats, times: Floats, x: Array, y: Array) -> RunPeak:
+    """The largest of values, (rows, ...), at places (...)."""
+    row, *at = np.unravel_index(int(values.argmax()), values.shape)
+    return RunPeak(float(values[row, *at]), float(times[row]), float(x[*at]), float(y[*at]))
+
+
+def _peak_at(values: Floats, times: Floats, place: tuple[float, float]) -> RunPeak:
+    """The largest of values, (rows,), at one place."""
+    return _peak(values, times, *map(np.asarray, place))
+
+
+# Share of the largest frequency that the time step allows, from which on there is a note.
+NEAR = 0.95
+# Share of the bending stress at the load from which on membrane stress counts there.
+STRETCHED = 0.2
+
+
+def doubts(simulation: Simulation, result: Result) -> Iterator[str]:
+    """Notes about the stored rows of a nonlinear plate; none of a linear one."""
+    if "membrane/largest_force" in result:
+        yield from _time_step(simulation, result)
+        yield from _delamination(simulation, result)
+
+
+def _time_step(simulation: Simulation, result: Result) -> Iterator[str]:
+    """Note of a membrane force that brings the largest frequency near to 2/DT.
+
+    w^2 <= w_linear^2 + N k^2/(rho h), where k is that of the shortest wave of the mesh, whose
+    length is the shortest side: nodes are half a side apart.
+    """
+    from fecm.mechanics.stretching import principal_values  # 0.5 ms, for NONL only
+
+    problem, dt, plate = simulation.problem, simulation.state.dt, simulation.model.motion.plate
+    largest = membrane_force(result)
+    # The frequencies of the linear plate contain the preload.
+    mean, radius = principal_values(np.array(plate.preload))
+    tension = largest.value - float(mean - radius)
+    if not simulation.state.plate.step or tension <= 0.0 or plate is not problem.moving_plate:
+        return
+    side = min(map(shortest_side, plate.families))
+    growth = tension * (2.0 * math.pi / side) ** 2 / min(one.mass for one in plate.laminates)
+    allowed = (2.0 / dt) ** 2
+    if (2.0 / problem.safe_time_step) ** 2 + growth <= NEAR**2 * allowed:
+        return
+    linear = (2.0 / problem.critical_time_step) ** 2
+    # A time step that is as near to that of the linear plate was chosen so.
+    limit = allowed * (NEAR**2 if linear < NEAR**2 * allowed else 1.0)
+    if linear + growth > limit:
+        force = quantity(largest.value, unit_of("force/length", result.units))
+        at = quantity(largest.time, unit_of("time", result.units))
+        share = math.sqrt((linear + growth) / allowed)
+        yield (
+            f"the membrane force reaches {force} at time {at}: it may raise the plate's largest "
+            f"frequency from {math.sqrt(linear / allowed):.1%} of 2/DT to {share:.1%}; a smaller "
+            "DT is safer"
+        )
+
+
+def _delamination(simulation: Simulation, result: Result) -> Iterator[str]:
+    """Note of a load under which the plate stretches when DELA's threshold is reached."""
+    crossing = simulation.state.monitor.crossing
+    if simulation.problem.threshold is None or "membrane/force_at_load" not in result:
+        return
+    if math.isnan(crossing):
+        crossing = float(result["history/time"][result["history/force"].argmax()])
+    row = int(np.abs(result["membrane/time"] - crossing).argmin())
+    at, force, moment = (
+        float(result[f"membrane/{name}"][row])
+        for name in ("time", "force_at_load", "moment_at_load")
+    )
+    bending = 6.0 * moment / simulation.problem.laminate.thickness
+    if bending > 0.0 and force > STRETCHED * bending:
+        time = quantity(at, unit_of("time", result.units))
+        pull = quantity(force, unit_of("force/length", result.units))
+        yield (
+            f"at time {time} the membrane force under the load is {pull}, {force / bending:.0%} of "
+            "6 M/h: the threshold of DELA is that of a plate in bending"
+        )
+
 
 # Error of the energy balance, relative to the supplied energy, that triggers a warning.
 ENERGY_WARNING = 0.01
@@ -40,7 +264,7 @@ LATER = 1.1  # peak of a later contact over that of the first, above which a not
 
 
 @frozen
-class Verdict:
+class RunVerdict:
     """What speaks against a result."""
 
     notes: list[str]  # sentences; empty if there is no doubt
@@ -55,18 +279,18 @@ class Doubt:
     note: str
 
 
-def judge(simulation: Simulation, result: Result) -> Verdict:
+def judge_run(simulation: Simulation, result: Result) -> RunVerdict:
     """Judge the result of a finished run."""
     beyond = list(_beyond(simulation, result))
     notes = [
         *_numerical(simulation),
         *(doubt.note for doubt in beyond),
         *_few_evaluations(simulation, result),
-        *membrane.doubts(simulation, result),
+        *doubts(simulation, result),
     ]
     end = result.end
     if end is None:
-        return Verdict(notes, "")
+        return RunVerdict(notes, "")
     if end in OPEN_ENDS:
         notes.append(OPEN_ENDS[end] + _remedy(result, end))
     notes += [*_later_peak(result), *_late_values(result, end)]
@@ -76,7 +300,7 @@ def judge(simulation: Simulation, result: Result) -> Verdict:
     peak_force = simulation.state.monitor.peak_force
     if peak_force > CROSSED * result.threshold.get("force", np.inf):
         reasons.append(Reason.DELAMINATED)
-    return Verdict(notes, joined(reasons))
+    return RunVerdict(notes, joined(reasons))
 
 
 def _remedy(result: Result, end: End) -> str:
@@ -215,10 +439,10 @@ def _coarse_elements(simulation: Simulation, result: Result) -> Iterator[str]:
 def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:
     """Deflection, strain, indentation and exposures beyond their limits."""
     with np.errstate(all="ignore"):
-        deflection = peaks.deflection(simulation, result)
-        slope = peaks.slope(result)
-        strain = peaks.strain(simulation, result)
-        indentation = peaks.indentation(simulation, result)
+        deflection = largest_deflection(simulation, result)
+        slope = largest_slope(result)
+        strain = largest_strain(simulation, result)
+        indentation = largest_indentation(simulation, result)
     limits = simulation.problem.judge
     h = limits.thickness
     if deflection.value > limits.limit * h:
@@ -249,7 +473,7 @@ def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:
         )
 
 
-def _bent(simulation: Simulation, result: Result, peak: Peak) -> str:
+def _bent(simulation: Simulation, result: Result, peak: RunPeak) -> str:
     """Note of a deflection beyond the linear plate."""
     limits = simulation.problem.judge
     is_free = rigid_deflections(simulation.problem.mesh).size > 0
@@ -269,7 +493,7 @@ def _size(result: Result, value: float, thickness: float) -> str:
     return f"{length} = {value / thickness:.3g} h"
 
 
-def _reached(result: Result, what: str, value: str, peak: Peak) -> str:
+def _reached(result: Result, what: str, value: str, peak: RunPeak) -> str:
     """Begin of a note: what a quantity reaches, and where and when."""
     time = f"time {peak.time:.6g} {result.units.get('time', '')}".rstrip()
     if not math.isnan(peak.x):

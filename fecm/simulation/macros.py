@@ -12,7 +12,7 @@ from functools import partial
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.deck.macros import WORDS, Body, load_factor, number
+from fecm.deck.macros import WORDS, Body, load_factor, macro_number
 from fecm.deck.model import Macro
 from fecm.mechanics.impact_steps import FIELDS
 from fecm.mechanics.membrane import strains_of_deflection
@@ -96,7 +96,7 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
     later = np.arange(count)
     passes, numbers = run.interpreter.current_pass + later, plate.step + 1 + later
     due = {
-        macro.word: (numbers if macro.word == "RODP" else passes) % int(number(macro)) == 0
+        macro.word: (numbers if macro.word == "RODP" else passes) % int(macro_number(macro)) == 0
         for macro in macros
         if macro.word != "TIME"
     }
@@ -153,7 +153,7 @@ def form_residual(run: Simulation) -> None:
     run.state.residual = run.model.motion.unbalanced(run.state.plate, run.force_factor())
 
 
-def solve(run: Simulation) -> None:
+def solve_statics(run: Simulation) -> None:
     """SOLV."""
     state = run.state
     if not state.factorised or state.residual is None:
@@ -268,7 +268,7 @@ def store_stresses(run: Simulation, n: int) -> None:
     run.printer.stresses(values, points.places(run.problem.mesh.coordinates), run.state.clock)
 
 
-def check(run: Simulation) -> None:
+def store_sizes(run: Simulation) -> None:
     """CHEC: store and print sizes; ends the program under its slip."""
     plate = run.model.plate
     profile = plate.profile()
@@ -286,7 +286,7 @@ ACTIONS: dict[str, Callable[..., bool | None]] = {
     "CMAS": partial(form_mass, consistent=True),
     "TANG": form_tangent,
     "FORM": form_residual,
-    "SOLV": solve,
+    "SOLV": solve_statics,
     "TOL": set_tolerance,
     "CONV": leave_if_converged,
     "REAC": store_reactions,
@@ -295,7 +295,7 @@ ACTIONS: dict[str, Callable[..., bool | None]] = {
     "RODP": impact_step,
     **{word: partial(_at_passes, word) for word in AT_PASSES},
     "STRE": store_stresses,
-    "CHEC": check,
+    "CHEC": store_sizes,
 }
 
 
@@ -315,5 +315,5 @@ def bind_loop(run: Simulation, body: Body) -> Passes | None:
 
 def bind(run: Simulation, macro: Macro) -> Action:
     """Return the action of a macro."""
-    values = [number(macro)] if WORDS[macro.word].value else []
+    values = [macro_number(macro)] if WORDS[macro.word].value else []
     return partial(ACTIONS[macro.word], run, *values)

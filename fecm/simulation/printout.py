@@ -20,8 +20,8 @@ from fecm.deck.macros import WORDS
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.mesh_cards import DOF_NAMES
 from fecm.deck.model import Macro
-from fecm.mechanics.laminate import Laminate
-from fecm.mechanics.mesh import Mesh
+from fecm.mechanics.laminate import LaminateSection
+from fecm.mechanics.mesh import MeshArrays
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.strains import GENERALISED_STRAINS, RESULTANTS
 from fecm.problem.parts import build_constants
@@ -72,7 +72,7 @@ class Printer:
         """A table of right-aligned columns."""
         self._write(map(_row, itertools.chain([names], rows, [()])))
 
-    def problem(self, deck: model.Deck, mesh: Mesh, plate: PlateModel) -> None:
+    def problem(self, deck: model.Deck, mesh: MeshArrays, plate: PlateModel) -> None:
         """Echo a problem: control, segments in the deck's order, equations, macro program."""
         if not self.is_on:
             return
@@ -120,7 +120,9 @@ class Printer:
             depth += macro.word == "LOOP"
         self._write([""])
 
-    def _segment(self, segment: model.Segment, mesh: Mesh, plate: PlateModel, echo: bool) -> None:
+    def _segment(
+        self, segment: model.Segment, mesh: MeshArrays, plate: PlateModel, echo: bool
+    ) -> None:
         """Echo one segment; mesh data only while echoing is on."""
         match segment:
             case model.Material():
@@ -190,7 +192,7 @@ class Printer:
             self._page(f"Laminate {number}")
             self._laminate(layers, laminate)
 
-    def _laminate(self, layers: Sequence[model.Layer], laminate: Laminate) -> None:
+    def _laminate(self, layers: Sequence[model.Layer], laminate: LaminateSection) -> None:
         """Layers and stiffness of a laminate."""
         several = any(one.material != MATERIAL for one in layers)
         header = ("layer", "angle", "thickness", *(["material"] if several else []))
@@ -207,7 +209,7 @@ class Printer:
         self._page(f"Nodal displacements at time {time:.6g}")
         self._nodes(field)
 
-    def reactions(self, force: Floats, mesh: Mesh, time: float) -> None:
+    def reactions(self, force: Floats, mesh: MeshArrays, time: float) -> None:
         """Forces of the supports, and their sum."""
         supports = np.where(mesh.equations == 0, force, 0.0)
         largest = np.abs(supports).max(axis=1)

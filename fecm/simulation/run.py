@@ -13,18 +13,18 @@ from fecm.deck.model import Cure, Deck, Material
 from fecm.deck.units import unit_names
 from fecm.mechanics import projectile
 from fecm.mechanics.failure import MODES, largest_in_plies
-from fecm.mechanics.own_law import name_of
+from fecm.mechanics.own_law import law_name
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.problem.build import RunOptions
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem, Threshold
 from fecm.problem.slips import mode_of
 from fecm.results.exposures import AT_REST, count_evaluations
+from fecm.results.hdf5_writer import ReadOnce, Sink
 from fecm.results.metrics import MOBILITY, VALIDITY
 from fecm.results.result import Result
 from fecm.results.schema import FORMAT_VERSION, KINEMATICS, Form, Kinematics
-from fecm.results.sinks import ReadOnce, Sink
-from fecm.simulation.judge import judge
+from fecm.simulation.judge import judge_run
 from fecm.simulation.macros import STORING, bind, bind_loop
 from fecm.simulation.simulation import Observer, Simulation
 
@@ -37,11 +37,11 @@ def simulate(
 ) -> Simulation:
     """Run a problem into a sink and return the finished simulation; see :func:`run`."""
     simulation = Simulation(problem, sink, options or RunOptions(), observers=observers)
-    run(simulation)
+    run_program(simulation)
     return simulation
 
 
-def run(simulation: Simulation) -> Result:
+def run_program(simulation: Simulation) -> Result:
     """Carry out a program, from its beginning or from the restored state; return its result.
 
     The result reads from the sink, as long as that is open.
@@ -68,9 +68,9 @@ def run(simulation: Simulation) -> Result:
                 simulation.recorder.failure(state.failure)
             simulation.recorder.finish()
     except DivergenceError as diverged:
-        from fecm.simulation.divergence import likely_cause  # only then
+        from fecm.simulation.state import cause_of_divergence  # only then
 
-        cause = likely_cause(problem, simulation.model, state.dt, simulation.options.law)
+        cause = cause_of_divergence(problem, simulation.model, state.dt, simulation.options.law)
         raise DivergenceError(diverged.step, f"{diverged.reason}; {cause}") from None
     return _write_footer(simulation)
 
@@ -103,9 +103,9 @@ def _own_parts(options: RunOptions) -> dict[str, str]:
     """Names of the parts by users that replace those of the deck."""
     parts = {}
     if options.law is not None:
-        parts["law"] = name_of(options.law)
+        parts["law"] = law_name(options.law)
     if options.projectile is not None:
-        parts["projectile"] = projectile.name_of(options.projectile)
+        parts["projectile"] = projectile.projectile_name(options.projectile)
     return parts
 
 
@@ -153,7 +153,7 @@ def _write_footer(simulation: Simulation) -> Result:
         sink.attributes("threshold", _threshold_attributes(threshold, crossing, result))
     if simulation.state.failure is not None:
         sink.attributes("failure", {"evaluations_in_contact": count_evaluations(result)})
-    verdict = judge(simulation, result)
+    verdict = judge_run(simulation, result)
     if verdict.validity:
         sink.attributes("", {VALIDITY: verdict.validity})
     if verdict.notes:

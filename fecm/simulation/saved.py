@@ -16,7 +16,7 @@ def _names(value: object) -> tuple[str, ...]:
     return getattr(value, "_fields", ())
 
 
-def save(value: object, path: str, seen: set[int] | None = None) -> dict[str, Any]:
+def saved_values(value: object, path: str, seen: set[int] | None = None) -> dict[str, Any]:
     """Values and arrays of a dataclass and its members, by path; shared members only once."""
     names = _names(value)
     seen = set() if seen is None else seen
@@ -25,7 +25,7 @@ def save(value: object, path: str, seen: set[int] | None = None) -> dict[str, An
     if id(value) in seen:
         return {}
     seen.add(id(value))
-    members = (save(getattr(value, name), f"{path}/{name}", seen) for name in names)
+    members = (saved_values(getattr(value, name), f"{path}/{name}", seen) for name in names)
     return {name: one for member in members for name, one in member.items()}
 
 

@@ -16,11 +16,11 @@ from fecm.mechanics.impact_steps import SINGLY, TOGETHER
 from fecm.mechanics.solutions import Tangent
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.problem import Problem
-from fecm.results.sinks import Sink
+from fecm.results.hdf5_writer import Sink
 from fecm.simulation.interpreter import Interpreter
 from fecm.simulation.printout import Printer
 from fecm.simulation.recorder import Recorder
-from fecm.simulation.saved import restore, save, subset
+from fecm.simulation.saved import restore, saved_values, subset
 from fecm.simulation.state import RunState
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ class Simulation:
         if self.model.impact is not None:
             self.state.first_dt = self.model.impact.first_dt
         recorder = {f"recorder/{name}": value for name, value in self.recorder.state().items()}
-        return {**save(self.state, "state"), **recorder, "printed": self.printer.state()}
+        return {**saved_values(self.state, "state"), **recorder, "printed": self.printer.state()}
 
     def restore(self, stored: dict[str, Any]) -> None:
         """Continue from the saved state of another simulation of the same problem.

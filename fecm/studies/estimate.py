@@ -11,6 +11,7 @@ from fecm.deck.model import Impact, Indentation
 from fecm.mechanics.laminate import SMALL_MASS, effective_rigidity
 from fecm.mechanics.quick_models import (
     QuickImpact,
+    StaticCurve,
     curved_plate,
     inelasticity,
     infinite_plate,
@@ -21,11 +22,10 @@ from fecm.mechanics.quick_models import (
 )
 from fecm.mechanics.roots import root
 from fecm.mechanics.solutions import static_stiffness
-from fecm.mechanics.static_curve import StaticCurve
+from fecm.problem.estimates import NoCurveError, nonlinear_curve
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
-from fecm.problem.static_plate import NoCurveError, nonlinear_curve
-from fecm.results.linear_plate import LIMITS
+from fecm.results.validity import LIMITS
 from fecm.studies import StudyError
 
 # Masses over the plate's.
@@ -36,7 +36,7 @@ LOW = "the nonlinear static plate is 9 to 26 % low in force at M/M_plate = 24"
 
 
 @frozen
-class Model:
+class QuickModel:
     """One quick model of an impact."""
 
     name: str
@@ -47,14 +47,14 @@ class Model:
 
 
 @frozen
-class Estimate:
+class QuickEstimate:
     """Quick estimates of an impact."""
 
     mass: float  # of the projectile
     mass_ratio: float  # to the plate's
     parameter: float  # Zener's lambda
     stiffness: float  # of the plate under its load, force/length; NaN for a free plate
-    models: tuple[Model, ...]
+    models: tuple[QuickModel, ...]
     remark: str = ""  # about the static model of a nonlinear plate
 
     @property
@@ -69,7 +69,7 @@ class Estimate:
         return "neither small nor large: run it"
 
 
-def estimate(problem: Problem) -> Estimate:
+def quick_estimate(problem: Problem) -> QuickEstimate:
     """Estimate the impact of a checked problem; without an impact, raise a StudyError."""
     contact = problem.contact
     if contact is None:
@@ -85,13 +85,15 @@ def estimate(problem: Problem) -> Estimate:
 
     small = infinite_plate(mass, velocity, k, parameter)
     reached = _velocity(_peaks_on_infinite_plate(problem, mass), velocity, SMALL_MASS * force)
-    models = [Model("infinite plate", small, SMALL_MASS * force, reached, applies=ratio < SMALL)]
+    models = [
+        QuickModel("infinite plate", small, SMALL_MASS * force, reached, applies=ratio < SMALL)
+    ]
     stiffness = static_stiffness(problem.moving_plate, contact)
     if not math.isfinite(stiffness):
-        return Estimate(mass, ratio, parameter, stiffness, tuple(models))
+        return QuickEstimate(mass, ratio, parameter, stiffness, tuple(models))
     large = static_plate(mass, velocity, k, stiffness)
     reached = _velocity(lambda v: static_peak(mass, v, k, stiffness), velocity, force)
-    static = Model("static plate", large, force, reached, applies=ratio > LARGE)
+    static = QuickModel("static plate", large, force, reached, applies=ratio > LARGE)
     models.append(static)
     remark = ""
     if problem.plate.nonlinear:
@@ -104,7 +106,7 @@ def estimate(problem: Problem) -> Estimate:
             remark = LOW
         except NoCurveError as error:
             remark = str(error)
-    return Estimate(mass, ratio, parameter, stiffness, tuple(models), remark)
+    return QuickEstimate(mass, ratio, parameter, stiffness, tuple(models), remark)
 
 
 def velocity_at(problem: Problem, force: float) -> float:
@@ -130,13 +132,13 @@ def velocity_at(problem: Problem, force: float) -> float:
 
 def _nonlinear_model(
     curve: StaticCurve, mass: float, velocity: float, k: float, threshold: float, *, applies: bool
-) -> Model:
+) -> QuickModel:
     """The static model of a nonlinear plate."""
     found = math.nan
     if math.isfinite(threshold):
         found = _static_velocity(curve, mass, k, threshold)
     impact = curved_plate(mass, velocity, k, curve)
-    return Model("nonlinear static plate", impact, threshold, found, applies)
+    return QuickModel("nonlinear static plate", impact, threshold, found, applies)
 
 
 def _static_velocity(curve: StaticCurve, mass: float, k: float, force: float) -> float:

@@ -17,29 +17,26 @@ from numpy.typing import ArrayLike
 
 from fecm._errors import warn, warn_once
 from fecm._files import ARGUMENT, check_outputs
-from fecm._memory import NotEnoughMemoryError
-from fecm._processors import free
+from fecm._machine import NotEnoughMemoryError, free_processors
 from fecm._progress import once_a_minute
 from fecm.api import LOGGER, LoadedDeck, Progress, load_deck
+from fecm.authoring.case import Case, CasesError, Limit, parse_exceed
+from fecm.authoring.cases import CaseTable, checked, combined
 from fecm.deck.catalogue import system_of
 from fecm.deck.findings import DeckError
 from fecm.deck.model import Deck
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import own_law
 from fecm.problem.problem import Problem
-from fecm.sweeps import schedule
-from fecm.sweeps.batch import deck_of
-from fecm.sweeps.case import Case, CasesError
-from fecm.sweeps.cases import Table, checked
-from fecm.sweeps.copula import Pair, correlation_of
-from fecm.sweeps.distributions import OwnDistribution, law_of
-from fecm.sweeps.doubts import doubtful_values, unused_values
-from fecm.sweeps.grid import combined
+from fecm.sweeps import execute
+from fecm.sweeps.batch import case_deck
+from fecm.sweeps.checks import check_sweep_memory, doubtful_values, unused_values
+from fecm.sweeps.convergence import refined_cases
+from fecm.sweeps.distributions import OwnDistribution, distribution_of
+from fecm.sweeps.execute import DamagedPartError, PartialResults
+from fecm.sweeps.files import save_sweep
 from fecm.sweeps.in_full import built
-from fecm.sweeps.limits import Limit, parse_exceed
-from fecm.sweeps.memory import check_memory
 from fecm.sweeps.outcome import Outcome, Status, merge
-from fecm.sweeps.parts import DamagedPartError, PartialResults
 from fecm.sweeps.plan import (
     MODES,
     REDUCED,
@@ -54,17 +51,17 @@ from fecm.sweeps.plan import (
 from fecm.sweeps.random import (
     REMEDY,
     DesignKind,
+    Pair,
+    correlation_of,
     design_of,
     doubt,
     random_cases,
 )
-from fecm.sweeps.reduced_check import ReducedModel, Trials, by_energy, count_held, trials
-from fecm.sweeps.refine import refined_cases
-from fecm.sweeps.result import SweepResult, result_of
-from fecm.sweeps.result_writer import save
+from fecm.sweeps.reduced import ReducedModel, Trials, by_energy, count_held, trials
+from fecm.sweeps.result import SweepResult, sweep_result
 
 
-def problem_of(deck: str | Path | Deck) -> Problem:
+def checked_problem(deck: str | Path | Deck) -> Problem:
     """Checked problem of a deck; DeckError if it has errors, CasesError if several problems."""
     return _loaded(deck).problems[0]
 
@@ -87,7 +84,7 @@ def check_draws(planned: Plan) -> None:
         values = [case[name] for case in planned.cases[: design.draws]]
         for value in (min(values), max(values)):
             try:
-                deck_of(planned, values.index(value))
+                case_deck(planned, values.index(value))
             except CasesError as error:
                 text = f"{name} {value:.6g}: {str(error).rstrip('.')}; sensitivity needs all draws"
                 raise CasesError(f"{text}; {REMEDY}") from None
@@ -119,7 +116,7 @@ def _check_sendable(spawned: bool, **functions: object) -> None:
             raise CasesError(f"{name} is defined {where}; {hint}")
 
 
-def carry_out(
+def carry_out_plan(
     problem: Problem,
     made: Plan,
     *,
@@ -127,14 +124,14 @@ def carry_out(
     scheduler: object = None,
     executor: Executor | None = None,
     parts: PartialResults | None = None,
-    done: schedule.Done = lambda task, outcome: None,
-    idle: schedule.Idle = lambda: None,
+    done: execute.Done = lambda task, outcome: None,
+    idle: execute.Idle = lambda: None,
     note: Callable[[str], None] = warn,
 ) -> SweepResult:
     """Run the tasks of a plan in this process, on an executor, a scheduler or several workers.
 
     Without a number of workers, tasks begin in this process, see
-    :func:`~fecm.sweeps.schedule.here_first`.
+    :func:`~fecm.sweeps.execute.here_first`.
     Tasks that `parts` has stored are not run again; with it, the result has no forces.  `done` is
     called with each task and its outcome, including tasks finished earlier, `idle` regularly,
     `note` with messages for the user.  Raises SchedulerError if the scheduler cannot be used, and
@@ -158,7 +155,7 @@ def carry_out(
         parts.tasks = whole
     outcomes = [outcome for _, outcome in run(whole, done=done)]
     history = made.settings.history and parts is None
-    return result_of(made, merge(outcomes, history=history), model)
+    return sweep_result(made, merge(outcomes, history=history), model)
 
 
 def _by_model(
@@ -195,8 +192,8 @@ def _outcomes(
     scheduler: object,
     executor: Executor | None,
     parts: PartialResults | None,
-    done: schedule.Done,
-    idle: schedule.Idle,
+    done: execute.Done,
+    idle: execute.Idle,
     note: Callable[[str], None],
 ) -> list[tuple[Task, Outcome]]:
     """Run tasks, or take their stored outcomes; see :func:`carry_out`."""
@@ -205,7 +202,7 @@ def _outcomes(
 
     def keep(task: Task, outcome: Outcome, *, new: bool = True) -> None:
         if parts is not None:
-            if new and not any(text.startswith(schedule.LOST) for text in outcome.status):
+            if new and not any(text.startswith(execute.LOST) for text in outcome.status):
                 parts.put(task, outcome)  # cases that were lost with their worker may be run again
             outcome.force = None
         outcomes.append((task, outcome))
@@ -222,23 +219,23 @@ def _outcomes(
         else:
             keep(task, before, new=False)
     if executor is not None:
-        schedule.on_executor(left, executor, keep, idle)
+        execute.on_executor(left, executor, keep, idle)
     elif scheduler is not None:
-        schedule.on_dask(left, scheduler, keep, idle)
+        execute.on_dask(left, scheduler, keep, idle)
     elif workers is None:
-        schedule.here_first(left, most_workers, keep, idle)
+        execute.here_first(left, most_workers, keep, idle)
     elif workers > 1 and len(left) > 1:
-        schedule.on_workers(left, workers, keep, idle)
+        execute.on_workers(left, workers, keep, idle)
     else:
-        schedule.here(left, keep, idle)
+        execute.here(left, keep, idle)
     return outcomes
 
 
 def _most_workers(problem: Problem, made: Plan, *, streamed: bool) -> int:
     """Worker processes for which processors and memory are free."""
-    for count in range(free(), 1, -1):
+    for count in range(free_processors(), 1, -1):
         with suppress(NotEnoughMemoryError):
-            check_memory(problem, made, count, streamed=streamed)
+            check_sweep_memory(problem, made, count, streamed=streamed)
             return count
     return 1
 
@@ -246,11 +243,11 @@ def _most_workers(problem: Problem, made: Plan, *, streamed: bool) -> int:
 def sweep(
     deck: str | Path | Deck | None = None,
     vary: Mapping[str, Sequence[Any]] | None = None,
-    cases: Iterable[Mapping[str, Any]] | Table | None = None,
+    cases: Iterable[Mapping[str, Any]] | CaseTable | None = None,
     *,
     refine: Sequence[int] | None = None,
     random: Mapping[str, str | OwnDistribution] | None = None,
-    correlation: Mapping[Pair, float] | ArrayLike | Table | None = None,
+    correlation: Mapping[Pair, float] | ArrayLike | CaseTable | None = None,
     samples: int | None = None,
     seed: int = 0,
     design: DesignKind = "lhs",
@@ -418,7 +415,7 @@ def sweep(
     )
     drawn = None
     if random is not None:
-        laws = {name: law_of(name, law, free=free) for name, law in random.items()}
+        laws = {name: distribution_of(name, law, free=free) for name, law in random.items()}
         joined = () if correlation is None else correlation_of([*laws], correlation)
         drawn = design_of(laws, samples, seed, design, sensitivity=sensitivity, correlation=joined)
         made = random_cases(drawn, made)
@@ -443,7 +440,7 @@ def sweep(
         extra=measures,
         design=drawn,
         limits=_limits(exceed),
-        modes=modes_of(model, modes),
+        modes=reduced_mode_count(model, modes),
         law=own_contact,
     )
     check_draws(planned)
@@ -451,9 +448,9 @@ def sweep(
     for text in doubts:
         warn(text)
     here = workers or 1 if executor is None else getattr(executor, "_max_workers", 0)
-    check_memory(problem, planned, 0 if scheduler is not None else here)
+    check_sweep_memory(problem, planned, 0 if scheduler is not None else here)
     LOGGER.info("%s: %d cases", problem.deck.title, len(made))
-    result = carry_out(
+    result = carry_out_plan(
         problem,
         planned,
         workers=workers,
@@ -462,7 +459,7 @@ def sweep(
         done=_Watch(len(made), progress, same_names=own is not None),
     )
     if output is not None:
-        save(result, Path(output), overwrite=overwrite)
+        save_sweep(result, Path(output), overwrite=overwrite)
     for text in result.notes:
         warn(text)
     return result
@@ -493,7 +490,7 @@ def _check_options(
         raise CasesError(f"build is {build!r}, not a function")
 
 
-def modes_of(model: str | None, modes: int | None) -> int | None:
+def reduced_mode_count(model: str | None, modes: int | None) -> int | None:
     """Bending modes of a model; None of full runs.  CasesError if there is no such model."""
     if model is None:
         if modes is not None:

@@ -16,8 +16,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._memory import require
+from fecm._machine import require_memory
 from fecm._typing import Floats
+from fecm.authoring.case import NO_THRESHOLD, PEAK_FORCE, THRESHOLD, Case, CasesError, Value
+from fecm.authoring.strike import Strike
+from fecm.authoring.timing import Clock, lengthened, with_clock
+from fecm.authoring.values import plate_values
+from fecm.authoring.vary import apply_case, columns_of, split, strike_of_case, tabled
 from fecm.deck.macros import flat
 from fecm.deck.model import Deck, Nonlinear
 from fecm.mechanics import kernels
@@ -26,30 +31,25 @@ from fecm.mechanics.own_law import CaseByCase
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import build_model
 from fecm.problem.problem import Problem
-from fecm.results.metrics import GAGE, Projectiles, summarise
+from fecm.results.metrics import GAGE, Projectiles, impact_metrics
 from fecm.simulation.judge import ENERGY_WARNING
-from fecm.sweeps import find_in_full
-from fecm.sweeps.case import Case, CasesError, Value
-from fecm.sweeps.find import LONGER, Runs, Sought, Strikes, found
+from fecm.sweeps import search
+from fecm.sweeps.checks import ADVANCED_BYTES
 from fecm.sweeps.in_full import (
-    alone,
+    CasePeaks,
     in_one_motion,
+    judge_cases,
     problem_of_case,
+    run_case_in_full,
     run_in_full,
+    thresholds_of,
     with_hit,
 )
-from fecm.sweeps.judge import Peak, judge, thresholds_of
-from fecm.sweeps.limits import NO_THRESHOLD, PEAK_FORCE, THRESHOLD
-from fecm.sweeps.memory import ADVANCED_BYTES
 from fecm.sweeps.outcome import About, Outcome, Status, merge, outcome_of
 from fecm.sweeps.plan import Measure, Plan, Settings, Task, shares_plate
 from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
 from fecm.sweeps.responses import Hits, Impacts, impacts, largest_sums, plate_response
-from fecm.sweeps.strike import Strike
-from fecm.sweeps.strike_table import columns_of, split, tabled
-from fecm.sweeps.timing import Clock, lengthened, with_clock
-from fecm.sweeps.values import plate_values
-from fecm.sweeps.vary import apply_case, strike
+from fecm.sweeps.search import LONGER, Runs, Sought, Strikes, search_by_response
 
 # Contact forces that are computed before they are evaluated, where none are stored: 16 MB, which
 # the C library keeps for the next ones and does not give back to the system.
@@ -58,7 +58,7 @@ FORCES = 2_000_000
 Longer = Callable[[int], Runs]
 
 
-def run(task: Task) -> Outcome:
+def run_task(task: Task) -> Outcome:
     """Run the cases of a task; a case that cannot be run becomes a row with the reason."""
     settings = task.settings
     if settings.shares_motion and len(task.cases) > 1:
@@ -96,7 +96,7 @@ def _strikes(task: Task, checked: Problem) -> tuple[Strikes, dict[int, str]]:
         if number in table:
             continue
         try:
-            made = strike(checked.deck, case)._replace(own_law=law)
+            made = strike_of_case(checked.deck, case)._replace(own_law=law)
             made.check(checked)
             others[number] = made
         except CasesError as error:
@@ -123,7 +123,7 @@ def _outcome(settings: Settings, checked: Problem, longer: Longer, strikes: Stri
         return merge(
             [_found_in_full(checked, n, one, levels[n], longer) for n, one in strikes.items()]
         )
-    return found(strikes, levels, longer)
+    return search_by_response(strikes, levels, longer)
 
 
 def _decided(outcome: Outcome, longer: Longer, strikes: Strikes, settings: Settings) -> Outcome:
@@ -154,7 +154,7 @@ def _found_in_full(
     start = velocity_at(replace(checked, deck=strike.deck()), force)
     first = strike.with_velocity(start)
     try:
-        return find_in_full.found(number, first, Sought.PEAK_FORCE, force, run)
+        return search.search_in_full(number, first, Sought.PEAK_FORCE, force, run)
     except CasesError as error:
         return Outcome.failed({number: str(error)})
 
@@ -210,17 +210,17 @@ def runs_of(checked: Problem, measures: Sequence[Measure] = (), *, history: bool
 
 def _one_by_one(checked: Problem, measures: Sequence[Measure], strikes: Strikes) -> list[Outcome]:
     return [
-        alone(number, replace(checked, deck=made.deck()), measures, law=made.own_law)
+        run_case_in_full(number, replace(checked, deck=made.deck()), measures, law=made.own_law)
         for number, made in strikes.items()
     ]
 
 
-def deck_of(planned: Plan, case: int) -> Deck:
+def case_deck(planned: Plan, case: int) -> Deck:
     """Return the deck of a case with its time step; CasesError if the case cannot be run."""
     return problem_of_case(planned.settings, planned.cases[case]).deck
 
 
-class Plate(NamedTuple):
+class PlateResponse(NamedTuple):
     """Response of a plate to a unit force in its first step of size `dt`, and the mass it moves."""
 
     response: Floats
@@ -238,7 +238,7 @@ class Plate(NamedTuple):
         return impacts(self.response, self.dt, self.node_mass, hits)
 
 
-def _plate(checked: Problem, *, gages: bool) -> Plate:
+def _plate(checked: Problem, *, gages: bool) -> PlateResponse:
     setup = build_model(checked)
     assert setup.impact is not None  # the program has impact steps
     load, steps = setup.impact.contact.load, checked.work.steps
@@ -251,7 +251,9 @@ def _plate(checked: Problem, *, gages: bool) -> Plate:
         sums = setup.motion.dof_sums(measured.dof_indices, measured.weights)
     with np.errstate(all="ignore"):
         response, strains = plate_response(setup.motion, load, dt, steps, sums)
-    return Plate(response, dt, 1.0 / load.inverse_mass, dict(zip(names, strains, strict=True)))
+    return PlateResponse(
+        response, dt, 1.0 / load.inverse_mass, dict(zip(names, strains, strict=True))
+    )
 
 
 class _Ordered(NamedTuple):
@@ -281,16 +283,16 @@ def _ordered(strikes: Strikes) -> _Ordered:
     )
 
 
-def _by_kernels(plate: Plate | ReducedImpacts, strikes: Strikes) -> bool:
+def _by_kernels(plate: PlateResponse | ReducedImpacts, strikes: Strikes) -> bool:
     """Whether the kernels run strikes: NumPy is faster with many cases at a time."""
-    if kernels.LIBRARY is None or not isinstance(plate, Plate):
+    if kernels.LIBRARY is None or not isinstance(plate, PlateResponse):
         return False
     return next(iter(strikes.values())).own_law is None
 
 
 def _together(
     checked: Problem,
-    plate: Plate | ReducedImpacts,
+    plate: PlateResponse | ReducedImpacts,
     measures: Sequence[Measure],
     history: bool,
     strikes: Strikes,
@@ -302,11 +304,11 @@ def _together(
     if len(strikes) > most and not history and _by_kernels(plate, strikes):
         run_some = partial(_together, checked, plate, measures, history, judged=judged)
         return merge([run_some(some) for some in split(strikes, most)], history=False)
-    require(ADVANCED_BYTES * steps * len(strikes), f"{len(strikes)} cases of {steps} steps")
+    require_memory(ADVANCED_BYTES * steps * len(strikes), f"{len(strikes)} cases of {steps} steps")
     with np.errstate(all="ignore"):
         ordered = _ordered(strikes)
         struck = plate.impacts(ordered.hits)
-        metrics = summarise(
+        metrics = impact_metrics(
             struck.force,
             np.add.accumulate(np.full(steps, dt)),
             struck.indentation,
@@ -316,7 +318,7 @@ def _together(
             checked.judge.mobility,
         )
         strains = plate.strains if judged else {}
-        peaks = {name: Peak(*largest_sums(r, struck.force)) for name, r in strains.items()}
+        peaks = {name: CasePeaks(*largest_sums(r, struck.force)) for name, r in strains.items()}
     outcome = outcome_of(
         ordered.numbers,
         metrics,
@@ -327,7 +329,7 @@ def _together(
         force=struck.force.T if history else None,
     )
     largest = struck.indentation.largest
-    judge(outcome, checked, measures, metrics, peaks=peaks, indentation=largest)
+    judge_cases(outcome, checked, measures, metrics, peaks=peaks, indentation=largest)
     outcome = outcome.select(ordered.back)
 
     settled = (struck.error < ENERGY_WARNING) & (struck.unconverged_steps == 0)

@@ -1,28 +1,213 @@
-"""The checks of ``fecm check`` on the deck of a case: its first error is that of the case."""
+"""Values of cases that look like a mistake, found before the sweep.
+
+Memory that a sweep needs.
+"""
 
 from __future__ import annotations
 
-from fecm.deck.findings import Findings
-from fecm.deck.model import Deck
-from fecm.deck.reader import ParsedProblem
-from fecm.problem.check import check
+from collections.abc import Iterator, Sequence
+from contextlib import suppress
+
+import numpy as np
+
+from fecm import _machine
+from fecm.authoring.case import Case, CasesError, check_deck, pair_of_text
+from fecm.authoring.values import EXPOSURE_NAMES, REFINE, Changes, ValueKind, kind_of, names_of
+from fecm.authoring.vary import apply_case
+from fecm.deck import model
+from fecm.deck.findings import Finding, Findings
+from fecm.mechanics.kernels import LIBRARY
+from fecm.mechanics.mesh import element_centres
+from fecm.problem.check import check_segments, check_values
+from fecm.problem.memory import needed_bytes
 from fecm.problem.problem import Problem
-from fecm.problem.rules.time_step import UNSTABLE
-from fecm.sweeps.case import CasesError
+from fecm.sweeps.in_full import stores_rows, without_output
+from fecm.sweeps.plan import MOST_TOGETHER, Plan, Task, runs_together, tasks
+
+THICKNESS = "thickness"
+LAMINATE = names_of(Changes.LAMINATE)
+_CHANGES = (Changes.FAILURE, Changes.STRIKE, Changes.LAMINATE)
+_NUMBERS = (n for n in names_of(*_CHANGES) if kind_of(n) is ValueKind.NUMBER)
+JUDGED = {"patch", *_NUMBERS} - {"angle"}
+OTHER_PLATE = {"size", "support"}  # names that change the mesh or its supports
+FEW = 4  # plies below which a laminate as thin as two of them is possible
 
 
-def check_deck(deck: Deck) -> Problem:
-    """Check a complete deck.  Raises CasesError if it has an error; the first is the message."""
+def doubtful_values(checked: Problem, cases: Sequence[Case]) -> list[str]:
+    """Say which values of a deck's cases look like a mistake, such as another unit.
+
+    The rules are those of a deck's values.  They are limits, so that only the smallest and the
+    largest value of every name are judged, each alone in the deck.
+    """
+    notes = list(_notes_of_places(checked, cases))
+    known = {(finding.code, finding.message) for finding in _findings(checked)}
+    for name in cases[0]:
+        if name not in JUDGED:
+            continue
+        values = [float(case[name]) for case in cases]
+        least, greatest = min(values), max(values)
+        notes += _thickness_notes(checked.deck, name, least)
+        told: set[str] = set()  # codes of this name
+        for value in dict.fromkeys((least, greatest)):
+            found = [
+                finding
+                for finding in _of_value(checked, name, value)
+                if (finding.code, finding.message) not in known
+            ]
+            if not found:
+                continue
+            best = max(found, key=lambda finding: "looks like" in finding.message)
+            if best.code not in told:
+                told.add(best.code)
+                notes.append(f"{name} = {value:g}: {best.message} [{best.code}]")
+    return notes
+
+
+def unused_values(planned: Plan) -> list[str]:
+    """Say which values change nothing, because the sweep leaves out the exposures."""
+    if planned.settings.in_full:
+        return []
+    if not (names := [name for name in EXPOSURE_NAMES if name in planned.cases[0]]):
+        return []
+    verb = "changes" if len(names) == 1 else "change"
+    text = "only exposures, which this sweep leaves out; --measure failure computes them"
+    return [f"{' and '.join(names)} {verb} {text}"]
+
+
+def _notes_of_places(checked: Problem, cases: Sequence[Case]) -> Iterator[str]:
+    """Name the impact points that lie outside the supports of the deck's plate."""
+    if not checked.outside_supports.any() or not cases[0].keys().isdisjoint(OTHER_PLATE):
+        return
+    places = [place for case in cases if (place := _place_of(checked, case)) is not None]
+    if not places:
+        return
+    centres = element_centres(checked.mesh.elements, checked.mesh.coordinates)
+    nearest = [int(np.hypot(*(centres - place).T).argmin()) for place in places]
+    outside = [p for p, row in zip(places, nearest, strict=True) if checked.outside_supports[row]]
+    if outside:
+        (x, y), count = outside[0], len(outside)
+        which = "1 case hits" if count == 1 else f"{count} cases hit"
+        yield (
+            f"{which} the free rim outside the supports, the first at ({x:g}, {y:g}): a fixture is "
+            "solid there [W556]"
+        )
+
+
+def _place_of(checked: Problem, case: Case) -> tuple[float, float] | None:
+    """Impact point of a case; None if the case does not move it."""
+    if "at" in case:
+        return pair_of_text("at", str(case["at"]))
+    if "impact_node" in case:
+        row = int(case["impact_node"]) - 1
+        rows = checked.mesh.coordinates
+        return (float(rows[row, 0]), float(rows[row, 1])) if 0 <= row < len(rows) else None
+    if (place := checked.load_place) is None or case.keys().isdisjoint({"x0", "y0"}):
+        return None
+    return float(case.get("x0", place[0])), float(case.get("y0", place[1]))
+
+
+def _thickness_notes(deck: model.Deck, name: str, least: float) -> Iterator[str]:
+    """What may be misunderstood about a thickness."""
+    if name not in (THICKNESS, "laminate_thickness"):
+        return
+    if name == THICKNESS:
+        yield (
+            f"{THICKNESS} is that of the laminate, as laminate_thickness; that of one ply is "
+            "ply_thickness"
+        )
+    layers = deck.require(model.Material).layers
+    ply = max(layer.thickness for layer in layers)
+    if len(layers) >= FEW and least < 2.0 * ply:
+        yield (
+            f"{name} = {least:g} is less than two plies of the deck, whose {len(layers)} plies are "
+            f"up to {ply:g} thick: ply_thickness varies the thickness of every ply"
+        )
+
+
+def _of_value(checked: Problem, name: str, value: float) -> list[Finding]:
+    """Warnings about the deck with one value; none where it is invalid, as its cases say."""
+    try:
+        deck = apply_case(checked.deck, {name: value})
+    except CasesError:
+        return []
+    errors = Findings()
+    check_segments(deck, errors)
+    if errors.errors:
+        return []
+    try:
+        return _findings(Problem(deck, checked.mesh, checked.program))
+    except (ArithmeticError, ValueError):  # no plate, a patch beyond it, or numbers out of range
+        return []
+
+
+def _findings(problem: Problem) -> list[Finding]:
     findings = Findings()
-    checked = check(ParsedProblem(deck), findings)
-    raise_first(findings)
-    assert checked is not None  # the deck has a control card
-    return checked
+    with np.errstate(all="ignore"):
+        check_values(problem, findings)
+    return [finding for finding in findings if finding.severity == "warning"]
 
 
-def raise_first(findings: Findings) -> None:
-    """Raise the first error as that of a case."""
-    if findings.errors:
-        first = findings.errors[0]
-        remedy = " Vary dt=auto, or take DT 0." if first.code == UNSTABLE else ""
-        raise CasesError(f"{first.message}{remedy}")
+def freed(some: Sequence[Task]) -> int:
+    """Count cases with B != 0 in which u and v, restrained at every node, are released."""
+    count = 0
+    for task in some:
+        if "support" in task.cases[0]:  # which has its own u and v
+            continue
+        deck = task.settings.deck
+        laminate = {name: value for name, value in task.cases[0].items() if name in LAMINATE}
+        with suppress(CasesError):
+            if apply_case(deck, laminate).all(model.Boundary) != deck.all(model.Boundary):
+                count += len(task.numbers)
+    return count
+
+
+# Bytes per step and case, above the measured values: of a case that is advanced, and of a case
+# whose history is stored.
+ADVANCED_BYTES = 34 if LIBRARY is None else 12
+HISTORY_BYTES = 24
+LONGER = frozenset(("duration", "dt"))  # values on which the number of steps depends
+
+
+def _steps(case: Case) -> float:
+    """Measure of the steps of a case, compared with other cases of the same names."""
+    duration, dt = (float(case.get(name, 1.0)) for name in ("duration", "dt"))
+    return duration / dt if dt > 0.0 else 0.0
+
+
+def check_sweep_memory(
+    checked: Problem, made: Plan, workers: int, *, streamed: bool = False
+) -> None:
+    """Reject a sweep that needs more memory than is free, by a NotEnoughMemoryError.
+
+    `workers` are those on this machine; 0 if a cluster runs the cases.  If histories are
+    `streamed` to files, only those of one task are held.
+    """
+    settings = made.settings
+    if REFINE in made.cases[-1]:
+        checked = check_deck(apply_case(settings.deck, made.cases[-1]))
+    elif not LONGER.isdisjoint(made.cases[-1]):
+        with suppress(CasesError):  # of a case that fails
+            checked = check_deck(apply_case(settings.deck, max(made.cases, key=_steps)))
+    steps, cases = checked.work.steps, len(made.cases)
+    at_once = min(workers, len(tasks(checked, made))) if workers > 1 else workers
+    plate = checked if settings.measure else without_output(checked, settings.measures)
+    in_memory = settings.measure is not None or (
+        settings.modes is None and stores_rows(checked, settings.measures)
+    )
+    stored = 0
+    if settings.history:
+        stored = HISTORY_BYTES * steps * (min(cases, MOST_TOGETHER) if streamed else cases)
+
+    def needed(exact: bool) -> int:
+        if not at_once:
+            return stored
+        one = needed_bytes(plate, in_memory=in_memory, exact=exact)
+        one += ADVANCED_BYTES * steps * runs_together(checked, made)
+        return stored + at_once * one
+
+    def remedy(free: int) -> str:
+        if needed(True) - stored <= free:
+            return "take fewer cases, or none of their histories"
+        return "take fewer workers" if at_once > 1 else "take fewer steps or a coarser mesh"
+
+    _machine.check_available_memory("the sweep", needed, remedy)

@@ -2,21 +2,28 @@
 
 P. J. Roache, Verification and Validation in Computational Science and Engineering, 1998, chapter 5;
 the error band is his grid convergence index (J. Fluids Engineering 116, 1994, 405-413).
+
+Refinement studies: one deck on meshes of which each is twice as fine as the one before.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from fecm._tables import aligned
+from fecm._text import aligned
 from fecm._typing import Floats
+from fecm.authoring.case import Case, CasesError
+from fecm.authoring.timing import stable_time_step
+from fecm.authoring.values import REFINE
+from fecm.authoring.vary import apply_case
+from fecm.deck.macros import flat
+from fecm.problem.problem import Problem
 from fecm.results.metrics import INTEGERS, VERDICTS
 from fecm.sweeps.outcome import Column
-from fecm.sweeps.values import REFINE
 
 ASSUMED_ORDER = 2.0  # of two factors, which observe none
 LOWEST_ORDER = 0.5  # that gives a limit
@@ -103,7 +110,7 @@ def _limit(values: Floats, highest: float) -> Convergence:
     return Convergence(order, last + rest, UNCONFIRMED * abs(rest), remark)
 
 
-def table(
+def convergence_lines(
     cases: Mapping[str, Column], summary: Mapping[str, Column], found: Mapping[str, Convergence]
 ) -> list[str]:
     """Lines with the values of every case, and order, limit and band of every quantity."""
@@ -120,3 +127,25 @@ def table(
     names, *numbers, remarks = zip(*rows, strict=True)
     justified = ([text.rjust(max(map(len, column))) for text in column] for column in numbers)
     return aligned(list(zip(names, *justified, remarks, strict=True)))
+
+
+FACTORS = "1,2,4,8"
+
+
+def refined_cases(checked: Problem, factors: Sequence[int]) -> list[Case]:
+    """Return the cases of a refinement study; the factors are 1, 2, 4, 8 or a part of it.
+
+    DT is that of the deck over the factor.  If it is 0, it is the largest with which no case
+    exceeds 0.9 of its critical time step.  Raises CasesError if factors or deck are unsuitable.
+    """
+    given = ",".join(map(str, factors))
+    if len(factors) < 2 or given not in FACTORS:
+        raise CasesError(f"refine takes {FACTORS} or a part of it, at least two, not {given}")
+    sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
+    if len(sizes) != 1:
+        raise CasesError("refine needs one DT in the program of the deck")
+    (dt,), numbers = sizes, list(map(int, factors))
+    if not dt:
+        dt = min(f * stable_time_step(apply_case(checked.deck, {REFINE: f})) for f in numbers)
+    count = checked.deck.control.numel
+    return [{REFINE: f, "elements": count * f * f, "dt": dt / f} for f in numbers]

@@ -11,10 +11,10 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from fecm._errors import did_you_mean
-from fecm._text import shown
+from fecm._text import short_text
 from fecm._typing import Floats
-from fecm.sweeps.case import CasesError
-from fecm.sweeps.values import NAMES, Kind, check_free, kind_of
+from fecm.authoring.case import CasesError
+from fecm.authoring.values import NAMES, ValueKind, check_free, kind_of
 
 LARGEST_SIGMA = 3.0  # of a lognormal law
 DOUBTFUL_SIGMA = 1.0  # from which a note asks whether it is meant
@@ -139,7 +139,7 @@ LAWS = {
 FORMS = tuple(f"{name}:{known.parameters}" for name, known in LAWS.items())
 
 
-class Law(NamedTuple):
+class ValueDistribution(NamedTuple):
     """Distribution of a value: one of :data:`LAWS` with its parameters."""
 
     kind: str
@@ -169,7 +169,7 @@ class Law(NamedTuple):
 
 
 @dataclass(frozen=True)
-class OwnLaw:
+class CustomDistribution:
     """Distribution of a value that is an object of the caller."""
 
     text: str  # that describes it
@@ -180,7 +180,7 @@ class OwnLaw:
 
     def __reduce__(self) -> tuple[object, ...]:
         """Pickle the text, so that a result does not depend on whether its laws can be pickled."""
-        return OwnLaw, (self.text,)
+        return CustomDistribution, (self.text,)
 
     def values(self, unit: Floats) -> Floats:
         """Values at which the distribution function takes these values, between 0 and 1."""
@@ -210,7 +210,9 @@ def _quantile_method(law: object) -> str | None:
     return next((name for name in names if callable(getattr(law, name, None))), None)
 
 
-def law_of(name: str, given: str | OwnDistribution, *, free: bool = False) -> Law | OwnLaw:
+def distribution_of(
+    name: str, given: str | OwnDistribution, *, free: bool = False
+) -> ValueDistribution | CustomDistribution:
     """The law of a name (any with `free`): a text, or an object with a method ``ppf`` or ``icdf``.
 
     Raises CasesError if it is neither, if it has no parameters yet, or if one is invalid.
@@ -227,7 +229,7 @@ def law_of(name: str, given: str | OwnDistribution, *, free: bool = False) -> La
     if isinstance(given, type) or callable(getattr(given, "freeze", None)):
         what = getattr(given, "name", None) or getattr(given, "__name__", type(given).__name__)
         raise CasesError(f"{name}: {what} has no parameters; call it with them first")
-    return OwnLaw(_text_of(given), given)
+    return CustomDistribution(_text_of(given), given)
 
 
 def _text_of(law: OwnDistribution) -> str:
@@ -236,10 +238,10 @@ def _text_of(law: OwnDistribution) -> str:
     if isinstance(name := getattr(getattr(law, "dist", None), "name", None), str):
         named = [f"{key}={value}" for key, value in getattr(law, "kwds", {}).items()]
         text = f"{name}({', '.join([*map(str, getattr(law, 'args', ())), *named])})"
-    return shown(" ".join(text.split()), LONGEST)
+    return short_text(" ".join(text.split()), LONGEST)
 
 
-def parse_law(name: str, text: str, *, free: bool = False) -> Law:
+def parse_law(name: str, text: str, *, free: bool = False) -> ValueDistribution:
     """Read ``LAW:PARAMETERS`` of a name (any with `free`); CasesError if one of them is invalid."""
     _check_random(name, free=free)
     kind, _, given = (part.strip() for part in str(text).partition(":"))
@@ -254,7 +256,7 @@ def parse_law(name: str, text: str, *, free: bool = False) -> Law:
         raise CasesError(f"{name}: `{text}` is not {kind}:{known.parameters} with finite numbers")
     if not known.holds(*parameters):
         raise CasesError(f"{name}: `{text}`: {known.rule}")
-    law = Law(kind, parameters)
+    law = ValueDistribution(kind, parameters)
     if kind == LOGNORMAL and parameters[1] > LARGEST_SIGMA:
         raise CasesError(f"{name}: {_of_logarithm(law)}; it is at most {LARGEST_SIGMA:g}")
     return law
@@ -265,13 +267,13 @@ def _check_random(name: str, *, free: bool) -> None:
     if free:
         check_free(name, "random")
         return
-    numbers = [known for known in NAMES if kind_of(known) is Kind.NUMBER]
+    numbers = [known for known in NAMES if kind_of(known) is ValueKind.NUMBER]
     if name not in numbers:
         others = did_you_mean(name, numbers) or f"; the names are {', '.join(numbers)}"
         raise CasesError(f"`{name}` cannot be random{others}")
 
 
-def _of_logarithm(law: Law) -> str:
+def _of_logarithm(law: ValueDistribution) -> str:
     """Say that SIGMA of a lognormal law is that of the logarithm, and what it would be of an SD."""
     median, sigma = law.parameters
     # The variance is m^2 s (s - 1) with the median m and s = exp(SIGMA^2).
@@ -280,7 +282,7 @@ def _of_logarithm(law: Law) -> str:
     return f"{text}; a standard deviation of {sigma:g} is SIGMA {meant:.2g}"
 
 
-def parse_random(text: str) -> tuple[str, Law]:
+def parse_random(text: str) -> tuple[str, ValueDistribution]:
     """Read ``NAME=LAW:PARAMETERS``; CasesError if the text has another form, or is invalid."""
     name, equals, law = (part.strip() for part in text.partition("="))
     if not equals:

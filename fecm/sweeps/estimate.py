@@ -8,18 +8,16 @@ from pathlib import Path
 
 from fecm._dataclasses import frozen
 from fecm._errors import warn
-from fecm._tables import aligned, html_table
-from fecm._text import DIGITS
+from fecm._text import DIGITS, aligned, html_table
 from fecm.api import sole_problem
 from fecm.deck.model import Deck
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.problem.problem import Problem
-from fecm.results.linear_plate import TOO_SOFT, unsafe
 from fecm.results.metrics import RATIO
-from fecm.results.validity import Judge
-from fecm.studies.estimate import Estimate as QuickEstimate
-from fecm.studies.estimate import estimate as by_quick_models
-from fecm.sweeps.api import carry_out
+from fecm.results.validity import TOO_SOFT, Judge, unsafe
+from fecm.studies.estimate import QuickEstimate
+from fecm.studies.estimate import quick_estimate as by_quick_models
+from fecm.sweeps.api import carry_out_plan
 from fecm.sweeps.plan import plan
 
 RUN = "run"  # name of the row of the run itself
@@ -253,12 +251,14 @@ def _rows(quick: QuickEstimate) -> dict[str, ModelEstimate]:
 
 def _run_itself(problem: Problem, mass: float) -> tuple[ModelEstimate, list[str], list[str]]:
     """Row of the run itself, by the kernel of sweeps, its deflections, and what is open in it."""
-    own = carry_out(problem, plan(problem, [{}]))
+    own = carry_out_plan(problem, plan(problem, [{}]))
     swept, doubts = {"the run": own}, []
     threshold = velocity = math.nan
     if problem.threshold is not None:
         threshold = problem.threshold.force
-        swept["the run at the threshold"] = carry_out(problem, plan(problem, [{}], until=threshold))
+        swept["the run at the threshold"] = carry_out_plan(
+            problem, plan(problem, [{}], until=threshold)
+        )
         velocity = float(swept["the run at the threshold"]["found_velocity"][0])
     peak, duration = (float(own[name][0]) for name in ("peak_force", "contact_time"))
     if math.isnan(duration):

@@ -1,50 +1,129 @@
-"""Cases that are run one by one, as ``fecm run`` does."""
+"""Validity of cases, and the columns that are measured on request.
+
+Cases that are run one by one, as ``fecm run`` does.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from fecm._typing import Floats
 from fecm.api import LoadedDeck, load_deck
+from fecm.authoring.case import Case, CasesError
+from fecm.authoring.strike import Strike, strike_of
+from fecm.authoring.timing import lengthened, with_clock
+from fecm.authoring.values import name_fault
+from fecm.authoring.vary import apply_case
 from fecm.deck.macros import Body, Loop
 from fecm.deck.model import Deck, Macro
 from fecm.deck.units import unit_names
 from fecm.mechanics.contact_law import Law
+from fecm.mechanics.laminate import threshold_force
 from fecm.mechanics.own_law import LawError
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.problem.build import RunOptions
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
+from fecm.results.end import decided
 from fecm.results.exposures import band_of_largest, count_evaluations, largest_exposures
+from fecm.results.hdf5_writer import MemorySink
 from fecm.results.metrics import (
     BAND,
     EVALUATIONS,
     EXPOSURES,
+    GAGE,
     HIT,
-    Indentation,
+    RATIO,
+    THRESHOLD_FORCE,
+    IndentationMetrics,
+    Metrics,
     Projectiles,
-    summarise,
+    impact_metrics,
 )
 from fecm.results.result import Result
 from fecm.results.run_metrics import deflection_of
-from fecm.results.sinks import MemorySink
-from fecm.results.validity import reasons_of
+from fecm.results.validity import Extent, reasons_of
 from fecm.simulation.recorder import exposures_of
-from fecm.simulation.run import run, simulate
+from fecm.simulation.run import run_program, simulate
 from fecm.simulation.simulation import Criteria, Simulation
-from fecm.sweeps import find_in_full
-from fecm.sweeps.case import Case, CasesError
-from fecm.sweeps.find import Sought
-from fecm.sweeps.judge import judge, peaks_of
-from fecm.sweeps.outcome import Outcome, outcome_of
+from fecm.sweeps import search as find_in_full
+from fecm.sweeps.outcome import About, Outcome, outcome_of
 from fecm.sweeps.plan import BuildFunction, Measure, MeasureFunction, Settings
-from fecm.sweeps.strike import Strike, strike_of
-from fecm.sweeps.timing import lengthened, with_clock
-from fecm.sweeps.values import name_fault
-from fecm.sweeps.vary import apply_case
+from fecm.sweeps.search import Sought
+
+
+class CasePeaks(NamedTuple):
+    """Largest and last value of a history of cases, (cases,) each."""
+
+    largest: Floats
+    last: Floats
+
+
+def thresholds_of(checked: Problem, toughness: Floats) -> Floats | None:
+    """Return the delamination thresholds (force) of cases; None without a DELA segment.
+
+    `toughness` (force/length) is (cases,).
+    """
+    if (own := checked.threshold) is None:
+        return None
+    values = {g: threshold_force(own.rigidity, g, own.number) for g in set(toughness.tolist())}
+    return np.array([values[g] for g in toughness.tolist()])
+
+
+def judge_cases(
+    outcome: Outcome,
+    checked: Problem,
+    measures: Sequence[Measure],
+    metrics: Metrics,
+    *,
+    peaks: Mapping[str, CasePeaks],
+    indentation: Floats,
+    of_rows: Collection[str] = (),
+) -> None:
+    """Add the validity of cases, and the columns of what was measured, with its open values.
+
+    `peaks` has the strains of gages and the exposures, `indentation` (cases,) is the largest.
+    `of_rows` has the reasons that the stored rows of a full run gave.
+    """
+    rules, end, plate = checked.judge, metrics.end, metrics.plate
+    known = {name: decided(peak.largest, peak.last, end) for name, peak in peaks.items()}
+    deflection = plate.largest
+    if rules.mobility:  # the plate moves as a whole
+        deflection = np.full(len(end), np.nan)
+    exposures = [peak.largest for name, peak in peaks.items() if name in EXPOSURES]
+    extent = Extent(
+        end=end,
+        peak=outcome.columns[About.REACHED],
+        indentation=indentation,
+        deflection=deflection,
+        exposure=np.nanmax(exposures, axis=0) if exposures else np.nan,
+        threshold=metrics.columns.get(THRESHOLD_FORCE, np.nan),
+        of_rows=of_rows,
+    )
+    ratio = metrics.deflection / rules.thickness
+    if Measure.DEFLECTION in measures:
+        known[Measure.DEFLECTION] = metrics.deflection
+    known[RATIO] = np.where(np.isnan(deflection), np.nan, ratio)
+    outcome.columns |= {**known, About.VALIDITY: rules.validity(extent)}
+
+
+def peaks_of(measures: Sequence[Measure], result: Result) -> dict[str, CasePeaks]:
+    """Peaks of the columns of a run that are measured on request."""
+    peaks: dict[str, CasePeaks] = {}
+    if Measure.GAGES in measures and "gages/number" in result:
+        strains = np.abs(result["gages/strain"]).T
+        numbers = result["gages/number"]
+        for number, values in zip(numbers, strains, strict=True):
+            peaks[f"{GAGE}{number}"] = CasePeaks(values.max(keepdims=True), values[-1:])
+    for one in largest_exposures(result) if Measure.FAILURE in measures else ():
+        last = one.exposure if one.time >= result["history/time"][-1] else 0.0
+        peaks[f"exposure_{one.criterion}"] = CasePeaks(np.array([one.exposure]), np.array([last]))
+    return peaks
+
 
 FIELDS = ("DISP", "STRE", "PLYS", "REAC", "EIGE")  # macros that store or print fields
 NEVER = 1e9  # steps between two rows of RODP
@@ -60,15 +139,17 @@ def run_in_full(settings: Settings, number: int, case: Case) -> Outcome:
             def run(strike: Strike, factor: int) -> Outcome:
                 longer = checked if factor == 1 else lengthened(checked, factor)
                 deck = replace(longer, deck=strike.deck())
-                return alone(number, deck, settings.measures, law=settings.law)
+                return run_case_in_full(number, deck, settings.measures, law=settings.law)
 
             level, start = float(search.level), strike_of(checked.deck)
             at_rest = checked.worst_at_rest
             if at_rest is not None and at_rest.exposure >= level:
                 raise CasesError(f"the plate at rest has the exposure {at_rest.exposure:.4g}")
-            outcome = find_in_full.found(number, start, search.quantity, level, run)
+            outcome = find_in_full.search_in_full(number, start, search.quantity, level, run)
         else:
-            outcome = alone(number, checked, settings.measures, measure, case, law=settings.law)
+            outcome = run_case_in_full(
+                number, checked, settings.measures, measure, case, law=settings.law
+            )
     except CasesError as error:
         return Outcome.failed({number: str(error)})
     return outcome if settings.build else with_hit(outcome, checked, case)
@@ -108,7 +189,7 @@ def with_hit(outcome: Outcome, checked: Problem, case: Case) -> Outcome:
     return outcome
 
 
-def alone(
+def run_case_in_full(
     number: int,
     checked: Problem,
     measures: Sequence[Measure],
@@ -154,7 +235,7 @@ def in_one_motion(
         simulation = Simulation(without_output(problems[0], measures), sink, options)
         if Measure.FAILURE in measures:
             simulation.others = [_criteria(simulation, one) for one in problems[1:]]
-        run(simulation)
+        run_program(simulation)
     except (CasesError, DivergenceError, LawError, ArithmeticError) as error:
         return [*invalid, Outcome.failed(dict.fromkeys(made, str(error)))]
     found: list[dict[str, Floats]] = [{} for _ in problems]
@@ -192,9 +273,11 @@ def _outcome(
     force, depth, times = (result[f"history/{n}"] for n in ("force", "indentation", "time"))
     about = result.attributes_of("history")
     permanent = np.array([about.get("permanent_indentation", 0.0)])
-    indentation = Indentation(np.maximum(depth.max(keepdims=True), 0.0), depth[-1:], permanent)
+    indentation = IndentationMetrics(
+        np.maximum(depth.max(keepdims=True), 0.0), depth[-1:], permanent
+    )
     own = strike_of(checked.deck)
-    metrics = summarise(
+    metrics = impact_metrics(
         force[:, None],
         times,
         indentation,
@@ -213,7 +296,7 @@ def _outcome(
         force=force[None],
     )
     peaks = peaks_of(measures, result)
-    judge(
+    judge_cases(
         outcome,
         checked,
         measures,

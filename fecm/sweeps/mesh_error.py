@@ -7,27 +7,26 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from fecm.api import Mode, Progress, load_one
+from fecm.authoring.case import CasesError, check_deck
+from fecm.authoring.timing import stable_time_step, with_time_step
 from fecm.deck.macros import flat
 from fecm.deck.model import Deck
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import RunOptions
-from fecm.problem.memory import check_memory
+from fecm.problem.estimates import resolution
+from fecm.problem.memory import check_run_memory
 from fecm.problem.problem import Problem
-from fecm.problem.refine import RefineError, refined
-from fecm.problem.resolution import resolution
+from fecm.problem.refine import RefineError, refined_deck
 from fecm.problem.slips import active_slips
 from fecm.results.end import OPEN_PEAKS
 from fecm.results.exposures import largest_exposures
+from fecm.results.hdf5_writer import MemorySink
 from fecm.results.run_metrics import end_of
-from fecm.results.sinks import MemorySink
 from fecm.results.stored import Stored
-from fecm.simulation.run import run
+from fecm.simulation.run import run_program
 from fecm.simulation.simulation import Simulation
-from fecm.sweeps.case import CasesError
-from fecm.sweeps.checks import check_deck
 from fecm.sweeps.in_full import without_output
 from fecm.sweeps.plan import Measure
-from fecm.sweeps.timing import stable_time_step, with_time_step
 
 
 @dataclass(frozen=True)
@@ -133,7 +132,7 @@ def bisected(problem: Problem) -> Problem:
     nothing hits the plate, or its elements cannot be bisected.
     """
     near = problem.distances <= max(_distance(problem), problem.distances.min())
-    deck = refined(problem.deck, problem.mesh, near)
+    deck = refined_deck(problem.deck, problem.mesh, near)
     taken = taken_time_step(problem.critical_time_step)
     sizes = [macro.value or taken for macro in flat(problem.program) if macro.word == "DT"]
     try:
@@ -179,8 +178,8 @@ def _exposures(stored: Stored) -> dict[str, float]:
 def _run(problem: Problem, options: RunOptions, advance: Callable[[int], object]) -> Stored:
     """Run a problem without storing fields."""
     plain = without_output(problem, [Measure.FAILURE])
-    check_memory(plain, solver=options.solver, in_memory=True)
+    check_run_memory(plain, solver=options.solver, in_memory=True)
     sink = MemorySink()
     observers = (lambda simulation: advance(simulation.interval),)
-    run(Simulation(plain, sink, options, observers=observers))
+    run_program(Simulation(plain, sink, options, observers=observers))
     return Stored(sink.arrays, sink.texts, sink.groups, plain.deck)

@@ -1,8 +1,8 @@
 """Plan of a sweep: its cases, and the tasks that compute them.
 
 A study (grid, cases, random, refine) gives cases.  A plan has them and what they have in common,
-:class:`Settings`.  :func:`tasks` splits it; :func:`fecm.sweeps.batch.run` computes the outcome of a
-task, and :func:`fecm.sweeps.result.result_of` makes the result of the plan from all outcomes.
+:class:`Settings`.  :func:`tasks` splits it; :func:`fecm.sweeps.batch.run_task` computes
+the outcome of a task, and :func:`fecm.sweeps.result.sweep_result` makes the result of the plan from all outcomes.
 """
 
 from __future__ import annotations
@@ -15,20 +15,9 @@ from enum import StrEnum
 from typing import Any
 
 from fecm._version import __version__
-from fecm.deck.macros import flat
-from fecm.deck.model import Deck, Gages, Nonlinear
-from fecm.mechanics.contact_law import Law
-from fecm.mechanics.own_law import name_of
-from fecm.problem.problem import Problem
-from fecm.results.metrics import COLUMNS, FOUND, GAGE, SUMMARY
-from fecm.results.metrics import THRESHOLD as OF_THRESHOLD
-from fecm.results.result import Result
-from fecm.sweeps.case import Case, CasesError
-from fecm.sweeps.find import FIRST_VELOCITIES, Search, Sought, Until, search_of
-from fecm.sweeps.limits import NO_THRESHOLD, THRESHOLD, Limit, check_limits
-from fecm.sweeps.random import Design
-from fecm.sweeps.timing import Clock, clock_of
-from fecm.sweeps.values import (
+from fecm.authoring.case import NO_THRESHOLD, THRESHOLD, Case, CasesError, Limit, check_limits
+from fecm.authoring.timing import Clock, clock_of
+from fecm.authoring.values import (
     FAILURE_NAMES,
     LAW_VALUES,
     REFINE,
@@ -38,7 +27,17 @@ from fecm.sweeps.values import (
     names_of,
     plate_values,
 )
-from fecm.sweeps.vary import apply_case
+from fecm.authoring.vary import apply_case
+from fecm.deck.macros import flat
+from fecm.deck.model import Deck, Gages, Nonlinear
+from fecm.mechanics.contact_law import Law
+from fecm.mechanics.own_law import law_name
+from fecm.problem.problem import Problem
+from fecm.results.metrics import COLUMNS, FOUND, GAGE, SUMMARY
+from fecm.results.metrics import THRESHOLD as OF_THRESHOLD
+from fecm.results.result import Result
+from fecm.sweeps.random import Design
+from fecm.sweeps.search import FIRST_VELOCITIES, Search, Sought, Until, search_of
 
 BuildFunction = Callable[[dict[str, Any]], Deck]  # of a case, whose values are any
 MeasureFunction = Callable[[Result], Mapping[str, float]]
@@ -105,7 +104,7 @@ class Plan:
         """Hash that identifies the outcomes of this sweep."""
         own = self.settings
         parts = [__version__, own.deck.to_text(), self.cases, own.history, own.search]
-        law = () if own.law is None else (name_of(own.law),)
+        law = () if own.law is None else (law_name(own.law),)
         text = json.dumps([*parts, own.measures, own.modes, MOST_TOGETHER, *law])
         return hashlib.sha256(text.encode()).hexdigest()
 
@@ -182,7 +181,7 @@ def plan(
 
 def check_law(law: Law, names: Collection[str], modes: int | None = None) -> None:
     """Raise CasesError if a user's law excludes values that vary, or the reduced model."""
-    own = f"the contact law {name_of(law)} takes the place of EXPE"
+    own = f"the contact law {law_name(law)} takes the place of EXPE"
     if constants := [name for name in names if name in LAW_VALUES]:
         raise CasesError(f"{own}, so that {', '.join(constants)} would change nothing")
     if modes is not None:

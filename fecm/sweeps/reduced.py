@@ -1,28 +1,43 @@
 """Cases of a nonlinear plate in a few modes, all together: the model ``reduced``.
 
 The theory is that of :mod:`~fecm.mechanics.reduced_plate`.
+
+Full runs beside the reduced model: those of the smallest, middle and largest energy.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fecm._typing import Floats
+from fecm.authoring.case import CasesError
+from fecm.authoring.strike import Strike
+from fecm.authoring.timing import duration_of
+from fecm.authoring.vary import strike_of_case
 from fecm.mechanics.contact_law import ContactPoint
 from fecm.mechanics.impact import ContactState, couple_step
 from fecm.mechanics.projectile import Rod
-from fecm.mechanics.reduced_motion import ReducedMotion, SeriesLaw
-from fecm.mechanics.reduced_plate import ReducedPlate, ReductionError, reduced_plate
+from fecm.mechanics.reduced_plate import (
+    ReducedMotion,
+    ReducedPlate,
+    ReductionError,
+    SeriesLaw,
+    reduced_plate,
+)
 from fecm.problem.problem import Problem
-from fecm.results.metrics import Indentation
-from fecm.sweeps.case import CasesError
-from fecm.sweeps.convolution import BLOCK, Convolution
-from fecm.sweeps.find import Strikes
+from fecm.results.groups import ResultFileError
+from fecm.results.metrics import RATIO, IndentationMetrics
+from fecm.sweeps.outcome import About, Column, Outcome, merge
+from fecm.sweeps.plan import MOST_MODES, Plan, Task
 from fecm.sweeps.responses import (
+    BLOCK,
+    Convolution,
     DeflectionRecord,
     Hits,
     Impacts,
@@ -31,8 +46,11 @@ from fecm.sweeps.responses import (
     Work,
     balance_errors,
 )
-from fecm.sweeps.strike import Strike
-from fecm.sweeps.timing import duration_of
+from fecm.sweeps.search import Strikes
+
+if TYPE_CHECKING:
+    from fecm.results.hdf5_reader import FileContents
+
 
 # Time step times the angular frequency of the fastest bending mode and of the contact on the plate,
 # and of the projectile on the contact.
@@ -95,7 +113,7 @@ class ReducedImpacts:
         last = law.of_law(state.contact).indentation
         return Impacts(
             force=force,
-            indentation=Indentation(deepest, last, permanent),
+            indentation=IndentationMetrics(deepest, last, permanent),
             unconverged_steps=state.unconverged_steps,
             plate=record.deflection,
             error=balance_errors(force, Work(np.array(done), none), tips),
@@ -145,3 +163,200 @@ def largest_time_step(plate: ReducedPlate, strike: Strike) -> float:
     if isinstance(rod := strike.projectile, Rod):
         found = min(found, rod.element_length * math.sqrt(rod.density / rod.modulus))
     return found
+
+
+RunTasks = Callable[[Sequence[Task]], list[tuple[Task, Outcome]]]
+GROUP = "reduced"
+LIMIT = 0.02  # largest difference of the peaks, relative to that of the full run
+TEXTS = {
+    "case": "number of the case that was also run in full",
+    "peak_force": "largest contact force of the reduced model",
+    "full_peak_force": "largest contact force of the full run",
+    RATIO: "largest displacement under the load over the thickness, of the reduced model",
+    f"full_{RATIO}": "largest displacement under the load over the thickness, of the full run",
+}
+DIMENSIONS = {"peak_force": "force", "full_peak_force": "force"}
+
+
+@dataclass(frozen=True)
+class ReducedModel:
+    """The reduced model of a sweep, beside full runs of some of its cases.
+
+    Attributes
+    ----------
+    modes : int
+        Largest number of bending modes.
+    columns : dict of ndarray (n,)
+        Of the cases that were also run in full: ``case``, their numbers; ``peak_force`` and
+        ``deflection_ratio`` by the model; ``full_peak_force`` and ``full_deflection_ratio`` by the
+        full runs.
+    in_full : int
+        Number of cases that were run in full, as the model differs too much: those of the largest
+        energies.
+    """
+
+    modes: int
+    columns: dict[str, Column]
+    in_full: int = 0
+
+    def difference(self, name: str) -> Column:
+        """Difference of the model from the full runs, relative to these, (n,)."""
+        full = self.columns[f"full_{name}"]
+        return np.asarray((self.columns[name] - full) / full)
+
+    @property
+    def _modes(self) -> str:
+        return f"{self.modes} mode{'' if self.modes == 1 else 's'}"
+
+    def lines(self) -> Iterator[str]:
+        """What the summary of the sweep says of the model."""
+        yield f"reduced model     {self._modes} of bending; difference from full runs:"
+        rows = zip(
+            self.columns["case"], self.difference("peak_force"), self.difference(RATIO), strict=True
+        )
+        for case, peak, w in rows:
+            of_w = "open" if np.isnan(w) else f"{w:+.3%}"
+            yield f"{'':18}peak {peak:+.2%}, w {of_w} (case {case})"
+        if self.in_full:
+            cases = "1 case" if self.in_full == 1 else f"{self.in_full} cases"
+            yield f"{'':18}{cases} of the largest energies: in full, as above {LIMIT:.0%}"
+        yield f"{'':18}slopes and strains are not judged"
+
+    def check(self) -> None:
+        """Raise CasesError if a peak differs by more than the limit."""
+        if not np.abs(self.difference("peak_force")).max() <= LIMIT:
+            remedy = "take more modes, or full runs (leave out the reduced model)"
+            if self.modes >= MOST_MODES:
+                remedy = "these are all its modes; take full runs: leave out the reduced model"
+            raise CasesError(f"{self._misfit}; at most {LIMIT:.0%} is allowed: {remedy}")
+
+    @property
+    def note(self) -> str:
+        """Which cases are run in full, and why."""
+        cases = "the case" if self.in_full == 1 else f"the {self.in_full} cases"
+        more = "" if self.modes >= MOST_MODES else "; with more modes they may be fewer"
+        return f"{self._misfit}: {cases} of the largest energies are run in full{more}"
+
+    @property
+    def _misfit(self) -> str:
+        """The largest difference of a peak force."""
+        peaks = self.difference("peak_force")
+        worst = int(np.abs(peaks).argmax())
+        return (
+            f"the peak force of the reduced model with {self._modes} differs by "
+            f"{peaks[worst]:+.1%} from the full run of case {self.columns['case'][worst]}"
+        )
+
+
+def trials(made: Plan, cases: Sequence[int], first: int) -> list[Task]:
+    """Tasks of some cases, each in full and by the model; case n has number `first` + 2 n."""
+    both = (replace(made.settings, modes=None), made.settings)
+    return [
+        Task(own, first + 2 * case + place, (case,), (made.cases[case],))
+        for case in cases
+        for place, own in enumerate(both)
+    ]
+
+
+def by_energy(made: Plan) -> list[int]:
+    """Cases with an energy, the smallest first; CasesError if none has one."""
+    energies: list[tuple[float, int]] = []
+    for number, case in enumerate(made.cases):
+        with suppress(CasesError):  # the case will fail
+            energies.append((strike_of_case(made.settings.deck, case).energy, number))
+    ordered = [number for energy, number in sorted(energies) if energy > 0.0]
+    if not ordered:
+        raise CasesError("no case has an energy, by which the reduced model could be checked")
+    return ordered
+
+
+class Trials:
+    """Cases that were run in full and by the model."""
+
+    def __init__(self, made: Plan, first: int, run: RunTasks) -> None:
+        self._made, self._first, self._run = made, first, run
+        self._fulls: list[Outcome] = []
+        self._models: list[Outcome] = []
+
+    def failing(self, cases: Iterable[int]) -> set[int]:
+        """Run cases that have not been run yet; those of all for which the model does not hold."""
+        before = {number for outcome in self._fulls for number in outcome.numbers}
+        new = [case for case in dict.fromkeys(cases) if case not in before]
+        for task, outcome in self._run(trials(self._made, new, self._first)) if new else ():
+            (self._models if task.settings.modes else self._fulls).append(outcome)
+        full, model = (merge(some, history=False) for some in (self._fulls, self._models))
+        forces = [one.columns[About.REACHED] for one in (model, full)]
+        holds = ~full.fine | (model.fine & (np.abs(forces[0] - forces[1]) <= LIMIT * forces[1]))
+        return {number for number, one in zip(full.numbers, holds, strict=True) if not one}
+
+    def compared(self, modes: int) -> ReducedModel:
+        """The model beside the full runs; CasesError if all failed."""
+        return compared(modes, self._fulls, self._models)
+
+
+def count_held(ordered: Sequence[int], failing: Callable[[Iterable[int]], set[int]]) -> int:
+    """Count the cases, ordered by energy, for which the model holds; others are run in full.
+
+    The model fits worst where the plate bends most.  So the case of the largest energy goes first.
+    If it fails, and that of the smallest holds, bisection finds the last that holds.  A case of the
+    middle is tried too.
+    """
+    held = len(ordered)
+    if failing(ordered[-1:]):
+        held -= 1
+        if ordered[0] in failing(ordered[:1]):
+            return 0
+        low = min(1, held)
+        while low < held:
+            middle = (low + held) // 2
+            if ordered[middle] in failing([ordered[middle]]):
+                held = middle
+            else:
+                low = middle + 1
+    if held:
+        wrong = failing([ordered[0], ordered[held // 2]])
+        held = next((n for n in range(held) if ordered[n] in wrong), held)
+    return held
+
+
+def compared(modes: int, fulls: Sequence[Outcome], models: Sequence[Outcome]) -> ReducedModel:
+    """Compare outcomes of the trials; CasesError if all failed."""
+    full, model = merge(fulls, history=False), merge(models, history=False)
+    fine = np.flatnonzero(full.fine & model.fine)
+    if not len(fine):
+        (failed, *_) = (one for one in (model, full) if not one.fine.all())
+        reason = failed.status[int(np.flatnonzero(~failed.fine)[0])]
+        raise CasesError(f"the reduced model can't be checked by full runs: {reason}")
+    full, model = full.select(fine), model.select(fine)
+    return ReducedModel(
+        modes,
+        {
+            "case": np.array(full.numbers),
+            "peak_force": model.columns[About.REACHED],
+            "full_peak_force": full.columns[About.REACHED],
+            RATIO: model.columns[RATIO],
+            f"full_{RATIO}": full.columns[RATIO],
+        },
+    )
+
+
+def reduced_attributes(model: ReducedModel) -> dict[str, Any]:
+    """Attributes of the group in the file."""
+    found = {"description": "full runs beside the reduced model", "modes": model.modes}
+    return found | ({"in_full": model.in_full} if model.in_full else {})
+
+
+def reduced_of(contents: FileContents) -> ReducedModel | None:
+    """The reduced model of a sweep's file, None without one; ResultFileError if incomplete."""
+    if GROUP not in contents.groups:
+        return None
+    try:
+        modes = int(contents.groups[GROUP]["modes"])
+        in_full = int(contents.groups[GROUP].get("in_full", 0))
+        columns = {name: contents[f"{GROUP}/{name}"] for name in TEXTS}
+    except (KeyError, ValueError, TypeError) as error:
+        message = f"{contents.path}: what is stored of the reduced model is incomplete ({error})"
+        raise ResultFileError(message) from None
+    if len({np.shape(values) for values in columns.values()}) != 1:
+        raise ResultFileError(f"{contents.path}: columns of the reduced model differ in length")
+    return ReducedModel(modes, columns, in_full)

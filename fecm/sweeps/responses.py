@@ -1,4 +1,9 @@
-"""Responses to a unit force in the first step, and their convolution with force histories.
+"""Convolution of responses with forces that depend on the sums so far.
+
+The sums are evaluated in blocks: a matrix product adds the contributions of earlier blocks, and
+those of steps within the block are added one by one.
+
+Responses to a unit force in the first step, and their convolution with force histories.
 
 The plate is linear and the projectile acts on one dof, so that the displacement of this dof is
 exactly the sum of its impulse responses: w_n = sum over m < n of g_(n-m) F_m.  A rod is linear too:
@@ -12,6 +17,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.fft import irfft, rfft
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
@@ -24,14 +30,92 @@ from fecm.mechanics.contact_law import (
     LinearPermanent,
 )
 from fecm.mechanics.impact import ContactState, ImpactConditions, ImpactSystem, couple_step
-from fecm.mechanics.impact_steps import ImpactSteps, kernel_law, knows, supports
-from fecm.mechanics.impact_sweep import Found, Given, sweep
+from fecm.mechanics.impact_steps import ImpactSteps, can_step, kernel_law, knows
+from fecm.mechanics.impact_sweep import Given, ResultRow, sweep_impacts
 from fecm.mechanics.plate_motion import AppliedForce, DofSums, Load, PlateMotion
 from fecm.mechanics.projectile import Projectile, RigidMass, RodIntegrator, RodState, WilsonStep
-from fecm.mechanics.rod_modes import Modes
+from fecm.mechanics.rod_modes import ProjectileModes
 from fecm.results.end import LEAST_WORK, Deflection
-from fecm.results.metrics import Indentation
-from fecm.sweeps.convolution import BLOCK, Convolution
+from fecm.results.metrics import IndentationMetrics
+
+# Steps of the blocks.  A force acts at once on the rest of the smallest block, which acts on the
+# rest of the next larger one by a matrix product, and so on; complete largest blocks act on later
+# ones by Fourier transforms.
+NEAR = 8
+BLOCK = 64
+FAR = 256
+TILE = 16  # cases of every matrix product, so that no case depends on the others
+
+
+class Convolution:
+    """Sums x_n = sum over m < n of r_(n-m) f_m of many cases, where f_n may depend on x_n.
+
+    `responses` are r_1, r_2, ... of each sum and kind of case, (steps,) or (sums, steps, kinds);
+    `kinds` (cases,), in ascending order, is the kind of each case.
+    """
+
+    def __init__(self, responses: Floats, kinds: NDArray[np.intp]) -> None:
+        r = responses[None, :, None] if responses.ndim == 1 else responses
+        sums, self._steps, count = r.shape
+        cases = np.bincount(kinds, minlength=count)
+        tiles = -(-cases // TILE)  # of each kind; the last is filled up
+        last, blocks = np.cumsum(tiles), -(-self._steps // FAR)
+        self._cuts = [slice(end - n, end) for n, end in zip(tiles, last, strict=True)]
+        shifts = TILE * (last - tiles) - np.cumsum(cases) + cases
+        self._place = np.arange(len(kinds)) + shifts[kinds]
+        known = np.zeros((count, sums, FAR * (blocks + 1)))
+        known[:, :, : self._steps] = r.transpose(2, 0, 1)
+        self._near = np.repeat(known[:, :, :NEAR, None], tiles, axis=0)
+        # Row t, column s: r_(t + size - s), the effect of a block of some size on later steps.
+        windows = np.lib.stride_tricks.sliding_window_view
+        self._tables = {
+            size: windows(known[:, :, 1:], size, axis=2)[:, :, : end - size, ::-1].copy()
+            for size, end in ((NEAR, BLOCK), (BLOCK, FAR))
+        }
+        parts = [known[:, :, FAR * n : FAR * (n + 2)] for n in range(blocks - 1)]
+        self._filters = [rfft(np.roll(part, -FAR, axis=2))[..., None] for part in parts]
+        self._spectra = np.empty((last[-1], len(parts), FAR + 1, TILE), dtype=complex)
+        self._given = np.zeros((last[-1], FAR, TILE))  # of the last block
+        self._block = np.zeros((last[-1], sums, FAR, TILE))
+        self._values = np.zeros(last[-1] * TILE)
+        self._step = 0
+
+    def next(self) -> Floats:
+        """Return x_n (sums, cases) of the next step n = 1, 2, ..."""
+        rows = self._block[:, :, self._step % FAR].swapaxes(0, 1)
+        found = rows.reshape(len(rows), -1)[:, self._place]
+        self._step += 1
+        if not self._step % NEAR and self._step < self._steps:
+            for kind, tiles in enumerate(self._cuts):
+                self._add_block(self._step, kind, tiles)
+        return found
+
+    def give(self, values: Floats) -> None:
+        """Set f_n of the step last returned by :meth:`next`; f_0 before the first step."""
+        self._values[self._place] = values
+        given = self._values.reshape(-1, 1, 1, TILE)
+        row, left = self._step % FAR, NEAR - self._step % NEAR
+        self._given[:, row] = given[:, 0, 0]
+        self._block[:, :, row : row + left] += self._near[:, :, :left] * given
+
+    def _add_block(self, known: int, kind: int, tiles: slice) -> None:
+        """Add the effect of a complete block, the last one, of forces on the later steps."""
+        if known % FAR:
+            size, end = (NEAR, BLOCK) if known % BLOCK else (BLOCK, FAR)
+            row, rows = known % FAR, end - known % end
+            factors = self._tables[size][kind, :, :rows]
+            part = self._given[tiles, None, row - size : row]
+            self._block[tiles, :, row : row + rows] += factors @ part
+            return
+        number = known // FAR
+        for tile in range(tiles.start, tiles.stop):
+            spectra = self._spectra[tile]
+            spectra[number - 1] = rfft(self._given[tile], 2 * FAR, axis=0)
+            total = self._filters[0][kind] * spectra[number - 1]
+            for distance in range(1, number):
+                total += self._filters[distance][kind] * spectra[number - 1 - distance]
+            self._block[tile] = irfft(total, axis=1)[:, :FAR]
+
 
 SMALL = BLOCK**3  # multiplications of a matrix product small enough for BLAS to use one thread
 NO_FORCE = HystereticLaw(LinearPermanent(0.0, 0.0, 0.0, 1.0))
@@ -50,7 +134,7 @@ def plate_response(
     state = system.start()
     response = np.empty(steps)
     strains = np.empty((0 if gages is None else len(gages.weights), steps))
-    burst = supports(system)
+    burst = can_step(system)
     for step in range(1 if burst else steps):
         motion.advance(state.plate, dt, 0.0, AppliedForce(load, 1.0) if step == 0 else None)
         response[step] = load.dot(state.plate.padded)
@@ -176,7 +260,7 @@ class Impacts(NamedTuple):
     """Histories of many impacts on one plate."""
 
     force: Floats  # (steps, cases): contact force after every step
-    indentation: Indentation
+    indentation: IndentationMetrics
     unconverged_steps: NDArray[np.int64]  # (cases,): steps whose contact iteration did not converge
     plate: Deflection
     error: Floats  # (cases,): error of the energy balance; see :func:`balance_errors`
@@ -235,7 +319,7 @@ def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Impact
         if not (step + 1) % BLOCK or step + 1 == steps:
             done.append(state.contact_work + plate_work)
     permanent = law.permanent(state.memory, state.contact)
-    indentation = Indentation(deepest, state.contact.indentation, permanent)
+    indentation = IndentationMetrics(deepest, state.contact.indentation, permanent)
     work = Work(np.array(done), node_mass * largest_ddw**2 / (8.0 * tips.dt**2))
     error = balance_errors(force, work, tips)
     return Impacts(force, indentation, state.unconverged_steps, record.deflection, error), work
@@ -293,8 +377,8 @@ def balance_errors(force: Floats, work: Work, tips: TipSteps) -> Floats:
 
 
 @lru_cache(maxsize=8)
-def _modes(rod: Projectile) -> Modes:
-    return Modes.of(rod.stiffness(), rod.mass(), rod.rigid)
+def _modes(rod: Projectile) -> ProjectileModes:
+    return ProjectileModes.of(rod.stiffness(), rod.mass(), rod.rigid)
 
 
 def _by_kernels(
@@ -316,26 +400,28 @@ def _by_kernels(
     }
     given = np.stack(np.broadcast_arrays(*(rows[row] for row in Given)))
     cases = len(hits.speed)
-    force, found = np.empty((cases, len(response))), np.empty((len(Found), cases))
+    force, found = np.empty((cases, len(response))), np.empty((len(ResultRow), cases))
     starts = np.searchsorted(hits.kind, np.arange(len(hits.rods) + 1)).tolist()
     for rod, first, last in zip(hits.rods, starts[:-1], starts[1:], strict=True):
         step = WilsonStep(rod.stiffness(), rod.mass(), dt, rigid=rod.rigid)
         own = slice(first, last)
-        sweep(_modes(rod), step, law.kind, response, given[:, own], force[own], found[:, own])
-    lost = found[Found.LOST] + node_mass * found[Found.LARGEST_DDW] ** 2 / (8.0 * dt**2)
-    initial = found[Found.INITIAL]
+        sweep_impacts(
+            _modes(rod), step, law.kind, response, given[:, own], force[own], found[:, own]
+        )
+    lost = found[ResultRow.LOST] + node_mass * found[ResultRow.LARGEST_DDW] ** 2 / (8.0 * dt**2)
+    initial = found[ResultRow.INITIAL]
     return Impacts(
         force=force.T,
-        indentation=Indentation(
-            found[Found.DEEPEST], found[Found.INDENTATION], found[Found.PERMANENT]
+        indentation=IndentationMetrics(
+            found[ResultRow.DEEPEST], found[ResultRow.INDENTATION], found[ResultRow.PERMANENT]
         ),
-        unconverged_steps=found[Found.UNCONVERGED].astype(np.int64),
+        unconverged_steps=found[ResultRow.UNCONVERGED].astype(np.int64),
         plate=Deflection(
-            largest=found[Found.HIGHEST],
-            last=found[Found.W],
-            speed=found[Found.LARGEST_DW] / dt,
-            energy=found[Found.PLATE_WORK],
-            compliance=found[Found.COMPLIANCE],
+            largest=found[ResultRow.HIGHEST],
+            last=found[ResultRow.W],
+            speed=found[ResultRow.LARGEST_DW] / dt,
+            energy=found[ResultRow.PLATE_WORK],
+            compliance=found[ResultRow.COMPLIANCE],
         ),
         error=lost / np.where(initial > 0.0, initial, 1.0),
     )

@@ -1,4 +1,7 @@
-"""Result of a sweep: values and results of every case, and what can be made of them."""
+"""Result of a sweep: values and results of every case, and what can be made of them.
+
+Reads results of sweeps from HDF5 files.
+"""
 
 from __future__ import annotations
 
@@ -10,24 +13,38 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._files import ARGUMENT, check_outputs, writing
-from fecm._tables import html_table
+from fecm._files import ARGUMENT, check_outputs, open_for_writing
+from fecm._text import html_table
+from fecm._typing import AnyFile
 from fecm.deck.model import Delamination
-from fecm.deck.units import unit_names
-from fecm.mechanics.own_law import name_of
-from fecm.results.metrics import COLUMNS, FOUND, RATIO, SUMMARY, THRESHOLD, VERDICTS
-from fecm.results.pictures import SweepKind, plot, report
+from fecm.deck.units import declared_units, unit_names
+from fecm.mechanics.own_law import law_name
+from fecm.results import schema
+from fecm.results.groups import ResultFileError
+from fecm.results.metrics import COLUMNS, FOUND, RATIO, SUMMARY, THRESHOLD, VALIDITY, VERDICTS
+from fecm.results.pictures import SweepKind, plot_results, report_results
+from fecm.sweeps import reduced as reduced_check
+from fecm.sweeps.files import FORCE, random_of
 from fecm.sweeps.outcome import About, Column, Outcome
 from fecm.sweeps.plan import Plan
-from fecm.sweeps.random_result import evaluate
-from fecm.sweeps.reduced_check import ReducedModel
+from fecm.sweeps.reduced import ReducedModel
+from fecm.sweeps.statistics import evaluate
 from fecm.sweeps.stored import StoredSweep
-from fecm.sweeps.summary import LABEL_WIDTH, counts, reasons, remarks, summary, verdict
+from fecm.sweeps.summary import (
+    LABEL_WIDTH,
+    doubtful_counts,
+    reasons,
+    remarks,
+    sweep_summary,
+    sweep_verdict,
+)
 
 if TYPE_CHECKING:
     import pandas
     import xarray
     from matplotlib.axes import Axes
+
+    from fecm.results.hdf5_reader import FileContents
 
 
 class SweepResult(StoredSweep):
@@ -61,17 +78,17 @@ class SweepResult(StoredSweep):
     """
 
     def __repr__(self) -> str:
-        return f"<fecm sweep {self.title!r} over {', '.join(self.cases)}: {verdict(self)}>"
+        return f"<fecm sweep {self.title!r} over {', '.join(self.cases)}: {sweep_verdict(self)}>"
 
     def _repr_html_(self) -> str:
         """Table of the summary, for notebooks."""
-        lines = ((line[:LABEL_WIDTH].strip(), line[LABEL_WIDTH:]) for line in summary(self))
+        lines = ((line[:LABEL_WIDTH].strip(), line[LABEL_WIDTH:]) for line in sweep_summary(self))
         return html_table(repr(self)[1:-1], lines)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """Numbers of cases that failed or whose results are doubtful."""
-        texts = [f"{count} of {len(self)} cases {what}" for count, what in counts(self)]
+        texts = [f"{count} of {len(self)} cases {what}" for count, what in doubtful_counts(self)]
         if not self.completed.all():
             texts[-1] += f": {reasons(self['status'][~self.completed])}"
         return (*texts, *remarks(self), *(() if self.random is None else self.random.notes))
@@ -101,10 +118,10 @@ class SweepResult(StoredSweep):
         >>> fecm.load_sweep("velocities.h5").keys() == found.keys()
         True
         """
-        from fecm.sweeps.result_writer import save  # h5py takes 60 ms to import
+        from fecm.sweeps.files import save_sweep  # h5py takes 60 ms to import
 
         check_outputs([Path(path)], overwrite, allowed_by=ARGUMENT)
-        save(self, Path(path), overwrite=overwrite)
+        save_sweep(self, Path(path), overwrite=overwrite)
 
     def to_dataframe(self) -> pandas.DataFrame:
         """Return values and results as a table with one row per case (requires pandas).
@@ -199,11 +216,11 @@ class SweepResult(StoredSweep):
         >>> found = fecm.sweep(deck, {"velocity": [100.0, 115.0, 130.0]})
         >>> found.export("velocities.csv")
         """
-        from fecm.sweeps.csv import csv_lines  # 2 ms at start
+        from fecm.sweeps.files import csv_lines  # 2 ms at start
 
         lines = csv_lines(self, table)
         check_outputs([Path(path)], overwrite, allowed_by=ARGUMENT)
-        with writing(Path(path), overwrite=overwrite) as file:
+        with open_for_writing(Path(path), overwrite=overwrite) as file:
             file.writelines(lines)
 
     def plot(
@@ -258,7 +275,9 @@ class SweepResult(StoredSweep):
         named = {self.title or "the sweep": self}
         if names or kind == "map":
             options["over"] = names
-        return plot(kind, named, path, ax, overwrite=overwrite, quantity=quantity, **options)
+        return plot_results(
+            kind, named, path, ax, overwrite=overwrite, quantity=quantity, **options
+        )
 
     def report(self, path: str | Path, *, overwrite: bool = False) -> None:
         """Write an HTML page to hand on, as ``fecm report`` does.
@@ -285,7 +304,7 @@ class SweepResult(StoredSweep):
         --------
         >>> found.report("impact.html")  # doctest: +SKIP
         """
-        report({self.title or "the sweep": self}, path, overwrite=overwrite)
+        report_results({self.title or "the sweep": self}, path, overwrite=overwrite)
 
 
 def _grid(cases: Mapping[str, Column], count: int) -> tuple[dict[str, Column], NDArray[np.intp]]:
@@ -302,7 +321,7 @@ def _grid(cases: Mapping[str, Column], count: int) -> tuple[dict[str, Column], N
     return {}, np.arange(count)
 
 
-def result_of(plan: Plan, outcome: Outcome, reduced: ReducedModel | None = None) -> SweepResult:
+def sweep_result(plan: Plan, outcome: Outcome, reduced: ReducedModel | None = None) -> SweepResult:
     """Create the result from a plan and its outcome."""
     cases = {name: np.array([case[name] for case in plan.cases]) for name in plan.cases[0]}
     columns, deck = outcome.columns, plan.settings.deck
@@ -324,7 +343,7 @@ def result_of(plan: Plan, outcome: Outcome, reduced: ReducedModel | None = None)
         units=unit_names(deck),
         random=random,
         reduced=reduced,
-        law="" if plan.settings.law is None else name_of(plan.settings.law),
+        law="" if plan.settings.law is None else law_name(plan.settings.law),
     )
 
 
@@ -340,3 +359,84 @@ def _summary_names(plan: Plan, outcome: Outcome) -> list[str]:
         names += FOUND
     names += [name for name in COLUMNS if name in columns and name not in names]
     return names if RATIO in names else [*names, RATIO]
+
+
+def load_sweep(path: str | Path | AnyFile) -> SweepResult:
+    """Read the result of a sweep.
+
+    Parameters
+    ----------
+    path : str, Path or file
+        HDF5 file, or one that is open as bytes.
+
+    Raises
+    ------
+    ResultFileError
+        If the file is not the result of a sweep.
+    OSError
+        If the file cannot be opened.
+    """
+    from fecm.results.hdf5_reader import read  # h5py takes 60 ms to import
+
+    return sweep_of(read(path, schema.Form.SWEEP))
+
+
+def sweep_of(contents: FileContents, *, history: bool = True) -> SweepResult:
+    """Create the result of a sweep from the contents of its file.
+
+    Without `history` the forces, which may be large, are not read.  Raises ResultFileError if data
+    are missing, or their number of cases differs.
+    """
+    path = contents.path
+    cases, summary = _group(contents, "cases/"), _group(contents, "summary/")
+    given = ("dt", "steps", "unsettled_steps")
+    steps = {n: contents[f"history/{n}"] for n in given if f"history/{n}" in contents}
+    required = (*SUMMARY, "status")
+    if not (summary.keys() >= {*required} and steps.keys() >= {"dt", "steps"}):
+        raise ResultFileError(f"{path}: the result of the sweep is incomplete")
+    summary = {name: summary[name] for name in required} | summary  # in their order
+    shape = contents.shapes.get(FORCE)
+    if not _agree(cases, summary, steps, shape):
+        message = f"{path}: the data of this sweep do not match in type or number of cases"
+        raise ResultFileError(message)
+    counts, most = steps["steps"], np.inf if shape is None else shape[1]
+    if counts.dtype.kind not in "iu" or not ((counts >= 0) & (counts <= most)).all():
+        raise ResultFileError(f"{path}: history/steps does not match the stored steps")
+    return SweepResult(
+        cases=cases,
+        summary=summary,
+        dt=steps["dt"],
+        steps=counts,
+        force=contents.get(FORCE) if history else None,
+        unsettled_steps=steps.get("unsettled_steps"),
+        deck_text=contents.texts.get("deck", ""),
+        title=str(contents.attributes.get("title", "")),
+        units=declared_units(contents.attributes),
+        random=random_of(contents, cases, summary, len(steps["dt"])),
+        reduced=reduced_check.reduced_of(contents),
+        law=str(contents.attributes.get("law", "")),
+    )
+
+
+def _group(contents: FileContents, group: str) -> dict[str, Column]:
+    """The datasets of a group by their names, numbers before texts."""
+    names = sorted(contents, key=lambda name: name in contents.lists)
+    return {name.removeprefix(group): contents[name] for name in names if name.startswith(group)}
+
+
+def _agree(
+    cases: dict[str, Column],
+    summary: dict[str, Column],
+    steps: dict[str, Column],
+    forces: tuple[int, ...] | None,
+) -> bool:
+    """Whether all datasets have one value for every case, and of their kind."""
+    count = np.shape(steps["dt"])[:1]
+    if any(v.shape != count for v in (*cases.values(), *summary.values(), *steps.values())):
+        return False
+    if forces is not None and (len(forces) != 2 or forces[:1] != count):
+        return False
+    if any(v.dtype.kind not in "fiu" for name, v in summary.items() if name not in VERDICTS):
+        return False
+    validity = summary.get(VALIDITY)
+    return validity is None or not validity.size or validity.dtype.kind == "U"

@@ -15,16 +15,16 @@ from fecm._arrays import read_only
 from fecm._errors import FecmError, did_you_mean
 from fecm._typing import Bools
 from fecm.api import load_deck
+from fecm.authoring.values import REFINE, dimension_of
 from fecm.deck.model import Deck
 from fecm.deck.units import unit_of
-from fecm.results.errors import NotStoredError, ResultFileError
+from fecm.results.groups import NotStoredError, ResultFileError
 from fecm.results.metrics import COLUMNS, VALIDITY
 from fecm.results.stored import deck_in
 from fecm.sweeps.convergence import Convergence, convergence
 from fecm.sweeps.outcome import Column, Status, was_run
-from fecm.sweeps.random_result import RandomResult, open_ends
-from fecm.sweeps.reduced_check import ReducedModel
-from fecm.sweeps.values import REFINE, dimension_of
+from fecm.sweeps.reduced import ReducedModel
+from fecm.sweeps.statistics import RandomResult, open_cases
 
 OWN_DIMENSIONS = {
     "force": "force",
@@ -113,7 +113,7 @@ class StoredSweep:
     @property
     def contact_over(self) -> Bools:
         """Completed cases whose contact is over at the end, so that no value is open."""
-        return self.completed & ~open_ends(self.summary)
+        return self.completed & ~open_cases(self.summary)
 
     @property
     def convergence(self) -> dict[str, Convergence]:

@@ -1,25 +1,38 @@
-"""Summary of a sweep: its cases in a few lines, and what they are worth."""
+"""Summary of a sweep: its cases in a few lines, and what they are worth.
+
+Lines of the result of a random sweep.
+"""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 
-from fecm._text import DIGITS
+from fecm._text import DIGITS, significant
 from fecm._typing import Bools
+from fecm.authoring.case import THRESHOLD, pair_of_text
 from fecm.deck.model import Curvature, Preload, Segment
-from fecm.deck.units import quantity
+from fecm.deck.units import column_name, quantity
 from fecm.problem.generate import generate
-from fecm.results.errors import ResultFileError
 from fecm.results.exposures import RESOLVED
-from fecm.results.linear_plate import TOO_SOFT, InPlane, in_plane_of, softness, unsafe
+from fecm.results.groups import ResultFileError
 from fecm.results.metrics import FOUND_BAND, RATIO
-from fecm.results.validity import BENT, MEANING, counted
-from fecm.sweeps.case import pair
+from fecm.results.validity import (
+    BENT,
+    MEANING,
+    TOO_SOFT,
+    InPlane,
+    counted,
+    in_plane_of,
+    softness,
+    unsafe,
+)
 from fecm.sweeps.outcome import Column
+from fecm.sweeps.random import pairs_of
+from fecm.sweeps.statistics import QUANTILES, RandomResult
 from fecm.sweeps.stored import StoredSweep
 
 LABEL_WIDTH = 18  # of the lines of the summary
@@ -30,7 +43,7 @@ WIDE = 0.75  # share of an energy found that finer meshes leave where the load i
 SAME_PLACE = 1e-9  # distance from the place given, relative to its coordinates, that is rounding
 
 
-def summary(result: StoredSweep) -> list[str]:
+def sweep_summary(result: StoredSweep) -> list[str]:
     """Return summary lines: number of cases, smallest and largest peak or velocity, failures."""
     fine = result.completed
     failed = Counter(result["status"][~fine].tolist())
@@ -78,7 +91,7 @@ def _moved(result: StoredSweep) -> Iterator[str]:
     """How far the places that were hit are from those given."""
     if "at" not in result.cases or "hit_x" not in result.summary:
         return
-    asked = np.array([pair("at", text) for text in result.cases["at"].tolist()]).T
+    asked = np.array([pair_of_text("at", text) for text in result.cases["at"].tolist()]).T
     moved = np.hypot(*(asked - (result["hit_x"], result["hit_y"])))
     if count := np.count_nonzero(moved > SAME_PLACE * np.abs(asked).max()):
         distance = f"{np.nanmax(moved):.4g} {result.unit('hit_x')}".rstrip()
@@ -99,9 +112,9 @@ def _shown(result: StoredSweep, name: str, case: int) -> str:
     return quantity(values[case], result.unit(name) if name in WEIGHED else "", digits)
 
 
-def verdict(result: StoredSweep) -> str:
+def sweep_verdict(result: StoredSweep) -> str:
     """Count the cases, the failures, and the cases with doubtful results."""
-    found = ", ".join(f"{count} {what}" for count, what in counts(result))
+    found = ", ".join(f"{count} {what}" for count, what in doubtful_counts(result))
     return f"{len(result)} case{'' if len(result) == 1 else 's'}: {found or 'all ok'}"
 
 
@@ -112,7 +125,7 @@ def reasons(status: Column) -> str:
     return f"{first}{more}"
 
 
-def counts(result: StoredSweep) -> list[tuple[int, str]]:
+def doubtful_counts(result: StoredSweep) -> list[tuple[int, str]]:
     """Numbers of cases with doubtful results and of failures, which are last."""
     fine, steps = result.completed, result.unsettled_steps
     unconverged = np.zeros_like(fine) if steps is None else fine & (steps > 0)
@@ -192,3 +205,83 @@ def _has(result: StoredSweep, kind: type[Segment]) -> bool:
         return result.deck.has(kind)
     except ResultFileError:  # of a damaged file
         return False
+
+
+MOST_PRINTED = 4  # quantities of :data:`MAIN`, and combinations
+TOUGHNESS = "giic"
+MARGIN = ("threshold_margin",)  # the quantity that toughness affects
+MAIN = (
+    "found_velocity",
+    "found_energy",
+    "peak_force",
+    "max_indentation",
+    "contact_time",
+    "energy_absorbed",
+)
+
+
+def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
+    """Lines of the most important quantities: statistics, indices and probabilities."""
+    design, found = random.design, random.exceedance
+    lines = [f"design            {design.kind}, {design.samples} samples, seed {design.seed}"]
+    lines += [
+        f"random            {column_name(name, unit(name))} {law}"
+        for name, law in design.laws.items()
+    ]
+    lines += [
+        f"correlation       {a}, {b} {value:.6g}"
+        for (a, b), value in pairs_of([*design.laws], design.correlation).items()
+        if value
+    ]
+    chosen = [name for name in MAIN if name in random.statistics][:MOST_PRINTED]
+    labels = ["mean", "std. dev.", *(f"{q:.0%}".replace("%", " %") for q in QUANTILES)]
+    count = len(next(iter(random.combinations.values()), [0]))
+    for number in range(min(count, MOST_PRINTED)):
+        place = (number,) if random.combinations else ()
+        lines += ["", *([random.label(number)] if place else [])]
+        own = [random.statistics[name] for name in chosen]
+        rows = [[s.mean[place], s.standard_deviation[place], *s.quantiles[place]] for s in own]
+        columns = [chosen, [unit(name) for name in chosen]]
+        columns += [[significant(value) for value in row] for row in zip(*rows, strict=True)]
+        lacking = [design.draws - int(s.draws[place]) for s in own]
+        columns.append([str(count) for count in lacking] if any(lacking) else [""] * len(own))
+        lines += [
+            f"{label:12}{''.join(f'{text:>16}' for text in row)}".rstrip()
+            for label, row in zip(["", "", *labels, "no value"], columns, strict=True)
+            if any(row)
+        ]
+        if random.sensitivity:
+            for name in (chosen[0], *(MARGIN if TOUGHNESS in design.laws else ())):
+                lines += ["", *_index_lines(random, name, place)]
+        for row, (name, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
+            p, low, high, n, lacking = (values[(*place, row)] for values in found[2:])
+            value = THRESHOLD if np.isnan(limit) else f"{limit:.6g}"
+            lines.append(f"P({name} > {value}) = {chance(p, low, high, lacking, design.draws - n)}")
+    if count > MOST_PRINTED:
+        lines += ["", f"{count - MOST_PRINTED} more combinations of varied values are in the file"]
+    return lines
+
+
+def chance(p: float, low: float, high: float, is_open: int, lacking: int) -> str:
+    """A probability, its interval and the number of draws without a value, in words."""
+    text = (
+        f"{'open' if np.isnan(p) else significant(p)} ({significant(low)} to {significant(high)})"
+    )
+    if is_open:
+        text += f"; {is_open} draws are open, counted as below and as above"
+    if lacking > is_open:
+        text += f"; {lacking - is_open} draws have no value"
+    return text
+
+
+def _index_lines(random: RandomResult, name: str, place: tuple[int, ...]) -> Iterator[str]:
+    laws = random.design.laws
+    width = max(12, *map(len, (name, *laws)))
+    yield f"{name:{width}}{'first-order index (95 %)':>29}{'total index (95 %)':>29}"
+    columns = [values[place].tolist() for values in random.sensitivity[name]]
+    for law, first, total, *intervals in zip(laws, *columns, strict=True):
+        texts = [
+            f"{value:.4f} ({low:.4f} to {high:.4f})"
+            for value, (low, high) in zip((first, total), intervals, strict=True)
+        ]
+        yield f"{law:{width}}{texts[0]:>29}{texts[1]:>29}"

@@ -10,18 +10,16 @@ from collections.abc import Iterable
 from fecm._errors import FecmError
 from fecm.verification import (  # noqa: F401  (they fill CASE_OF)
     curved,
-    damage,
     fields,
     impacts,
-    location,
     parts,
     plates,
     stretching,
     studies,
 )
-from fecm.verification.case import CASE_OF, TABLES, Case, Row, carry_out
+from fecm.verification.case import CASE_OF, TABLES, Case, Row, compute_rows
 
-__all__ = ["CASES", "Case", "Row", "UnknownCaseError", "carry_out", "chosen", "verify"]
+__all__ = ["CASES", "Case", "Row", "UnknownCaseError", "chosen", "compute_rows", "verify"]
 
 CASES: tuple[Case, ...] = tuple(CASE_OF[name] for name in TABLES)
 
@@ -66,4 +64,4 @@ def verify(*cases: str) -> list[Row]:
     >>> print(rows[0].check.quantity, "=", rows[0].check.source)
     A11 (lb/in) = E h/(1 - ν²)
     """
-    return [row for one in chosen(cases) for row in carry_out(one)]
+    return [row for one in chosen(cases) for row in compute_rows(one)]

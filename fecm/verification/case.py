@@ -40,7 +40,7 @@ class Label(StrEnum):
     AGAINST_CHANGE = "against change"  # the value is the one of an earlier version
 
 
-class Verdict(StrEnum):
+class RowVerdict(StrEnum):
     """Whether a row is within its tolerance."""
 
     FINE = "ok"
@@ -121,9 +121,9 @@ class Row:
         return abs(self.error) <= self.check.tolerance
 
     @property
-    def verdict(self) -> Verdict:
+    def verdict(self) -> RowVerdict:
         """The verdict."""
-        return Verdict.FINE if self.within else Verdict.FAILED
+        return RowVerdict.FINE if self.within else RowVerdict.FAILED
 
     def to_dict(self) -> dict[str, object]:
         """Plain values, for JSON; None for values that could not be computed."""
@@ -162,7 +162,7 @@ def case(compute: Compute) -> Compute:
     return compute
 
 
-def carry_out(one: Case) -> list[Row]:
+def compute_rows(one: Case) -> list[Row]:
     """Compute the rows of a case; an exception becomes the failure of all rows."""
     try:
         values, failure = one.compute(), ""
@@ -201,7 +201,7 @@ def cells(row: Row) -> tuple[str, ...]:
     )
 
 
-def table(cases: Sequence[Case], rows: Iterable[Row]) -> Iterator[str]:
+def table_lines(cases: Sequence[Case], rows: Iterable[Row]) -> Iterator[str]:
     """Yield the lines of a table as rows are computed; the cases give the widths of the columns."""
     known = [cells(Row(one.name, check, math.nan)) for one in cases for check in one.checks]
     columns = zip(HEAD, *known, strict=True)
@@ -217,7 +217,7 @@ def table(cases: Sequence[Case], rows: Iterable[Row]) -> Iterator[str]:
             yield f"  {row.failure}"
 
 
-def page(rows: Iterable[Row]) -> str:
+def verification_page(rows: Iterable[Row]) -> str:
     """Return the documentation page in Markdown."""
     text = [INTRODUCTION]
     for name, group in groupby(rows, key=lambda row: row.case):

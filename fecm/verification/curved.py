@@ -6,14 +6,14 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
+import fecm.verification.decks as decks
 from fecm.deck import model
 from fecm.deck.catalogue import MATERIALS
-from fecm.deck.grid import EDGES, Grid, refined, uniform
+from fecm.deck.grid import EDGES, ElementGrid, refined_sections, uniform_section
 from fecm.deck.model import Curvature, Impact, Macro, Patch, Projectile
 from fecm.results.result import Result
-from fecm.verification import decks
 from fecm.verification.case import Value, case
-from fecm.verification.impacts import peak
+from fecm.verification.impacts import largest_force
 
 SIDES = (300.0, 200.0)  # mm
 ELEMENT = 25.0  # side of an element that is not refined
@@ -23,26 +23,28 @@ STATIC = decks.program("TANG FORM SOLV DISP STRE")
 
 
 def panel(
-    curvature: Curvature, grid: Grid, macros: Iterable[Macro], *others: model.Segment
+    curvature: Curvature, grid: ElementGrid, macros: Iterable[Macro], *others: model.Segment
 ) -> Result:
     """Run a simply supported panel (SS3) of IM7/8552 (mm, N, s)."""
     ply = MATERIALS["IM7/8552"].converted("mm-N-s")
     supports = grid.supported((0,) * 5, dict.fromkeys(EDGES, "simple"), in_plane="tangential")
     segments = (supports, curvature, *others, decks.MITC, decks.material(ply, ANGLES, 0.2))
-    return decks.result_of(decks.deck(grid, segments, macros))
+    return decks.run_of_deck(decks.deck(grid, segments, macros))
 
 
-def refined_grid(side: float) -> Grid:
+def refined_grid(side: float) -> ElementGrid:
     """Build a grid with elements of this side where the force acts."""
-    return Grid(*(refined(a, round(a / ELEMENT), a / 2.0, 2.0, side) for a in SIDES))
+    return ElementGrid(
+        *(refined_sections(a, round(a / ELEMENT), a / 2.0, 2.0, side) for a in SIDES)
+    )
 
 
-def middle(grid: Grid) -> int:
+def middle_node(grid: ElementGrid) -> int:
     """Number of the node in the middle."""
     return grid.nearest(SIDES[0] / 2.0, SIDES[1] / 2.0)[0]
 
 
-def pressed(curvature: Curvature, grid: Grid) -> tuple[Result, float]:
+def pressed(curvature: Curvature, grid: ElementGrid) -> tuple[Result, float]:
     """Press the panel in its middle; its deflection is the mean over the patch per force."""
     found = panel(curvature, grid, STATIC, PATCH)
     w = found.tape3.w[0, found["patch/node"] - 1] @ found["patch/weight"]
@@ -55,12 +57,12 @@ def _curved_panel() -> Sequence[Value]:
     coarse, fine = refined_grid(4.0), refined_grid(2.0)
     flatter = pressed(Curvature(radius_y=1000.0), coarse)[1]
     found, deflection = pressed(Curvature(radius_x=500.0), fine)
-    at = found["mesh/elements"] == middle(fine)
+    at = found["mesh/elements"] == middle_node(fine)
     resultants = [
         field[0][at].mean() / PATCH.load
-        for field in decks.fields(found, "stresses", "N_x N_y M_x M_y")
+        for field in decks.field_values(found, "stresses", "N_x N_y M_x M_y")
     ]
-    even = Grid(*(uniform(side, round(1.5 * side / ELEMENT)) for side in SIDES))
+    even = ElementGrid(*(uniform_section(side, round(1.5 * side / ELEMENT)) for side in SIDES))
     modes = panel(Curvature(radius_y=1000.0), even, decks.program("LMAS EIGE=4"))
     omega = modes.modes.angular_frequency
     return [flatter, deflection, *resultants, *omega[:3]]
@@ -70,17 +72,17 @@ def _curved_panel() -> Sequence[Value]:
 def _curved_impact() -> Sequence[Value]:
     """A mass of 20 g at 3 m/s until 200 us."""
     grid, patch = refined_grid(4.0), model.Patch("DISC", 4.0)
-    hit = (Projectile(0, 0, 2.0e-5), Impact(middle(grid), 3, 3000.0), decks.elastic(5.0e4))
+    hit = (Projectile(0, 0, 2.0e-5), Impact(middle_node(grid), 3, 3000.0), decks.elastic(5.0e4))
     macros = decks.impact_program(1.6e-7, 1250)
     found = panel(Curvature(radius_x=500.0), grid, macros, patch, *hit)
-    return [*peak(found), found.plate_w[-1]]
+    return [*largest_force(found), found.plate_w[-1]]
 
 
 @case
 def _curved_strains() -> Sequence[Value]:
     """One element of a twisted panel with NONL, held in a constant w."""
     side, w = 10.0, 0.01
-    grid = Grid(uniform(side, 1), uniform(side, 1))
+    grid = ElementGrid(uniform_section(side, 1), uniform_section(side, 1))
     held = np.zeros((grid.nodes, 5))
     held[:, 2] = w
     ply = MATERIALS["IM7/8552"].converted("mm-N-s")
@@ -93,7 +95,7 @@ def _curved_strains() -> Sequence[Value]:
         decks.material(ply, (30.0,), 0.2),
     )
     macros = decks.program("TANG FORM SOLV STRE REAC")
-    found = decks.result_of(decks.deck(grid, segments, macros))
-    strains = decks.fields(found, "stresses", "eps_xx eps_yy gamma_xy")
+    found = decks.run_of_deck(decks.deck(grid, segments, macros))
+    strains = decks.field_values(found, "stresses", "eps_xx eps_yy gamma_xy")
     pressure = found["reactions/force"][..., 2].sum() / side**2
     return [*(strain / w for strain in strains), pressure / w]

@@ -12,7 +12,7 @@ from fecm._errors import FecmWarning
 from fecm._typing import Floats
 from fecm.api import Mode, read_one, run_one
 from fecm.deck import model
-from fecm.deck.grid import Grid, Section, lines, uniform
+from fecm.deck.grid import ElementGrid, GridSection, grid_lines, uniform_section
 from fecm.deck.model import Control, Integration, Layer, Macro, NodeCodes, NodeValues, Ply
 from fecm.results.result import Result
 
@@ -72,7 +72,7 @@ DEFLECTION = program("TANG FORM SOLV DISP")
 STRESSES = program("TANG FORM SOLV STRE")
 
 
-def supports(grid: Grid, codes: str) -> model.Boundary | None:
+def restraints(grid: ElementGrid, codes: str) -> model.Boundary | None:
     """Restraints of codes such as `SUPPORTED`."""
     every, *edges = ([int(code) for code in word] for word in codes.split())
     return grid.boundary(every, dict(zip(("left", "bottom", "right", "top"), edges, strict=True)))
@@ -87,7 +87,7 @@ def held_but(dof: int, node: int = 1) -> model.Boundary:
 
 
 def deck(
-    grid: Grid,
+    grid: ElementGrid,
     segments: Iterable[model.Segment | None],
     macros: Iterable[Macro],
     coordinates: model.Coordinates | None = None,
@@ -100,13 +100,13 @@ def deck(
     return model.Deck("verification", control, given, tuple(macros))
 
 
-def result_of(one: model.Deck, mode: Mode = "report") -> Result:
+def run_of_deck(one: model.Deck, mode: Mode = "report") -> Result:
     """Run a deck of one problem."""
     with warnings.catch_warnings(action="ignore", category=FecmWarning):
         return run_one(one, mode=mode)
 
 
-def fields(found: Result, group: str, names: str) -> list[Floats]:
+def field_values(found: Result, group: str, names: str) -> list[Floats]:
     """Fields of a group, by their names."""
     return [found[f"{group}/{name}"] for name in names.split()]
 
@@ -156,28 +156,28 @@ def quarter_plate(
     `elements` are those of a side, `load` is force/area at the nodes, (nodes along y, nodes along
     x), `codes` are supports such as `BENDING`, `others` further segments.
     """
-    half = uniform(side / 2.0, elements)
-    grid = Grid(half, half)
-    along = weights(lines(grid.columns))
+    half = uniform_section(side / 2.0, elements)
+    grid = ElementGrid(half, half)
+    along = weights(grid_lines(grid.columns))
     loads = np.zeros((grid.up, grid.across, 5))
     loads[..., 2] = np.outer(along, along) * load
     loads[-1] = loads[:, -1] = 0.0  # a value there would be a displacement
     given = forces(loads) if np.any(load) else None
-    return deck(grid, (supports(grid, codes), given, plate, *others), macros)
+    return deck(grid, (restraints(grid, codes), given, plate, *others), macros)
 
 
 def pressed_rectangle(
     along: int, patch: model.Patch, macros: Iterable[Macro], *others: model.Segment
 ) -> model.Deck:
     """Build a simply supported [0/90]5s of the report's ply with MITC, pressed on a patch."""
-    grid = Grid(uniform(SIDES[0], along), uniform(SIDES[1], along * 2 // 3))
+    grid = ElementGrid(uniform_section(SIDES[0], along), uniform_section(SIDES[1], along * 2 // 3))
     plate = material(REPORT_PLY, 5 * (0.0, 90.0) + 5 * (90.0, 0.0), 0.106 / 20)
-    held = supports(grid, SUPPORTED)
+    held = restraints(grid, SUPPORTED)
     return deck(grid, (held, patch, *others, MITC, plate), macros)
 
 
 def struck_plate(
-    grid: Grid,
+    grid: ElementGrid,
     plate: model.Material,
     projectile: model.Projectile | None,
     velocity: float,
@@ -187,7 +187,7 @@ def struck_plate(
 ) -> model.Deck:
     """Build a plate without supports that is hit in the middle."""
     middle = grid.nearest(grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)[0]
-    segments = (supports(grid, FREE), projectile, model.Impact(middle, 3, velocity), law, plate)
+    segments = (restraints(grid, FREE), projectile, model.Impact(middle, 3, velocity), law, plate)
     return deck(grid, segments, impact_program(dt, steps))
 
 
@@ -195,7 +195,7 @@ def fixed_target(
     mass: float, velocity: float, law: model.Indentation, dt: float, steps: int
 ) -> model.Deck:
     """Build the impact of a rigid mass on a plate of extreme stiffness and density."""
-    grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
+    grid = ElementGrid(uniform_section(2.0, 2), uniform_section(2.0, 2))
     ply = Ply(1.48e6, 0.3, 1.75e16, 1.75e16, 5e15, 5e15, 5e15)
     plate, hit = material(ply, (0.0, 90.0), 0.053), model.Projectile(0, 0, mass)
     return struck_plate(grid, plate, hit, velocity, law, dt, steps)
@@ -203,9 +203,9 @@ def fixed_target(
 
 def report_impact(steps: int = 4000) -> model.Deck:
     """Build the report's experiment: 115 in/s on a plate of 20 layers (lb, in, s)."""
-    grid = Grid(
-        [Section(0.0, 1.5, 3), Section(1.5, 4.5, 8), Section(4.5, 6.0, 3)],
-        [Section(0.0, 0.5, 1), Section(0.5, 3.5, 8), Section(3.5, 4.0, 1)],
+    grid = ElementGrid(
+        [GridSection(0.0, 1.5, 3), GridSection(1.5, 4.5, 8), GridSection(4.5, 6.0, 3)],
+        [GridSection(0.0, 0.5, 1), GridSection(0.5, 3.5, 8), GridSection(3.5, 4.0, 1)],
     )
     plate = material(REPORT_PLY, REPORT_ANGLES, REPORT_THICKNESS)
     law = model.Indentation(1.912e6, 6.564e-4, 0.094, 2.0)
@@ -215,8 +215,8 @@ def report_impact(steps: int = 4000) -> model.Deck:
 def panel_with_gages(along: int, up: int) -> model.Deck:
     """Build the panel of examples/panel-with-gages.inp (mm, N, s) with other elements."""
     example = read_one(examples.path("panel-with-gages.inp"))
-    grid = Grid(uniform(300.0, along), uniform(200.0, up))
+    grid = ElementGrid(uniform_section(300.0, along), uniform_section(200.0, up))
     kinds = (model.Material, model.Shear, model.Patch, model.Gages)
     middle = grid.nearest(150.0, 100.0)[0]
     others = (*(example.require(kind) for kind in kinds), model.Impact(middle, 3, 0.0))
-    return deck(grid, (supports(grid, SUPPORTED), *others), DEFLECTION)
+    return deck(grid, (restraints(grid, SUPPORTED), *others), DEFLECTION)

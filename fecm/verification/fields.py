@@ -1,4 +1,7 @@
-"""Plates whose fields of strains and resultants every mesh must reproduce."""
+"""Plates whose fields of strains and resultants every mesh must reproduce.
+
+Failure of plies and interfaces in a field that is held (mm, N, s).
+"""
 
 from __future__ import annotations
 
@@ -6,10 +9,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+import fecm.verification.decks as decks
 from fecm.deck import model
-from fecm.deck.grid import Grid, Section, lines, uniform
-from fecm.deck.model import Deck, Impact, NodeCodes, NodeValues, Projectile
-from fecm.verification import decks
+from fecm.deck.grid import ElementGrid, GridSection, grid_lines, uniform_section
+from fecm.deck.model import Allowables, Deck, Impact, NodeCodes, NodeValues, Ply, Projectile
 from fecm.verification.case import Value, case
 from fecm.verification.parts import FIBRES, THICK
 
@@ -32,14 +35,14 @@ def _patch() -> Sequence[Value]:
     field = decks.constant_strains(x, y, (0.4, -0.5, 0.6), strain=(1e-3, 2e-3, 3e-3))
     field = field.reshape(5, 5, 5)
     field[1:-1, 1:-1] = 0.0  # the inner nodes are free
-    grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
+    grid = ElementGrid(uniform_section(2.0, 2), uniform_section(2.0, 2))
     places = enumerate(fine.reshape(-1, 2).tolist(), start=1)
     plate = decks.material(FIBRES, (0.0, 90.0), THICK / 2.0)
-    segments = (decks.supports(grid, "00000" + 4 * " 11111"), decks.forces(field), plate)
+    segments = (decks.restraints(grid, "00000" + 4 * " 11111"), decks.forces(field), plate)
     coordinates = model.Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in places))
-    found = decks.result_of(decks.deck(grid, segments, decks.STRESSES, coordinates))
-    shears = np.array(decks.fields(found, "stresses", "gamma_xz gamma_yz"))
-    return [*decks.fields(found, "stresses", IN_PLANE), shears, found["stresses/M_x"]]
+    found = decks.run_of_deck(decks.deck(grid, segments, decks.STRESSES, coordinates))
+    shears = np.array(decks.field_values(found, "stresses", "gamma_xz gamma_yz"))
+    return [*decks.field_values(found, "stresses", IN_PLANE), shears, found["stresses/M_x"]]
 
 
 def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = False) -> Deck:
@@ -48,16 +51,16 @@ def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = F
     `x` and `y` are the forces per length of the five dofs on an edge with normal x or y.  With
     `shears` only w moves, and a shear correction factor acts.
     """
-    columns = [Section(0.0, 1.2, 1), Section(1.2, 2.0, 1)]
-    grid = Grid(columns, [Section(0.0, 0.5, 1), Section(0.5, 1.5, 1)])
+    columns = [GridSection(0.0, 1.2, 1), GridSection(1.2, 2.0, 1)]
+    grid = ElementGrid(columns, [GridSection(0.0, 0.5, 1), GridSection(0.5, 1.5, 1)])
     codes = np.tile([1, 1, 0, 1, 1] if shears else [0] * 5, (grid.up, grid.across, 1))
     codes[0, 0, :3] = 1
     if not shears:
         codes[0, -1, 1:3] = codes[-1, 0, 2] = 1
     loads = np.zeros(codes.shape)
     for place, sign in ((-1, 1.0), (0, -1.0)):
-        loads[:, place] += sign * np.outer(decks.weights(lines(grid.rows)), x)
-        loads[place] += sign * np.outer(decks.weights(lines(grid.columns)), y)
+        loads[:, place] += sign * np.outer(decks.weights(grid_lines(grid.rows)), x)
+        loads[place] += sign * np.outer(decks.weights(grid_lines(grid.columns)), y)
     rows = enumerate(codes.reshape(-1, 5).tolist(), start=1)
     segments = (
         model.Boundary(tuple(NodeCodes(n, 0, tuple(code)) for n, code in rows if any(code))),
@@ -74,11 +77,11 @@ def _resultants() -> Sequence[Value]:
     # A couple M does work on -theta.
     pulled = loaded_rectangle((n_x, n_xy, 0.0, -m_x, -m_xy), (n_xy, n_y, 0.0, -m_xy, -m_y))
     shears = (0.0, 0.0, 20.0, 0.0, 0.0), (0.0, 0.0, -8.0, 0.0, 0.0)
-    found = decks.result_of(pulled)
-    sheared = decks.result_of(loaded_rectangle(*shears, shears=True))
+    found = decks.run_of_deck(pulled)
+    sheared = decks.run_of_deck(loaded_rectangle(*shears, shears=True))
     return [
-        *decks.fields(found, "stresses", f"{IN_PLANE} N_x N_y N_xy M_x M_y M_xy"),
-        *decks.fields(sheared, "stresses", "gamma_xz gamma_yz Q_x Q_y"),
+        *decks.field_values(found, "stresses", f"{IN_PLANE} N_x N_y N_xy M_x M_y M_xy"),
+        *decks.field_values(sheared, "stresses", "gamma_xz gamma_yz Q_x Q_y"),
     ]
 
 
@@ -89,18 +92,18 @@ def _tape8() -> Sequence[Value]:
     A very slow rigid mass hits this dof, in the middle of the first element, for one step: the
     other elements keep the field.
     """
-    grid = Grid(uniform(2.0, 2), uniform(2.0, 2))
+    grid = ElementGrid(uniform_section(2.0, 2), uniform_section(2.0, 2))
     struck = 2 + grid.across
-    x, y = (v.ravel() for v in np.meshgrid(lines(grid.columns), lines(grid.rows)))
+    x, y = (v.ravel() for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     field = decks.constant_strains(x, y, (0.4, -0.5, 0.6), shear=(0.02, -0.03))
     field[struck - 1, 2] = 0.0
     codes = [NodeCodes(n, 0, (1, 1, int(n != struck), 1, 1)) for n in range(1, grid.nodes + 1)]
     hit = (Projectile(0, 0, 1e-6), Impact(struck, 3, 1e-12), decks.elastic(1.0))
     plate = decks.material(FIBRES, (0.0, 90.0), 0.01)
     segments = (model.Boundary(tuple(codes)), decks.forces(field), *hit, plate)
-    found = decks.result_of(decks.deck(grid, segments, decks.impact_program(1e-7, 1)))
+    found = decks.run_of_deck(decks.deck(grid, segments, decks.impact_program(1e-7, 1)))
     names = "kappa_x kappa_y kappa_xy gamma_yz gamma_xz"
-    return [field[:, 1:] for field in decks.fields(found, "tape8", names)]
+    return [field[:, 1:] for field in decks.field_values(found, "tape8", names)]
 
 
 def held_trapezoid() -> Deck:
@@ -108,7 +111,7 @@ def held_trapezoid() -> Deck:
 
     The other dofs are 0, so that γ_yz is -θ_y, of which a cubic part in ξ is interpolated.
     """
-    grid = Grid(uniform(2.0, 1), uniform(1.0, 1))
+    grid = ElementGrid(uniform_section(2.0, 1), uniform_section(1.0, 1))
     xi, eta = (v.ravel() for v in np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)))
     corners = enumerate(np.stack([xi, eta * (1.0 + xi / 2.0) / 2.0], axis=1).tolist(), start=1)
     places = model.Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in corners))
@@ -124,6 +127,54 @@ def _assumed_shear() -> Sequence[Value]:
     made = [
         decks.quarter_plate(4, card, decks.DEFLECTION, 1.0, others=[decks.MITC]) for card in cards
     ]
-    x, shear = decks.fields(decks.result_of(held_trapezoid()), "stresses", "x gamma_yz")
+    x, shear = decks.field_values(decks.run_of_deck(held_trapezoid()), "stresses", "x gamma_yz")
     sides = [shear[:, np.isclose(x, at)] for at in (-1.0, 1.0)]
-    return [*(decks.result_of(one).tape3.w[0, 0] for one in made), *sides]
+    return [*(decks.run_of_deck(one).tape3.w[0, 0] for one in made), *sides]
+
+
+CARBON = Ply(1.6e-9, 0.3, 150e3, 10e3, 5e3, 5e3, 3.5e3)
+ANGLES = (30.0, -45.0, 90.0)
+PLY_THICKNESS = 0.25
+STRENGTHS = Allowables(2000.0, 1200.0, 60.0, 200.0, 90.0, 80.0, 50.0, -0.4, 0.3, 0.25)
+# By x, y, xx, xy and yy of u, v and the negatives of the rotations, in the middle of the element.
+FIELD = np.array([
+    [-3.0, 5.0, -1.5, 2.0, 1.25],
+    [5.0, 2.0, 0.75, -1.5, -0.25],
+    [-12.0, -3.0, 0.5, -0.5, 1.75],
+    [-3.0, -7.0, 0.25, -1.75, 1.75],
+]) * 1e-3  # fmt: skip
+CRITERIA = ("max_stress", "tsai_wu", "hashin", "puck")
+
+
+@case
+def _failure_states() -> Sequence[Value]:
+    """Exposures in the middle of an element, one of whose w is free."""
+    grid = ElementGrid(uniform_section(1.0, 1), uniform_section(1.0, 1))
+    x, y = (v.ravel() - 0.5 for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
+    u, v, p, q = FIELD @ [x, y, x * x / 2.0, x * y, y * y / 2.0]
+    plate = decks.material(CARBON, ANGLES, PLY_THICKNESS, points=1)
+    held = decks.forces(np.stack([u, v, 0.0 * u, -p, -q], axis=1))
+    macros = decks.program("TANG FORM SOLV FAIL")
+    found = decks.run_of_deck(decks.deck(grid, (decks.held_but(2), held, STRENGTHS, plate), macros))
+    plies = [found[f"failure/{name}/exposure"].max(axis=(0, 1, 3)) for name in CRITERIA]
+    return [*np.ravel(plies), *found["failure/interlaminar/exposure"][0]]
+
+
+# σ2 and τ12 of a ply at 0 degrees that is pressed across its fibres; the action plane is inclined.
+PRESSED = ((-180.0, 0.0), (-180.0, 60.0), (-150.0, -80.0))
+
+
+@case
+def _inclined_failure() -> Sequence[Value]:
+    """Puck's exposure in constant stresses of one element, by which mode C decides."""
+    grid = ElementGrid(uniform_section(1.0, 1), uniform_section(1.0, 1))
+    x, y = (v.ravel() - 0.5 for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
+    plate, macros = decks.material(CARBON, [0.0], 1.0), decks.program("TANG FORM SOLV FAIL")
+    found = []
+    for across, shear in PRESSED:
+        strain = (-CARBON.nu12 * across / CARBON.e1, across / CARBON.e2, shear / CARBON.g12)
+        held = decks.forces(decks.constant_strains(x, y, (0.0, 0.0, 0.0), strain=strain))
+        segments = (decks.held_but(2), held, STRENGTHS, plate)
+        result = decks.run_of_deck(decks.deck(grid, segments, macros))
+        found.append(result["failure/puck/exposure"].max())
+    return found

@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+import fecm.verification.decks as decks
 from fecm._typing import Floats
 from fecm.api import load_deck
 from fecm.deck import model
-from fecm.deck.grid import Grid, refined, uniform
+from fecm.deck.grid import ElementGrid, refined_sections, uniform_section
 from fecm.deck.model import Deck, Impact, Indentation, Patch, Projectile
 from fecm.mechanics.laminate import effective_rigidity, laminate
 from fecm.mechanics.quick_models import inelasticity, infinite_plate, static_peak
@@ -20,16 +21,15 @@ from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
 from fecm.results.end import Deflection, LastContact, decided, ends, peak_known
 from fecm.results.result import Result
-from fecm.sweeps.api import carry_out, problem_of
+from fecm.sweeps.api import carry_out_plan, checked_problem
 from fecm.sweeps.plan import plan
-from fecm.verification import decks
 from fecm.verification.case import Value, case
 from fecm.verification.parts import ALPHA_CR
 
 V = 100.0  # of projectiles
 
 
-def peak(found: Result) -> list[float]:
+def largest_force(found: Result) -> list[float]:
     """Largest force, and its time."""
     return [found.force.max(), found.time[found.force.argmax()]]
 
@@ -38,7 +38,7 @@ def peak(found: Result) -> list[float]:
 def _rigid_target() -> Sequence[Value]:
 
     def values(law: Indentation) -> list[float]:
-        found = decks.result_of(decks.fixed_target(2.0e-4, V, law, 2e-8, 9000))
+        found = decks.run_of_deck(decks.fixed_target(2.0e-4, V, law, 2e-8, 9000))
         touching = found.time[found.force > 0.0]
         return [found.indentation.max(), found.force.max(), touching[-1], found.velocity[-1]]
 
@@ -68,10 +68,10 @@ def _end_of_contact() -> Sequence[Value]:
 @case
 def _free_plate() -> Sequence[Value]:
     """A plate so stiff that it moves as a rigid body, which DAMP slows down."""
-    grid = Grid(uniform(1.0, 2), uniform(1.0, 2))
+    grid = ElementGrid(uniform_section(1.0, 2), uniform_section(1.0, 2))
     plate, law = decks.material(decks.isotropic(1e9, 0.3, 2.5e-4), [0.0], 0.2), decks.elastic(1e5)
     made = decks.struck_plate(grid, plate, Projectile(0, 0, 2.0e-4), V, law, 3e-8, 10000)
-    found = decks.result_of(replace(made, segments=(*made.segments, model.Damping(2000.0))))
+    found = decks.run_of_deck(replace(made, segments=(*made.segments, model.Damping(2000.0))))
     ends = (found.velocity[-1], found.plate_w[-1], found.energy.damping_work[-1])
     return [found.force.max(), *ends]
 
@@ -79,11 +79,11 @@ def _free_plate() -> Sequence[Value]:
 @case
 def _infinite_plate() -> Sequence[Value]:
     """A thin plate of 12 x 12 in, stiff in shear; no reflection returns within 200 us."""
-    grid = Grid(uniform(12.0, 48), uniform(12.0, 48))
+    grid = ElementGrid(uniform_section(12.0, 48), uniform_section(12.0, 48))
     plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4, 13.0), [0.0], 0.1)
     mass, law = Projectile(0, 0, 2.0e-5), decks.elastic(5.0e4)
-    found = decks.result_of(decks.struck_plate(grid, plate, mass, V, law, 5e-8, 4000))
-    return [*peak(found), found.velocity[-1]]
+    found = decks.run_of_deck(decks.struck_plate(grid, plate, mass, V, law, 5e-8, 4000))
+    return [*largest_force(found), found.velocity[-1]]
 
 
 @case
@@ -92,14 +92,14 @@ def _supported_plate() -> Sequence[Value]:
     plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.03)
     hit = (Projectile(0, 0, 5.0e-6 / 4.0), Impact(1, 3, V), decks.elastic(1.0e5 / 4.0))
     macros = decks.impact_program(8e-8, 2500)
-    found = decks.result_of(decks.quarter_plate(8, plate, macros, others=hit))
-    force, time = peak(found)
+    found = decks.run_of_deck(decks.quarter_plate(8, plate, macros, others=hit))
+    force, time = largest_force(found)
     return [4.0 * force, time, found.plate_w.max(), found.velocity[-1]]
 
 
 @case
 def _report_impact() -> Sequence[Value]:
-    found = decks.result_of(decks.report_impact())
+    found = decks.run_of_deck(decks.report_impact())
     energy = found.energy
     balance = float(np.abs(energy.balance_error).max()) / float(energy.attributes["initial"])
     first = int(found.force[found.time < 500e-6].argmax())
@@ -110,7 +110,7 @@ def _report_impact() -> Sequence[Value]:
         _at(found, "transducer", 642e-6),
         found.force[first],
         found.time[first],
-        *peak(found),
+        *largest_force(found),
     ]
 
 
@@ -122,7 +122,7 @@ def _at(result: Result, name: str, time: float) -> float:
 
 @case
 def _listing_impact() -> Sequence[Value]:
-    found = decks.result_of(decks.report_impact(500), "listing")
+    found = decks.run_of_deck(decks.report_impact(500), "listing")
     end = found.time[found.force > 0.0][-1]
     return [_at(found, "force", 46e-6), _at(found, "transducer", 46e-6), end]
 
@@ -130,12 +130,12 @@ def _listing_impact() -> Sequence[Value]:
 @case
 def _convolution() -> Sequence[Value]:
     made = decks.report_impact(1000)
-    problem = problem_of(made)
-    swept = carry_out(problem, plan(problem, [{"velocity": 60.0}], history=True)).force
+    problem = checked_problem(made)
+    swept = carry_out_plan(problem, plan(problem, [{"velocity": 60.0}], history=True)).force
     if swept is None:
         raise ValueError("the sweep has kept no forces")
     slower = tuple(replace(s, velocity=60.0) if isinstance(s, Impact) else s for s in made.segments)
-    full = decks.result_of(replace(made, segments=slower)).force
+    full = decks.run_of_deck(replace(made, segments=slower)).force
     return [np.abs(swept[0] - full).max() / full.max()]
 
 
@@ -144,8 +144,8 @@ def _patch_impact() -> Sequence[Value]:
     patch = Patch("DISC", 0.125, decks.SIDES[0] / 2.0, decks.SIDES[1] / 2.0)
     middle = 97 * 32 + 49  # of 97 by 65 nodes
     hit = (Projectile(0, 0, 0.000181), Impact(middle, 3, 115.0), decks.elastic(1.912e6))
-    return peak(
-        decks.result_of(
+    return largest_force(
+        decks.run_of_deck(
             decks.pressed_rectangle(48, patch, decks.impact_program(1.0e-7, 1250), *hit)
         )
     )
@@ -160,11 +160,11 @@ SQUARE_K = 8.2641942e9  # contact coefficient
 def struck_square(mass: float, end: float) -> Deck:
     """Build the simply supported square, hit in the middle at 1 m/s, until a time."""
     side, radius = 0.2, 0.002
-    sections = refined(side, 12, side / 2.0, 4.0, radius)
-    grid = Grid(sections, sections)
+    sections = refined_sections(side, 12, side / 2.0, 4.0, radius)
+    grid = ElementGrid(sections, sections)
     middle = grid.nearest(side / 2.0, side / 2.0)[0]
     segments = (
-        decks.supports(grid, decks.SUPPORTED),
+        decks.restraints(grid, decks.SUPPORTED),
         Projectile(0, 0, mass),
         Impact(middle, 3, 1.0),
         Patch("DISC", radius),
@@ -187,7 +187,7 @@ def _small_mass() -> Sequence[Value]:
         dashpot.time,
         parameter,
         infinite_plate(mass, 1.0, SQUARE_K, parameter).peak,
-        decks.result_of(struck_square(mass, 3e-5)).force.max(),
+        decks.run_of_deck(struck_square(mass, 3e-5)).force.max(),
     ]
 
 

@@ -12,7 +12,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.linalg import eigh
 
-from fecm.deck.grid import Grid, lines, uniform
+from fecm.deck.grid import ElementGrid, grid_lines, uniform_section
 from fecm.deck.model import Coordinates, NodeValues, Ply
 from fecm.mechanics.contact_law import (
     ContactPoint,
@@ -21,7 +21,7 @@ from fecm.mechanics.contact_law import (
     YangSunPermanent,
     follow,
 )
-from fecm.mechanics.laminate import Laminate, effective_rigidity, laminate, threshold_force
+from fecm.mechanics.laminate import LaminateSection, effective_rigidity, laminate, threshold_force
 from fecm.mechanics.plate_motion import PlateMotion
 from fecm.mechanics.projectile import CONSISTENT, Rod, report_rod
 from fecm.problem.generate import generate
@@ -93,7 +93,7 @@ def _angle_ply() -> Sequence[Value]:
     ]
 
 
-def report_laminate() -> Laminate:
+def report_laminate() -> LaminateSection:
     """Stack [0/45/0/-45/0]2s of the report's graphite/epoxy."""
     return laminate(REPORT_PLY, REPORT_ANGLES, [REPORT_THICKNESS] * len(REPORT_ANGLES))
 
@@ -101,8 +101,8 @@ def report_laminate() -> Laminate:
 @case
 def _internal_force() -> Sequence[Value]:
     """K u on a mesh without parallel sides, which elements compute from their strains."""
-    grid = Grid(uniform(2.0, 3), uniform(2.0, 3))
-    x, y = (v.ravel() for v in np.meshgrid(lines(grid.columns), lines(grid.rows)))
+    grid = ElementGrid(uniform_section(2.0, 3), uniform_section(2.0, 3))
+    x, y = (v.ravel() for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     corners = enumerate(np.stack([x + 0.1 * x * y, y + 0.2 * x * y], axis=1).tolist(), start=1)
     places = Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in corners))
     plate, found = material(FIBRES, (0.0, 30.0), THICK / 2.0), []

@@ -8,20 +8,20 @@ from dataclasses import replace
 
 import numpy as np
 
+import fecm.verification.decks as decks
 from fecm._typing import Floats
 from fecm.deck import model
 from fecm.deck.catalogue import MATERIALS
-from fecm.deck.grid import Grid, lines, uniform
+from fecm.deck.grid import ElementGrid, grid_lines, uniform_section
 from fecm.deck.model import Gage, LoadTable, Macro, Patch, Ply, Segment
-from fecm.mechanics.buckling import buckling_factor
 from fecm.mechanics.laminate import laminate
-from fecm.mechanics.residual_stresses import residual_stresses
+from fecm.mechanics.ply_stresses import residual_stresses
+from fecm.mechanics.solutions import buckling_factor
 from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
 from fecm.results.exposures import largest_exposures
 from fecm.results.result import Result
-from fecm.verification import decks
 from fecm.verification.case import Value, case
 from fecm.verification.parts import FIBRES
 
@@ -36,7 +36,7 @@ QUASI = (45.0, 0.0, -45.0, 90.0)
 
 @case
 def _time_step() -> Sequence[Value]:
-    grid = Grid(uniform(0.3, 1), uniform(0.3, 1))
+    grid = ElementGrid(uniform_section(0.3, 1), uniform_section(0.3, 1))
     made = decks.deck(grid, [decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.1)], ())
     mesh, found = generate(made), []
     for dof in (2, 3):  # of node 5, the centre
@@ -55,7 +55,7 @@ def _static_bending() -> Sequence[Value]:
         ply = decks.isotropic(1.0, 0.3, 1.0, factor)
         plate = decks.material(ply, [0.0], thickness, shear_order)
         made = decks.quarter_plate(ELEMENTS, plate, decks.DEFLECTION, 1.0)
-        return np.asarray(decks.result_of(made).tape3.w[0])
+        return np.asarray(decks.run_of_deck(made).tape3.w[0])
 
     quarter = ELEMENTS + ELEMENTS * (2 * ELEMENTS + 1)  # the row of the node at (a/4, a/4)
     thick = w(0.1)
@@ -74,9 +74,9 @@ def _frequencies() -> Sequence[Value]:
     """Frequencies of the symmetric modes, on a quarter of the plate, and of uniform shear."""
     plate = decks.material(decks.ONE, [0.0], 0.1, 2)
     macros = decks.program("LMAS EIGE=4 CMAS EIGE=4")
-    found = decks.result_of(decks.quarter_plate(ELEMENTS, plate, macros)).modes.angular_frequency
+    found = decks.run_of_deck(decks.quarter_plate(ELEMENTS, plate, macros)).modes.angular_frequency
     scaled = found * math.sqrt(0.1 / (0.1**3 / (12.0 * (1.0 - 0.3**2))))
-    grid = Grid(uniform(0.7, 2), uniform(1.3, 2))
+    grid = ElementGrid(uniform_section(0.7, 2), uniform_section(1.3, 2))
     held = grid.boundary((1, 1, 1, 0, 1), {})
     made = decks.deck(grid, (held, decks.material(decks.ONE, [0.0], 0.1)), ())
     free = build_plate(made, generate(made))
@@ -92,7 +92,7 @@ def two_layers(angles: Sequence[float], codes: str, mode: int, node: int) -> Seq
 
     def made(shear_order: int, load: float, macros: Sequence[Macro]) -> Result:
         card = decks.material(FIBRES, angles, THICKNESS / 2.0, shear_order)
-        return decks.result_of(decks.quarter_plate(FEWER, card, macros, load, codes))
+        return decks.run_of_deck(decks.quarter_plate(FEWER, card, macros, load, codes))
 
     modes = [made(n, 0.0, decks.program("LMAS EIGE=3")).modes.angular_frequency for n in (2, 3)]
     first, second = (made(n, 1.0, decks.DEFLECTION).tape3.displacement[0] for n in (2, 3))
@@ -127,17 +127,17 @@ def _preload() -> Sequence[Value]:
         return buckling_factor(build_plate(deck, generate(deck)))
 
     modes = [
-        decks.result_of(made(preload, "LMAS EIGE=2")).modes.angular_frequency
+        decks.run_of_deck(made(preload, "LMAS EIGE=2")).modes.angular_frequency
         for preload in (TENSION, COMPRESSION)
     ]
-    bent = decks.result_of(made(TENSION, "TANG FORM SOLV DISP", 1.0))
-    rest = decks.result_of(made(TENSION, "STRE PLYS"))
+    bent = decks.run_of_deck(made(TENSION, "TANG FORM SOLV DISP", 1.0))
+    rest = decks.run_of_deck(made(TENSION, "STRE PLYS"))
     return [
         *(factor(*force) for force in ((-1.0, 0.0), (0.0, -1.0), (-1.0, 0.5))),
         *modes[0],
         modes[1][0],
         bent.tape3.w[0, 0],
-        *decks.fields(rest, "stresses", "N_x N_y"),
+        *decks.field_values(rest, "stresses", "N_x N_y"),
         rest["plies/sigma_1"][:, :, :, [0, 2]],
         rest["plies/sigma_2"][:, :, :, 1],
     ]
@@ -155,7 +155,7 @@ def _forced_plate() -> Sequence[Value]:
     card = decks.material(FIBRES, (0.0, 90.0), THICKNESS / 2.0, 2)
     made = decks.quarter_plate(FEWER, card, steps, 1.0, decks.CROSS_PLY, [model.Gages((gage,))])
     table = LoadTable(1, 2, 0.0, 1.0, (0.0, 0.0, 1.0, 5.0e4, 0.0))
-    found = decks.result_of(replace(made, tables=(table,)))
+    found = decks.run_of_deck(replace(made, tables=(table,)))
     return [found.tape3.w[-1, 0], found.gages.strain[-1, 0]]
 
 
@@ -164,9 +164,9 @@ def _patch_compliance() -> Sequence[Value]:
     found, radii = [], []
     for shape in ("DISC", "HERT"):
         patch = Patch(shape, 0.5, decks.SIDES[0] / 2.0, decks.SIDES[1] / 2.0, 1.0)
-        result = decks.result_of(decks.pressed_rectangle(12, patch, decks.DEFLECTION))
+        result = decks.run_of_deck(decks.pressed_rectangle(12, patch, decks.DEFLECTION))
         found.append(result.tape3.w[0, result["patch/node"] - 1] @ result["patch/weight"])
-        blank = decks.result_of(
+        blank = decks.run_of_deck(
             decks.pressed_rectangle(3, replace(patch, radius=None), decks.DEFLECTION)
         )
         radii.append(blank.attributes_of("patch")["radius"] / 0.106)
@@ -201,21 +201,22 @@ def bent(
     q: float = 1.0,
 ) -> Result:
     """Run a simply supported square under q cos(pi x) cos(pi y), its origin in the middle."""
-    along = np.cos(np.pi * np.array(lines(uniform(0.5, ELEMENTS))))
+    along = np.cos(np.pi * np.array(grid_lines(uniform_section(0.5, ELEMENTS))))
     plate = decks.material(ply, angles, thickness / len(angles), points=2)
     macros, load = decks.program(f"TANG FORM SOLV STRE {word}"), q * np.outer(along, along)
     made = decks.quarter_plate(ELEMENTS, plate, macros, load, others=[decks.MITC, *others])
-    return decks.result_of(made)
+    return decks.run_of_deck(made)
 
 
 @case
 def _ply_stresses() -> Sequence[Value]:
     found = bent(STIFF, CROSS)
-    x, y = decks.fields(found, "stresses", "x y")
+    x, y = decks.field_values(found, "stresses", "x y")
     even, odd = np.cos(np.pi * x) * np.cos(np.pi * y), np.sin(np.pi * x) * np.sin(np.pi * y)
     x, y = x.mean(axis=1), y.mean(axis=1)
     one, two, shear, xz, yz = (
-        field[0] for field in decks.fields(found, "plies", "sigma_1 sigma_2 tau_12 tau_xz tau_yz")
+        field[0]
+        for field in decks.field_values(found, "plies", "sigma_1 sigma_2 tau_12 tau_xz tau_yz")
     )
     return [
         (one[:, :, 2, 1], even),
@@ -229,7 +230,7 @@ def _ply_stresses() -> Sequence[Value]:
 
 def _sandwich_deck(ratio: float) -> model.Deck:
     """Build Pagano's sandwich, a square of side 1, under q = cos(pi x) cos(pi y)."""
-    along = np.cos(np.pi * np.array(lines(uniform(0.5, ELEMENTS))))
+    along = np.cos(np.pi * np.array(grid_lines(uniform_section(0.5, ELEMENTS))))
     parts = ((0.1, 1), (0.8, 2), (0.1, 1))  # of the thickness; material
     layers = tuple(
         model.Layer(n, 0.0, share / ratio, material)
@@ -253,8 +254,8 @@ def _unlike_densities() -> Sequence[Value]:
 
 @case
 def _sandwich() -> Sequence[Value]:
-    thin, thick = (decks.result_of(_sandwich_deck(ratio)) for ratio in (100.0, 10.0))
-    x, y = decks.fields(thin, "stresses", "x y")
+    thin, thick = (decks.run_of_deck(_sandwich_deck(ratio)) for ratio in (100.0, 10.0))
+    x, y = decks.field_values(thin, "stresses", "x y")
     even, odd = np.cos(np.pi * x) * np.cos(np.pi * y), np.sin(np.pi * x) * np.sin(np.pi * y)
     x, y = x.mean(axis=1), y.mean(axis=1)
     along, across = np.sin(np.pi * x) * np.cos(np.pi * y), np.cos(np.pi * x) * np.sin(np.pi * y)
@@ -271,7 +272,7 @@ def _sandwich() -> Sequence[Value]:
 @case
 def _ply_shear() -> Sequence[Value]:
     found = bent(decks.ONE, (0.0,) * 4)
-    x, y = (place.mean(axis=1) for place in decks.fields(found, "stresses", "x y"))
+    x, y = (place.mean(axis=1) for place in decks.field_values(found, "stresses", "x y"))
     shape = np.sin(np.pi * x) * np.cos(np.pi * y)
     tau = found["plies/tau_xz"][0]
     at_faces = (tau[:, [0, 3], [0, 2]], shape[:, None])
@@ -287,7 +288,7 @@ def _failure() -> Sequence[Value]:
     return [1.0 / found[f"failure/{name}/exposure"].max() for name in ("max_stress", "tsai_wu")]
 
 
-def cured(dt: float) -> model.Cure:
+def cure_of_named_ply(dt: float) -> model.Cure:
     """Change of temperature of the named ply T300/5208."""
     expansion = MATERIALS["T300/5208"].expansion
     assert expansion is not None
@@ -296,9 +297,9 @@ def cured(dt: float) -> model.Cure:
 
 @case
 def _residual_stresses() -> Sequence[Value]:
-    ply, cold = MATERIALS["T300/5208"].ply, cured(-100.0)
+    ply, cold = MATERIALS["T300/5208"].ply, cure_of_named_ply(-100.0)
     kaw = laminate(ply, (0.0, 90.0), (0.005, 0.005))
-    found = residual_stresses(kaw, *cured(-75.0).strains(1))
+    found = residual_stresses(kaw, *cure_of_named_ply(-75.0).strains(1))
     lower, upper = found.stresses[0]
     across = [
         bent(ply, angles, 0.01, "PLYS", cold)["plies/cure_stress"][0, 0, 1]
@@ -324,6 +325,6 @@ def _cured_failure() -> Sequence[Value]:
     strengths = named.allowables("m-N-s")
     assert strengths is not None
     q, angles = 5e4, (0.0, 90.0, 90.0, 0.0)
-    found = bent(named.ply, angles, 0.01, "FAIL", strengths, cured(-100.0), q=q)
+    found = bent(named.ply, angles, 0.01, "FAIL", strengths, cure_of_named_ply(-100.0), q=q)
     factors = {one.criterion: one.load_factor for one in largest_exposures(found)}
     return [q * (factors[name] or 0.0) for name in ("max_stress", "tsai_wu", "puck")]

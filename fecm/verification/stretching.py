@@ -7,16 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
+import fecm.verification.decks as decks
 from fecm._typing import Floats
 from fecm.deck import model
-from fecm.deck.grid import Grid, graded, lines, uniform
+from fecm.deck.grid import ElementGrid, graded, grid_lines, uniform_section
 from fecm.deck.model import Deck, Impact, NodeValues, Patch, Ply, Projectile, Segment
 from fecm.mechanics.interpolation import interpolate
 from fecm.mechanics.reduced_plate import reduced_plate
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
-from fecm.verification import decks
 from fecm.verification.case import Value, case
 
 NEWTON = decks.program("LOOP=30 TANG FORM SOLV CONV NEXT DISP")
@@ -35,9 +35,9 @@ PRESSURES = (0.1022849258, 0.02069852564)  # of a clamped disc, and of one that 
 VELOCITY = 2271.56334  # of the mass
 
 
-def middle(made: Deck) -> float:
+def middle_deflection(made: Deck) -> float:
     """Deflection of node 1."""
-    return float(decks.result_of(made).tape3.w[-1, 0])
+    return float(decks.run_of_deck(made).tape3.w[-1, 0])
 
 
 @case
@@ -47,7 +47,7 @@ def _stretching_plate() -> Sequence[Value]:
     plate = decks.material(decks.isotropic(1.0, 0.1**0.5, 1.0, FACTOR), [0.0], h)
     codes = f"{QUARTER} {CLAMPED}"
     made = decks.quarter_plate(ELEMENTS, plate, NEWTON, 134.9 * h**4, codes, STRETCHES)
-    return [middle(made) / h]
+    return [middle_deflection(made) / h]
 
 
 def strip(
@@ -58,14 +58,14 @@ def strip(
     The lines across the strip are slanted one way and the other, by a share of an element.
     """
     half, width = 50.0, 10.0
-    grid = Grid(uniform(half, 8), uniform(width, 1))
+    grid = ElementGrid(uniform_section(half, 8), uniform_section(width, 1))
     loads = np.zeros((grid.up, grid.across, 5))
-    across, along = (decks.weights(lines(parts)) for parts in (grid.rows, grid.columns))
+    across, along = (decks.weights(grid_lines(parts)) for parts in (grid.rows, grid.columns))
     loads[..., 2] = pressure * np.outer(across, along)
     loads[:, -1] = 0.0  # a value there would be a displacement
     plate = decks.material(FIBRES, 4 * (0.0,) + 4 * (90.0,), 0.25)
-    held = decks.supports(grid, f"01001 11011 01001 {end} 01001")
-    x, y = (at.ravel() for at in np.meshgrid(lines(grid.columns), lines(grid.rows)))
+    held = decks.restraints(grid, f"01001 11011 01001 {end} 01001")
+    x, y = (at.ravel() for at in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     side = half / 8
     x = x + slant * side * np.sin(np.pi * x / (2.0 * side)) * (2.0 * y / width - 1.0)
     places = np.column_stack([x, y]).tolist()
@@ -80,22 +80,22 @@ def _cylindrical_bending() -> Sequence[Value]:
     strong = 0.1
     bent, linear = strip(sliding, strong), strip(sliding, strong, [decks.MITC])
     return [
-        middle(strip(pinned, 0.01)),
-        middle(strip(pinned, -0.01)),
-        middle(strip(clamped, 0.03)),
-        middle(bent) / middle(linear),
-        middle(strip(pinned, 0.01, slant=0.3)),
+        middle_deflection(strip(pinned, 0.01)),
+        middle_deflection(strip(pinned, -0.01)),
+        middle_deflection(strip(clamped, 0.03)),
+        middle_deflection(bent) / middle_deflection(linear),
+        middle_deflection(strip(pinned, 0.01, slant=0.3)),
     ]
 
 
 def disc(rim: str, pressure: float) -> Deck:
     """A quarter of a circular plate under a pressure, its elements those of a square, mapped."""
     radius = 100.0
-    grid = Grid(uniform(1.0, ELEMENTS), uniform(1.0, ELEMENTS))
-    x, y = (at.ravel() for at in np.meshgrid(lines(grid.columns), lines(grid.rows)))
+    grid = ElementGrid(uniform_section(1.0, ELEMENTS), uniform_section(1.0, ELEMENTS))
+    x, y = (at.ravel() for at in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     places = radius * np.stack([x * np.sqrt(1.0 - y**2 / 2.0), y * np.sqrt(1.0 - x**2 / 2.0)], 1)
     cards = (NodeValues(n, 0, tuple(place)) for n, place in enumerate(places.tolist(), start=1))
-    held = decks.supports(grid, f"{QUARTER} {rim}")
+    held = decks.restraints(grid, f"{QUARTER} {rim}")
     plate = decks.material(ALUMINIUM, [0.0], THICKNESS)
     made = decks.deck(grid, (held, plate, *STRETCHES), NEWTON, model.Coordinates(tuple(cards)))
     loads = pressure * areas(made)
@@ -118,7 +118,7 @@ def areas(made: Deck) -> Floats:
 @case
 def _stretching_disc() -> Sequence[Value]:
     rims = zip((CLAMPED, RESTS), PRESSURES, strict=True)
-    return [middle(disc(rim, pressure)) / THICKNESS for rim, pressure in rims]
+    return [middle_deflection(disc(rim, pressure)) / THICKNESS for rim, pressure in rims]
 
 
 @case
@@ -126,9 +126,9 @@ def _stretching_impact() -> Sequence[Value]:
     """A mass on the middle of a clamped square plate, until both peaks are over."""
     side, end = 100.0, 1.7e-3
     sections = graded(side, 8, side / 2.0, 2.0)
-    grid = Grid(sections, sections)
+    grid = ElementGrid(sections, sections)
     segments = (
-        decks.supports(grid, f"00000 {CLAMPED} {CLAMPED}"),
+        decks.restraints(grid, f"00000 {CLAMPED} {CLAMPED}"),
         Projectile(0, 0, 1e-3),
         Impact(grid.nearest(side / 2.0, side / 2.0)[0], 3, VELOCITY),
         Patch("HERT", 8.0, side / 2.0, side / 2.0),
@@ -139,7 +139,7 @@ def _stretching_impact() -> Sequence[Value]:
     made = decks.deck(grid, segments, ())
     dt = rounded_time_step(critical_time_step(build_plate(made, generate(made))))
     made = replace(made, macros=decks.impact_program(dt, round(end / dt)))
-    found = decks.result_of(made)
+    found = decks.run_of_deck(made)
     balance = np.abs(found.energy.balance_error).max() / found.energy.attributes["initial"]
     return [found.plate_w.max(), found.force.max(), balance]
 

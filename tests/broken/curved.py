@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from fecm.mechanics import curvature, membrane
+from fecm.mechanics import membrane
+from fecm.mechanics import strains as curvature
 from tests.breaks import Breaks, changed, instead
 
 

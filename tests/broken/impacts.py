@@ -3,13 +3,9 @@
 from __future__ import annotations
 
 import fecm
-from fecm.mechanics import (
-    assumed_shear,
-    points,
-    quick_models,
-)
 from fecm.mechanics import impact as impacts
 from fecm.mechanics import laminate as laminates
+from fecm.mechanics import points, quick_models, strains
 from fecm.mechanics.contact_law import (
     UNLOADING,
     VIRGIN,
@@ -117,7 +113,7 @@ BREAKS: Breaks = {
         changed(parts, "has_assumed_shear", lambda found: False), {"assumed-shear": ("w",)},
     ),
     "tying points on the sides of the element": (
-        value(assumed_shear, "TYING", {9: (assumed_shear.TYING[9][0], (-1.0, 0.0, 1.0), 3)}),
+        value(strains, "TYING", {9: (strains.TYING[9][0], (-1.0, 0.0, 1.0), 3)}),
         {"assumed-shear": ("γ_yz",)},
     ),
     "half of DAMP": (

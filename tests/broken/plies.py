@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from fecm.deck.model import Cure
-from fecm.mechanics import failure, ply_stresses, residual_stresses
+from fecm.mechanics import failure, ply_stresses
 from fecm.mechanics import laminate as laminates
 from fecm.mechanics.failure_monitor import FailureMonitor
 from fecm.problem import parts
@@ -76,12 +76,12 @@ BREAKS: Breaks = {
         {"ply-stresses": ("σ2",), "failure": ("",), "inclined-failure": ("",)},
     ),
     "free strains of a ply in its own axes": (
-        instead(residual_stresses, "free_strains",
+        instead(ply_stresses, "free_strains",
                 lambda right, plate, along, across: right(unturned(plate), along, across)),
         {"residual-stresses": ("",)},
     ),
     "a free plate that stays flat": (
-        changed(residual_stresses, "in_plane_stresses",
+        changed(ply_stresses, "in_plane_stresses",
                 lambda found: np.concatenate([found[..., :3], 0.0 * found[..., 3:]], axis=-1)),
         {"residual-stresses": ("σ1 of [0/90], outer", "σ2 of [0/90], outer")},
     ),

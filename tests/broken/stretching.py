@@ -10,7 +10,7 @@ import pytest
 
 from fecm.mechanics import membrane, reduced_plate
 from fecm.mechanics.elements import gauss
-from fecm.mechanics.membrane import Membrane, QuadraticStrains
+from fecm.mechanics.membrane import MembraneForces, QuadraticStrains
 from tests.breaks import Breaks, changed, in_numpy, instead
 
 EVERY_STRIP = ("w in the middle",)
@@ -49,7 +49,7 @@ BREAKS: Breaks = {
         in_numpy(without_component(2)), {"stretching-plate": ("",), "stretching-disc": ("",)},
     ),
     "a strain energy without the quadratic strains' share": (
-        in_numpy(changed(Membrane, "forces", lambda found: (found[0], 0.0))),
+        in_numpy(changed(MembraneForces, "forces", lambda found: (found[0], 0.0))),
         {"stretching-impact": ("worst",)},
     ),
     "a quartic energy of the reduced model 2 % too large": (

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from fecm.identification import fitting
-from fecm.location import responses
+from fecm.location import model
 from fecm.location.model import Footprint
 from fecm.mechanics import half_space
 from fecm.sweeps import convergence, distributions, statistics
 from fecm.sweeps import random as random_values
-from fecm.sweeps.convolution import Convolution
+from fecm.sweeps.responses import Convolution
 from tests.breaks import (
     Breaks,
     changed,
@@ -29,7 +29,7 @@ BREAKS: Breaks = {
         instead(random_values, "matrix", exchanged_matrices), {"random-values": ("first", "total")},
     ),
     "the median of a lognormal law taken for its mean": (
-        instead(distributions.Law, "values",
+        instead(distributions.ValueDistribution, "values",
                 lambda right, law, unit: right(law, unit) * np.exp(-law.parameters[1] ** 2 / 2.0)),
         {"random-values": ("mean", "its")},
     ),
@@ -41,10 +41,10 @@ BREAKS: Breaks = {
         {"refinement": ("",)},
     ),
     "the computed force 1 % too large": (
-        changed(fitting.Model, "at", lambda force: 1.01 * force), {"identification": ("",)},
+        changed(fitting.ForceModel, "at", lambda force: 1.01 * force), {"identification": ("",)},
     ),
     "the strains of the gages 1 % too large in their runs": (
-        changed(responses, "rows_of", lambda rows: 1.01 * rows), {"reciprocity": ("",)},
+        changed(model, "rows_of", lambda rows: 1.01 * rows), {"reciprocity": ("",)},
     ),
     "a force on the panel 2 mm beside its place, and 10 % too large": (
         instead(Footprint, "weights", lambda right, self, x, y: 1.1 * right(self, x + 2, y + 2)),

@@ -8,7 +8,7 @@ Each kernel has one Python file, with its structures, what goes in and what come
 - many impacts on one plate: :mod:`fecm.mechanics.impact_sweep`;
 - strains: :mod:`~fecm.mechanics.kernels.strains`;
 - exposures of plies: :mod:`~fecm.mechanics.kernels.failure`, from the strains of
-  :mod:`~fecm.mechanics.kernels.midplane`.
+  :mod:`~fecm.mechanics.kernels.strains`.
 
 This one finds and loads the library.
 """

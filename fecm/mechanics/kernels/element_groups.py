@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
-from fecm.mechanics import assumed_shear
-from fecm.mechanics.curvature import FLAT
+from fecm.mechanics import strains
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import NDOF, jacobian, local_shape_functions
 from fecm.mechanics.kernels import Doubles, Integers, Structure, membrane
 from fecm.mechanics.kernels.layout import LANES, Indices
 from fecm.mechanics.mesh import ElementBlock, distinct
 from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.strains import FLAT
 from fecm.mechanics.symmetry import TURNED, opposite_nodes
 
 # With fewer congruent elements a shared matrix fills too few lanes.
@@ -42,7 +42,7 @@ class ElementKind(IntEnum):
     TABULATED = 3  # quadrature with tables of the shape functions
 
 
-class Group(Structure):
+class GroupStruct(Structure):
     """Elements with the same nodes present and the same laminate, and either a matrix or none.
 
     Arrays that a kind does not use are not set.  n is the number of dofs of an element, `nodes`
@@ -137,7 +137,7 @@ class ElementGroup:
         nn = family.nodes.shape[1]
         self.order = np.arange(nn)
         rules = plate.rules
-        shear = assumed_shear.quadrature(family) if rules.assumes_shear else rules.shear
+        shear = strains.quadrature(family) if rules.assumes_shear else rules.shear
         self._rules = (rules.bending, shear)
         if nonlinear:
             self._rules = (membrane.in_rows(rules.bending), shear)
@@ -153,10 +153,10 @@ class ElementGroup:
             nonlinear and not curved and bool(membrane.are_parallelograms(family).all())
         )
         if nonlinear:
-            places = np.argsort(self.order)[membrane.grid(family)]
+            places = np.argsort(self.order)[membrane.node_grid(family)]
             fields["grid"] = places.astype(np.int32)
         laminate = plate.laminate_of(family)
-        self.structure = Group(
+        self.structure = GroupStruct(
             kind=self.kind,
             nodes=nn,
             parallelograms=int(self.parallelograms),
@@ -261,10 +261,9 @@ class ElementGroup:
         slopes = _slopes(local)
         if self._plate.rules.assumes_shear:
             tied = [
-                local_shape_functions(family, assumed_shear.tying_points(nn, axis))
-                for axis in (0, 1)
+                local_shape_functions(family, strains.tying_points(nn, axis)) for axis in (0, 1)
             ]
-            weights = [assumed_shear.tying_weights(nn, axis, shear) for axis in (0, 1)]
+            weights = [strains.tying_weights(nn, axis, shear) for axis in (0, 1)]
             values = np.concatenate([value for value, _ in tied])
             deflection = np.concatenate([at[:, axis] for axis, (_, at) in enumerate(tied)])
             fields["tying"] = len(tied[0][0])
@@ -383,7 +382,7 @@ def slopes_of_mapping(family: ElementBlock) -> list[Floats]:
     nn = family.nodes.shape[1]
     found: list[Floats] = []
     for axis in (0, 1):
-        _, local = local_shape_functions(family, assumed_shear.tying_points(nn, axis))
+        _, local = local_shape_functions(family, strains.tying_points(nn, axis))
         found.append(np.einsum("tn,eni->eti", local[:, axis], family.coordinates))
     return found
 

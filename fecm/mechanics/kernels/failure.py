@@ -21,10 +21,10 @@ from fecm.mechanics.exposures import Evaluations, FailureEnvelope
 from fecm.mechanics.failure import CRITERIA, MODES, Strengths, puck_limits, puck_slope
 from fecm.mechanics.failure_monitor import FailureMonitor, Run, ZoneCriteria
 from fecm.mechanics.kernels import LIBRARY, Codes, Doubles, Longs, Structure, filled, floats
-from fecm.mechanics.kernels.midplane import Midplane, midplanes
+from fecm.mechanics.kernels.strains import Midplane, midplanes
 
 
-class Ply(Structure):
+class PlyStruct(Structure):
     """Strengths, force/area, and slopes of a ply; see :class:`~fecm.mechanics.failure.Strengths`.
 
     The last two are Puck's, of :func:`~fecm.mechanics.failure.puck_limits`.
@@ -44,7 +44,7 @@ class Ply(Structure):
     )
 
 
-class Plies(Structure):
+class PliesStruct(Structure):
     """Neighbouring states of stress of the same strengths, `states` at each of `points` points.
 
     The arrays:
@@ -64,7 +64,7 @@ class Plies(Structure):
         ("row", Longs),
         ("stress", Doubles),
         ("residual", Doubles),
-        ("ply", Ply),
+        ("ply", PlyStruct),
         ("prunes", c_int64),  # whether states that cannot rise are not evaluated
         ("pucks", c_int64),  # whether Puck's criterion is evaluated
     )
@@ -92,19 +92,19 @@ class Interfaces(Structure):
     )
 
 
-class Maxima(Structure):
+class MaximaStruct(Structure):
     """:class:`~fecm.mechanics.exposures.Maxima`, by the same names."""
 
     _fields_ = (("exposure", Doubles), ("time", Doubles), ("mode", Codes))
 
 
-class Largest(Structure):
+class LargestStruct(Structure):
     """:class:`~fecm.mechanics.exposures.Largest`, by the same names."""
 
     _fields_ = (("exposure", Doubles), ("strain", Doubles), ("state", Longs), ("mode", Codes))
 
 
-class Exposures(Structure):
+class ExposuresStruct(Structure):
     """Exposures of a plate, and what they are found from.
 
     The arrays; the last two are those of the displacement in work:
@@ -131,13 +131,13 @@ class Exposures(Structure):
         ("runs", c_int64),
         ("zones", c_int64),
         ("family", POINTER(Midplane)),
-        ("run", POINTER(Plies)),
+        ("run", POINTER(PliesStruct)),
         ("zone", POINTER(Interfaces)),
         ("counts", Codes),
         ("far", Codes),
-        ("plies", Maxima),
-        ("between", Maxima),
-        ("largest", Largest),
+        ("plies", MaximaStruct),
+        ("between", MaximaStruct),
+        ("largest", LargestStruct),
         ("strain", Doubles),
         ("gradient", Doubles),
     )
@@ -149,10 +149,10 @@ LARGEST_RATIO = 1e4
 LARGEST_F12 = 0.999
 
 
-def _ply(p: Strengths) -> Ply:
+def _ply(p: Strengths) -> PlyStruct:
     """Strengths for the kernels."""
     resistance, critical = puck_limits(p)
-    return Ply(
+    return PlyStruct(
         xt=p.xt,
         xc=p.xc,
         yt=p.yt,
@@ -177,7 +177,7 @@ class _Kept:
     """What the kernels need to find the exposures of an envelope."""
 
     monitor: CompiledMonitor
-    structure: Exposures
+    structure: ExposuresStruct
     strain: Floats  # (elements, points, strains): of the last displacement
     held: list[Structure]  # of the arrays of structures, which must live as long
 
@@ -246,7 +246,7 @@ class CompiledMonitor(FailureMonitor):
             if zone.interfaces and self.has_interfaces
         ]
         strain = np.empty((elements, points, count))
-        structure = Exposures(
+        structure = ExposuresStruct(
             elements=elements,
             points=elements * points,
             states=self.states,
@@ -257,23 +257,23 @@ class CompiledMonitor(FailureMonitor):
             runs=len(runs),
             zones=len(zones),
             family=(Midplane * len(families))(*families),
-            run=(Plies * len(runs))(*runs),
+            run=(PliesStruct * len(runs))(*runs),
             zone=(Interfaces * len(zones))(*zones),
             counts=self.counts.astype(np.int8),
             far=self.far.astype(np.int8),
-            plies=Maxima(**vars(envelope.plies)),
-            between=Maxima(**vars(envelope.interfaces)),
-            largest=Largest(**vars(envelope.largest)),
+            plies=MaximaStruct(**vars(envelope.plies)),
+            between=MaximaStruct(**vars(envelope.interfaces)),
+            largest=LargestStruct(**vars(envelope.largest)),
             strain=strain,
             gradient=np.empty((elements, 2, count)),
         )
         return _Kept(self, structure, strain, [*families, *runs, *zones])
 
-    def _run(self, zone: ZoneCriteria, run: Run, strains: int) -> Plies:
+    def _run(self, zone: ZoneCriteria, run: Run, strains: int) -> PliesStruct:
         """The structure of plies of the same strengths."""
         stress = filled(zone.in_plane[6 - strains :, :, run.states])
         rows = None if isinstance(zone.points, slice) else zone.points
-        return Plies(
+        return PliesStruct(
             points=self.counts.size if rows is None else len(rows),
             states=run.states.stop - run.states.start,
             width=stress.shape[2],

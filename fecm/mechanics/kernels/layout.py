@@ -38,7 +38,7 @@ class Layout:
 
 
 @frozen
-class Places:
+class NodePlaces:
     """Places of nodes in the vectors of the kernels."""
 
     node: Indices  # (places,): node of each, chunk by chunk
@@ -50,7 +50,7 @@ class Places:
     home: Indices  # (2, numnp): chunk and place of nodes that move independently; otherwise -1
 
 
-def layout_of(families: list[ElementBlock]) -> Layout:
+def kernel_layout(families: list[ElementBlock]) -> Layout:
     """Put the elements of groups into blocks, and the blocks into chunks of near elements."""
     counts = np.array([len(family.rows) for family in families])
     group = np.repeat(np.arange(len(families)), counts)
@@ -144,7 +144,7 @@ def _cut(centres: Floats, sizes: Indices) -> Indices:
     return chunk
 
 
-def places_of(layout: Layout, families: list[ElementBlock], leader: Indices) -> Places:
+def places_of(layout: Layout, families: list[ElementBlock], leader: Indices) -> NodePlaces:
     """Number the nodes of each chunk, and in the last one those that others share.
 
     Along a strip, nodes with the same place in the elements follow one another.
@@ -188,4 +188,4 @@ def places_of(layout: Layout, families: list[ElementBlock], leader: Indices) -> 
     mine = own[node]
     home[:, node[mine]] = chunk[mine], place[mine]
     home[:, shared] = np.broadcast_arrays(layout.chunks, np.arange(len(shared)))
-    return Places(node, at, starts, np.cumsum(sizes) - sizes, sizes, home)
+    return NodePlaces(node, at, starts, np.cumsum(sizes) - sizes, sizes, home)

@@ -5,28 +5,28 @@ from __future__ import annotations
 import numpy as np
 
 from fecm._typing import Bools, Floats, Indices
-from fecm.mechanics import assumed_shear, membrane
-from fecm.mechanics.curvature import FLAT, Curvature, strain_of_deflection
+from fecm.mechanics import membrane, strains
 from fecm.mechanics.elements import Quadrature, gauss
 from fecm.mechanics.interpolation import inverse_jacobian, jacobian, local_shape_functions
 from fecm.mechanics.mesh import TOLERANCE, ElementBlock
 from fecm.mechanics.plate import PlateModel
+from fecm.mechanics.strains import FLAT, Curvature, strain_of_deflection
 
 # Upper half of a symmetric (3, 3).
 _UPPER = np.triu_indices(3)
 
 
-def supports(plate: PlateModel) -> bool:
+def has_kernel_membrane(plate: PlateModel) -> bool:
     """Whether the kernels have the membrane of a plate: of 9-node elements with 3 x 3 points."""
     rules = plate.rules
     return (
         rules.assumes_shear
         and len(rules.bending.xi) == 9
-        and all(map(membrane.supports, plate.families))
+        and all(map(membrane.has_tied_membrane, plate.families))
     )
 
 
-def grid(family: ElementBlock) -> Indices:
+def node_grid(family: ElementBlock) -> Indices:
     """Places of the nodes of a 9-node element in rows of eta, xi ascending, (9,)."""
     return np.lexsort((family.shape.xi, family.shape.eta))
 
@@ -69,7 +69,7 @@ def numbers(
         covariant *= (weights * np.linalg.det(centre))[:, None, None]
     parts = [0.5 * centre, *covariant[:, :, *_UPPER]]
     if not parallelograms:
-        along, across, _ = assumed_shear.TYING[9]
+        along, across, _ = strains.TYING[9]
         for xi, eta, rows in (
             (along, across, slice(0, 1)),
             (across, along, slice(1, 2)),

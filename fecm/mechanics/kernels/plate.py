@@ -50,23 +50,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Array, Floats
-from fecm.mechanics.curvature import strain_of_deflection
 from fecm.mechanics.interpolation import NDOF
 from fecm.mechanics.kernels import LIBRARY, Doubles, Integers, Structure, floats
-from fecm.mechanics.kernels.element_groups import ElementGroup, Group, grouped
-from fecm.mechanics.kernels.layout import Indices, Layout, Places, layout_of, places_of
+from fecm.mechanics.kernels.element_groups import ElementGroup, GroupStruct, grouped
+from fecm.mechanics.kernels.layout import Indices, Layout, NodePlaces, kernel_layout, places_of
 from fecm.mechanics.plate import PlateModel, R, StiffnessOperator, pieces
+from fecm.mechanics.strains import strain_of_deflection
 from fecm.mechanics.symmetry import TURNED, SymmetryReduction
 
 # Relative difference below which ratios of masses count as equal.
 EQUAL = 1e-12
 
 
-class Block(Structure):
+class BlockStruct(Structure):
     """Eight elements of a group."""
 
     _fields_ = (
-        ("group", POINTER(Group)),
+        ("group", POINTER(GroupStruct)),
         ("place", Integers),  # (nodes,): see the head of this module
         ("data", Doubles),  # (numbers, 8): see ElementGroup.data; not set for those with a matrix
         ("membrane", Doubles),  # (numbers, 8) of a nonlinear plate: see ElementGroup.membrane
@@ -74,7 +74,7 @@ class Block(Structure):
 
 
 # The same as an array's type: blocks are filled in by group, many at a time.
-BLOCK = np.dtype([(name, np.uint64) for name, _ in Block._fields_])
+BLOCK = np.dtype([(name, np.uint64) for name, _ in BlockStruct._fields_])
 
 
 class Chunk(Structure):
@@ -93,7 +93,7 @@ class Chunk(Structure):
 
     _fields_ = (
         ("blocks", c_int64),
-        ("block", POINTER(Block)),
+        ("block", POINTER(BlockStruct)),
         ("first", c_int64),  # nodes of the chunks before
         ("nodes", c_int64),  # a multiple of eight
         ("shared", c_int64),
@@ -106,7 +106,7 @@ class Chunk(Structure):
     )
 
 
-class Plate(Structure):
+class PlateStruct(Structure):
     """A plate and its state.
 
     The arrays:
@@ -182,7 +182,7 @@ class CompiledPlate:
         ]
         families = [group.family for group in groups]
         leader = _leaders(kept)
-        layout = layout_of(families)
+        layout = kernel_layout(families)
         places = places_of(layout, families, leader)
         nd, count = len(columns), int(places.sizes.sum())
 
@@ -214,7 +214,7 @@ class CompiledPlate:
         cuts = self._chunks(parts, places, leader)
         curved = plate.is_curved and not nonlinear
         lanes = self._blocks(cuts, layout, groups, places)
-        self.structure = Plate(
+        self.structure = PlateStruct(
             nd=nd,
             chunks=layout.chunks,
             nodes=count,
@@ -237,7 +237,9 @@ class CompiledPlate:
             damping=0.0,
         )
 
-    def _chunks(self, masses: list[Floats], places: Places, leader: Indices) -> ctypes.Array[Chunk]:
+    def _chunks(
+        self, masses: list[Floats], places: NodePlaces, leader: Indices
+    ) -> ctypes.Array[Chunk]:
         """Chunks without their blocks, with the masses (nd, nodes) of their entries."""
         chunk, place = places.home
         cuts = (Chunk * len(masses))()
@@ -268,7 +270,7 @@ class CompiledPlate:
         cuts: ctypes.Array[Chunk],
         layout: Layout,
         groups: list[ElementGroup],
-        places: Places,
+        places: NodePlaces,
     ) -> Indices:
         """Give the chunks their blocks; returns places of lanes that don't follow one another."""
         counts, left = np.diff(places.starts), places.at
@@ -300,7 +302,7 @@ class CompiledPlate:
         for c in range(layout.chunks):
             where = ctypes.c_void_p(table.ctypes.data + int(blocks[c]) * BLOCK.itemsize)
             cuts[c].blocks = int(blocks[c + 1] - blocks[c])
-            cuts[c].block = ctypes.cast(where, POINTER(Block))
+            cuts[c].block = ctypes.cast(where, POINTER(BlockStruct))
         return np.concatenate(lanes)
 
     def _addresses(self, array: Array) -> NDArray[np.uint64]:

@@ -1,4 +1,11 @@
-"""Strains by the compiled kernels.
+"""Midplane strains, curvatures and their derivatives by the compiled kernels.
+
+In: a displacement field, (numnp, 5).  Out: strains (elements, points, 6) and gradients (elements,
+2, 6), as :meth:`~fecm.mechanics.ply_stresses.PlyStresses.strains` has them; the curvatures alone,
+(elements, points, 3) and (elements, 2, 3), where the midplane does not stretch.  Four points of an
+element are computed at once; tables are filled up to fours of points with zeros.
+
+Strains by the compiled kernels.
 
 In: displacement fields (fields, numnp, 5).  Out: strains (5, fields, numel, points), as
 :class:`~fecm.mechanics.strains.StrainField` has them.  Four points of an element are computed at
@@ -15,12 +22,106 @@ from functools import cached_property
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.mechanics import assumed_shear
-from fecm.mechanics.interpolation import local_shape_functions
-from fecm.mechanics.kernels import LIBRARY, Doubles, Longs, Structure, floats
+from fecm.mechanics import strains as assumed_shear
+from fecm.mechanics.elements import gauss
+from fecm.mechanics.interpolation import interpolate, local_shape_functions
+from fecm.mechanics.kernels import LIBRARY, Doubles, Longs, Structure, filled, floats
 from fecm.mechanics.kernels.element_groups import jacobians, slopes_of_mapping
+from fecm.mechanics.membrane import QuadraticStrains
 from fecm.mechanics.mesh import ElementBlock
-from fecm.mechanics.strains import STRAINS, StrainField
+from fecm.mechanics.ply_stresses import PlyStresses, second_derivatives
+from fecm.mechanics.strains import FLAT, STRAINS, StrainField, strain_of_deflection
+
+TYING = 12  # tying points of w,1 and of w,2 in fours; structures.h has it too
+
+
+class Midplane(Structure):
+    """Elements with the same nodes present, `elements` of `nodes` nodes, and their points.
+
+    The arrays; the last four are those of a nonlinear plate, and are not set otherwise:
+
+    ==============  =======================  ===================================================
+    `row`           (elements,)              number of the element in the result
+    `node`          (elements, nodes)        numbers of its nodes
+    `shape`         (elements,)              row of the arrays of shapes
+    `table`         (nodes, 3, width)        slopes in xi and eta, and value, of the shape functions
+    `metric`        (shapes, 4, width)       inverse Jacobian, 1/length
+    `initial`       (3,)                     midplane strains of the undeformed plate
+    `curved`        (3,)                     midplane strains per w; not set of a flat plate
+    `centre`        (shapes, 5, nodes)       derivatives of the shape functions at the centre, xx,
+                                             yy, xy, x, y; not set without nine nodes
+    `tying`         (nodes, 2, 2, TYING)     slopes in xi and eta at the tying points of w,1 and w,2
+    `tying_metric`  (shapes, 2, 2, TYING)    w,1 and w,2 per slope in xi and in eta
+    `tied`          (16, width)              interpolation of e_11 (6), e_22 (6) and e_12 (4)
+    `tied_strain`   (shapes, 3, 3)           strains xx, yy, xy per e_11, e_22, e_12
+    ==============  =======================  ===================================================
+    """
+
+    _fields_ = (
+        ("elements", c_int64),
+        ("nodes", c_int64),
+        ("points", c_int64),
+        ("width", c_int64),  # number of points, filled up to fours
+        ("row", Longs),
+        ("node", Longs),
+        ("shape", Longs),
+        ("table", Doubles),
+        ("metric", Doubles),
+        ("initial", Doubles),
+        ("curved", Doubles),
+        ("centre", Doubles),
+        ("tying", Doubles),
+        ("tying_metric", Doubles),
+        ("tied", Doubles),
+        ("tied_strain", Doubles),
+    )
+
+
+def midplanes(stresses: PlyStresses) -> list[Midplane]:
+    """The elements of some ply stresses, for the kernels."""
+    return [_structure(stresses, family, complete) for family, complete in stresses.families]
+
+
+def _structure(stresses: PlyStresses, family: ElementBlock, complete: bool) -> Midplane:
+    """The structure of a family."""
+    rule = stresses.rule
+    same = family.congruence
+    shapes = family.take(same.representatives)
+    values, local = local_shape_functions(family, rule)
+    inverse, _ = jacobians(shapes, local, transposed=False)
+    table = filled(np.stack([*local.transpose(1, 2, 0), values.T], axis=1))
+    centre = None
+    if complete:
+        slopes = interpolate(shapes, gauss(1)).dN[:, 0]
+        centre = np.concatenate([second_derivatives(shapes), slopes], axis=1)
+    initial = np.zeros(3) if stresses.initial is None else np.ascontiguousarray(stresses.initial)
+    curved = None if stresses.curvature == FLAT else strain_of_deflection(stresses.curvature)
+    return Midplane(
+        elements=len(family.rows),
+        nodes=family.nodes.shape[1],
+        points=len(rule.xi),
+        width=table.shape[2],
+        row=np.ascontiguousarray(family.rows, dtype=np.int64),
+        node=np.ascontiguousarray(family.nodes, dtype=np.int64),
+        shape=np.ascontiguousarray(same.group, dtype=np.int64),
+        table=table,
+        metric=filled(inverse.swapaxes(1, 2)),
+        initial=initial,
+        curved=curved,
+        centre=centre,
+        **(_quadratic(QuadraticStrains(shapes, rule)) if stresses.nonlinear else {}),
+    )
+
+
+def _quadratic(tied: QuadraticStrains) -> dict[str, Floats]:
+    """Arrays of the quadratic strains of a nonlinear plate."""
+    slopes = [table.reshape(2, -1, table.shape[1]) for table in tied.tables]  # (2, tying, nodes)
+    return {
+        "tying": filled(np.stack(slopes).transpose(3, 0, 1, 2)),
+        "tying_metric": filled(np.stack(tied.metric).transpose(3, 0, 1, 2)),
+        "tied": filled(np.concatenate([weights.T for weights in tied.weights])),
+        "tied_strain": np.ascontiguousarray(tied.to_global.transpose(2, 0, 1)),
+    }
 
 
 class Strains(Structure):

@@ -6,11 +6,11 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
-from fecm.mechanics.curvature import strain_of_deflection
+from fecm.mechanics.strains import strain_of_deflection
 from fecm.problem.parts import W
 from fecm.problem.problem import Problem
+from fecm.problem.rules.cards import report_elements
 from fecm.problem.rules.nonlinear import ORDER, not_nine_nodes
-from fecm.problem.rules.numbering import report_elements
 
 # Slope of the midplane at an edge: that of an arc is four times its rise over its side.
 SHALLOW = 0.5
@@ -43,7 +43,7 @@ def no_curvature(card: model.Curvature) -> Reports:
     cause="Elements with fewer nodes lock: their strains of u and v do not follow w/R.",
     remedy="Take 9-node elements; `fecm new` writes them.",
 )
-def other_elements(problem: Problem) -> Reports:
+def elements_without_curvature(problem: Problem) -> Reports:
     """Find elements that are not for curved panels."""
     what = "is not a quadrilateral with 9 nodes, as CURV needs"
     hint = "elements with 3, 4, 8 or 12 nodes are for flat plates only"
@@ -174,6 +174,6 @@ def preload_bends_panel(problem: Problem) -> Reports:
 
 
 ALONE = (no_curvature,)
-OF_PANEL = (other_elements, low_order, deep_panel, preload_bends_panel)
+OF_PANEL = (elements_without_curvature, low_order, deep_panel, preload_bends_panel)
 VALUES = (hardly_shallow, thick_panel)
 OF_SUPPORTS = (clamped_membrane,)

@@ -9,7 +9,7 @@ import numpy as np
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, reports, rule
 from fecm.deck.units import unit_names
-from fecm.mechanics.points import locate
+from fecm.mechanics.points import containing_elements
 from fecm.problem.problem import Problem
 from fecm.problem.rules.laminate import are_like_radians
 from fecm.problem.rules.units import USED, needed_unit
@@ -57,7 +57,7 @@ def gage_off_the_plate(problem: Problem) -> Reports:
     """Find gages in no element."""
     for record in problem.deck.require(model.Gages).records:
         point = np.array([[record.x, record.y]])
-        if not any(len(locate(family, point)[0]) for family in problem.families):
+        if not any(len(containing_elements(family, point)[0]) for family in problem.families):
             message = f"Gage {record.number} at ({record.x:g}, {record.y:g}) is not on the plate."
             yield Report(message, record.place("gage's x"))
 

@@ -8,9 +8,9 @@ from fecm._typing import Bools
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.mechanics.mesh import distinct, extent
+from fecm.problem.estimates import ENOUGH_PER_WAVE, resolution, said_error
 from fecm.problem.parts import W
 from fecm.problem.problem import Problem
-from fecm.problem.resolution import ENOUGH_PER_WAVE, resolution, said_error
 
 W_DOF = W + 1  # number of w on the card
 LEAST_PER_WAVE = 4  # elements per bending wave below which a mesh is too coarse

@@ -13,7 +13,7 @@ from fecm.mechanics.mesh import distinct, holds_the_plane
 from fecm.problem.generate import place_of_element
 from fecm.problem.parts import THETA_X, W
 from fecm.problem.problem import Problem
-from fecm.problem.rules.numbering import describe_elements, describe_nodes, report_elements
+from fecm.problem.rules.cards import describe_elements, describe_nodes, report_elements
 
 CORNERS = TRIANGLE.corners
 FEW_SUPPORTS = 2  # nodes that hold w up to which they are no support

@@ -13,7 +13,7 @@ from fecm.mechanics.elements import QUADRILATERAL
 from fecm.mechanics.mesh import holds_the_plane
 from fecm.problem.parts import THETA_X, W, has_assumed_shear
 from fecm.problem.problem import Problem
-from fecm.problem.rules.numbering import report_elements
+from fecm.problem.rules.cards import report_elements
 
 ORDER = 3  # bending order L1, by which the membrane is integrated too
 SAME_LINE = 1e-9  # difference of coordinates on one line, over the size of the mesh
@@ -72,7 +72,7 @@ def without_assumed_shear(problem: Problem) -> Reports:
     "NONL has an element that is not a quadrilateral with 9 nodes.",
     remedy="Take 9-node elements; `fecm new` writes them.",
 )
-def other_elements(problem: Problem) -> Reports:
+def elements_without_membrane(problem: Problem) -> Reports:
     """Find elements whose stretching by deflections is not known."""
     what = "is not a quadrilateral with 9 nodes, as NONL needs"
     hint = "elements with 3, 4, 8 or 12 nodes are for linear plates only"
@@ -95,7 +95,7 @@ def not_nine_nodes(problem: Problem) -> Bools:
     cause="Nonlinear plates take the lumped mass.",
     remedy="`LMAS`.",
 )
-def consistent_mass(problem: Problem) -> Reports:
+def consistent_mass_of_nonlinear_plate(problem: Problem) -> Reports:
     """Find a consistent mass, for which there are no nonlinear plates."""
     card = next((macro for macro in problem.deck.macros if macro.word == "CMAS"), None)
     if card is not None:
@@ -171,10 +171,10 @@ def _on_edges_across(problem: Problem, axis: int) -> Bools:
 
 
 OF_NONLINEAR = (
-    other_elements,
+    elements_without_membrane,
     without_assumed_shear,
     other_order,
     held_plane,
-    consistent_mass,
+    consistent_mass_of_nonlinear_plate,
 )
 OF_SYMMETRY = (open_symmetry,)

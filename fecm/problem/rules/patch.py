@@ -10,7 +10,7 @@ from fecm._typing import Bools, Indices
 from fecm.deck import model
 from fecm.deck.macros import flat
 from fecm.deck.rules import Report, Reports, Subject, reports, rule
-from fecm.mechanics.mesh import Mesh, longest_sides
+from fecm.mechanics.mesh import MeshArrays, longest_sides
 from fecm.mechanics.points import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError
 from fecm.problem.contact_estimates import expected_peak
 from fecm.problem.parts import W
@@ -169,7 +169,7 @@ def unresolved_patch(problem: Problem) -> Reports:
     yield Report(message, card.place("radius c"), hint)
 
 
-def _longest_side(mesh: Mesh, rows: Indices | Bools) -> float:
+def _longest_side(mesh: MeshArrays, rows: Indices | Bools) -> float:
     """Longest side of the elements in some rows."""
     return float(longest_sides(mesh.elements[rows], mesh.coordinates).max(initial=0.0))
 

@@ -13,7 +13,7 @@ from fecm.deck.units import KNOWN, MASS, in_si, unit_names
 from fecm.mechanics.projectile import Rod, report_rod
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
-from fecm.problem.rules.numbering import ranges
+from fecm.problem.rules.cards import ranges
 from fecm.problem.rules.units import looks_like
 
 # A rod's step is a full matrix of three times as many rows and columns as it has dofs.

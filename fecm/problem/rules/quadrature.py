@@ -10,12 +10,13 @@ import numpy as np
 from fecm._dataclasses import frozen
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
-from fecm.mechanics import assumed_shear, interpolation
+from fecm.mechanics import interpolation
+from fecm.mechanics import strains as assumed_shear
 from fecm.mechanics.elements import CUBIC, TRIANGLE
 from fecm.mechanics.mesh import ElementBlock, distinct
 from fecm.problem.parts import W, has_assumed_shear
 from fecm.problem.problem import Problem
-from fecm.problem.rules.numbering import describe_elements, report_elements
+from fecm.problem.rules.cards import describe_elements, report_elements
 
 FEW_LOADED = 4  # loaded nodes up to this number are single forces, more are a pressure
 BLOCK = 1024  # elements whose Jacobians are computed together
@@ -247,7 +248,7 @@ def elements_without_assumed_shear(problem: Problem) -> Reports:
         return
     wrong = np.zeros(len(problem.mesh.elements), dtype=bool)
     for family in problem.families:
-        wrong[family.rows] = not assumed_shear.supports(family)
+        wrong[family.rows] = not assumed_shear.uses_assumed_shear(family)
     what = "has no assumed shear strains (SHEA MITC)"
     hint = "quadrilaterals with 4 or with 9 nodes have; without MITC any element will do"
     yield from report_elements(problem.deck, np.flatnonzero(wrong), what, hint)

@@ -6,19 +6,20 @@ import math
 
 from fecm._dataclasses import frozen
 from fecm.deck import model
-from fecm.deck.findings import Place
+from fecm.deck.findings import CardPlace
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Ply, Record
 from fecm.deck.rules import Report, Reports, Subject, rule
-from fecm.deck.unit_systems import MASSES, force_of
 from fecm.deck.units import (
     COEFFICIENT,
     DENSITY,
     KNOWN,
     MASS,
+    MASSES,
     MODULUS,
     TOUGHNESS,
     VELOCITY,
+    force_of,
     in_si,
     unit_names,
     unit_of,
@@ -149,7 +150,7 @@ def unit_of_another_kind(card: model.Units) -> Reports:
 def unreal_values(problem: Problem) -> Reports:
     """Find values that nothing real has; all of them are one report."""
     names = unit_names(problem.deck)
-    wrong: list[tuple[Place | None, str]] = []
+    wrong: list[tuple[CardPlace | None, str]] = []
     for kind, record, name, value in _judged(problem):
         real = REAL[kind]
         factor = in_si(real.dimension, names)

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fecm.deck import model
-from fecm.deck.findings import Place
+from fecm.deck.card import Record
+from fecm.deck.findings import CardPlace
 from fecm.deck.macros import flat
 from fecm.deck.material_cards import MATERIAL
-from fecm.deck.record import Record
 from fecm.deck.rules import Report, Reports, Subject, reports, rule
-from fecm.mechanics.laminate import Laminate
+from fecm.mechanics.laminate import LaminateSection
 from fecm.problem.problem import Problem
 from fecm.problem.rules.cure import FIELDS
 
@@ -150,13 +150,13 @@ def unused(problem: Problem) -> Reports:
             yield Report(message, laminate.head.place(), "ZONE gives elements their laminates")
 
 
-def _used(problem: Problem) -> list[tuple[int, Laminate]]:
+def _used(problem: Problem) -> list[tuple[int, LaminateSection]]:
     """Numbers and laminates of the elements."""
     numbers, laminates = list(problem.deck.layers), problem.plate.laminates
     return [(numbers[n], laminates[n]) for n in problem.used_laminates]
 
 
-def _place(deck: model.Deck, number: int) -> Place | None:
+def _place(deck: model.Deck, number: int) -> CardPlace | None:
     """Place of the cards of a laminate."""
     own = (one for one in _laminates(deck) if one.number == number)
     if (found := next(own, None)) is not None:

@@ -1,12 +1,21 @@
-"""Parameters of the contact law from an indentation test."""
+"""Parameters of the contact law from an indentation test.
+
+Fits of an indentation test as text, as plain values and as an EXPE card.
+"""
 
 from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from fecm._dataclasses import frozen
+from fecm._text import aligned
 from fecm._typing import Floats
+from fecm.authoring.contact import Contact
+from fecm.deck.model import Indentation
 from fecm.mechanics.contact_law import (
     ACR_POWER,
     LOADING_POWER,
@@ -16,16 +25,19 @@ from fecm.mechanics.contact_law import (
 )
 from fecm.studies import StudyError
 from fecm.studies.indentation_test.curves import (
+    Critical,
     Curves,
-    Estimate,
-    Solution,
+    CurveSolution,
+    FittedValue,
+    PermanentLine,
+    critical,
+    fit_curves,
+    fit_permanent_line,
     influence,
     r_squared,
     scaled,
-    solve,
 )
-from fecm.studies.indentation_test.permanent import Critical, Line, critical, line
-from fecm.studies.indentation_test.turns import Kind, divide
+from fecm.studies.indentation_test.turns import StretchKind, divide
 
 LARGEST = 1e60  # largest number whose powers are finite
 # Smallest error of a coordinate relative to the largest indentation, for tests without noise.
@@ -36,8 +48,8 @@ ROUNDING = 1e-9
 class FreePower:
     """First loading with a free power, F = k a^n (equation 3-1)."""
 
-    n: Estimate
-    k: Estimate  # force/length^n
+    n: FittedValue
+    k: FittedValue  # force/length^n
     r_squared: float | None
 
 
@@ -49,7 +61,7 @@ def free_power(curves: Curves) -> FreePower:
     """
     from scipy.optimize import least_squares  # takes 0.3 s, and most commands do not fit
 
-    rows = curves.division.rows(Kind.LOADING)
+    rows = curves.division.rows(StretchKind.LOADING)
     everywhere = np.maximum(curves.a[rows], 0.0), curves.f[rows]
     a, f = (values[everywhere[0] > 0.0] for values in everywhere)
     start = [1.0, LOADING_POWER]
@@ -60,8 +72,8 @@ def free_power(curves: Curves) -> FreePower:
     k = c * curves.force / curves.length**n
     by = np.array([k / c, -k * np.log(curves.length)])
     return FreePower(
-        Estimate(float(n), float(covariance[1, 1] ** 0.5)),
-        Estimate(float(k), float((by @ covariance @ by) ** 0.5)),
+        FittedValue(float(n), float(covariance[1, 1] ** 0.5)),
+        FittedValue(float(k), float((by @ covariance @ by) ** 0.5)),
         r_squared(c * everywhere[0] ** n, everywhere[1]),
     )
 
@@ -70,28 +82,28 @@ def free_power(curves: Curves) -> FreePower:
 class Cycle:
     """Unloading and reloading from a point of the first loading curve."""
 
-    alpha_m: Estimate  # largest indentation (length); its error is 0 if it is the recorded value
+    alpha_m: FittedValue  # largest indentation (length); its error is 0 if it is the recorded value
     alpha_m_recorded: float  # smoothed if noisy
-    alpha_0: Estimate  # permanent indentation (length)
-    k_1: Estimate  # reloading rigidity, equation 3-12, force/length^1.5
+    alpha_0: FittedValue  # permanent indentation (length)
+    k_1: FittedValue  # reloading rigidity, equation 3-12, force/length^1.5
     # Like `k_1`, from the origin of the first reloading curve; None without reloading, and if the
     # reloading began without contact, where both are equal.
-    k_1_measured: Estimate | None
+    k_1_measured: FittedValue | None
 
 
 @frozen
-class Fit:
+class ContactLawFit:
     """Result of a fit."""
 
-    k: Estimate  # contact coefficient with n = 3/2, force/length^1.5
+    k: FittedValue  # contact coefficient with n = 3/2, force/length^1.5
     free: FreePower
-    q: Estimate | None  # unloading power; None if the test has no unloading
+    q: FittedValue | None  # unloading power; None if the test has no unloading
     cycles: tuple[Cycle, ...]
-    line: Line | None  # None if fewer than two cycles leave an indentation
+    line: PermanentLine | None  # None if fewer than two cycles leave an indentation
     critical: Critical | None  # if the law of equation 3-7 was requested
     r_squared: dict[str, float | None]  # of loading, unloading, reloading and permanent
     scatter: float  # root mean square of the residuals, relative to the largest force
-    solution: Solution
+    solution: CurveSolution
 
     def relation(self) -> ContactParameters | None:
         """Return the contact law with admissible values; None if alpha_0(alpha_m) is unknown."""
@@ -106,14 +118,14 @@ class Fit:
         return LinearPermanent(k, max(self.line.alpha_p.value, 0.0), s_p, self.q.value)
 
 
-def fit(
+def fit_contact_law(
     indentation: ArrayLike,
     force: ArrayLike,
     *,
     retreat: float | None = None,
     q: float | None = None,
     acr: bool = False,
-) -> Fit:
+) -> ContactLawFit:
     """Fit the contact law to a test.
 
     Indentation and force, (n,), are in the order of measurement from first contact at zero, and
@@ -131,7 +143,7 @@ def fit(
         if not 1.0 / LARGEST < float(np.abs(values).max()) < LARGEST:
             raise StudyError(f"the {name} are not between {1.0 / LARGEST:g} and {LARGEST:g}")
     curves = scaled(divide(a, retreat), a, f)
-    solution = solve(curves, ACR_POWER if acr else q)
+    solution = fit_curves(curves, ACR_POWER if acr else q)
     at, division, p = solution.curves.layout, curves.division, solution.values
     peaks = [at.corners[n] for n in division.peaks]
     places = peaks + at.permanents
@@ -140,10 +152,12 @@ def fit(
         covariance = covariance + np.eye(len(places)) * (ROUNDING * p[peaks].max()) ** 2
     found = p[peaks], p[at.permanents], covariance
     cycles = tuple(_cycle(solution, n) for n in range(len(peaks)))
-    straight = line(*found) if not acr and len(cycles) > 1 else None
-    of_curves = {kind.value: r_squared(*solution.curves.of(solution.scaled, kind)) for kind in Kind}
-    fitted, measured = solution.curves.of(solution.scaled, *Kind)
-    return Fit(
+    straight = fit_permanent_line(*found) if not acr and len(cycles) > 1 else None
+    of_curves = {
+        kind.value: r_squared(*solution.curves.of(solution.scaled, kind)) for kind in StretchKind
+    }
+    fitted, measured = solution.curves.of(solution.scaled, *StretchKind)
+    return ContactLawFit(
         k=_parameter(solution, at.K),
         free=free_power(curves),
         q=_parameter(solution, at.Q) if cycles else None,
@@ -156,7 +170,7 @@ def fit(
     )
 
 
-def _explained(straight: Line | None, peaks: Floats, permanents: Floats) -> float | None:
+def _explained(straight: PermanentLine | None, peaks: Floats, permanents: Floats) -> float | None:
     """Return R² of equation 3-8; None for fewer than three cycles."""
     if straight is None or len(peaks) < 3:
         return None
@@ -164,18 +178,18 @@ def _explained(straight: Line | None, peaks: Floats, permanents: Floats) -> floa
     return r_squared(fitted, permanents)
 
 
-def _parameter(solution: Solution, place: int) -> Estimate:
+def _parameter(solution: CurveSolution, place: int) -> FittedValue:
     error = max(float(solution.covariance[place, place]), 0.0) ** 0.5
-    return Estimate(float(solution.values[place]), error)
+    return FittedValue(float(solution.values[place]), error)
 
 
-def _cycle(solution: Solution, number: int) -> Cycle:
+def _cycle(solution: CurveSolution, number: int) -> Cycle:
     """Return the values of a cycle and the rigidities derived from them."""
     at, division = solution.curves.layout, solution.curves.division
     corner = division.peaks[number]
     peak, permanent = at.corners[corner], at.permanents[number]
 
-    def rigidity(origin: int) -> Estimate:
+    def rigidity(origin: int) -> FittedValue:
         def k_1(p: Floats) -> float:
             return float(p[at.K] * (p[peak] / (p[peak] - p[origin])) ** LOADING_POWER)
 
@@ -186,3 +200,150 @@ def _cycle(solution: Solution, number: int) -> Cycle:
     recorded = division.corners[corner].indentation
     alpha_m, alpha_0 = _parameter(solution, peak), _parameter(solution, permanent)
     return Cycle(alpha_m, recorded, alpha_0, rigidity(permanent), measured)
+
+
+DIGITS = 5  # digits on the card
+NOT_ZERO = 2.0  # standard errors within which a slope does not differ from 0
+BAD = 0.05  # scatter that triggers a note
+
+
+def law(fit: ContactLawFit) -> Contact | None:
+    """Return the law in the digits of a card; None if the test does not determine it."""
+    relation = fit.relation()
+    if isinstance(relation, YangSunPermanent):
+        values, word = (relation.k, relation.alpha_cr, 0.0, relation.q), Indentation.ACR
+    elif isinstance(relation, LinearPermanent):
+        values, word = (relation.k, relation.alpha_p, relation.s_p, relation.q), ""
+    else:
+        return None
+    k, alpha, s_p, q = (float(f"{value:.{DIGITS}g}") for value in values)
+    return Contact(k, alpha, s_p, q, word)
+
+
+def card(fit: ContactLawFit) -> str:
+    """Return the EXPE segment; empty if the test does not determine all parameters."""
+    found = law(fit)
+    return found.text() if found else ""
+
+
+def fit_notes(fit: ContactLawFit) -> list[str]:
+    """Return notes on the reliability of the fit."""
+    found: list[str] = []
+    corners = [fit.solution.curves.division.corners[n] for n in fit.solution.held]
+    held = [corner.cycle + 1 for corner in corners if corner.is_peak]
+    if not fit.cycles:
+        found.append("the test has no unloading: it gives only k and n, and no card")
+    elif fit.line is None and fit.critical is None:
+        found.append(
+            "no card: s_p and alpha_p require two or more peaks with a permanent indentation; "
+            "`acr` requires one"
+        )
+    if fit.solution.at_limit:
+        found.append("a value is at a bound of the fit: the law does not fit this test")
+    if fit.scatter > BAD:
+        found.append(f"the points scatter by {100.0 * fit.scatter:.2g} % of the largest force")
+    if held:
+        which = ", ".join(map(str, sorted(held)))
+        found.append(
+            f"alpha_m of cycle {which} is the recorded value: the curves do not determine it"
+        )
+    straight = fit.line
+    if straight is not None:
+        if straight.s_p.value < NOT_ZERO * straight.s_p.error or straight.s_p.value >= 1.0:
+            found.append("s_p does not differ significantly from 0")
+        if straight.alpha_p.value < 0.0 < straight.s_p.value:
+            found.append("alpha_p is negative; the card has 0")
+        if straight.elastic:
+            which = ", ".join(str(n + 1) for n in straight.elastic)
+            found.append(f"cycle {which} is below alpha_p and has no permanent indentation")
+        if side := _one_side(fit.cycles, straight):
+            found.append(
+                f"the line of s_p and alpha_p is {side} all of its points: the test does not "
+                "follow the law; compare n with 3/2, and fit single cycles to compare q"
+            )
+    scatter = straight.scatter if straight else fit.critical.scatter if fit.critical else 1.0
+    if scatter > 1.0:
+        found.append(
+            f"the scatter of the permanent indentations is {scatter:.1f} times that expected from "
+            "the noise of the forces: the errors of their parameters are multiplied by it"
+        )
+    return found
+
+
+def _one_side(cycles: tuple[Cycle, ...], straight: PermanentLine) -> str:
+    """Return whether the line is ``"above"`` or ``"below"`` all points by more than an error."""
+    slope, start = straight.s_p.value, straight.alpha_p.value
+    points = [cycle for n, cycle in enumerate(cycles) if n not in straight.elastic]
+    off = [c.alpha_0.value - slope * (c.alpha_m.value - start) for c in points]
+    least = [max(c.alpha_0.error, 1e-6 * c.alpha_m.value) for c in points]
+    if len(off) < 3 or not any(abs(o) > e for o, e in zip(off, least, strict=True)):
+        return ""
+    return "above" if max(off) < 0.0 else "below" if min(off) > 0.0 else ""
+
+
+def _format(estimate: FittedValue | None) -> str:
+    """Format a value and its error."""
+    if estimate is None:
+        return "-"
+    error = f" ± {estimate.error:.2g}" if estimate.error else ""
+    return f"{estimate.value:.5g}{error}"
+
+
+def _share(value: float | None) -> str:
+    return "" if value is None else f"   R² {value:.5f}"
+
+
+def fit_lines(fit: ContactLawFit) -> list[str]:
+    """Return the fit as lines of text."""
+    division = fit.solution.curves.division
+    loading, falling, rising = (len(division.rows(kind)) for kind in StretchKind)
+    shares = {kind: _share(value) for kind, value in fit.r_squared.items()}
+    found = [
+        f"first loading   {loading} points",
+        f"  k             {_format(fit.k)} (n = 3/2){shares[StretchKind.LOADING]}",
+        f"  n             {_format(fit.free.n)}, with k {_format(fit.free.k)}"
+        f"{_share(fit.free.r_squared)}",
+    ]
+    if fit.q is not None:
+        found.append(f"unloading       {falling} points")
+        found.append(f"  q             {_format(fit.q)}{shares[StretchKind.FALLING]}")
+    if rising:
+        found.append(f"reloading       {rising} points{shares[StretchKind.RISING]}")
+    if fit.line is not None:
+        found.append(f"permanent       {shares['permanent'].strip()}".rstrip())
+        found.append(f"  s_p           {_format(fit.line.s_p)}")
+        found.append(f"  alpha_p       {_format(fit.line.alpha_p)}")
+    if fit.critical is not None:
+        found.append(f"alpha_cr        {_format(fit.critical.alpha_cr)}")
+    found.append(f"scatter         {100.0 * fit.scatter:.2g} % of the largest force")
+    return [*found, "", *_table(fit.cycles), ""] if fit.cycles else found
+
+
+def _table(cycles: tuple[Cycle, ...]) -> list[str]:
+    rows: list[tuple[str, ...]] = [("cycle", "alpha_m", "alpha_0", "k_1", "k_1 of the reloading")]
+    for n, c in enumerate(cycles, start=1):
+        rows.append((str(n), *map(_format, (c.alpha_m, c.alpha_0, c.k_1, c.k_1_measured))))
+    width = 4 if all(c.k_1_measured is None for c in cycles) else 5
+    return aligned([row[:width] for row in rows])
+
+
+def plain(fit: ContactLawFit) -> dict[str, Any]:
+    """Return the fit as plain values for JSON."""
+    straight = fit.line
+    constants = {
+        "k": fit.k,
+        "n": fit.free.n,
+        "k_with_n": fit.free.k,
+        "q": fit.q,
+        "s_p": straight.s_p if straight else None,
+        "alpha_p": straight.alpha_p if straight else None,
+        "alpha_cr": fit.critical.alpha_cr if fit.critical else None,
+    }
+    return {
+        **{name: asdict(estimate) if estimate else None for name, estimate in constants.items()},
+        "r_squared": {**fit.r_squared, "loading_with_n": fit.free.r_squared},
+        "scatter": fit.scatter,
+        "cycles": [asdict(cycle) for cycle in fit.cycles],
+        "notes": fit_notes(fit),
+        "card": card(fit) or None,
+    }

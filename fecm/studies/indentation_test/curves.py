@@ -9,6 +9,11 @@ coarse steps reduce, is only the initial guess.
 Covariances follow from the residuals of the points (divided by 1 minus their leverage) instead of
 a common variance: they hold also for a scatter that grows with the force, and include the error of
 k.
+
+Relation of permanent to largest indentation, equations 3-8 and 3-7.
+
+Both coordinates of a cycle have errors, which are correlated with each other and with those of
+other cycles; the fit is by generalised least squares with the complete covariance.
 """
 
 from __future__ import annotations
@@ -19,14 +24,14 @@ from dataclasses import replace
 import numpy as np
 
 from fecm._dataclasses import frozen
-from fecm._typing import Bools, Floats
-from fecm.mechanics.contact_law import LOADING_POWER, power_curve
+from fecm._typing import Bools, Floats, Indices
+from fecm.mechanics.contact_law import ACR_POWER, LOADING_POWER, power_curve
 from fecm.studies import StudyError
-from fecm.studies.indentation_test.turns import Division, Kind, Rows
+from fecm.studies.indentation_test.turns import Division, Rows, StretchKind
 
 
 @frozen
-class Estimate:
+class FittedValue:
     """A value and its standard error, which is 0 for a prescribed value."""
 
     value: float
@@ -78,14 +83,14 @@ class ParameterLayout:
     Q = 1
 
 
-def layout_of(division: Division, tied: frozenset[int] = frozenset()) -> ParameterLayout:
+def parameter_layout(division: Division, tied: frozenset[int] = frozenset()) -> ParameterLayout:
     """Number the parameters: k, q, corners, permanent indentations, and origins not in `tied`."""
     corners = list(range(2, 2 + len(division.corners)))
     permanents = [2 + len(corners) + n for n in range(len(division.peaks))]
     origins: dict[int, int] = {}
     size = 2 + len(corners) + len(permanents)
     for n, s in enumerate(division.stretches):
-        if s.kind == Kind.RISING and len(s.rows) >= FEWEST and n not in tied:
+        if s.kind == StretchKind.RISING and len(s.rows) >= FEWEST and n not in tied:
             origins[n], size = size, size + 1
     return ParameterLayout(corners, permanents, origins, size)
 
@@ -115,9 +120,9 @@ class Curves:
     def stretch(self, p: Floats, number: int, a: Floats) -> Floats:
         """Return the scaled force on the curve of a stretch for scaled `p` and `a`."""
         s, at = self.division.stretches[number], self.layout
-        if s.kind == Kind.LOADING:
+        if s.kind == StretchKind.LOADING:
             return np.asarray(power_curve(p[at.K], 0.0, 1.0, LOADING_POWER, a))
-        if s.kind == Kind.RISING:
+        if s.kind == StretchKind.RISING:
             return self._rising(p, number, s.cycle, a)
         corner, top = self.division.corners[s.begin], p[at.corners[s.begin]]
         if corner.is_peak:
@@ -134,12 +139,12 @@ class Curves:
         top = self.peak_force(p, cycle)
         return np.asarray(power_curve(top, origin, peak - origin, LOADING_POWER, a))
 
-    def numbers(self, *kinds: Kind) -> list[int]:
+    def numbers(self, *kinds: StretchKind) -> list[int]:
         """Return the numbers of the stretches of some kinds with enough points."""
         own = [(n, s) for n, s in enumerate(self.division.stretches) if s.kind in kinds]
-        return [n for n, s in own if s.kind != Kind.RISING or len(s.rows) >= FEWEST]
+        return [n for n, s in own if s.kind != StretchKind.RISING or len(s.rows) >= FEWEST]
 
-    def of(self, p: Floats, *kinds: Kind) -> tuple[Floats, Floats]:
+    def of(self, p: Floats, *kinds: StretchKind) -> tuple[Floats, Floats]:
         """Return fitted and measured forces of the stretches of some kinds."""
         parts = [(n, self.division.stretches[n].rows) for n in self.numbers(*kinds)]
         fitted = [self.stretch(p, n, self.a[rows]) for n, rows in parts]
@@ -152,18 +157,20 @@ def scaled(division: Division, indentation: Floats, force: Floats) -> Curves:
     length, top = float(division.path.smooth.max()), float(force.max())
     if length <= 0.0 or top <= 0.0:
         raise StudyError("indentation and force are never positive")
-    curves = Curves(division, indentation / length, force / top, length, top, layout_of(division))
-    loading = division.rows(Kind.LOADING)
+    curves = Curves(
+        division, indentation / length, force / top, length, top, parameter_layout(division)
+    )
+    loading = division.rows(StretchKind.LOADING)
     if np.count_nonzero(curves.a[loading] > 0.0) < FEWEST:
         raise StudyError(f"the first loading has fewer than {FEWEST} points")
     for cycle in range(len(division.peaks)):
-        if len(division.rows(Kind.FALLING, cycle)) < FEWEST:
+        if len(division.rows(StretchKind.FALLING, cycle)) < FEWEST:
             raise StudyError(f"cycle {cycle + 1} has fewer than {FEWEST} points of unloading")
     return curves
 
 
 @frozen
-class Solution:
+class CurveSolution:
     """Fitted parameters in the units of the test, numbered by :class:`ParameterLayout`.
 
     A value at a bound means that the curves do not fit, and that the errors are meaningless.
@@ -180,15 +187,15 @@ class Solution:
         """Scaled values."""
         return np.asarray(self.values / self.curves.units)
 
-    def estimate(self, function: Callable[[Floats], float]) -> Estimate:
+    def estimate(self, function: Callable[[Floats], float]) -> FittedValue:
         """Return a function of the parameters and its standard error."""
         units = self.curves.units
         gradient = _derivatives(lambda x: np.array([function(x * units)]), self.scaled)[0] / units
         variance = float(gradient @ self.covariance @ gradient)
-        return Estimate(function(self.values), max(variance, 0.0) ** 0.5)
+        return FittedValue(function(self.values), max(variance, 0.0) ** 0.5)
 
 
-def solve(curves: Curves, q: float | None = None) -> Solution:
+def fit_curves(curves: Curves, q: float | None = None) -> CurveSolution:
     """Fit all curves; corners that the curves do not determine keep their recorded values.
 
     The unloading power is fitted unless `q` prescribes it.  In a first fit, every reloading has a
@@ -202,10 +209,10 @@ def solve(curves: Curves, q: float | None = None) -> Solution:
     tied = frozenset(n for n, at in curves.layout.origins.items() if lowest[at] > turns[n])
     if not tied:
         return solution
-    return _held_or_not(replace(curves, layout=layout_of(curves.division, tied)), q)
+    return _held_or_not(replace(curves, layout=parameter_layout(curves.division, tied)), q)
 
 
-def _held_or_not(curves: Curves, q: float | None) -> Solution:
+def _held_or_not(curves: Curves, q: float | None) -> CurveSolution:
     """Fit; hold corners that the curves do not determine."""
     held: frozenset[int] = frozenset()
     while True:
@@ -217,7 +224,7 @@ def _held_or_not(curves: Curves, q: float | None) -> Solution:
         held |= vague
 
 
-def _solve(curves: Curves, q: float | None, held: frozenset[int]) -> Solution:
+def _solve(curves: Curves, q: float | None, held: frozenset[int]) -> CurveSolution:
     from scipy.optimize import least_squares  # takes 0.3 s, and most commands do not fit
 
     start, low, high = _start(curves, q)
@@ -229,7 +236,7 @@ def _solve(curves: Curves, q: float | None, held: frozenset[int]) -> Solution:
     def residuals(x: Floats) -> Floats:
         p = start.copy()
         p[free] = x
-        fitted, measured = curves.of(p, Kind.FALLING, Kind.RISING)
+        fitted, measured = curves.of(p, StretchKind.FALLING, StretchKind.RISING)
         return np.asarray(measured - fitted)
 
     p = start.copy()
@@ -246,13 +253,13 @@ def _solve(curves: Curves, q: float | None, held: frozenset[int]) -> Solution:
     units = curves.units
     covariance = _covariance(curves, p, free) * np.outer(units, units)
     near = np.minimum(p - low, high - p)[free] < AT_LIMIT * (high - low)[free]
-    return Solution(curves, p * units, covariance, held, bool(near.any()))
+    return CurveSolution(curves, p * units, covariance, held, bool(near.any()))
 
 
 def _start(curves: Curves, q: float | None) -> tuple[Floats, Floats, Floats]:
     """Return initial values and bounds of all parameters; k is final."""
     at, division = curves.layout, curves.division
-    rows = division.rows(Kind.LOADING)
+    rows = division.rows(StretchKind.LOADING)
     x = np.maximum(curves.a[rows], 0.0) ** LOADING_POWER
     p, low, high = (np.zeros(at.size) for _ in range(3))
     p[at.K] = float(x @ curves.f[rows]) / float(x @ x)
@@ -271,7 +278,7 @@ def _start(curves: Curves, q: float | None) -> tuple[Floats, Floats, Floats]:
         p[place] = min(max(guess, 0.9 * low[place]), 0.9 * high[place])
 
     for cycle, place in enumerate(at.permanents):
-        rows = division.rows(Kind.FALLING, cycle)
+        rows = division.rows(StretchKind.FALLING, cycle)
         start_origin(place, rows, cycle=cycle, power=p[at.Q], limits=LIMITS_PERMANENT)
     for number, place in at.origins.items():
         s = division.stretches[number]
@@ -292,15 +299,17 @@ def _covariance(curves: Curves, p: Floats, free: Bools) -> Floats:
     """Return the covariance of the scaled parameters; zero for parameters that are not free."""
     # The sum over the points of the squares of their influence.  Points of the first loading affect
     # k and, through k, all other parameters.
-    rows = curves.division.rows(Kind.LOADING)
+    rows = curves.division.rows(StretchKind.LOADING)
     x = np.maximum(curves.a[rows], 0.0) ** LOADING_POWER
     share = x / float(x @ x)
     on_k = share * ((curves.f[rows] - p[ParameterLayout.K] * x) / np.sqrt(1.0 - x * share))
     covariance, by_k = np.zeros((len(p), len(p))), np.zeros(len(p))
     by_k[ParameterLayout.K] = 1.0
     if free.any():
-        jacobian = _derivatives(lambda x: curves.of(x, Kind.FALLING, Kind.RISING)[0], p)
-        fitted, measured = curves.of(p, Kind.FALLING, Kind.RISING)
+        jacobian = _derivatives(
+            lambda x: curves.of(x, StretchKind.FALLING, StretchKind.RISING)[0], p
+        )
+        fitted, measured = curves.of(p, StretchKind.FALLING, StretchKind.RISING)
         inverse, of_points = influence(jacobian[:, free], measured - fitted)
         by_k[free] = -inverse @ jacobian[:, ParameterLayout.K]
         block = of_points @ of_points.T
@@ -314,3 +323,106 @@ def _derivatives(function: Callable[[Floats], Floats], p: Floats) -> Floats:
     """Return the Jacobian of a function of scaled parameters by central differences."""
     steps = STEP * np.eye(len(p))
     return np.stack([(function(p + h) - function(p - h)) / (2.0 * STEP) for h in steps], axis=1)
+
+
+ROUNDS = 20  # iterations of the weights, which depend on the slope
+UNLIKELY = 0.01  # probability below which the scatter exceeds the noise of the points
+
+
+@frozen
+class PermanentLine:
+    """Permanent indentation by equation 3-8, alpha_0 = s_p (alpha_m - alpha_p)."""
+
+    s_p: FittedValue
+    alpha_p: FittedValue
+    elastic: tuple[int, ...]  # cycles below alpha_p, without permanent indentation
+    scatter: float  # of :func:`_scatter`; it multiplies the errors
+
+
+def fit_permanent_line(
+    peaks: Floats, permanents: Floats, covariance: Floats
+) -> PermanentLine | None:
+    """Fit alpha_0 = max(0, s_p (alpha_m - alpha_p)); None if fewer than two cycles exceed alpha_p.
+
+    The covariance, regular, is that of all peaks alpha_m, then all permanent indentations alpha_0.
+    """
+    order = np.argsort(peaks)
+    fits: list[tuple[float, PermanentLine]] = []
+    for count in range(len(peaks) - 1):
+        found = _split(peaks, permanents, covariance, order[:count])
+        if found is None:
+            continue
+        start = found[1].alpha_p.value
+        if not count or peaks[order[count - 1]] <= start < peaks[order[count]]:
+            fits.append(found)
+    return min(fits, key=lambda one: one[0])[1] if fits else None
+
+
+def _split(
+    peaks: Floats, permanents: Floats, covariance: Floats, elastic: Indices
+) -> tuple[float, PermanentLine] | None:
+    """Return chi² and the line for a set of elastic cycles."""
+    n = len(peaks)
+    beyond = np.full(n, 1.0)
+    beyond[elastic] = 0.0
+    design = np.stack([beyond * peaks, beyond], axis=1)
+    slope, level = np.polyfit(peaks[beyond > 0.0], permanents[beyond > 0.0], 1)
+    normal, weight = np.eye(2), np.eye(n)
+    for _ in range(ROUNDS):
+        across = np.concatenate([np.diag(-slope * beyond), np.eye(n)], axis=1)
+        variance = across @ covariance @ across.T
+        weight = np.linalg.pinv(variance, rcond=1e-14, hermitian=True)
+        normal = design.T @ weight @ design
+        if not np.all(np.isfinite(normal)) or np.linalg.matrix_rank(normal) < 2:
+            return None
+        slope, level = np.linalg.solve(normal, design.T @ weight @ permanents)
+    if slope == 0.0:
+        return None
+    errors = np.linalg.inv(normal)
+    left = permanents - design @ [slope, level]
+    chi = float(left @ weight @ left)
+    scatter = _scatter(chi, n - 2)
+    by = np.array([level / slope**2, -1.0 / slope])
+    s_p = FittedValue(float(slope), scatter * float(errors[0, 0] ** 0.5))
+    alpha_p = FittedValue(float(-level / slope), scatter * float((by @ errors @ by) ** 0.5))
+    return chi, PermanentLine(s_p, alpha_p, tuple(elastic.tolist()), scatter)
+
+
+def _scatter(chi: float, freedom: int) -> float:
+    """Return the root of chi² per degree of freedom if it exceeds the noise, else 1."""
+    from scipy.special import chdtrc  # takes 0.15 s, and most commands do not fit
+
+    if freedom > 0 and chdtrc(freedom, chi) < UNLIKELY:
+        return float((chi / freedom) ** 0.5)
+    return 1.0
+
+
+@frozen
+class Critical:
+    """Permanent indentation by equation 3-7, with the critical indentation alpha_cr."""
+
+    alpha_cr: FittedValue
+    scatter: float  # as that of a line
+
+
+def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:
+    """Fit alpha_cr = (alpha_m - alpha_0)^(5/2)/alpha_m^(3/2), equal for all cycles.
+
+    Parameters are those of :func:`line`.  A cycle below alpha_cr has no permanent indentation and
+    only bounds alpha_cr: such cycles are excluded if there are others.
+    """
+    own = (peaks - permanents) ** ACR_POWER / peaks**LOADING_POWER
+    by_peak = own * (ACR_POWER / (peaks - permanents) - LOADING_POWER / peaks)
+    by_permanent = -own * ACR_POWER / (peaks - permanents)
+    across = np.concatenate([np.diag(by_peak), np.diag(by_permanent)], axis=1)
+    variance = across @ covariance @ across.T
+    deep = peaks > own + np.sqrt(np.diag(variance))
+    if not deep.any():
+        deep[:] = True
+    weight = np.linalg.pinv(variance[np.ix_(deep, deep)], hermitian=True)
+    total = float(weight.sum())
+    mean = float((weight @ own[deep]).sum()) / total if total > 0.0 else float(own[deep].mean())
+    left = own[deep] - mean
+    scatter = _scatter(float(left @ weight @ left), int(deep.sum()) - 1)
+    error = scatter * total**-0.5 if total > 0.0 else 0.0
+    return Critical(FittedValue(mean, error), scatter)

@@ -15,10 +15,10 @@ from fecm._typing import Floats
 from fecm.authoring.contact import Contact
 from fecm.authoring.parameters import check_positive
 from fecm.mechanics.contact_law import ACR_POWER
-from fecm.studies.indentation_test import output
-from fecm.studies.indentation_test.constants import Cycle, Fit, fit
-from fecm.studies.indentation_test.curves import LIMITS_Q, Estimate
-from fecm.studies.indentation_test.measured import Test, read_test
+from fecm.studies.indentation_test import constants
+from fecm.studies.indentation_test.constants import ContactLawFit, Cycle, fit_contact_law
+from fecm.studies.indentation_test.curves import LIMITS_Q, FittedValue
+from fecm.studies.indentation_test.turns import Test, read_test
 
 
 @frozen
@@ -44,40 +44,40 @@ class IndentationFit:
     force: Floats
     units: Mapping[str, str]
     stated: tuple[str, str]
-    fit: Fit
+    fit: ContactLawFit
 
     @property
-    def k(self) -> Estimate:
+    def k(self) -> FittedValue:
         """Contact coefficient with n = 3/2 (equation 3-1), force/length^1.5."""
         return self.fit.k
 
     @property
-    def n(self) -> Estimate:
+    def n(self) -> FittedValue:
         """Power of the first loading, if it is free."""
         return self.fit.free.n
 
     @property
-    def k_with_n(self) -> Estimate:
+    def k_with_n(self) -> FittedValue:
         """Contact coefficient with the power `n`, force/length^n."""
         return self.fit.free.k
 
     @property
-    def q(self) -> Estimate | None:
+    def q(self) -> FittedValue | None:
         """Power of the unloading (equation 3-3)."""
         return self.fit.q
 
     @property
-    def s_p(self) -> Estimate | None:
+    def s_p(self) -> FittedValue | None:
         """Slope of the permanent over the largest indentation (equation 3-8)."""
         return self.fit.line.s_p if self.fit.line else None
 
     @property
-    def alpha_p(self) -> Estimate | None:
+    def alpha_p(self) -> FittedValue | None:
         """Critical indentation of equation 3-8, length."""
         return self.fit.line.alpha_p if self.fit.line else None
 
     @property
-    def alpha_cr(self) -> Estimate | None:
+    def alpha_cr(self) -> FittedValue | None:
         """Critical indentation of equation 3-7, length."""
         return self.fit.critical.alpha_cr if self.fit.critical else None
 
@@ -99,23 +99,23 @@ class IndentationFit:
     @property
     def notes(self) -> tuple[str, ...]:
         """Reasons to doubt the law."""
-        return tuple(output.notes(self.fit))
+        return tuple(constants.fit_notes(self.fit))
 
     @property
     def law(self) -> Contact | None:
         """Law for `fecm.impact`, as on the card; None if the test does not determine it."""
-        return output.law(self.fit)
+        return constants.law(self.fit)
 
     def to_dict(self) -> dict[str, Any]:
         """Plain values, as `fecm indent fit --format json` prints them."""
-        return {"units": dict(self.units) or None, **output.plain(self.fit)}
+        return {"units": dict(self.units) or None, **constants.plain(self.fit)}
 
     def __str__(self) -> str:
         own = tuple(self.units.values())
         stated = "" if self.stated in (("", ""), own) else f" (the test: {', '.join(self.stated)})"
         about = f"{', '.join(own)}{stated}" if own else "those of the test, which names none"
-        card = output.card(self.fit)
-        shown = [*output.lines(self.fit), f"units           {about}"]
+        card = constants.card(self.fit)
+        shown = [*constants.fit_lines(self.fit), f"units           {about}"]
         return "\n".join([*shown, card] if card else shown)
 
 
@@ -198,7 +198,7 @@ def fit_law(
                 f"{name} is {values[peak]:g} at the largest force; both are positive in "
                 f"compression: a minus before a name or number of `columns` changes the sign"
             )
-    found = fit(test.indentation, test.force, retreat=turn, q=q, acr=acr)
+    found = fit_contact_law(test.indentation, test.force, retreat=turn, q=q, acr=acr)
     return IndentationFit(test.indentation, test.force, test.units, test.stated, found)
 
 

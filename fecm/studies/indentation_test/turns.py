@@ -2,18 +2,23 @@
 
 A stretch is a run of points between two turns.  A turn is a point from which the path retreats by
 more than a threshold above its noise.  Points within the noise of a turn belong to no stretch.
+
+Measured indentation tests: tables of indentation and force in any units.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm._dataclasses import frozen
+from fecm._measured_tables import read_table
 from fecm._typing import Floats
 from fecm.studies import StudyError
 
@@ -27,7 +32,7 @@ NEGLIGIBLE = 0.1  # noise below this fraction of a step reverses no step
 
 
 @frozen
-class Path:
+class SmoothedIndentation:
     """Moving mean of measured indentations, and their noise."""
 
     smooth: Floats  # (n,), length
@@ -40,21 +45,23 @@ class Path:
         return float(np.ptp(self.smooth))
 
 
-def smoothed(indentation: Floats) -> Path:
+def smoothed(indentation: Floats) -> SmoothedIndentation:
     """Estimate the noise of a path, and smooth it only as much as needed to find its turns."""
     # Third differences of a path without noise are almost zero; their median gives the noise.  A
     # moving mean over w points divides the noise by sqrt(w) and cuts off about w/4 steps at a turn;
     # w balances both.
     n = len(indentation)
     if n < 5:
-        return Path(indentation, 0.0, 0)
+        return SmoothedIndentation(indentation, 0.0, 0)
     noise = float(np.median(np.abs(np.diff(indentation, 3)))) / (0.6745 * math.sqrt(20.0))
     rough = _moving_mean(indentation, max(1, n // 200))
     step = float(np.abs(np.diff(rough)).sum()) / (n - 1)
     if noise <= NEGLIGIBLE * step:
-        return Path(indentation, 0.0, 0)
+        return SmoothedIndentation(indentation, 0.0, 0)
     reach = min(max(1, round((4.0 * noise / step) ** (2.0 / 3.0) / 2.0)), n // 50 + 1)
-    return Path(_moving_mean(indentation, reach), noise / math.sqrt(2 * reach + 1), reach)
+    return SmoothedIndentation(
+        _moving_mean(indentation, reach), noise / math.sqrt(2 * reach + 1), reach
+    )
 
 
 def _moving_mean(values: Floats, reach: int) -> Floats:
@@ -65,7 +72,7 @@ def _moving_mean(values: Floats, reach: int) -> Floats:
     return np.asarray((sums[last] - sums[first]) / (last - first))
 
 
-def turns(path: Path, retreat: float) -> list[int]:
+def turns(path: SmoothedIndentation, retreat: float) -> list[int]:
     """Find points from which the path retreats by more than `retreat`, and the first and last."""
     s = path.smooth
     found = [0]
@@ -91,7 +98,7 @@ def turns(path: Path, retreat: float) -> list[int]:
     return found
 
 
-class Kind(StrEnum):
+class StretchKind(StrEnum):
     """Kinds of stretches."""
 
     LOADING = "loading"  # for the first time
@@ -100,10 +107,10 @@ class Kind(StrEnum):
 
 
 @frozen
-class Stretch:
+class CurveStretch:
     """Points on one curve."""
 
-    kind: Kind
+    kind: StretchKind
     cycle: int  # number of the last peak, from 0; of LOADING, of the next peak
     rows: Rows
     # Of FALLING, the corner at which it begins: the peak of its cycle, or a turn during reloading.
@@ -125,8 +132,8 @@ class Corner:
 class Division:
     """A test divided into stretches."""
 
-    path: Path
-    stretches: tuple[Stretch, ...]
+    path: SmoothedIndentation
+    stretches: tuple[CurveStretch, ...]
     corners: tuple[Corner, ...]
 
     @property
@@ -134,7 +141,7 @@ class Division:
         """Corners that are peaks, one per cycle."""
         return [n for n, corner in enumerate(self.corners) if corner.is_peak]
 
-    def rows(self, kind: Kind, cycle: int | None = None) -> Rows:
+    def rows(self, kind: StretchKind, cycle: int | None = None) -> Rows:
         """Return the points of all stretches of a kind, or of those of a cycle."""
         own = [s for s in self.stretches if s.kind == kind]
         parts = [s.rows for s in own if cycle is None or s.cycle == cycle]
@@ -161,10 +168,10 @@ def divide(indentation: Floats, retreat: float | None = None) -> Division:
     return _stretches(path, found, near=max(retreat / 2.0, 4.0 * path.noise))
 
 
-def _stretches(path: Path, found: list[int], *, near: float) -> Division:
+def _stretches(path: SmoothedIndentation, found: list[int], *, near: float) -> Division:
     """Divide a path at its turns; peaks within a distance `near` are one."""
     s = path.smooth
-    stretches: list[Stretch] = []
+    stretches: list[CurveStretch] = []
     corners: list[Corner] = []
     cycle = -1
     begin = -1  # corner at which the next unloading begins
@@ -173,15 +180,15 @@ def _stretches(path: Path, found: list[int], *, near: float) -> Division:
         ends_in_turn = end != found[-1]
         rows, top = _between(path, first, end, ends_in_turn), float(s[end])
         if top <= s[first]:
-            stretches.append(Stretch(Kind.FALLING, cycle, rows, begin))
+            stretches.append(CurveStretch(StretchKind.FALLING, cycle, rows, begin))
             continue
 
         if cycle >= 0:
             below = rows[s[rows] <= peak]
-            stretches.append(Stretch(Kind.RISING, cycle, below, turn=float(s[first])))
+            stretches.append(CurveStretch(StretchKind.RISING, cycle, below, turn=float(s[first])))
         rise = len(stretches) - 1
         if top > peak + near:  # a rise continues on the first loading curve beyond the peak
-            stretches.append(Stretch(Kind.LOADING, cycle + 1, rows[s[rows] > peak]))
+            stretches.append(CurveStretch(StretchKind.LOADING, cycle + 1, rows[s[rows] > peak]))
             if ends_in_turn:
                 cycle += 1
                 peak = top
@@ -195,7 +202,7 @@ def _stretches(path: Path, found: list[int], *, near: float) -> Division:
     return Division(path, tuple(stretches), tuple(corners))
 
 
-def _between(path: Path, first: int, end: int, ends_in_turn: bool) -> Rows:
+def _between(path: SmoothedIndentation, first: int, end: int, ends_in_turn: bool) -> Rows:
     """Return the points between two turns, without the turns and points too close to them.
 
     The point at a turn may have been recorded before or after it.
@@ -211,3 +218,49 @@ def _between(path: Path, first: int, end: int, ends_in_turn: bool) -> Rows:
     if ends_in_turn:
         keep &= (np.abs(s[rows] - s[end]) > guard) & (rows < end - path.reach)
     return np.asarray(rows[keep])
+
+
+NAMES = ("indentation", "force")  # columns
+IMPERIAL = {"in", "inch", "inches", "mil", "mils", "lbf", "lb", "lbs", "kip", "kips"}
+
+
+@frozen
+class Test:
+    """An indentation test."""
+
+    indentation: Floats  # (rows,), in `units`
+    force: Floats  # (rows,)
+    units: Mapping[str, str]  # names of the units of length and force; empty if unknown
+    stated: tuple[str, str]  # units of both in the file; empty texts if none
+
+
+def read_test(
+    path: Path, columns: Sequence[str] = (), units: tuple[str, str] | None = None
+) -> Test:
+    """Read an indentation test in consistent units.
+
+    The columns are named as in :data:`WORDS`, or `columns` has their names or numbers (from 1).
+    Values are converted to `units` of length and force; by default, a file in inches and pounds to
+    in and lbf, others to m and N or mm and N.  A file without units is assumed to be in `units`.
+    Raises StudyError if a column is missing, a unit is unknown, or a number is invalid.  Raises
+    OSError if the file cannot be read.
+    """
+    table = read_table(path)
+    places = table.places(NAMES, columns)
+    stated = (table.unit(places[0]), table.unit(places[1]))
+    if units is None and any(stated) and not all(stated):
+        text = f"{path}: one column is in {stated[0] or stated[1]}, the other has no unit"
+        raise StudyError(f"{text}; state both, or give both in `units`")
+    names = units or (_system(*stated) if any(stated) else None)
+    target = dict(zip(("length", "force"), names, strict=True)) if names else {}
+    indentation, force = table.columns(NAMES, columns, target, places=places).values()
+    if names and any(stated):
+        stated = (stated[0] or names[0], stated[1] or names[1])
+    return Test(indentation, force, target, stated)
+
+
+def _system(length: str, force: str) -> tuple[str, str]:
+    """Return units of length and force of the same system as those of the file."""
+    if {length.casefold(), force.casefold()} <= IMPERIAL:
+        return "in", "lbf"
+    return ("m" if length == "m" else "mm"), "N"

@@ -17,8 +17,7 @@ from fecm.api import sole_problem
 from fecm.authoring.laminate import system_asked
 from fecm.authoring.parameters import check_positive
 from fecm.deck.model import Deck
-from fecm.deck.unit_systems import units_of
-from fecm.deck.units import unit_names
+from fecm.deck.units import unit_names, units_of
 from fecm.mechanics.projectile import (
     INTEGRATORS,
     MASSES,
@@ -168,13 +167,13 @@ def pulse_test(
         if value not in known:
             raise StudyError(f"`{name}` is {value!r}, none of {', '.join(known)}")
     if isinstance(rod, Rod):
-        struck = uniform(rod, units)
+        struck = uniform_rod(rod, units)
     elif units is not None:
         raise StudyError("`units` are those of the deck; leave them out")
     else:
         struck = rod_of(sole_problem(rod, warns=False).deck)
     chosen = filter_of(filter) if isinstance(filter, str) else filter
-    return strike(
+    return simulate_rod_test(
         struck,
         _pulse(pulse, struck.units),
         dt,
@@ -186,7 +185,7 @@ def pulse_test(
     )
 
 
-def uniform(rod: Rod, units: str | None) -> Struck:
+def uniform_rod(rod: Rod, units: str | None) -> Struck:
     """A rod by itself, in a system of units."""
     system = system_asked(units)
     return Struck(rod, rod.length / 2.0, None, units_of(system) if system else {})
@@ -203,7 +202,7 @@ def rod_of(deck: Deck) -> Struck:
     return Struck(projectile, station, steps[0] if steps else None, unit_names(deck))
 
 
-def strike(
+def simulate_rod_test(
     struck: Struck,
     pulse: Pulse,
     dt: float | None,

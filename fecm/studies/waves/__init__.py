@@ -16,10 +16,8 @@ mode the earlier name.
 of given normals, and `fronts` tracks the fronts over all normals.
 """
 
-from fecm.studies.waves.fronts import Cusp, WaveSurfaces
-from fecm.studies.waves.harmonic import MODES, Dispersion, dispersion
-from fecm.studies.waves.medium import Medium
-from fecm.studies.waves.sheets import FRONTS, Fronts
+from fecm.studies.waves.fronts import FRONTS, Cusp, Fronts, WaveSurfaces
+from fecm.studies.waves.harmonic import MODES, Dispersion, Medium, dispersion
 
 __all__ = [
     "FRONTS",

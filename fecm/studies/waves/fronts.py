@@ -1,4 +1,9 @@
-"""Wave fronts: normal velocities, rays, positions and cusps, section 2.3.
+"""Sheets of the wave fronts: eigenvalues, derivatives, branch tracking.
+
+The squares of the five normal velocities are the eigenvalues of M^-1 L(n).  As functions of the
+normal they form sheets; sheets that cross are identified by their modes.
+
+Wave fronts: normal velocities, rays, positions and cusps, section 2.3.
 
 Across a front only the highest derivatives are discontinuous, so that k drops out of the 5 x 5
 problem: L(n) a = c_n^2 M a couples A, B, D with P, R, I, and transverse shear is independent
@@ -9,21 +14,218 @@ angle, computed by perturbation of the eigenvalue problem: with the slowness p =
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import permutations
+from typing import ClassVar
+
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from fecm._dataclasses import frozen
-from fecm.studies.waves.medium import Medium, first_largest
-from fecm.studies.waves.sheets import (
-    FRONTS,
-    ORDERS,
-    SURE,
-    Fronts,
-    match_modes,
-    sheets,
-    track_branch,
+from fecm._typing import Floats, Indices
+from fecm.studies import StudyError
+from fecm.studies.waves.harmonic import (
+    OUT_OF_RANGE,
+    Medium,
+    first_largest,
+    gradients,
+    in_normal_axes,
+    shares,
+    trigonometry,
 )
+
+EQUAL = 1e-10  # relative tolerance of equal squared velocities
+SURE = 0.8  # squared scalar product above which one mode continues another
+FINEST = 1e-9  # smallest step of the normal (degrees)
+
+ORDERS = np.array(list(permutations(range(5))))  # in which five modes may continue five others
+
+# Names of the fronts, by their dominant component: u_n, u_t, phi_n, phi_t, w.
+FRONTS = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shear")
+
+
+@frozen
+class Fronts:
+    """The five fronts for a series of normals.
+
+    Attributes
+    ----------
+    modes : tuple of str
+        Names of the fronts, in the order of the columns.
+    normal : ndarray (n,)
+        Angles of the normals, degrees.
+    velocity : ndarray (n, 5)
+        Normal velocity c_n, length/time.
+    slope, curvature : ndarray (n, 5)
+        Its first and second derivative with respect to the angle of the normal (radian).
+    share : ndarray (n, 5, 5)
+        Share of u_n, u_t, phi_n, phi_t, w (last axis) in the kinetic energy.
+    """
+
+    modes: ClassVar[tuple[str, ...]] = FRONTS
+    normal: Floats
+    velocity: Floats
+    slope: Floats
+    curvature: Floats
+    share: Floats
+
+    @property
+    def ray(self) -> Floats:
+        """Ray velocity of equation 2-84, (n, 5, 2): x and y, length/time."""
+        cos, sin = (part[:, None] for part in trigonometry(self.normal))
+        c, s = self.velocity, self.slope
+        return np.stack([c * cos - s * sin, c * sin + s * cos], axis=-1)
+
+    @property
+    def ray_angle(self) -> Floats:
+        """Direction of the rays, (n, 5), degrees in (-180, 180]."""
+        ray = self.ray
+        angle = np.rad2deg(np.arctan2(ray[..., 1], ray[..., 0]))
+        return np.asarray(np.where(angle <= -180.0 + 1e-9, angle + 360.0, angle))
+
+    def positions(self, time: float, radius: float) -> Floats:
+        """Positions, (n, 5, 2), of fronts that start as a circle, equations 2-85 to 2-87.
+
+        The report's radius of the circle (length) is the laminate's thickness.
+        """
+        start = radius * np.stack(trigonometry(self.normal), axis=-1)
+        return np.asarray(start[:, None] + time * self.ray)
+
+    def growth(self, time: float, radius: float) -> Floats:
+        """Length of the front per radian of the normal, (n, 5); zero at a cusp, then negative."""
+        return radius + time * (self.velocity + self.curvature)
+
+
+@frozen
+class Sheets(Fronts):
+    """The five solutions for a series of normals, in descending order of velocity."""
+
+    # Modes as columns, (n, 5, 5), orthonormal after scaling by the inertia's Cholesky factor.
+    mode: Floats
+
+
+def sheets(medium: Medium, normal: Floats) -> Sheets:
+    """Solve L(n) a = c_n^2 M a, with derivatives by perturbation, for normals in degrees, (n,)."""
+    with np.errstate(all="ignore"):
+        root = np.linalg.inv(np.linalg.cholesky(medium.inertia))
+        operators = [root @ matrix @ root.T for matrix in _stiffness(medium, normal)]
+        if not np.isfinite(operators).all():
+            raise StudyError(OUT_OF_RANGE)
+        square, basis = _solved(*operators)
+        first, second = (basis.transpose(0, 2, 1) @ matrix @ basis for matrix in operators[1:])
+        gap = square[:, :, None] - square[:, None, :]
+        apart = np.abs(gap) > EQUAL * square[:, :1, None]
+        bend = 2.0 * np.where(apart, first**2 / np.where(apart, gap, 1.0), 0.0).sum(axis=2)
+        bend += np.diagonal(second, axis1=1, axis2=2)
+        velocity = np.sqrt(square)
+        slope = np.diagonal(first, axis1=1, axis2=2) / (2.0 * velocity)
+        curvature = (bend / 2.0 - slope**2) / velocity
+        if not np.isfinite(curvature).all():
+            raise StudyError(OUT_OF_RANGE)
+    share = shares(medium.inertia, root.T @ basis)
+    return Sheets(normal, velocity, slope, curvature, share, basis)
+
+
+def match_modes(before: Floats, after: Floats) -> tuple[Indices, Floats]:
+    """Match modes of neighbouring normals; the modes are columns, (n, 5, 5).
+
+    Indices in `after` of the modes that continue those of `before`, (n, 5), and the smallest
+    squared scalar product of such a pair, (n,), at most 1.
+    """
+    likeness = (before.transpose(0, 2, 1) @ after) ** 2
+    pairs = likeness[:, np.arange(5), ORDERS]
+    place = first_largest(pairs.sum(axis=2))
+    return ORDERS[place], pairs[np.arange(len(pairs)), place].min(axis=1)
+
+
+def track_branch(medium: Medium, first: float, last: float) -> Indices:
+    """Match the sheets of two close normals in degrees, (5,), bisecting the step as necessary.
+
+    Sheets that approach each other without crossing exchange their modes within a small angle;
+    sheets that cross keep them.
+    """
+    mode = sheets(medium, np.array([first, last])).mode
+    (found,), (likeness,) = match_modes(mode[:1], mode[1:])
+    if likeness <= SURE and last - first >= FINEST:
+        middle = (first + last) / 2.0
+        found = track_branch(medium, middle, last)[track_branch(medium, first, middle)]
+    return np.asarray(found)
+
+
+def _stiffness(medium: Medium, normal: Floats) -> Floats:
+    """L(n) and its first and second derivative with respect to the angle, (3, n, 5, 5)."""
+    both = np.zeros((3, len(normal), 6, 4))
+    for matrix, part in zip(both, gradients(normal), strict=True):
+        matrix[:, :3, :2] = matrix[:, 3:, 2:] = part
+    strain, first, second = both
+
+    def product(a: Floats, b: Floats) -> Floats:
+        half = a.transpose(0, 2, 1) @ medium.section @ b
+        return (half + half.transpose(0, 2, 1)) / 2.0
+
+    shear = in_normal_axes(medium.laminate.shear, normal)
+    nn, nt, tt = shear[:, 0, 0], shear[:, 0, 1], shear[:, 1, 1]
+    found = np.zeros((3, len(normal), 5, 5))
+    found[0, :, :4, :4] = product(strain, strain)
+    found[1, :, :4, :4] = 2.0 * product(strain, first)
+    found[2, :, :4, :4] = 2.0 * product(strain, second) + 2.0 * product(first, first)
+    found[:, :, 4, 4] = nn, 2.0 * nt, 2.0 * (tt - nn)
+    return found
+
+
+def _solved(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
+    """Eigenvalues, descending, and eigenvectors; those of equal eigenvalues follow the sheets."""
+    # Uncoupled in-plane and flexural components are solved separately.
+    coupled = operator[:, :2, 2:4].any()
+    values = np.empty(operator.shape[:2])
+    vectors = np.zeros(operator.shape)
+    for block in (slice(0, 4), slice(4, 5)) if coupled else (slice(0, 2), slice(2, 4), slice(4, 5)):
+        part = np.stack([operator, first, second])[..., block, block]
+        square, basis = np.linalg.eigh(part[0])
+        limit = EQUAL * np.abs(square).max(axis=1)
+        meeting = (np.diff(square, axis=1) < limit[:, None]).any(axis=1)
+        for row in np.flatnonzero(meeting).tolist():
+            basis[row] = _kept_apart(square[row], basis[row], part[1:, row], limit[row])
+        values[:, block], vectors[:, block, block] = square, basis
+    order = np.argsort(-values, axis=1, kind="stable")
+    values = np.take_along_axis(values, order, axis=1)
+    return values, np.take_along_axis(vectors, order[:, None], axis=2)
+
+
+def _kept_apart(values: Floats, vectors: Floats, derivatives: Floats, limit: float) -> Floats:
+    """Eigenvectors that are continuous in the normal where sheets meet."""
+    # Among equal eigenvalues they diagonalise the first, then the second derivative of the
+    # operator; for identical sheets they separate the components.
+    parts: list[Floats] = []
+    first, second = derivatives
+    for group in _runs(values, limit):
+        basis = vectors[:, group]
+        others = np.delete(vectors, group, axis=1)
+        slopes = first @ others
+        gaps = values[group[0]] - np.delete(values, group)
+        bends = second + 2.0 * (slopes / gaps) @ slopes.T
+        components = np.diag(np.linspace(1.0, 0.0, len(values))) * values[-1]
+        parts += _split(basis, [first, bends, components], 1e3 * limit)
+    return np.concatenate(parts, axis=1)
+
+
+def _runs(values: Floats, limit: float) -> list[Indices]:
+    """Indices of runs of sorted values that are equal up to `limit`."""
+    steps = np.flatnonzero(np.abs(np.diff(values)) >= limit) + 1
+    return np.split(np.arange(len(values)), steps)
+
+
+def _split(basis: Floats, operators: Sequence[Floats], limit: float) -> list[Floats]:
+    """Split a subspace into eigenspaces of the operators, one after another."""
+    if basis.shape[1] == 1 or not operators:
+        return [basis]
+    values, vectors = np.linalg.eigh(basis.T @ operators[0] @ basis)
+    parts: list[Floats] = []
+    for run in _runs(values, limit):
+        parts += _split(basis @ vectors[:, run], operators[1:], limit)
+    return parts
+
 
 STEPS = 10  # per degree, for tracking sheets and searching cusps
 AROUND = 360 * STEPS  # steps over all normals

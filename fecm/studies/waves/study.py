@@ -15,12 +15,10 @@ from fecm.authoring.laminate import Laminate, stiffness_of_laminate
 from fecm.authoring.parameters import check_positive
 from fecm.deck.model import Deck
 from fecm.deck.units import unit_names
-from fecm.mechanics.laminate import Laminate as Stiffness
+from fecm.mechanics.laminate import LaminateSection as Stiffness
 from fecm.problem.problem import Problem
-from fecm.studies.waves.fronts import Cusp, WaveSurfaces
-from fecm.studies.waves.harmonic import Dispersion, dispersion
-from fecm.studies.waves.medium import Medium
-from fecm.studies.waves.sheets import Fronts
+from fecm.studies.waves.fronts import Cusp, Fronts, WaveSurfaces
+from fecm.studies.waves.harmonic import Dispersion, Medium, dispersion
 
 
 class Waves:

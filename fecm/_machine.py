@@ -1,0 +1,156 @@
+"""Free memory, as the operating system reports it.
+
+Processors that a computation may use, and those that other work leaves free.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from fecm._errors import FecmError
+
+MEMINFO = Path("/proc/meminfo")
+CGROUP = Path("/proc/self/cgroup")
+CGROUPS = Path("/sys/fs/cgroup")
+UNNOTICED = 100_000_000  # bytes that are allocated without a check
+
+
+class NotEnoughMemoryError(MemoryError, FecmError):
+    """More memory is needed than is free; the message contains both numbers."""
+
+
+def available_memory() -> int | None:
+    """Bytes that can be allocated without swapping; None if the system does not report them.
+
+    On Linux the smallest of the kernel's estimate (MemAvailable, proc(5)) and the remainders of the
+    limits of the control groups, such as those of a container or a batch job (memory.max,
+    cgroups(7)); on macOS the free and the inactive pages; on Windows the least of free memory and
+    of what the process may still commit.
+    """
+    known = [count for count in (_of_machine(), *_of_groups()) if count is not None]
+    return max(0, min(known)) if known else None
+
+
+def require_memory(count: int, what: str) -> None:
+    """Refuse to allocate more memory than is free."""
+    if count >= UNNOTICED and (free := available_memory()) is not None and count > free:
+        raise NotEnoughMemoryError(_shortage(what, count, free))
+
+
+def check_available_memory(
+    what: str, needed: Callable[[bool], int], remedy: Callable[[int], str]
+) -> None:
+    """Refuse a computation that needs more memory than is free.
+
+    `needed` gives the bytes: a quick bound for False, the best estimate for True; `remedy` advice.
+    """
+    free = available_memory()
+    if free is not None and needed(False) > free and (count := needed(True)) > free:
+        raise NotEnoughMemoryError(f"{_shortage(what, count, free)}; {remedy(free)}")
+
+
+def _shortage(what: str, count: int, free: int) -> str:
+    needed, left = format_bytes(count), format_bytes(free)
+    return f"{what} takes about {needed} of memory, and {left} are free"
+
+
+def _of_machine() -> int | None:
+    with contextlib.suppress(OSError, ValueError, IndexError, AttributeError):
+        if sys.platform in READERS:
+            return READERS[sys.platform]()
+        for line in MEMINFO.read_text().splitlines():
+            if line.startswith("MemAvailable:"):
+                return 1024 * int(line.split()[1])
+    with contextlib.suppress(OSError, ValueError, AttributeError):
+        pages = os.sysconf("SC_AVPHYS_PAGES")
+        if pages > 0:
+            return pages * os.sysconf("SC_PAGE_SIZE")
+    return None
+
+
+def _of_windows() -> int | None:
+    """The least of free memory and free page file, fields of MEMORYSTATUSEX after its length."""
+    import ctypes
+
+    size = 64
+    status = (ctypes.c_uint64 * (size // 8))(size)
+    if not ctypes.CDLL("kernel32").GlobalMemoryStatusEx(ctypes.byref(status)):
+        return None
+    free, to_commit = status[2], status[4]
+    return min(free, to_commit)
+
+
+def _of_macos() -> int | None:
+    """The head of vm_statistics64: free, active and inactive pages."""
+    import ctypes
+
+    system = ctypes.CDLL(None)
+    system.mach_host_self.restype = ctypes.c_uint32
+    pages = (ctypes.c_uint32 * 64)()
+    size = ctypes.c_uint32(len(pages))
+    of_memory = 4  # HOST_VM_INFO64
+    if system.host_statistics64(system.mach_host_self(), of_memory, pages, ctypes.byref(size)):
+        return None
+    free, _, inactive = pages[:3]
+    return (free + inactive) * os.sysconf("SC_PAGE_SIZE")
+
+
+READERS: dict[str, Callable[[], int | None]] = {"win32": _of_windows, "darwin": _of_macos}
+
+
+def _of_groups() -> list[int]:
+    """Remaining bytes of the process's control group and of those around it."""
+    left: list[int] = []
+    with contextlib.suppress(OSError, ValueError, IndexError):
+        (own,) = [line[3:] for line in CGROUP.read_text().splitlines() if line.startswith("0::")]
+        folder = CGROUPS / own.strip("/")
+        while folder != CGROUPS.parent:
+            with contextlib.suppress(OSError, ValueError):
+                most = int((folder / "memory.max").read_text())  # "max" is not a number
+                left.append(most - int((folder / "memory.current").read_text()))
+            folder = folder.parent
+    return left
+
+
+def format_bytes(count: float) -> str:
+    """Format a number of bytes with a unit."""
+    for unit, size in (("GB", 1e9), ("MB", 1e6), ("kB", 1e3)):
+        if count >= size:
+            return f"{count / size:.3g} {unit}"
+    return f"{count:g} bytes"
+
+
+LOADS = Path("/proc/loadavg")  # proc(5), on Linux
+
+
+def available_processors() -> int:
+    """Processors that this process may use."""
+    if hasattr(os, "sched_getaffinity"):
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
+
+
+def free_processors() -> int:
+    """Processors that this process may use and other work leaves free, at least 1."""
+    return max(1, min(available_processors(), round((os.cpu_count() or 1) - _busy())))
+
+
+def _busy() -> float:
+    """Processors that other work uses: the load of the last minute, or less if less runs now.
+
+    The load contains work that has just ended, such as an earlier run.  It is 0 where the system
+    does not tell it.
+    """
+    try:
+        load = os.getloadavg()[0]
+    except (AttributeError, OSError):
+        return 0.0
+    with suppress(OSError, ValueError, IndexError):
+        running, _, _ = LOADS.read_text(encoding="ascii").split()[3].partition("/")
+        load = min(load, float(running) - 1.0)  # without this process
+    return load

@@ -1,0 +1,115 @@
+"""A case of a sweep: its values by name, and how the numbers in its texts are read.
+
+The checks of ``fecm check`` on the deck of a case: its first error is that of the case.
+
+Limits of quantities: what a search reaches, and what random values may exceed.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import NamedTuple
+
+from fecm._errors import FecmError
+from fecm.deck.findings import Findings
+from fecm.deck.model import Deck
+from fecm.deck.reader import ParsedProblem
+from fecm.problem.check import check_problem
+from fecm.problem.problem import Problem
+from fecm.problem.rules.time_step import UNSTABLE
+
+Value = float | int | str
+Case = dict[str, Value]
+MOST_CASES = 1_000_000
+# Forms and separators of the names whose text is two numbers.
+PAIRS = {
+    "at": ("({},{})", r"[,;\s]+"),
+    "size": ("{}x{}", "[xX×]"),
+}
+
+
+class CasesError(FecmError, ValueError):
+    """The cases are invalid."""
+
+
+def number_of_text(name: str, text: str) -> float:
+    """Finite number of a text; CasesError if it is none."""
+    with suppress(ValueError):
+        if math.isfinite(value := float(text)):
+            return value
+    raise CasesError(f"{name} must be a finite number, not `{text.strip()}`")
+
+
+def pair_of_text(name: str, text: str) -> tuple[float, float]:
+    """Two numbers of a text, as in ``(3,2)`` or ``6x4``; raises CasesError if it has none."""
+    form, separators = PAIRS[name]
+    parts = re.split(separators, text.strip().removeprefix("(").removesuffix(")").strip())
+    if len(parts) != 2:
+        raise CasesError(f"{name} must be two numbers as in {form.format(6, 4)}, not `{text}`")
+    return number_of_text(name, parts[0]), number_of_text(name, parts[1])
+
+
+def normal_pair(name: str, text: str) -> str:
+    """The text of two numbers in its usual form."""
+    form, _ = PAIRS[name]
+    return form.format(*(repr(value).removesuffix(".0") for value in pair_of_text(name, text)))
+
+
+def check_count(count: int, cases: str = "") -> None:
+    """Raise CasesError if there are no cases or too many; `cases` says which."""
+    if not count:
+        raise CasesError("a sweep needs at least one case")
+    if count > MOST_CASES:
+        raise CasesError(f"{cases or f'{count} cases'}; at most {MOST_CASES} are allowed")
+
+
+def check_deck(deck: Deck) -> Problem:
+    """Check a complete deck.  Raises CasesError if it has an error; the first is the message."""
+    findings = Findings()
+    checked = check_problem(ParsedProblem(deck), findings)
+    raise_first(findings)
+    assert checked is not None  # the deck has a control card
+    return checked
+
+
+def raise_first(findings: Findings) -> None:
+    """Raise the first error as that of a case."""
+    if findings.errors:
+        first = findings.errors[0]
+        remedy = " Vary dt=auto, or take DT 0." if first.code == UNSTABLE else ""
+        raise CasesError(f"{first.message}{remedy}")
+
+
+THRESHOLD = "threshold"  # instead of a number: the delamination threshold
+PEAK_FORCE = "peak_force"
+NO_THRESHOLD = (
+    "the threshold needs a DELA segment and a plate without a core, which the deck does not have"
+)
+
+
+class Limit(NamedTuple):
+    """A quantity whose probability of exceedance is asked for, and its limit."""
+
+    quantity: str
+    value: float | str  # a number or :data:`THRESHOLD`
+
+
+def parse_exceed(text: str) -> Limit:
+    """Read ``QUANTITY=NUMBER`` or ``peak_force=threshold``; CasesError if it is neither."""
+    name, _, value = (part.strip() for part in text.partition("="))
+    if not name or not value or (value == THRESHOLD and name != PEAK_FORCE):
+        raise CasesError(f"`{text}`: write QUANTITY=NUMBER or {PEAK_FORCE}={THRESHOLD}")
+    return Limit(name, value if value == THRESHOLD else number_of_text(name, value))
+
+
+def check_limits(limits: Sequence[Limit], known: Sequence[str], *, threshold: bool) -> None:
+    """Raise CasesError if a quantity is not among the known ones, or the deck has no threshold."""
+    for limit in limits:
+        if limit.quantity not in known:
+            names = ", ".join(known)
+            raise CasesError(f"there is no quantity `{limit.quantity}`; there are {names}")
+        if limit.value == THRESHOLD and not threshold:
+            raise CasesError(NO_THRESHOLD)

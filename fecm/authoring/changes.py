@@ -1,0 +1,167 @@
+"""Changes of a deck in Python: its values by the names of sweeps, and its parts as objects."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from contextlib import suppress
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any, TypedDict
+
+from fecm.authoring.case import Case, CasesError, check_deck
+from fecm.authoring.cases import checked
+from fecm.authoring.parameters import EXAMPLES, in_units
+from fecm.authoring.timing import clock_of, with_clock
+from fecm.authoring.values import NAMES, check_known, dimension_of
+from fecm.authoring.vary import apply_case
+from fecm.deck.catalogue import system_of
+from fecm.deck.findings import DeckError
+from fecm.deck.macros import compile_program
+from fecm.deck.model import END, MACROS, STOP, TITLE, Deck, Nonlinear
+from fecm.deck.reader import Reader
+
+if TYPE_CHECKING:
+    from fecm.authoring.contact import AnyContact
+    from fecm.authoring.impact import AnyProjectile
+    from fecm.authoring.laminate import Laminate
+    from fecm.authoring.plate import Plate, Support
+
+Number = float | str  # a number, or its text
+OBJECTS = ("plate", "laminate", "projectile", "contact")
+NONLINEAR = "nonlinear"
+
+
+class Values(TypedDict, total=False):
+    """What :meth:`fecm.Deck.with_` changes: values by their names in sweeps, and whole objects."""
+
+    plate: Plate
+    laminate: Laminate
+    projectile: AnyProjectile
+    contact: AnyContact
+    nonlinear: bool
+    velocity: Number
+    energy: Number
+    k: Number
+    radius: Number
+    alpha_p: Number
+    s_p: Number
+    q: Number
+    mass: Number
+    rod_mass: Number
+    rod_length: Number
+    rod_modulus: Number
+    rod_density: Number
+    at: str | Iterable[float]
+    impact_node: int | str
+    patch: Number
+    x0: Number
+    y0: Number
+    laminate_thickness: Number
+    ply_thickness: Number
+    thickness: Number
+    density: Number
+    nu12: Number
+    e1: Number
+    e2: Number
+    g12: Number
+    g13: Number
+    g23: Number
+    layup: str | Iterable[float]
+    layer_materials: str | Iterable[int]
+    angle: Number
+    preload_x: Number
+    preload_y: Number
+    preload_xy: Number
+    radius_x: Number
+    radius_y: Number
+    giic: Number
+    xt: Number
+    xc: Number
+    yt: Number
+    yc: Number
+    s12: Number
+    s13: Number
+    s23: Number
+    cure_dT: Number
+    size: str | Iterable[float]
+    support: Support
+    dt: Number
+    duration: Number
+
+
+def with_values(deck: Deck, values: Mapping[str, Any]) -> Deck:
+    """Return a deck with other values and parts; see :meth:`fecm.Deck.with_`.
+
+    Raises CasesError if a name is unknown or a value is invalid, and ObjectError if an object is.
+    """
+    for name in values:
+        check_known(name, "with_", (*OBJECTS, NONLINEAR, *NAMES))
+    if NONLINEAR in values:
+        deck = _with_kinematics(deck, nonlinear=values[NONLINEAR])
+    given = {name: value for name, value in values.items() if name in OBJECTS}
+    others = (*OBJECTS, NONLINEAR)
+    numbers = _converted(deck, {name: values[name] for name in values if name not in others})
+    (case,) = checked([numbers], "with_")
+    objects = None
+    if given:
+        from fecm.authoring.objects import Objects  # 30 ms, which other values need not
+
+        objects = Objects(**given)
+        objects.check()
+    try:
+        made = apply_case(deck, case, objects)
+    except LookupError as error:  # a value of a segment that the deck lacks
+        raise CasesError(f"with_: {error}") from None
+    is_new = "plate" in given or "laminate" in given
+    return _on_the_clock(deck, made, case) if is_new and "dt" not in case else made
+
+
+def _converted(deck: Deck, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Values in the units of the deck, where a text has a unit, as in ``10J``."""
+    system = system_of(deck)
+    return {
+        name: in_units(name, value, dimension_of(name), system)
+        if system and dimension_of(name) in EXAMPLES and value != "auto"
+        else value
+        for name, value in values.items()
+    }
+
+
+def _with_kinematics(deck: Deck, *, nonlinear: object) -> Deck:
+    """The deck without NONL, or as it is if it has NONL and is to keep it."""
+    if not isinstance(nonlinear, bool):
+        raise CasesError(f"with_: nonlinear is {nonlinear!r}, not True or False")
+    if nonlinear and not deck.has(Nonlinear):
+        raise CasesError(
+            "with_: the deck has no NONL, and its supports may not suit it; make the nonlinear "
+            'deck with fecm.impact(kinematics="von-karman"), and take NONL out with nonlinear=False'
+        )
+    if nonlinear:
+        return deck
+    kept = tuple(segment for segment in deck.segments if not isinstance(segment, Nonlinear))
+    return replace(deck, segments=kept, text="")
+
+
+def _on_the_clock(deck: Deck, made: Deck, case: Case) -> Deck:
+    """The new deck with the time step of its plate, if that of the old one follows from its own."""
+    with suppress(CasesError):  # a run states what is wrong with either deck
+        if (clock := clock_of(check_deck(deck))) is not None:
+            return with_clock(made, clock, case).deck
+    return made
+
+
+def with_cards(deck: Deck, cards: str) -> Deck:
+    """The deck with the macro program of cards: those between MACR and END.
+
+    The cards of PROP's load tables may follow after END; otherwise the deck's own stay.  Raises
+    DeckError if the cards are no macro program.
+    """
+    lines = [TITLE, deck.control.to_card(), END, MACROS, *cards.rstrip("\n").split("\n")]
+    if END not in map(str.strip, lines[4:]):
+        lines += [END, *(table.to_card() for table in deck.tables)]
+    reader = Reader("\n".join([*lines, STOP, ""]))
+    found = [problem.deck for problem in reader.problems() if problem.deck is not None]
+    for one in found:
+        compile_program(one.macros, reader.findings)
+    if errors := reader.findings.errors:
+        raise DeckError(errors, "<macros>")
+    return replace(deck, macros=found[0].macros, tables=found[0].tables)

@@ -1,0 +1,182 @@
+"""Put a plate, a laminate, a projectile or a contact as objects into a deck."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from fecm._dataclasses import frozen
+from fecm._errors import warn
+from fecm.authoring.contact import AnyContact, Sphere, indentation_law
+from fecm.authoring.impact import AnyProjectile, doubts_of_core
+from fecm.authoring.laminate import (
+    Bound,
+    DeckPlies,
+    Laminate,
+    cure_segment,
+    deck_plies,
+    strengths_of,
+    toughness_of,
+)
+from fecm.authoring.mesh import MembraneSupport, placed, supported
+from fecm.authoring.parameters import ObjectError, check_kind
+from fecm.authoring.plate import Plate
+from fecm.authoring.plates import swapped
+from fecm.authoring.strike import strike_of, struck_layers
+from fecm.deck import model
+from fecm.deck.catalogue import STANDARD, named_ply, system_of
+from fecm.deck.material_cards import MATERIAL
+from fecm.mechanics.projectile import RigidMass, Rod
+from fecm.problem.parts import is_coupled, is_curved
+
+# Segments of a mesh and its supports.
+OF_MESH: tuple[type[model.Segment], ...] = (model.Coordinates, model.Elements, model.Boundary)
+
+
+@frozen
+class Objects:
+    """Objects that replace parts of a deck; None leaves a part as it is."""
+
+    plate: Plate | None = None
+    laminate: Laminate | None = None
+    projectile: AnyProjectile | None = None
+    contact: AnyContact | None = None
+
+    def check(self) -> None:
+        """Raise ObjectError if one is no object of fecm."""
+        if self.plate is not None:
+            check_kind("plate", self.plate, Plate)
+        if self.laminate is not None:
+            check_kind("laminate", self.laminate, Laminate)
+        if self.projectile is not None:
+            check_kind("projectile", self.projectile, AnyProjectile)
+        if self.contact is not None:
+            check_kind("contact", self.contact, AnyContact)
+
+    def with_plate(self, deck: model.Deck, at: tuple[float, float] | None) -> model.Deck:
+        """The deck with the laminate and the plate, which is struck at a point."""
+        if self.laminate is not None:
+            deck = with_laminate(deck, self.laminate)
+        return deck if self.plate is None else with_plate(deck, self.plate, at)
+
+    def with_strike(self, deck: model.Deck) -> model.Deck:
+        """The deck with the projectile and the contact."""
+        if self.projectile is not None:
+            deck = with_projectile(deck, self.projectile)
+        return deck if self.contact is None else with_contact(deck, self.contact)
+
+
+def with_projectile(deck: model.Deck, projectile: AnyProjectile) -> model.Deck:
+    """The deck with another projectile; a rod keeps the node of the transducer."""
+    if isinstance(projectile, Rod | RigidMass):
+        return strike_of(deck).with_projectile(projectile).deck()
+    return swapped(deck, deck.last(model.Projectile), projectile)
+
+
+def with_contact(deck: model.Deck, contact: AnyContact) -> model.Deck:
+    """The deck with another indentation law, which may be estimated from its laminate."""
+    plies = plies_of_deck(deck)
+    elastic = isinstance(contact, Sphere) and contact.modulus is not None
+    if plies.system is None and not elastic and not isinstance(contact, model.Indentation):
+        raise ObjectError("`contact` needs the units of the deck: give it a UNIT segment")
+    struck = struck_layers(deck)
+    law, comment = indentation_law(contact, plies, struck)
+    for doubt in doubts_of_core(plies, struck) if comment else []:
+        warn(doubt)
+    return swapped(deck, deck.last(model.Indentation), law)
+
+
+def with_laminate(deck: model.Deck, laminate: Laminate) -> model.Deck:
+    """The deck with another laminate; the new plies' strengths go in the place of those it has."""
+    _refuse(deck, "laminate", model.Laminates, model.Zones)
+    system = system_of(deck)
+    plies, _ = deck_plies(laminate, (), system, [])
+    if system is None and plies.named:
+        raise ObjectError("`laminate` has a named ply: the deck needs a UNIT segment to convert it")
+    material, *others = plies.segments()
+    assert isinstance(material, model.Material)
+    old = deck.require(model.Material)
+    integration = replace(old.integration, thickness=plies.thickness, source=None)
+    made = swapped(deck, old, replace(material, integration=integration))
+    kept = [segment for segment in made.segments if not isinstance(segment, model.Materials)]
+    control = replace(deck.control, layers=len(material.layers), source=None)
+    made = replace(made, control=control, segments=(*kept, *others))
+    constants = dict(enumerate((one.ply for one in plies.materials), start=MATERIAL))
+    return made if constants == deck.plies else _with_properties(made, plies)
+
+
+def _with_properties(deck: model.Deck, plies: DeckPlies) -> model.Deck:
+    """The deck with strengths, toughness and expansions of other plies, where it has any."""
+    segments: list[model.Segment] = []
+    try:
+        for segment in deck.segments:
+            match segment:
+                case model.Allowables():
+                    segments.append(strengths_of(plies))
+                case model.Delamination():
+                    segments.append(replace(segment, toughness=toughness_of(plies), source=None))
+                case model.Cure(delta_t=change) if segment.delta_c == 0.0:
+                    segments.append(cure_segment(plies, change) or segment)
+                case model.Cure():
+                    raise ObjectError("a named ply has no expansion by moisture")
+                case _:
+                    segments.append(segment)
+    except ObjectError as error:
+        raise ObjectError(
+            "`laminate` has other plies, of which the deck needs strengths, toughness or "
+            f"expansions as it has of its own: {error}"
+        ) from None
+    return replace(deck, segments=tuple(segments))
+
+
+def with_plate(deck: model.Deck, plate: Plate, at: tuple[float, float] | None) -> model.Deck:
+    """The deck with another mesh and its supports, struck at a point, by default in its middle."""
+    _refuse(deck, "plate", model.Forces, model.Zones)
+    test = plate.fixture.test if plate.fixture else None
+    if test is not None and system_of(deck) != STANDARD:
+        raise ObjectError(f"`plate`: the fixture's standard is in {STANDARD}, and the deck is not")
+    old, doubts = deck.last(model.Patch), list[str]()
+    patch = None if old is None else replace(old, x=None, y=None, source=None)
+    mesh, node, patch = placed(plate, plies_of_deck(deck), at, patch, doubts)
+    stretches = deck.has(model.Nonlinear) or is_coupled(deck)
+    membrane = MembraneSupport.of(curved=is_curved(deck), stretches=stretches)
+    boundary, _ = supported(plate, mesh, None, [], membrane)
+    for doubt in doubts:
+        warn(doubt)
+    control = replace(
+        deck.control,
+        numnp=mesh.nodes,
+        numel=mesh.elements,
+        nen=mesh.most_nodes,
+        source=None,
+    )
+    kept = tuple(segment for segment in deck.segments if not isinstance(segment, OF_MESH))
+    supports = () if boundary is None else (boundary,)
+    made = replace(
+        deck,
+        control=control,
+        segments=(mesh.coordinates(), mesh.element_cards(), *supports, *kept),
+    )
+    if old is not None and patch is not None:
+        made = swapped(made, old, patch)
+    if (strike := deck.last(model.Impact)) is not None:
+        made = swapped(made, strike, replace(strike, node=node, source=None))
+    return made
+
+
+def _refuse(deck: model.Deck, name: str, *kinds: type[model.Segment]) -> None:
+    """Raise ObjectError if the deck has segments that refer to what is replaced."""
+    if there := [kind.keyword for kind in kinds if deck.has(kind)]:
+        raise ObjectError(
+            f"`{name}` can't replace that of a deck with {' and '.join(there)}, which would no "
+            "longer fit"
+        )
+
+
+def plies_of_deck(deck: model.Deck) -> DeckPlies:
+    """Laminates and materials of a deck; constants that are those of a named ply have its name."""
+    system, plies = system_of(deck), deck.plies
+    first = plies[MATERIAL]
+    numbers = range(MATERIAL, max(plies) + 1)
+    materials = [plies.get(number, first) for number in numbers]
+    bound = tuple(Bound(ply, named_ply(ply, system)) for ply in materials)
+    return DeckPlies(tuple(deck.layers.values()), bound, system)

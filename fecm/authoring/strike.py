@@ -1,0 +1,203 @@
+"""What strikes the plate in a case: ROD, EXPE, the projectile, and DELA, which judges the force.
+
+The values of a case that change nothing else need no deck of their own: cases of one plate differ
+in their strikes.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any, NamedTuple, TypeVar
+
+from fecm.authoring.case import NO_THRESHOLD, CasesError, Value, raise_first
+from fecm.authoring.plates import swapped
+from fecm.deck import model
+from fecm.deck.catalogue import NU23, STANDARD, STEEL_MODULUS, STEEL_POISSON
+from fecm.deck.findings import Findings
+from fecm.deck.macros import compile_program
+from fecm.deck.units import MODULUS, in_si, unit_names, units_of
+from fecm.mechanics.contact_law import ContactParameters, Law, hertz_coefficient
+from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
+from fecm.mechanics.projectile import DeckProjectile, RigidMass, Rod
+from fecm.problem.check import check_impact, check_segment
+from fecm.problem.generate import generate
+from fecm.problem.parts import build_constants, build_projectile, projectile_segment
+from fecm.problem.problem import Problem
+
+_S = TypeVar("_S", bound=model.Segment)
+
+
+class Strike(NamedTuple):
+    """Velocity, contact law, projectile and toughness of a case."""
+
+    plate: model.Deck  # deck whose plate is struck; its own strike is not that of the case
+    impact: model.Impact | None
+    indentation: model.Indentation | None
+    card: model.Projectile | None  # None if the deck has the report's rod
+    projectile: DeckProjectile
+    own_law: Law | None = None  # a user's, instead of that of EXPE
+    delamination: model.Delamination | None = None  # toughness, whose threshold the force may reach
+
+    @property
+    def velocity(self) -> float:
+        """Approach velocity, length/time."""
+        return _required(self.impact, model.Impact).velocity
+
+    @property
+    def law(self) -> ContactParameters:
+        """Constants of the contact law."""
+        return build_constants(_required(self.indentation, model.Indentation))
+
+    @property
+    def energy(self) -> float:
+        """Kinetic energy of the projectile before the impact, force*length."""
+        return 0.5 * self.projectile.total_mass * self.velocity**2
+
+    def with_velocity(self, velocity: float) -> Strike:
+        """The strike at another velocity."""
+        impact = _required(self.impact, model.Impact)
+        return self._replace(impact=replace(impact, velocity=velocity, source=None))
+
+    def with_constant(self, name: str, value: float) -> Strike:
+        """The strike with another constant of EXPE."""
+        old = _required(self.indentation, model.Indentation)
+        changed: dict[str, Any] = {name: value}  # mypy compares each with every field
+        return self._replace(indentation=replace(old, **changed, source=None))
+
+    def with_projectile(self, projectile: DeckProjectile) -> Strike:
+        """The strike of another projectile; a rod keeps the transducer of the deck."""
+        transducer = 0
+        if self.card is not None and isinstance(projectile, Rod):
+            transducer = self.card.transducer
+        card = projectile_segment(projectile, transducer)
+        return self._replace(card=card, projectile=projectile)
+
+    def deck(self) -> model.Deck:
+        """The deck of the plate with this strike."""
+        deck = self.plate
+        for kind, segment in (
+            (model.Impact, self.impact),
+            (model.Indentation, self.indentation),
+            (model.Projectile, self.card),
+            (model.Delamination, self.delamination),
+        ):
+            old = deck.last(kind)
+            if segment is not None and segment is not old:
+                deck = swapped(deck, old, segment)
+        return replace(deck, text="")  # whose cards are not those that were read
+
+    def check(self, plate: Problem) -> None:
+        """Raise CasesError with the first error of a deck with this strike."""
+        findings = Findings()
+        if self.impact is not None:
+            deck = swapped(plate.deck, plate.deck.last(model.Impact), self.impact)
+            check_impact(Problem(deck, plate.mesh, plate.program), findings)
+        for segment in (self.indentation, self.card, self.delamination):
+            if segment is not None:
+                check_segment(segment, findings)
+        raise_first(findings)
+
+
+StrikeSetter = Callable[[Strike, Value], Strike]
+
+
+def strike_of(deck: model.Deck) -> Strike:
+    """The strike of a deck itself."""
+    return Strike(
+        plate=deck,
+        impact=deck.last(model.Impact),
+        indentation=deck.last(model.Indentation),
+        card=deck.last(model.Projectile),
+        projectile=build_projectile(deck),
+        delamination=deck.last(model.Delamination),
+    )
+
+
+def _required(segment: _S | None, kind: type[_S]) -> _S:
+    if segment is None:
+        raise LookupError(f"the deck has no {kind.keyword} segment")
+    return segment
+
+
+# Setters ------------------------------------------------------------------------------------------
+
+
+def set_velocity(strike: Strike, value: Value) -> Strike:
+    """Change the velocity of ROD."""
+    return strike.with_velocity(float(value))
+
+
+def set_energy(strike: Strike, value: Value) -> Strike:
+    """Change the velocity to that which gives the projectile an energy."""
+    mass, energy = strike.projectile.total_mass, float(value)
+    if not (mass > 0.0 and energy >= 0.0):
+        raise CasesError(f"no velocity gives the energy {energy:g} to the mass {mass:g}")
+    return strike.with_velocity(math.sqrt(2.0 * energy / mass))
+
+
+def constant(name: str) -> StrikeSetter:
+    """Setter of a constant of EXPE."""
+    return lambda strike, value: strike.with_constant(name, float(value))
+
+
+def set_radius(strike: Strike, value: Value) -> Strike:
+    """Change k to that of a steel sphere on the laminate of the deck."""
+    unit = in_si(MODULUS, unit_names(strike.plate))
+    if unit is None:
+        hint = "add a UNIT segment, or vary k instead"
+        raise CasesError(f"radius: the modulus of steel needs the units of the deck; {hint}")
+    steel = STEEL_MODULUS * (in_si(MODULUS, units_of(STANDARD)) or 1.0) / unit
+    layers = struck_layers(strike.plate)
+    plies = tuple(strike.plate.plies[layer.material] for layer in layers)
+    try:
+        modulus = _indentation_modulus(layers, plies)
+        k = hertz_coefficient(float(value), steel, STEEL_POISSON, modulus)
+    except ValueError as error:
+        raise CasesError(f"k cannot be estimated: {error}") from None
+    return strike.with_constant("k", k)
+
+
+def struck_layers(deck: model.Deck) -> tuple[model.Layer, ...]:
+    """Layers under the load."""
+    layups, number = list(deck.layers.values()), 0
+    if len(layups) > 1:
+        program = compile_program(deck.macros, Findings())
+        number = Problem(deck, generate(deck), program).laminate_number
+    return layups[number]
+
+
+@lru_cache(maxsize=256)
+def _indentation_modulus(layers: tuple[model.Layer, ...], plies: tuple[model.Ply, ...]) -> float:
+    angles = [layer.angle for layer in layers]
+    thicknesses = [layer.thickness for layer in layers]
+    return indentation_modulus(effective_stiffness(plies, angles, thicknesses, NU23))
+
+
+def set_toughness(strike: Strike, value: Value) -> Strike:
+    """Change the toughness of DELA."""
+    if (old := strike.delamination) is None:
+        raise CasesError(f"giic: {NO_THRESHOLD}")
+    return strike._replace(delamination=replace(old, toughness=float(value), source=None))
+
+
+def set_mass(strike: Strike, value: Value) -> Strike:
+    """Change the mass of the projectile; the density of a rod follows."""
+    old, mass = strike.projectile, float(value)
+    if isinstance(old, RigidMass):
+        return strike.with_projectile(RigidMass(mass))
+    return strike.with_projectile(replace(old, density=old.density * mass / old.total_mass))
+
+
+def rod_property(name: str, field: str) -> StrikeSetter:
+    """Setter of a field of the rod, which varies under a name."""
+
+    def changed(strike: Strike, value: Value) -> Strike:
+        if isinstance(strike.projectile, RigidMass):
+            raise CasesError(f"{name}: the projectile of the deck is a rigid mass")
+        fields: dict[str, Any] = {field: float(value)}  # mypy compares each with every field
+        return strike.with_projectile(replace(strike.projectile, **fields))
+
+    return changed

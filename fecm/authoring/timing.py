@@ -1,0 +1,155 @@
+"""Time steps and durations of the decks of cases."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import lru_cache
+from typing import NamedTuple
+
+from fecm.authoring.case import Case, CasesError, check_deck, raise_first
+from fecm.deck.findings import Findings
+from fecm.deck.macros import STEPS, compile_program, every, flat
+from fecm.deck.model import Deck, Macro
+from fecm.mechanics.time_step import rounded_time_step, taken_time_step
+from fecm.problem.check import check_program
+from fecm.problem.problem import Problem
+
+LONGEST_LOOP = 1e15  # the checks reject much shorter programs
+STORING = ("RODP", "DISP", "STRE", "PLYS")  # macros that store every N-th step or pass
+
+
+class Clock(NamedTuple):
+    """How the time step of a plate follows from its critical one."""
+
+    own: float  # time step of the deck
+    rule: Callable[[float], float]
+
+
+def clock_of(checked: Problem) -> Clock | None:
+    """Rule of a deck, that of DT 0 or of ``fecm new``; None if its DT applies to every case."""
+    sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
+    if len(sizes) != 1:
+        return None
+    (dt,) = sizes
+    rule = rounded_time_step if dt else taken_time_step
+    taken = rule(checked.critical_time_step)
+    return Clock(taken, rule) if dt in (0.0, taken) else None
+
+
+def with_clock(deck: Deck, clock: Clock | None, case: Case) -> Problem:
+    """Check the deck of a case, with the time step of its plate if there is a clock."""
+    if clock is None:
+        return check_deck(deck)
+    checked = check_deck(with_time_step(deck, 0.0))  # below the critical time step of any plate
+    dt = clock.rule(checked.critical_time_step)
+    duration = float(case["duration"]) if "duration" in case else None
+    timed = with_time_step(deck, dt, clock.own, duration)
+    findings = Findings()
+    problem = Problem(timed, checked.mesh, compile_program(timed.macros, findings))
+    check_program(problem, findings)
+    raise_first(findings)
+    return problem
+
+
+@lru_cache(maxsize=8)
+def stable_time_step(deck: Deck) -> float:
+    """Time step that DT 0 would mean in a deck."""
+    # DT 0 is below the critical time step of any plate.
+    return taken_time_step(check_deck(with_time_step(deck, 0.0)).critical_time_step)
+
+
+def duration_of(checked: Problem) -> float:
+    """Simulated time of a problem."""
+    taken = taken_time_step(checked.critical_time_step)
+    return _length(checked.deck.macros, taken).duration
+
+
+def lengthened(checked: Problem, factor: float) -> Problem:
+    """Return a problem that runs `factor` times as long, with the same time step."""
+    deck, taken = checked.deck, taken_time_step(checked.critical_time_step)
+    macros = with_time_step(deck, None, taken, factor * duration_of(checked)).macros
+    return replace(checked, program=compile_program(macros, Findings()))
+
+
+def with_time_step(
+    deck: Deck, dt: float | None, taken: float = 0.0, duration: float | None = None
+) -> Deck:
+    """Change every DT of a deck, and the loops so that the duration is kept, or is another.
+
+    `taken` is the time step that DT 0 means in the deck; 0 if no DT is 0.  If the new one is None,
+    every DT is kept; if it is not positive, only the DT cards change.  Macros that store rows keep
+    approximately their number of rows.
+
+    Raises CasesError if whole numbers of passes miss the duration by a step and by 1 %.
+    """
+    before = _length(deck.macros, taken).duration
+    share = 1.0 if duration is None or not before else duration / before
+    visits = list(_visits(deck.macros, taken))
+    ratios: dict[int, float] = {}  # of the passes, by the place of a LOOP
+    for visit in visits:
+        if visit.loop is None or visit.macro.word not in STEPS:
+            continue
+        if visit.dt > 0.0 and (dt is None or dt > 0.0):
+            ratios[visit.loop] = share * (1.0 if dt is None else visit.dt / dt)
+
+    macros = tuple(_changed(visit, dt, ratios) for visit in visits)
+    wanted, made = share * before, _length(macros, taken)
+    if ratios and abs(made.duration - wanted) > max(0.01 * wanted, made.largest_step):
+        text = (
+            f"the loops of the deck give the duration {made.duration:.6g} instead of {wanted:.6g}"
+        )
+        raise CasesError(f"{text}; take all steps in one loop")
+    return replace(deck, macros=macros)
+
+
+class _Visit(NamedTuple):
+    """A macro on the way through a program."""
+
+    macro: Macro
+    place: int
+    loop: int | None  # place of the innermost LOOP around it
+    passes: float  # of that loop
+    dt: float  # time step
+
+
+def _visits(cards: Sequence[Macro], taken: float) -> Iterator[_Visit]:
+    loops: list[tuple[int, float]] = []  # place and passes of the open ones
+    dt = 0.0
+    for place, macro in enumerate(cards):
+        if macro.word == "NEXT" and loops:
+            loops.pop()
+        elif macro.word == "DT":
+            dt = macro.value or taken
+        loop, passes = loops[-1] if loops else (None, 1.0)
+        yield _Visit(macro, place, loop, passes, dt)
+        if macro.word == "LOOP":
+            loops.append((place, passes * max(1.0, macro.value)))
+
+
+def _changed(visit: _Visit, dt: float | None, ratios: dict[int, float]) -> Macro:
+    """A macro of a program with another time step, and with other passes of its loops."""
+    macro = visit.macro
+    if macro.word == "DT" and dt is not None:
+        return replace(macro, value=dt, source=None)
+    if macro.word == "LOOP" and visit.place in ratios:
+        count = min(max(1.0, macro.value) * ratios[visit.place], LONGEST_LOOP)
+        return replace(macro, value=float(max(1, math.ceil(count - 1e-9))), source=None)
+    if macro.word in STORING and visit.loop in ratios:
+        count = min(every(macro) * ratios[visit.loop], LONGEST_LOOP)
+        return replace(macro, value=float(max(1, round(count))), source=None)
+    return macro
+
+
+class _Length(NamedTuple):
+    """Length of a program in time."""
+
+    duration: float
+    largest_step: float
+
+
+def _length(macros: Sequence[Macro], taken: float) -> _Length:
+    steps = [visit for visit in _visits(macros, taken) if visit.macro.word in STEPS]
+    duration = sum(visit.passes * visit.dt for visit in steps)
+    return _Length(duration, max((visit.dt for visit in steps), default=0.0))

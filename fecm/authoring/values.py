@@ -1,0 +1,337 @@
+"""The values that can vary: one row each, from which checks, help and docs/sweeps.md follow."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+from enum import Enum, IntEnum, auto
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from fecm._errors import did_you_mean
+from fecm.authoring import plates, strike
+from fecm.authoring.case import PAIRS, Case, CasesError, Value, normal_pair, number_of_text
+from fecm.authoring.parameters import EXAMPLES, NUMBER, ObjectError, in_units, text_of
+from fecm.authoring.plates import PlateSetter
+from fecm.authoring.strike import StrikeSetter
+from fecm.deck.grid import SUPPORTS
+from fecm.deck.units import TOUGHNESS
+from fecm.results.metrics import COLUMNS, VERDICTS
+
+_Setter = TypeVar("_Setter", PlateSetter, StrikeSetter, None)
+
+
+class ValueKind(Enum):
+    """Kind of a value."""
+
+    NUMBER = auto()
+    INTEGER = auto()
+    TEXT = auto()
+
+
+class Changes(IntEnum):
+    """What a value changes, in the order in which the values of a case are applied.
+
+    Values of failure and of a strike share a run of the plate; each other value needs its own.
+    """
+
+    FAILURE = auto()  # exposures or the threshold, which do not affect the motion
+    LAMINATE = auto()
+    PLATE = auto()  # mesh and supports
+    PLACE = auto()  # where the force acts
+    STRIKE = auto()  # velocity, contact law and projectile
+    TIME = auto()  # time step and duration
+
+
+@dataclass(frozen=True)
+class SweepValue(Generic[_Setter]):
+    """A value that can vary."""
+
+    name: str
+    changes: Changes
+    dimension: str  # that of its unit; empty for a pure number or a text
+    setter: _Setter
+    kind: ValueKind = ValueKind.NUMBER
+    meaning: str = ""  # Markdown of docs/sweeps.md
+
+
+_MASS = "force*time^2/length"
+_DENSITY = "force*time^2/length^4"
+_STRESS = "force/length^2"
+_SPEED = "length/time"
+
+STRENGTHS = {
+    "xt": "tensile strength along the fibres",
+    "xc": "compressive strength along the fibres, positive,",
+    "yt": "tensile strength across the fibres",
+    "yc": "compressive strength across the fibres, positive,",
+    "s12": "in-plane shear strength",
+    "s13": "interlaminar shear strength along the fibres",
+    "s23": "interlaminar shear strength across the fibres",
+}
+
+# fmt: off
+STRIKE_VALUES: tuple[SweepValue[StrikeSetter], ...] = (
+    SweepValue("velocity", Changes.STRIKE, _SPEED, strike.set_velocity,
+             meaning="approach velocity of `ROD`"),
+    SweepValue("energy", Changes.STRIKE, "force*length", strike.set_energy,
+             meaning="½ m v² of the projectile, instead of `velocity`; with the mass of the case"),
+    SweepValue("k", Changes.STRIKE, "force/length^1.5", strike.constant("k"),
+             meaning="contact coefficient of `EXPE`"),
+    SweepValue("radius", Changes.STRIKE, "length", strike.set_radius,
+             meaning="radius of a steel sphere, instead of `k`: [its k](#radius-of-the-sphere) on "
+                     "the laminate of the case"),
+    SweepValue("alpha_p", Changes.STRIKE, "length", strike.constant("alpha_p"),
+             meaning="critical indentation of `EXPE`"),
+    SweepValue("s_p", Changes.STRIKE, "", strike.constant("s_p"),
+             meaning="constant of `EXPE`"),
+    SweepValue("q", Changes.STRIKE, "", strike.constant("q"),
+             meaning="unloading power of `EXPE`"),
+    SweepValue("mass", Changes.STRIKE, _MASS, strike.set_mass,
+             meaning="mass of the projectile; changes the density of a rod"),
+    SweepValue("rod_mass", Changes.STRIKE, _MASS, strike.set_mass,
+             meaning="the same as `mass`"),
+    SweepValue("rod_length", Changes.STRIKE, "length", strike.rod_property("rod_length", "length"),
+             meaning="length of the rod (`PROJ`, or the rod of the report)"),
+    SweepValue("rod_modulus", Changes.STRIKE, _STRESS,
+             strike.rod_property("rod_modulus", "modulus"),
+             meaning="Young's modulus of the rod"),
+    SweepValue("rod_density", Changes.STRIKE, _DENSITY,
+             strike.rod_property("rod_density", "density"),
+             meaning="density of the rod"),
+    SweepValue("giic", Changes.FAILURE, TOUGHNESS, strike.set_toughness,
+             meaning="toughness G_IIc of `DELA`; only the delamination threshold depends on it"),
+)
+PLATE_VALUES: tuple[SweepValue[PlateSetter], ...] = (
+    SweepValue("at", Changes.PLACE, "", plates.set_place, ValueKind.TEXT,
+             meaning="[impact point](#impact-point) `(x,y)`"),
+    SweepValue("impact_node", Changes.PLACE, "", plates.set_impact_node, ValueKind.INTEGER,
+             meaning="node of `ROD`"),
+    SweepValue("patch", Changes.PLACE, "length", plates.patch_field("radius"),
+             meaning="radius of the patch (`PATC`; a deck without one gets a disc at the impact "
+                     "node)"),
+    SweepValue("x0", Changes.PLACE, "length", plates.patch_field("x"),
+             meaning="centre of the patch; with `y0`, unless the deck gives that"),
+    SweepValue("y0", Changes.PLACE, "length", plates.patch_field("y"),
+             meaning="centre of the patch; with `x0`, unless the deck gives that"),
+    SweepValue("laminate_thickness", Changes.LAMINATE, "length", plates.set_thickness,
+             meaning="thickness of the laminate; every ply is scaled"),
+    SweepValue("ply_thickness", Changes.LAMINATE, "length", plates.set_ply_thickness,
+             meaning="thickness of every ply, which all have the same"),
+    SweepValue("thickness", Changes.LAMINATE, "length", plates.set_thickness,
+             meaning="the same as `laminate_thickness`"),
+    SweepValue("density", Changes.LAMINATE, _DENSITY, plates.ply_property("density"),
+             meaning="density of the ply of `MATE`"),
+    SweepValue("nu12", Changes.LAMINATE, "", plates.ply_property("nu12"),
+             meaning="Poisson's ratio of the ply"),
+    SweepValue("e1", Changes.LAMINATE, _STRESS, plates.ply_property("e1"),
+             meaning="Young's modulus of the ply along the fibres"),
+    SweepValue("e2", Changes.LAMINATE, _STRESS, plates.ply_property("e2"),
+             meaning="Young's modulus of the ply across the fibres"),
+    SweepValue("g12", Changes.LAMINATE, _STRESS, plates.ply_property("g12"),
+             meaning="shear modulus in the plane of the ply"),
+    SweepValue("g13", Changes.LAMINATE, _STRESS, plates.ply_property("g13"),
+             meaning="transverse shear modulus along the fibres"),
+    SweepValue("g23", Changes.LAMINATE, _STRESS, plates.ply_property("g23"),
+             meaning="transverse shear modulus across the fibres"),
+    SweepValue("layup", Changes.LAMINATE, "", plates.set_layup, ValueKind.TEXT,
+             meaning="[layup](making.md#layups), with the ply thickness of the deck"),
+    SweepValue("layer_materials", Changes.LAMINATE, "", plates.set_layer_materials, ValueKind.TEXT,
+             meaning="numbers of the materials of the layers, written as a layup's angles: "
+                     "`[1/2]s`; `layup` keeps each layer's"),
+    SweepValue("angle", Changes.LAMINATE, "", plates.add_angle,
+             meaning="degrees added to the angle of every ply"),
+    SweepValue("preload_x", Changes.LAMINATE, "force/length", plates.preload_force("n_x"),
+             meaning="membrane force N0x of `PREL`, tension positive; a deck without it gets it"),
+    SweepValue("preload_y", Changes.LAMINATE, "force/length", plates.preload_force("n_y"),
+             meaning="the same for N0y"),
+    SweepValue("preload_xy", Changes.LAMINATE, "force/length", plates.preload_force("n_xy"),
+             meaning="the same for N0xy"),
+    SweepValue("radius_x", Changes.LAMINATE, "length", plates.curvature_radius("radius_x"),
+             meaning="radius of a [curved panel](curved.md) (`CURV`), 0 is flat; the deck leaves u "
+                     "and v free"),
+    SweepValue("radius_y", Changes.LAMINATE, "length", plates.curvature_radius("radius_y"),
+             meaning="the same for Ry"),
+    *(SweepValue(name, Changes.FAILURE, _STRESS, plates.strength(name),
+               meaning=f"{text} of the ply of `MATE` (`ALLO`); only exposures depend on it")
+      for name, text in STRENGTHS.items()),
+    SweepValue("cure_dT", Changes.FAILURE, "", plates.set_cure,
+             meaning="change of temperature of `CURE`, K; only exposures depend on it"),
+    SweepValue("size", Changes.PLATE, "", plates.set_size, ValueKind.TEXT,
+             meaning="`AxB`: sides of the plate; coordinates are scaled along x and y, and with "
+                     "them the centre of the patch and the gages"),
+    SweepValue("support", Changes.PLATE, "", plates.set_support, ValueKind.TEXT,
+             meaning="`free`, `simple`, `pinned` or `clamped`: [support](#supports-of-the-outline) "
+                     "of the outline"),
+)
+TIME_VALUES: tuple[SweepValue[None], ...] = (  # which are set together, after all others
+    SweepValue("dt", Changes.TIME, "time", None,
+             meaning="[time step](#time-step-and-duration), or `auto`; the duration is kept"),
+    SweepValue("duration", Changes.TIME, "time", None,
+             meaning="simulated time, rounded up to a step"),
+)
+# fmt: on
+REFINEMENT = SweepValue("refine", Changes.PLATE, "", plates.refine)  # of a refinement study
+REFINE = REFINEMENT.name
+VARIABLES: dict[str, SweepValue[PlateSetter] | SweepValue[StrikeSetter] | SweepValue[None]] = {
+    **{variable.name: variable for variable in STRIKE_VALUES},
+    **{variable.name: variable for variable in PLATE_VALUES},
+    **{variable.name: variable for variable in TIME_VALUES},
+}
+NAMES = tuple(VARIABLES)
+EXCLUDING = (  # names of which only one can vary
+    ("velocity", "energy"),
+    ("k", "radius"),
+    ("mass", "rod_mass", "rod_density"),
+    ("at", "impact_node"),
+    ("at", "x0"),
+    ("at", "y0"),
+    ("laminate_thickness", "ply_thickness", "thickness"),
+)
+# Names of results, which are no names of cases or of measured columns.
+RESERVED = ("case", "step", "steps", "force", "unsettled_steps", *VERDICTS, *COLUMNS)
+
+
+def names_of(*changes: Changes) -> tuple[str, ...]:
+    """Names of the values that change something."""
+    return tuple(name for name, variable in VARIABLES.items() if variable.changes in changes)
+
+
+PLATE_NAMES = names_of(Changes.PLACE, Changes.LAMINATE, Changes.PLATE, Changes.TIME)
+FAILURE_NAMES = names_of(Changes.FAILURE)
+EXPOSURE_NAMES = ("cure_dT", *STRENGTHS)  # names that change nothing but exposures
+LAW_VALUES = ("k", "radius", "alpha_p", "s_p", "q")  # of EXPE
+OF_PLATE = frozenset((*PLATE_NAMES, REFINE))  # which need another response of the plate
+
+
+def plate_values(case: Case) -> Case:
+    """The values of a case that need another response of the plate."""
+    if OF_PLATE.isdisjoint(case):  # most cases, of which there may be many
+        return {}
+    return {name: value for name, value in case.items() if name in OF_PLATE}
+
+
+def motion_values(case: Case) -> Case:
+    """The values of a case that change its motion."""
+    return {name: value for name, value in case.items() if name not in FAILURE_NAMES}
+
+
+def kind_of(name: str) -> ValueKind:
+    """Kind of a value."""
+    return VARIABLES[name].kind
+
+
+def dimension_of(name: str) -> str:
+    """Dimension of a value; empty if its name is none of the table."""
+    return VARIABLES[name].dimension if name in VARIABLES else ""
+
+
+def check_names(names: Collection[str]) -> None:
+    """Raise CasesError if names exclude each other."""
+    for group in EXCLUDING:
+        if len(given := [name for name in group if name in names]) > 1:
+            raise CasesError(f"{given[0]} and {given[1]} exclude each other; vary one of them")
+
+
+def check_known(name: str, where: str, known: Collection[str] = NAMES) -> None:
+    """Raise CasesError if a name is none of those known, by default those of the table."""
+    if name not in known:
+        others = did_you_mean(str(name), known) or f"; the names are {', '.join(known)}"
+        raise CasesError(f"{where}: `{name}` cannot be varied{others}")
+
+
+def check_free(name: object, where: str) -> None:
+    """Raise CasesError if a name that the caller chose can't be that of a column."""
+    if fault := name_fault(name):
+        raise CasesError(f"{where}: {fault}")
+
+
+def name_fault(name: object) -> str:
+    """Why a name can't be that of a column; empty if it can."""
+    if not (isinstance(name, str) and name.isidentifier()):
+        return f"`{name}` is not a name such as width"
+    return f"`{name}` is a name of the results; choose another" if name in RESERVED else ""
+
+
+def without_unit(name: str, text: str, system: str | None) -> str:
+    """A number in a system of units, from a text that may have a unit, as in ``10J``.
+
+    Other texts stay as they are.  Raises CasesError if the unit is not one of the name's dimension,
+    or the system, which is the deck's, is unknown.
+    """
+    match = re.fullmatch(rf"\s*{NUMBER}\s*(\S.*)?", text)
+    if match is None or match[1] is None:
+        return text
+    dimension = dimension_of(name)
+    if dimension not in EXAMPLES:
+        raise CasesError(f"{name} must be a finite number, not `{text.strip()}`")
+    if system is None:
+        raise CasesError(
+            f"{name}: `{text.strip()}` has a unit, but the deck names no units; add UNIT to it, or "
+            "leave out the unit"
+        )
+    try:
+        return repr(in_units(name, text, dimension, system))
+    except ObjectError:
+        raise CasesError(
+            f"{name} must be a finite number, or one with a unit as in {EXAMPLES[dimension]}, not "
+            f"`{text.strip()}`"
+        ) from None
+
+
+def parse_value(name: str, text: str, system: str | None = None) -> Value:
+    """Read the value of a name; CasesError if it is invalid.
+
+    A value with a unit is converted to a system of units.
+    """
+    if name in PAIRS:
+        return normal_pair(name, text)
+    if name == "support" and text.strip() not in SUPPORTS:
+        raise CasesError(f"support must be {', '.join(SUPPORTS)}, not `{text.strip()}`")
+    if kind_of(name) is ValueKind.TEXT:
+        return text.strip()
+    is_auto = name == "dt" and text.strip() == "auto"
+    value = 0.0 if is_auto else number_of_text(name, without_unit(name, text, system))
+    if kind_of(name) is ValueKind.NUMBER:
+        return value
+    if not value.is_integer():
+        raise CasesError(f"{name} must be an integer, not {value:g}")
+    return int(value)
+
+
+def value_of(name: str, given: object, where: str, system: str | None = None) -> Value:
+    """The value of a name that a caller of Python has given; CasesError if it is invalid.
+
+    A text with a unit, or a quantity, is converted to a system of units.
+    """
+    given = text_of(given)
+    if isinstance(given, np.generic):
+        given = given.item()
+    if isinstance(given, bool):
+        raise CasesError(f"{where}: {name} can't be {given}")
+    if (
+        kind_of(name) is ValueKind.TEXT
+        and isinstance(given, Iterable)
+        and not isinstance(given, str)
+    ):
+        separator = {"at": ",", "size": "x"}.get(name, "/")
+        given = separator.join(map(str, given))
+    try:
+        # float() reports what is not a number
+        text = given if isinstance(given, str) else repr(float(given))  # type: ignore[arg-type]
+        return parse_value(name, text, system)
+    except (TypeError, ValueError) as error:
+        text = str(error) if isinstance(error, CasesError) else f"{name} can't be {given!r}"
+        raise CasesError(f"{where}: {text}") from None
+
+
+def free_value_of(name: str, given: object, where: str) -> Value:
+    """The value of a name that the caller chose: a finite number or a text."""
+    if isinstance(given, np.generic):
+        given = given.item()
+    if isinstance(given, str) or (isinstance(given, float | int) and math.isfinite(given)):
+        return given
+    raise CasesError(f"{where}: {name} is {given!r}, not a finite number or a text")

@@ -1,0 +1,418 @@
+"""Physical groups of the curves and surfaces in a file of Gmsh 4.1.
+
+meshio knows all groups of an entity that have names, and of those without a name the first alone.
+
+Nodes and elements of the bulk data of Nastran: CQUAD4, CQUADR, CTRIA3, CTRIAR, CQUAD8, CTRIA6.
+
+Coordinates are converted from the systems of CP and GRDSET to the basic one.  INCLUDE is followed.
+What a plate of fecm does not have, such as offsets, angles of elements and stiffeners, is refused.
+Bars without a property, as Gmsh writes lines, are groups of nodes named by its number.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+import struct
+from collections.abc import Callable, Iterator
+from itertools import islice
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._dataclasses import frozen
+from fecm._inputs import read_input
+from fecm._typing import Floats
+
+_HEAD = re.compile(rb"\s*\$MeshFormat\s+4\.1 ([01]) 8\r?\n(....)?", re.DOTALL)
+_SECTION = re.compile(rb"^\$Entities *\r?\n", re.MULTILINE)
+_DOUBLES = {0: 3, 1: 6, 2: 6}  # coordinates of an entity by its dimension
+
+Take = Callable[[str, int], list[int]]  # numbers of a kind, `i` or `N` or `d`
+
+
+def physical_groups(text: bytes) -> dict[tuple[int, int], list[int]]:
+    """Numbers of the physical groups of an entity, by its dimension and number.
+
+    Empty for a file that is not of Gmsh 4.1 or is damaged.
+    """
+    head, section = _HEAD.match(text), _SECTION.search(text)
+    if head is None or section is None:
+        return {}
+    body = text[section.end() :]
+    order = "<" if head[2] == b"\1\0\0\0" else ">"
+    take = _binary(body, order) if head[1] == b"1" else _ascii(body)
+    try:
+        return dict(_entities(take))
+    except (ValueError, struct.error):
+        return {}
+
+
+def _entities(take: Take) -> Iterator[tuple[tuple[int, int], list[int]]]:
+    """Dimension and number of points, curves and surfaces, and their groups."""
+    counts = take("N", 4)
+    for dimension, doubles in _DOUBLES.items():
+        for _ in range(counts[dimension]):
+            (number,) = take("i", 1)
+            take("d", doubles)
+            groups = take("i", *take("N", 1))
+            if dimension:
+                take("i", *take("N", 1))  # entities around it
+            yield (dimension, number), [abs(group) for group in groups]
+
+
+def _ascii(body: bytes) -> Take:
+    words = iter(body.partition(b"$End")[0].split())
+
+    def take(kind: str, count: int) -> list[int]:
+        found = list(islice(words, count))
+        if len(found) < count:
+            raise ValueError(f"{count} numbers, of which {len(found)} are there")
+        return [] if kind == "d" else [int(word) for word in found]
+
+    return take
+
+
+def _binary(body: bytes, order: str) -> Take:
+    position = 0
+    letters = {"i": "i", "N": "Q", "d": "d"}
+
+    def take(kind: str, count: int) -> list[int]:
+        nonlocal position
+        form = f"{order}{count}{letters[kind]}"
+        found = struct.unpack_from(form, body, position)
+        position += struct.calcsize(form)
+        return [] if kind == "d" else list(found)
+
+    return take
+
+
+DEPTH = 10  # deepest nesting of INCLUDE
+MOST_SYSTEMS = 100  # within one another
+PARALLEL = 1e-9
+_NUMBER = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?:[EeDd]?([+-]?[0-9]+))?")
+_INCLUDE = re.compile(r"\s*INCLUDE\s*(['\"]?)(.+?)\1\s*", re.IGNORECASE)
+_BULK = re.compile(r"\s*BEGIN\b", re.IGNORECASE)
+_SYSTEM = re.compile(r"CORD([12])([RCS])")
+# Cards that begin with C and are no elements.
+_OTHERS = re.compile(r"C(AERO|LOAD|OMPOSIT|ONV|ORD|REEP|SET|SSCHD|SUP|YAX|YJOIN|YSUP|YSYM)")
+_LINES = ("CBAR", "CBEAM", "CROD")
+_OF_LINES = re.compile(r"PB(AR|EAM)L?|PBCOMP|PROD")  # properties
+_RIGID = re.compile(r"R(BAR|BE[123]|ROD|SPLINE|SSCON|TRPLT)")
+
+
+class NastranError(ValueError):
+    """Bulk data can't be read as a plate."""
+
+
+class NastranCard(NamedTuple):
+    """A card with its continuations."""
+
+    place: str  # file and line
+    fields: list[str]  # without the keyword
+
+    def error(self, keyword: str, what: str) -> NastranError:
+        """Error that names the card."""
+        number = f" {self.fields[0]}" if self.fields and self.fields[0] else ""
+        return NastranError(f"{self.place}: {keyword}{number} {what}")
+
+    def text(self, place: int) -> str:
+        """Field after the keyword, from 0; empty beyond the last."""
+        return self.fields[place] if place < len(self.fields) else ""
+
+    def real(self, keyword: str, place: int) -> float:
+        """Number in a field; 0 in a blank one."""
+        text = self.text(place)
+        match = _NUMBER.fullmatch(text) if text else None
+        value = float(f"{match[1]}e{match[2] or 0}") if match else 0.0
+        if (text and match is None) or not math.isfinite(value):
+            raise self.error(keyword, f"has `{text}`, which is not a finite number")
+        return value
+
+    def whole(self, keyword: str, place: int, default: int | None = None) -> int:
+        """Whole number in a field; the default in a blank one."""
+        text = self.text(place)
+        if not text and default is not None:
+            return default
+        if not re.fullmatch(r"\+?[0-9]+", text):
+            found = f"`{text}`" if text else "a blank field"
+            raise self.error(keyword, f"has {found} in place of a whole number")
+        return int(text)
+
+
+@frozen
+class NastranElement:
+    """Places of the fields of an element, from the first node, 2, on."""
+
+    nodes: int
+    angle: int  # THETA or MCID
+    offset: int | None
+    thicknesses: tuple[int, ...] = ()  # T1 to T4
+
+
+_QUAD4 = NastranElement(4, 6, 7, (10, 11, 12, 13))
+_TRIA3 = NastranElement(3, 5, 6, (10, 11, 12))
+_QUAD9 = NastranElement(9, 11, None)
+ELEMENTS = {
+    "CQUAD4": _QUAD4,
+    "CQUADR": _QUAD4,
+    "CTRIA3": _TRIA3,
+    "CTRIAR": _TRIA3,
+    "CQUAD8": NastranElement(8, 14, 15, (10, 11, 12, 13)),
+    "CTRIA6": NastranElement(6, 8, 9, (10, 11, 12)),
+    "CQUAD": _QUAD9,
+    "CQUAD9": _QUAD9,  # of meshio
+}
+
+NOT_OF_PLATE = f"is not part of a plate: leave it out; the elements are {', '.join(ELEMENTS)}"
+
+
+@frozen
+class System:
+    """Coordinate system in the basic one."""
+
+    kind: str  # R, C or S
+    origin: Floats
+    axes: Floats  # its x, y and z in rows
+
+    def basic(self, place: Floats) -> Floats:
+        """Basic coordinates of a place; angles are in degrees."""
+        a, b, c = place.tolist()
+        turn, rise = np.radians(b), np.radians(c)
+        if self.kind == "C":
+            place = np.array([a * np.cos(turn), a * np.sin(turn), c])
+        elif self.kind == "S":
+            flat = a * np.sin(turn)
+            place = np.array([flat * np.cos(rise), flat * np.sin(rise), a * np.cos(turn)])
+        return np.asarray(self.origin + place @ self.axes)
+
+
+BASIC = System("R", np.zeros(3), np.eye(3))
+
+
+class Bulk(NamedTuple):
+    """Points (n, 3) in the basic system; cells (m, k) and groups have their rows, from 0."""
+
+    points: Floats
+    cells: NDArray[np.int_]
+    groups: dict[str, list[int]]
+
+
+def read_nastran(path: Path) -> Bulk:
+    """Points, cells and groups of a file.
+
+    Raises NastranError with the place and the remedy.
+    """
+    reader = _Reader()
+    for keyword, card in _cards(path):
+        reader.add(keyword, card)
+    return reader.mesh(path)
+
+
+class _Reader:
+    """What is used of the cards."""
+
+    def __init__(self) -> None:
+        self._grids: dict[int, NastranCard] = {}
+        self._systems: dict[int, tuple[str, NastranCard, int]] = {}  # with the first of its fields
+        self._elements: list[tuple[str, NastranCard]] = []
+        self._lines: list[tuple[str, NastranCard]] = []
+        self._properties: set[int] = set()  # of lines
+        self._default_system = 0
+        self._places: dict[int, Floats] = {}
+        self._found: dict[int, System] = {0: BASIC}
+        self._open: list[int] = []  # systems that are being resolved
+
+    def add(self, keyword: str, card: NastranCard) -> None:
+        """Take a card."""
+        if keyword.startswith("=") or "=" in card.fields:
+            raise card.error(keyword, "repeats the card before it by `=`; write the card in full")
+        if keyword == "GRID":
+            number = card.whole(keyword, 0)
+            if number in self._grids:
+                raise card.error(keyword, f"is given twice, first at {self._grids[number].place}")
+            self._grids[number] = card
+        elif keyword == "GRDSET":
+            self._default_system = card.whole(keyword, 1, 0)
+        elif match := _SYSTEM.fullmatch(keyword):
+            for first in (0, 4) if match[1] == "1" else (0,):
+                if card.text(first):
+                    self._systems[card.whole(keyword, first)] = (keyword, card, first)
+        elif keyword in ELEMENTS:
+            self._elements.append((keyword, card))
+        elif keyword in _LINES:
+            self._lines.append((keyword, card))
+        elif _OF_LINES.fullmatch(keyword):
+            self._properties.add(card.whole(keyword, 0))
+        elif _RIGID.match(keyword) or (keyword.startswith("C") and not _OTHERS.match(keyword)):
+            raise card.error(keyword, NOT_OF_PLATE)
+
+    def mesh(self, path: Path) -> Bulk:
+        """Points, cells and groups."""
+        if not self._elements:
+            known = ", ".join(ELEMENTS)
+            raise NastranError(f"{path} has no elements of a plate, which are {known}")
+        rows = {number: row for row, number in enumerate(self._grids)}
+        cells = []
+        first, _ = self._elements[0]
+        for keyword, card in self._elements:
+            if ELEMENTS[keyword].nodes != ELEMENTS[first].nodes:
+                raise card.error(
+                    keyword, f"is beside {first}; all elements must have the same number of nodes"
+                )
+            cells.append([rows[node] for node in self._nodes(keyword, card)])
+        groups: dict[str, list[int]] = {}
+        for keyword, card in self._lines:
+            number = card.whole(keyword, 1, 0)
+            if number in self._properties:
+                raise card.error(keyword, NOT_OF_PLATE)
+            ends = [self._node(keyword, card, place) for place in (2, 3)]
+            groups.setdefault(str(number), []).extend(rows[node] for node in ends)
+        points = np.array([self._place(number) for number in self._grids])
+        return Bulk(points, np.array(cells), groups)
+
+    def _node(self, keyword: str, card: NastranCard, place: int) -> int:
+        """Number of a node that a GRID card gives."""
+        node = card.whole(keyword, place)
+        if node not in self._grids:
+            raise card.error(keyword, f"has the node {node}, which no GRID card gives")
+        return node
+
+    def _nodes(self, keyword: str, card: NastranCard) -> list[int]:
+        """Nodes of an element that has nothing else."""
+        kind = ELEMENTS[keyword]
+        nodes = [self._node(keyword, card, 2 + n) for n in range(kind.nodes)]
+        if kind.offset is not None and card.real(keyword, kind.offset):
+            raise card.error(
+                keyword,
+                f"has the offset ZOFFS {card.text(kind.offset)}; the nodes of a plate are in its "
+                "midplane: leave it out",
+            )
+        if angle := card.text(kind.angle):
+            self._check_angle(keyword, card, angle, kind.angle)
+        if any(card.text(place) for place in kind.thicknesses):
+            raise card.error(
+                keyword, "has thicknesses of corners; give zones of other laminates instead"
+            )
+        return nodes
+
+    def _check_angle(self, keyword: str, card: NastranCard, angle: str, place: int) -> None:
+        """Refuse an angle of the material; MCID may be a system along x."""
+        if angle.isdecimal():
+            system = self._system(int(angle), keyword, card)
+            if system.kind == "R" and abs(system.axes[0, 0] - 1.0) < PARALLEL:
+                return
+            what = f"MCID {angle}"
+        elif not card.real(keyword, place):
+            return
+        else:
+            what = f"THETA {angle}"
+        raise card.error(
+            keyword,
+            f"has {what}, which turns its plies; angles of plies are counted from x: turn the "
+            "layup of the plate or of a zone instead, and leave it out",
+        )
+
+    def _place(self, number: int) -> Floats:
+        """Basic coordinates of a node."""
+        if number not in self._places:
+            card = self._grids[number]
+            own = np.array([card.real("GRID", n) for n in (2, 3, 4)])
+            system = self._system(card.whole("GRID", 1, self._default_system), "GRID", card)
+            self._places[number] = system.basic(own)
+        return self._places[number]
+
+    def _system(self, number: int, keyword: str, user: NastranCard) -> System:
+        """System of a number, which a card uses."""
+        if number in self._found:
+            return self._found[number]
+        if number not in self._systems:
+            raise user.error(keyword, f"has the system {number}, which no CORD card gives")
+        name, card, first = self._systems[number]
+        if number in self._open:
+            raise card.error(name, "depends on itself")
+        if len(self._open) == MOST_SYSTEMS:
+            raise card.error(name, f"is within more than {MOST_SYSTEMS} other systems")
+        self._open.append(number)
+        if name[4] == "2":
+            within = self._system(card.whole(name, 1, 0), name, card)
+            values = [card.real(name, n) for n in range(2, 11)]
+            given = [within.basic(np.array(values[n : n + 3])) for n in (0, 3, 6)]
+        else:
+            nodes = [self._node(name, card, first + n) for n in (1, 2, 3)]
+            given = [self._place(node) for node in nodes]
+        self._open.pop()
+        origin, on_z, in_xz = given
+        z = on_z - origin
+        y = np.cross(z, in_xz - origin)
+        if not (np.any(z) and np.any(y)):
+            raise card.error(name, "has three points in a line")
+        z, y = z / np.linalg.norm(z), y / np.linalg.norm(y)
+        self._found[number] = System(name[5], origin, np.array([np.cross(y, z), y, z]))
+        return self._found[number]
+
+
+def _cards(path: Path) -> Iterator[tuple[str, NastranCard]]:
+    """Keywords and cards of the bulk data."""
+    keyword, card, expected = "", NastranCard("", []), ""
+    for place, line in _lines(path, 0):
+        fields, name, here, follows = _fields(line)
+        if name[:1] in ("", "+", "*"):
+            if not keyword:
+                raise NastranError(f"{place}: a continuation without its card")
+            if expected and here and expected != here:
+                raise NastranError(
+                    f"{place}: the continuation `{name}` does not follow its card; sort the cards"
+                )
+            card.fields.extend(fields)
+        else:
+            if keyword:
+                yield keyword, card
+            keyword, card = name.rstrip("*").upper(), NastranCard(place, fields)
+        expected = follows
+    if keyword:
+        yield keyword, card
+
+
+def _fields(line: str) -> tuple[list[str], str, str, str]:
+    """Fields of a line, its first field, and the marks of its continuations."""
+    if "," in line:
+        name, *fields = (field.strip() for field in line.split(","))
+        width = 4 if "*" in name else 8
+        follows = fields[width] if len(fields) > width else ""
+        fields = (fields[:width] + [""] * width)[:width]
+    else:
+        name, size = line[:8].strip(), 16 if "*" in line[:8] else 8
+        fields = [line[n : n + size].strip() for n in range(8, 72, size)]
+        follows = line[72:80].strip()
+    return fields, name, name.lstrip("+*"), follows.lstrip("+*")
+
+
+def _lines(path: Path, depth: int) -> Iterator[tuple[str, str]]:
+    """Places and texts of the lines of bulk data, with those of other files."""
+    text = read_input(path).decode("latin-1")
+    lines = re.split("\r\n|\r|\n", text)
+    starts = [number for number, line in enumerate(lines) if _BULK.match(line)]
+    begin = starts[0] + 1 if starts else 0
+    for number, line in enumerate(lines[begin:], start=begin + 1):
+        place = f"{path}:{number}"
+        line = line.partition("$")[0].expandtabs(8).rstrip()
+        if line.strip().upper() == "ENDDATA":
+            return
+        if not line or line.startswith(("//", "#")):
+            continue
+        if (match := _INCLUDE.fullmatch(line)) is None:
+            yield place, line
+            continue
+        if depth == DEPTH:
+            raise NastranError(f"{place}: INCLUDE is nested deeper than {DEPTH} files")
+        other = path.parent / match[2]
+        try:
+            yield from _lines(other, depth + 1)
+        except OSError as error:
+            why = error.strerror or str(error)
+            raise NastranError(
+                f"{place}: INCLUDE: {other} can't be read ({why}); put it beside this file"
+            ) from None

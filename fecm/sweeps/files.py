@@ -1,0 +1,358 @@
+"""Results of a random sweep in a file.
+
+Writes results of sweeps into HDF5 files.
+
+Results of sweeps as CSV tables.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+from types import SimpleNamespace
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from fecm._typing import Floats
+from fecm._version import __version__
+from fecm.authoring.values import dimension_of
+from fecm.deck.units import column_name
+from fecm.results import schema
+from fecm.results.groups import ExportError, ResultFileError
+from fecm.results.metrics import COLUMNS, VERDICTS, described
+from fecm.sweeps import reduced
+from fecm.sweeps.distributions import CustomDistribution, ValueDistribution
+from fecm.sweeps.outcome import Column, Forces
+from fecm.sweeps.random import DESIGNS, Design, correlation_of
+from fecm.sweeps.statistics import (
+    INTERVAL_ENDS,
+    QUANTILES,
+    Columns,
+    Exceedance,
+    Indices,
+    RandomResult,
+    Statistics,
+    exceedances,
+)
+from fecm.sweeps.stored import StoredSweep
+
+if TYPE_CHECKING:
+    from fecm.results.hdf5_reader import FileContents
+    from fecm.results.hdf5_writer import FileSink
+
+
+# Description and axes of the parts of the indices.
+INDEX_PARTS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "first": ("first-order Sobol' index of every random value", ("laws",)),
+    "total": ("total Sobol' index of every random value", ("laws",)),
+    "first_interval": ("its 95 % interval", ("laws", "bounds")),
+    "total_interval": ("its 95 % interval", ("laws", "bounds")),
+}
+OWN = "own"  # instead of the name of a law: that of an object, of which the file has a text
+RANDOM_GROUPS = {
+    "random": "laws of the random values",
+    "design": "design that the random values were drawn from",
+    "statistics": "statistics of every quantity over the draws",
+    "sensitivity": "Sobol' indices of every quantity",
+    "exceedance": "probabilities that quantities exceed limits",
+}
+LIMIT_PARTS = {
+    "quantity": "name of the quantity",
+    "limit": "limit, in the unit of the quantity; NaN: the threshold of each case",
+    "probability": "probability that the quantity exceeds the limit",
+    "lower": "lower end of its 95 % interval, whatever the open draws are",
+    "upper": "upper end of its 95 % interval, whatever the open draws are",
+    "draws": "number of draws that have a value",
+    "open": "number of draws that ended before they had a value",
+}
+
+
+class RandomDataset(NamedTuple):
+    """A dataset of the file."""
+
+    path: str
+    values: Column
+    text: str
+    dimension: str
+    axes: tuple[str, ...]
+
+
+def stored(random: RandomResult) -> Iterator[RandomDataset]:
+    """Every dataset of the file."""
+    first = ("combinations",) if random.combinations else ()
+    for name, made in random.statistics.items():
+        text, dimension = COLUMNS.get(name, (name, ""))
+        moments = np.stack([made.draws, made.mean, made.standard_deviation], axis=-1)
+        values = np.concatenate([moments, made.quantiles], axis=-1)
+        text = f"draws with a value, and their statistics: {text}"
+        yield RandomDataset(f"statistics/{name}", values, text, dimension, (*first, "statistics"))
+    for name, found in random.sensitivity.items():
+        for part, values in found._asdict().items():
+            text, axes = INDEX_PARTS[part]
+            yield RandomDataset(f"sensitivity/{name}/{part}", values, text, "", (*first, *axes))
+    if len(random.exceedance.quantity):
+        for part, values in random.exceedance._asdict().items():
+            own = () if part in ("quantity", "limit") else first
+            yield RandomDataset(
+                f"exceedance/{part}", values, LIMIT_PARTS[part], "", (*own, "limits")
+            )
+
+
+def random_attributes(random: RandomResult) -> dict[str, dict[str, Any]]:
+    """Attributes of the groups of the file."""
+    design = random.design
+    empty = set() if random.sensitivity else {"sensitivity"}
+    empty |= set() if len(random.exceedance.quantity) else {"exceedance"}
+    made: dict[str, dict[str, Any]] = {
+        name: {"description": text} for name, text in RANDOM_GROUPS.items() if name not in empty
+    }
+    about = {name: getattr(design, name) for name in ("kind", "samples", "seed", "sensitivity")}
+    made["design"] |= {**about, "names": list(design.laws), "notes": random.notes}
+    if design.correlation:
+        made["design"]["correlation"] = np.array(design.correlation)
+    for name, law in design.laws.items():
+        made[f"random/{name}"] = (
+            {"law": law.kind, "parameters": np.array(law.parameters)}
+            if isinstance(law, ValueDistribution)
+            else {"law": OWN, "text": law.text}
+        )
+    return made
+
+
+def random_of(
+    contents: FileContents, cases: Columns, quantities: Iterable[str], count: int
+) -> RandomResult | None:
+    """Results of a random sweep, None if it is none; ResultFileError if they are incomplete."""
+    if "design" not in contents.groups:
+        return None
+    try:
+        design = _design(contents)
+        combinations = {n: v[:: design.rows] for n, v in cases.items() if n not in design.laws}
+        whole = count % design.rows == 0 if combinations else count == design.rows
+        if not (whole and design.laws.keys() <= cases.keys()):
+            raise ValueError("cases")
+        first = (count // design.rows,) if combinations else ()
+        known = [name for name in quantities if name not in VERDICTS]
+        asked = known if design.sensitivity else []
+        return RandomResult(
+            design,
+            {name: _statistics(contents, name, first) for name in known},
+            {name: _indices(contents, name, first, len(design.laws)) for name in asked},
+            _exceedance(contents, known, first),
+            combinations,
+            tuple(map(str, contents.groups["design"]["notes"])),
+        )
+    except (KeyError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
+        message = f"{contents.path}: the results of this random sweep are incomplete ({error})"
+        raise ResultFileError(message) from None
+
+
+def _design(contents: FileContents) -> Design:
+    groups = contents.groups
+    about = groups["design"]
+    laws: dict[str, ValueDistribution | CustomDistribution] = {}
+    for name in about["names"]:
+        law = groups[f"random/{name}"]
+        if law["law"] == OWN:
+            laws[name] = CustomDistribution(str(law["text"]))
+        else:
+            laws[name] = ValueDistribution(str(law["law"]), tuple(map(float, law["parameters"])))
+    return Design(
+        laws,
+        samples=int(about["samples"]),
+        seed=int(about["seed"]),
+        kind=DESIGNS[DESIGNS.index(about["kind"])],
+        sensitivity=bool(about["sensitivity"]),
+        correlation=correlation_of([*laws], about["correlation"]) if "correlation" in about else (),
+    )
+
+
+def _numbers(contents: FileContents, path: str, shape: tuple[int, ...]) -> Floats:
+    """Numbers of a shape; ValueError if they are others."""
+    values = contents[path]
+    if values.shape != shape or values.dtype.kind != "f":
+        raise ValueError(path)
+    return values
+
+
+def _statistics(contents: FileContents, name: str, first: tuple[int, ...]) -> Statistics:
+    values = _numbers(contents, f"statistics/{name}", (*first, 3 + len(QUANTILES)))
+    draws, mean, deviation = np.moveaxis(values[..., :3], -1, 0)
+    return Statistics(draws.astype(int), mean, deviation, values[..., 3:])
+
+
+def _indices(contents: FileContents, name: str, first: tuple[int, ...], laws: int) -> Indices:
+    sizes = {"laws": laws, "bounds": len(INTERVAL_ENDS)}
+    return Indices(*(
+        _numbers(contents, f"sensitivity/{name}/{part}", (*first, *(sizes[axis] for axis in axes)))
+        for part, (_, axes) in INDEX_PARTS.items()
+    ))  # fmt: skip
+
+
+def _exceedance(contents: FileContents, known: Iterable[str], first: tuple[int, ...]) -> Exceedance:
+    if "exceedance/quantity" not in contents:
+        none = {name: np.empty((*first, 0)) for name in known}
+        return exceedances(none, np.empty((*first, 0), dtype=bool), [])
+    parts = {part: contents[f"exceedance/{part}"] for part in Exceedance._fields if part != "open"}
+    missing = np.zeros_like(parts["draws"])  # in files of earlier versions
+    found = Exceedance(**parts, open=contents.get("exceedance/open", missing))
+    shape = (*first, len(found.quantity))
+    if found.limit.shape != shape[-1:] or {values.shape for values in found[2:]} != {shape}:
+        raise ValueError("exceedance")
+    return found
+
+
+FORCE = "history/force"
+VERDICT_TEXTS = {
+    "status": "ok, still in contact, or why the case failed",
+    "validity": "ok, reasons to doubt the case, or failed",
+}
+GROUPS = {
+    "cases": "values of what varies",
+    "summary": "what came out of every case",
+    "history": "time steps of every case, and its contact force if asked for",
+}
+
+
+def save_sweep(
+    result: StoredSweep, path: Path, *, overwrite: bool = True, forces: Iterable[Forces] = ()
+) -> None:
+    """Write the result of a sweep.
+
+    `forces` are those that the result does not hold, of some cases after the other.  Raises
+    ResultWriteError if the file cannot be written; an existing file is then unchanged.
+    """
+    from fecm.results.hdf5_writer import result_writing  # h5py takes 60 ms to import
+
+    if result.force is not None:
+        forces = [(range(len(result)), result.force)]
+    with result_writing(path, overwrite=overwrite) as sink:
+        _write_attributes(sink, result)
+        for name, values in result.cases.items():
+            text = f"{name} of every case"
+            _write(sink, f"cases/{name}", values, text, dimension_of(name))
+        for name, values in result.summary.items():
+            text = VERDICT_TEXTS.get(name) or described(name)
+            _, dimension = COLUMNS.get(name, ("", ""))
+            _write(sink, f"summary/{name}", values, text, dimension)
+        _write(sink, "history/dt", result.dt, "time step of every case", "time")
+        _write(sink, "history/steps", result.steps, "number of steps of every case")
+        if result.unsettled_steps is not None:
+            text = "steps whose contact iteration did not converge"
+            _write(sink, "history/unsettled_steps", result.unsettled_steps, text)
+        if forces and len(result):
+            _write_forces(sink, len(result), int(result.steps.max()), forces)
+        for one in () if result.random is None else stored(result.random):
+            _write(sink, one.path, one.values, one.text, one.dimension, one.axes)
+        if result.reduced is not None:
+            sink.attributes(reduced.GROUP, reduced.reduced_attributes(result.reduced))
+            for name, text in reduced.TEXTS.items():
+                values = result.reduced.columns[name]
+                dimension = reduced.DIMENSIONS.get(name, "")
+                place = f"{reduced.GROUP}/{name}"
+                _write(sink, place, values, text, dimension, ("trials",))
+        for group, text in GROUPS.items():
+            sink.attributes(group, {"description": text})
+        for name, limit in result.convergence.items():
+            sink.attributes(f"convergence/{name}", vars(limit))
+
+
+def _write_attributes(sink: FileSink, result: StoredSweep) -> None:
+    """Write what is known of the sweep, its deck, and the groups of a random sweep."""
+    about = {
+        "format": schema.Form.SWEEP.value,
+        "format_version": schema.FORMAT_VERSION,
+        "fecm_version": __version__,
+        "title": result.title,
+    }
+    units = {f"unit_{name}": unit for name, unit in result.units.items()}
+    law = {"law": result.law} if result.law else {}
+    sink.attributes("", about | units | law)
+    sink.text("deck", result.deck_text, "the cards of the deck that was varied")
+    if result.random is not None:
+        sink.axis_names["laws"] = tuple(result.random.design.laws)
+        for group, values in random_attributes(result.random).items():
+            sink.attributes(group, values)
+
+
+def _write(
+    sink: FileSink,
+    name: str,
+    values: Column,
+    text: str,
+    dimension: str = "",
+    axes: tuple[str, ...] = ("cases",),
+) -> None:
+    """Write a dataset of numbers or of texts."""
+    if values.dtype.kind in "US":
+        sink.text(name, values.tolist(), text, axes)
+        return
+    dtype = "i8" if values.dtype.kind in "iu" else "f8"
+    sink.create(schema.Dataset(name, axes, text, dimension, dtype), values.shape)
+    sink.write(name, 0, values)
+
+
+def _write_forces(sink: FileSink, count: int, longest: int, forces: Iterable[Forces]) -> None:
+    """Write contact forces as they come, NaN where a case has none."""
+    text = "contact force after every step"
+    sink.create(schema.Dataset(FORCE, ("cases", "steps"), text, "force"), (count, longest))
+    for numbers, force in forces:
+        rows = np.full((len(numbers), longest), np.nan)
+        if force is not None:
+            rows[:, : force.shape[1]] = force
+        # Numbers without a gap are written at once.
+        ends = np.flatnonzero(np.diff(numbers) != 1) + 1
+        for start, some in zip([0, *ends.tolist()], np.split(rows, ends), strict=True):
+            sink.write(FORCE, numbers[start], some)
+
+
+FORMULA = re.compile(r"[=+@\x00-\x1f-]")  # how a formula begins
+CASES = "cases"
+HISTORY = "history"
+
+
+def csv_lines(sweep: StoredSweep, name: str = CASES) -> Iterator[str]:
+    """Return the lines of a CSV table, with line ends.
+
+    ``"cases"`` has the values and results of every case, ``"history"`` the contact force after
+    every step of every case that was run.  Cases count from 0, steps from 1.  Units follow the
+    names in the header.  Numbers are written as Python's repr, which preserves every bit.  An
+    apostrophe precedes texts that a spreadsheet would read as formulas.  Raises ExportError if
+    there is no such table.
+    """
+    if name not in (CASES, HISTORY):
+        raise ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")
+    if name == HISTORY and sweep.force is None:
+        raise ExportError("the sweep has no stored forces; run it again with --history")
+    echo: Any = SimpleNamespace(write=str)  # writerow returns what write returns
+    writer = csv.writer(echo, lineterminator="\n")
+    return (
+        writer.writerow([f"'{v}" if isinstance(v, str) and FORMULA.match(v) else v for v in row])
+        for row in (_case_rows(sweep) if name == CASES else _step_rows(sweep))
+    )
+
+
+def _case_rows(sweep: StoredSweep) -> Iterator[Iterable[Any]]:
+    columns = {**sweep.cases, **sweep.summary}
+    texts = {name: columns.pop(name) for name in VERDICTS if name in columns}
+    columns |= {"dt": sweep.dt, "steps": sweep.steps, **texts}
+    yield ("case", *_headings(sweep, columns))
+    yield from zip(range(len(sweep)), *(v.tolist() for v in columns.values()), strict=True)
+
+
+def _headings(sweep: StoredSweep, names: Iterable[str]) -> list[str]:
+    """Names of columns, with units."""
+    return [column_name(name, sweep.unit(name)) for name in names]
+
+
+def _step_rows(sweep: StoredSweep) -> Iterator[Iterable[Any]]:
+    assert sweep.force is not None
+    yield ("case", "step", column_name("time", sweep.unit("dt")), *_headings(sweep, ["force"]))
+    for case in np.flatnonzero(sweep.completed).tolist():
+        count = int(sweep.steps[case])
+        times = np.add.accumulate(np.full(count, sweep.dt[case])).tolist()
+        forces = sweep.force[case, :count].tolist()
+        yield from zip([case] * count, range(1, count + 1), times, forces, strict=True)

@@ -1,0 +1,324 @@
+"""Searches for the velocity at which the peak force of a case reaches a value.
+
+Searches by full runs for the velocity at which a quantity of a case reaches a value.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping
+from enum import StrEnum
+from itertools import compress
+from typing import NamedTuple
+
+import numpy as np
+
+from fecm._typing import Bools, Floats
+from fecm.authoring.case import NO_THRESHOLD, PEAK_FORCE, THRESHOLD, CasesError, parse_exceed
+from fecm.authoring.strike import Strike
+from fecm.deck.model import Deck, Delamination, Impact
+from fecm.results.exposures import FEWEST
+from fecm.results.metrics import BAND, EVALUATIONS, EXPOSURES, FOUND_BAND
+from fecm.sweeps.outcome import About, Outcome, merge
+
+Until = float | str | Mapping[str, float | str]  # what a search reaches; see :func:`search_of`
+Strikes = Mapping[int, Strike]  # by the numbers of their cases, ascending
+Runs = Callable[[Strikes, bool], Outcome]  # runs strikes; doubtful ones in full if they are judged
+RANGE = 100.0  # of velocities relative to the deck's
+FIRST_VELOCITIES = 25  # of the first round of a search
+VELOCITY_ERROR = 1e-6  # relative error of the velocity found
+ROUGH = 1e-4  # relative difference of the peak force from the value searched, beyond which it jumps
+LONGER = (1, 2, 4, 8)  # times the duration, until the peak at the velocity found is known
+BELOW = "the peak force is below"
+
+
+class Sought(StrEnum):
+    """Quantity of a search."""
+
+    PEAK_FORCE = PEAK_FORCE
+    EXPOSURE = "exposure"
+
+
+class Search(NamedTuple):
+    """A search for the velocity at which a quantity reaches a level."""
+
+    quantity: Sought
+    level: float | str  # a number, or of the peak force :data:`~fecm.authoring.case.THRESHOLD`
+
+    def check(self, deck: Deck, names: Collection[str]) -> None:
+        """Raise CasesError if the search is not possible in cases of a deck with these names."""
+        if not {"velocity", "energy"}.isdisjoint(names):
+            raise CasesError("velocity is what is searched; it can't be varied as well")
+        if not deck.require(Impact).velocity:
+            raise CasesError("the search begins at the velocity of ROD, which must not be 0")
+        if self.level == THRESHOLD:
+            if deck.last(Delamination) is None:
+                raise CasesError(NO_THRESHOLD)
+        elif not (isinstance(self.level, float | int) and 0.0 < self.level < math.inf):
+            name = self.quantity.replace("_", " ")
+            raise CasesError(f"the {name} to reach is a positive number, not {self.level}")
+
+
+def parse_until(text: str) -> Until:
+    """Read ``peak_force=VALUE`` or ``exposure=NUMBER``; CasesError if it is neither."""
+    name, _, value = (part.strip() for part in text.partition("="))
+    if name not in tuple(Sought) or not value:
+        forms = f"peak_force=NUMBER or peak_force={THRESHOLD}, or exposure=NUMBER"
+        raise CasesError(f"`{text}`: write {forms}")
+    return {name: parse_exceed(text).value}
+
+
+def search_of(until: Until | None) -> Search | None:
+    """The search for a value, alone that of a peak force, or for that of one named quantity."""
+    if until is None:
+        return None
+    if not isinstance(until, Mapping):
+        return Search(Sought.PEAK_FORCE, until)
+    if len(until) != 1 or not {*until} <= {*Sought}:
+        example = '{"exposure": 1.0}'
+        raise CasesError(f"until is {until!r}; write a number, {THRESHOLD!r} or {example}")
+    ((name, level),) = until.items()
+    return Search(Sought(name), level)
+
+
+def search_by_response(
+    strikes: Strikes, forces: Mapping[int, float], longer: Callable[[int], Runs]
+) -> Outcome:
+    """Run cases at the velocities at which the peak of each reaches its force.
+
+    Cases whose peak there is open are searched again in longer runs: `longer` returns what runs
+    strikes so many times as long.
+    """
+    left, parts = dict(strikes), []
+    for factor in LONGER:
+        runs, numbers = longer(factor), list(left)
+        together = -(-len(numbers) // factor)  # as many forces in memory as at first
+        for start in range(0, len(numbers), together):
+            some = {number: left[number] for number in numbers[start : start + together]}
+            outcome, still_open = _searched(some, forces, runs)
+            parts.append(outcome)
+            left = {n: one for n, one in left.items() if n not in some or n in still_open}
+        if not left:
+            return merge(parts)
+    text = f"it is open even in a run {LONGER[-1]} times as long"
+    reasons = {n: f"no peak force of {forces[n]:.6g}: {text}" for n in left}
+    return merge([*parts, Outcome.failed(reasons)])
+
+
+def with_found(outcome: Outcome, strikes: Strikes) -> Outcome:
+    """Add the velocities that were found, and their energies: those of the strikes."""
+    velocity = np.array([one.velocity for one in strikes.values()])
+    mass = np.array([one.projectile.total_mass for one in strikes.values()])
+    outcome.columns |= {"found_velocity": velocity, "found_energy": 0.5 * mass * velocity**2}
+    return outcome
+
+
+def _searched(
+    strikes: Strikes, forces: Mapping[int, float], runs: Runs
+) -> tuple[Outcome, set[int]]:
+    """Search the velocities of cases: outcome of those that are decided, and the open ones."""
+
+    def tried(pairs: list[tuple[int, float]]) -> Outcome:
+        trials = [strikes[case].with_velocity(velocity) for case, velocity in pairs]
+        return runs(dict(enumerate(trials)), False)
+
+    starts = {case: one.velocity for case, one in strikes.items()}
+    searched = lowest_velocities(starts, forces, lambda pairs: tried(pairs).columns[About.REACHED])
+    reasons = {case: v for case, v in searched.items() if isinstance(v, str)}
+    still_open: set[int] = set()
+    # What is not reached in a run that is too short may be reached in a longer one.
+    if low := [case for case, text in reasons.items() if text.startswith(BELOW)]:
+        highest = tried([(case, starts[case] * RANGE) for case in low])
+        lacking = np.isnan(highest.columns[PEAK_FORCE])
+        still_open = set(compress(low, lacking))
+    parts = [Outcome.failed({n: text for n, text in reasons.items() if n not in still_open})]
+
+    velocities = {case: v for case, v in searched.items() if isinstance(v, float)}
+    if velocities:
+        hit = {case: strikes[case].with_velocity(v) for case, v in velocities.items()}
+        outcome = with_found(runs(hit, True), hit)
+        is_open = outcome.fine & np.isnan(outcome.columns[PEAK_FORCE])
+        still_open |= {outcome.numbers[row] for row in np.flatnonzero(is_open)}
+        parts += _decided(outcome, forces, ~is_open)
+    return merge(parts), still_open
+
+
+def _decided(outcome: Outcome, forces: Mapping[int, float], known: Bools) -> list[Outcome]:
+    """Outcomes of the cases whose peak is known; those whose peak is not the force have failed."""
+    force = np.array([forces[number] for number in outcome.numbers])
+    reached, velocity = outcome.columns[About.REACHED], outcome.columns["found_velocity"]
+    right = outcome.fine & known & (np.abs(reached - force) <= ROUGH * force)
+    reasons = {}
+    for row in np.flatnonzero(~right & known):
+        text = f"at velocity {velocity[row]:.6g}: {outcome.status[row]}"
+        if outcome.fine[row]:
+            jump = f"from velocity {velocity[row]:.6g} on it is {reached[row]:.6g}"
+            text = f"no peak force of {force[row]:.6g}: {jump}, and below it jumps"
+        reasons[outcome.numbers[row]] = text
+    return [outcome.select(np.flatnonzero(right)), Outcome.failed(reasons)]
+
+
+def lowest_velocities(
+    starts: Mapping[int, float],
+    forces: Mapping[int, float],
+    peaks: Callable[[list[tuple[int, float]]], Floats],
+) -> dict[int, float | str]:
+    """Find the lowest velocity of each case at which the contact force reaches its value.
+
+    The range from 1/100 to 100 times the start is searched, by rounds of velocities.  Later rounds
+    gather around the interpolated velocity of the bracket, whose upper end is the result.  `peaks`
+    returns the largest forces of pairs of case and velocity; NaN where unknown.  A text is the
+    reason why a case has no velocity.
+    """
+    found: dict[int, float | str] = dict.fromkeys(starts, "")
+    trials = {n: np.geomspace(v / RANGE, v * RANGE, FIRST_VELOCITIES) for n, v in starts.items()}
+    first = True
+    while trials:
+        given = peaks([(n, float(v)) for n, values in trials.items() for v in values])
+        ends = np.cumsum([len(values) for values in trials.values()])[:-1]
+        left: dict[int, Floats] = {}
+        for (n, values), own in zip(trials.items(), np.split(given, ends), strict=True):
+            force = forces[n]
+            if not first:  # the ends of a bracket, whatever rounding makes of them
+                own[0], own[-1] = min(own[0], np.nextafter(force, 0.0)), np.fmax(own[-1], force)
+            (above,) = np.nonzero(own >= force)
+            after = above[0] if len(above) else 0
+            low, high = values[after - 1], values[after]
+            if not len(above):
+                found[n] = f"{BELOW} {force:.6g} up to velocity {values[-1]:.6g}"
+            elif not after:
+                found[n] = f"the peak force is above {force:.6g} from velocity {values[0]:.6g} on"
+            elif high - low <= VELOCITY_ERROR * high:
+                found[n] = float(high)
+            else:
+                with np.errstate(all="ignore"):  # a power law; else the middle alone
+                    share = np.log(force / own[after - 1]) / np.log(own[after] / own[after - 1])
+                    guess = low * (high / low) ** share
+                offsets = (high - low) * 10.0 ** -np.arange(1.0, 9.0)
+                around = np.concatenate([guess - offsets, guess + offsets])
+                inside = around[(around > low) & (around < high)]
+                left[n] = np.unique(np.concatenate([[low, (low + high) / 2.0, high], inside]))
+        trials, first = left, False
+    return found
+
+
+LEVEL_EXCESS = 1e-5  # largest relative excess of the value found
+USUAL = 5  # runs of a case, if the value depends smoothly on the velocity
+MOST = 40
+APART = 1e-3  # least relative distance of the trials that give a slope
+NAMES = {Sought.PEAK_FORCE: "peak force", Sought.EXPOSURE: "exposure"}
+
+
+def search_in_full(
+    number: int,
+    start: Strike,
+    quantity: Sought,
+    level: float,
+    run: Callable[[Strike, int], Outcome],
+) -> Outcome:
+    """Run a case at the velocity at which its peak force or largest exposure reaches a level.
+
+    Every trial is a full run: exposures need the whole plate, and a nonlinear plate has no impulse
+    response.  `run` takes a strike and how many times as long the run is; one that leaves the
+    value open is repeated, longer.  Raises CasesError with the reason if no velocity is found.
+    """
+    outcomes: dict[float, Outcome] = {}
+    factors = list(LONGER)  # those that are left
+    largest = largest_exposure if quantity is Sought.EXPOSURE else peak_force
+
+    def reached(velocity: float) -> float:
+        at = f"at velocity {velocity:.6g}"
+        while factors:
+            outcome = outcomes[velocity] = run(start.with_velocity(velocity), factors[0])
+            if not outcome.fine[0]:
+                raise CasesError(f"{at}: {outcome.status[0]}")
+            try:
+                value = largest(outcome)
+            except CasesError as error:
+                raise CasesError(f"{at}: {error}") from None
+            if not math.isnan(value):
+                return value
+            del factors[0]
+        text = f"open even in a run {LONGER[-1]} times as long"
+        raise CasesError(f"{at} the largest {NAMES[quantity]} is {text}")
+
+    velocity = velocity_at_level(start.velocity, level, reached, NAMES[quantity])
+    outcome = with_found(outcomes[velocity], {number: start.with_velocity(velocity)})
+    if quantity is Sought.EXPOSURE:
+        exposures = {v: largest_exposure(one) for v, one in outcomes.items()}
+        _add_band(outcome, velocity, level, exposures)
+    return outcome
+
+
+def _add_band(
+    outcome: Outcome, velocity: float, level: float, exposures: Mapping[float, float]
+) -> None:
+    """Add the energies at which finer meshes may reach the level, from the band of the exposure.
+
+    Near the velocity that was found the exposure is a power of the velocity, by the nearest other
+    trial; without one it is proportional to it.
+    """
+    columns = outcome.columns
+    if not columns.keys() >= {*BAND}:
+        return
+    exponent = 1.0
+    apart = {v: abs(math.log(v / velocity)) for v in exposures}
+    others = [v for v, distance in apart.items() if distance > APART]
+    if others:
+        other = min(others, key=apart.__getitem__)
+        slope = math.log(exposures[other] / exposures[velocity]) / math.log(other / velocity)
+        exponent = slope if slope > 0.0 else exponent
+    for name, end in zip(FOUND_BAND, reversed(BAND), strict=True):
+        with np.errstate(divide="ignore"):
+            columns[name] = columns["found_energy"] * (level / columns[end]) ** (2.0 / exponent)
+
+
+def peak_force(outcome: Outcome) -> float:
+    """Peak force of a run, NaN if it is open."""
+    return float(outcome.columns[Sought.PEAK_FORCE][0])
+
+
+def largest_exposure(outcome: Outcome) -> float:
+    """Largest exposure of a run, NaN if it is open; CasesError if the run has none to rely on."""
+    values = [float(outcome.columns[name][0]) for name in EXPOSURES if name in outcome.columns]
+    if values and np.isnan(values).any():
+        return math.nan
+    (counted,) = EVALUATIONS
+    if (count := int(outcome.columns[counted][0])) < FEWEST or not values:
+        raise CasesError(f"FAIL was evaluated {count} times during contact, less than {FEWEST}")
+    return max(values)
+
+
+def velocity_at_level(
+    start: float, level: float, reached: Callable[[float], float], name: str = "exposure"
+) -> float:
+    """Find a velocity at which a value is at the level, or above it by at most :data:`ERROR`.
+
+    Secants in the logarithms, as the value is almost a power of the velocity; a bracket guards
+    them once it is known.  Raises CasesError if there is none within 1/100 to 100 times the start.
+    """
+    least, most = math.log(start / RANGE), math.log(start * RANGE)
+    low, high = -math.inf, math.inf  # bracket
+    x, slope, last = math.log(start), 1.0, None
+    for _ in range(MOST):
+        velocity = math.exp(x)
+        found = reached(velocity)
+        if not found > 0.0:
+            raise CasesError(f"there is no {name} at velocity {velocity:.6g}")
+        y = math.log(found / level)
+        if 0.0 <= y <= LEVEL_EXCESS:
+            return velocity
+        if x <= least and y > 0.0:
+            raise CasesError(f"the {name} is above {level:.6g} from velocity {velocity:.6g} on")
+        if x >= most and y < 0.0:
+            raise CasesError(f"the {name} is below {level:.6g} up to velocity {velocity:.6g}")
+        low, high = (x, high) if y < 0.0 else (low, x)
+        if last is not None and (y - last[1]) / (x - last[0]) > 0.0:
+            slope = (y - last[1]) / (x - last[0])
+        last = x, y
+        x = min(max(x - (y - LEVEL_EXCESS / 2.0) / slope, least), most)
+        if not low < x < high:
+            x = (low + high) / 2.0
+        if x in (low, high):
+            break
+    raise CasesError(f"no {name} of {level:.6g}: it jumps at velocity {math.exp(x):.6g}")
