@@ -345,7 +345,7 @@ def test_cases_that_differ_in_the_cure_alone_share_their_motion(
         runs.append(simulation)
         run_program(simulation)
 
-    monkeypatch.setattr(in_full, "run", counted)
+    monkeypatch.setattr(in_full, "run_program", counted)
     (tmp_path / "d.inp").write_text(struck(0.0).to_text())
     options = ("--random", "cure_dT=normal:-3,1", "--samples", "16", "--measure", "failure")
     done = call("sweep", "d.inp", *options, "-o", "s.h5", cwd=tmp_path)

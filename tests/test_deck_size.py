@@ -235,7 +235,7 @@ def test_a_deck_whose_cards_exceed_the_free_memory_is_not_read(
 ) -> None:
     deck = tmp_path / "deck.inp"
     deck.write_text("1\n" * 400_000)
-    monkeypatch.setattr(reader, "available", lambda: 300_000_000)
+    monkeypatch.setattr(reader, "available_memory", lambda: 300_000_000)
     monkeypatch.setattr(_machine, "available_memory", lambda: 300_000_000)
     with pytest.raises(NotEnoughMemoryError, match=r"deck\.inp: the deck takes about .* free"):
         load_text(deck)

@@ -51,7 +51,7 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> list[Simulation]:
         counted.append(simulation)
         run_program(simulation)
 
-    monkeypatch.setattr(in_full, "run", counting)
+    monkeypatch.setattr(in_full, "run_program", counting)
     return counted
 
 

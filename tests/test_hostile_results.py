@@ -35,11 +35,11 @@ def short_calls(seconds):
 
 COMMANDS["act"] = LazyCommand("__main__", "", isolated=True)
 
-@click.command()
+@click.command("act")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.argument("what")
 @isolation.reads("file")
-def act(file, what):
+def act_command(file, what):
     if what == "crash":
         partial_of(Path("out.h5")).write_text("half")
         os.write(2, b"malloc(): corrupted top size\\n")

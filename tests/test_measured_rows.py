@@ -44,7 +44,7 @@ def test_a_table_of_short_lines_that_memory_does_not_hold_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     path = table(tmp_path / "cases.csv", 220_000, 1, "2")  # 0.44 MB of text
-    monkeypatch.setattr(fecm._machine, "available", lambda: 50_000_000)
+    monkeypatch.setattr(fecm._machine, "available_memory", lambda: 50_000_000)
     with pytest.raises(NotEnoughMemoryError, match="a table of 220001 lines takes about 107 MB"):
         read_table(path)
 

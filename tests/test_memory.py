@@ -187,7 +187,7 @@ def test_the_estimate_is_near_what_is_measured(
 def test_a_run_that_needs_more_than_is_free_is_refused_with_both_numbers(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fecm._machine, "available", lambda: 2 * MEGABYTE)
+    monkeypatch.setattr(fecm._machine, "available_memory", lambda: 2 * MEGABYTE)
     deck, output = tmp_path / "small.inp", tmp_path / "small.h5"
     deck.write_text(small().replace("DISP          5", "DISP"))
     done = call("run", deck, "-o", output)
@@ -200,7 +200,7 @@ def test_a_run_that_needs_more_than_is_free_is_refused_with_both_numbers(
 
 def test_gages_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # 4000 gages on 1008 elements took 119 MB more than none, 1000 gages 40 MB.
-    monkeypatch.setattr(fecm._machine, "available", lambda: 30 * MEGABYTE)
+    monkeypatch.setattr(fecm._machine, "available_memory", lambda: 30 * MEGABYTE)
     deck = tmp_path / "d.inp"
     deck.write_text(small())
     assert call("run", deck, "-o", tmp_path / "d.h5").exit_code == 0
@@ -212,7 +212,7 @@ def test_gages_count(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_result_in_memory_counts_with_all_its_rows(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fecm._machine, "available", lambda: 100 * MEGABYTE)
+    monkeypatch.setattr(fecm._machine, "available_memory", lambda: 100 * MEGABYTE)
     many = small().replace("LOOP         10", "LOOP      99999").replace("DISP          5", "DISP")
     problem = load_deck(many).problems[0]
     # w and five unknowns of 25 nodes in each of the rows.
@@ -253,7 +253,7 @@ def test_the_estimate_of_a_sweep_bounds_what_is_measured(
 def test_the_steps_of_a_sweep_are_those_of_its_longest_case(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(fecm._machine, "available", lambda: 50 * MEGABYTE)
+    monkeypatch.setattr(fecm._machine, "available_memory", lambda: 50 * MEGABYTE)
     monkeypatch.setattr("fecm.sweeps.checks.ADVANCED_BYTES", 30)
     deck = tmp_path / "small.inp"
     deck.write_text(small().replace("LOOP         10", "LOOP        100"))
@@ -277,7 +277,7 @@ def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(
     free: int,
     remedy: str,
 ) -> None:
-    monkeypatch.setattr(fecm._machine, "available", lambda: free * MEGABYTE)
+    monkeypatch.setattr(fecm._machine, "available_memory", lambda: free * MEGABYTE)
     monkeypatch.setattr("fecm.sweeps.checks.ADVANCED_BYTES", 30)  # with kernels or without
     deck = tmp_path / "small.inp"
     deck.write_text(small().replace("LOOP         10", "LOOP       4500"))
@@ -296,7 +296,7 @@ def test_matrices_that_do_not_fit_are_refused(
 ) -> None:
     problem = load_deck(plate(tmp_path, 46, IMPACT)).problems[0]
     model = build_plate(problem.deck, problem.mesh)
-    monkeypatch.setattr(fecm._machine, "available", lambda: 101 * MEGABYTE)
+    monkeypatch.setattr(fecm._machine, "available_memory", lambda: 101 * MEGABYTE)
     # 24 bytes for each of the 45 x 45 entries of 2116 matrices.
     told = "assemble the plate's matrices takes about 103 MB of memory, and 101 MB are free"
     with pytest.raises(NotEnoughMemoryError, match=told):
@@ -325,7 +325,7 @@ def _write_on(pipe: int) -> None:
 
 @pytest.mark.posix
 def test_a_deck_that_never_ends_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fecm.deck.reader, "available", lambda: 12 * MEGABYTE)
+    monkeypatch.setattr(fecm.deck.reader, "available_memory", lambda: 12 * MEGABYTE)
     endless, begin = os.pipe()
     writer = threading.Thread(target=_write_on, args=(begin,))
     writer.start()

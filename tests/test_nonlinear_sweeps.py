@@ -49,7 +49,7 @@ def runs(monkeypatch: pytest.MonkeyPatch) -> list[float]:
         taken.append(float(outcome.columns["peak_force"][0]))
         return outcome
 
-    monkeypatch.setattr(batch, "alone", counted)
+    monkeypatch.setattr(batch, "run_case_in_full", counted)
     return taken
 
 

@@ -20,17 +20,21 @@ PACKAGE = ROOT / "fecm"
 NOTES = {
     "simulation/judge.py": (),
     "simulation/macros.py": ("PINNED",),
-    "simulation/membrane.py": (),
     "location/verdict.py": ("_serious", "_remarks"),
     "results/end.py": ("OPEN_ENDS", "OPEN_LATER"),
-    "results/linear_plate.py": ("TOO_SOFT", "PRELOADED", "REMEDY", "UNSAFE", "softness"),
-    "results/validity.py": ("MEANING",),
+    "results/validity.py": ("MEANING", "TOO_SOFT", "PRELOADED", "REMEDY", "UNSAFE", "softness"),
     "sweeps/distributions.py": ("doubt", "_of_logarithm"),
-    "sweeps/doubts.py": (),
-    "sweeps/expected.py": ("expected",),
+    "sweeps/checks.py": (
+        "doubtful_values",
+        "unused_values",
+        "_notes_of_places",
+        "_thickness_notes",
+        "_of_value",
+    ),
+    "sweeps/execute.py": ("expected",),
     "sweeps/random.py": ("REMEDY", "doubt", "cost"),
-    "sweeps/random_result.py": ("_notes",),
-    "sweeps/summary.py": ("counts", "remarks"),
+    "sweeps/statistics.py": ("_notes",),
+    "sweeps/summary.py": ("doubtful_counts", "remarks"),
 }
 # Where notes are handed to the user as they are written.
 HANDED_OVER = ("simulation/*.py", "sweeps/*.py", "cli/run.py", "cli/sweep.py")

@@ -44,13 +44,11 @@ def test_the_namespace_lists_the_public_names_and_nothing_else() -> None:
 
 
 def test_each_public_name_is_what_a_type_checker_takes_it_for() -> None:
-    block = next(
-        node for node in ast.parse(inspect.getsource(fecm)).body if isinstance(node, ast.If)
-    )
-    assert ast.unparse(block.test) == "TYPE_CHECKING"
+    stub = Path(fecm.__file__).with_suffix(".pyi").read_text(encoding="utf-8")
     named: dict[str, object] = {}
-    for line in block.body:
-        assert isinstance(line, ast.ImportFrom)
+    for line in ast.parse(stub).body:
+        if not isinstance(line, ast.ImportFrom):
+            continue
         module = import_module(str(line.module))
         named |= {alias.asname or alias.name: getattr(module, alias.name) for alias in line.names}
     assert len(named) > 20

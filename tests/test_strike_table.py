@@ -68,7 +68,7 @@ def test_valid_cases_of_a_plate_need_no_cards(monkeypatch: pytest.MonkeyPatch) -
         made.append(case)
         return strike_of_case(plate, case)
 
-    monkeypatch.setattr(batch, "strike", counted)
+    monkeypatch.setattr(batch, "strike_of_case", counted)
     monkeypatch.setattr(strike_table, "strike_of_case", counted)
     vary = {"velocity": np.linspace(60.0, 115.0, 8).tolist(), "k": np.linspace(1e6, 2e6, 8)}
     assert sweep(ROD, {**vary, "k": vary["k"].tolist()}).completed.all()

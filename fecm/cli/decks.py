@@ -99,6 +99,7 @@ def _failures(decks: Sequence[Path], work: Callable[[Path], None]) -> list[Excep
 
 
 @click.command(
+    "check",
     short_help="Check decks without running them, and summarise them.",
     epilog=typical(
         "fecm check impact-patch.inp",
@@ -267,6 +268,7 @@ def _location(deck: Path, finding: Finding) -> dict[str, Any]:
 
 
 @click.command(
+    "fmt",
     short_help="Align the columns of decks.",
     epilog=typical(
         "fecm fmt impact-patch.inp -o aligned.inp",

@@ -103,10 +103,11 @@ def _tolerances(text: str) -> Tolerances:
 
 
 @click.command(
+    "diff",
     epilog=typical(
         "fecm diff a.h5 b.h5 --rtol 1e-6",
         "fecm diff a.h5 tapes --only tape9/force",
-    )
+    ),
 )
 @click.argument("a", type=NAMED_PATH)
 @click.argument("b", type=NAMED_PATH)

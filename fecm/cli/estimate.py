@@ -13,10 +13,11 @@ from fecm.sweeps.estimate import estimate_problem
 
 
 @click.command(
+    "estimate",
     epilog=typical(
         "fecm estimate drop-weight.inp",
         "fecm estimate impact-patch.inp --format json",
-    )
+    ),
 )
 @click.argument("deck", type=DECK_PATH)
 @FORMAT_OPTION

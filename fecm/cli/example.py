@@ -13,6 +13,7 @@ from fecm.cli.options import FILE_PATH, Parsed, typical
 
 
 @click.command(
+    "example",
     short_help="List the example decks and tables, or write one.",
     epilog=typical(
         "fecm example",

@@ -22,10 +22,11 @@ from fecm.results.tapes import tape_texts, write_tapes
 
 
 @click.command(
+    "tapes",
     epilog=typical(
         "fecm tapes impact-patch.h5",
         "fecm tapes impact-patch.h5 -d tapes",
-    )
+    ),
 )
 @click.argument("result", type=DECK_PATH)
 @click.option(
@@ -38,7 +39,7 @@ from fecm.results.tapes import tape_texts, write_tapes
 )
 @click.option("--overwrite", is_flag=True, help="Replace existing tapes.")
 @reads("result")
-def tapes(result: Path, directory: Path, overwrite: bool) -> None:
+def tapes_command(result: Path, directory: Path, overwrite: bool) -> None:
     """Write tape3, tape8 and tape9 of RESULT as text, in the original program's formats."""
     loaded = load(result)
     if directory.is_dir():
@@ -50,10 +51,11 @@ def tapes(result: Path, directory: Path, overwrite: bool) -> None:
 
 
 @click.command(
+    "export",
     epilog=typical(
         "fecm export impact-patch.h5 --to vtkhdf",
         "fecm export impact-patch.h5 --to csv --dataset energy",
-    )
+    ),
 )
 @click.argument("result", type=DECK_PATH)
 @click.option(

@@ -54,10 +54,11 @@ class IdentifyOptions:
 
 
 @click.command(
+    "identify",
     epilog=typical(
         "fecm identify impact-patch.inp measured-force.csv --free k",
         "fecm identify impact-patch.inp measured-force.csv --free k,velocity --plot fit.png",
-    )
+    ),
 )
 @click.argument("deck", type=DECK_PATH)
 @click.argument("measured", type=DECK_PATH, metavar="MEASURED.csv")
@@ -119,7 +120,7 @@ def identify_command(options: IdentifyOptions) -> None:
     units = unit_names(problem.deck)
     measured = measurement_of(options.measured, units, options.columns or (), options.units or ())
     found = _fit(problem.deck, measured, options)
-    targets.draw("histories:fit_picture", found, units)
+    targets.draw("histories:force_fit_picture", found, units)
     if output is not None:
         write_lines([found.deck.to_text()], output, overwrite=overwrite)
         note(f"wrote {output}")

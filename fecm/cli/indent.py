@@ -47,7 +47,7 @@ from fecm.studies.indentation_test.turns import read_test
 PARAMETERS = ("acr", "columns", "units")  # of fits, which messages name
 
 
-@click.group(cls=HelpGroup)
+@click.group("indent", cls=HelpGroup)
 def indent_command() -> None:
     """Indentation tests and the law of contact (the report's chapter 3)."""
 
@@ -124,7 +124,9 @@ def fit_command(options: FitOptions) -> None:
     except StudyError as error:
         raise RefusedError(as_options(f"{test}: {error}", PARAMETERS)) from None
     names = {**read.units, "time": "s"} if read.units else {}
-    options.targets.draw("studies:fit_picture", read.indentation, read.force, found.fit, names)
+    options.targets.draw(
+        "studies:indentation_fit_picture", read.indentation, read.force, found.fit, names
+    )
     note(*(as_options(text, PARAMETERS) for text in found.notes))
     if options.form is Format.JSON:
         click.echo(json.dumps({"file": str(test), **found.to_dict()}))

@@ -57,6 +57,7 @@ def _system(context: click.Context, _: object, asked: bool) -> None:
 
 
 @click.command(
+    "info",
     short_help="Describe the contents of RESULT.",
     epilog=typical(
         "fecm info impact-patch.h5",

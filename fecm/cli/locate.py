@@ -50,10 +50,11 @@ class LocateOptions:
 
 
 @click.command(
+    "locate",
     epilog=typical(
         "fecm locate panel-with-gages.inp panel-strains.csv",
         "fecm locate panel-with-gages.inp panel-strains.csv --mass 2e-5 --plot located.png",
-    )
+    ),
 )
 @click.argument("deck", type=DECK_PATH)
 @click.argument("strains", type=DECK_PATH, metavar="STRAINS.csv")

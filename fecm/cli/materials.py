@@ -20,10 +20,11 @@ LINES = (
 
 
 @click.command(
+    "materials",
     epilog=typical(
         "fecm materials own-plies.toml",
         "fecm materials --units mm-ms-kg --format json",
-    )
+    ),
 )
 @click.argument("plies", type=PLIES, metavar="[FILE.toml]", required=False)
 @click.option(

@@ -165,6 +165,7 @@ class NewOptions:
 
 
 @click.command(
+    "new",
     cls=GroupedCommand,
     groups=GROUPS,
     short_help="Write a deck from plate, layup, supports and impact.",

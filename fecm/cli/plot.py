@@ -79,6 +79,7 @@ class PlotOptions:
 
 
 @click.command(
+    "plot",
     short_help="Draw the report's figures, or the map of a sweep.",
     epilog=typical(
         "fecm plot impact-patch.h5 --kind force --kind loop",

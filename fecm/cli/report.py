@@ -17,6 +17,7 @@ from fecm.results.schema import Form
 
 
 @click.command(
+    "report",
     epilog=typical(
         "fecm report impact-patch.h5",
         "fecm report thin.h5 thick.h5 -o comparison.html",

@@ -60,7 +60,7 @@ class _PulseGroup(HelpGroup):
         return super().parse_args(ctx, args)
 
 
-@click.group(cls=_PulseGroup)
+@click.group("rod", cls=_PulseGroup)
 def rod_command() -> None:
     """The projectile's rod by itself: response to a pulse, filters, calibration.
 

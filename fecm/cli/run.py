@@ -135,6 +135,7 @@ def _outputs(path: Path, printed: Path | None) -> list[Path]:
 
 
 @click.command(
+    "run",
     cls=GroupedCommand,
     groups=GROUPS,
     epilog=typical(

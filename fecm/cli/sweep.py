@@ -184,6 +184,7 @@ def _checked_vary(text: str) -> str:
 
 
 @click.command(
+    "sweep",
     cls=GroupedCommand,
     groups=GROUPS,
     epilog=typical(

@@ -14,10 +14,11 @@ from fecm.verification.case import table_lines, verification_page
 
 
 @click.command(
+    "verify",
     epilog=typical(
         "fecm verify",
         "fecm verify --list",
-    )
+    ),
 )
 @click.argument("cases", nargs=-1, metavar="[CASE]...")
 @click.option("--list", "listing", is_flag=True, help="List the cases without computing them.")

@@ -158,7 +158,7 @@ def _normals(step: float) -> list[float]:
     return [n * step for n in range(count)] + [min(360.0, count * step)]
 
 
-@click.group(cls=HelpGroup)
+@click.group("waves", cls=HelpGroup)
 def waves_command() -> None:
     """Waves in the laminate of a DECK, or of a layup: the report's chapter 2, for any laminate."""
 
@@ -212,7 +212,7 @@ def dispersion_command(
         for row, wavelength in enumerate(curve.wavelength.tolist())
         for place, mode in enumerate(curve.modes)
     )
-    targets.draw("waves:dispersion_picture", waves.medium, curves)
+    targets.draw("studies:dispersion_picture", waves.medium, curves)
     dimensions = {
         "angle_deg": "",
         "wavelength_over_h": "",
@@ -237,7 +237,7 @@ def speeds(step: float, source: LaminateSource, targets: OutputPaths) -> None:
     waves = source.waves()
     fronts = waves.fronts(_normals(step))
     rows = np.column_stack([fronts.normal, fronts.velocity]).tolist()
-    targets.draw("waves:speeds_picture", waves.surfaces, waves.units)
+    targets.draw("studies:speeds_picture", waves.surfaces, waves.units)
     _note_names(waves)
     targets.write({"angle_deg": "", **dict.fromkeys(fronts.modes, VELOCITY)}, waves.units, rows)
 
@@ -289,7 +289,7 @@ def fronts(
         for row, normal in enumerate(normals)
         for at, time in enumerate(times)
     )
-    targets.draw("waves:fronts_picture", waves.surfaces, times, start, waves.units)
+    targets.draw("studies:fronts_picture", waves.surfaces, times, start, waves.units)
     _note_names(waves)
     for time in times:
         cusps = waves.cusps(time, start)

@@ -93,7 +93,7 @@ KINDS: dict[str, Drawing] = {
         "histories:energy", Shows.RUNS, "energies of plate and projectile against time"
     ),
     PictureKind.STRAIN: Drawing(
-        "strains:strain", Shows.RUNS, "surface strain at points against time"
+        "histories:strain_picture", Shows.RUNS, "surface strain at points against time"
     ),
     PictureKind.THICKNESS: Drawing(
         "thickness:thickness", Shows.RUN, "ply stresses through the thickness of an element"
@@ -102,16 +102,16 @@ KINDS: dict[str, Drawing] = {
         "failure:failure", Shows.RUN, "largest exposures over the plate and of every ply"
     ),
     PictureKind.LINE: Drawing(
-        "plate:line", Shows.RUNS, "deflection along a line through the impact point"
+        "plate:line_picture", Shows.RUNS, "deflection along a line through the impact point"
     ),
     PictureKind.CONTOUR: Drawing(
         "plate:contour", Shows.RUN, "deflection of the plate, seen from above"
     ),
-    PictureKind.SURFACE: Drawing("surface:surface", Shows.RUN, "the deflected plate"),
+    PictureKind.SURFACE: Drawing("plate:surface_picture", Shows.RUN, "the deflected plate"),
     PictureKind.MESH: Drawing(
-        "mesh:mesh", Shows.RUN, "mesh, supports, impact point and contact patch"
+        "mesh:mesh_picture", Shows.RUN, "mesh, supports, impact point and contact patch"
     ),
-    PictureKind.ANIMATION: Drawing("surface:animation", Shows.RUN, "the moving plate", (".gif",)),
+    PictureKind.ANIMATION: Drawing("plate:animation", Shows.RUN, "the moving plate", (".gif",)),
     PictureKind.MAP: Drawing(
         "maps:parameter_map", Shows.SWEEP, "a quantity of a sweep over its parameters"
     ),

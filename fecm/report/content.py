@@ -62,12 +62,12 @@ class Judgement:
 
 @frozen
 class PageBlock:
-    """A part of a section; each kind has its template, a macro of this name in page.html."""
+    """A part of a section; each kind has its template, a macro in page.html."""
 
     @property
     def kind(self) -> str:
         """Name of the macro."""
-        return type(self).__name__.lower()
+        return type(self).__name__.removeprefix("Page").lower()
 
 
 @frozen

@@ -1,8 +1,9 @@
 """Plan of a sweep: its cases, and the tasks that compute them.
 
-A study (grid, cases, random, refine) gives cases.  A plan has them and what they have in common,
-:class:`Settings`.  :func:`tasks` splits it; :func:`fecm.sweeps.batch.run_task` computes
-the outcome of a task, and :func:`fecm.sweeps.result.sweep_result` makes the result of the plan from all outcomes.
+A study (grid, cases, random, refine) gives cases. A plan has them and what they have in common,
+:class:`Settings`. :func:`tasks` splits it; :func:`fecm.sweeps.batch.run_task` computes the outcome
+of a task, and :func:`fecm.sweeps.result.sweep_result` makes the result of the plan from all
+outcomes.
 """
 
 from __future__ import annotations
