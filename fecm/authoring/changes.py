@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any, TypedDict
@@ -15,7 +15,7 @@ from fecm.authoring.values import NAMES, check_known, dimension_of
 from fecm.authoring.vary import apply_case
 from fecm.deck.catalogue import system_of
 from fecm.deck.findings import DeckError
-from fecm.deck.macros import compile_program
+from fecm.deck.macros import Macro, compile_program, with_outputs
 from fecm.deck.model import END, MACROS, STOP, TITLE, Deck, Nonlinear
 from fecm.deck.reader import Reader
 
@@ -147,6 +147,23 @@ def _on_the_clock(deck: Deck, made: Deck, case: Case) -> Deck:
         if (clock := clock_of(check_deck(deck))) is not None:
             return with_clock(made, clock, case).deck
     return made
+
+
+def with_program(
+    deck: Deck,
+    macros: str | Sequence[Macro] | None = None,
+    *,
+    every: int | None = None,
+    plies: int | bool | tuple[int, int] | None = None,
+    failure: int | bool | None = None,
+) -> Deck:
+    """Return a deck with another macro program; see :meth:`fecm.Deck.with_program`."""
+    if isinstance(macros, str):
+        deck = with_cards(deck, macros)
+    elif macros is not None:
+        deck = replace(deck, macros=tuple(macros))
+    program = with_outputs(deck.macros, every=every, plies=plies, failure=failure)
+    return replace(deck, macros=program, text="")
 
 
 def with_cards(deck: Deck, cards: str) -> Deck:

@@ -8,11 +8,12 @@ and elements between them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field, replace
+from dataclasses import field
 from textwrap import shorten
 from typing import TYPE_CHECKING, TypeVar, Unpack
 
 from fecm._dataclasses import frozen
+from fecm._methods import function_of
 from fecm._text import html_table
 from fecm.deck.card import Control, Record
 from fecm.deck.impact_cards import Impact, Indentation, Patch, Projectile, RodDiameter
@@ -220,9 +221,8 @@ class Deck(Record):
         >>> "PROJ" in deck.with_(projectile=fecm.RigidMass(1e-4)).to_text()
         True
         """
-        from fecm.authoring.changes import with_values  # the one module that climbs
-
-        return with_values(self, values)
+        changed: Deck = function_of("Deck.with_")(self, values)
+        return changed
 
     def with_program(
         self,
@@ -264,17 +264,10 @@ class Deck(Record):
         >>> [macro.value for macro in deck.with_program("LMAS\nEIGE,3").macros]
         [0.0, 3.0]
         """
-        from fecm.deck.macros import with_outputs  # 1 ms, and only what changes programs needs it
-
-        deck = self
-        if isinstance(macros, str):
-            from fecm.authoring.changes import with_cards
-
-            deck = with_cards(self, macros)
-        elif macros is not None:
-            deck = replace(self, macros=tuple(macros))
-        made = with_outputs(deck.macros, every=every, plies=plies, failure=failure)
-        return replace(deck, macros=made, text="")
+        changed: Deck = function_of("Deck.with_program")(
+            self, macros, every=every, plies=plies, failure=failure
+        )
+        return changed
 
     def to_text(self) -> str:
         """Write the problem as cards, ended by STOP; reading them gives the same model.

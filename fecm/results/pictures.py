@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from fecm._files import ARGUMENT
+from fecm._methods import function_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,15 +40,11 @@ def plot_results(
     **options: Any,
 ) -> Axes:
     """Draw results by their names in the legend; see :func:`fecm.plot.pictures.draw_results`."""
-    # The one import that climbs: whoever draws nothing can do without the room of pictures.
-    from fecm.plot import pictures
-
-    return pictures.draw_results(kind, results, path, ax, overwrite=overwrite, **options)
+    axes: Axes = function_of("Result.plot")(kind, results, path, ax, overwrite=overwrite, **options)
+    return axes
 
 
 def report_results(results: Mapping[str, Any], path: str | Path, *, overwrite: bool) -> None:
     """Write the page about results by their names; see :func:`fecm.report.report.write_report`."""
-    # As above: whoever hands nothing on can do without the room of reports.
-    from fecm.report.report import write_report
-
+    write_report = function_of("Result.report")
     write_report(results, Path(path), overwrite=overwrite, allowed_by=ARGUMENT)
