@@ -14,8 +14,9 @@ from importlib import import_module as _import_module
 from pathlib import Path as _Path
 
 from fecm import _methods
-from fecm._errors import FecmError, FecmWarning
-from fecm._version import __version__
+from fecm._errors import FecmError as FecmError
+from fecm._errors import FecmWarning as FecmWarning
+from fecm._version import __version__ as __version__
 
 _methods.FUNCTIONS.update(
     {

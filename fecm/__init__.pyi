@@ -48,10 +48,11 @@ from fecm.studies.rod_test.study import pulse_test as pulse_test
 from fecm.studies.waves.study import waves as waves
 from fecm.sweeps.api import sweep as sweep
 from fecm.sweeps.estimate import estimate as estimate
-from fecm.sweeps.files import load_sweep as load_sweep
 from fecm.sweeps.mesh_error import MeshErrorEstimate as MeshErrorEstimate
 from fecm.sweeps.mesh_error import mesh_error as mesh_error
 from fecm.sweeps.result import SweepResult as SweepResult
+from fecm.sweeps.result import load_sweep as load_sweep
 from fecm.verification import verify as verify
 
 __version__: str
+__all__: list[str]

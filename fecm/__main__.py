@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import atexit
 import contextlib
 import gc
 import os
 import signal
-import sys
 from types import FrameType
 from typing import NoReturn
 
@@ -56,35 +54,8 @@ def _run() -> NoReturn:
         _refuse(f"a part of the program can't be loaded: {line}")
     try:
         run()
-    except SystemExit as left:
-        if isinstance(left.code, int) and not _is_watched():
-            _end(left.code)
-        raise
-
-
-def _is_watched() -> bool:
-    """Whether a debugger, a profiler or a thread waits for the end of the program."""
-    from threading import active_count  # which the command line has imported
-
-    if sys.gettrace() or sys.getprofile() or active_count() > 1:
-        return True
-    return sys.version_info >= (3, 12) and any(map(sys.monitoring.get_tool, range(6)))
-
-
-def _end(status: int) -> NoReturn:
-    """End the process as the interpreter does, but without freeing each object: 10 ms."""
-    atexit._run_exitfuncs()
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError, ValueError):
-            stream.flush()
-    os._exit(status)
-
-
-# CPython keeps the frames of calls in blocks of 16 KB, and unmaps a block when its first frame
-# returns.  Imports nested so deeply that they cross the end of a block would map and unmap one
-# thousands of times: 7 ms of a short run, 90 ms where SciPy is imported.  All calls below a frame
-# of 256 KB share its block.
-_run.__code__ = _run.__code__.replace(co_stacksize=2**15)
+    finally:
+        gc.freeze()  # nothing is left to collect: the interpreter need not look for garbage at exit
 
 
 if __name__ == "__main__":

@@ -16,10 +16,10 @@ from collections.abc import Mapping, Sequence
 from itertools import chain
 from pathlib import Path
 from types import MappingProxyType
+from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._errors import StudyError, warn
 from fecm._inputs import decoded, lines_of, read_input
 from fecm._machine import require_memory
@@ -84,8 +84,7 @@ _BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
 _SEPARATOR = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
 
 
-@frozen
-class MeasuredTable:
+class MeasuredTable(NamedTuple):
     """Rows of a file below the names and units of its columns; both are empty if it has none."""
 
     path: Path

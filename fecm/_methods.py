@@ -1,8 +1,8 @@
 """Methods of lower rooms that upper rooms carry out.
 
-``Deck.with_`` needs the values of sweeps and ``Result.plot`` the pictures, but decks and results know
-neither.  The package ``fecm``, which knows all rooms, names the function of each such method; the
-function is imported when the method is called.
+``Deck.with_`` needs the values of sweeps and ``Result.plot`` needs the pictures, but decks and
+results know neither.  The package ``fecm``, which knows all rooms, names the function of each such
+method.  The function is imported when the method is called.
 """
 
 from __future__ import annotations

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from itertools import zip_longest
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
-from fecm._dataclasses import frozen
 from fecm._errors import OptionsError, warn, warn_once
 from fecm._files import ARGUMENT, check_outputs
 from fecm._progress import once_a_minute
@@ -50,8 +50,7 @@ Progress = Callable[[int, int], object]
 LOGGER = logging.getLogger("fecm")
 
 
-@frozen
-class LoadedDeck:
+class LoadedDeck(NamedTuple):
     """A file that was read and checked."""
 
     source: str  # its name
@@ -88,7 +87,7 @@ def load_deck(path_or_text: str | Path | AnyFile | Deck, mode: str = REPORT) -> 
     return LoadedDeck(source, problems, list(reader.findings))
 
 
-@frozen
+@dataclass(frozen=True)
 class DeckCheck:
     """What is known of a deck before it runs; ``str()`` is what ``fecm check`` prints.
 

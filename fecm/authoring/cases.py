@@ -16,6 +16,7 @@ from typing import Any, Protocol, runtime_checkable
 
 import numpy as np
 
+from fecm._errors import StudyError
 from fecm._measured_tables import read_table
 from fecm.authoring.case import MOST_CASES, Case, CasesError, Value, check_count, number_of_text
 from fecm.authoring.values import (
@@ -28,7 +29,6 @@ from fecm.authoring.values import (
     value_of,
     without_unit,
 )
-from fecm.studies import StudyError
 
 
 def read_cases(path: Path, system: str | None = None) -> list[Case]:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
-from fecm._dataclasses import frozen
 from fecm.authoring.laminate import DeckPlies
 from fecm.authoring.parameters import ObjectError, check_numbers, check_positive
 from fecm.authoring.plate import DropWeight
@@ -33,7 +33,7 @@ SOFT_TIP = 0.3  # modulus of a tip over E2, below which its contact is wide
 PATCHES = {"disc": DISC, "hertz": HERTZ}
 
 
-@frozen
+@dataclass(frozen=True)
 class Sphere:
     """Elastic contact of a sphere, its k estimated from the ply's constants."""
 
@@ -121,7 +121,7 @@ def doubts_of_soft_tip(
     ]
 
 
-@frozen
+@dataclass(frozen=True)
 class Contact(Indentation):
     """Measured indentation law in the deck's units; :meth:`named` and :meth:`estimate` find one.
 

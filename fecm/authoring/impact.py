@@ -6,10 +6,9 @@ The deck of an impact from plate, laminate, projectile and contact.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, get_args
 
-from fecm._dataclasses import frozen
 from fecm._errors import warn
 from fecm.api import load_deck
 from fecm.authoring.contact import (
@@ -96,7 +95,7 @@ AnyProjectile = Rod | RigidMass | model.Projectile
 GagePlace = tuple[float, float, float, float]  # x, y, z and degrees
 
 
-@frozen
+@dataclass(frozen=True)
 class ImpactParameters:
     """What hits the plate, how fast and where."""
 
@@ -107,8 +106,7 @@ class ImpactParameters:
     at: tuple[float, float] | None = None
 
 
-@frozen
-class Request:
+class Request(NamedTuple):
     """What :func:`impact` and ``fecm new`` are asked for; see there."""
 
     plate: Plate
@@ -158,8 +156,7 @@ class Motion(NamedTuple):
     duration: float | None
 
 
-@frozen
-class Authored:
+class Authored(NamedTuple):
     """A new deck, not yet checked."""
 
     deck: model.Deck

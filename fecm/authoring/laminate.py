@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from textwrap import shorten
 from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._errors import did_you_mean
 from fecm._text import html_table
 from fecm._typing import Floats
@@ -69,7 +68,7 @@ class LaminatePly(NamedTuple):
     thickness: float | None = None  # length; None if the layup has none
 
 
-@frozen
+@dataclass(frozen=True)
 class Laminate:
     """Layup of a plate, and its stiffness.
 

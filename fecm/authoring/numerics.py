@@ -10,7 +10,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
-from fecm._dataclasses import frozen
 from fecm.api import load_deck
 from fecm.authoring.contact import parse_patch
 from fecm.authoring.parameters import ObjectError, check_positive
@@ -40,8 +39,7 @@ MITC: Quadrature = "mitc"
 FULL: Quadrature = "full"
 
 
-@frozen
-class Numerics:
+class Numerics(NamedTuple):
     """How an impact is computed."""
 
     patch: str | Patch | None = AUTO

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
-from fecm._dataclasses import frozen
 from fecm._errors import warn
 from fecm.authoring.contact import AnyContact, Sphere, indentation_law
 from fecm.authoring.impact import AnyProjectile, doubts_of_core
@@ -32,8 +32,7 @@ from fecm.problem.parts import is_coupled, is_curved
 OF_MESH: tuple[type[model.Segment], ...] = (model.Coordinates, model.Elements, model.Boundary)
 
 
-@frozen
-class Objects:
+class Objects(NamedTuple):
     """Objects that replace parts of a deck; None leaves a part as it is."""
 
     plate: Plate | None = None

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Literal, Self
+from typing import Literal, NamedTuple, Self
 
 from numpy.typing import ArrayLike
 
-from fecm._dataclasses import frozen
 from fecm._text import html_table
 from fecm.authoring.parameters import ObjectError, check_positive, number_pair
 from fecm.deck import grid as grids
@@ -24,8 +23,7 @@ from fecm.problem.plate_mesh import BOUNDARY, GridLike, MeshLike, PlateMesh
 CUSTOM = "window:LXxLY,WXxWY"
 
 
-@frozen
-class DropWeight:
+class DropWeight(NamedTuple):
     """What a test standard prescribes besides its fixture, in mm, N, s and t."""
 
     mass: float  # of the rigid projectile
@@ -40,8 +38,7 @@ class DropWeight:
         return self.thinnest <= round(thickness, 9) <= self.thickest
 
 
-@frozen
-class Fixture:
+class Fixture(NamedTuple):
     """A plate on the edges of a window in its middle."""
 
     name: str
@@ -89,7 +86,7 @@ WINDOW_GRADING = 3.0
 Support = Literal["free", "simple", "pinned", "clamped"]
 
 
-@frozen
+@dataclass(frozen=True)
 class Plate:
     """Mesh and supports of a plate.
 

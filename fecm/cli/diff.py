@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 from click import option
 
-from fecm._dataclasses import frozen
 from fecm._inputs import parsed_toml
 from fecm._text import printable
 from fecm.cli.common import FAILED, echo_json
@@ -29,8 +29,7 @@ from fecm.cli.options import (
 from fecm.results.diff import diff as compare
 
 
-@frozen
-class Tolerances:
+class Tolerances(NamedTuple):
     """Tolerances, patterns that are left out, and patterns with tolerances of their own."""
 
     rtol: float | None = None
@@ -39,7 +38,7 @@ class Tolerances:
     own: tuple[tuple[str, tuple[float, ...]], ...] = ()
 
 
-@frozen
+@dataclass(frozen=True)
 class DiffOptions:
     """Arguments and options of ``fecm diff``."""
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 from click import option
 
-from fecm._dataclasses import frozen
 from fecm.cli.common import DASH, FAILED, echo, echo_json, every_minute, note
 from fecm.cli.decks import load_single
 from fecm.cli.options import (
@@ -35,7 +35,7 @@ from fecm.results.comparison import Measurement, measurement_of
 from fecm.studies.rod_test.filters import Filter, filter_of
 
 
-@frozen
+@dataclass(frozen=True)
 class IdentifyOptions:
     """Arguments and options of ``fecm identify``."""
 

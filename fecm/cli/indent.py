@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import json
 import math
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 import numpy as np
 from click import option
 
-from fecm._dataclasses import frozen
 from fecm.cli.common import RefusedError, echo, note
 from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options
 from fecm.cli.options import (
@@ -52,7 +52,7 @@ def indent_command() -> None:
     """Indentation tests and the law of contact (the report's chapter 3)."""
 
 
-@frozen
+@dataclass(frozen=True)
 class FitOptions:
     """Argument and options of ``fecm indent fit``."""
 
@@ -150,7 +150,7 @@ def _law(deck: Path) -> tuple[Deck, Indentation]:
     return laws[0]
 
 
-@frozen
+@dataclass(frozen=True)
 class CurveOptions:
     """Argument and options of ``fecm indent curve``."""
 
@@ -293,7 +293,7 @@ def _report_length(deck: Deck, value: float, name: str, flag: str) -> float:
     return convert(value, "length", catalogue.SYSTEM, f"{unit}-N-s")
 
 
-@frozen
+@dataclass(frozen=True)
 class SphereOptions:
     """An indenter."""
 
@@ -309,7 +309,7 @@ class SphereOptions:
             raise click.UsageError(str(error)) from None
 
 
-@frozen
+@dataclass(frozen=True)
 class CardOptions:
     """Parameters of an EXPE card besides its coefficient."""
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import NoReturn, TypeVar
 
 import click
 from click import option
 
-from fecm._dataclasses import frozen
 from fecm.authoring.laminate import Laminate as AuthoredLaminate
 from fecm.cli.options import (
     POSITIVE,
@@ -36,7 +36,7 @@ LETTER = "[A-Z]"  # name of a material in a layup
 CORE = "K"  # letter of a core that has no other
 
 
-@frozen
+@dataclass(frozen=True)
 class LaminateOptions:
     """Layup and plies; values by the letter of a material, empty for plies without one."""
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 from click import option
 
-from fecm._dataclasses import frozen
 from fecm.cli.common import DASH, FAILED, echo, echo_json, every_minute, note
 from fecm.cli.decks import load_single
 from fecm.cli.interrupts import signals
@@ -29,7 +29,7 @@ from fecm.location.prepare import LocationSettings
 from fecm.location.summary import location_lines, values
 
 
-@frozen
+@dataclass(frozen=True)
 class LocateOptions:
     """Arguments and options of ``fecm locate``."""
 

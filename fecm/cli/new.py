@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
@@ -10,7 +11,6 @@ import click
 from click import option
 from click.core import ParameterSource
 
-from fecm._dataclasses import frozen
 from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.authoring.contact import Sphere, parse_patch
@@ -90,7 +90,7 @@ GROUPS = {
 }
 
 
-@frozen
+@dataclass(frozen=True)
 class NewOptions:
     """Argument and options of ``fecm new``."""
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from click import option
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmWarning
 from fecm._files import check_outputs
 from fecm._text import printable
@@ -52,7 +52,7 @@ def _by_name(_: Any, __: Any, pairs: tuple[tuple[str, str], ...]) -> dict[str, s
     return values
 
 
-@frozen
+@dataclass(frozen=True)
 class PlotOptions:
     """Options of kinds of pictures, with the names that their functions give them."""
 

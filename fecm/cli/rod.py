@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 import numpy as np
 from click import option
 
-from fecm._dataclasses import frozen
 from fecm._measured_tables import read_table
 from fecm.cli.common import DASH, RefusedError, note
 from fecm.cli.decks import load_valid
@@ -68,7 +68,7 @@ def rod_command() -> None:
     """
 
 
-@frozen
+@dataclass(frozen=True)
 class Shape:
     """A uniform rod, and the system of its units."""
 
@@ -84,7 +84,7 @@ class Shape:
         return [name for name, value in vars(self).items() if value is not None]
 
 
-@frozen
+@dataclass(frozen=True)
 class PulseOptions:
     """Argument and options of ``fecm rod pulse``."""
 

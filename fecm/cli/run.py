@@ -6,12 +6,13 @@ import contextlib
 import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import click
 from click import option
 
-from fecm._dataclasses import frozen
 from fecm._files import check_outputs, open_for_writing
 from fecm._machine import format_bytes
 from fecm.api import numbered
@@ -76,7 +77,7 @@ GROUPS = {
 }
 
 
-@frozen
+@dataclass(frozen=True)
 class RunOptionsOfCommand:
     """Argument and options of ``fecm run``."""
 
@@ -113,8 +114,7 @@ class RunOptionsOfCommand:
         )
 
 
-@frozen
-class Job:
+class Job(NamedTuple):
     """A problem of the deck, and its files."""
 
     problem: Problem

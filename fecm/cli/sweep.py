@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import click
 from click import option
 
-from fecm._dataclasses import frozen
 from fecm._files import check_outputs
 from fecm.api import load_deck
 from fecm.authoring.case import Case, CasesError, Limit, parse_exceed
@@ -102,7 +102,7 @@ GROUPS = {
 }
 
 
-@frozen
+@dataclass(frozen=True)
 class SweepOptions:
     """Argument and options of ``fecm sweep``; those of :func:`fecm.sweep` have its names."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,6 @@ import click
 import numpy as np
 from click import option
 
-from fecm._dataclasses import frozen
 from fecm.authoring.parameters import ObjectError
 from fecm.cli.common import RefusedError, note
 from fecm.cli.decks import load_valid
@@ -89,7 +89,7 @@ def _is_number(text: str) -> bool:
     return True
 
 
-@frozen
+@dataclass(frozen=True)
 class LaminateSource:
     """Where a laminate comes from: a deck, or options."""
 

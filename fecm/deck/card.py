@@ -17,9 +17,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from functools import cache, lru_cache
-from typing import Any, ClassVar, Self
+from typing import Any, ClassVar, NamedTuple, Self
 
-from fecm._dataclasses import frozen
 from fecm.deck.findings import CardPlace
 
 LONGEST = 100  # characters of the longest number that is read
@@ -126,8 +125,7 @@ class FieldKind(StrEnum):
     WORD = "A"
 
 
-@frozen
-class Field:
+class Field(NamedTuple):
     """A field of a card: name, kind, columns, and a label for rulers.
 
     A blank number is 0; with `has_default` it is read as :data:`BLANK` and the record has its
@@ -232,8 +230,7 @@ class Card:
         return pieces
 
 
-@frozen
-class CardSource:
+class CardSource(NamedTuple):
     """Source of a record: its card and the fields of the card."""
 
     card: Card
@@ -283,7 +280,7 @@ def _free(value: Value) -> str:
     return f"{digits}E{int(exponent)}" if exponential else digits
 
 
-@frozen
+@dataclass(frozen=True)
 class Record:
     """Values of one card, as attributes in the card's order."""
 
@@ -332,7 +329,7 @@ class Record:
         return self.source.place(name) if self.source else None
 
 
-@frozen
+@dataclass(frozen=True)
 class Control(Record):
     """Control card: 6I5."""
 

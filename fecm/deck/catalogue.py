@@ -13,8 +13,8 @@ from dataclasses import replace
 from functools import cache
 from importlib import resources
 from pathlib import Path
+from typing import NamedTuple
 
-from fecm._dataclasses import frozen
 from fecm._errors import warn
 from fecm._inputs import lines_of, parsed_file, parsed_toml
 from fecm.deck.model import Allowables, Deck, Delamination, Expansion, Indentation, Ply
@@ -78,8 +78,7 @@ SOFT, LIGHT = 1e9, 800.0
 NU23 = 0.4  # of a ply whose nu23 is not known
 
 
-@frozen
-class NamedPly:
+class NamedPly(NamedTuple):
     """A ply with a name, which `fecm.Laminate` takes.
 
     Attributes
@@ -343,8 +342,7 @@ S_P = 0.094  # slope of the permanent over the maximum indentation
 ALPHA_CR = 3.16e-3  # critical indentation of equation 3-7, from reference 14
 
 
-@frozen
-class NamedContact:
+class NamedContact(NamedTuple):
     """A measured contact law with a name, which `fecm.impact` takes.
 
     Attributes

@@ -6,13 +6,13 @@ import math
 import re
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import accumulate, pairwise
 from typing import ClassVar, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm.deck.mesh_cards import (
     Boundary,
     Coordinates,
@@ -62,8 +62,7 @@ def held_in_plane(support: str, in_plane: str) -> str:
     return "held" if holds_both else in_plane
 
 
-@frozen
-class GridSection:
+class GridSection(NamedTuple):
     """A run of equally long elements in one direction."""
 
     start: float  # coordinates of its ends (length)
@@ -170,7 +169,7 @@ def grid_lines(sections: Sequence[GridSection]) -> list[float]:
     return [*found, sections[-1].end]
 
 
-@frozen
+@dataclass(frozen=True)
 class ElementGrid:
     """A grid of 9-node elements; node numbers run along x first."""
 

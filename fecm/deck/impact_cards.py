@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import ClassVar, Self
 
-from fecm._dataclasses import frozen
 from fecm.deck.card import Card, Control, Fields, Record, layout
 from fecm.deck.segment import CardStream, Segment
 
 
-@frozen
+@dataclass(frozen=True)
 class Impact(Segment, keyword="ROD"):
     """ROD: (2I5,F10.0); impact point and velocity."""
 
@@ -24,7 +23,7 @@ class Impact(Segment, keyword="ROD"):
     )
 
 
-@frozen
+@dataclass(frozen=True)
 class Indentation(Segment, keyword="EXPE"):
     """EXPE: (4F10.0); the measured indentation law, equations 3-1, 3-3 and 3-8.
 
@@ -85,7 +84,7 @@ class Indentation(Segment, keyword="EXPE"):
         yield from self.text().split("\n")
 
 
-@frozen
+@dataclass(frozen=True)
 class RodDiameter(Record):
     """PROJ card: (2I5,F10.0); an element's diameter (length), and the step to generated ones."""
 
@@ -96,7 +95,7 @@ class RodDiameter(Record):
     fields: ClassVar[Fields] = layout("I5 element|elm", "I5 increment|incr", "F10 diameter")
 
 
-@frozen
+@dataclass(frozen=True)
 class Projectile(Segment, keyword="PROJ"):
     """PROJ: (2I5,3F10.0) and, for a rod, its diameters; the projectile (not in the report)."""
 
@@ -136,7 +135,7 @@ class Projectile(Segment, keyword="PROJ"):
             yield ""
 
 
-@frozen
+@dataclass(frozen=True)
 class Patch(Segment, keyword="PATC"):
     """PATC: (A4,6X,4F10.0); the contact force acts on a circle (not in the report's program)."""
 

@@ -11,12 +11,11 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import Enum, auto
 from numbers import Integral
 from typing import ClassVar, NamedTuple
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm.deck.card import Fields, Record, Value, layout, parse_real
 from fecm.deck.findings import Findings
@@ -33,7 +32,7 @@ def without_points(values: Sequence[Value]) -> list[Value]:
     ]
 
 
-@frozen
+@dataclass(frozen=True)
 class Macro(Record):
     """A macro card: (A4,1X,A4,1X,2F5.0)."""
 
@@ -56,7 +55,7 @@ class Macro(Record):
         return without_points(super().row())
 
 
-@frozen
+@dataclass(frozen=True)
 class LoadTable(Record):
     """Card of PROP: (2I5,7F10.0), after the macro program's END."""
 
@@ -95,8 +94,7 @@ class MacroNumber(Enum):
     TOLERANCE = auto()  # positive
 
 
-@frozen
-class Word:
+class Word(NamedTuple):
     """A word of the macro language."""
 
     name: str  # up to four letters
@@ -167,7 +165,7 @@ WORDS = {
 STEPS = {"RODP", "EXCD"}  # words that take a time step
 
 
-@frozen
+@dataclass(frozen=True)
 class Loop:
     """A loop: its LOOP card, number of passes and body."""
 
@@ -324,8 +322,7 @@ def moves_only(body: Body) -> bool:
     return all(macro.word not in ("TANG", "FORM", "SOLV") for macro in flat(body))
 
 
-@frozen
-class WorkEstimate:
+class WorkEstimate(NamedTuple):
     """Work and output of a program; an upper bound where CONV may leave loops early."""
 
     macros: int  # executed macros; each pass of a loop executes its NEXT
@@ -387,8 +384,7 @@ class RowsError(FecmError, ValueError):
     """A program can't store what it is asked for."""
 
 
-@frozen
-class _Output:
+class _Output(NamedTuple):
     """A macro that stores rows."""
 
     word: str

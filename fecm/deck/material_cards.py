@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import compress
 from typing import ClassVar, Self
 
-from fecm._dataclasses import frozen
 from fecm.deck.card import (
     BLANK,
     Card,
@@ -24,7 +23,7 @@ from fecm.deck.segment import CardStream, Segment
 MATERIAL = 1  # number of the material and of the laminate of MATE
 
 
-@frozen
+@dataclass(frozen=True)
 class Integration(Record):
     """First card of MATE: (3I5,2F10.0)."""
 
@@ -47,7 +46,7 @@ class Integration(Record):
     )
 
 
-@frozen
+@dataclass(frozen=True)
 class Ply(Record):
     """Second card of MATE: (7F10.0); mass density and elastic constants of every layer."""
 
@@ -71,7 +70,7 @@ class Ply(Record):
     )
 
 
-@frozen
+@dataclass(frozen=True)
 class Layer(Record):
     """Layer card of MATE: (I5,F5.0,F10.0,I5); the number is not used for placing.
 
@@ -98,7 +97,7 @@ class Layer(Record):
         return super().to_card(fields or written)
 
 
-@frozen
+@dataclass(frozen=True)
 class Material(Segment, keyword="MATE"):
     """MATE: integration orders, ply constants and layers, the first layer at z = -h/2."""
 
@@ -142,7 +141,7 @@ def read_layers(head: Card, cards: CardStream, count: int, said: str) -> tuple[L
     return layers if len(layers) == count else None
 
 
-@frozen
+@dataclass(frozen=True)
 class Shear(Segment, keyword="SHEA"):
     """SHEA: (F10.0); treatment of transverse shear (not in the report's program)."""
 
@@ -185,7 +184,7 @@ class Shear(Segment, keyword="SHEA"):
             yield write_card(self.fields, [self.factor])
 
 
-@frozen
+@dataclass(frozen=True)
 class Allowables(Segment, keyword="ALLO"):
     """ALLO: (7F10.0,I5) and (3F10.0); strengths of plies (not in the report's program).
 
@@ -275,7 +274,7 @@ class Allowables(Segment, keyword="ALLO"):
         return next((one for one in (self, *self.others) if one.material == material), None)
 
 
-@frozen
+@dataclass(frozen=True)
 class Delamination(Segment, keyword="DELA"):
     """DELA: (2F10.0); toughness for the delamination threshold (not in the report's program)."""
 
@@ -285,7 +284,7 @@ class Delamination(Segment, keyword="DELA"):
     fields: ClassVar[Fields] = layout("F10 G_IIc", "F10? number of delaminations|number")
 
 
-@frozen
+@dataclass(frozen=True)
 class Damping(Segment, keyword="DAMP"):
     """DAMP: (F10.0); mass-proportional damping of the plate (not in the report's program)."""
 
@@ -294,7 +293,7 @@ class Damping(Segment, keyword="DAMP"):
     fields: ClassVar[Fields] = layout("F10 a")
 
 
-@frozen
+@dataclass(frozen=True)
 class Nonlinear(Segment, keyword="NONL"):
     """NONL: the plate stretches as it bends, von Karman (not in the report's program)."""
 
@@ -308,7 +307,7 @@ class Nonlinear(Segment, keyword="NONL"):
         yield self.keyword
 
 
-@frozen
+@dataclass(frozen=True)
 class Preload(Segment, keyword="PREL"):
     """PREL: (3F10.0); uniform initial membrane force (not in the report's program)."""
 
@@ -325,7 +324,7 @@ class Preload(Segment, keyword="PREL"):
         return self.n_x, self.n_y, self.n_xy
 
 
-@frozen
+@dataclass(frozen=True)
 class Curvature(Segment, keyword="CURV"):
     """CURV: (3F10.0); radii of a shallow curved panel (not in the report's program)."""
 
@@ -344,7 +343,7 @@ class Curvature(Segment, keyword="CURV"):
         return x, y, xy
 
 
-@frozen
+@dataclass(frozen=True)
 class Expansion(Record):
     """CURE card: (I5,5X,4F10.0); free strains of a material along and across its fibres."""
 
@@ -365,7 +364,7 @@ class Expansion(Record):
     )
 
 
-@frozen
+@dataclass(frozen=True)
 class Cure(Segment, keyword="CURE"):
     """CURE: (2F10.0) and expansions; what has happened since the plies were free of stress.
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
-from fecm._dataclasses import frozen
 from fecm.deck.card import Control, Fields, Record, layout
 from fecm.deck.segment import NumberedSegment
 
@@ -14,7 +14,7 @@ NODES_AN_ELEMENT = (3, 12)  # smallest and largest number of nodes per element
 NODE = ("I5 node", "I5 increment|incr")  # first fields of a card of a node
 
 
-@frozen
+@dataclass(frozen=True)
 class NodeValues(Record):
     """COOR or FORC card: values at a node, and the step to the next node generated from it."""
 
@@ -25,7 +25,7 @@ class NodeValues(Record):
     packed: ClassVar[slice] = slice(2, None)
 
 
-@frozen
+@dataclass(frozen=True)
 class NodeCodes(Record):
     """BOUN card: restraint codes of a node; a negative code carries on to generated nodes."""
 
@@ -36,7 +36,7 @@ class NodeCodes(Record):
     packed: ClassVar[slice] = slice(2, None)
 
 
-@frozen
+@dataclass(frozen=True)
 class ElementNodes(Record):
     """ELEM card: the nodes of an element (0 where absent) and the step for generated ones."""
 
@@ -47,7 +47,7 @@ class ElementNodes(Record):
     packed: ClassVar[slice] = slice(1, -1)
 
 
-@frozen
+@dataclass(frozen=True)
 class Coordinates(NumberedSegment[NodeValues], keyword="COOR", record=NodeValues):
     """COOR: (2I5,7F10.0); coordinates of the nodes (length), of which NDM are used."""
 
@@ -57,7 +57,7 @@ class Coordinates(NumberedSegment[NodeValues], keyword="COOR", record=NodeValues
         return layout(*NODE, *(f"F10 {axis}-coordinate|{axis}" for axis in AXES[: control.ndm]))
 
 
-@frozen
+@dataclass(frozen=True)
 class Elements(NumberedSegment[ElementNodes], keyword="ELEM", record=ElementNodes):
     """ELEM: (16I5); nodes of the elements; the increment follows the last of the NEN nodes."""
 
@@ -73,7 +73,7 @@ class Elements(NumberedSegment[ElementNodes], keyword="ELEM", record=ElementNode
         return isinstance(record, ElementNodes) and record.element >= control.numel
 
 
-@frozen
+@dataclass(frozen=True)
 class Boundary(NumberedSegment[NodeCodes], keyword="BOUN", record=NodeCodes):
     """BOUN: (16I5); restraint codes of the nodes; a dof with a code other than 0 is restrained."""
 
@@ -83,7 +83,7 @@ class Boundary(NumberedSegment[NodeCodes], keyword="BOUN", record=NodeCodes):
         return layout(*NODE, *(f"I5 code {i}|c{i}" for i in range(1, control.ndf + 1)))
 
 
-@frozen
+@dataclass(frozen=True)
 class Forces(NumberedSegment[NodeValues], keyword="FORC", record=NodeValues):
     """FORC: (2I5,7F10.0); nodal forces, or displacements where the dof is restrained."""
 

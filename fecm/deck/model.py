@@ -8,11 +8,10 @@ and elements between them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from textwrap import shorten
 from typing import TYPE_CHECKING, TypeVar, Unpack
 
-from fecm._dataclasses import frozen
 from fecm._methods import function_of
 from fecm._text import html_table
 from fecm.deck.card import Control, Record
@@ -104,7 +103,7 @@ SEGMENTS: dict[str, type[Segment]] = {
 _S = TypeVar("_S", bound=Segment)
 
 
-@frozen
+@dataclass(frozen=True)
 class Deck(Record):
     """One problem: everything from its FECM card to the END of its macro program.
 

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import ClassVar, Self
 
-from fecm._dataclasses import frozen
 from fecm.deck.card import Card, CardSource, Control, Fields, Record, layout
 from fecm.deck.segment import CardStream, NumberedSegment, Segment
 
 
-@frozen
+@dataclass(frozen=True)
 class Gage(Record):
     """GAGE card: (I5,5X,4F10.0); a strain gage."""
 
@@ -31,12 +31,12 @@ class Gage(Record):
     )
 
 
-@frozen
+@dataclass(frozen=True)
 class Gages(NumberedSegment[Gage], keyword="GAGE", record=Gage):
     """GAGE: strain gages, read at every step (not in the report's program)."""
 
 
-@frozen
+@dataclass(frozen=True)
 class Units(Segment, keyword="UNIT"):
     """UNIT: names of the deck's units, for output; nothing is converted."""
 
@@ -73,7 +73,7 @@ class Units(Segment, keyword="UNIT"):
         yield f"{self.length} {self.force} {self.time}"
 
 
-@frozen
+@dataclass(frozen=True)
 class PrintOption(Segment, keyword="PRIN"):
     """PRIN or NOPR: whether the data that follow are printed."""
 
@@ -91,7 +91,7 @@ class PrintOption(Segment, keyword="PRIN"):
         yield self.keyword if self.on else self.OFF
 
 
-@frozen
+@dataclass(frozen=True)
 class Page(Segment, keyword="PAGE"):
     """PAGE: the printer's carriage control at the head of each page, on a separate card."""
 

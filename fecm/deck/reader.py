@@ -8,10 +8,10 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
-from fecm._dataclasses import frozen, mutable
 from fecm._errors import OptionsError
 from fecm._inputs import InputError, decoded
 from fecm._machine import NotEnoughMemoryError, available_memory, format_bytes, require_memory
@@ -83,8 +83,7 @@ MOST_SEGMENTS = 20_000
 MOST_MACRO_CARDS = 100_000
 
 
-@frozen
-class OtherFile:
+class OtherFile(NamedTuple):
     """A file of another program."""
 
     lines: str  # pattern of one of its first lines, or of two
@@ -123,7 +122,7 @@ OTHER_FILES = (
 )
 
 
-@mutable
+@dataclass
 class ParsedProblem:
     """The readable part of a problem."""
 

@@ -7,9 +7,9 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Callable, Collection, Iterator, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, cast
 
-from fecm._dataclasses import frozen
 from fecm._inputs import lines_of
 from fecm.deck.card import Card, CardSource, Control, Fields, Record, Value
 from fecm.deck.findings import Findings
@@ -187,7 +187,7 @@ class CardStream:
             self.findings.add("E007", message, (following or head).place, hint)
 
 
-@frozen
+@dataclass(frozen=True)
 class Segment(Record):
     """A keyword card and the data that follow it: by default one card, the segment's own values."""
 
@@ -210,7 +210,7 @@ class Segment(Record):
         yield self.to_card()
 
 
-@frozen
+@dataclass(frozen=True)
 class NumberedSegment(Segment, Generic[_R]):
     """A segment of any number of cards, ended by a blank one.
 

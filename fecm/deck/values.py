@@ -5,8 +5,8 @@ from __future__ import annotations
 import re
 import sys
 from itertools import pairwise
+from typing import NamedTuple
 
-from fecm._dataclasses import frozen
 from fecm.deck.card import (
     BLANK,
     LONGEST,
@@ -170,8 +170,7 @@ def _report_blank(
     findings.add("E104", message, source.place(field.name), hint)
 
 
-@frozen
-class _Misplaced:
+class _Misplaced(NamedTuple):
     """Text that is not within its field."""
 
     code: str

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import ClassVar, Self
+from dataclasses import dataclass
+from typing import ClassVar, NamedTuple, Self
 
-from fecm._dataclasses import frozen
 from fecm.deck.card import Card, CardSource, Control, Fields, Record, layout
 from fecm.deck.material_cards import Layer, Ply, read_layers
 from fecm.deck.segment import CardStream, NumberedSegment, Segment
 
 
-@frozen
+@dataclass(frozen=True)
 class MaterialNumber(Record):
     """First card of a material of MATS: (I5)."""
 
@@ -20,8 +20,7 @@ class MaterialNumber(Record):
     fields: ClassVar[Fields] = layout("I5 material|mat")
 
 
-@frozen
-class NumberedPly:
+class NumberedPly(NamedTuple):
     """A material of MATS."""
 
     head: MaterialNumber
@@ -33,7 +32,7 @@ class NumberedPly:
         return self.head.number
 
 
-@frozen
+@dataclass(frozen=True)
 class Materials(Segment, keyword="MATS"):
     """MATS: materials beside that of MATE, a pair of cards each: (I5) and (7F10.0)."""
 
@@ -62,7 +61,7 @@ class Materials(Segment, keyword="MATS"):
         yield ""
 
 
-@frozen
+@dataclass(frozen=True)
 class LaminateNumber(Record):
     """First card of a laminate of LAMS: (2I5)."""
 
@@ -72,8 +71,7 @@ class LaminateNumber(Record):
     fields: ClassVar[Fields] = layout("I5 laminate|lam", "I5 layers|lays")
 
 
-@frozen
-class NumberedLaminate:
+class NumberedLaminate(NamedTuple):
     """A laminate of LAMS, the first layer at z = -h/2."""
 
     head: LaminateNumber
@@ -85,7 +83,7 @@ class NumberedLaminate:
         return self.head.number
 
 
-@frozen
+@dataclass(frozen=True)
 class Laminates(Segment, keyword="LAMS"):
     """LAMS: laminates beside that of MATE, (2I5) and the layer cards of each."""
 
@@ -136,7 +134,7 @@ def _is_layer(card: Card) -> bool:
     return len(texts) > 2 and bool(texts[2]) and not texts[1].isdigit()
 
 
-@frozen
+@dataclass(frozen=True)
 class Zone(Record):
     """A card of ZONE: (4I5); elements and their laminate."""
 
@@ -155,6 +153,6 @@ class Zone(Record):
         return range(self.first, max(self.last, self.first) + 1, self.step or 1)
 
 
-@frozen
+@dataclass(frozen=True)
 class Zones(NumberedSegment[Zone], keyword="ZONE", record=Zone):
     """ZONE: laminates of elements; those without a zone have that of MATE."""

@@ -6,12 +6,11 @@ What of a fitted force the strains determine, and its contact.
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm._typing import Bools, Floats
 from fecm.location.model import StrainModel, triangular
@@ -64,7 +63,7 @@ class Errors(NamedTuple):
     force_change: Floats
 
 
-@frozen
+@dataclass(frozen=True)
 class LocationFit:
     """Least squares of a model, and what is fitted besides place and force."""
 

@@ -15,13 +15,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
@@ -42,7 +41,7 @@ MANY = 1.5  # observations per sample from which on they are reduced
 STENCIL = np.array([-1, 0, 1, 2])
 
 
-@frozen
+@dataclass(frozen=True)
 class Observation:
     """Measured strains and the functions' values that they observe.
 
@@ -118,7 +117,7 @@ def triangular(matrix: Floats) -> Floats:
     return factor
 
 
-@frozen
+@dataclass(frozen=True)
 class Footprint:
     """Where a contact force acts: on a circle, or on a point without one."""
 
@@ -155,7 +154,7 @@ def point_weights(mesh: MeshArrays, x: float, y: float) -> Floats:
     raise OutsideError(f"({x:g}, {y:g}) is not on the plate")
 
 
-@frozen
+@dataclass(frozen=True)
 class StrainModel:
     """Strains of gages under a force at a place.
 
@@ -245,7 +244,7 @@ W = 2  # dof of the deflection
 ROWS = 16  # sampled fields of all dofs that are in memory at the same time
 
 
-@frozen
+@dataclass(frozen=True)
 class Sampling:
     """Time steps, samples and force of a run."""
 

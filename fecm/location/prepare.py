@@ -15,7 +15,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError, StudyError
 from fecm._machine import require_memory
 from fecm._measured_tables import UNITS, plain_unit
@@ -56,8 +55,7 @@ from fecm.sweeps.responses import plate_response
 SAME = 1e-9  # relative difference of equal stiffnesses and rows
 
 
-@frozen
-class Symmetry:
+class Symmetry(NamedTuple):
     """A symmetry of a plate."""
 
     name: str  # in messages

@@ -8,7 +8,6 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError, StudyError
 from fecm._typing import Floats, Indices
 from fecm.location.fit import LocationFit, PlaceTrial, is_determined
@@ -28,8 +27,7 @@ NOISY = 10.0  # variances of a residual by which two fits differ by chance
 BEFORE = 0.25  # how much earlier a force may begin if the shift is fitted, over the record
 
 
-@frozen
-class Region:
+class Region(NamedTuple):
     """Rectangle in which the place is sought: x0, y0, x1, y1."""
 
     corners: tuple[float, float, float, float]
@@ -104,8 +102,7 @@ class SearchResult(NamedTuple):
     misfit: Floats
 
 
-@frozen
-class Scan:
+class Scan(NamedTuple):
     """Misfits of the best forces at candidates."""
 
     x: Floats  # (columns,)

@@ -5,12 +5,11 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm._errors import StudyError, warn
 from fecm._measured_tables import MeasuredTable, factor, read_table, same_name, unit_free, unit_in
 from fecm._text import printable
@@ -28,8 +27,7 @@ FEWEST = 10  # points
 _NUMBER = re.compile(r"(?:gage|gauge|strain)?[ _-]?([0-9]+)")
 
 
-@frozen
-class StrainTable:
+class StrainTable(NamedTuple):
     """Measured strains of some gages."""
 
     name: str

@@ -14,13 +14,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.deck.units import unit_of
@@ -43,7 +42,7 @@ ROUND = (10.0, 100.0, 1e3, 1e6)  # factors of another unit
 NEAR = 0.2  # relative distance from them
 
 
-@frozen
+@dataclass(frozen=True)
 class Cause:
     """What may be wrong, and by which factor the misfit is smaller without it."""
 

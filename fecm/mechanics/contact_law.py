@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import field, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import (
     TYPE_CHECKING,
     Any,
@@ -29,7 +29,6 @@ from typing import (
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats, Indices
 
 if TYPE_CHECKING:
@@ -118,7 +117,7 @@ class ContactParameters(ABC, Generic[Number]):
         return self.loading(peak) / (peak - self.permanent(peak)) ** self.q
 
 
-@frozen
+@dataclass(frozen=True)
 class LinearPermanent(ContactParameters[Number]):
     """Parameters with a linear permanent indentation (the card of EXPE)."""
 
@@ -138,7 +137,7 @@ class LinearPermanent(ContactParameters[Number]):
         return select(value > 0.0, value, 0.0)
 
 
-@frozen
+@dataclass(frozen=True)
 class YangSunPermanent(ContactParameters[Number]):
     """Parameters with one unloading rigidity k/alpha_cr for every peak (the card of EXPE ACR)."""
 
@@ -264,7 +263,7 @@ class Law(Protocol[Number]):
         """Permanent indentation after unloading from the last point (length)."""
 
 
-@frozen
+@dataclass(frozen=True)
 class MeasuredLaw(Generic[Number]):
     """A law of the report, with measured parameters; subclasses add `trial` and `accept`."""
 
@@ -291,7 +290,7 @@ class MeasuredLaw(Generic[Number]):
         return self.constants.permanent(select(peak > memory.peak, peak, memory.peak))
 
 
-@frozen
+@dataclass(frozen=True)
 class HystereticLaw(MeasuredLaw[Number]):
     """The report's law with any sequence of unloadings and reloadings.
 
@@ -399,7 +398,7 @@ class HystereticLaw(MeasuredLaw[Number]):
         )
 
 
-@frozen
+@dataclass(frozen=True)
 class ListingLaw(MeasuredLaw[Number]):
     """The printed program's law (the slip ``reload``), which never returns to an earlier branch.
 

@@ -8,9 +8,10 @@ kappa_y = -theta_y,y.  Arrays over elements have the element first, then the qua
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.mechanics import strains
 from fecm.mechanics.elements import Quadrature
@@ -26,7 +27,7 @@ from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.strains import FLAT, Curvature, strain_of_deflection
 
 
-@frozen
+@dataclass(frozen=True)
 class IntegrationRules:
     """Quadrature rules of a plate."""
 

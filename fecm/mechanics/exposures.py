@@ -16,7 +16,6 @@ from typing import NamedTuple, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import Codes
@@ -149,7 +148,7 @@ class Evaluations(NamedTuple):
         )
 
 
-@frozen
+@dataclass(frozen=True)
 class PlyPoints:
     """Coordinates of the points of the plies, (elements, points)."""
 

@@ -16,12 +16,11 @@ import reprlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm._extensions import EntryPoints, installed
 from fecm._typing import Bools, Floats, Indices
@@ -163,8 +162,7 @@ def is_evaluated(criterion: str, *, fabric: bool) -> bool:
     return not (fabric and criterion in UNIDIRECTIONAL)
 
 
-@frozen
-class PlyExposure:
+class PlyExposure(NamedTuple):
     """Largest exposure of a criterion in the plies of a laminate."""
 
     criterion: str

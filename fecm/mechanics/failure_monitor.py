@@ -18,7 +18,6 @@ from typing import ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.mechanics import failure
 from fecm.mechanics.exposures import (
@@ -45,8 +44,7 @@ UNKNOWN = -1.0  # exposure that no criterion can find
 AllStrengths = failure.Strengths | Sequence[Sequence[failure.Strengths | None]]
 
 
-@frozen
-class Run:
+class Run(NamedTuple):
     """Neighbouring plies of the same strengths: states from the lower face of one to another's."""
 
     strengths: failure.Strengths

@@ -10,12 +10,11 @@ the indentation is -u_tip - w.
 from __future__ import annotations
 
 import math
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import Any, Generic
 
 import numpy as np
 
-from fecm._dataclasses import frozen, mutable
 from fecm.mechanics.contact_law import ContactPoint, Law, Number, any_case, select
 from fecm.mechanics.plate_motion import AppliedForce, DivergenceError, Load, PlateMotion, PlateState
 from fecm.mechanics.projectile import Projectile, RodIntegrator, TipStep, WilsonStep, rigid_approach
@@ -25,7 +24,7 @@ PASSES = 5
 TOLERANCE = 1.0e-6
 
 
-@mutable
+@dataclass
 class ContactState(Generic[Number]):
     """State of projectile and contact after a step: floats, or arrays with an entry per case."""
 
@@ -38,14 +37,14 @@ class ContactState(Generic[Number]):
     unconverged_steps: Any
 
 
-@mutable
+@dataclass
 class ImpactState(ContactState[float]):
     """State of plate, projectile and contact after a step."""
 
     plate: PlateState = field(kw_only=True)  # the plate, with the number of steps and the time
 
 
-@frozen
+@dataclass(frozen=True)
 class ImpactConditions:
     """Conditions of the impact, with the slips that affect it as parameters."""
 

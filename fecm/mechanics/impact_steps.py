@@ -14,7 +14,6 @@ from typing import Generic, NamedTuple, cast
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics.contact_law import (
     ContactParameters,
@@ -59,8 +58,7 @@ COLUMNS = (
 FIELDS = 4_000_000  # numbers of the displacement fields that one call of the kernels stores
 
 
-@frozen
-class Pace:
+class Pace(NamedTuple):
     """How many steps are taken until the observers of a run are called."""
 
     most: int  # steps
@@ -194,8 +192,7 @@ class ImpactStruct(Structure):
     )
 
 
-@frozen
-class Written:
+class Written(NamedTuple):
     """Arrays that the kernel writes; see :class:`Rod` and :class:`Impact`."""
 
     motion: Floats
@@ -219,8 +216,7 @@ def kernel_law(constants: ContactParameters[Number]) -> KernelLaw[Number]:
     raise TypeError(f"the kernels have no law of {type(constants).__name__}")
 
 
-@frozen
-class Burst:
+class Burst(NamedTuple):
     """Records of consecutive steps."""
 
     columns: dict[str, Floats]  # (steps,) each

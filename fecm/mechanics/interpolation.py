@@ -6,10 +6,10 @@ Arrays over elements have the element first, then the quadrature point.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Array, Bools, Floats
 from fecm.mechanics.elements import ElementShape, Quadrature
 from fecm.mechanics.mesh import ElementBlock
@@ -20,8 +20,7 @@ NDOF = 5
 DOUBTFUL = 1.0e-10
 
 
-@frozen
-class Interpolation:
+class Interpolation(NamedTuple):
     """Shape functions of an element block at the points of a rule."""
 
     N: Floats  # (npt, nn): values

@@ -6,12 +6,11 @@ Elements fit together if their common side has the same nodes in both.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.elements import CUBIC
 from fecm.mechanics.mesh import ElementBlock, Ints, distinct
@@ -25,8 +24,7 @@ STRETCH = float(np.hypot(*SLANT))  # distance along it over the distance, at mos
 PAIRS = 1_000_000  # compared at a time
 
 
-@frozen
-class ElementSides:
+class ElementSides(NamedTuple):
     """Sides of elements, each once for every element that has it.
 
     Attributes

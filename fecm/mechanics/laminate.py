@@ -15,7 +15,6 @@ from typing import NamedTuple, Protocol
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Floats
 
 # The slip ``small-stiffness`` sets entries of A, B and D below the first limit to 0, except
@@ -53,7 +52,7 @@ def are_cores(plies: Sequence[PlyConstants]) -> list[bool]:
     return [ply.g13 < SOFT_CORE * stiffest for ply in plies]
 
 
-@frozen
+@dataclass(frozen=True)
 class PlyStack:
     """Plies of a laminate, from z = -h/2 on."""
 
@@ -80,7 +79,7 @@ class EngineeringConstants(NamedTuple):
     nu_xy: float  # Poisson's ratio: contraction along y over extension along x
 
 
-@frozen
+@dataclass(frozen=True)
 class LaminateSection:
     """Stiffness and inertia of a laminate, per area."""
 

@@ -26,9 +26,10 @@ Arrays over elements have them last here: (..., points, ne).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics import strains as assumed_shear
 from fecm.mechanics.element_matrices import membrane_and_bending
@@ -178,8 +179,7 @@ def quadratic_strains_at(points: StrainField, field: Floats) -> Floats:
     return strains
 
 
-@frozen
-class _Elements:
+class _Elements(NamedTuple):
     """Some elements, and what their forces need."""
 
     nodes: Indices  # (9, ne)

@@ -9,14 +9,13 @@ node or element n.  An absent node of an element and the equation of a restraine
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.elements import CUBIC, QUADRILATERAL, TRIANGLE, ElementShape
 
@@ -31,7 +30,7 @@ TOLERANCE = 1.0e-9
 PARALLEL = 1.0e-2  # sides whose directions differ by less form no corner
 
 
-@frozen
+@dataclass(frozen=True)
 class MeshArrays:
     """Nodes, elements, restraints and nodal forces of a problem."""
 
@@ -85,15 +84,14 @@ def holds_the_plane(codes: Ints) -> bool:
     return bool((codes[:, :2] != 0).all())
 
 
-@frozen
-class Congruence:
+class Congruence(NamedTuple):
     """Groups of elements of a block that are translations of one another."""
 
     representatives: Indices  # (ng,): position in the block of one element per group
     group: Indices  # (ne,): group of every element
 
 
-@frozen
+@dataclass(frozen=True)
 class ElementBlock:
     """Elements that have the same nodes present."""
 

@@ -7,12 +7,11 @@ from __future__ import annotations
 
 import math
 from numbers import Real
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm._extensions import EntryPoints, installed
 from fecm._typing import Floats
@@ -28,8 +27,7 @@ class LawError(FecmError, ValueError):
     """A contact law by a user lacks a method, raises an exception, or returns no number."""
 
 
-@frozen
-class OwnLaw:
+class OwnLaw(NamedTuple):
     """A law by a user whose values are checked; :class:`LawError` names the indentation.
 
     Where the indentation is no longer finite, the force is not either, and the law is not asked.
@@ -147,8 +145,7 @@ def law_name(law: Law) -> str:
     return law.name if isinstance(law, OwnLaw) else type(law).__name__
 
 
-@frozen
-class CaseByCase:
+class CaseByCase(NamedTuple):
     """A law of single cases for many cases, one after the other.
 
     The memories are an array of objects.  Where the law fails, the force is NaN.

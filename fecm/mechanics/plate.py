@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm._machine import require_memory
 from fecm._typing import Bools, Floats, Indices
@@ -43,7 +43,7 @@ class UnsoundPlateError(FecmError, ArithmeticError):
     """The plate's stiffness is not finite or has no largest frequency."""
 
 
-@frozen
+@dataclass(frozen=True)
 class PlateModel:
     """The discrete plate: M a + f(u) = P, with f(u) = K u unless it is nonlinear."""
 

@@ -19,13 +19,12 @@ body slows down by (1 - b)/(1 + b) a step: the rate a is off by the factor 1 + (
 
 from __future__ import annotations
 
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen, mutable
 from fecm._errors import FecmError
 from fecm._typing import Floats, Indices
 from fecm.mechanics.plate import PlateModel, pieces
@@ -69,7 +68,7 @@ class DivergenceError(FecmError, ArithmeticError):
         return DivergenceError, (self.step, self.reason), self.__dict__
 
 
-@mutable
+@dataclass
 class PlateState:
     """State of the plate after a step."""
 
@@ -118,8 +117,7 @@ class Sums(NamedTuple):
     quadratic: float = 0.0  # of a nonlinear plate: integral of (N - N0) eps_q
 
 
-@frozen
-class PointLoad:
+class PointLoad(NamedTuple):
     """A unit force on one equation."""
 
     equation: int
@@ -135,8 +133,7 @@ class PointLoad:
         internal[self.equation] -= force * (self.inverse_mass * dt2)
 
 
-@frozen
-class DistributedLoad:
+class DistributedLoad(NamedTuple):
     """A unit force distributed over equations."""
 
     equations: Indices | slice  # (m,)
@@ -171,8 +168,7 @@ class AppliedForce(NamedTuple):
     force: float
 
 
-@frozen
-class DofSums:
+class DofSums(NamedTuple):
     """Weighted sums of dofs, such as the strains of gages."""
 
     dof_indices: Indices  # (n, m): indices into the padded displacement

@@ -21,12 +21,12 @@ that they change neither the motion nor the force of an impact.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple, Self
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.elements import Quadrature, gauss
 from fecm.mechanics.interpolation import interpolate, inverse_jacobian, local_shape_functions
@@ -150,7 +150,7 @@ def second_derivatives(family: ElementBlock) -> Floats:
 Zones = Sequence[tuple[LaminateSection, Rows]]
 
 
-@frozen
+@dataclass(frozen=True)
 class ElementZone:
     """Stresses per strain of the plies of some elements."""
 

@@ -6,12 +6,11 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm._typing import Floats, Indices
 from fecm.mechanics.elements import Quadrature
@@ -213,8 +212,7 @@ class GagePlace(Protocol):
     direction: float
 
 
-@frozen
-class GageArray:
+class GageArray(NamedTuple):
     """Strains of gages by weighted sums of dofs.
 
     The first rows are the linear strains of the gages; those of a nonlinear plate are followed by

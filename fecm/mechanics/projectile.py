@@ -11,11 +11,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from numbers import Real
-from typing import Any, ClassVar, Literal, Protocol, TypeVar, runtime_checkable
+from typing import Any, ClassVar, Literal, NamedTuple, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError, OptionsError
 from fecm._typing import Floats
 from fecm.mechanics.contact_law import Number
@@ -165,7 +164,7 @@ AVERAGE: Integrator = "average-acceleration"
 INTEGRATORS = (WILSON, AVERAGE)
 
 
-@frozen
+@dataclass(frozen=True)
 class RodMethod:
     """Mass matrix and integrator, the report program's by default; OptionsError if unknown."""
 
@@ -193,7 +192,7 @@ def _check_numbers(kind: str, **values: object) -> None:
             )
 
 
-@frozen
+@dataclass(frozen=True)
 class Rod:
     """A straight elastic rod of equal elements."""
 
@@ -303,7 +302,7 @@ def _energy(matrix: Floats, x: Floats) -> Floats:
     return np.asarray(energy)
 
 
-@frozen
+@dataclass(frozen=True)
 class RigidMass:
     """A projectile that does not deform, with one dof."""
 
@@ -354,8 +353,7 @@ def projectile_name(projectile: Projectile) -> str:
     return projectile.name if isinstance(projectile, OwnProjectile) else type(projectile).__name__
 
 
-@frozen
-class Transducer:
+class Transducer(NamedTuple):
     """Node and sign of the force that the transducer measures."""
 
     node: int  # node of the rod, from 1; 0 for the contact force itself

@@ -24,7 +24,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.mechanics.membrane import MembraneForces
 from fecm.mechanics.plate import PlateModel
@@ -44,8 +43,7 @@ LARGEST_STEP = 0.1
 SMALLEST_STEP = 1.0e-3
 
 
-@frozen
-class StaticCurve:
+class StaticCurve(NamedTuple):
     """Force F and work of the force over the deflection W; cubic between the points.
 
     Attributes
@@ -198,8 +196,7 @@ ROUNDING = 1e-14  # of the last terms, relative to the first
 LONGEST = 1e6  # time of a contact
 
 
-@frozen
-class QuickImpact:
+class QuickImpact(NamedTuple):
     """Result of a quick model."""
 
     peak: float  # contact force

@@ -44,12 +44,12 @@ difference is sin(omega dt)/(omega dt) times the velocity.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm._machine import require_memory
 from fecm._typing import Floats, Indices
@@ -97,7 +97,7 @@ class ReducedModes(NamedTuple):
         return np.asarray(self.deflection**2 / self.stiffness)
 
 
-@frozen
+@dataclass(frozen=True)
 class ReducedPlate:
     """A plate in n coordinates, of which the first m are bending modes, the others membrane modes.
 
@@ -444,8 +444,7 @@ class ReducedMotion:
         return ((1.0 - b) * self._increment + self._inertia * pull) / (1.0 + b)
 
 
-@frozen
-class SeriesLaw:
+class SeriesLaw(NamedTuple):
     """A contact law in series with a linear spring, for many cases: the approach is a + F(a)/k_r.
 
     The spring is what the modes left out of a reduced plate yield under the present force, so that

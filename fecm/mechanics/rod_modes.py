@@ -5,9 +5,10 @@ The first mode is the rigid motion, whose displacement is left to the tip.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.mechanics.projectile import RodIntegrator, RodState, rigid_dofs
 
@@ -15,8 +16,7 @@ from fecm.mechanics.projectile import RodIntegrator, RodState, rigid_dofs
 EQUAL = 1e-10
 
 
-@frozen
-class ProjectileModes:
+class ProjectileModes(NamedTuple):
     """Natural modes of a projectile, of unit modal mass; the first is its rigid motion."""
 
     shapes: Floats  # (n, modes)

@@ -8,11 +8,10 @@ from __future__ import annotations
 import math
 import warnings
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm._machine import require_memory
 from fecm._typing import Floats
@@ -210,8 +209,7 @@ def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:
     return internal
 
 
-@frozen
-class Modes:
+class Modes(NamedTuple):
     """The lowest modes of a plate, K x = omega^2 M x."""
 
     angular_frequency: Floats  # (n,): ascending; rigid motions are 0 (1/time)

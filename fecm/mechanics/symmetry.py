@@ -9,12 +9,11 @@ curvature is invariant under the half turn; an element and its image must have t
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics.mesh import ElementBlock, Ints, equation_numbers, extent
 from fecm.mechanics.plate import PlateModel
@@ -25,7 +24,7 @@ TURNED = np.array([-1.0, -1.0, 1.0, -1.0, -1.0])
 TOLERANCE = 1.0e-9
 
 
-@frozen
+@dataclass(frozen=True)
 class SymmetryReduction:
     """Independent dofs, and the dependence of the others on them."""
 

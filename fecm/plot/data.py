@@ -6,10 +6,10 @@ What a result lacks, or can't be drawn, is a :class:`~fecm.plot.kinds.PlotError`
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.deck.model import Deck, Impact
 from fecm.mechanics.elements import Quadrature
@@ -131,8 +131,7 @@ def contact_end(result: Result) -> float:
     return float(touching[-1]) if len(touching) else np.inf
 
 
-@frozen
-class Patches:
+class Patches(NamedTuple):
     """The plate divided into small quadrilaterals, equally many per element."""
 
     points: Floats  # (n, 2): corners (length)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.collections import LineCollection, PolyCollection
@@ -12,7 +12,6 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Circle, Patch
 from matplotlib.ticker import MaxNLocator
 
-from fecm._dataclasses import frozen
 from fecm._errors import warn
 from fecm._typing import Bools, Floats
 from fecm.deck.model import Material
@@ -57,8 +56,7 @@ NAMED = 12  # elements under the load that a note names; the others it counts
 TICKS = 16  # numbers on the axis of the plies at most
 
 
-@frozen
-class DrawnExposures:
+class DrawnExposures(NamedTuple):
     """What is drawn of a result."""
 
     under_load: Bools  # (numel, points): mask of the points that are left out

@@ -7,9 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from enum import Enum, StrEnum, auto
-from typing import TYPE_CHECKING, Literal, TypedDict
+from typing import TYPE_CHECKING, Literal, NamedTuple, TypedDict
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 
 if TYPE_CHECKING:
@@ -33,8 +32,7 @@ class MatplotlibError(FecmError, ImportError):
     """matplotlib is not installed."""
 
 
-@frozen
-class Picture:
+class Picture(NamedTuple):
     """A figure; `frames` draw its frames if it is animated; `notes` say what it shows in words."""
 
     figure: Figure
@@ -72,8 +70,7 @@ class Shows(Enum):
     LOCATION = auto()  # one impact that gages located
 
 
-@frozen
-class Drawing:
+class Drawing(NamedTuple):
     """How a kind of picture is drawn."""
 
     function: str  # ``module:name`` in this package; it is imported when it draws

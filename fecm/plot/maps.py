@@ -17,7 +17,6 @@ from matplotlib.colors import BoundaryNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from fecm._dataclasses import frozen
 from fecm._errors import warn
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.plot import style
@@ -49,8 +48,7 @@ LEVEL: style.Look = {"color": "0.2", "linestyle": style.DASHED, "linewidth": 1.1
 RING: style.Look = {"ms": 4.2, "mfc": "none", "mec": LEVEL_COLOUR}
 
 
-@frozen
-class MarkedLevel:
+class MarkedLevel(NamedTuple):
     """A value of the quantity to mark."""
 
     value: float
@@ -62,8 +60,7 @@ class MarkedLevel:
         return THRESHOLD if self.is_threshold else "level"
 
 
-@frozen
-class MapContents:
+class MapContents(NamedTuple):
     """Contents of a map."""
 
     over: list[DrawnVariable]  # one or two parameters
@@ -77,8 +74,7 @@ class MapContents:
     thresholds: Floats
 
 
-@frozen
-class Graph:
+class Graph(NamedTuple):
     """Axes, and what lies along them."""
 
     axes: Axes

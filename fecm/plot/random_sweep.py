@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Indices
 from fecm.plot.kinds import LackingError, Picture, PlotError, Width
 from fecm.plot.maps import LEVEL
@@ -30,8 +29,7 @@ POINT: Look = {"alpha": 0.5, "mew": 0.0, "rasterized": True}
 POINT_SIZES = (2.2, 5.0)  # of many points and of few (points)
 
 
-@frozen
-class Draws:
+class Draws(NamedTuple):
     """Draws of a random sweep."""
 
     name: str  # of the sweep

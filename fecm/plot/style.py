@@ -12,7 +12,7 @@ import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ContextDecorator
 from contextvars import ContextVar
-from typing import TYPE_CHECKING, Any, Literal, cast
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast
 
 import matplotlib
 import numpy as np
@@ -23,7 +23,6 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import Formatter, Locator
 
-from fecm._dataclasses import frozen
 from fecm._text import printable
 from fecm._typing import Array
 from fecm.deck.units import PREFIXED, thousands, unit_of, with_prefix
@@ -138,8 +137,7 @@ class Multiple(Formatter):
         return f"{self._factor * value:.4g}"
 
 
-@frozen
-class AxisScale:
+class AxisScale(NamedTuple):
     """Scale of an axis: factor of the numbers at its ticks, and text of the unit."""
 
     factor: float

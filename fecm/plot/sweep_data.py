@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from matplotlib.ticker import MaxNLocator
 
-from fecm._dataclasses import frozen
 from fecm._errors import did_you_mean, warn
 from fecm._typing import Array, Bools, Indices
 from fecm.authoring.values import NAMES, VARIABLES, ValueKind
@@ -43,8 +42,7 @@ ENDED = "contact not over at the end"
 Where = Mapping[str, float | str]  # values of parameters, by name, that select cases
 
 
-@frozen
-class DrawnVariable:
+class DrawnVariable(NamedTuple):
     """A parameter or quantity of cases, shown by an axis or by colours."""
 
     name: str

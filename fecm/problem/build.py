@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import field, replace
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._errors import OptionsError
 from fecm._machine import free_processors
 from fecm._typing import Bools, Indices
@@ -53,7 +52,7 @@ WORTH_SHARING = 100_000  # number of equations above which threads save more tha
 PLATE_SLIPS = {"g12", "small-stiffness", "shear-order", "tapes", "jacobian", "rod-force"}
 
 
-@frozen
+@dataclass(frozen=True)
 class RunOptions:
     """Options of a run, by default the report's.  Raises OptionsError if a value is not valid."""
 
@@ -103,8 +102,7 @@ def check_run_options(problem: Problem, options: RunOptions) -> None:
         raise OptionsError("the slip jacobian is for linear plates only, and the deck has NONL")
 
 
-@frozen
-class ImpactModel:
+class ImpactModel(NamedTuple):
     """Model of a problem, ready to run."""
 
     plate: PlateModel

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.deck import model
 from fecm.mechanics.laminate import LaminateSection, effective_rigidity
@@ -54,8 +54,7 @@ def contact_stiffness(deck: model.Deck, plate: PlateModel) -> float:
         return float(force * max(1.5 / peak, law.q / (peak - law.permanent(peak))))
 
 
-@frozen
-class ContactStep:
+class ContactStep(NamedTuple):
     """Limit of the time step from the contact."""
 
     stiffness: float  # tangent stiffness of the contact, force/length

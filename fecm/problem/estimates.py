@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm.deck import model
 from fecm.deck.model import Impact, Indentation
@@ -36,8 +36,7 @@ MOST_ERROR = 0.5  # largest mesh error of the peak that is estimated
 FULL = 3  # shear order at which 9-node elements have no zero-energy modes
 
 
-@frozen
-class Resolution:
+class Resolution(NamedTuple):
     """Resolution of an impact by the mesh."""
 
     # Duration of a Hertz contact on a rigid target, 2.94 (5 m v^2/4 k)^(2/5)/v: S. P.

@@ -6,11 +6,10 @@ import bisect
 from collections.abc import Callable, Sequence
 from functools import partial
 from itertools import pairwise
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 from fecm.deck.findings import CardPlace, Findings
 from fecm.deck.model import (
@@ -117,8 +116,7 @@ def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floa
 _R = TypeVar("_R", NodeValues, NodeCodes, ElementNodes)
 
 
-@frozen
-class _Cards:
+class _Cards(NamedTuple):
     """Cards of nodes or elements as arrays, and their records, which know the places."""
 
     numbers: Indices  # of the nodes or elements

@@ -22,7 +22,6 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm._inputs import read_input
 from fecm._typing import Floats
 
@@ -142,8 +141,7 @@ class NastranCard(NamedTuple):
         return int(text)
 
 
-@frozen
-class NastranElement:
+class NastranElement(NamedTuple):
     """Places of the fields of an element, from the first node, 2, on."""
 
     nodes: int
@@ -169,8 +167,7 @@ ELEMENTS = {
 NOT_OF_PLATE = f"is not part of a plate: leave it out; the elements are {', '.join(ELEMENTS)}"
 
 
-@frozen
-class System:
+class System(NamedTuple):
     """Coordinate system in the basic one."""
 
     kind: str  # R, C or S

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Bools, Indices
 from fecm.mechanics.mesh import Ints, MeshArrays, element_blocks, extent
 from fecm.problem.parts import W
@@ -51,8 +50,7 @@ def unsupported(mesh: MeshArrays, load: tuple[float, float] | None) -> Span:
 MID_SIDES = 4  # column of the node between the first two corners
 
 
-@frozen
-class PlateSides:
+class PlateSides(NamedTuple):
     """Sides of all elements, each once for every element that has it.
 
     Attributes

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats, Indices
 from fecm.deck import model
 from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, moves_only
@@ -41,8 +41,7 @@ if TYPE_CHECKING:
     from fecm.mechanics.ply_stresses import Residual
 
 
-@frozen
-class Threshold:
+class Threshold(NamedTuple):
     """Force at which delaminations grow, and what it is computed from."""
 
     force: float
@@ -52,8 +51,7 @@ class Threshold:
     band: tuple[float, float]  # forces for a delamination in each of them, and for a single one
 
 
-@frozen
-class ContactPatch:
+class ContactPatch(NamedTuple):
     """Circle on which the contact force acts, and its nodal weights."""
 
     shape: str  # ``"DISC"`` or ``"HERT"``
@@ -64,7 +62,7 @@ class ContactPatch:
     weights: Floats  # (numnp,): shares of the nodes in a unit force; 0 where w is restrained
 
 
-@frozen
+@dataclass(frozen=True)
 class Problem:
     """A checked problem; each part is built once, when it is first needed."""
 

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import math
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._machine import format_bytes
 from fecm._typing import Floats
 from fecm.deck.macros import flat
@@ -69,7 +68,7 @@ def larger_steps(problem: Problem) -> list[str]:
     return [f"time step         DT is at most {largest / least:.2f} of the critical one; {fewer}"]
 
 
-@frozen
+@dataclass(frozen=True)
 class ProblemSummary:
     """A problem without errors in numbers, in the deck's units.
 

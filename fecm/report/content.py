@@ -13,11 +13,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from importlib import resources
 from pathlib import Path
+from typing import NamedTuple
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm._files import OPTION, beside, check_outputs
 from fecm._text import DIGITS, printable
@@ -39,8 +40,7 @@ class TrustLevel(StrEnum):
     UNJUDGED = "not judged"
 
 
-@frozen
-class ShownNumber:
+class ShownNumber(NamedTuple):
     """A number and the text that shows it."""
 
     value: float
@@ -50,8 +50,7 @@ class ShownNumber:
 Cell = str | ShownNumber
 
 
-@frozen
-class Judgement:
+class Judgement(NamedTuple):
     """A quantity, its size, and whether it is within the range of the model."""
 
     level: TrustLevel
@@ -60,7 +59,7 @@ class Judgement:
     words: str = ""
 
 
-@frozen
+@dataclass(frozen=True)
 class PageBlock:
     """A part of a section; each kind has its template, a macro in page.html."""
 
@@ -70,7 +69,7 @@ class PageBlock:
         return type(self).__name__.removeprefix("Page").lower()
 
 
-@frozen
+@dataclass(frozen=True)
 class PageTable(PageBlock):
     """A table; the first cell of a row is its heading."""
 
@@ -79,7 +78,7 @@ class PageTable(PageBlock):
     caption: str = ""
 
 
-@frozen
+@dataclass(frozen=True)
 class Judgements(PageBlock):
     """A table of judgements."""
 
@@ -87,7 +86,7 @@ class Judgements(PageBlock):
     caption: str = ""
 
 
-@frozen
+@dataclass(frozen=True)
 class Notes(PageBlock):
     """Sentences, as a list."""
 
@@ -95,7 +94,7 @@ class Notes(PageBlock):
     title: str = ""
 
 
-@frozen
+@dataclass(frozen=True)
 class PagePicture(PageBlock):
     """A picture inside the page."""
 
@@ -105,7 +104,7 @@ class PagePicture(PageBlock):
     wide: bool = False
 
 
-@frozen
+@dataclass(frozen=True)
 class Listing(PageBlock):
     """A long text, folded."""
 
@@ -113,16 +112,14 @@ class Listing(PageBlock):
     text: str
 
 
-@frozen
-class PageSection:
+class PageSection(NamedTuple):
     """A heading and what stands below it."""
 
     title: str
     blocks: tuple[PageBlock, ...]
 
 
-@frozen
-class ReportPage:
+class ReportPage(NamedTuple):
     """A page about one or more results."""
 
     title: str

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._errors import StudyError, warn
 from fecm._measured_tables import factor, read_table
 from fecm._text import printable
@@ -23,7 +22,7 @@ TRIGGER = 0.5  # time between two rises, over the time above half of the peak
 Source = str | Path | tuple[Any, Any]
 
 
-@frozen
+@dataclass(frozen=True)
 class Measurement:
     """A measured force in the deck's units."""
 
@@ -53,7 +52,7 @@ class Measurement:
         return replace(self, time=self.time - delay, force=self.force - offset)
 
 
-@frozen
+@dataclass(frozen=True)
 class Comparison:
     """A result's force, interpolated at measured times, against the measured force.
 

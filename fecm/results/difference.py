@@ -6,14 +6,13 @@ import math
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from fecm._dataclasses import frozen
 from fecm._text import html_table, printable, shown_apart
 
 MAX = "max"  # the usual scale of differences, in words
 TEXT = "text"  # the type of a dataset of texts
 
 
-@frozen
+@dataclass(frozen=True)
 class Position:
     """Position of a number in a dataset.
 
@@ -203,7 +202,7 @@ class Listed(NamedTuple):
         return f"{printable(self.name)}{line}: {left} against {right}"
 
 
-@frozen
+@dataclass(frozen=True)
 class Difference:
     """Outcome of :func:`fecm.diff`; ``str()`` is what ``fecm diff`` prints.
 

@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from enum import StrEnum
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Array, Floats
 from fecm.deck.material_cards import MATERIAL
 from fecm.results.criteria import (
@@ -43,8 +42,7 @@ AT_REST = "at_rest"
 LOAD_FACTOR = "load_factor"
 
 
-@frozen
-class LargestExposure:
+class LargestExposure(NamedTuple):
     """Largest exposure of a criterion outside the load and on the circle around it."""
 
     criterion: str
@@ -286,7 +284,7 @@ def evaluations_in_contact(stored: Stored) -> int | None:
 NEEDED = tuple(f"exposures/{name}" for name in ("time", "exposure", "mode", "ply", "x", "y"))
 
 
-@frozen
+@dataclass(frozen=True)
 class FirstFailure:
     """First exposure of a criterion at a level, 1 for failure, outside the load.
 

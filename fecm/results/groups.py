@@ -10,9 +10,8 @@ A group of a result: its datasets as attributes.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from fecm._dataclasses import frozen
 from fecm._errors import FecmError
 from fecm._text import html_table
 from fecm._typing import Array
@@ -37,8 +36,7 @@ class ExportError(FecmError, ValueError):
     """A result lacks the data for an export, or the request is invalid."""
 
 
-@frozen
-class GroupInfo:
+class GroupInfo(NamedTuple):
     """What is known of a group before any run."""
 
     description: str

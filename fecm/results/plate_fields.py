@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm._typing import Array, Floats
 from fecm.mechanics.strains import STRAINS
 from fecm.results.criteria import INTERLAMINAR, criteria_of
@@ -60,8 +60,7 @@ class At(StrEnum):
     CELLS = "Cell"
 
 
-@frozen
-class Fields:
+class Fields(NamedTuple):
     """Fields that are computed together."""
 
     at: At

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.deck.model import Deck, Layer, Material, Ply
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
@@ -22,7 +22,7 @@ IN_PLANE = ("sigma_1", "sigma_2", "tau_12")
 INTERLAMINAR = ("tau_xz", "tau_yz")
 
 
-@frozen
+@dataclass(frozen=True)
 class PlyResults:
     """Stresses and strains of plies, in the deck's units.
 

@@ -7,14 +7,13 @@ The annotations of a group serve type checkers, editors and :data:`DATASETS`.
 """
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm._typing import Floats
 from fecm.deck.mesh_cards import AXES, DOF_NAMES
 from fecm.results.criteria import ALL_CRITERIA
@@ -51,7 +50,7 @@ class Kinematics(StrEnum):
 KINEMATICS = "kinematics"
 
 
-@frozen
+@dataclass(frozen=True)
 class Dataset:
     """One dataset of a result."""
 

@@ -14,12 +14,12 @@ from __future__ import annotations
 import contextlib
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._files import beside
 from fecm._typing import Array, Floats
 from fecm.results.groups import ResultFileError
@@ -118,7 +118,7 @@ def write_tapes(result: Result, folder: Path, *, overwrite: bool = True) -> list
     return list(texts)
 
 
-@frozen
+@dataclass(frozen=True)
 class TapeText:
     """Contents of a folder of tapes."""
 

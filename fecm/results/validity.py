@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
 from enum import StrEnum
 from itertools import compress
+from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Array, Bools, Floats
 from fecm.results.end import End, Texts
 
@@ -198,7 +199,7 @@ def counted(validity: Texts) -> Iterator[tuple[Reason, Bools]]:
             yield reason, np.array([reason in own[text] for text in texts], dtype=bool)
 
 
-@frozen
+@dataclass(frozen=True)
 class Extent:
     """What cases have reached: (cases,) each, lower bounds where the end has not decided them."""
 
@@ -212,8 +213,7 @@ class Extent:
     of_rows: Collection[str] = ()
 
 
-@frozen
-class Judge:
+class Judge(NamedTuple):
     """Judge of the impacts on a plate."""
 
     thickness: float

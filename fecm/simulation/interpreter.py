@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
-from fecm._dataclasses import frozen
 from fecm.deck.macros import Body, Loop
 from fecm.deck.model import Macro
 
@@ -19,8 +18,7 @@ class EndedError(Exception):
     """The program ends before its last macro."""
 
 
-@frozen
-class _BoundLoop:
+class _BoundLoop(NamedTuple):
     """A loop whose macros are actions; the program itself is a loop of one pass."""
 
     items: list[_Item]

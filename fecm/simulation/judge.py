@@ -13,7 +13,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Array, Floats
 from fecm.deck.model import Gages
 from fecm.deck.units import in_si, quantity, unit_of
@@ -263,16 +262,14 @@ HEAVY = 0.02  # share of the peak force that gravity adds, above which a note sa
 LATER = 1.1  # peak of a later contact over that of the first, above which a note says so
 
 
-@frozen
-class RunVerdict:
+class RunVerdict(NamedTuple):
     """What speaks against a result."""
 
     notes: list[str]  # sentences; empty if there is no doubt
     validity: str  # ``"ok"`` or reasons; empty without impact steps
 
 
-@frozen
-class Doubt:
+class Doubt(NamedTuple):
     """A quantity beyond the range of the model."""
 
     reason: Reason

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import field
+from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen, mutable
 from fecm._typing import Floats
 from fecm.deck.macros import load_factor
 from fecm.mechanics.impact_steps import SINGLY, TOGETHER
@@ -28,8 +27,7 @@ if TYPE_CHECKING:
     from fecm.mechanics.failure_monitor import FailureMonitor
 
 
-@frozen
-class Criteria:
+class Criteria(NamedTuple):
     """Failure criteria of plies with other residual stresses, and their largest exposures."""
 
     monitor: FailureMonitor
@@ -39,7 +37,7 @@ class Criteria:
 Observer = Callable[["Simulation"], object]
 
 
-@mutable
+@dataclass
 class Simulation:
     """A run; building it writes nothing."""
 

@@ -6,12 +6,11 @@ State of a run, and the monitor of its energies and forces.
 from __future__ import annotations
 
 import math
-from dataclasses import field
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from fecm._dataclasses import mutable
 from fecm._typing import Floats
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.impact import ImpactState
@@ -62,7 +61,7 @@ def cause_of_divergence(
 TOLERANCE = 1.0e-9  # relative change of the displacement below which CONV leaves its loop
 
 
-@mutable
+@dataclass
 class Monitor:
     """Energy balance and largest contact force of the steps so far."""
 
@@ -121,7 +120,7 @@ class Monitor:
         self.last_work = float(work[-1])
 
 
-@mutable
+@dataclass
 class RunState:
     """State passed from one macro to the next; a checkpoint stores every field."""
 

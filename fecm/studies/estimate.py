@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
-from fecm._dataclasses import frozen
 from fecm.deck.model import Impact, Indentation
 from fecm.mechanics.laminate import SMALL_MASS, effective_rigidity
 from fecm.mechanics.quick_models import (
@@ -35,7 +35,7 @@ LARGE = 50.0  # above, the impact is quasi-static
 LOW = "the nonlinear static plate is 9 to 26 % low in force at M/M_plate = 24"
 
 
-@frozen
+@dataclass(frozen=True)
 class QuickModel:
     """One quick model of an impact."""
 
@@ -46,8 +46,7 @@ class QuickModel:
     applies: bool  # whether the mass ratio is in the model's range
 
 
-@frozen
-class QuickEstimate:
+class QuickEstimate(NamedTuple):
     """Quick estimates of an impact."""
 
     mass: float  # of the projectile

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
-from fecm._dataclasses import frozen
 from fecm._errors import warn
 from fecm._text import DIGITS, aligned, html_table
 from fecm.api import sole_problem
@@ -31,7 +30,7 @@ COLUMNS = {
 }
 
 
-@frozen
+@dataclass(frozen=True)
 class ModelEstimate:
     """An impact by one model, or by the run itself.
 
@@ -55,7 +54,7 @@ class ModelEstimate:
     applies: bool
 
 
-@frozen
+@dataclass(frozen=True)
 class Estimate:
     """Quick estimates of an impact beside its run; printed, it is the page of `fecm estimate`.
 

@@ -11,11 +11,10 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from enum import StrEnum
 from importlib import resources
 from itertools import groupby
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Floats
 
 TABLES: dict[str, dict[str, Any]] = tomllib.loads(
@@ -47,8 +46,7 @@ class RowVerdict(StrEnum):
     FAILED = "FAILED"
 
 
-@frozen
-class Check:
+class Check(NamedTuple):
     """Expected value of one quantity.
 
     Attributes
@@ -78,8 +76,7 @@ class Check:
     scale: float | None = None
 
 
-@frozen
-class Case:
+class Case(NamedTuple):
     """Quantities computed together: `compute` returns one value per check, in order."""
 
     name: str
@@ -88,8 +85,7 @@ class Case:
     compute: Compute
 
 
-@frozen
-class Row:
+class Row(NamedTuple):
     """Result of a check.
 
     Attributes

@@ -6,10 +6,11 @@ numbered along strips: eight elements of a strip load and store numbers that fol
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats
 from fecm.mechanics.mesh import ElementBlock, distinct
 
@@ -22,8 +23,7 @@ CHUNK = 1024
 PIECE = 4 * LANES
 
 
-@frozen
-class Layout:
+class Layout(NamedTuple):
     """Blocks of eight elements, and chunks of blocks that are near each other."""
 
     chunks: int
@@ -37,8 +37,7 @@ class Layout:
     axis: int  # along which the elements of a strip follow one another
 
 
-@frozen
-class NodePlaces:
+class NodePlaces(NamedTuple):
     """Places of nodes in the vectors of the kernels."""
 
     node: Indices  # (places,): node of each, chunk by chunk

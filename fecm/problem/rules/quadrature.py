@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.mechanics import interpolation
@@ -98,8 +98,7 @@ def nodes_without_mass(problem: Problem) -> Reports:
     yield Report(message, card.place("bending order L1"), hint)
 
 
-@frozen
-class ShearOrders:
+class ShearOrders(NamedTuple):
     """Least orders L2 under which elements have no motions without energy."""
 
     name: str  # of the elements

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from fecm._dataclasses import frozen
 from fecm.deck import model
 from fecm.deck.findings import CardPlace
 from fecm.deck.material_cards import MATERIAL
@@ -45,8 +45,7 @@ REACH = 30.0  # greatest ratio of a value to the usual one at which a unit is na
 SAME = 1e-3  # relative difference of units that are the same
 
 
-@frozen
-class Range:
+class Range(NamedTuple):
     """Range of a quantity in real materials and impacts, in m, N and s."""
 
     dimension: str

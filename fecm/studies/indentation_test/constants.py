@@ -5,13 +5,12 @@ Fits of an indentation test as text, as plain values and as an EXPE card.
 
 from __future__ import annotations
 
-from dataclasses import asdict
-from typing import Any
+from dataclasses import asdict, dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecm._dataclasses import frozen
 from fecm._text import aligned
 from fecm._typing import Floats
 from fecm.authoring.contact import Contact
@@ -44,8 +43,7 @@ LARGEST = 1e60  # largest number whose powers are finite
 ROUNDING = 1e-9
 
 
-@frozen
-class FreePower:
+class FreePower(NamedTuple):
     """First loading with a free power, F = k a^n (equation 3-1)."""
 
     n: FittedValue
@@ -78,7 +76,7 @@ def free_power(curves: Curves) -> FreePower:
     )
 
 
-@frozen
+@dataclass(frozen=True)
 class Cycle:
     """Unloading and reloading from a point of the first loading curve."""
 
@@ -91,7 +89,7 @@ class Cycle:
     k_1_measured: FittedValue | None
 
 
-@frozen
+@dataclass(frozen=True)
 class ContactLawFit:
     """Result of a fit."""
 

@@ -19,18 +19,18 @@ other cycles; the fit is by generalised least squares with the complete covarian
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.contact_law import ACR_POWER, LOADING_POWER, power_curve
 from fecm.studies import StudyError
 from fecm.studies.indentation_test.turns import Division, Rows, StretchKind
 
 
-@frozen
+@dataclass(frozen=True)
 class FittedValue:
     """A value and its standard error, which is 0 for a prescribed value."""
 
@@ -66,7 +66,7 @@ SURE = 3.0  # standard errors by which an origin must exceed a turn
 STEP = 1e-6  # step of the scaled parameters in derivatives
 
 
-@frozen
+@dataclass(frozen=True)
 class ParameterLayout:
     """Index of each parameter in the vector of parameters.
 
@@ -95,7 +95,7 @@ def parameter_layout(division: Division, tied: frozenset[int] = frozenset()) -> 
     return ParameterLayout(corners, permanents, origins, size)
 
 
-@frozen
+@dataclass(frozen=True)
 class Curves:
     """Curves of a test, scaled by its largest indentation and force."""
 
@@ -169,8 +169,7 @@ def scaled(division: Division, indentation: Floats, force: Floats) -> Curves:
     return curves
 
 
-@frozen
-class CurveSolution:
+class CurveSolution(NamedTuple):
     """Fitted parameters in the units of the test, numbered by :class:`ParameterLayout`.
 
     A value at a bound means that the curves do not fit, and that the errors are meaningless.
@@ -329,7 +328,7 @@ ROUNDS = 20  # iterations of the weights, which depend on the slope
 UNLIKELY = 0.01  # probability below which the scatter exceeds the noise of the points
 
 
-@frozen
+@dataclass(frozen=True)
 class PermanentLine:
     """Permanent indentation by equation 3-8, alpha_0 = s_p (alpha_m - alpha_p)."""
 
@@ -397,8 +396,7 @@ def _scatter(chi: float, freedom: int) -> float:
     return 1.0
 
 
-@frozen
-class Critical:
+class Critical(NamedTuple):
     """Permanent indentation by equation 3-7, with the critical indentation alpha_cr."""
 
     alpha_cr: FittedValue

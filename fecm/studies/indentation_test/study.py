@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecm._dataclasses import frozen
 from fecm._errors import StudyError, warn
 from fecm._typing import Floats
 from fecm.authoring.contact import Contact
@@ -21,7 +21,7 @@ from fecm.studies.indentation_test.curves import LIMITS_Q, FittedValue
 from fecm.studies.indentation_test.turns import Test, read_test
 
 
-@frozen
+@dataclass(frozen=True)
 class IndentationFit:
     """Contact law fitted to an indentation test; printed, it is the page of `fecm indent fit`.
 

@@ -13,11 +13,11 @@ from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from fecm._dataclasses import frozen
 from fecm._measured_tables import read_table
 from fecm._typing import Floats
 from fecm.studies import StudyError
@@ -31,8 +31,7 @@ GUARD = 2.0  # standard deviations of a smoothed point within which its neighbou
 NEGLIGIBLE = 0.1  # noise below this fraction of a step reverses no step
 
 
-@frozen
-class SmoothedIndentation:
+class SmoothedIndentation(NamedTuple):
     """Moving mean of measured indentations, and their noise."""
 
     smooth: Floats  # (n,), length
@@ -106,8 +105,7 @@ class StretchKind(StrEnum):
     RISING = "reloading"
 
 
-@frozen
-class CurveStretch:
+class CurveStretch(NamedTuple):
     """Points on one curve."""
 
     kind: StretchKind
@@ -118,8 +116,7 @@ class CurveStretch:
     turn: float = 0.0  # of RISING, the recorded indentation at its beginning
 
 
-@frozen
-class Corner:
+class Corner(NamedTuple):
     """An upper turn."""
 
     indentation: float  # largest value of the smoothed path near the turn
@@ -128,8 +125,7 @@ class Corner:
     rise: int = -1  # otherwise, the number of the RISING stretch that ends there
 
 
-@frozen
-class Division:
+class Division(NamedTuple):
     """A test divided into stretches."""
 
     path: SmoothedIndentation
@@ -224,8 +220,7 @@ NAMES = ("indentation", "force")  # columns
 IMPERIAL = {"in", "inch", "inches", "mil", "mils", "lbf", "lb", "lbs", "kip", "kips"}
 
 
-@frozen
-class Test:
+class Test(NamedTuple):
     """An indentation test."""
 
     indentation: Floats  # (rows,), in `units`

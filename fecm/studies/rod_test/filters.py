@@ -18,13 +18,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import field, replace
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._errors import warn
 from fecm._inputs import open_input
 from fecm._measured_tables import read_table
@@ -59,7 +58,7 @@ class FilterKind(StrEnum):
     CFC = "cfc"  # a channel frequency class, which weakens sines by 3 dB at 5/3 of the class
 
 
-@frozen
+@dataclass(frozen=True)
 class Filter:
     """A filter of unit static gain."""
 
@@ -205,7 +204,7 @@ def _butterworth_of(text: str, numbers: str) -> Filter:
 TRANSDUCER = "transducer"
 
 
-@frozen
+@dataclass(frozen=True)
 class TimeHistory:
     """A quantity in time."""
 

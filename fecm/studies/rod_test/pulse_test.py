@@ -15,11 +15,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
-from fecm._dataclasses import frozen
 from fecm._measured_tables import NO_UNITS, read_table
 from fecm._typing import Floats
 from fecm.mechanics.projectile import STEPS, WILSON, Rod, RodState
@@ -31,8 +32,7 @@ FORMS = {"gauss": ("F0", "TAU", "B"), "sine": ("F0", "B")}
 USAGE = "gauss:F0,TAU,B, sine:F0,B or a CSV file of time and force"
 
 
-@frozen
-class Pulse:
+class Pulse(NamedTuple):
     """A force as a function of times of any shape, and the default duration of a test."""
 
     force: Callable[[Floats], Floats]
@@ -109,7 +109,7 @@ COUNTS = 0.01  # fraction of the peak of the pulse above which a row counts in t
 POINTS = ("struck_end", "middle", "far_end")
 
 
-@frozen
+@dataclass(frozen=True)
 class RodHistory:
     """History of a rod under a pulse."""
 
@@ -256,7 +256,7 @@ def pulse_table(
     return dimensions, np.hstack(columns).tolist()
 
 
-@frozen
+@dataclass(frozen=True)
 class Calibration:
     """Straight line through V_F against V_a, and the sensitivity, with standard errors."""
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Mapping
-from dataclasses import field
+from dataclasses import dataclass, field
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecm._dataclasses import frozen
 from fecm._errors import StudyError, warn
 from fecm._typing import Floats
 from fecm.api import sole_problem
@@ -40,8 +40,7 @@ from fecm.studies.rod_test.pulse_test import (
 MOST_TRAVELS = 1000.0  # of a wave along the rod in a usual pulse
 
 
-@frozen
-class Struck:
+class Struck(NamedTuple):
     """A rod under a pulse: where its force is computed, and with which time step, by default."""
 
     rod: Rod
@@ -50,7 +49,7 @@ class Struck:
     units: dict[str, str]
 
 
-@frozen
+@dataclass(frozen=True)
 class PulseTest(RodHistory):
     """History of a rod under a pulse; printed, it is the summary of `fecm rod`.
 

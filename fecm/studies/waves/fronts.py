@@ -15,6 +15,7 @@ angle, computed by perturbation of the eigenvalue problem: with the slowness p =
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from itertools import permutations
 from typing import ClassVar
 
@@ -22,7 +23,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
-from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 from fecm.studies import StudyError
 from fecm.studies.waves.harmonic import (
@@ -45,7 +45,7 @@ ORDERS = np.array(list(permutations(range(5))))  # in which five modes may conti
 FRONTS = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shear")
 
 
-@frozen
+@dataclass(frozen=True)
 class Fronts:
     """The five fronts for a series of normals.
 
@@ -97,7 +97,7 @@ class Fronts:
         return radius + time * (self.velocity + self.curvature)
 
 
-@frozen
+@dataclass(frozen=True)
 class Sheets(Fronts):
     """The five solutions for a series of normals, in descending order of velocity."""
 
@@ -231,7 +231,7 @@ STEPS = 10  # per degree, for tracking sheets and searching cusps
 AROUND = 360 * STEPS  # steps over all normals
 
 
-@frozen
+@dataclass(frozen=True)
 class Cusp:
     """A cusp of a front.
 

@@ -5,6 +5,7 @@ Harmonic plane waves: phase velocities and frequencies, section 2.2.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations
 from typing import ClassVar
@@ -13,7 +14,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.linalg.lapack import dgejsv
 
-from fecm._dataclasses import frozen
 from fecm._typing import Floats, Indices
 from fecm.mechanics.laminate import LaminateSection
 from fecm.studies import StudyError
@@ -21,7 +21,7 @@ from fecm.studies import StudyError
 OUT_OF_RANGE = "the laminate's constants are too large or too far apart to compute with"
 
 
-@frozen
+@dataclass(frozen=True)
 class Medium:
     """An infinite laminate; raises StudyError if stiffness or inertia is not positive definite."""
 
@@ -131,7 +131,7 @@ MODES = ("flexural_1", "flexural_2", "flexural_3", "extension", "in_plane_shear"
 _PAIRS = np.array(list(combinations(range(5), 2)))  # candidates for the two in-plane modes
 
 
-@frozen
+@dataclass(frozen=True)
 class Dispersion:
     """Harmonic waves in one direction.
 
