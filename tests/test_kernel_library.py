@@ -194,19 +194,6 @@ def test_a_file_that_is_no_library_is_not_used(
 
 
 @compiled
-@pytest.mark.skipif(sys.platform != "linux", reason="judges ELF files")
-@pytest.mark.parametrize("eighths", range(8))
-def test_a_library_cut_short_is_not_loaded(
-    eighths: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    whole = Path(kernels.LIBRARY._name).read_bytes()
-    path = tmp_path / "libfecm.so"
-    path.write_bytes(whole[: max(100, len(whole) * eighths // 8)])
-    with pytest.warns(FecmWarning, match="it is incomplete"):
-        assert loaded_from(path, monkeypatch) is None
-
-
-@compiled
 def test_a_library_of_other_sources_is_not_used_and_every_command_says_so(tmp_path: Path) -> None:
     package = tmp_path / "fecm"
     shutil.copytree(SOURCE.parents[2], package)

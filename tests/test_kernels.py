@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import itertools
+import re
 import shutil
 import subprocess
 from dataclasses import replace
@@ -26,7 +27,7 @@ from fecm.mechanics.interpolation import NDOF
 from fecm.mechanics.kernels.element_groups import ElementKind
 from fecm.mechanics.kernels.layout import LANES
 from fecm.mechanics.kernels.plate import CompiledProduct
-from fecm.mechanics.kernels.strains import TYING, CompiledStrains, Strains
+from fecm.mechanics.kernels.strains import TYING, CompiledStrains, StrainsStruct
 from fecm.mechanics.laminate import LaminateSection
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.projectile import Rod, RodState, WilsonStep
@@ -258,52 +259,72 @@ def test_the_modes_of_a_rod_take_the_step_of_its_matrices(elements: int, tapered
         np.testing.assert_allclose(found, wanted, rtol=0.0, atol=1e-9 * np.abs(wanted).max())
 
 
-class Entry(ctypes.Structure):
-    """Entry of a table of fields.h."""
-
-    _fields_ = [
-        ("owner", ctypes.c_char_p),
-        ("name", ctypes.c_char_p),
-        ("offset", ctypes.c_int64),
-        ("size", ctypes.c_int64),
-    ]
+HEADER = Path(kernels.__file__).with_name("structures.h")
+NUMBERS = {"int64_t": ctypes.c_int64, "double": ctypes.c_double}
+POINTERS = {
+    "double": kernels.Doubles, "int32_t": kernels.Integers, "int64_t": kernels.Longs,
+    "int8_t": kernels.Codes,
+}  # fmt: skip
 
 
-def entries(address: int) -> dict[tuple[str, str], tuple[int, int]]:
-    """Offset and size by owner and name, up to the empty entry at the end of a table."""
-    found = {}
-    table = ctypes.cast(address, ctypes.POINTER(Entry))
-    for place in itertools.count():
-        entry = table[place]
-        if entry.owner is None:
-            break
-        found[entry.owner.decode(), entry.name.decode()] = entry.offset, entry.size
-    return found
+def declared_structures() -> dict[str, list[tuple[str, str, bool]]]:
+    """Name, type and whether it is a pointer, of the fields of each structure of structures.h."""
+    code = re.sub(r"/\*.*?\*/", "", HEADER.read_text(encoding="utf-8"), flags=re.DOTALL)
+    structures = {}
+    for body, name in re.findall(r"typedef struct \{(.*?)\} (\w+);", code, flags=re.DOTALL):
+        fields = []
+        for declaration in filter(None, map(str.strip, body.split(";"))):
+            kind, names = re.fullmatch(r"(?:const )?(\w+) (.*)", declaration, re.DOTALL).groups()
+            for field in (field.strip() for field in names.split(",")):
+                fields.append((field.lstrip("*"), kind, field.startswith("*")))
+        structures[name] = fields
+    return structures
 
 
-@compiled
-def test_the_structures_of_python_lie_as_those_of_c() -> None:
+def declared_constants() -> dict[str, int]:
+    """Values of the enumerators of structures.h by name."""
+    code = re.sub(r"/\*.*?\*/", "", HEADER.read_text(encoding="utf-8"), flags=re.DOTALL)
+    constants = {}
+    for body in re.findall(r"enum \{(.*?)\};", code, flags=re.DOTALL):
+        value = 0
+        for enumerator in filter(None, map(str.strip, body.split(","))):
+            name, _, given = enumerator.partition("=")
+            value = int(given) if given else value
+            constants[name.strip()] = value
+            value += 1
+    return constants
+
+
+def test_the_structures_of_python_have_the_fields_of_those_of_c() -> None:
     import_module("fecm.mechanics.kernels.failure")  # nothing else here needs its structures
-    expected = {}
-    structures = {kind.__name__: kind for kind in kernels.Structure.__subclasses__()}
-    for name, kind in structures.items():
-        expected[name, ""] = 0, ctypes.sizeof(kind)
-        for field, *_ in kind._fields_:
-            at = getattr(kind, field)
-            expected[name, field] = at.offset, at.size
-    found = entries(kernels.LIBRARY.fecm_fields())
-    assert len(structures) == 18
-    assert found == expected
+    python = {
+        kind.__name__.removesuffix("Struct"): kind for kind in kernels.Structure.__subclasses__()
+    }
+    expected = {
+        name: [
+            (
+                field,
+                (POINTERS.get(kind) or ctypes.POINTER(python[kind]))
+                if is_pointer
+                else NUMBERS.get(kind) or python[kind],
+            )
+            for field, kind, is_pointer in fields
+        ]
+        for name, fields in declared_structures().items()
+    }
+    assert len(expected) == 18
+    assert {name: [tuple(field) for field in kind._fields_] for name, kind in python.items()} == (
+        expected
+    )
 
 
-@compiled
 def test_the_enumerations_of_python_have_the_values_of_those_in_c() -> None:
-    enumerations = (ElementKind, LawKind, Given, ResultRow)
-    expected = {(kind.__name__, one.name): one.value for kind in enumerations for one in kind}
-    branches = {"VIRGIN": VIRGIN, "UNLOADING": UNLOADING, "RELOADING": RELOADING}
-    expected |= {("Branch", name): branch for name, branch in branches.items()}
-    expected |= {("Column", name.upper()): place for place, name in enumerate(COLUMNS)}
-    counts = {
+    expected = {one.name: one.value for kind in (ElementKind, LawKind) for one in kind}
+    expected |= {f"GIVEN_{one.name}": one.value for one in Given}
+    expected |= {f"FOUND_{one.name}": one.value for one in ResultRow}
+    expected |= {"VIRGIN": VIRGIN, "UNLOADING": UNLOADING, "RELOADING": RELOADING}
+    expected |= {name.upper(): place for place, name in enumerate(COLUMNS)}
+    expected |= {
         "COLUMNS": len(COLUMNS),
         "GIVEN": len(Given),
         "FOUND": len(ResultRow),
@@ -313,18 +334,16 @@ def test_the_enumerations_of_python_have_the_values_of_those_in_c() -> None:
         "PASSES": impact.PASSES,
         "TYING": TYING,
     }
-    expected |= {("Count", name): count for name, count in counts.items()}
-    found = entries(kernels.LIBRARY.fecm_constants())
-    assert {key: value for key, (value, _) in found.items()} == expected
+    assert declared_constants() == expected
 
 
 def test_a_structure_takes_arrays_of_its_types_in_c_order() -> None:
     table = np.zeros((2, 3, 4))
-    assert Strains(table=table).table[5] == 0.0
+    assert StrainsStruct(table=table).table[5] == 0.0
     with pytest.raises(TypeError, match="LP_c_double"):
-        Strains(table=table.astype(np.int64))
+        StrainsStruct(table=table.astype(np.int64))
     with pytest.raises(ValueError, match="not in C order"):
-        Strains(table=table[:, :2])
+        StrainsStruct(table=table[:, :2])
 
 
 @compiled

@@ -106,7 +106,7 @@ class HistoryStruct(Structure):
     _fields_ = tuple((name, c_double) for name in LoadingHistory._fields)
 
 
-class Point(Structure):
+class PointStruct(Structure):
     """:class:`~fecm.mechanics.contact_law.ContactPoint`, by the same names."""
 
     _fields_ = tuple((name, c_double) for name in ContactPoint._fields)
@@ -168,7 +168,7 @@ class ImpactStruct(Structure):
         ("law", LawStruct),
         # State before the steps, and after them.
         ("memory", HistoryStruct),
-        ("contact", Point),
+        ("contact", PointStruct),
         ("plate_w", c_double),  # the plate's displacement in the contact law
         ("work", c_double),  # of the contact force on the indentation
         ("time", c_double),
@@ -331,7 +331,7 @@ class ImpactSteps:
                 k=law.constants.k, q=law.constants.q, **kernel_law(law.constants)._asdict()
             ),
             memory=HistoryStruct(**state.memory._asdict()),
-            contact=Point(**state.contact._asdict()),
+            contact=PointStruct(**state.contact._asdict()),
             plate_w=state.plate_w,
             work=state.contact_work,
             time=state.plate.time,

@@ -45,7 +45,7 @@ class ResultRow(IntEnum):
     COMPLIANCE = 11  # largest w^2/(2 E) of the plate; see :data:`~fecm.results.end.LEAST_WORK`
 
 
-class Sweep(Structure):
+class SweepStruct(Structure):
     """Impacts of `cases` cases by one kind of projectile.
 
     The arrays, of which the last two are written:
@@ -100,7 +100,7 @@ def sweep_impacts(
     T, h = modes.step(step)
     before, after = step.weights
     cases, steps = force.shape
-    structure = Sweep(
+    structure = SweepStruct(
         cases=cases,
         stride=given.strides[0] // given.itemsize,
         steps=steps,

@@ -21,7 +21,7 @@ from fecm.mechanics.exposures import Evaluations, FailureEnvelope
 from fecm.mechanics.failure import CRITERIA, MODES, Strengths, puck_limits, puck_slope
 from fecm.mechanics.failure_monitor import FailureMonitor, Run, ZoneCriteria
 from fecm.mechanics.kernels import LIBRARY, Codes, Doubles, Longs, Structure, filled, floats
-from fecm.mechanics.kernels.strains import Midplane, midplanes
+from fecm.mechanics.kernels.strains import MidplaneStruct, midplanes
 
 
 class PlyStruct(Structure):
@@ -70,7 +70,7 @@ class PliesStruct(Structure):
     )
 
 
-class Interfaces(Structure):
+class InterfacesStruct(Structure):
     """Interlaminar stresses of `interfaces` interfaces of `elements` elements.
 
     The arrays:
@@ -130,9 +130,9 @@ class ExposuresStruct(Structure):
         ("families", c_int64),
         ("runs", c_int64),
         ("zones", c_int64),
-        ("family", POINTER(Midplane)),
+        ("family", POINTER(MidplaneStruct)),
         ("run", POINTER(PliesStruct)),
-        ("zone", POINTER(Interfaces)),
+        ("zone", POINTER(InterfacesStruct)),
         ("counts", Codes),
         ("far", Codes),
         ("plies", MaximaStruct),
@@ -256,9 +256,9 @@ class CompiledMonitor(FailureMonitor):
             families=len(families),
             runs=len(runs),
             zones=len(zones),
-            family=(Midplane * len(families))(*families),
+            family=(MidplaneStruct * len(families))(*families),
             run=(PliesStruct * len(runs))(*runs),
-            zone=(Interfaces * len(zones))(*zones),
+            zone=(InterfacesStruct * len(zones))(*zones),
             counts=self.counts.astype(np.int8),
             far=self.far.astype(np.int8),
             plies=MaximaStruct(**vars(envelope.plies)),
@@ -286,13 +286,13 @@ class CompiledMonitor(FailureMonitor):
             pucks=int(run.is_evaluated("puck")),
         )
 
-    def _interfaces(self, zone: ZoneCriteria, strains: int) -> Interfaces:
+    def _interfaces(self, zone: ZoneCriteria, strains: int) -> InterfacesStruct:
         """The structure of the interfaces of a zone."""
         rows = None if isinstance(zone.elements, slice) else zone.elements
         shear = zone.shear / zone.weaker[:, None]  # (12, interfaces, plies, tau)
         shear = shear.reshape(2, 6, zone.interfaces, 4)[:, 6 - strains :].swapaxes(2, 3)
         table = filled(shear)
-        return Interfaces(
+        return InterfacesStruct(
             elements=len(self.counts) if rows is None else len(rows),
             interfaces=zone.interfaces,
             width=table.shape[3],

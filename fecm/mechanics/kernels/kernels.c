@@ -10,7 +10,6 @@
  *   sweep.h       many impacts on one plate, eight at a time; twice
  *   midplane.h    strains of the midplane and curvatures for the exposures; twice
  *   failure.h     exposures of plies, four states of stress at a time; twice
- *   fields.h      places of the fields of structures, for a test
  *
  * and here the steps, their threads, and the functions that Python calls.
  *
@@ -56,9 +55,7 @@
 #include <immintrin.h>
 #endif
 
-#define LANES 8
 #define APART __attribute__((noinline)) /* loops that need all registers, which compilers find only there */
-#define PASSES 5 /* of the contact iteration */
 #define TIE 1.0e-9 /* see fecm/mechanics/exposures.py */
 #define LEAST_WORK 1.0e-3 /* see fecm/results/end.py */
 #define TOLERANCE 1.0e-6
@@ -179,7 +176,6 @@ static const int BEGIN[CRITERIA + 1] = {0, 5, 6, 10, 15};
 #define TARGET static
 #include "impact.h"
 #undef TARGET
-#include "fields.h"
 
 #ifdef HAS_AVX2_CODE
 /* Whether processor and system know AVX2 and FMA. */
@@ -542,11 +538,6 @@ EXPORT void fecm_failure(const Exposures *m, int64_t rows, int64_t numbers, cons
         memcpy(mode + m->criteria * row, m->largest.mode, sizeof *mode * m->criteria);
     }
 }
-
-/* Places of the fields of structures, and values of enumerations; each ends with an empty entry. */
-EXPORT const Entry *fecm_fields(void) { return FIELDS; }
-
-EXPORT const Entry *fecm_constants(void) { return CONSTANTS; }
 
 /* Checksum of the sources, given by the build. */
 EXPORT int fecm_stamp(void) { return FECM_STAMP; }

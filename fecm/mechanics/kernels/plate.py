@@ -77,7 +77,7 @@ class BlockStruct(Structure):
 BLOCK = np.dtype([(name, np.uint64) for name, _ in BlockStruct._fields_])
 
 
-class Chunk(Structure):
+class ChunkStruct(Structure):
     """Blocks of near elements, and their nodes; the last chunk has only the shared nodes.
 
     The arrays:
@@ -132,7 +132,7 @@ class PlateStruct(Structure):
         ("chunks", c_int64),  # without the last one
         ("nodes", c_int64),  # of all chunks
         ("most", c_int64),  # of the largest chunk
-        ("chunk", POINTER(Chunk)),
+        ("chunk", POINTER(ChunkStruct)),
         ("lane", Integers),
         ("preload", Doubles),
         ("curvature", Doubles),
@@ -239,10 +239,10 @@ class CompiledPlate:
 
     def _chunks(
         self, masses: list[Floats], places: NodePlaces, leader: Indices
-    ) -> ctypes.Array[Chunk]:
+    ) -> ctypes.Array[ChunkStruct]:
         """Chunks without their blocks, with the masses (nd, nodes) of their entries."""
         chunk, place = places.home
-        cuts = (Chunk * len(masses))()
+        cuts = (ChunkStruct * len(masses))()
         for number, mass in enumerate(masses):
             here = places.node[places.starts[number] : places.starts[number + 1]]
             copies = np.flatnonzero(chunk[here] != number)
@@ -250,7 +250,7 @@ class CompiledPlate:
             follows = copied != here[copies]
             signs = np.where(follows[:, None], TURNED[self.columns], 1.0)
             at_rest = np.flatnonzero(mass <= 0.0)
-            made = Chunk(
+            made = ChunkStruct(
                 first=int(places.firsts[number]),
                 nodes=mass.shape[1],
                 shared=len(copies),
@@ -267,7 +267,7 @@ class CompiledPlate:
 
     def _blocks(
         self,
-        cuts: ctypes.Array[Chunk],
+        cuts: ctypes.Array[ChunkStruct],
         layout: Layout,
         groups: list[ElementGroup],
         places: NodePlaces,

@@ -35,7 +35,7 @@ from fecm.mechanics.strains import FLAT, STRAINS, StrainField, strain_of_deflect
 TYING = 12  # tying points of w,1 and of w,2 in fours; structures.h has it too
 
 
-class Midplane(Structure):
+class MidplaneStruct(Structure):
     """Elements with the same nodes present, `elements` of `nodes` nodes, and their points.
 
     The arrays; the last four are those of a nonlinear plate, and are not set otherwise:
@@ -77,12 +77,12 @@ class Midplane(Structure):
     )
 
 
-def midplanes(stresses: PlyStresses) -> list[Midplane]:
+def midplanes(stresses: PlyStresses) -> list[MidplaneStruct]:
     """The elements of some ply stresses, for the kernels."""
     return [_structure(stresses, family, complete) for family, complete in stresses.families]
 
 
-def _structure(stresses: PlyStresses, family: ElementBlock, complete: bool) -> Midplane:
+def _structure(stresses: PlyStresses, family: ElementBlock, complete: bool) -> MidplaneStruct:
     """The structure of a family."""
     rule = stresses.rule
     same = family.congruence
@@ -96,7 +96,7 @@ def _structure(stresses: PlyStresses, family: ElementBlock, complete: bool) -> M
         centre = np.concatenate([second_derivatives(shapes), slopes], axis=1)
     initial = np.zeros(3) if stresses.initial is None else np.ascontiguousarray(stresses.initial)
     curved = None if stresses.curvature == FLAT else strain_of_deflection(stresses.curvature)
-    return Midplane(
+    return MidplaneStruct(
         elements=len(family.rows),
         nodes=family.nodes.shape[1],
         points=len(rule.xi),
@@ -124,7 +124,7 @@ def _quadratic(tied: QuadraticStrains) -> dict[str, Floats]:
     }
 
 
-class Strains(Structure):
+class StrainsStruct(Structure):
     """Elements with the same nodes present, `elements` of `nodes` nodes, and their points.
 
     The arrays:
@@ -163,11 +163,11 @@ class CompiledStrains(StrainField):
     """The same strains."""
 
     @cached_property
-    def _structures(self) -> list[Strains]:
+    def _structures(self) -> list[StrainsStruct]:
         """A structure of each family."""
         return [self._structure(family) for family in self.families]
 
-    def _structure(self, family: ElementBlock) -> Strains:
+    def _structure(self, family: ElementBlock) -> StrainsStruct:
         same = family.congruence
         values, local = local_shape_functions(family, self.rule)
         inverse, _ = jacobians(family.take(same.representatives), local, self.transposed_jacobian)
@@ -180,7 +180,7 @@ class CompiledStrains(StrainField):
         metric = np.zeros((len(inverse), 4, width))
         metric[:, :, :points] = inverse.swapaxes(1, 2)
         tied = self._tied(family.take(same.representatives), width) if self.assumes_shear else {}
-        return Strains(
+        return StrainsStruct(
             elements=len(family.rows),
             nodes=nodes,
             points=points,

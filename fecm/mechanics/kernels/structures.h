@@ -1,13 +1,15 @@
 /* The structures and enumerations that C and Python share; included once.
  *
  * Python fills them in, and points them to arrays that it owns: the kernels allocate nothing that
- * outlives a call.  Each is repeated with ctypes in the Python file of its kernel: plate.py and
- * element_groups.py (Plate, Chunk, Block, Group), strains.py (Strains), midplane.py (Midplane), failure.py (Exposures), and beside
- * this folder impact_steps.py (Impact) and impact_sweep.py (Sweep).  fields.h says where each field lies,
- * for a test that compares both sides.
+ * outlives a call.  Each structure is repeated with ctypes, under its name and "Struct", in the Python file
+ * of its kernel: plate.py and element_groups.py, strains.py, failure.py, and beside this folder
+ * impact_steps.py and impact_sweep.py.  A test reads this file and compares both sides.
  *
  * Shapes are those of NumPy, C order; the last index runs fastest.  Numbers are in the deck's units.
  */
+
+enum { LANES = 8 };  /* elements of a block */
+enum { PASSES = 5 }; /* most passes of the contact iteration */
 
 /* Plate; plate.py has a drawing of chunks, blocks, lanes and places. */
 
