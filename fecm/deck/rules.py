@@ -1,8 +1,8 @@
 """Rules: what each code of a finding means, beside the function that finds it.
 
-A rule is declared once, with its code and its text.  Most are functions, decorated with
-:func:`rule`, that look at a segment or a problem and yield a :class:`Report` for each fault.  What
-is found while cards are read has no such function; ``reader_rules.py`` declares those codes.
+Most rules are functions, decorated with :func:`rule`, that look at a segment or a problem and yield
+a :class:`Report` for each fault; the docstring is the text of the rule.  What is found while cards
+are read has no such function; ``reader_rules.py`` declares those codes.
 
 The page ``docs/findings.md`` is made of the declarations, see ``fecm/problem/findings_page.py``.
 """
@@ -76,11 +76,24 @@ def reports(code: str) -> Callable[[Callable[P, Reports]], Callable[P, list[Find
 
 
 def rule(
-    code: str, subject: Subject, summary: str, *, remedy: str, cause: str = ""
+    code: str, subject: Subject
 ) -> Callable[[Callable[P, Reports]], Callable[P, list[Finding]]]:
-    """Declare a code, and give it to what a function reports."""
-    declare(code, subject, summary, remedy=remedy, cause=cause)
-    return reports(code)
+    """Declare a code by the docstring of a function, and give it to what the function reports.
+
+    The first paragraph of the docstring is the summary, the last one begins with "Remedy:", and
+    those between them are the cause.
+    """
+
+    def decorate(function: Callable[P, Reports]) -> Callable[P, list[Finding]]:
+        # Python with -OO has no docstrings; the findings do not need them.
+        text = function.__doc__ or f"{code}.\n\nRemedy: "
+        summary, *cause, remedy = [" ".join(part.split()) for part in text.split("\n\n")]
+        declare(
+            code, subject, summary, remedy=remedy.removeprefix("Remedy: "), cause=" ".join(cause)
+        )
+        return reports(code)(function)
+
+    return decorate
 
 
 def apply(

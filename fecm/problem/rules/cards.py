@@ -80,14 +80,12 @@ SINGLE: Kinds = (
 )
 
 
-@rule(
-    "E203",
-    Subject.SEGMENTS,
-    "A segment is missing.",
-    remedy="COOR, ELEM and MATE are needed always, ROD and EXPE with RODP, ALLO with FAIL.",
-)
+@rule("E203", Subject.SEGMENTS)
 def missing_segment(deck: model.Deck, unsound: set[str]) -> Reports:
-    """Find what the program needs; a segment with unreadable cards is not missing."""
+    """A segment is missing.
+
+    Remedy: COOR, ELEM and MATE are needed always, ROD and EXPE with RODP, ALLO with FAIL.
+    """
     words = {macro.word for macro in deck.macros}
     impact = IN_AN_IMPACT if "RODP" in words else ()
     failure: Kinds = (model.Allowables,) if "FAIL" in words else ()
@@ -98,15 +96,14 @@ def missing_segment(deck: model.Deck, unsound: set[str]) -> Reports:
             )
 
 
-@rule(
-    "W204",
-    Subject.SEGMENTS,
-    "A segment is given twice.",
-    cause="The last is effective. BOUN segments add up.",
-    remedy="Remove one of them.",
-)
+@rule("W204", Subject.SEGMENTS)
 def repeated_segment(deck: model.Deck, unsound: set[str]) -> Reports:
-    """Find segments that a later one of the same keyword replaces."""
+    """A segment is given twice.
+
+    The last is effective. BOUN segments add up.
+
+    Remedy: Remove one of them.
+    """
     for kind in SINGLE:
         for segment in deck.all(kind)[1:]:
             message = f"A second {kind.keyword} segment replaces the first."

@@ -31,14 +31,12 @@ USUAL_RADIUS = 8e-3  # m
 REACH = 8.0  # greatest ratio to the usual radius at which a unit is named
 
 
-@rule(
-    "E412",
-    Subject.IMPACT,
-    "A parameter of EXPE is out of range.",
-    remedy="k and q positive, alpha_p 0 or more, s_p at least 0 and below 1.",
-)
+@rule("E412", Subject.IMPACT)
 def invalid_parameter(law: model.Indentation) -> Reports:
-    """Find parameters that no contact law has."""
+    """A parameter of EXPE is out of range.
+
+    Remedy: k and q positive, alpha_p 0 or more, s_p at least 0 and below 1.
+    """
     limits = limits_of(law.word, *law.values())
     for name, value, (valid, must) in zip(law.names(), law.values(), limits, strict=True):
         if not valid:
@@ -67,15 +65,14 @@ def limits_of(
     ]
 
 
-@rule(
-    "W436",
-    Subject.IMPACT,
-    "alpha_p is above the thickness.",
-    cause="No permanent indentation would occur.",
-    remedy="A length in the deck's unit.",
-)
+@rule("W436", Subject.IMPACT)
 def large_indentation(problem: Problem) -> Reports:
-    """Find a critical indentation deeper than the plate."""
+    """alpha_p is above the thickness.
+
+    No permanent indentation would occur.
+
+    Remedy: A length in the deck's unit.
+    """
     law = problem.deck.require(model.Indentation)
     thickness = problem.deck.require(model.Material).integration.thickness
     if law.alpha_p > thickness:
@@ -85,15 +82,14 @@ def large_indentation(problem: Problem) -> Reports:
         yield Report(message, law.place(name), "it is a length in the deck's unit")
 
 
-@rule(
-    "W437",
-    Subject.IMPACT,
-    "q is outside 1.5 to 5.",
-    cause="q is the power of unloading. The power of loading is 1.5 whatever q is.",
-    remedy="Measured powers are 1.5 to 2.5; an elastic law has 1.5.",
-)
+@rule("W437", Subject.IMPACT)
 def doubtful_power(problem: Problem) -> Reports:
-    """Find powers of unloading that nobody measured."""
+    """The power q is outside 1.5 to 5.
+
+    q is the power of unloading. The power of loading is 1.5 whatever q is.
+
+    Remedy: Measured powers are 1.5 to 2.5; an elastic law has 1.5.
+    """
     law = problem.deck.require(model.Indentation)
     if law.word != model.Indentation.ACR and not LEAST_POWER <= law.q <= GREATEST_POWER:
         limits = f"{LEAST_POWER:g} to {GREATEST_POWER:g}"
@@ -102,15 +98,14 @@ def doubtful_power(problem: Problem) -> Reports:
         yield Report(message, law.place(law.names()[3]), hint)
 
 
-@rule(
-    "W550",
-    Subject.IMPACT,
-    "alpha_p and s_p look exchanged.",
-    cause="s_p is below 0.02, and alpha_p has a size that is usual for s_p (0.03 to 0.5).",
-    remedy="k, alpha_p (a length), s_p (the permanent over the largest indentation), q.",
-)
+@rule("W550", Subject.IMPACT)
 def exchanged_constants(problem: Problem) -> Reports:
-    """Find a slope of the permanent indentation in the place of the critical indentation."""
+    """alpha_p and s_p look exchanged.
+
+    s_p is below 0.02, and alpha_p has a size that is usual for s_p (0.03 to 0.5).
+
+    Remedy: k, alpha_p (a length), s_p (the permanent over the largest indentation), q.
+    """
     law = problem.deck.require(model.Indentation)
     least, greatest = USUAL_SLOPES
     if 0.0 < law.s_p < SMALLEST_SLOPE and least <= law.alpha_p <= greatest:
@@ -126,18 +121,15 @@ def sphere_radius(deck: model.Deck) -> float:
         return float((0.75 * np.float64(k) / e2) ** 2)
 
 
-@rule(
-    "W476",
-    Subject.IMPACT,
-    "k is that of a sphere of an impossible radius.",
-    cause=(
-        "By equation 3-2 with E2 it is smaller than 0.03 mm or larger than 5 m (without UNIT: than "
-        "0.006 of the thickness, or 100 plates)."
-    ),
-    remedy="k in force/length^1.5; `fecm indent estimate`.",
-)
+@rule("W476", Subject.IMPACT)
 def doubtful_coefficient(problem: Problem) -> Reports:
-    """Find a k that only a sphere of an impossible radius has."""
+    """K is that of a sphere of an impossible radius.
+
+    By equation 3-2 with E2 it is smaller than 0.03 mm or larger than 5 m (without UNIT: than 0.006
+    of the thickness, or 100 plates).
+
+    Remedy: k in force/length^1.5; `fecm indent estimate`.
+    """
     deck, names = problem.deck, unit_names(problem.deck)
     if not has_real_moduli(deck.require(model.Material).ply, names):  # W435 says so
         return

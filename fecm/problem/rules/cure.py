@@ -24,18 +24,14 @@ LARGEST_WARP = 0.1  # rise of the free plate over its thickness without a warnin
 FIELDS = "its fields are the material (columns 1-5, blank: 1), alpha1 (11-20) and alpha2 (21-30)"
 
 
-@rule(
-    "E453",
-    Subject.LAMINATE,
-    "CURE has no coefficients of expansion of the plies.",
-    cause=(
-        "Its second card is missing, of another material or given twice; or alpha1 and alpha2 are "
-        "0."
-    ),
-    remedy="After the changes a card with the material (blank: 1), alpha1 and alpha2.",
-)
+@rule("E453", Subject.LAMINATE)
 def missing_expansion(card: model.Cure) -> Reports:
-    """Find a change of temperature or moisture without what it does to the plies."""
+    """CURE has no coefficients of expansion of the plies.
+
+    Its second card is missing, of another material or given twice; or alpha1 and alpha2 are 0.
+
+    Remedy: After the changes a card with the material (blank: 1), alpha1 and alpha2.
+    """
     hint = FIELDS
     materials = [one.material for one in card.expansions]
     for position, one in enumerate(card.expansions):
@@ -55,15 +51,14 @@ def missing_expansion(card: model.Cure) -> Reports:
             yield Report(message, free.place(names[0]), hint)
 
 
-@rule(
-    "E454",
-    Subject.LAMINATE,
-    "A coefficient of thermal expansion on CURE is above 10⁻³ per kelvin.",
-    cause="Fibres and resins have 10⁻⁶ to 10⁻⁴.",
-    remedy="Coefficients per kelvin: 22.5E-6, not 22.5.",
-)
+@rule("E454", Subject.LAMINATE)
 def implausible_expansion(card: model.Cure) -> Reports:
-    """Find coefficients of expansion that are given in millionths."""
+    """A coefficient of thermal expansion on CURE is above 10⁻³ per kelvin.
+
+    Fibres and resins have 10⁻⁶ to 10⁻⁴.
+
+    Remedy: Coefficients per kelvin: 22.5E-6, not 22.5.
+    """
     for one in card.expansions:
         for name in one.THERMAL:
             value = getattr(one, name)
@@ -73,15 +68,14 @@ def implausible_expansion(card: model.Cure) -> Reports:
                 yield Report(message, one.place(name), hint)
 
 
-@rule(
-    "W496",
-    Subject.LAMINATE,
-    "A coefficient of moisture expansion on CURE is above 0.1.",
-    cause="It is the strain per per cent of weight. Books have the strain at 100 %.",
-    remedy="A hundredth of the book's value: 0.006 for 0.6.",
-)
+@rule("W496", Subject.LAMINATE)
 def implausible_moisture(problem: Problem) -> Reports:
-    """Find moisture coefficients that are not per per cent."""
+    """A coefficient of moisture expansion on CURE is above 0.1.
+
+    It is the strain per per cent of weight. Books have the strain at 100 %.
+
+    Remedy: A hundredth of the book's value: 0.006 for 0.6.
+    """
     card = problem.deck.last(model.Cure)
     for one in () if card is None else card.expansions:
         for name in one.MOISTURE:
@@ -92,14 +86,12 @@ def implausible_moisture(problem: Problem) -> Reports:
                 yield Report(message, one.place(name), hint)
 
 
-@rule(
-    "W462",
-    Subject.LAMINATE,
-    "The change of temperature on CURE is above 500 K.",
-    remedy="Temperature of use minus stress-free temperature, in kelvin.",
-)
+@rule("W462", Subject.LAMINATE)
 def large_change(problem: Problem) -> Reports:
-    """Find changes of temperature that no resin withstands."""
+    """The change of temperature on CURE is above 500 K.
+
+    Remedy: Temperature of use minus stress-free temperature, in kelvin.
+    """
     card = problem.deck.last(model.Cure)
     if card is not None and abs(card.delta_t) > LARGEST_CHANGE:
         message = f"The change of temperature is {card.delta_t:g} K, above {LARGEST_CHANGE:g}."
@@ -107,18 +99,15 @@ def large_change(problem: Problem) -> Reports:
         yield Report(message, card.place("change of temperature"), hint)
 
 
-@rule(
-    "W540",
-    Subject.LAMINATE,
-    "The change of temperature on CURE is positive.",
-    cause=(
-        "The plies have been heated since they were free of stress. After a cure the change is "
-        "negative, and residual stresses of the wrong sign hide the first failure."
-    ),
-    remedy="The temperature of use minus that of the cure: -155 from 177 to 22.",
-)
+@rule("W540", Subject.LAMINATE)
 def heated_since_the_cure(problem: Problem) -> Reports:
-    """Find a change of temperature of the wrong sign."""
+    """The change of temperature on CURE is positive.
+
+    The plies have been heated since they were free of stress. After a cure the change is negative,
+    and residual stresses of the wrong sign hide the first failure.
+
+    Remedy: The temperature of use minus that of the cure: -155 from 177 to 22.
+    """
     card = problem.deck.last(model.Cure)
     if card is not None and card.delta_t > 0.0:
         message = (
@@ -129,15 +118,14 @@ def heated_since_the_cure(problem: Problem) -> Reports:
         yield Report(message, card.place("change of temperature"), hint)
 
 
-@rule(
-    "W463",
-    Subject.DAMAGE,
-    "The laminate cracks before any load.",
-    cause="The residual stresses of CURE alone reach the strength of a ply.",
-    remedy="The values of CURE and ALLO, or another layup.",
-)
+@rule("W463", Subject.DAMAGE)
 def cracks_at_rest(problem: Problem) -> Reports:
-    """Find residual stresses beyond the strength of a ply."""
+    """The laminate cracks before any load.
+
+    The residual stresses of CURE alone reach the strength of a ply.
+
+    Remedy: The values of CURE and ALLO, or another layup.
+    """
     card, residuals = problem.deck.last(model.Cure), problem.residuals
     if not problem.deck.has(model.Allowables) or card is None or residuals is None:
         return
@@ -162,15 +150,14 @@ def cracks_at_rest(problem: Problem) -> Reports:
         yield Report(message, card.place(), "strengths and moduli must be in the same unit")
 
 
-@rule(
-    "W551",
-    Subject.LAMINATE,
-    "A ply of parallel fibres expands more along the fibres than across them.",
-    cause="alpha1 is above alpha2, or beta1 above beta2, in a ply with E1 > 2 E2.",
-    remedy="alpha1, along the fibres, before alpha2.",
-)
+@rule("W551", Subject.LAMINATE)
 def exchanged_expansions(problem: Problem) -> Reports:
-    """Find coefficients of expansion along and across the fibres that look exchanged."""
+    """A ply of parallel fibres expands more along the fibres than across them.
+
+    alpha1 is above alpha2, or beta1 above beta2, in a ply with E1 > 2 E2.
+
+    Remedy: alpha1, along the fibres, before alpha2.
+    """
     for one in _expansions_of_fibrous_plies(problem):
         for along, across in (one.THERMAL, one.MOISTURE):
             first, second = getattr(one, along), getattr(one, across)
@@ -183,15 +170,14 @@ def exchanged_expansions(problem: Problem) -> Reports:
                 yield Report(message, one.place(along), hint)
 
 
-@rule(
-    "W552",
-    Subject.LAMINATE,
-    "alpha2 on CURE looks like a coefficient per degree Fahrenheit.",
-    cause="It is 8·10⁻⁶ to 18·10⁻⁶ in a ply with E1 > 2 E2; resins have 19·10⁻⁶ and more.",
-    remedy="Coefficients per kelvin: 1.8 times those per degree Fahrenheit.",
-)
+@rule("W552", Subject.LAMINATE)
 def expansion_per_fahrenheit(problem: Problem) -> Reports:
-    """Find an expansion across the fibres that is too small for a resin."""
+    """alpha2 on CURE looks like a coefficient per degree Fahrenheit.
+
+    It is 8·10⁻⁶ to 18·10⁻⁶ in a ply with E1 > 2 E2; resins have 19·10⁻⁶ and more.
+
+    Remedy: Coefficients per kelvin: 1.8 times those per degree Fahrenheit.
+    """
     for one in _expansions_of_fibrous_plies(problem):
         least, greatest = PER_FAHRENHEIT
         if one.alpha1 <= one.alpha2 and least < one.alpha2 < greatest:
@@ -221,18 +207,15 @@ def _largest_curvature(curvature: Floats) -> float:
     return float(abs(x + y) / 2.0 + np.hypot((x - y) / 2.0, xy / 2.0))
 
 
-@rule(
-    "W464",
-    Subject.LAMINATE,
-    "The laminate is not symmetric and warps as it cools.",
-    cause=(
-        "The free plate rises by more than a tenth of its thickness. It is taken as flat when it "
-        "is mounted, without the forces that flatten it."
-    ),
-    remedy="A symmetric laminate, or accept it.",
-)
+@rule("W464", Subject.LAMINATE)
 def warped_plate(problem: Problem) -> Reports:
-    """Find laminates that are not flat after the cure."""
+    """The laminate is not symmetric and warps as it cools.
+
+    The free plate rises by more than a tenth of its thickness. It is taken as flat when it is
+    mounted, without the forces that flatten it.
+
+    Remedy: A symmetric laminate, or accept it.
+    """
     card, residual = problem.deck.last(model.Cure), problem.residual
     if card is None or residual is None:
         return
@@ -248,15 +231,14 @@ def warped_plate(problem: Problem) -> Reports:
         yield Report(message, card.place(), hint)
 
 
-@rule(
-    "W465",
-    Subject.LAMINATE,
-    "CURE is without PLYS and FAIL.",
-    cause="Residual stresses change neither the motion nor the force.",
-    remedy="FAIL, with ALLO, in the loop of RODP.",
-)
+@rule("W465", Subject.LAMINATE)
 def cure_without_stresses(problem: Problem) -> Reports:
-    """Find residual stresses that the program never uses."""
+    """CURE is without PLYS and FAIL.
+
+    Residual stresses change neither the motion nor the force.
+
+    Remedy: FAIL, with ALLO, in the loop of RODP.
+    """
     card = problem.deck.last(model.Cure)
     if card is not None and {"PLYS", "FAIL"}.isdisjoint(m.word for m in flat(problem.program)):
         message = "CURE has no effect without PLYS or FAIL: motion and force don't depend on it."

@@ -23,28 +23,25 @@ def _card(problem: Problem) -> model.Curvature:
     return problem.deck.require(model.Curvature)
 
 
-@rule(
-    "W521",
-    Subject.LAMINATE,
-    "All radii of CURV are infinite.",
-    remedy="Give Rx, Ry or Rxy, or remove the segment.",
-)
+@rule("W521", Subject.LAMINATE)
 def no_curvature(card: model.Curvature) -> Reports:
-    """Find a panel that is flat."""
+    """All radii of CURV are infinite.
+
+    Remedy: Give Rx, Ry or Rxy, or remove the segment.
+    """
     if not any(card.curvatures):
         hint = "its fields are the radii Rx, Ry and Rxy; blank is infinite"
         yield Report("CURV is without effect: all its radii are infinite.", card.place(), hint)
 
 
-@rule(
-    "E522",
-    Subject.LAMINATE,
-    "CURV has an element that is not a quadrilateral with 9 nodes.",
-    cause="Elements with fewer nodes lock: their strains of u and v do not follow w/R.",
-    remedy="Take 9-node elements; `fecm new` writes them.",
-)
+@rule("E522", Subject.LAMINATE)
 def elements_without_curvature(problem: Problem) -> Reports:
-    """Find elements that are not for curved panels."""
+    """CURV has an element that is not a quadrilateral with 9 nodes.
+
+    Elements with fewer nodes lock: their strains of u and v do not follow w/R.
+
+    Remedy: Take 9-node elements; `fecm new` writes them.
+    """
     what = "is not a quadrilateral with 9 nodes, as CURV needs"
     hint = "elements with 3, 4, 8 or 12 nodes are for flat plates only"
     yield from report_elements(problem.deck, np.flatnonzero(not_nine_nodes(problem)), what, hint)
@@ -70,43 +67,40 @@ def _steepness(problem: Problem) -> str:
 RADII = "radii are in the deck's unit of length"
 
 
-@rule(
-    "E523",
-    Subject.LAMINATE,
-    "The panel of CURV is deep: an arc that rises by more than 1/4 of its side.",
-    cause="The theory of shallow shells takes the slope of the midplane as small.",
-    remedy="Larger radii, in the deck's unit of length, or a smaller panel.",
-)
+@rule("E523", Subject.LAMINATE)
 def deep_panel(problem: Problem) -> Reports:
-    """Find a panel that shallow-shell theory does not describe."""
+    """The panel of CURV is deep: an arc that rises by more than 1/4 of its side.
+
+    The theory of shallow shells takes the slope of the midplane as small.
+
+    Remedy: Larger radii, in the deck's unit of length, or a smaller panel.
+    """
     if not _slope(problem) <= STEEP:
         message = f"{_steepness(problem)}; the theory of shallow shells ends at 1/4."
         yield Report(message, _card(problem).place(), RADII)
 
 
-@rule(
-    "W524",
-    Subject.LAMINATE,
-    "The panel of CURV is hardly shallow: its arc rises by more than 1/8 of a side.",
-    cause="The theory of shallow shells takes the slope of the midplane as small.",
-    remedy="Larger radii, or a smaller panel; stiffness and frequencies are approximate.",
-)
+@rule("W524", Subject.LAMINATE)
 def hardly_shallow(problem: Problem) -> Reports:
-    """Find a panel at the limit of shallow-shell theory."""
+    """The panel of CURV is hardly shallow: its arc rises by more than 1/8 of a side.
+
+    The theory of shallow shells takes the slope of the midplane as small.
+
+    Remedy: Larger radii, or a smaller panel; stiffness and frequencies are approximate.
+    """
     if SHALLOW < _slope(problem) <= STEEP:
         message = f"{_steepness(problem)}; the theory of shallow shells is for less than 1/8."
         yield Report(message, _card(problem).place(), RADII)
 
 
-@rule(
-    "W525",
-    Subject.LAMINATE,
-    "A radius of CURV is less than 20 times the thickness.",
-    cause="Strains vary over the thickness of a thick shell as those of a thin one do not.",
-    remedy="The unit of the radius, the deck's of length.",
-)
+@rule("W525", Subject.LAMINATE)
 def thick_panel(problem: Problem) -> Reports:
-    """Find a panel that is no thin shell."""
+    """A radius of CURV is less than 20 times the thickness.
+
+    Strains vary over the thickness of a thick shell as those of a thin one do not.
+
+    Remedy: The unit of the radius, the deck's of length.
+    """
     card, thickness = _card(problem), float(problem.plate.thicknesses.max())
     radii = {"Rx": card.radius_x, "Ry": card.radius_y, "Rxy": card.radius_xy}
     for name, radius in radii.items():
@@ -116,15 +110,14 @@ def thick_panel(problem: Problem) -> Reports:
             yield Report(message, card.place(name), f"thin shells have at least {THIN:g} times")
 
 
-@rule(
-    "W526",
-    Subject.LAMINATE,
-    "CURV, and u or v is restrained at every node.",
-    cause="That clamps the membrane: the panel is much too stiff.",
-    remedy="Restrain u and v only where a support holds them. `fecm new --radius-x` does so.",
-)
+@rule("W526", Subject.LAMINATE)
 def clamped_membrane(problem: Problem) -> Reports:
-    """Find a curved panel that can't move in its plane."""
+    """CURV, and u or v is restrained at every node.
+
+    That clamps the membrane: the panel is much too stiff.
+
+    Remedy: Restrain u and v only where a support holds them. `fecm new --radius-x` does so.
+    """
     held = (problem.mesh.codes[:, :W] != 0).all(axis=0)
     names = [name for name, all_held in zip("uv", held.tolist(), strict=True) if all_held]
     if names:
@@ -138,30 +131,28 @@ def clamped_membrane(problem: Problem) -> Reports:
         yield Report(message, boundary.place() if boundary else None, hint)
 
 
-@rule(
-    "E527",
-    Subject.LAMINATE,
-    "CURV is with a bending order L1 below 3.",
-    cause="The membrane is integrated with it: 2 leaves motions of u and v without energy.",
-    remedy="L1 = 3.",
-)
+@rule("E527", Subject.LAMINATE)
 def low_order(problem: Problem) -> Reports:
-    """Find a rule that does not hold the membrane."""
+    """CURV is with a bending order L1 below 3.
+
+    The membrane is integrated with it: 2 leaves motions of u and v without energy.
+
+    Remedy: L1 = 3.
+    """
     card = problem.deck.require(model.Material).integration
     if card.bending < ORDER:
         message = f"CURV needs the bending order L1 = {ORDER} for the membrane, not {card.bending}."
         yield Report(message, card.place("bending order L1"), f"take L1 = {ORDER}")
 
 
-@rule(
-    "E528",
-    Subject.LAMINATE,
-    "CURV and PREL are not in equilibrium.",
-    cause="The force N0x/Rx + N0y/Ry + 2 N0xy/Rxy across the midplane deflects the panel.",
-    remedy="Forces along a direction that is straight.",
-)
+@rule("E528", Subject.LAMINATE)
 def preload_bends_panel(problem: Problem) -> Reports:
-    """Find a preload that would deflect the panel."""
+    """CURV and PREL are not in equilibrium.
+
+    The force N0x/Rx + N0y/Ry + 2 N0xy/Rxy across the midplane deflects the panel.
+
+    Remedy: Forces along a direction that is straight.
+    """
     if (card := problem.deck.last(model.Preload)) is None:
         return
     parts = strain_of_deflection(_card(problem).curvatures) * card.forces

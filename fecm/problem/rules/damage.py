@@ -59,14 +59,12 @@ ENOUGH_EVALUATIONS = 20  # of FAIL, that a largest exposure over time is not mis
 MOST_TWIST = 0.1  # largest |D16| and |D26|, over (D11 D22)^(1/2), without a warning of DELA
 
 
-@rule(
-    "E455",
-    Subject.DAMAGE,
-    "A strength on ALLO's card is not positive.",
-    remedy="Compressive strengths are positive too.",
-)
+@rule("E455", Subject.DAMAGE)
 def invalid_strength(card: model.Allowables) -> Reports:
-    """Find strengths that no ply has."""
+    """A strength on ALLO's card is not positive.
+
+    Remedy: Compressive strengths are positive too.
+    """
     for one in (card, *card.others):
         for (name, _, _), value in zip(SHARES, one.row(), strict=False):
             if isinstance(value, str) or not value > 0.0:
@@ -76,14 +74,12 @@ def invalid_strength(card: model.Allowables) -> Reports:
                 yield Report(message, one.place(name), hint)
 
 
-@rule(
-    "E456",
-    Subject.DAMAGE,
-    "F12* is not between -1 and 1, or p+ or p- not between 0 and 1.",
-    remedy="Blanks take -0.5, 0.35, 0.3 (carbon fibres; glass: 0.30, 0.25).",
-)
+@rule("E456", Subject.DAMAGE)
 def invalid_constant_of_criterion(card: model.Allowables) -> Reports:
-    """Find constants that the criteria of Tsai-Wu and Puck don't allow."""
+    """F12* is not between -1 and 1, or p+ or p- not between 0 and 1.
+
+    Remedy: Blanks take -0.5, 0.35, 0.3 (carbon fibres; glass: 0.30, 0.25).
+    """
     for one in (card, *card.others):
         for name, value in (("p+", one.p_plus), ("p-", one.p_minus)):
             if not 0.0 < value < 1.0:
@@ -94,15 +90,14 @@ def invalid_constant_of_criterion(card: model.Allowables) -> Reports:
             yield Report(message, one.place(), "a blank takes -0.5")
 
 
-@rule(
-    "E457",
-    Subject.DAMAGE,
-    "G_IIc is not positive, or the number of delaminations not whole.",
-    cause="The number is a whole number from 1.",
-    remedy="Correct DELA.",
-)
+@rule("E457", Subject.DAMAGE)
 def invalid_delamination(card: model.Delamination) -> Reports:
-    """Find values that give no threshold."""
+    """G_IIc is not positive, or the number of delaminations not whole.
+
+    The number is a whole number from 1.
+
+    Remedy: Correct DELA.
+    """
     if not card.toughness > 0.0:
         message = f"G_IIc is {card.toughness:g}; it must be positive."
         yield Report(message, card.place("G_IIc"))
@@ -112,32 +107,26 @@ def invalid_delamination(card: model.Delamination) -> Reports:
         yield Report(message, card.place("number of delaminations"))
 
 
-@rule(
-    "W458",
-    Subject.DAMAGE,
-    "B is not zero: the threshold takes D - B A⁻¹ B for D.",
-    remedy="A symmetric laminate, or accept it.",
-)
+@rule("W458", Subject.DAMAGE)
 def coupled_threshold(problem: Problem) -> Reports:
-    """Find coupled laminates, to which the threshold of an isotropic plate is an approximation."""
+    """B is not zero: the threshold takes D - B A⁻¹ B for D.
+
+    Remedy: A symmetric laminate, or accept it.
+    """
     delamination = problem.deck.last(model.Delamination)
     if delamination is not None and problem.laminate.is_coupled:
         message = "B is not zero: the delamination threshold takes D - B A^-1 B for D."
         yield Report(message, delamination.place())
 
 
-@rule(
-    "W461",
-    Subject.DAMAGE,
-    "Bending twists the plate.",
-    cause=(
-        "D16 or D26 is more than a tenth of √(D11 D22). The threshold is that of an isotropic "
-        "plate."
-    ),
-    remedy="An estimate; a test of this layup is better.",
-)
+@rule("W461", Subject.DAMAGE)
 def twisted_threshold(problem: Problem) -> Reports:
-    """Find laminates whose bending and twisting are coupled."""
+    """Bending twists the plate.
+
+    D16 or D26 is more than a tenth of √(D11 D22). The threshold is that of an isotropic plate.
+
+    Remedy: An estimate; a test of this layup is better.
+    """
     if (delamination := problem.deck.last(model.Delamination)) is None:
         return
     D = problem.laminate.D
@@ -151,15 +140,14 @@ def twisted_threshold(problem: Problem) -> Reports:
         yield Report(message, delamination.place(), hint)
 
 
-@rule(
-    "W467",
-    Subject.DAMAGE,
-    "A strength does not suit the modulus in its direction.",
-    cause="It is below 5·10⁻⁵ or above 0.3 of it. The unit that it seems to be in is named.",
-    remedy="Strengths in the moduli's unit.",
-)
+@rule("W467", Subject.DAMAGE)
 def strengths_in_another_unit(problem: Problem) -> Reports:
-    """Find strengths that no material of these moduli has."""
+    """A strength does not suit the modulus in its direction.
+
+    It is below 5·10⁻⁵ or above 0.3 of it. The unit that it seems to be in is named.
+
+    Remedy: Strengths in the moduli's unit.
+    """
     for card, ply in _strengths(problem):
         yield from _strengths_in_another_unit(card, ply, unit_names(problem.deck))
 
@@ -203,18 +191,15 @@ def _strengths_in_another_unit(
     yield Report(f"{message}.", card.place(first), hint)
 
 
-@rule(
-    "W468",
-    Subject.DAMAGE,
-    "YT or XC is above XT, YC above XC, or YC below YT in a ply with E1 > 2 E2.",
-    cause=(
-        "The order that the values seem to be in is named. Plies of boron fibres, whose XC is "
-        "above XT, are known by E1 > 5 E2 and G12 < 0.35 E2."
-    ),
-    remedy="XT, XC, YT, YC, S12, S13, S23.",
-)
+@rule("W468", Subject.DAMAGE)
 def strengths_in_another_order(problem: Problem) -> Reports:
-    """Find strengths of a fibrous ply that are not in the order of the card."""
+    """YT or XC is above XT, YC above XC, or YC below YT in a ply with E1 > 2 E2.
+
+    The order that the values seem to be in is named. Plies of boron fibres, whose XC is above XT,
+    are known by E1 > 5 E2 and G12 < 0.35 E2.
+
+    Remedy: XT, XC, YT, YC, S12, S13, S23.
+    """
     for card, ply in _strengths(problem):
         yield from _strengths_in_another_order(card, ply)
 
@@ -249,15 +234,14 @@ def _faults(strengths: Sequence[float], ply: model.Ply) -> dict[str, str]:
     return faults
 
 
-@rule(
-    "W553",
-    Subject.DAMAGE,
-    "A shear strength is below a quarter of YT in a ply with E1 > 2 E2.",
-    cause="The unit that the value seems to be in is named.",
-    remedy="S12, S13 and S23 in the unit of the other strengths.",
-)
+@rule("W553", Subject.DAMAGE)
 def weak_in_shear(problem: Problem) -> Reports:
-    """Find shear strengths of a fibrous ply that are in another unit than YT."""
+    """A shear strength is below a quarter of YT in a ply with E1 > 2 E2.
+
+    The unit that the value seems to be in is named.
+
+    Remedy: S12, S13 and S23 in the unit of the other strengths.
+    """
     names = unit_names(problem.deck)
     for card, ply in _strengths(problem):
         if ply.e1 <= FIBROUS * ply.e2 or card.yt > ENDLESS * ply.e2:
@@ -276,15 +260,14 @@ def weak_in_shear(problem: Problem) -> Reports:
         yield Report(f"{message}.", card.place(first), hint)
 
 
-@rule(
-    "W469",
-    Subject.DAMAGE,
-    "No laminate has this G_IIc.",
-    cause="It is outside 50 to 5000 J/m² (without UNIT: G_IIc/(E2 h) outside 10⁻⁷ to 5·10⁻³).",
-    remedy="N/mm is 1000 J/m², lbf/in 175 J/m².",
-)
+@rule("W469", Subject.DAMAGE)
 def doubtful_toughness(problem: Problem) -> Reports:
-    """Find a toughness in another unit: absolute with UNIT, otherwise over E2 h."""
+    """No laminate has this G_IIc.
+
+    It is outside 50 to 5000 J/m² (without UNIT: G_IIc/(E2 h) outside 10⁻⁷ to 5·10⁻³).
+
+    Remedy: N/mm is 1000 J/m², lbf/in 175 J/m².
+    """
     deck, names = problem.deck, unit_names(problem.deck)
     if (card := deck.last(model.Delamination)) is None:
         return
@@ -310,14 +293,12 @@ def doubtful_toughness(problem: Problem) -> Reports:
     yield Report(f"{message}: it looks like another unit.", place, hint)
 
 
-@rule(
-    "W470",
-    Subject.DAMAGE,
-    "There are more delaminations than interfaces.",
-    remedy="A blank is one.",
-)
+@rule("W470", Subject.DAMAGE)
 def too_many_delaminations(problem: Problem) -> Reports:
-    """Find more delaminations than the laminate has room for."""
+    """There are more delaminations than interfaces.
+
+    Remedy: A blank is one.
+    """
     card = problem.deck.last(model.Delamination)
     plies = len(problem.laminate.plies.angles)
     if card is not None and card.number > max(1, plies - 1):
@@ -327,33 +308,29 @@ def too_many_delaminations(problem: Problem) -> Reports:
         yield Report(message, place, "a blank takes one, whose threshold is the highest")
 
 
-@rule(
-    "W471",
-    Subject.DAMAGE,
-    "ALLO is without FAIL.",
-    cause="No exposure is computed.",
-    remedy="FAIL in the loop of RODP.",
-)
+@rule("W471", Subject.DAMAGE)
 def strengths_without_criteria(problem: Problem) -> Reports:
-    """Find strengths that the program never uses."""
+    """ALLO is without FAIL.
+
+    No exposure is computed.
+
+    Remedy: FAIL in the loop of RODP.
+    """
     card = problem.deck.last(model.Allowables)
     if card is not None and all(macro.word != "FAIL" for macro in flat(problem.program)):
         message = "ALLO has strengths, but the program has no FAIL: no exposure is computed."
         yield Report(message, card.place(), "put FAIL into the loop of RODP")
 
 
-@rule(
-    "W472",
-    Subject.DAMAGE,
-    "FAIL is evaluated at too few times of an impact.",
-    cause=(
-        "It is outside the loop of RODP, or evaluated less than 20 times at an interval above 1: "
-        "the largest exposure may be missed."
-    ),
-    remedy="FAIL in the loop, a smaller N.",
-)
+@rule("W472", Subject.DAMAGE)
 def few_evaluations(problem: Problem) -> Reports:
-    """Find criteria that may miss the peak."""
+    """FAIL is evaluated at too few times of an impact.
+
+    It is outside the loop of RODP, or evaluated less than 20 times at an interval above 1: the
+    largest exposure may be missed.
+
+    Remedy: FAIL in the loop, a smaller N.
+    """
     cards = [macro for macro in flat(problem.program) if macro.word == "FAIL"]
     count = problem.work.passes["FAIL"]
     if not cards or not problem.has_impact or count == 0:  # W510 says so
@@ -376,15 +353,14 @@ def few_evaluations(problem: Problem) -> Reports:
         yield Report(message, cards[0].place("value"), hint)
 
 
-@rule(
-    "W489",
-    Subject.DAMAGE,
-    "The preload alone fails a ply.",
-    cause="A criterion of FAIL is at 1 or above under PREL, before anything moves.",
-    remedy="A smaller preload; the units of PREL, force/length, and of ALLO.",
-)
+@rule("W489", Subject.DAMAGE)
 def preload_beyond_strength(problem: Problem) -> Reports:
-    """Find a preload whose stresses reach the strength of a ply."""
+    """The preload alone fails a ply.
+
+    A criterion of FAIL is at 1 or above under PREL, before anything moves.
+
+    Remedy: A smaller preload; the units of PREL, force/length, and of ALLO.
+    """
     card = problem.deck.last(model.Preload)
     if not problem.deck.has(model.Allowables) or card is None:
         return
@@ -405,18 +381,15 @@ def preload_beyond_strength(problem: Problem) -> Reports:
         yield Report(message, card.place(), "PREL is a force per length, tension positive")
 
 
-@rule(
-    "W541",
-    Subject.DAMAGE,
-    "DELA is of no use: the plate is a sandwich.",
-    cause=(
-        "The threshold is that of a solid laminate. The faces of a sandwich delaminate, or leave "
-        "the core, at a small part of it. No threshold is computed."
-    ),
-    remedy="Remove DELA; FAIL has the exposures of faces and core.",
-)
+@rule("W541", Subject.DAMAGE)
 def threshold_of_a_sandwich(problem: Problem) -> Reports:
-    """Find a delamination threshold of a plate with a core."""
+    """DELA is of no use: the plate is a sandwich.
+
+    The threshold is that of a solid laminate. The faces of a sandwich delaminate, or leave the
+    core, at a small part of it. No threshold is computed.
+
+    Remedy: Remove DELA; FAIL has the exposures of faces and core.
+    """
     card = problem.deck.last(model.Delamination)
     if card is not None and problem.laminate.has_core:
         message = (
@@ -426,15 +399,14 @@ def threshold_of_a_sandwich(problem: Problem) -> Reports:
         yield Report(message, card.place(), "remove DELA; FAIL has the exposures of the core")
 
 
-@rule(
-    "N559",
-    Subject.DAMAGE,
-    "FAIL leaves out Puck's criterion for the plies of a fabric.",
-    cause="The criterion is that of unidirectional plies. E2 is near E1, and G12 far below.",
-    remedy="The other criteria are evaluated; none of them is made for fabrics either.",
-)
+@rule("N559", Subject.DAMAGE)
 def puck_of_a_fabric(problem: Problem) -> Reports:
-    """Find fabrics among the plies with strengths."""
+    """FAIL leaves out Puck's criterion for the plies of a fabric.
+
+    The criterion is that of unidirectional plies. E2 is near E1, and G12 far below.
+
+    Remedy: The other criteria are evaluated; none of them is made for fabrics either.
+    """
     for card, ply in _strengths(problem):
         if is_fabric(ply):
             message = (
@@ -445,15 +417,14 @@ def puck_of_a_fabric(problem: Problem) -> Reports:
             yield Report(message, card.place(), hint)
 
 
-@rule(
-    "N560",
-    Subject.DAMAGE,
-    "Puck's slope p+ is above S12/YT, and is taken as S12/YT.",
-    cause="With a larger slope the exposure at YT would not be 1.",
-    remedy="Check YT and S12, or give p+ on the second card of ALLO.",
-)
+@rule("N560", Subject.DAMAGE)
 def limited_slope(problem: Problem) -> Reports:
-    """Find slopes with which Puck's criterion does not pass through YT."""
+    """Puck's slope p+ is above S12/YT, and is taken as S12/YT.
+
+    With a larger slope the exposure at YT would not be 1.
+
+    Remedy: Check YT and S12, or give p+ on the second card of ALLO.
+    """
     for card, ply in _strengths(problem):
         is_endless = card.yt > ENDLESS * ply.e2
         if is_fabric(ply) or is_endless or (slope := puck_slope(card)) == card.p_plus:

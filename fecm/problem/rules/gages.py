@@ -31,14 +31,12 @@ def too_many_gages(problem: Problem) -> Reports:
         yield Report(message, segment.place())
 
 
-@rule(
-    "E425",
-    Subject.POINTS,
-    "A gage is defined twice.",
-    remedy="Its own number for each gage.",
-)
+@rule("E425", Subject.POINTS)
 def repeated_gage(problem: Problem) -> Reports:
-    """Find a number that two gages have."""
+    """A gage is defined twice.
+
+    Remedy: Its own number for each gage.
+    """
     seen: set[int] = set()
     for record in problem.deck.require(model.Gages).records:
         if record.number in seen:
@@ -47,14 +45,12 @@ def repeated_gage(problem: Problem) -> Reports:
         seen.add(record.number)
 
 
-@rule(
-    "E424",
-    Subject.POINTS,
-    "A gage is not on the plate.",
-    remedy="Correct its place.",
-)
+@rule("E424", Subject.POINTS)
 def gage_off_the_plate(problem: Problem) -> Reports:
-    """Find gages in no element."""
+    """A gage is not on the plate.
+
+    Remedy: Correct its place.
+    """
     for record in problem.deck.require(model.Gages).records:
         point = np.array([[record.x, record.y]])
         if not any(len(containing_elements(family, point)[0]) for family in problem.families):
@@ -62,14 +58,12 @@ def gage_off_the_plate(problem: Problem) -> Reports:
             yield Report(message, record.place("gage's x"))
 
 
-@rule(
-    "W426",
-    Subject.POINTS,
-    "A gage is outside the laminate.",
-    remedy="z from -h/2 to h/2.",
-)
+@rule("W426", Subject.POINTS)
 def gage_outside_laminate(problem: Problem) -> Reports:
-    """Find gages above or below the faces."""
+    """A gage is outside the laminate.
+
+    Remedy: z from -h/2 to h/2.
+    """
     half = max(one.thickness for one in problem.plate.laminates) / 2.0
     for record in problem.deck.require(model.Gages).records:
         if abs(record.z) > half * (1.0 + 1e-9):
@@ -78,15 +72,14 @@ def gage_outside_laminate(problem: Problem) -> Reports:
             yield Report(message, record.place("gage's z"))
 
 
-@rule(
-    "W452",
-    Subject.POINTS,
-    "A gage is nearer than the thickness to the impact node.",
-    cause="Strains under a point force depend on the mesh.",
-    remedy="Another place, or PATC.",
-)
+@rule("W452", Subject.POINTS)
 def gage_under_force(problem: Problem) -> Reports:
-    """Find gages near the node of a point force."""
+    """A gage is nearer than the thickness to the impact node.
+
+    Strains under a point force depend on the mesh.
+
+    Remedy: Another place, or PATC.
+    """
     segment = problem.deck.last(model.Gages)
     if segment is None or problem.deck.has(model.Patch):
         return
@@ -103,15 +96,14 @@ def gage_under_force(problem: Problem) -> Reports:
             yield Report(f"{what}: {why}.", record.place("gage's x"), hint)
 
 
-@rule(
-    "W477",
-    Subject.POINTS,
-    "A gage is almost in the mid-plane.",
-    cause="It is nearer than h/100, but not in it.",
-    remedy="z in the deck's unit of length.",
-)
+@rule("W477", Subject.POINTS)
 def shallow_gage(problem: Problem) -> Reports:
-    """Find gages just beside the mid-plane."""
+    """A gage is almost in the mid-plane.
+
+    It is nearer than h/100, but not in it.
+
+    Remedy: z in the deck's unit of length.
+    """
     segment = problem.deck.last(model.Gages)
     if segment is None:
         return
@@ -132,14 +124,12 @@ def shallow_gage(problem: Problem) -> Reports:
     yield Report(f"{message}.", first.place("gage's z"), "0 is the mid-plane itself")
 
 
-@rule(
-    "W478",
-    Subject.POINTS,
-    "The directions of all gages are multiples of 5° in radians.",
-    remedy="Degrees.",
-)
+@rule("W478", Subject.POINTS)
 def directions_in_radians(problem: Problem) -> Reports:
-    """Find directions that look like radians."""
+    """The directions of all gages are multiples of 5° in radians.
+
+    Remedy: Degrees.
+    """
     segment = problem.deck.last(model.Gages)
     if segment is None:
         return

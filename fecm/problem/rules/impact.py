@@ -20,14 +20,12 @@ CREEPING = 1.0e-6
 HYPERSONIC = 0.1
 
 
-@rule(
-    "E408",
-    Subject.IMPACT,
-    "The impact node does not exist.",
-    remedy="1 to NUMNP.",
-)
+@rule("E408", Subject.IMPACT)
 def unknown_impact_node(problem: Problem) -> Reports:
-    """Find a node beyond those of the control card."""
+    """The impact node does not exist.
+
+    Remedy: 1 to NUMNP.
+    """
     impact, control = problem.deck.require(model.Impact), problem.deck.control
     if not 1 <= impact.node <= control.numnp:
         what = f"The impact node {impact.node} does not exist"
@@ -35,28 +33,24 @@ def unknown_impact_node(problem: Problem) -> Reports:
         yield Report(message, impact.place("impact node"))
 
 
-@rule(
-    "E409",
-    Subject.IMPACT,
-    "The impact dof does not exist, or with PATC is not w.",
-    remedy="3 is w.",
-)
+@rule("E409", Subject.IMPACT)
 def unknown_impact_dof(problem: Problem) -> Reports:
-    """Find a dof beyond those of the control card."""
+    """The impact dof does not exist, or with PATC is not w.
+
+    Remedy: 3 is w.
+    """
     impact, control = problem.deck.require(model.Impact), problem.deck.control
     if not 1 <= impact.dof <= control.ndf:
         message = f"The impact dof is {impact.dof}; it must be 1 to {control.ndf}."
         yield Report(message, impact.place("impact dof"), "3 is w")
 
 
-@rule(
-    "E410",
-    Subject.IMPACT,
-    "The impact dof is restrained.",
-    remedy="Another node, or no support there.",
-)
+@rule("E410", Subject.IMPACT)
 def restrained_impact_dof(problem: Problem) -> Reports:
-    """Find a dof that a support holds."""
+    """The impact dof is restrained.
+
+    Remedy: Another node, or no support there.
+    """
     impact = problem.deck.require(model.Impact)
     known = 1 <= impact.node <= problem.deck.control.numnp
     if known and problem.mesh.equations[impact.node - 1, impact.dof - 1] == 0:
@@ -64,42 +58,36 @@ def restrained_impact_dof(problem: Problem) -> Reports:
         yield Report(message, impact.place("impact node"), "a BOUN card restrains it")
 
 
-@rule(
-    "E413",
-    Subject.IMPACT,
-    "The impact dof is a rotation.",
-    remedy="3 is w.",
-)
+@rule("E413", Subject.IMPACT)
 def impact_on_rotation(problem: Problem) -> Reports:
-    """Find a dof that is not a displacement."""
+    """The impact dof is a rotation.
+
+    Remedy: 3 is w.
+    """
     impact = problem.deck.require(model.Impact)
     if impact.dof > W_DOF:
         message = f"The impact dof {impact.dof} is a rotation: a projectile pushes a displacement."
         yield Report(message, impact.place("impact dof"), "3 is w")
 
 
-@rule(
-    "W413",
-    Subject.IMPACT,
-    "The impact dof is in the plane of the plate.",
-    remedy="3 is w.",
-)
+@rule("W413", Subject.IMPACT)
 def impact_in_plane(problem: Problem) -> Reports:
-    """Find a displacement other than w."""
+    """The impact dof is in the plane of the plate.
+
+    Remedy: 3 is w.
+    """
     impact = problem.deck.require(model.Impact)
     if impact.dof < W_DOF:
         message = f"The impact dof is {impact.dof}, not 3: the projectile does not push w."
         yield Report(message, impact.place("impact dof"))
 
 
-@rule(
-    "E411",
-    Subject.IMPACT,
-    "The impact velocity is negative.",
-    remedy="An approach is positive.",
-)
+@rule("E411", Subject.IMPACT)
 def negative_velocity(problem: Problem) -> Reports:
-    """Find a projectile that moves away."""
+    """The impact velocity is negative.
+
+    Remedy: An approach is positive.
+    """
     impact = problem.deck.require(model.Impact)
     if impact.velocity < 0.0:
         message = f"The impact velocity is {impact.velocity:g}; it must be positive."
@@ -107,29 +95,26 @@ def negative_velocity(problem: Problem) -> Reports:
         yield Report(message, impact.place("impact velocity"), hint)
 
 
-@rule(
-    "W411",
-    Subject.IMPACT,
-    "The impact velocity is 0.",
-    cause="The projectile rests on the plate.",
-    remedy="A velocity, or loads of FORC.",
-)
+@rule("W411", Subject.IMPACT)
 def projectile_at_rest(problem: Problem) -> Reports:
-    """Find a projectile that does not move."""
+    """The impact velocity is 0.
+
+    The projectile rests on the plate.
+
+    Remedy: A velocity, or loads of FORC.
+    """
     impact = problem.deck.require(model.Impact)
     if impact.velocity == 0.0:
         why = "the projectile rests on the plate, which only FORC's loads can move"
         yield Report(f"The impact velocity is 0: {why}.", impact.place("impact velocity"))
 
 
-@rule(
-    "W441",
-    Subject.IMPACT,
-    "All neighbours of the impact node are restrained.",
-    remedy="Restrain the supports only.",
-)
+@rule("W441", Subject.IMPACT)
 def held_around_impact(problem: Problem) -> Reports:
-    """Find supports inside the plate that hold every other node of the struck elements."""
+    """All neighbours of the impact node are restrained.
+
+    Remedy: Restrain the supports only.
+    """
     mesh, impact = problem.mesh, problem.deck.require(model.Impact)
     touching = mesh.elements[(mesh.elements == impact.node).any(axis=1)]
     around = distinct(touching[(touching > 0) & (touching != impact.node)]) - 1
@@ -142,15 +127,14 @@ def held_around_impact(problem: Problem) -> Reports:
         yield Report(message, impact.place("impact node"), "restrain the supports only")
 
 
-@rule(
-    "W440",
-    Subject.IMPACT,
-    "The velocity does not suit the wave speed along the fibres.",
-    cause="Their ratio is outside 10⁻⁶ to 0.1.",
-    remedy="Velocity in the deck's units.",
-)
+@rule("W440", Subject.IMPACT)
 def doubtful_velocity(problem: Problem) -> Reports:
-    """Find velocities that no low-velocity impact has."""
+    """The velocity does not suit the wave speed along the fibres.
+
+    Their ratio is outside 10⁻⁶ to 0.1.
+
+    Remedy: Velocity in the deck's units.
+    """
     impact, ply = problem.deck.require(model.Impact), problem.deck.require(model.Material).ply
     along_fibres = math.sqrt(ply.e1 / ply.density)
     share = abs(impact.velocity) / along_fibres
@@ -161,14 +145,12 @@ def doubtful_velocity(problem: Problem) -> Reports:
         yield Report(message, impact.place("impact velocity"), hint)
 
 
-@rule(
-    "W415",
-    Subject.IMPACT,
-    "There are too few elements per bending wave at the impact node.",
-    remedy="A finer mesh there: see [checking a deck](making.md#checking).",
-)
+@rule("W415", Subject.IMPACT)
 def coarse_mesh(problem: Problem) -> Reports:
-    """Find elements at the impact node that are too large for its bending waves."""
+    """There are too few elements per bending wave at the impact node.
+
+    Remedy: A finer mesh there: see [checking a deck](making.md#checking).
+    """
     found = resolution(problem)
     if found is None or found.elements >= ENOUGH_PER_WAVE:
         return
@@ -186,18 +168,15 @@ def coarse_mesh(problem: Problem) -> Reports:
     yield Report(f"{what}: {sides} per {wave}{about}.", place, hint)
 
 
-@rule(
-    "W556",
-    Subject.IMPACT,
-    "The impact point lies outside the supports.",
-    cause=(
-        "A closed line of supports, such as the edges of a window, holds the plate, and the plate "
-        "is hit on the free rim around it. A fixture is solid there: the rim can't move."
-    ),
-    remedy="A point inside the window. The origin is a corner of the plate.",
-)
+@rule("W556", Subject.IMPACT)
 def impact_outside_supports(problem: Problem) -> Reports:
-    """Find an impact on the rim of a plate that lies on the edges of a window."""
+    """The impact point lies outside the supports.
+
+    A closed line of supports, such as the edges of a window, holds the plate, and the plate is hit
+    on the free rim around it. A fixture is solid there: the rim can't move.
+
+    Remedy: A point inside the window. The origin is a corner of the plate.
+    """
     if not problem.outside_supports[problem.distances.argmin()]:
         return
     impact = problem.deck.require(model.Impact)

@@ -37,14 +37,12 @@ SHARES = 3  # of plies at 0, ±45 and 90 degrees
 POISSONS_RATIO = "Poisson's ratio NU12"
 
 
-@rule(
-    "W401",
-    Subject.LAMINATE,
-    "L1 or L2 is outside 1 to 4.",
-    remedy="The nearest of these is used.",
-)
+@rule("W401", Subject.LAMINATE)
 def unknown_order(material: model.Material) -> Reports:
-    """Find orders of bending and shear that are replaced."""
+    """L1 or L2 is outside 1 to 4.
+
+    Remedy: The nearest of these is used.
+    """
     card = material.integration
     for name, order in (("bending order L1", card.bending), ("shear order L2", card.shear)):
         if not 1 <= order <= HIGHEST_ORDER:
@@ -53,14 +51,12 @@ def unknown_order(material: model.Material) -> Reports:
             yield Report(message, card.place(name))
 
 
-@rule(
-    "E402",
-    Subject.LAMINATE,
-    "The stress-point order K is not 1 to 4 or -1 to -4.",
-    remedy="K > 0: Gauss points; K < 0: nodal points.",
-)
+@rule("E402", Subject.LAMINATE)
 def unknown_stress_points(material: model.Material) -> Reports:
-    """Find an order K that does not exist."""
+    """The stress-point order K is not 1 to 4 or -1 to -4.
+
+    Remedy: K > 0: Gauss points; K < 0: nodal points.
+    """
     card = material.integration
     if not 1 <= abs(card.points) <= HIGHEST_ORDER:
         must = "1 to 4 (Gauss points) or -1 to -4 (nodal points)"
@@ -85,28 +81,25 @@ def _invalid_constants(ply: model.Ply) -> list[tuple[str, float]]:
     return [(name, value) for name, value in named if value <= 0.0 and name != POISSONS_RATIO]
 
 
-@rule(
-    "E403",
-    Subject.LAMINATE,
-    "A constant of the ply is not positive.",
-    remedy="Correct MATE or MATS.",
-)
+@rule("E403", Subject.LAMINATE)
 def invalid_constant(segment: Plies) -> Reports:
-    """Find density and moduli that are not positive."""
+    """A constant of the ply is not positive.
+
+    Remedy: Correct MATE or MATS.
+    """
     for ply in _plies_of(segment):
         for name, value in _invalid_constants(ply):
             yield Report(f"The {name} is {value:g}; it must be positive.", ply.place(name))
 
 
-@rule(
-    "E534",
-    Subject.LAMINATE,
-    "G13 and G23 of a ply differ by a factor of more than 1e12.",
-    cause="Their stiffness can't be inverted within the precision of numbers.",
-    remedy="Correct MATE or MATS.",
-)
+@rule("E534", Subject.LAMINATE)
 def unequal_shear_moduli(segment: Plies) -> Reports:
-    """Find transverse shear moduli of which one is lost in rounding."""
+    """G13 and G23 of a ply differ by a factor of more than 1e12.
+
+    Their stiffness can't be inverted within the precision of numbers.
+
+    Remedy: Correct MATE or MATS.
+    """
     for ply in _plies_of(segment):
         small, large = sorted((ply.g13, ply.g23))
         if not _invalid_constants(ply) and small < large / LARGEST_RATIO:
@@ -117,14 +110,12 @@ def unequal_shear_moduli(segment: Plies) -> Reports:
             yield Report(message, ply.place("shear modulus G13"))
 
 
-@rule(
-    "E404",
-    Subject.LAMINATE,
-    "NU12² is not below E1/E2.",
-    remedy="NU12 of fibre composites is 0.2 to 0.4.",
-)
+@rule("E404", Subject.LAMINATE)
 def impossible_poissons_ratio(segment: Plies) -> Reports:
-    """Find a ratio under which the ply's stiffness is not positive definite."""
+    """NU12² is not below E1/E2.
+
+    Remedy: NU12 of fibre composites is 0.2 to 0.4.
+    """
     for ply in _plies_of(segment):
         # The square of nu12 against E1/E2, written so that no number overflows.
         if not _invalid_constants(ply) and abs(ply.nu12) >= (ply.e1 / ply.e2) ** 0.5:
@@ -135,28 +126,24 @@ def impossible_poissons_ratio(segment: Plies) -> Reports:
             yield Report(message, ply.place(POISSONS_RATIO), hint)
 
 
-@rule(
-    "E405",
-    Subject.LAMINATE,
-    "The thickness of a layer is not positive.",
-    remedy="Correct the layer.",
-)
+@rule("E405", Subject.LAMINATE)
 def invalid_layer_thickness(laminate: Layers) -> Reports:
-    """Find layers without a thickness."""
+    """The thickness of a layer is not positive.
+
+    Remedy: Correct the layer.
+    """
     for position, layer in enumerate(laminate.layers, start=1):
         if layer.thickness <= 0.0:
             what = f"Layer {position} has the thickness {layer.thickness:g}"
             yield Report(f"{what}; it must be positive.", layer.place("layer thickness"))
 
 
-@rule(
-    "W408",
-    Subject.LAMINATE,
-    "The number of a layer differs from its position.",
-    remedy="Layers are stacked in the order of their cards.",
-)
+@rule("W408", Subject.LAMINATE)
 def layer_out_of_order(laminate: Layers) -> Reports:
-    """Find layers whose numbers have no effect."""
+    """The number of a layer differs from its position.
+
+    Remedy: Layers are stacked in the order of their cards.
+    """
     for position, layer in enumerate(laminate.layers, start=1):
         if layer.number != position:
             why = "layers are stacked in the order of their cards, whatever their numbers"
@@ -164,28 +151,24 @@ def layer_out_of_order(laminate: Layers) -> Reports:
             yield Report(message, layer.place("layer"))
 
 
-@rule(
-    "E406",
-    Subject.LAMINATE,
-    "The total thickness is not positive.",
-    remedy="Correct MATE.",
-)
+@rule("E406", Subject.LAMINATE)
 def invalid_thickness(material: model.Material) -> Reports:
-    """Find a laminate without a thickness."""
+    """The total thickness is not positive.
+
+    Remedy: Correct MATE.
+    """
     card = material.integration
     if card.thickness <= 0.0:
         message = f"The total thickness is {card.thickness:g}; it must be positive."
         yield Report(message, card.place("total thickness"))
 
 
-@rule(
-    "E407",
-    Subject.LAMINATE,
-    "The layers together are not as thick as MATE says.",
-    remedy="Stiffness follows the layers, inertia the card: they must agree.",
-)
+@rule("E407", Subject.LAMINATE)
 def layers_do_not_add_up(material: model.Material) -> Reports:
-    """Compare the sum of the layers with the total thickness, where both are valid."""
+    """The layers together are not as thick as MATE says.
+
+    Remedy: Stiffness follows the layers, inertia the card: they must agree.
+    """
     card, thicknesses = material.integration, [layer.thickness for layer in material.layers]
     total, given = sum(thicknesses), card.thickness
     if given <= 0.0 or any(h <= 0.0 for h in thicknesses):
@@ -196,14 +179,12 @@ def layers_do_not_add_up(material: model.Material) -> Reports:
         yield Report(message, card.place("total thickness"), hint)
 
 
-@rule(
-    "W433",
-    Subject.LAMINATE,
-    "E1 is below E2/2.",
-    remedy="E1 is the modulus along the fibres.",
-)
+@rule("W433", Subject.LAMINATE)
 def moduli_exchanged(problem: Problem) -> Reports:
-    """Find a ply that is stiffer across its fibres."""
+    """E1 is below E2/2.
+
+    Remedy: E1 is the modulus along the fibres.
+    """
     for ply in problem.deck.plies.values():
         if ply.e1 / ply.e2 < LOWEST_RATIO:
             why = "E1 is the modulus along the fibres"
@@ -211,15 +192,14 @@ def moduli_exchanged(problem: Problem) -> Reports:
             yield Report(message, ply.place("Young's modulus E1"))
 
 
-@rule(
-    "W434",
-    Subject.LAMINATE,
-    "NU12 is beyond 1, or outside 0.1 to 0.6 in a ply with E1 > 3 E2.",
-    cause="The value may be NU21, or its decimal point is misplaced.",
-    remedy="NU12 of fibre composites is 0.2 to 0.4; NU12 = NU21 E1/E2.",
-)
+@rule("W434", Subject.LAMINATE)
 def doubtful_poissons_ratio(problem: Problem) -> Reports:
-    """Find a ratio that no ply has, or that is the other one."""
+    """NU12 is beyond 1, or outside 0.1 to 0.6 in a ply with E1 > 3 E2.
+
+    The value may be NU21, or its decimal point is misplaced.
+
+    Remedy: NU12 of fibre composites is 0.2 to 0.4; NU12 = NU21 E1/E2.
+    """
     for ply in problem.deck.plies.values():
         ratio, nu, place = ply.e1 / ply.e2, ply.nu12, ply.place(POISSONS_RATIO)
         if abs(nu) > 1.0:
@@ -237,15 +217,14 @@ def doubtful_poissons_ratio(problem: Problem) -> Reports:
             yield Report(message, place, "NU12 of fibre composites is 0.2 to 0.4")
 
 
-@rule(
-    "W558",
-    Subject.LAMINATE,
-    "The core of a sandwich is thinner than its thinnest ply.",
-    cause="The thickness of the core is likely in another unit, as in 0.012 for 12 mm.",
-    remedy="The thickness of the core in the deck's unit of length.",
-)
+@rule("W558", Subject.LAMINATE)
 def thin_core(problem: Problem) -> Reports:
-    """Find a soft layer that is thinner than the plies of the faces."""
+    """The core of a sandwich is thinner than its thinnest ply.
+
+    The thickness of the core is likely in another unit, as in 0.012 for 12 mm.
+
+    Remedy: The thickness of the core in the deck's unit of length.
+    """
     plies = problem.deck.plies
     for layers in problem.deck.layers.values():
         soft = are_cores([plies[layer.material] for layer in layers])
@@ -262,15 +241,14 @@ def thin_core(problem: Problem) -> Reports:
                 yield Report(message, layer.place("layer thickness"), hint)
 
 
-@rule(
-    "W562",
-    Subject.LAMINATE,
-    "The angles look like shares in per cent.",
-    cause="25/50/25 may mean 25 % of plies at 0, 50 % at ±45 and 25 % at 90 degrees.",
-    remedy="The angle of every ply, as in `[0/45/-45/90]s`.",
-)
+@rule("W562", Subject.LAMINATE)
 def shares_as_angles(problem: Problem) -> Reports:
-    """Find three positive angles that add up to 100, alone or mirrored."""
+    """The angles look like shares in per cent.
+
+    25/50/25 may mean 25 % of plies at 0, 50 % at ±45 and 25 % at 90 degrees.
+
+    Remedy: The angle of every ply, as in `[0/45/-45/90]s`.
+    """
     for layers in problem.deck.layers.values():
         angles = [layer.angle for layer in layers]
         half = angles[: len(angles) // 2] if angles == angles[::-1] else []
@@ -282,14 +260,12 @@ def shares_as_angles(problem: Problem) -> Reports:
                 break
 
 
-@rule(
-    "W431",
-    Subject.LAMINATE,
-    "A fibre angle is beyond ±180.",
-    remedy="Degrees, counter-clockwise from the x-axis.",
-)
+@rule("W431", Subject.LAMINATE)
 def large_angle(problem: Problem) -> Reports:
-    """Find angles of more than half a turn."""
+    """A fibre angle is beyond ±180.
+
+    Remedy: Degrees, counter-clockwise from the x-axis.
+    """
     for layer in _all_layers(problem):
         if abs(layer.angle) > LARGEST_ANGLE:
             message = f"The fibre angle {layer.angle:g} is beyond {LARGEST_ANGLE:g} degrees."
@@ -297,14 +273,12 @@ def large_angle(problem: Problem) -> Reports:
             yield Report(message, layer.place("fibre angle"), hint)
 
 
-@rule(
-    "W432",
-    Subject.LAMINATE,
-    "All fibre angles are multiples of 5° in radians.",
-    remedy="Degrees.",
-)
+@rule("W432", Subject.LAMINATE)
 def angles_in_radians(problem: Problem) -> Reports:
-    """Find angles that look like radians."""
+    """All fibre angles are multiples of 5° in radians.
+
+    Remedy: Degrees.
+    """
     turned = [layer for layer in _all_layers(problem) if layer.angle]
     if turned and are_like_radians([layer.angle for layer in turned]):
         known = dict.fromkeys(layer.angle for layer in turned[:SHOWN_ANGLES])
@@ -344,18 +318,15 @@ def _thick_plate(problem: Problem) -> tuple[float, str]:
     return share, f"thickness {thickness:g} is {share:.2g} of the {span.name} {span.length:.4g}"
 
 
-@rule(
-    "W430",
-    Subject.LAMINATE,
-    "The plate is far too thin, or too thick.",
-    cause=(
-        "The thickness is below 10⁻⁴ of the longer side, or above 1/4 of the distance between "
-        "supports (without supports, of the shorter side)."
-    ),
-    remedy="One unit of length for thickness and coordinates.",
-)
+@rule("W430", Subject.LAMINATE)
 def impossible_thickness(problem: Problem) -> Reports:
-    """Find thicknesses for which there is no plate theory."""
+    """The plate is far too thin, or too thick.
+
+    The thickness is below 10⁻⁴ of the longer side, or above 1/4 of the distance between supports
+    (without supports, of the shorter side).
+
+    Remedy: One unit of length for thickness and coordinates.
+    """
     card, side = problem.deck.require(model.Material).integration, problem.longer_side
     thickness, place = _thickest(problem), card.place("total thickness")
     hint = "thickness and coordinates must be in the same unit of length"
@@ -370,15 +341,14 @@ def impossible_thickness(problem: Problem) -> Reports:
         yield Report(message, place, hint)
 
 
-@rule(
-    "N430",
-    Subject.LAMINATE,
-    "The thickness is above 1/10 of the distance between supports.",
-    cause="[Plate theory](assumptions.md#plate-theory) is off by more than 10 %.",
-    remedy="`SHEA EQUI`; a thinner plate, or elasticity in three dimensions.",
-)
+@rule("N430", Subject.LAMINATE)
 def thick_plate(problem: Problem) -> Reports:
-    """Find thicknesses at which plate theory is off."""
+    """The thickness is above 1/10 of the distance between supports.
+
+    [Plate theory](assumptions.md#plate-theory) is off by more than 10 %.
+
+    Remedy: `SHEA EQUI`; a thinner plate, or elasticity in three dimensions.
+    """
     if _is_too_thin(problem):
         return
     share, what = _thick_plate(problem)
@@ -419,42 +389,37 @@ VALUES = (
 FIELD = "shear correction factor"
 
 
-@rule(
-    "E427",
-    Subject.POINTS,
-    "The shear correction factor is not positive.",
-    remedy="1 as in the report, or π²/12.",
-)
+@rule("E427", Subject.POINTS)
 def invalid_factor(segment: model.Shear) -> Reports:
-    """Find a factor that removes the shear stiffness."""
+    """The shear correction factor is not positive.
+
+    Remedy: 1 as in the report, or π²/12.
+    """
     if not segment.factor > 0.0:
         message = f"The shear correction factor is {segment.factor:g}; it must be positive."
         hint = "1 as in the report, or pi^2/12 = 0.822467"
         yield Report(message, segment.place(FIELD), hint)
 
 
-@rule(
-    "W428",
-    Subject.POINTS,
-    "The shear correction factor is more than 1.",
-    remedy="At most 1.",
-)
+@rule("W428", Subject.POINTS)
 def large_factor(segment: model.Shear) -> Reports:
-    """Find a factor that makes the plate stiffer than its laminate."""
+    """The shear correction factor is more than 1.
+
+    Remedy: At most 1.
+    """
     if segment.factor > 1.0:
         message = f"The shear correction factor is {segment.factor:g}, more than 1."
         yield Report(message, segment.place(FIELD))
 
 
-@rule(
-    "W481",
-    Subject.POINTS,
-    "SHEA EQUI has a factor other than 1.",
-    cause="The stiffness is reduced twice.",
-    remedy="Leave out the factor.",
-)
+@rule("W481", Subject.POINTS)
 def factor_with_equilibrium(segment: model.Shear) -> Reports:
-    """Find a factor beside the stiffness from equilibrium."""
+    """SHEA EQUI has a factor other than 1.
+
+    The stiffness is reduced twice.
+
+    Remedy: Leave out the factor.
+    """
     if segment.equilibrium and segment.factor != 1.0:
         message = (
             f"SHEA has EQUI and the factor {segment.factor:g}: the stiffness from equilibrium is "

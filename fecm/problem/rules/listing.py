@@ -28,18 +28,13 @@ LATER_SEGMENTS = (
 )
 
 
-@rule(
-    "E601",
-    Subject.LISTING,
-    "An element has other nodes than element 1.",
-    cause="The printed program takes the node list of element 1 for all.",
-    remedy=REMEDY,
-)
+@rule("E601", Subject.LISTING)
 def mixed_elements(problem: Problem) -> Reports:
-    """Find elements that lack other nodes than element 1.
+    """An element has other nodes than element 1.
 
-    The listing's LMAS takes element 1's node list for all elements (MASS01 hands IX, not IX(1,N),
-    to SHAPE), so that such an element gets wrong masses or none.
+    The printed program takes the node list of element 1 for all.
+
+    Remedy: Report mode.
     """
     present = problem.mesh.elements != 0
     other = np.flatnonzero((present != present[:1]).any(axis=1))
@@ -51,14 +46,12 @@ def mixed_elements(problem: Problem) -> Reports:
         yield Report(message, place_of_element(problem.deck, number), HINT)
 
 
-@rule(
-    "E602",
-    Subject.LISTING,
-    "There are more layers than the printed program has room for.",
-    remedy=REMEDY,
-)
+@rule("E602", Subject.LISTING)
 def too_many_layers(problem: Problem) -> Reports:
-    """Find laminates beyond the arrays of the listing."""
+    """There are more layers than the printed program has room for.
+
+    Remedy: Report mode.
+    """
     layers = problem.deck.require(model.Material).layers
     if len(layers) > MOST_LAYERS:
         room = f"the {MOST_LAYERS} that the printed program has room for"
@@ -66,18 +59,15 @@ def too_many_layers(problem: Problem) -> Reports:
         yield Report(message, layers[MOST_LAYERS].place("layer"), HINT)
 
 
-@rule(
-    "E603",
-    Subject.LISTING,
-    "The deck has a word that the printed program does not have.",
-    cause=(
-        "These are PATC, PLYS, FAIL, ALLO, DELA, DAMP, NONL, PREL, CURV, CURE, MATS, LAMS, ZONE, "
-        "SHEA MITC and SHEA EQUI."
-    ),
-    remedy=REMEDY,
-)
+@rule("E603", Subject.LISTING)
 def later_words(problem: Problem) -> Reports:
-    """Find words that came after the printed program."""
+    """The deck has a word that the printed program does not have.
+
+    These are PATC, PLYS, FAIL, ALLO, DELA, DAMP, NONL, PREL, CURV, CURE, MATS, LAMS, ZONE, SHEA
+    MITC and SHEA EQUI.
+
+    Remedy: Report mode.
+    """
     deck = problem.deck
     later = {macro.word: macro for macro in deck.macros if macro.word in LATER_MACROS}
     words = [(word, macro.place("macro")) for word, macro in later.items()]

@@ -74,25 +74,21 @@ def _is_empty(problem: Problem) -> Bools:
     return np.asarray(~(problem.mesh.elements != 0).any(axis=1))
 
 
-@rule(
-    "E308",
-    Subject.MESH,
-    "An element has no nodes.",
-    remedy="Add its nodes.",
-)
+@rule("E308", Subject.MESH)
 def empty_element(problem: Problem) -> Reports:
-    """Find elements without nodes."""
+    """An element has no nodes.
+
+    Remedy: Add its nodes.
+    """
     yield from _report(problem, _is_empty(problem), "has no nodes")
 
 
-@rule(
-    "E309",
-    Subject.MESH,
-    "An element has a node outside 1 to NUMNP.",
-    remedy="Correct its own card, or the increment of the card before.",
-)
+@rule("E309", Subject.MESH)
 def unknown_node(problem: Problem) -> Reports:
-    """Find elements with nodes that the mesh does not have."""
+    """An element has a node outside 1 to NUMNP.
+
+    Remedy: Correct its own card, or the increment of the card before.
+    """
     elements, numnp = problem.mesh.elements, len(problem.mesh.coordinates)
     unknown = (elements < 0) | (elements > numnp)
     hint = "its own card or the increment of the card before it is wrong"
@@ -100,14 +96,12 @@ def unknown_node(problem: Problem) -> Reports:
     yield from _report(problem, wrong, f"has a node outside 1 to {numnp}", hint)
 
 
-@rule(
-    "E310",
-    Subject.MESH,
-    "An element lacks a corner.",
-    remedy="Give a triangle three corners, the others four.",
-)
+@rule("E310", Subject.MESH)
 def missing_corner(problem: Problem) -> Reports:
-    """Find elements that lack one of their corners."""
+    """An element lacks a corner.
+
+    Remedy: Give a triangle three corners, the others four.
+    """
     pointed = _is_pointed(problem)
     wrong = _corner_missing(problem, CORNERS) & pointed & ~_is_empty(problem)
     hint = "an element that ends with its third node is a triangle, any other has four corners"
@@ -116,14 +110,12 @@ def missing_corner(problem: Problem) -> Reports:
     yield from _report(problem, wrong, "lacks one of its four corners")
 
 
-@rule(
-    "E312",
-    Subject.MESH,
-    "An element has a node twice.",
-    remedy="Correct the card.",
-)
+@rule("E312", Subject.MESH)
 def repeated_node(problem: Problem) -> Reports:
-    """Find elements with a node twice."""
+    """An element has a node twice.
+
+    Remedy: Correct the card.
+    """
     ordered = np.sort(problem.mesh.elements, axis=1)
     repeated = ((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] != 0)).any(axis=1)
     hint = _hint_of_feap(problem) if repeated.any() else ""
@@ -138,55 +130,48 @@ def _hint_of_feap(problem: Problem) -> str:
     return "ELEM has no material number; FEAP's has one before the nodes: leave it out"
 
 
-@rule(
-    "E306",
-    Subject.MESH,
-    "Nodes have no coordinates.",
-    remedy="Add COOR cards for them.",
-)
+@rule("E306", Subject.MESH)
 def nodes_without_coordinates(problem: Problem) -> Reports:
-    """Find nodes that no COOR card gives or generates."""
+    """Nodes have no coordinates.
+
+    Remedy: Add COOR cards for them.
+    """
     missing = np.flatnonzero(~problem.mesh.given)
     if len(missing):
         place = problem.deck.require(model.Coordinates).place()
         yield Report(f"{describe_nodes(missing)} without coordinates.", place)
 
 
-@rule(
-    "E307",
-    Subject.MESH,
-    "Nodes are in no element.",
-    remedy="Remove them, or correct the elements.",
-)
+@rule("E307", Subject.MESH)
 def nodes_in_no_element(problem: Problem) -> Reports:
-    """Find nodes that no element has."""
+    """Nodes are in no element.
+
+    Remedy: Remove them, or correct the elements.
+    """
     unused = np.flatnonzero(problem.mesh.given & ~problem.mesh.used)
     if len(unused):
         place = problem.deck.require(model.Elements).place()
         yield Report(f"{describe_nodes(unused)} in no element.", place)
 
 
-@rule(
-    "E311",
-    Subject.MESH,
-    "Every dof is restrained.",
-    remedy="BOUN restrains supports only.",
-)
+@rule("E311", Subject.MESH)
 def nothing_free(problem: Problem) -> Reports:
-    """Find a plate that can't move at all."""
+    """Every dof is restrained.
+
+    Remedy: BOUN restrains supports only.
+    """
     if not problem.mesh.number_of_equations:
         yield Report("Every dof of the plate is restrained.", problem.deck.place())
 
 
-@rule(
-    "W314",
-    Subject.MESH,
-    "Nodes are in the place of another node.",
-    cause="The plate is cut there.",
-    remedy="Give the elements the same node.",
-)
+@rule("W314", Subject.MESH)
 def coincident_nodes(problem: Problem) -> Reports:
-    """Find nodes whose distance is nothing beside the shortest side."""
+    """Nodes are in the place of another node.
+
+    The plate is cut there.
+
+    Remedy: Give the elements the same node.
+    """
     pairs = problem.coincident_nodes
     if len(pairs):
         message = (
@@ -196,15 +181,14 @@ def coincident_nodes(problem: Problem) -> Reports:
         yield Report(message, problem.deck.require(model.Coordinates).place())
 
 
-@rule(
-    "E324",
-    Subject.MESH,
-    "A node lies inside a side of an element that does not have it.",
-    cause="The plate is cut there: elements of another size, or of other mid-side nodes, meet.",
-    remedy="Give both elements the same nodes along their common side.",
-)
+@rule("E324", Subject.MESH)
 def hanging_node(problem: Problem) -> Reports:
-    """Find nodes that the element on one side of a joint has, and that on the other lacks."""
+    """A node lies inside a side of an element that does not have it.
+
+    The plate is cut there: elements of another size, or of other mid-side nodes, meet.
+
+    Remedy: Give both elements the same nodes along their common side.
+    """
     sides = merged(problem.sides, problem.coincident_nodes)
     nodes, elements = hanging_nodes(sides, problem.mesh.coordinates)
     hint = "give both elements the same nodes along their common side"
@@ -220,15 +204,14 @@ def hanging_node(problem: Problem) -> Reports:
         yield Report(message, problem.deck.require(model.Elements).place(), hint)
 
 
-@rule(
-    "W323",
-    Subject.MESH,
-    "A side node is away from its place by more than 5 % of the side.",
-    cause="Its place is the middle of the side, in cubic elements the third point.",
-    remedy="Correct the coordinates.",
-)
+@rule("W323", Subject.MESH)
 def side_node_off_place(problem: Problem) -> Reports:
-    """Find nodes on sides that are off the middle or the third points, seen along the side."""
+    """A side node is away from its place by more than 5 % of the side.
+
+    Its place is the middle of the side, in cubic elements the third point.
+
+    Remedy: Correct the coordinates.
+    """
     mesh = problem.mesh
     wrong: list[int] = []
     for family in problem.families:
@@ -256,14 +239,12 @@ def side_node_off_place(problem: Problem) -> Reports:
     yield Report(message, place_of_element(problem.deck, int(rows[0]) + 1), hint)
 
 
-@rule(
-    "W319",
-    Subject.MESH,
-    "w is restrained at one or two nodes only.",
-    remedy="Restrain every node of a supported edge. A free plate needs no support.",
-)
+@rule("W319", Subject.MESH)
 def too_few_supports(problem: Problem) -> Reports:
-    """Find a plate that one or two nodes support, unless symmetry holds its rotations."""
+    """The deflection w is restrained at one or two nodes only.
+
+    Remedy: Restrain every node of a supported edge. A free plate needs no support.
+    """
     held = problem.mesh.equations == 0
     count = int(held[:, W].sum())
     if 0 < count <= FEW_SUPPORTS and held[:, THETA_X:].any(axis=1).sum() <= FEW_SUPPORTS:
@@ -273,15 +254,14 @@ def too_few_supports(problem: Problem) -> Reports:
         yield Report(message, None if segment is None else segment.place(), hint)
 
 
-@rule(
-    "W318",
-    Subject.MESH,
-    "B is not zero, and u and v are restrained at every node.",
-    cause="The plate is too stiff.",
-    remedy="Restrain u and v only where a support holds them. `fecm new` does so.",
-)
+@rule("W318", Subject.MESH)
 def held_plane_of_coupled_laminate(problem: Problem) -> Reports:
-    """Find in-plane restraints at every node of a laminate whose B is not zero."""
+    """B is not zero, and u and v are restrained at every node.
+
+    The plate is too stiff.
+
+    Remedy: Restrain u and v only where a support holds them. `fecm new` does so.
+    """
     if holds_the_plane(problem.mesh.codes) and problem.plate.is_coupled:
         boundary = problem.deck.last(model.Boundary)
         why = "the plate is stiffer than its laminate"

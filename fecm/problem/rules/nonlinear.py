@@ -19,18 +19,14 @@ ORDER = 3  # bending order L1, by which the membrane is integrated too
 SAME_LINE = 1e-9  # difference of coordinates on one line, over the size of the mesh
 
 
-@rule(
-    "E490",
-    Subject.LAMINATE,
-    "NONL, and u and v are restrained at every node.",
-    cause=(
-        "The plate is too stiff: under 20 J on 4.4 mm in the fixture D7136 the force is 12 % too "
-        "high."
-    ),
-    remedy="Restrain u and v only where a support holds them. `fecm new --nonlinear` does so.",
-)
+@rule("E490", Subject.LAMINATE)
 def held_plane(problem: Problem) -> Reports:
-    """Find a nonlinear plate none of whose points can move in the plane."""
+    """NONL, and u and v are restrained at every node.
+
+    The plate is too stiff: under 20 J on 4.4 mm in the fixture D7136 the force is 12 % too high.
+
+    Remedy: Restrain u and v only where a support holds them. `fecm new --nonlinear` does so.
+    """
     if not holds_the_plane(problem.mesh.codes):
         return
     records = [card for segment in problem.deck.all(model.Boundary) for card in segment.records]
@@ -48,15 +44,14 @@ def held_plane(problem: Problem) -> Reports:
     yield Report(message, place, hint)
 
 
-@rule(
-    "E491",
-    Subject.LAMINATE,
-    "NONL is without SHEA MITC.",
-    cause="Full quadrature of the transverse shear locks before the plate stretches.",
-    remedy="Add `SHEA MITC`.",
-)
+@rule("E491", Subject.LAMINATE)
 def without_assumed_shear(problem: Problem) -> Reports:
-    """Find a nonlinear plate without assumed shear strains."""
+    """NONL is without SHEA MITC.
+
+    Full quadrature of the transverse shear locks before the plate stretches.
+
+    Remedy: Add `SHEA MITC`.
+    """
     deck = problem.deck
     if not has_assumed_shear(deck):
         why = "with full quadrature the transverse shear locks before the plate stretches"
@@ -66,14 +61,12 @@ def without_assumed_shear(problem: Problem) -> Reports:
         yield Report(f"NONL needs assumed shear strains: {why}.", place, hint)
 
 
-@rule(
-    "E492",
-    Subject.LAMINATE,
-    "NONL has an element that is not a quadrilateral with 9 nodes.",
-    remedy="Take 9-node elements; `fecm new` writes them.",
-)
+@rule("E492", Subject.LAMINATE)
 def elements_without_membrane(problem: Problem) -> Reports:
-    """Find elements whose stretching by deflections is not known."""
+    """NONL has an element that is not a quadrilateral with 9 nodes.
+
+    Remedy: Take 9-node elements; `fecm new` writes them.
+    """
     what = "is not a quadrilateral with 9 nodes, as NONL needs"
     hint = "elements with 3, 4, 8 or 12 nodes are for linear plates only"
     yield from report_elements(problem.deck, np.flatnonzero(not_nine_nodes(problem)), what, hint)
@@ -88,47 +81,42 @@ def not_nine_nodes(problem: Problem) -> Bools:
     return wrong
 
 
-@rule(
-    "E493",
-    Subject.LAMINATE,
-    "NONL is with CMAS.",
-    cause="Nonlinear plates take the lumped mass.",
-    remedy="`LMAS`.",
-)
+@rule("E493", Subject.LAMINATE)
 def consistent_mass_of_nonlinear_plate(problem: Problem) -> Reports:
-    """Find a consistent mass, for which there are no nonlinear plates."""
+    """NONL is with CMAS.
+
+    Nonlinear plates take the lumped mass.
+
+    Remedy: `LMAS`.
+    """
     card = next((macro for macro in problem.deck.macros if macro.word == "CMAS"), None)
     if card is not None:
         yield Report("NONL takes the lumped mass only.", card.place("macro"), "take LMAS")
 
 
-@rule(
-    "E494",
-    Subject.LAMINATE,
-    "NONL is with a bending order L1 other than 3.",
-    cause="The membrane is integrated with it: 2 leaves motions of u and v without energy.",
-    remedy="L1 = 3.",
-)
+@rule("E494", Subject.LAMINATE)
 def other_order(problem: Problem) -> Reports:
-    """Find a rule that does not fit the interpolation of the quadratic strains."""
+    """NONL is with a bending order L1 other than 3.
+
+    The membrane is integrated with it: 2 leaves motions of u and v without energy.
+
+    Remedy: L1 = 3.
+    """
     card = problem.deck.require(model.Material).integration
     if card.bending != ORDER:
         message = f"NONL needs the bending order L1 = {ORDER} for the membrane, not {card.bending}."
         yield Report(message, card.place("bending order L1"), f"take L1 = {ORDER}")
 
 
-@rule(
-    "W495",
-    Subject.LAMINATE,
-    "NONL or CURV, and a line of symmetry is free to move across itself.",
-    cause=(
-        "On a straight edge the slope across it is held, as by symmetry, but w and the in-plane "
-        "displacement across it are free."
-    ),
-    remedy="Restrain u on an edge along y with θx, v on one along x with θy.",
-)
+@rule("W495", Subject.LAMINATE)
 def open_symmetry(problem: Problem) -> Reports:
-    """Find edges with the symmetry of bending, but not that of stretching."""
+    """NONL or CURV, and a line of symmetry is free to move across itself.
+
+    On a straight edge the slope across it is held, as by symmetry, but w and the in-plane
+    displacement across it are free.
+
+    Remedy: Restrain u on an edge along y with θx, v on one along x with θy.
+    """
     boundary = problem.deck.last(model.Boundary)
     if boundary is None:
         return

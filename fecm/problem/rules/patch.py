@@ -21,14 +21,12 @@ from fecm.results.exposures import RESOLVED
 LARGE = 2.0  # radius of a patch over the thickness, and over that of the contact
 
 
-@rule(
-    "E442",
-    Subject.POINTS,
-    "The shape on PATC's card is unknown.",
-    remedy="DISC is a uniform pressure, HERT Hertz's.",
-)
+@rule("E442", Subject.POINTS)
 def unknown_shape(problem: Problem) -> Reports:
-    """Find words other than those of the shapes."""
+    """The shape on PATC's card is unknown.
+
+    Remedy: DISC is a uniform pressure, HERT Hertz's.
+    """
     card = problem.deck.require(model.Patch)
     if card.shape not in RADIUS_PER_THICKNESS:
         message = f"`{card.shape}` is not a shape of a patch."
@@ -36,14 +34,12 @@ def unknown_shape(problem: Problem) -> Reports:
         yield Report(message, card.place("shape"), hint)
 
 
-@rule(
-    "E443",
-    Subject.POINTS,
-    "The radius of the patch is not positive.",
-    remedy="A blank takes 0.327 h (HERT: 0.377 h).",
-)
+@rule("E443", Subject.POINTS)
 def invalid_radius(problem: Problem) -> Reports:
-    """Find a patch without an area."""
+    """The radius of the patch is not positive.
+
+    Remedy: A blank takes 0.327 h (HERT: 0.377 h).
+    """
     card = problem.deck.require(model.Patch)
     if card.radius is not None and not card.radius > 0.0:
         message = f"The radius of the patch is {card.radius:g}; it must be positive."
@@ -51,14 +47,12 @@ def invalid_radius(problem: Problem) -> Reports:
         yield Report(message, card.place("radius c"), hint)
 
 
-@rule(
-    "E444",
-    Subject.POINTS,
-    "The patch has only one of x0 and y0, or none without ROD.",
-    remedy="Both, or neither with ROD.",
-)
+@rule("E444", Subject.POINTS)
 def incomplete_centre(problem: Problem) -> Reports:
-    """Find a patch without a centre."""
+    """The patch has only one of x0 and y0, or none without ROD.
+
+    Remedy: Both, or neither with ROD.
+    """
     card = problem.deck.require(model.Patch)
     if (card.x is None) != (card.y is None):
         given, missing = ("y0", "x0") if card.x is None else ("x0", "y0")
@@ -79,14 +73,12 @@ def patch_without_w(problem: Problem) -> Reports:
         yield Report(message, impact.place("impact unknown"), "a pressure pushes w")
 
 
-@rule(
-    "E445",
-    Subject.POINTS,
-    "A part of the patch is off the plate, or w is restrained under it.",
-    remedy="A smaller radius, another centre.",
-)
+@rule("E445", Subject.POINTS)
 def patch_off_the_plate(problem: Problem) -> Reports:
-    """Find a patch that is not wholly on free elements."""
+    """A part of the patch is off the plate, or w is restrained under it.
+
+    Remedy: A smaller radius, another centre.
+    """
     card = problem.deck.require(model.Patch)
     try:
         patch = problem.patch
@@ -129,26 +121,16 @@ def _held(problem: Problem, patch: ContactPatch) -> str:
     return ""
 
 
-@rule(
-    "W447",
-    Subject.POINTS,
-    "The mesh at the patch is too coarse for its radius or for stored stresses.",
-    cause=(
-        "With a radius on the card: the element is larger than the radius c. With stored ply "
-        "stresses: it is larger than 2.6 times R = c + h/2. Strains near the patch depend on the "
-        "mesh, and the peak force is too high."
-    ),
-    remedy=(
-        "A finer mesh at the patch (`fecm new --grading`); `fecm check --mesh-error`: see "
-        "[checking a deck](making.md#checking)."
-    ),
-)
+@rule("W447", Subject.POINTS)
 def unresolved_patch(problem: Problem) -> Reports:
-    """Find a patch that the mesh does not resolve, where its radius is given or stresses stored.
+    """The mesh at the patch is too coarse for its radius or for stored stresses.
 
-    The default radius belongs to plate theory.  Few meshes resolve it, and the force hardly needs
-    it: on the window of D7136 elements 2 and 4 times as large as c change the peak by 0.2 %.
-    Stresses count from R on, at which they converge by elements smaller than RESOLVED R.
+    With a radius on the card: the element is larger than the radius c. With stored ply stresses: it
+    is larger than 2.6 times R = c + h/2. Strains near the patch depend on the mesh, and the peak
+    force is too high.
+
+    Remedy: A finer mesh at the patch (`fecm new --grading`); `fecm check --mesh-error`: see
+    [checking a deck](making.md#checking).
     """
     card, patch = problem.deck.require(model.Patch), problem.patch
     if patch is None:
@@ -174,18 +156,13 @@ def _longest_side(mesh: MeshArrays, rows: Indices | Bools) -> float:
     return float(longest_sides(mesh.elements[rows], mesh.coordinates).max(initial=0.0))
 
 
-@rule(
-    "W474",
-    Subject.POINTS,
-    "PATC with commas has a blank radius.",
-    cause="The values after it are centre and static load.",
-    remedy="`DISC,1.,50.,50.`: columns 5–10 need no field of their own.",
-)
+@rule("W474", Subject.POINTS)
 def blank_radius(problem: Problem) -> Reports:
-    """Find a card with commas whose blank field was meant for the columns 5-10 it skips.
+    """PATC with commas has a blank radius.
 
-    The values are then centre and load instead of radius and centre, and the centre that was meant
-    is nearer to the impact node.
+    The values after it are centre and static load.
+
+    Remedy: `DISC,1.,50.,50.`: columns 5–10 need no field of their own.
     """
     card = problem.deck.last(model.Patch)
     if card is None or card.radius is not None or card.x is None or card.y is None:
@@ -205,18 +182,14 @@ def blank_radius(problem: Problem) -> Reports:
     yield Report(message, card.place("radius c"), hint)
 
 
-@rule(
-    "N473",
-    Subject.POINTS,
-    "The patch is away from ROD's node.",
-    cause=(
-        "It is further than its radius and the sides of the elements there. The force acts on the "
-        "patch."
-    ),
-    remedy="x0 and y0 blank for the node of ROD.",
-)
+@rule("N473", Subject.POINTS)
 def patch_away_from_node(problem: Problem) -> Reports:
-    """Find a patch that is away from the impact node."""
+    """The patch is away from ROD's node.
+
+    It is further than its radius and the sides of the elements there. The force acts on the patch.
+
+    Remedy: x0 and y0 blank for the node of ROD.
+    """
     patch, mesh, impact = problem.patch, problem.mesh, problem.deck.require(model.Impact)
     if patch is None:
         return
@@ -258,15 +231,14 @@ def _radius_hint(card: model.Patch) -> str:
     return f"a blank takes {RADIUS_PER_THICKNESS[card.shape]:g} times the thickness"
 
 
-@rule(
-    "W475",
-    Subject.POINTS,
-    "The radius of the patch looks like that of the indenter.",
-    cause="It is more than twice the thickness, and more than twice that of the contact.",
-    remedy="The radius of the contact, or blank for 0.327 h.",
-)
+@rule("W475", Subject.POINTS)
 def large_patch(problem: Problem) -> Reports:
-    """Find a large patch where stresses under the load are judged."""
+    """The radius of the patch looks like that of the indenter.
+
+    It is more than twice the thickness, and more than twice that of the contact.
+
+    Remedy: The radius of the contact, or blank for 0.327 h.
+    """
     if _judges_stresses(problem) and (what := _large_patch(problem)):
         card = problem.deck.require(model.Patch)
         message = (
@@ -276,15 +248,14 @@ def large_patch(problem: Problem) -> Reports:
         yield Report(message, card.place("radius c"), _radius_hint(card))
 
 
-@rule(
-    "N475",
-    Subject.POINTS,
-    "The radius of the patch is large, but only the force depends on it.",
-    cause="As W475, where the program has neither FAIL nor PLYS.",
-    remedy="The radius of the contact, or blank for 0.327 h.",
-)
+@rule("N475", Subject.POINTS)
 def large_patch_without_stresses(problem: Problem) -> Reports:
-    """Find a large patch that may be meant so that a coarse mesh resolves it."""
+    """The radius of the patch is large, but only the force depends on it.
+
+    As W475, where the program has neither FAIL nor PLYS.
+
+    Remedy: The radius of the contact, or blank for 0.327 h.
+    """
     if not _judges_stresses(problem) and (what := _large_patch(problem)):
         card = problem.deck.require(model.Patch)
         yield Report(f"the {what}", card.place("radius c"), _radius_hint(card))

@@ -21,28 +21,25 @@ FORCE = "force/length"
 LARGEST_STRAIN = 0.01  # by the preload, above which its unit is doubted
 
 
-@rule(
-    "W485",
-    Subject.LAMINATE,
-    "All forces of PREL are zero.",
-    remedy="Give N0x, N0y or N0xy, or remove the segment.",
-)
+@rule("W485", Subject.LAMINATE)
 def no_preload(card: model.Preload) -> Reports:
-    """Find a preload without a force."""
+    """All forces of PREL are zero.
+
+    Remedy: Give N0x, N0y or N0xy, or remove the segment.
+    """
     if not any(card.forces):
         hint = "its fields are N0x, N0y and N0xy, a force over a length; tension is positive"
         yield Report("PREL is without effect: all its forces are zero.", card.place(), hint)
 
 
-@rule(
-    "E483",
-    Subject.LAMINATE,
-    "PREL is with a laminate whose B is not zero.",
-    cause="Such a laminate bends under a force in its plane.",
-    remedy="A static solution under that force before the impact, with `NONL`.",
-)
+@rule("E483", Subject.LAMINATE)
 def preload_of_coupled_laminate(problem: Problem) -> Reports:
-    """Find a preload that would bend the plate."""
+    """PREL is with a laminate whose B is not zero.
+
+    Such a laminate bends under a force in its plane.
+
+    Remedy: A static solution under that force before the impact, with `NONL`.
+    """
     card = problem.deck.last(model.Preload)
     if card is not None and any(card.forces) and problem.plate.is_coupled:
         message = "B is not zero: the plate bends under the force of PREL, and is not flat."
@@ -50,14 +47,12 @@ def preload_of_coupled_laminate(problem: Problem) -> Reports:
         yield Report(message, card.place(), hint)
 
 
-@rule(
-    "W484",
-    Subject.LAMINATE,
-    "The preload of PREL strains the plate by more than 1 %.",
-    remedy="The unit of force over length: N/mm in mm and N.",
-)
+@rule("W484", Subject.LAMINATE)
 def large_preload(problem: Problem) -> Reports:
-    """Find a preload that few laminates would survive."""
+    """The preload of PREL strains the plate by more than 1 %.
+
+    Remedy: The unit of force over length: N/mm in mm and N.
+    """
     if (card := problem.deck.last(model.Preload)) is None:
         return
     largest = float(np.abs(problem.plate.preload_strain).max())
@@ -70,15 +65,14 @@ def large_preload(problem: Problem) -> Reports:
         yield Report(message, card.place(), hint)
 
 
-@rule(
-    "E499",
-    Subject.LAMINATE,
-    "PREL is with laminates of different stiffness.",
-    cause="Their strains under the same force differ: the forces in such a plate are not uniform.",
-    remedy="A static solution under that force before the impact, with `NONL`.",
-)
+@rule("E499", Subject.LAMINATE)
 def preload_of_unlike_laminates(problem: Problem) -> Reports:
-    """Find a preload whose strains would not fit together."""
+    """PREL is with laminates of different stiffness.
+
+    Their strains under the same force differ: the forces in such a plate are not uniform.
+
+    Remedy: A static solution under that force before the impact, with `NONL`.
+    """
     card = problem.deck.last(model.Preload)
     if card is None or not any(card.forces):
         return
@@ -89,15 +83,14 @@ def preload_of_unlike_laminates(problem: Problem) -> Reports:
         yield Report(message, card.place(), hint)
 
 
-@rule(
-    "W557",
-    Subject.LAMINATE,
-    "PREL is with a plate that has a hole.",
-    cause="PREL is uniform over the plate; around a hole the force in the plane is not.",
-    remedy="A static solution under that force before the impact, with `NONL`.",
-)
+@rule("W557", Subject.LAMINATE)
 def preload_around_hole(problem: Problem) -> Reports:
-    """Find a preload of a plate whose outline has more than one closed part."""
+    """PREL is with a plate that has a hole.
+
+    PREL is uniform over the plate; around a hole the force in the plane is not.
+
+    Remedy: A static solution under that force before the impact, with `NONL`.
+    """
     card = problem.deck.last(model.Preload)
     if card is None or not any(card.forces) or not (count := holes(problem.mesh)) > 0:
         return
@@ -107,14 +100,12 @@ def preload_around_hole(problem: Problem) -> Reports:
     yield Report(message, card.place(), hint)
 
 
-@rule(
-    "E535",
-    Subject.LAMINATE,
-    "PREL has two whole numbers that may be one with a decimal comma.",
-    remedy="Write -12.5, or give all three forces: -12,5,0.",
-)
+@rule("E535", Subject.LAMINATE)
 def decimal_comma(card: model.Preload) -> Reports:
-    """Find a card such as `-12,5`."""
+    """PREL has two whole numbers that may be one with a decimal comma.
+
+    Remedy: Write -12.5, or give all three forces: -12,5,0.
+    """
     text = "" if card.source is None else card.source.card.data.strip()
     if match := re.fullmatch(r"([+-]?[0-9]+),([0-9]*[1-9][0-9]*)", text):
         message = f"PREL has `{text}`, which is two forces or one with a decimal comma."
@@ -134,15 +125,14 @@ NEAR = 1.1  # buckling load over the preload below which the response is doubtfu
 FEWEST_ELEMENTS = 2.0
 
 
-@rule(
-    "E486",
-    Subject.LAMINATE,
-    "PREL compresses a plate that its supports let move along w.",
-    cause="It has no buckling load, and its edge loads may or may not keep their direction.",
-    remedy="Restrain w at the edges, or a preload in tension.",
-)
+@rule("E486", Subject.LAMINATE)
 def compressed_free_plate(problem: Problem) -> Reports:
-    """Find compression of a plate with rigid deflections."""
+    """PREL compresses a plate that its supports let move along w.
+
+    It has no buckling load, and its edge loads may or may not keep their direction.
+
+    Remedy: Restrain w at the edges, or a preload in tension.
+    """
     card = problem.deck.last(model.Preload)
     if card is None or not problem.plate.is_compressed:
         return
@@ -151,15 +141,14 @@ def compressed_free_plate(problem: Problem) -> Reports:
         yield Report(message, card.place(), "restrain w at every node of a supported edge")
 
 
-@rule(
-    "E487",
-    Subject.LAMINATE,
-    "The preload is at or beyond the buckling load.",
-    cause="The flat plate is not stable: its deflection would grow without bound.",
-    remedy="A smaller compression; the units of PREL, force/length.",
-)
+@rule("E487", Subject.LAMINATE)
 def buckled(problem: Problem) -> Reports:
-    """Compare the preload with the buckling load."""
+    """The preload is at or beyond the buckling load.
+
+    The flat plate is not stable: its deflection would grow without bound.
+
+    Remedy: A smaller compression; the units of PREL, force/length.
+    """
     card, factor = problem.deck.last(model.Preload), problem.buckling_factor
     if card is None or not factor <= 1.0:
         return
@@ -170,15 +159,14 @@ def buckled(problem: Problem) -> Reports:
     yield Report(f"{message}: the plate is not stable.", card.place(), hint)
 
 
-@rule(
-    "W488",
-    Subject.LAMINATE,
-    "The preload is above 1/1.1 of the buckling load.",
-    cause="Stiffness and frequencies depend on a small difference.",
-    remedy="A finer mesh and exact loads and supports, or a smaller compression.",
-)
+@rule("W488", Subject.LAMINATE)
 def nearly_buckled(problem: Problem) -> Reports:
-    """Find a preload just below the buckling load."""
+    """The preload is above 1/1.1 of the buckling load.
+
+    Stiffness and frequencies depend on a small difference.
+
+    Remedy: A finer mesh and exact loads and supports, or a smaller compression.
+    """
     card, factor = problem.deck.last(model.Preload), problem.buckling_factor
     if card is None or not 1.0 < factor < NEAR:
         return
@@ -187,18 +175,15 @@ def nearly_buckled(problem: Problem) -> Reports:
     yield Report(f"{message}: {why}.", card.place(), "imperfections of a real plate matter here")
 
 
-@rule(
-    "W561",
-    Subject.LAMINATE,
-    "The elements are too large for the buckles of a curved panel.",
-    cause=(
-        "A buckle is about 1.73 (R h)^(1/2) long. With less than two elements along it the "
-        "buckling load is too high: by 3 % with 1.2 elements, 50 % with 0.5."
-    ),
-    remedy="A finer mesh. `fecm check` prints the buckling load, here with `at most`.",
-)
+@rule("W561", Subject.LAMINATE)
 def coarse_for_buckles(problem: Problem) -> Reports:
-    """Find a curved panel under compression whose elements are longer than its buckles."""
+    """The elements are too large for the buckles of a curved panel.
+
+    A buckle is about 1.73 (R h)^(1/2) long. With less than two elements along it the buckling load
+    is too high: by 3 % with 1.2 elements, 50 % with 0.5.
+
+    Remedy: A finer mesh. `fecm check` prints the buckling load, here with `at most`.
+    """
     card, count = problem.deck.last(model.Preload), problem.elements_per_buckle
     if card is None or not problem.plate.is_compressed or count >= FEWEST_ELEMENTS:
         return

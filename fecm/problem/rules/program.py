@@ -18,14 +18,12 @@ STORE = {"DISP", "STRE", "REAC"}
 OF_AN_IMPACT: tuple[type[model.Segment], ...] = (model.Impact, model.Indentation, model.Projectile)
 
 
-@rule(
-    "E509",
-    Subject.PROGRAM,
-    "The program executes too many macros.",
-    remedy="Nested LOOPs multiply.",
-)
+@rule("E509", Subject.PROGRAM)
 def endless_program(problem: Problem) -> Reports:
-    """Find a program that would run for days."""
+    """The program executes too many macros.
+
+    Remedy: Nested LOOPs multiply.
+    """
     if problem.work.macros > MOST_MACROS:
         # 0.8 ms at start-up; the number may be beyond all floats.
         from decimal import Context, Decimal
@@ -36,14 +34,12 @@ def endless_program(problem: Problem) -> Reports:
         yield Report(message, place, "nested LOOPs multiply")
 
 
-@rule(
-    "W510",
-    Subject.PROGRAM,
-    "A macro stores every N steps or passes, but there are fewer.",
-    remedy="A smaller N.",
-)
+@rule("W510", Subject.PROGRAM)
 def nothing_stored(problem: Problem) -> Reports:
-    """Find macros that are never reached at their N-th step or pass."""
+    """A macro stores every N steps or passes, but there are fewer.
+
+    Remedy: A smaller N.
+    """
     sizes = problem.work
     for macro in flat(problem.program):
         if macro.word == "RODP" and every(macro) > max(1, sizes.steps):
@@ -56,14 +52,12 @@ def nothing_stored(problem: Problem) -> Reports:
             yield Report(message, macro.place("value"))
 
 
-@rule(
-    "W511",
-    Subject.PROGRAM,
-    "The program takes no step and stores nothing.",
-    remedy="Add macros.",
-)
+@rule("W511", Subject.PROGRAM)
 def idle_program(problem: Problem) -> Reports:
-    """Find a program without a result."""
+    """The program takes no step and stores nothing.
+
+    Remedy: Add macros.
+    """
     if not problem.work.steps and not any(problem.work.passes.values()):
         macros = problem.deck.macros
         place = macros[0].place("macro") if macros else None
@@ -74,15 +68,14 @@ def _cards(problem: Problem, *words: str) -> list[Macro]:
     return [macro for macro in flat(problem.program) if macro.word in words]
 
 
-@rule(
-    "W449",
-    Subject.POINTS,
-    "Ply stresses under a point force grow without limit.",
-    cause="They depend on the mesh: the finer it is, the larger they are.",
-    remedy="PATC.",
-)
+@rule("W449", Subject.POINTS)
 def ply_stresses_under_point_force(problem: Problem) -> Reports:
-    """Find ply stresses of an impact without a contact patch."""
+    """Ply stresses under a point force grow without limit.
+
+    They depend on the mesh: the finer it is, the larger they are.
+
+    Remedy: PATC.
+    """
     cards = _cards(problem, "PLYS", "FAIL")
     if cards and problem.has_impact and problem.patch is None:
         message = "Ply stresses under a point force grow without bound as the mesh is refined."
@@ -90,15 +83,14 @@ def ply_stresses_under_point_force(problem: Problem) -> Reports:
         yield Report(message, cards[0].place("macro"), hint)
 
 
-@rule(
-    "W450",
-    Subject.POINTS,
-    "Elements without nine nodes have no interlaminar stresses.",
-    cause="They are NaN.",
-    remedy="9-node quadrilaterals.",
-)
+@rule("W450", Subject.POINTS)
 def no_interlaminar_stresses(problem: Problem) -> Reports:
-    """Find elements whose interlaminar stresses are not computed."""
+    """Elements without nine nodes have no interlaminar stresses.
+
+    They are NaN.
+
+    Remedy: 9-node quadrilaterals.
+    """
     cards = _cards(problem, "PLYS", "FAIL")
     others = np.flatnonzero(~is_complete(problem.mesh.elements))
     if cards and len(others):
@@ -107,18 +99,15 @@ def no_interlaminar_stresses(problem: Problem) -> Reports:
         yield Report(message, cards[0].place("macro"))
 
 
-@rule(
-    "E448",
-    Subject.POINTS,
-    "The number of elements of PLYS can't be taken.",
-    cause=(
-        "There are fewer elements, several cards have different numbers, or the nearest ones are "
-        "asked for without a load."
-    ),
-    remedy="0 or a blank takes all.",
-)
+@rule("E448", Subject.POINTS)
 def wrong_number_of_elements(problem: Problem) -> Reports:
-    """Check the number of elements on the PLYS cards."""
+    """The number of elements of PLYS can't be taken.
+
+    There are fewer elements, several cards have different numbers, or the nearest ones are asked
+    for without a load.
+
+    Remedy: 0 or a blank takes all.
+    """
     cards, numel = _cards(problem, "PLYS"), problem.deck.control.numel
     for card in cards:
         if card.second > numel:
@@ -133,15 +122,14 @@ def wrong_number_of_elements(problem: Problem) -> Reports:
         yield Report(message, cards[0].place("second value"), hint)
 
 
-@rule(
-    "W512",
-    Subject.PROGRAM,
-    "The result will be large.",
-    cause="The macro that stores most of it is marked.",
-    remedy="A larger N of that macro; fewer elements of PLYS.",
-)
+@rule("W512", Subject.PROGRAM)
 def large_result(problem: Problem) -> Reports:
-    """Find results of gigabytes."""
+    """The result will be large.
+
+    The macro that stores most of it is marked.
+
+    Remedy: A larger N of that macro; fewer elements of PLYS.
+    """
     if problem.output_bytes <= LARGE_OUTPUT:
         return
     word = max(problem.stored_bytes, key=problem.stored_bytes.__getitem__)
@@ -185,14 +173,12 @@ def _without_impact(segment: model.Segment) -> str:
 NO_RODP_HINT = "RODP takes an impact step; use it instead of EXCD"
 
 
-@rule(
-    "E519",
-    Subject.PROGRAM,
-    "ROD, EXPE or PROJ are without RODP, and nothing moves the plate.",
-    remedy="RODP instead of EXCD.",
-)
+@rule("E519", Subject.PROGRAM)
 def plate_at_rest(problem: Problem) -> Reports:
-    """Find an impact deck all of whose results would be 0."""
+    """ROD, EXPE or PROJ are without RODP, and nothing moves the plate.
+
+    Remedy: RODP instead of EXCD.
+    """
     segment, stored = _unused_segment(problem), _storing_at_rest(problem)
     if segment is not None and stored is not None:
         what = _without_impact(segment)
@@ -200,30 +186,28 @@ def plate_at_rest(problem: Problem) -> Reports:
         yield Report(message, stored.place("macro"), NO_RODP_HINT)
 
 
-@rule(
-    "W520",
-    Subject.PROGRAM,
-    "ROD, EXPE or PROJ are without RODP, and EXCD moves the plate: nothing hits.",
-    cause="Statics and natural modes of a plate do not need its impact, and are not doubted.",
-    remedy="RODP, or remove the segments.",
-)
+@rule("W520", Subject.PROGRAM)
 def nothing_hits(problem: Problem) -> Reports:
-    """Find segments of an impact in another program."""
+    """ROD, EXPE or PROJ are without RODP, and EXCD moves the plate: nothing hits.
+
+    Statics and natural modes of a plate do not need its impact, and are not doubted.
+
+    Remedy: RODP, or remove the segments.
+    """
     segment = _unused_segment(problem)
     if segment is not None and _storing_at_rest(problem) is None and "EXCD" in _movers(problem):
         message = f"{_without_impact(segment)}: nothing hits the plate."
         yield Report(message, segment.place(), NO_RODP_HINT)
 
 
-@rule(
-    "W518",
-    Subject.PROGRAM,
-    "EXCD is beside RODP.",
-    cause="The projectile stands still during EXCD.",
-    remedy="RODP only.",
-)
+@rule("W518", Subject.PROGRAM)
 def projectile_stands_still(problem: Problem) -> Reports:
-    """Find central differences in a program that takes impact steps."""
+    """EXCD is beside RODP.
+
+    The projectile stands still during EXCD.
+
+    Remedy: RODP only.
+    """
     if {"RODP", "EXCD"} <= _movers(problem):
         last = [macro for macro in problem.deck.macros if macro.word == "EXCD"][-1]
         message = "EXCD moves the plate but not the projectile, which is at rest during the step."

@@ -44,28 +44,24 @@ declare(
 )
 
 
-@rule(
-    "E418",
-    Subject.IMPACT,
-    "The number of rod elements is out of range.",
-    remedy="0 is a rigid mass.",
-)
+@rule("E418", Subject.IMPACT)
 def invalid_number_of_elements(card: model.Projectile) -> Reports:
-    """Find a rod of a negative number of elements, or of far too many."""
+    """The number of rod elements is out of range.
+
+    Remedy: 0 is a rigid mass.
+    """
     if not 0 <= card.elements <= MOST_ROD_ELEMENTS:
         must = f"0 (a rigid mass) to {MOST_ROD_ELEMENTS}"
         message = f"The projectile has {card.elements} rod elements; it must have {must}."
         yield Report(message, card.place("number of rod elements"))
 
 
-@rule(
-    "E419",
-    Subject.IMPACT,
-    "Length, mass, modulus or density of the projectile is not positive.",
-    remedy="Positive numbers.",
-)
+@rule("E419", Subject.IMPACT)
 def invalid_projectile(card: model.Projectile) -> Reports:
-    """Find values of a projectile that are not positive."""
+    """Length, mass, modulus or density of the projectile is not positive.
+
+    Remedy: Positive numbers.
+    """
     values = [
         (f"projectile's {'length' if card.elements else 'mass'}", card.size, "length or mass")
     ]
@@ -77,28 +73,24 @@ def invalid_projectile(card: model.Projectile) -> Reports:
             yield Report(f"The {what} is {value:g}; it must be positive.", card.place(name))
 
 
-@rule(
-    "E423",
-    Subject.IMPACT,
-    "The transducer node does not exist.",
-    remedy="Blank is the middle.",
-)
+@rule("E423", Subject.IMPACT)
 def unknown_transducer(card: model.Projectile) -> Reports:
-    """Find a transducer beyond the rod."""
+    """The transducer node does not exist.
+
+    Remedy: Blank is the middle.
+    """
     if card.elements and not 0 <= card.transducer <= card.elements + 1:
         what = f"The transducer node {card.transducer} does not exist"
         message = f"{what}; the rod has nodes 1 to {card.elements + 1}."
         yield Report(message, card.place("transducer node"), "blank is the middle")
 
 
-@rule(
-    "E422",
-    Subject.IMPACT,
-    "Rod elements have no diameter, or one that is not positive.",
-    remedy="The first and the last element, with an increment of 1 on the first card.",
-)
+@rule("E422", Subject.IMPACT)
 def invalid_diameter(card: model.Projectile, diameters: Floats) -> Reports:
-    """Find elements of a rod without a diameter."""
+    """Rod elements have no diameter, or one that is not positive.
+
+    Remedy: The first and the last element, with an increment of 1 on the first card.
+    """
     missing = np.flatnonzero(np.isnan(diameters))
     if len(missing):
         message = f"Rod elements {ranges(missing + 1)} have no diameter."
@@ -110,14 +102,12 @@ def invalid_diameter(card: model.Projectile, diameters: Floats) -> Reports:
             yield Report(f"{what}; it must be positive.", record.place("diameter"))
 
 
-@rule(
-    "E429",
-    Subject.IMPACT,
-    "Mass or stiffness of the rod is beyond the range of numbers.",
-    remedy="Check the units of length, diameters, modulus and density.",
-)
+@rule("E429", Subject.IMPACT)
 def rod_out_of_range(card: model.Projectile, diameters: Floats) -> Reports:
-    """Find a rod whose matrices overflow or vanish."""
+    """Mass or stiffness of the rod is beyond the range of numbers.
+
+    Remedy: Check the units of length, diameters, modulus and density.
+    """
     rod = Rod(card.size, tuple(diameters.tolist()), card.modulus, card.density)
     try:
         with np.errstate(all="ignore"):
@@ -130,15 +120,14 @@ def rod_out_of_range(card: model.Projectile, diameters: Floats) -> Reports:
         yield Report(message, card.place("length or mass"), hint)
 
 
-@rule(
-    "W438",
-    Subject.IMPACT,
-    "The projectile is far too light, or too heavy, for the plate.",
-    cause="Its mass over that of the plate is outside 10⁻⁴ to 2000.",
-    remedy="Mass in force·time²/length: t in mm, N and s; pounds over 386.09 in in, lbf and s.",
-)
+@rule("W438", Subject.IMPACT)
 def doubtful_mass(problem: Problem) -> Reports:
-    """Find masses in another unit."""
+    """The projectile is far too light, or too heavy, for the plate.
+
+    Its mass over that of the plate is outside 10⁻⁴ to 2000.
+
+    Remedy: Mass in force·time²/length: t in mm, N and s; pounds over 386.09 in in, lbf and s.
+    """
     deck, plate, projectile = problem.deck, problem.plate, build_projectile(problem.deck)
     ratio = projectile.total_mass / plate.total_mass()
     if LIGHTEST <= ratio <= HEAVIEST:
@@ -160,15 +149,14 @@ def doubtful_mass(problem: Problem) -> Reports:
     yield Report(f"{message}.", place, hint)
 
 
-@rule(
-    "W439",
-    Subject.IMPACT,
-    "The wave speed in the rod does not suit that along the fibres.",
-    cause="Their ratio is outside 1/30 to 30.",
-    remedy="Modulus and density in the ply's units.",
-)
+@rule("W439", Subject.IMPACT)
 def doubtful_rod(problem: Problem) -> Reports:
-    """Find moduli and densities of a rod in other units than those of the ply."""
+    """The wave speed in the rod does not suit that along the fibres.
+
+    Their ratio is outside 1/30 to 30.
+
+    Remedy: Modulus and density in the ply's units.
+    """
     card, projectile = problem.deck.last(model.Projectile), build_projectile(problem.deck)
     if card is None or not isinstance(projectile, Rod):
         return
@@ -182,15 +170,14 @@ def doubtful_rod(problem: Problem) -> Reports:
         yield Report(message, card.place("rod's Young's modulus"), hint)
 
 
-@rule(
-    "W554",
-    Subject.IMPACT,
-    "The rod is thicker than long.",
-    cause="Its largest diameter is above its length. Waves run along a slender rod only.",
-    remedy="The length on PROJ's card, the diameters on the cards below; or a rigid mass.",
-)
+@rule("W554", Subject.IMPACT)
 def rod_thicker_than_long(problem: Problem) -> Reports:
-    """Find a rod whose length and diameter look exchanged."""
+    """The rod is thicker than long.
+
+    Its largest diameter is above its length. Waves run along a slender rod only.
+
+    Remedy: The length on PROJ's card, the diameters on the cards below; or a rigid mass.
+    """
     card, projectile = problem.deck.last(model.Projectile), build_projectile(problem.deck)
     if card is None or not isinstance(projectile, Rod):
         return
@@ -204,15 +191,14 @@ def rod_thicker_than_long(problem: Problem) -> Reports:
         yield Report(message, card.place("length or mass"), hint)
 
 
-@rule(
-    "W555",
-    Subject.IMPACT,
-    "The impact energy is above 200 J per mm of thickness.",
-    cause="Drop-weight tests have 1 to 10 J per mm. Judged where UNIT names the units.",
-    remedy="Velocity and mass in the deck's units: 10 J are 10 000 mJ in mm, N and s.",
-)
+@rule("W555", Subject.IMPACT)
 def large_energy(problem: Problem) -> Reports:
-    """Find an energy that no plate withstands."""
+    """The impact energy is above 200 J per mm of thickness.
+
+    Drop-weight tests have 1 to 10 J per mm. Judged where UNIT names the units.
+
+    Remedy: Velocity and mass in the deck's units: 10 J are 10 000 mJ in mm, N and s.
+    """
     names = unit_names(problem.deck)
     force = in_si("force", names)
     if force is None:
@@ -240,29 +226,27 @@ def _has_the_reports_units(names: dict[str, str]) -> bool:
     return not names or [in_si(name, names) for name in names] == REPORT_UNITS
 
 
-@rule(
-    "N414",
-    Subject.IMPACT,
-    "There is no PROJ: the report's steel rod is taken.",
-    cause="The deck is without UNIT, or in in, lbf and s.",
-    remedy="Give PROJ for another projectile.",
-)
+@rule("N414", Subject.IMPACT)
 def reports_rod(problem: Problem) -> Reports:
-    """Find a deck in the report's units without a projectile."""
+    """There is no PROJ: the report's steel rod is taken.
+
+    The deck is without UNIT, or in in, lbf and s.
+
+    Remedy: Give PROJ for another projectile.
+    """
     if _takes_the_reports_rod(problem) and _has_the_reports_units(unit_names(problem.deck)):
         place = problem.deck.require(model.Impact).place("impact node")
         yield Report("no PROJ: the report's steel rod (in, lbf, s) is taken", place)
 
 
-@rule(
-    "W414",
-    Subject.IMPACT,
-    "There is no PROJ in a deck of other units than in, lbf and s.",
-    cause="The report's rod is taken as if the deck were in these.",
-    remedy="Give PROJ.",
-)
+@rule("W414", Subject.IMPACT)
 def reports_rod_in_other_units(problem: Problem) -> Reports:
-    """Find a deck in other units without a projectile."""
+    """There is no PROJ in a deck of other units than in, lbf and s.
+
+    The report's rod is taken as if the deck were in these.
+
+    Remedy: Give PROJ.
+    """
     if not _takes_the_reports_rod(problem) or _has_the_reports_units(unit_names(problem.deck)):
         return
     rod = report_rod()

@@ -24,15 +24,14 @@ NO_MASS = 1e-12  # sum of a node's squared shape functions at the points of L1 t
 HOURGLASS = "E321"
 
 
-@rule(
-    "E317",
-    Subject.MESH,
-    "Strains at nodes of triangles do not exist.",
-    cause="Their Jacobian is zero at the third node.",
-    remedy="Take Gauss points: a positive K.",
-)
+@rule("E317", Subject.MESH)
 def strains_at_nodes_of_triangles(problem: Problem) -> Reports:
-    """Find triangles whose strains are stored on the side eta = 1."""
+    """Strains at nodes of triangles do not exist.
+
+    Their Jacobian is zero at the third node.
+
+    Remedy: Take Gauss points: a positive K.
+    """
     card = problem.deck.require(model.Material).integration
     for family in problem.families:
         if _has_singular_points(problem, family):
@@ -49,15 +48,14 @@ def _has_singular_points(problem: Problem, family: ElementBlock) -> bool:
     return family.shape is TRIANGLE and points < -1
 
 
-@rule(
-    "E313",
-    Subject.MESH,
-    "The Jacobian of an element is not positive.",
-    cause="Its nodes are clockwise, or it is distorted.",
-    remedy="Number the nodes counter-clockwise.",
-)
+@rule("E313", Subject.MESH)
 def folded_elements(problem: Problem) -> Reports:
-    """Find Jacobians that are not positive at a quadrature point."""
+    """The Jacobian of an element is not positive.
+
+    Its nodes are clockwise, or it is distorted.
+
+    Remedy: Number the nodes counter-clockwise.
+    """
     bending, shear, strains = problem.rules
     folded: dict[str, list[int]] = {}  # rows by the hint about the numbering
     for family in problem.families:
@@ -76,14 +74,12 @@ def folded_elements(problem: Problem) -> Reports:
         yield from report_elements(problem.deck, rows, what, numbering)
 
 
-@rule(
-    "E315",
-    Subject.MESH,
-    "Nodes have no mass under the bending order L1.",
-    remedy="Take L1 = 2 or more for elements with mid-side nodes.",
-)
+@rule("E315", Subject.MESH)
 def nodes_without_mass(problem: Problem) -> Reports:
-    """Find nodes whose shape functions are zero at every point of L1."""
+    """Nodes have no mass under the bending order L1.
+
+    Remedy: Take L1 = 2 or more for elements with mid-side nodes.
+    """
     massless: list[np.ndarray[tuple[int], np.dtype[np.intp]]] = []
     for family in problem.families:
         values, _ = interpolation.local_shape_functions(family, problem.rules[0])
@@ -157,15 +153,14 @@ def _only_supports_resist(problem: Problem) -> bool:
     return NINE_NODES.held <= _shear_order(problem) < NINE_NODES.free
 
 
-@rule(
-    "W320",
-    Subject.MESH,
-    "4-node elements with L2 = 2 lock.",
-    cause="A thin plate is much too stiff.",
-    remedy="L2 = 1 and supports, `SHEA MITC`, or elements with mid-side nodes.",
-)
+@rule("W320", Subject.MESH)
 def locking(problem: Problem) -> Reports:
-    """Find 4-node elements with full integration of their shear strains."""
+    """4-node elements with L2 = 2 lock.
+
+    A thin plate is much too stiff.
+
+    Remedy: L2 = 1 and supports, `SHEA MITC`, or elements with mid-side nodes.
+    """
     if _shear_order(problem) < FOUR_NODES.free:
         return
     card = problem.deck.require(model.Material).integration
@@ -176,15 +171,14 @@ def locking(problem: Problem) -> Reports:
         yield Report(message, card.place("shear order L2"), hint)
 
 
-@rule(
-    HOURGLASS,
-    Subject.MESH,
-    "A force excites a checkerboard motion of 9-node elements.",
-    cause="With L2 = 2 nothing resists it in a free plate under a force on single nodes.",
-    remedy="L2 = 3. `fecm run --force` runs the deck.",
-)
+@rule(HOURGLASS, Subject.MESH)
 def checkerboard_of_free_plate(problem: Problem) -> Reports:
-    """Find 9-node elements of a free plate whose checkerboard has no energy."""
+    """A force excites a checkerboard motion of 9-node elements.
+
+    With L2 = 2 nothing resists it in a free plate under a force on single nodes.
+
+    Remedy: L2 = 3. `fecm run --force` runs the deck.
+    """
     if _is_supported(problem):
         return
     place = problem.deck.require(model.Material).integration.place("shear order L2")
@@ -193,15 +187,14 @@ def checkerboard_of_free_plate(problem: Problem) -> Reports:
         yield Report(f"{what} nothing resists in a plate without supports.", place, hint)
 
 
-@rule(
-    "W322",
-    Subject.MESH,
-    "An impact excites a checkerboard motion of 9-node elements.",
-    cause="With L2 = 2 only the supports resist it: it is a few per cent of w.",
-    remedy="L2 = 3.",
-)
+@rule("W322", Subject.MESH)
 def checkerboard_of_supported_plate(problem: Problem) -> Reports:
-    """Find 9-node elements of a supported plate whose checkerboard has little energy."""
+    """An impact excites a checkerboard motion of 9-node elements.
+
+    With L2 = 2 only the supports resist it: it is a few per cent of w.
+
+    Remedy: L2 = 3.
+    """
     if not _is_supported(problem):
         return
     place = problem.deck.require(model.Material).integration.place("shear order L2")
@@ -209,14 +202,12 @@ def checkerboard_of_supported_plate(problem: Problem) -> Reports:
         yield Report(f"{what} only the supports resist.", place, "take L2 = 3")
 
 
-@rule(
-    "W316",
-    Subject.MESH,
-    "The shear order L2 leaves motions without energy.",
-    remedy="Take the L2 of the hint.",
-)
+@rule("W316", Subject.MESH)
 def motions_without_energy(problem: Problem) -> Reports:
-    """Find elements with zero-energy modes, but for checkerboards that have their own rules."""
+    """The shear order L2 leaves motions without energy.
+
+    Remedy: Take the L2 of the hint.
+    """
     order, supported = _shear_order(problem), _is_supported(problem)
     excited = any(_checkerboards(problem))
     weak: dict[int, list[str]] = {}
@@ -235,14 +226,12 @@ def motions_without_energy(problem: Problem) -> Reports:
     yield Report(message, card.place("shear order L2"), f"take L2 = {max(weak)}")
 
 
-@rule(
-    "E451",
-    Subject.POINTS,
-    "SHEA MITC has an element with neither 4 nor 9 nodes.",
-    remedy="Take other elements, or SHEA without MITC.",
-)
+@rule("E451", Subject.POINTS)
 def elements_without_assumed_shear(problem: Problem) -> Reports:
-    """Find elements that have no assumed shear strains."""
+    """SHEA MITC has an element with neither 4 nor 9 nodes.
+
+    Remedy: Take other elements, or SHEA without MITC.
+    """
     if not has_assumed_shear(problem.deck):
         return
     wrong = np.zeros(len(problem.mesh.elements), dtype=bool)

@@ -50,15 +50,14 @@ def _needs_critical_step(problem: Problem) -> bool:
     return min(values) == 0.0 or max(values) >= safe
 
 
-@rule(
-    "E417",
-    Subject.IMPACT,
-    "The plate has no critical time step.",
-    cause="Numbers are out of range.",
-    remedy="Check the units of constants, thickness and coordinates.",
-)
+@rule("E417", Subject.IMPACT)
 def no_critical_step(problem: Problem) -> Reports:
-    """Find plates whose stiffness or mass is not a number."""
+    """The plate has no critical time step.
+
+    Numbers are out of range.
+
+    Remedy: Check the units of constants, thickness and coordinates.
+    """
     if not takes_steps(problem):
         return
     try:
@@ -70,14 +69,12 @@ def no_critical_step(problem: Problem) -> Reports:
         yield Report(message, problem.deck.require(model.Material).place(), hint)
 
 
-@rule(
-    "E515",
-    Subject.PROGRAM,
-    "DT is so small that rounding loses the motion.",
-    remedy="The unit of time; `DT 0` takes 0.9 of the critical step.",
-)
+@rule("E515", Subject.PROGRAM)
 def step_lost_by_rounding(problem: Problem) -> Reports:
-    """Find steps whose change of the displacements is rounded off."""
+    """DT is so small that rounding loses the motion.
+
+    Remedy: The unit of time; `DT 0` takes 0.9 of the critical step.
+    """
     safe = known_safe_step(problem)
     if safe is None or not takes_steps(problem):
         return
@@ -89,15 +86,14 @@ def step_lost_by_rounding(problem: Problem) -> Reports:
             yield Report(message, macro.place("value"), hint)
 
 
-@rule(
-    UNSTABLE,
-    Subject.PROGRAM,
-    "DT is not below the critical time step.",
-    cause="The motion would grow without bound.",
-    remedy="A smaller DT, or `DT 0`. `--force` runs it.",
-)
+@rule(UNSTABLE, Subject.PROGRAM)
 def unstable_step(problem: Problem) -> Reports:
-    """Compare every DT with the critical time step of the plate."""
+    """DT is not below the critical time step.
+
+    The motion would grow without bound.
+
+    Remedy: A smaller DT, or `DT 0`. `--force` runs it.
+    """
     if not takes_steps(problem) or not _needs_critical_step(problem):
         return
     critical = problem.critical_time_step
@@ -109,18 +105,15 @@ def unstable_step(problem: Problem) -> Reports:
             yield Report(message, macro.place("value"), hint)
 
 
-@rule(
-    "W517",
-    Subject.PROGRAM,
-    "DT is not below the stable step with the contact's stiffness.",
-    cause=(
-        "The plate moves explicitly under the contact force of the last step, so that the contact "
-        "acts on it as a spring. The contact may diverge."
-    ),
-    remedy="Check k and the masses, or a smaller DT.",
-)
+@rule("W517", Subject.PROGRAM)
 def unstable_contact(problem: Problem) -> Reports:
-    """Find steps that the contact makes unstable."""
+    """DT is not below the stable step with the contact's stiffness.
+
+    The plate moves explicitly under the contact force of the last step, so that the contact acts on
+    it as a spring. The contact may diverge.
+
+    Remedy: Check k and the masses, or a smaller DT.
+    """
     contact = problem.contact_step
     if contact is None:
         return
@@ -136,14 +129,12 @@ def unstable_contact(problem: Problem) -> Reports:
             yield Report(message, macro.place("value"), hint)
 
 
-@rule(
-    "W516",
-    Subject.PROGRAM,
-    "DT is below 1/100 of the stable step.",
-    remedy="The unit of time.",
-)
+@rule("W516", Subject.PROGRAM)
 def wasteful_step(problem: Problem) -> Reports:
-    """Find steps far below the stable one."""
+    """DT is below 1/100 of the stable step.
+
+    Remedy: The unit of time.
+    """
     contact, bound = problem.contact_step, problem.safe_time_step
     stable = bound if contact is None else min(bound, contact.limit)
     for macro in deck_time_steps(problem):
@@ -163,29 +154,26 @@ WITHOUT_EFFECT = 0.01  # damping times the duration
 WORST_RATE = 0.01  # relative error of the rate of damping
 
 
-@rule(
-    "E459",
-    Subject.DAMAGE,
-    "The damping a of DAMP is negative.",
-    remedy="0 is none.",
-)
+@rule("E459", Subject.DAMAGE)
 def negative_damping(card: model.Damping) -> Reports:
-    """Find a damping that feeds energy."""
+    """The damping a of DAMP is negative.
+
+    Remedy: 0 is none.
+    """
     if not card.coefficient >= 0.0:
         message = f"The damping a is {card.coefficient:g}; it must not be negative."
         hint = "the amplitude of a free plate decays as exp(-a t/2)"
         yield Report(message, card.place("a"), hint)
 
 
-@rule(
-    "W460",
-    Subject.DAMAGE,
-    "The rate of damping is off by more than 1 %.",
-    cause="Its error is (a DT)²/12.",
-    remedy="The unit of time, or a smaller DT.",
-)
+@rule("W460", Subject.DAMAGE)
 def badly_resolved_damping(problem: Problem) -> Reports:
-    """Find a damping that decays within a few steps."""
+    """The rate of damping is off by more than 1 %.
+
+    Its error is (a DT)²/12.
+
+    Remedy: The unit of time, or a smaller DT.
+    """
     card, safe = problem.deck.last(model.Damping), known_safe_step(problem)
     if card is None or safe is None or not takes_steps(problem):
         return
@@ -209,15 +197,14 @@ def _damping_hint(problem: Problem) -> str:
     return f"a is in 1/time: {one} of the lowest mode"
 
 
-@rule(
-    "W479",
-    Subject.DAMAGE,
-    "DAMP is without effect.",
-    cause="a times the simulated time is below 0.01.",
-    remedy="a in 1/time, 2 ζ ω for the damping ratio ζ of a mode.",
-)
+@rule("W479", Subject.DAMAGE)
 def damping_without_effect(problem: Problem) -> Reports:
-    """Find a damping that takes nothing off the amplitudes."""
+    """DAMP is without effect.
+
+    a times the simulated time is below 0.01.
+
+    Remedy: a in 1/time, 2 ζ ω for the damping ratio ζ of a mode.
+    """
     if (card := problem.deck.last(model.Damping)) is None:
         return
     a = card.coefficient
@@ -231,15 +218,14 @@ def damping_without_effect(problem: Problem) -> Reports:
         yield Report(f"{message}{likeness}.", card.place("a"), _damping_hint(problem))
 
 
-@rule(
-    "W480",
-    Subject.DAMAGE,
-    "DAMP is so large that no low mode oscillates.",
-    cause="a/2 is above the lowest natural frequency with clamped edges.",
-    remedy="a in 1/time, 2 ζ ω.",
-)
+@rule("W480", Subject.DAMAGE)
 def overdamped(problem: Problem) -> Reports:
-    """Find a damping that lets nothing oscillate."""
+    """DAMP is so large that no low mode oscillates.
+
+    a/2 is above the lowest natural frequency with clamped edges.
+
+    Remedy: a in 1/time, 2 ζ ω.
+    """
     if (card := problem.deck.last(model.Damping)) is None:
         return
     lowest = clamped_frequency(problem)

@@ -115,15 +115,14 @@ def has_real_moduli(ply: Ply, names: dict[str, str]) -> bool:
     return factor is None or all(least <= e * factor <= greatest for e in (ply.e1, ply.e2))
 
 
-@rule(
-    "W482",
-    Subject.LAMINATE,
-    "A name on UNIT is a unit of something else.",
-    cause="For instance, kg is given as the force.",
-    remedy="Length, force and time in this order: `mm N s`.",
-)
+@rule("W482", Subject.LAMINATE)
 def unit_of_another_kind(card: model.Units) -> Reports:
-    """Find names of masses, stresses and energies, and names in another order."""
+    """A name on UNIT is a unit of something else.
+
+    For instance, kg is given as the force.
+
+    Remedy: Length, force and time in this order: `mm N s`.
+    """
     kinds = {**{kind: tuple(units) for kind, units in KNOWN.items()}, **OTHERS}
     for wanted, name in zip(card.NAMES, (card.length, card.force, card.time), strict=True):
         kind = next((kind for kind, units in kinds.items() if name in units), wanted)
@@ -136,18 +135,15 @@ def unit_of_another_kind(card: model.Units) -> Reports:
         yield Report(f"{message}.", card.place(), hint)
 
 
-@rule(
-    "W435",
-    Subject.LAMINATE,
-    "A value is outside the range of real materials in the units of UNIT.",
-    cause=(
-        "Modulus, density, thickness, velocity and k are judged. The unit that the value seems to "
-        "be in is named."
-    ),
-    remedy="Correct the values or UNIT. Nothing is converted.",
-)
+@rule("W435", Subject.LAMINATE)
 def unreal_values(problem: Problem) -> Reports:
-    """Find values that nothing real has; all of them are one report."""
+    """A value is outside the range of real materials in the units of UNIT.
+
+    Modulus, density, thickness, velocity and k are judged. The unit that the value seems to be in
+    is named.
+
+    Remedy: Correct the values or UNIT. Nothing is converted.
+    """
     names = unit_names(problem.deck)
     wrong: list[tuple[CardPlace | None, str]] = []
     for kind, record, name, value in _judged(problem):

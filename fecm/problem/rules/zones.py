@@ -34,15 +34,14 @@ def _numbers(deck: model.Deck) -> set[int]:
     return {MATERIAL, *(one.number for one in _materials(deck))}
 
 
-@rule(
-    "E496",
-    Subject.LAMINATE,
-    "A number on MATS or LAMS is below 2, or taken.",
-    cause="Number 1 is the material, and the laminate, of MATE.",
-    remedy="A number from 2 for each.",
-)
+@rule("E496", Subject.LAMINATE)
 def number_taken(deck: model.Deck) -> Reports:
-    """Find materials and laminates whose numbers are not their own."""
+    """A number on MATS or LAMS is below 2, or taken.
+
+    Number 1 is the material, and the laminate, of MATE.
+
+    Remedy: A number from 2 for each.
+    """
     heads = (("material", _materials(deck)), ("laminate", _laminates(deck)))
     for kind, numbered in heads:
         seen: set[int] = set()
@@ -62,15 +61,14 @@ def _in_layers(deck: model.Deck) -> Iterator[model.Layer]:
         yield from laminate.layers
 
 
-@rule(
-    "E497",
-    Subject.LAMINATE,
-    "A card has a material that the deck does not have, or a laminate no layers.",
-    cause="Materials are that of MATE, number 1, and those of MATS.",
-    remedy="The material's cards on MATS, or another number.",
-)
+@rule("E497", Subject.LAMINATE)
 def missing_material(deck: model.Deck) -> Reports:
-    """Find layers and strengths of unknown materials."""
+    """A card has a material that the deck does not have, or a laminate no layers.
+
+    Materials are that of MATE, number 1, and those of MATS.
+
+    Remedy: The material's cards on MATS, or another number.
+    """
     known = _numbers(deck)
     strengths = deck.last(model.Allowables)
     given: list[tuple[int, Record]] = [(layer.material, layer) for layer in _in_layers(deck)]
@@ -87,14 +85,12 @@ def missing_material(deck: model.Deck) -> Reports:
             yield Report(message, laminate.head.place("layers"))
 
 
-@rule(
-    "E498",
-    Subject.LAMINATE,
-    "A zone has an element or a laminate that the deck does not have.",
-    remedy="Elements up to NUMEL; laminate 1 is that of MATE, the others are those of LAMS.",
-)
+@rule("E498", Subject.LAMINATE)
 def invalid_zone(deck: model.Deck) -> Reports:
-    """Find zones outside the plate, and without a laminate."""
+    """A zone has an element or a laminate that the deck does not have.
+
+    Remedy: Elements up to NUMEL; laminate 1 is that of MATE, the others are those of LAMS.
+    """
     card, count = deck.last(model.Zones), deck.control.numel
     known = {MATERIAL, *(one.number for one in _laminates(deck))}
     for zone in () if card is None else card.records:
@@ -128,15 +124,14 @@ def missing_expansions(deck: model.Deck) -> Reports:
         yield Report(f"CURE has no card of material {number}.", card.place(), FIELDS)
 
 
-@rule(
-    "W500",
-    Subject.LAMINATE,
-    "A material or a laminate of the deck is not used.",
-    cause="No layer has the material, or no zone the laminate.",
-    remedy="Material in columns 21-25 of a layer; ZONE; or remove the cards.",
-)
+@rule("W500", Subject.LAMINATE)
 def unused(problem: Problem) -> Reports:
-    """Find materials and laminates without effect."""
+    """A material or a laminate of the deck is not used.
+
+    No layer has the material, or no zone the laminate.
+
+    Remedy: Material in columns 21-25 of a layer; ZONE; or remove the cards.
+    """
     deck = problem.deck
     in_layers = {layer.material for layers in deck.layers.values() for layer in layers}
     for one in _materials(deck):
@@ -164,15 +159,14 @@ def _place(deck: model.Deck, number: int) -> CardPlace | None:
     return deck.require(model.Material).place()
 
 
-@rule(
-    "W497",
-    Subject.LAMINATE,
-    "The mass of the laminate is not symmetric about its middle.",
-    cause="Its first moment I1 is above 0.02 of its mass times the thickness, and is left out.",
-    remedy="Accept it: the lowest frequencies change far less. Or a symmetric laminate.",
-)
+@rule("W497", Subject.LAMINATE)
 def coupled_inertia(problem: Problem) -> Reports:
-    """Find laminates whose inertia couples stretching and bending."""
+    """The mass of the laminate is not symmetric about its middle.
+
+    Its first moment I1 is above 0.02 of its mass times the thickness, and is left out.
+
+    Remedy: Accept it: the lowest frequencies change far less. Or a symmetric laminate.
+    """
     for number, laminate in _used(problem):
         share = abs(laminate.coupling_inertia) / (laminate.mass * laminate.thickness)
         if share > LARGEST_COUPLING:
@@ -181,18 +175,15 @@ def coupled_inertia(problem: Problem) -> Reports:
             yield Report(message, _place(problem.deck, number), hint)
 
 
-@rule(
-    "W466",
-    Subject.POINTS,
-    "A core is far softer in shear than the faces, and SHEA is without EQUI.",
-    cause=(
-        "G13 of a ply is below 1/50 of the largest. The sum of the plies' shear stiffnesses is "
-        "then several times too large."
-    ),
-    remedy="`SHEA EQUI`.",
-)
+@rule("W466", Subject.POINTS)
 def soft_core(problem: Problem) -> Reports:
-    """Find sandwich plates that are too stiff in shear."""
+    """A core is far softer in shear than the faces, and SHEA is without EQUI.
+
+    G13 of a ply is below 1/50 of the largest. The sum of the plies' shear stiffnesses is then
+    several times too large.
+
+    Remedy: `SHEA EQUI`.
+    """
     deck = problem.deck
     shear = deck.last(model.Shear) or model.Shear()
     if shear.equilibrium or shear.factor != 1.0:
@@ -208,15 +199,14 @@ def soft_core(problem: Problem) -> Reports:
             yield Report(message, shear.place() or _place(deck, number), "use SHEA EQUI")
 
 
-@rule(
-    "W498",
-    Subject.DAMAGE,
-    "FAIL has no strengths of some layers.",
-    cause="Their exposures are not known (NaN), nor are those of the interfaces beside them.",
-    remedy="A pair of cards on ALLO for their material.",
-)
+@rule("W498", Subject.DAMAGE)
 def layers_without_strengths(problem: Problem) -> Reports:
-    """Find materials of layers that ALLO does not have."""
+    """FAIL has no strengths of some layers.
+
+    Their exposures are not known (NaN), nor are those of the interfaces beside them.
+
+    Remedy: A pair of cards on ALLO for their material.
+    """
     deck, card = problem.deck, problem.deck.last(model.Allowables)
     if card is None or all(macro.word != "FAIL" for macro in flat(problem.program)):
         return
