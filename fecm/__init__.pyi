@@ -5,6 +5,7 @@ from fecm import examples as examples
 from fecm._errors import FecmError as FecmError
 from fecm._errors import FecmWarning as FecmWarning
 from fecm._extensions import ExtensionError as ExtensionError
+from fecm._version import __version__ as __version__
 from fecm.api import DeckCheck as DeckCheck
 from fecm.api import check as check
 from fecm.api import read_one as read_one
@@ -54,5 +55,4 @@ from fecm.sweeps.result import SweepResult as SweepResult
 from fecm.sweeps.result import load_sweep as load_sweep
 from fecm.verification import verify as verify
 
-__version__: str
 __all__: list[str]

@@ -14,8 +14,8 @@ import numpy as np
 from scipy.integrate import solve_ivp
 from scipy.special import beta, j1
 
+from fecm import Ply
 from fecm._typing import Floats
-from fecm.deck.model import Ply
 from tests.builders import turned_stiffness
 from tests.closed_forms_plies import (
     equilibrium_shear,

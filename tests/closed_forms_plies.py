@@ -12,8 +12,8 @@ import numpy as np
 from numpy.polynomial import Polynomial
 from scipy.optimize import brentq, minimize_scalar
 
+from fecm import Ply
 from fecm._typing import Floats
-from fecm.deck.model import Ply
 from tests.builders import turned_stiffness
 
 # Transverse shear --------------------------------------------------------------------------------

@@ -10,8 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 
+from fecm import Ply
 from fecm._typing import Floats
-from fecm.deck.model import Ply
 
 H = 0.1  # thickness
 TENSION = (0.02, 0.005)

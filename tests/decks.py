@@ -8,7 +8,7 @@ from pathlib import Path
 import fecm
 from fecm.api import load_deck
 from fecm.deck import Deck
-from fecm.problem.build import ImpactModel, build_model
+from fecm.problem import ImpactModel, build_model
 
 ROOT = Path(__file__).parent.parent
 DATA = Path(__file__).parent / "data"

@@ -17,8 +17,7 @@ from collections import Counter
 from types import FrameType
 
 from fecm.api import load_deck
-from fecm.deck.format import format_deck
-from fecm.deck.reader import Reader
+from fecm.deck import Reader, format_deck
 from tests.decks import APPENDIX, small
 
 SECONDS = 1.0

@@ -32,9 +32,9 @@ from typing import Any
 import h5py
 import numpy as np
 
+from fecm import sweep
 from fecm.api import run
 from fecm.cli import main as fecm
-from fecm.sweeps.api import sweep
 from tests.decks import PROGRAM, small
 
 # Seconds of the clock after which a command hangs.

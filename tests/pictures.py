@@ -5,10 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import fecm
+from fecm import Result
 from fecm._typing import Array
-from fecm.plot.kinds import KINDS, Shows
-from fecm.plot.pictures import draw
-from fecm.results.result import Result
+from fecm.plot import KINDS, Shows, draw
 from tests.decks import DATA_CARDS, PROGRAM, small
 
 OF_RUNS = [name for name, kind in KINDS.items() if kind.shows in (Shows.RUN, Shows.RUNS)]

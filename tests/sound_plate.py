@@ -8,7 +8,7 @@ from functools import cache
 
 import fecm
 from fecm.api import load_deck
-from fecm.deck.findings import Finding
+from fecm.deck import Finding
 
 # Codes of the rules on test; that of the mesh, W415, depends on the decks' few elements.
 RULES = re.compile(

@@ -12,7 +12,7 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck import DeckError
-from fecm.problem.summary import deck_summary
+from fecm.problem import deck_summary
 from tests.decks import PROGRAM, small
 from tests.fuzz_decks import FORC, OWN
 

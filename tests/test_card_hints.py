@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fecm.api import load_deck
-from fecm.deck.findings import Finding
+from fecm.deck import Finding
 from tests.sound_plate import Edit, base, replaced, with_card
 
 

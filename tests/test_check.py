@@ -14,8 +14,7 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.problem import parts, problem
-from fecm.problem.summary import deck_summary
+from fecm.problem import deck_summary, parts, problem
 from tests import decks
 from tests.calls import call
 from tests.decks import APPENDIX, DATA, LONG, MESH, PROGRAM, ROOT

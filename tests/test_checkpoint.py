@@ -14,16 +14,9 @@ import pytest
 
 from fecm.api import load_deck
 from fecm.mechanics import kernels
-from fecm.results import hdf5_writer
-from fecm.results.hdf5_writer import RowBuffer
-from fecm.simulation.checkpoint import (
-    Checkpointer,
-    CheckpointError,
-    checkpoint_of,
-    spool_of,
-)
-from fecm.simulation.run import run_program as simulate_run
-from fecm.simulation.simulation import Simulation
+from fecm.results import RowBuffer, hdf5_writer
+from fecm.simulation import Checkpointer, CheckpointError, Simulation, checkpoint_of, spool_of
+from fecm.simulation import run_program as simulate_run
 from tests.calls import call
 from tests.decks import DATA_CARDS, MESH, small
 from tests.stopped_runs import StoppedError, run, stop_at_once

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.plot.pictures import draw
+from fecm.plot import draw
 from fecm.studies import StudyError
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, small

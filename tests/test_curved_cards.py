@@ -10,8 +10,7 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck import Finding, model
-from fecm.problem.memory import needed_bytes
-from fecm.problem.rules.time_step import clamped_frequency
+from fecm.problem import clamped_frequency, needed_bytes
 from fecm.verification import decks
 from tests.curved_panels import mesh, panel, shortly
 

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
+from fecm import Result
 from fecm.api import load_deck
 from fecm.deck import model
+from fecm.mechanics import PlateModel
 from fecm.mechanics.laminate import laminate
-from fecm.mechanics.plate import PlateModel
-from fecm.results.result import Result
-from fecm.studies.estimate import QuickEstimate, quick_estimate
+from fecm.studies import QuickEstimate, quick_estimate
 from fecm.verification import decks
 from tests import curved_panels
 from tests.builders import nothing, with_restraints

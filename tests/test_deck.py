@@ -11,13 +11,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import fecm
-from fecm.deck import Deck, DeckError, Reader
-from fecm.deck.card import format_real, parse_real
-from fecm.deck.model import (
+from fecm.deck import (
     SEGMENTS,
     Boundary,
     Control,
     Coordinates,
+    Deck,
+    DeckError,
     Elements,
     Forces,
     Impact,
@@ -28,7 +28,10 @@ from fecm.deck.model import (
     NumberedSegment,
     Page,
     PrintOption,
+    Reader,
     Segment,
+    format_real,
+    parse_real,
 )
 from tests.decks import APPENDIX, DATA_CARDS, LONG, MESH, small
 

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.authoring import changes
-from fecm.authoring.plate import Plate, Support
-from fecm.authoring.values import NAMES
-from fecm.deck.layup import parse_layup, parse_plies
-from fecm.deck.model import (
+from fecm import Plate
+from fecm.authoring import NAMES, Support, changes
+from fecm.deck import (
     Allowables,
     Boundary,
     Delamination,
@@ -22,6 +20,8 @@ from fecm.deck.model import (
     Indentation,
     Macro,
     Projectile,
+    parse_layup,
+    parse_plies,
 )
 from fecm.problem.generate import generate
 from tests.decks import LONG, ROOT

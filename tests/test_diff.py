@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results.result import load
+from fecm import load
 from tests.calls import Done, assert_unusable, call, diff, told
 from tests.decks import LONG, PROGRAM, ROOT, small
 

@@ -11,8 +11,8 @@ import h5py
 import numpy as np
 import pytest
 
-from fecm.results.result import load
-from fecm.results.tapes import fortran_number, read_tapes, write_tapes
+from fecm import load
+from fecm.results import fortran_number, read_tapes, write_tapes
 from tests.calls import assert_unusable, diff, told
 from tests.decks import DATA
 

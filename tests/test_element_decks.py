@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import Result
 from fecm.api import load_deck
-from fecm.mechanics.mesh import element_blocks
-from fecm.results.result import Result
+from fecm.mechanics import element_blocks
 from tests.builders import (
     Floats,
     Ints,

@@ -14,8 +14,8 @@ from concurrent.futures import ProcessPoolExecutor
 import pytest
 
 import fecm
-from fecm.deck.findings import CardPlace, DeckError, Finding
-from fecm.mechanics.plate_motion import DivergenceError
+from fecm import DeckError, DivergenceError
+from fecm.deck import CardPlace, Finding
 from tests.decks import small
 
 FINDING = Finding(

@@ -11,8 +11,8 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.deck.model import Impact
-from fecm.studies.estimate import quick_estimate
+from fecm.deck import Impact
+from fecm.studies import quick_estimate
 from tests.calls import call
 from tests.decks import MESH, PROGRAM, small
 

@@ -11,24 +11,24 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import fecm
-from fecm.deck.model import Ply
-from fecm.mechanics.failure import (
+from fecm import Ply, Strengths
+from fecm.mechanics import (
     CRITERIA,
     MODES,
     Candidates,
     Codes,
-    Strengths,
     exposure_of,
+    in_plane_stresses,
     interlaminar,
     is_evaluated,
+    is_fabric,
     largest_modes,
     max_stress,
     puck,
     puck_limits,
     tsai_wu,
 )
-from fecm.mechanics.laminate import is_fabric, laminate
-from fecm.mechanics.ply_stresses import in_plane_stresses
+from fecm.mechanics.laminate import laminate
 from tests.builders import Floats, table
 
 

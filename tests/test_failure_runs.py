@@ -10,22 +10,24 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import Ply
 from fecm._text import jsonable
 from fecm.api import Solver
-from fecm.deck.model import Allowables, Ply
-from fecm.mechanics.elements import gauss
-from fecm.mechanics.failure import CRITERIA, exposure_of
-from fecm.mechanics.failure_monitor import FailureMonitor
-from fecm.mechanics.interpolation import interpolate
+from fecm.deck import Allowables
+from fecm.mechanics import (
+    CRITERIA,
+    FailureMonitor,
+    PlateModel,
+    PlyStresses,
+    element_blocks,
+    exposure_of,
+    gauss,
+    interpolate,
+)
 from fecm.mechanics.laminate import laminate
-from fecm.mechanics.mesh import element_blocks
-from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.ply_stresses import PlyStresses
-from fecm.results.exposures import largest_exposures
-from fecm.results.hdf5_writer import MemorySink
-from fecm.results.summary import about_run, run_summary
-from fecm.simulation.run import simulate
-from fecm.sweeps.in_full import without_output
+from fecm.results import MemorySink, about_run, largest_exposures, run_summary
+from fecm.simulation import simulate
+from fecm.sweeps import without_output
 from tests.builders import nothing, rules, square, table, with_restraints
 from tests.calls import call
 from tests.decks import PROGRAM, small

@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import Result
 from fecm._typing import Bools
 from fecm.api import load_deck
-from fecm.deck.model import Allowables
-from fecm.mechanics.exposures import FailureEnvelope, Largest, Maxima
-from fecm.mechanics.failure import CRITERIA, exposure_of
-from fecm.mechanics.ply_stresses import PlyStresses
-from fecm.results.exposures import evaluations_in_contact, first_failures
-from fecm.results.result import Result
+from fecm.deck import Allowables
+from fecm.mechanics import CRITERIA, FailureEnvelope, Largest, Maxima, PlyStresses, exposure_of
+from fecm.results import evaluations_in_contact, first_failures
 from tests.calls import call
 from tests.decks import DATA_CARDS, DISC, PROGRAM, small
 from tests.test_machines import validate

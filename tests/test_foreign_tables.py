@@ -12,13 +12,10 @@ import pytest
 import fecm
 from fecm import FecmWarning
 from fecm._measured_tables import read_table
-from fecm.authoring.cases import read_cases
-from fecm.location.table import strain_table
-from fecm.results.comparison import measurement_of
-from fecm.studies import StudyError
-from fecm.studies.indentation_test.turns import read_test
-from fecm.studies.rod_test.filters import recorded
-from fecm.studies.rod_test.pulse_test import pulse_of
+from fecm.authoring import read_cases
+from fecm.location import strain_table
+from fecm.results import measurement_of
+from fecm.studies import StudyError, pulse_of, read_test, recorded
 from tests.calls import assert_unusable, call
 from tests.decks import ROOT
 

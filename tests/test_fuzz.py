@@ -8,15 +8,16 @@ from dataclasses import replace
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from fecm import Ply
 from fecm.api import load_deck
-from fecm.deck import Deck
-from fecm.deck.model import (
+from fecm.deck import (
     Allowables,
     Boundary,
     Control,
     Coordinates,
     Cure,
     Curvature,
+    Deck,
     ElementNodes,
     Elements,
     Expansion,
@@ -37,14 +38,13 @@ from fecm.deck.model import (
     NumberedLaminate,
     NumberedPly,
     Page,
-    Ply,
     Preload,
     PrintOption,
+    Reader,
     Units,
     Zone,
     Zones,
 )
-from fecm.deck.reader import Reader
 from tests.decks import small
 from tests.fuzz_decks import examine, mutate
 

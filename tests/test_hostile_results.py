@@ -16,7 +16,7 @@ import pytest
 
 import fecm
 from fecm.cli.isolation import GB, limits_for
-from fecm.results.groups import ResultFileError
+from fecm.results import ResultFileError
 from tests.calls import assert_unusable, call
 from tests.decks import PROGRAM as PROGRAM_CARDS
 from tests.decks import small

@@ -12,10 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
-from fecm.identification.alignment import IdentifyError, level, noise, onset
-from fecm.identification.misfit import sign_runs
-from fecm.studies import StudyError
-from fecm.studies.rod_test.filters import filter_of
+from fecm.identification import IdentifyError, level, noise, onset, sign_runs
+from fecm.studies import StudyError, filter_of
 from tests.calls import call
 
 Floats = NDArray[np.float64]

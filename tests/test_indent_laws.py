@@ -11,12 +11,10 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import Result
 from fecm.api import load_deck
-from fecm.deck.catalogue import CONTACTS
-from fecm.deck.format import format_deck
-from fecm.deck.model import Indentation
-from fecm.mechanics.contact_law import YangSunPermanent, hertz_coefficient
-from fecm.results.result import Result
+from fecm.deck import CONTACTS, Indentation, format_deck
+from fecm.mechanics import YangSunPermanent, hertz_coefficient
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, small
 from tests.indentation_tests import K

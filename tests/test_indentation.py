@@ -9,13 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from fecm.mechanics.contact_law import (
+from fecm import ContactPoint, Law
+from fecm.mechanics import (
     RELOADING,
     UNLOADING,
     VIRGIN,
-    ContactPoint,
     HystereticLaw,
-    Law,
     LinearPermanent,
     ListingLaw,
     LoadingHistory,

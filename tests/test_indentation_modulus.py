@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fecm.deck.model import Ply
-from fecm.mechanics.contact_law import hertz_coefficient
-from fecm.mechanics.half_space import (
+from fecm import Ply
+from fecm.mechanics import (
     PlyError,
     effective_stiffness,
+    hertz_coefficient,
     indentation_modulus,
     ply_stiffness,
 )

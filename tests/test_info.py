@@ -16,9 +16,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results.groups import GROUPS, ResultFileError
-from fecm.results.hdf5_reader import read
-from fecm.results.schema import DATASETS, GROUP_TYPES
+from fecm.results import DATASETS, GROUP_TYPES, GROUPS, ResultFileError, read
 from tests.calls import assert_unusable, call
 from tests.decks import APPENDIX, DATA_CARDS, PROGRAM, small
 

@@ -8,15 +8,11 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import Ply
 from fecm.api import load_deck
-from fecm.deck.catalogue import MATERIALS
-from fecm.deck.findings import Finding
-from fecm.deck.model import Allowables, Damping, Ply
-from fecm.deck.units import MASS, NAMES, convert
-from fecm.mechanics.mesh import MeshArrays
-from fecm.problem.outline import unsupported
-from fecm.problem.rules.time_step import clamped_frequency
-from fecm.problem.rules.units import likely_unit
+from fecm.deck import MASS, MATERIALS, NAMES, Allowables, Damping, Finding, convert
+from fecm.mechanics import MeshArrays
+from fecm.problem import clamped_frequency, likely_unit, unsupported
 from tests.decks import DATA, ROOT
 from tests.sound_plate import STRENGTHS, Edit, base, found, replaced, strengths, with_card
 

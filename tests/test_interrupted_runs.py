@@ -21,13 +21,9 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.problem.build import RunOptions
-from fecm.problem.slips import active_slips
-from fecm.results.hdf5_writer import MemorySink
-from fecm.simulation.checkpoint import Checkpointer, checkpoint_of
-from fecm.simulation.interpreter import Interpreter
-from fecm.simulation.run import simulate
-from fecm.simulation.simulation import Simulation
+from fecm.problem import RunOptions, active_slips
+from fecm.results import MemorySink
+from fecm.simulation import Checkpointer, Interpreter, Simulation, checkpoint_of, simulate
 from tests.calls import Done, call, program
 from tests.decks import DATA_CARDS, LONG, LONGER, PROGRAM, small
 from tests.kill_runs import FECM, SWEEP, SWEPT, sweep_trial, trial, verdict

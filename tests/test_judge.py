@@ -15,15 +15,28 @@ import pytest
 from matplotlib.text import Text
 
 import fecm
+from fecm import Deck, SweepResult
 from fecm.api import load_deck
-from fecm.deck.model import Deck
-from fecm.plot.pictures import draw
-from fecm.results.end import Deflection, End, LastContact, decided, ends, settled_deflection
-from fecm.results.metrics import IndentationMetrics, Projectiles, impact_metrics
-from fecm.results.summary import run_summary
-from fecm.results.validity import LIMITS, Extent, InPlane, counted, in_plane_of, softness
-from fecm.sweeps.result import SweepResult
-from fecm.sweeps.statistics import exceedance_bounds, wilson
+from fecm.plot import draw
+from fecm.results import (
+    LIMITS,
+    Deflection,
+    End,
+    Extent,
+    IndentationMetrics,
+    InPlane,
+    LastContact,
+    Projectiles,
+    counted,
+    decided,
+    ends,
+    impact_metrics,
+    in_plane_of,
+    run_summary,
+    settled_deflection,
+    softness,
+)
+from fecm.sweeps import exceedance_bounds, wilson
 from tests.builders import table
 from tests.calls import call
 from tests.decks import small

@@ -17,27 +17,40 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import Result, Rod
 from fecm.api import load_deck
-from fecm.mechanics import failure, impact, kernels, strains
-from fecm.mechanics.contact_law import RELOADING, UNLOADING, VIRGIN
-from fecm.mechanics.elements import Quadrature, gauss, nodal
-from fecm.mechanics.impact_steps import COLUMNS, LawKind
-from fecm.mechanics.impact_sweep import Given, ResultRow
-from fecm.mechanics.interpolation import NDOF
-from fecm.mechanics.kernels.element_groups import ElementKind
-from fecm.mechanics.kernels.layout import LANES
-from fecm.mechanics.kernels.plate import CompiledProduct
-from fecm.mechanics.kernels.strains import TYING, CompiledStrains, StrainsStruct
-from fecm.mechanics.laminate import LaminateSection
-from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.projectile import Rod, RodState, WilsonStep
-from fecm.mechanics.rod_modes import ProjectileModes
-from fecm.mechanics.stiffness_product import stiffness_operator
-from fecm.mechanics.strains import StrainField
-from fecm.mechanics.symmetry import symmetry_reduction
-from fecm.problem.build import RunOptions, build_model
-from fecm.problem.problem import Problem
-from fecm.results.result import Result
+from fecm.mechanics import (
+    COLUMNS,
+    LANES,
+    NDOF,
+    RELOADING,
+    TYING,
+    UNLOADING,
+    VIRGIN,
+    CompiledProduct,
+    CompiledStrains,
+    ElementKind,
+    Given,
+    LaminateSection,
+    LawKind,
+    PlateModel,
+    ProjectileModes,
+    Quadrature,
+    ResultRow,
+    RodState,
+    StrainField,
+    StrainsStruct,
+    WilsonStep,
+    failure,
+    gauss,
+    impact,
+    kernels,
+    nodal,
+    stiffness_operator,
+    strains,
+    symmetry_reduction,
+)
+from fecm.problem import Problem, RunOptions, build_model
 from tests.builders import (
     boundary,
     distorted_square,
@@ -274,7 +287,9 @@ def declared_structures() -> dict[str, list[tuple[str, str, bool]]]:
     for body, name in re.findall(r"typedef struct \{(.*?)\} (\w+);", code, flags=re.DOTALL):
         fields = []
         for declaration in filter(None, map(str.strip, body.split(";"))):
-            kind, names = re.fullmatch(r"(?:const )?(\w+) (.*)", declaration, re.DOTALL).groups()
+            words = re.fullmatch(r"(?:const )?(\w+) (.*)", declaration, re.DOTALL)
+            assert words is not None, declaration
+            kind, names = words.groups()
             for field in (field.strip() for field in names.split(",")):
                 fields.append((field.lstrip("*"), kind, field.startswith("*")))
         structures[name] = fields

@@ -6,15 +6,16 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck.model import Control, Deck, Integration, Layer, Material, Ply
-from fecm.mechanics.laminate import (
+from fecm import Deck, Ply
+from fecm.deck import Control, Integration, Layer, Material
+from fecm.mechanics import (
     LaminateSection,
-    laminate,
     reduced_stiffness,
     transformed_shear,
     transformed_stiffness,
 )
-from fecm.problem.parts import laminates_of_deck
+from fecm.mechanics.laminate import laminate
+from fecm.problem import laminates_of_deck
 from tests.builders import (
     GENERAL_PLY,
     REPORT_ANGLES,

@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import DeckError, Result
 from fecm.api import Mode, load_deck
-from fecm.deck.findings import DeckError
-from fecm.results.result import Result
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ready, small
 

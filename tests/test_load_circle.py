@@ -8,17 +8,16 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import Result
 from fecm.api import load_deck
-from fecm.mechanics.exposures import CircleStresses
-from fecm.mechanics.mesh import element_blocks, inner_corners
-from fecm.results.exposures import (
+from fecm.mechanics import CircleStresses, element_blocks, inner_corners
+from fecm.results import (
     FailureVerdict,
     LargestExposure,
     failure_verdict,
     largest_exposures,
     mesh_band,
 )
-from fecm.results.result import Result
 from tests.builders import report_plate, square
 
 

@@ -7,15 +7,16 @@ from dataclasses import replace
 import pytest
 
 import fecm
+from fecm import Ply
 from fecm.api import load_deck
-from fecm.deck import DeckError, Finding, read_deck
-from fecm.deck.format import format_deck
-from fecm.deck.macros import WORDS, estimate_work
-from fecm.deck.model import (
+from fecm.deck import (
+    WORDS,
     Allowables,
     Cure,
     Curvature,
+    DeckError,
     Expansion,
+    Finding,
     Impact,
     Indentation,
     LaminateNumber,
@@ -28,16 +29,18 @@ from fecm.deck.model import (
     NumberedLaminate,
     NumberedPly,
     Patch,
-    Ply,
     Preload,
     Projectile,
+    Reader,
     Segment,
     Shear,
     Zone,
     Zones,
+    estimate_work,
+    format_deck,
+    read_deck,
 )
-from fecm.deck.reader import Reader
-from fecm.problem.slips import MODES
+from fecm.problem import MODES
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ROOT, small
 

@@ -11,10 +11,16 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.deck import Deck
-from fecm.deck.catalogue import MATERIALS
-from fecm.deck.model import Allowables, Delamination, Indentation
-from fecm.deck.units import NAMES, UnitsError, system_named
+from fecm.deck import (
+    MATERIALS,
+    NAMES,
+    Allowables,
+    Deck,
+    Delamination,
+    Indentation,
+    UnitsError,
+    system_named,
+)
 from tests.calls import Done, assert_unusable, call
 
 PLATE = (

@@ -10,7 +10,7 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.mechanics.laminate import threshold_force
+from fecm.mechanics import threshold_force
 from tests.decks import ROOT
 
 PAGE = (ROOT / "docs" / "measured.md").read_text(encoding="utf-8")

@@ -10,8 +10,7 @@ import pytest
 import fecm._machine
 from fecm._machine import NotEnoughMemoryError
 from fecm._measured_tables import COPIES, FIELD_BYTES, LINE_BYTES, read_table
-from fecm.authoring.case import CasesError
-from fecm.authoring.cases import read_cases
+from fecm.authoring import CasesError, read_cases
 
 NAMES = ("velocity", "k", "alpha_p", "s_p", "q")
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import DivergenceError, Result
 from fecm.api import load_deck
-from fecm.mechanics.plate_motion import DivergenceError
-from fecm.mechanics.time_step import critical_time_step
-from fecm.problem.parts import build_plate
-from fecm.results.result import Result
+from fecm.mechanics import critical_time_step
+from fecm.problem import build_plate
 from tests.decks import DATA
 
 BASE = (DATA / "plate-100x100x2.inp").read_text()

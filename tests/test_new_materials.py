@@ -10,25 +10,24 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import Ply
 from fecm.api import load_deck
-from fecm.deck import Deck
-from fecm.deck.catalogue import MATERIALS
-from fecm.deck.layup import parse_plies
-from fecm.deck.model import (
+from fecm.deck import (
+    MATERIALS,
     Allowables,
     Cure,
+    Deck,
     Delamination,
     Expansion,
     Indentation,
     Material,
-    Ply,
     Preload,
+    Segment,
     Zones,
+    parse_plies,
 )
-from fecm.deck.segment import Segment
 from fecm.problem.plate_mesh import plate_mesh
-from fecm.results.criteria import is_isotropic
-from fecm.results.exposures import largest_exposures
+from fecm.results import is_isotropic, largest_exposures
 from tests.calls import Done, call
 
 PLATE = ("--size", "40x30", "--mesh", "4x3", "--support", "simple", "--patch", "none")

@@ -13,15 +13,13 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.authoring.vary import apply_case
-from fecm.deck import Finding
-from fecm.deck.model import Boundary, Nonlinear, Preload, Shear
-from fecm.mechanics.time_step import critical_time_step
+from fecm.authoring import apply_case
+from fecm.deck import Boundary, Finding, Nonlinear, Preload, Shear
+from fecm.mechanics import critical_time_step
+from fecm.problem import build_plate
 from fecm.problem.generate import generate
-from fecm.problem.parts import build_plate
 from fecm.studies import StudyError
-from fecm.sweeps.api import checked_problem
-from fecm.sweeps.plan import shares_plate
+from fecm.sweeps import checked_problem, shares_plate
 from tests.builders import DATA
 from tests.calls import assert_unusable, call
 from tests.decks import ROOT

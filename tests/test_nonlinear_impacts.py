@@ -24,8 +24,8 @@ from scipy.interpolate import CubicSpline
 from scipy.special import ellipk
 
 import fecm
-from fecm.authoring.mesh import InPlane
-from fecm.results.result import Result
+from fecm import Result
+from fecm.authoring import InPlane
 from fecm.verification.decks import run_of_deck
 from tests.builders import Floats, table
 from tests.nonlinear_impacts import (

@@ -13,14 +13,12 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.authoring.case import Case
-from fecm.deck.model import Impact
-from fecm.problem.estimates import NoCurveError, nonlinear_curve
-from fecm.problem.problem import Problem
-from fecm.studies.estimate import quick_estimate, velocity_at
-from fecm.sweeps import batch, execute, in_full
-from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.plan import plan, tasks
+from fecm.authoring import Case
+from fecm.deck import Impact
+from fecm.problem import NoCurveError, Problem, nonlinear_curve
+from fecm.studies import quick_estimate, velocity_at
+from fecm.sweeps import Outcome, batch, execute, in_full, tasks
+from fecm.sweeps.plan import plan
 from tests.calls import call
 from tests.test_nonlinear_decks import STRUCK, forces, text
 

@@ -15,10 +15,8 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.deck.format import format_deck
-from fecm.deck.model import Impact, Indentation, Material, Patch
-from fecm.mechanics.mesh import MeshArrays
-from fecm.mechanics.solutions import static_stiffness
+from fecm.deck import Impact, Indentation, Material, Patch, format_deck
+from fecm.mechanics import MeshArrays, static_stiffness
 from fecm.problem.generate import generate
 from tests.builders import DATA, table
 from tests.calls import assert_unusable, call

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results.result import Result
-from fecm.results.summary import run_summary
+from fecm import Result
+from fecm.results import run_summary
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, small
 

@@ -8,18 +8,23 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck.model import Ply
-from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
-from fecm.mechanics.impact import ImpactConditions, ImpactSystem
-from fecm.mechanics.laminate import LaminateSection, laminate
-from fecm.mechanics.mesh import MeshArrays
-from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.plate_motion import PlateMotion
-from fecm.mechanics.points import DISC, HERTZ, patch_weights
-from fecm.mechanics.projectile import RigidMass
-from fecm.mechanics.symmetry import symmetry_reduction
-from fecm.mechanics.time_step import critical_time_step
-from fecm.results.result import Result
+from fecm import Ply, Result, RigidMass
+from fecm.mechanics import (
+    DISC,
+    HERTZ,
+    HystereticLaw,
+    ImpactConditions,
+    ImpactSystem,
+    LaminateSection,
+    LinearPermanent,
+    MeshArrays,
+    PlateModel,
+    PlateMotion,
+    critical_time_step,
+    patch_weights,
+    symmetry_reduction,
+)
+from fecm.mechanics.laminate import laminate
 from tests.builders import (
     Floats,
     mesh_on,

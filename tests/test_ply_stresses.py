@@ -8,18 +8,20 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from fecm.deck.model import Ply
-from fecm.mechanics.elements import gauss
-from fecm.mechanics.laminate import LaminateSection, laminate
-from fecm.mechanics.mesh import MeshArrays, element_blocks
-from fecm.mechanics.ply_stresses import (
+from fecm import Ply
+from fecm.mechanics import (
+    LaminateSection,
+    MeshArrays,
     PlyStresses,
+    containing_elements,
+    element_blocks,
     equilibrium_shear_stiffness,
+    gauss,
     in_plane_stresses,
     interlaminar_stresses,
     second_derivatives,
 )
-from fecm.mechanics.points import containing_elements
+from fecm.mechanics.laminate import laminate
 from tests.builders import (
     DATA,
     GENERAL_ANGLES,

@@ -9,9 +9,7 @@ from pathlib import Path
 import pytest
 
 from fecm import _machine
-from fecm.sweeps import execute
-from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.plan import Settings, Task
+from fecm.sweeps import Outcome, Settings, Task, execute
 from tests.decks import model, small
 
 

@@ -10,16 +10,13 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import Result
 from fecm.api import Mode, load_deck
-from fecm.deck import Findings
-from fecm.deck.macros import compile_program, estimate_work
-from fecm.deck.model import Macro
-from fecm.mechanics.time_step import critical_time_step
-from fecm.problem.build import RunOptions
-from fecm.results.hdf5_writer import MemorySink
-from fecm.results.result import Result
-from fecm.simulation.interpreter import Action, Interpreter
-from fecm.simulation.run import simulate
+from fecm.deck import Findings, Macro, compile_program, estimate_work
+from fecm.mechanics import critical_time_step
+from fecm.problem import RunOptions
+from fecm.results import MemorySink
+from fecm.simulation import Action, Interpreter, simulate
 from tests.decks import DATA_CARDS, PROGRAM, ready, small
 
 

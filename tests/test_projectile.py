@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from fecm.mechanics.projectile import Rod, RodState, WilsonStep, report_rod, rigid_approach
+from fecm import Rod
+from fecm.mechanics import RodState, WilsonStep, report_rod, rigid_approach
 from tests.builders import displacement
 
 

@@ -10,26 +10,25 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import fecm
+from fecm import Ply, Result, RigidMass, Rod
 from fecm.api import load_deck
-from fecm.deck import Deck
-from fecm.deck.grid import ElementGrid, GridSection
-from fecm.deck.model import (
+from fecm.deck import (
     Control,
+    Deck,
+    ElementGrid,
+    GridSection,
     Impact,
     Indentation,
     Integration,
     Layer,
     Macro,
     Material,
-    Ply,
     Projectile,
 )
-from fecm.mechanics.points import gages
-from fecm.mechanics.projectile import RigidMass, Rod, report_rod
+from fecm.mechanics import gages, report_rod
+from fecm.problem import build_plate, build_projectile
 from fecm.problem.generate import generate
-from fecm.problem.parts import build_plate, build_projectile
-from fecm.results.export import dataset_csv_lines
-from fecm.results.result import Result
+from fecm.results import dataset_csv_lines
 from tests.decks import DATA_CARDS, LONG, MESH, OWN_FINDINGS, small
 
 Floats = NDArray[np.float64]

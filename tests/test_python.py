@@ -23,8 +23,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck.reader import HDF5
-from fecm.mechanics.contact_law import ContactPoint
+from fecm import ContactPoint
+from fecm.deck import HDF5
 from tests.calls import call
 from tests.decks import APPENDIX, DATA_CARDS, DISC, LONG, PLY_PROGRAM, PROGRAM, ROOT, small
 
@@ -112,8 +112,7 @@ print([name for name in names if name in sys.modules])
 # Modules that a command does not use on a small deck: their import takes a part of its time.
 ELSEWHERE = "scipy fecm.sweeps fecm.objects tomllib multiprocessing concurrent.futures decimal html"
 NOT_IN_A_RUN = (
-    "numpy.ma fecm.results.hdf5_reader fecm.results.export fecm.results.exposures "
-    "fecm.results.plies fecm.mechanics.solutions fecm.mechanics.ply_stresses "
+    "numpy.ma fecm.results.hdf5_reader fecm.results.export fecm.results.plies "
     "fecm.mechanics.stretching"
 )
 # By the module that loads most of what the commands below it share.

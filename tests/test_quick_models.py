@@ -15,25 +15,22 @@ from scipy.optimize import brentq
 from scipy.special import beta, ellipk
 
 import fecm
+from fecm import Ply, Result
 from fecm.api import load_deck
-from fecm.deck.model import Ply
-from fecm.mechanics import quick_models
-from fecm.mechanics.laminate import (
+from fecm.mechanics import (
     SMALL_MASS,
     LaminateSection,
     effective_rigidity,
-    laminate,
-    threshold_force,
-)
-from fecm.mechanics.quick_models import (
     inelasticity,
     infinite_plate,
+    quick_models,
     static_plate,
+    static_stiffness,
+    threshold_force,
 )
-from fecm.mechanics.solutions import static_stiffness
-from fecm.problem.contact_estimates import wave_impedance
-from fecm.results.result import Result
-from fecm.results.summary import run_summary
+from fecm.mechanics.laminate import laminate
+from fecm.problem import wave_impedance
+from fecm.results import run_summary
 from fecm.verification.decks import run_of_deck
 from fecm.verification.impacts import struck_square
 from tests.builders import REPORT_ANGLES, report_plate, table

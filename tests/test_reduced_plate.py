@@ -8,23 +8,28 @@ import numpy as np
 import pytest
 from scipy.special import ellipk
 
-from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, LinearPermanent
-from fecm.mechanics.laminate import LaminateSection
-from fecm.mechanics.membrane import MembraneForces
-from fecm.mechanics.mesh import equation_numbers
-from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.points import DISC, patch_weights
-from fecm.mechanics.reduced_plate import (
+from fecm import ContactPoint
+from fecm.mechanics import (
+    DISC,
+    FLAT,
+    Curvature,
+    HystereticLaw,
+    LaminateSection,
+    LinearPermanent,
+    MembraneForces,
+    PlateModel,
     ReducedMotion,
     ReducedPlate,
     ReductionError,
     SeriesLaw,
-    _moved,
+    Tangent,
     bending_modes,
-    reduced_plate,
+    equation_numbers,
+    modes,
+    patch_weights,
+    static_stiffness,
 )
-from fecm.mechanics.solutions import Tangent, modes, static_stiffness
-from fecm.mechanics.strains import FLAT, Curvature
+from fecm.mechanics.reduced_plate import _moved, reduced_plate
 from tests.builders import (
     Floats,
     boundary,

@@ -11,17 +11,23 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import RigidMass
 from fecm.api import load_deck
-from fecm.authoring.case import CasesError
-from fecm.authoring.strike import strike_of
-from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
-from fecm.mechanics.projectile import RigidMass
-from fecm.mechanics.reduced_plate import ReducedPlate
-from fecm.results.metrics import RATIO
-from fecm.sweeps import api
-from fecm.sweeps.plan import Task, plan, tasks
-from fecm.sweeps.reduced import ReducedImpacts, ReducedModel, by_halvings, count_held, reduced
-from fecm.sweeps.responses import Hits
+from fecm.authoring import CasesError, strike_of
+from fecm.mechanics import HystereticLaw, LinearPermanent, ReducedPlate
+from fecm.results import RATIO
+from fecm.sweeps import (
+    Hits,
+    ReducedImpacts,
+    ReducedModel,
+    Task,
+    api,
+    by_halvings,
+    count_held,
+    tasks,
+)
+from fecm.sweeps.plan import plan
+from fecm.sweeps.reduced import reduced
 from tests.builders import table
 from tests.calls import call
 from tests.nonlinear_impacts import struck_rectangle

@@ -8,9 +8,9 @@ import pytest
 import fecm
 from fecm.api import load_deck
 from fecm.deck import Deck
-from fecm.mechanics.plate import PlateModel
+from fecm.mechanics import PlateModel
+from fecm.problem import RefineError, refined_deck
 from fecm.problem.generate import generate
-from fecm.problem.refine import RefineError, refined_deck
 from tests.decks import LONG, MESH, small
 
 

@@ -14,12 +14,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import fecm
-from fecm.deck.layup import layup_text, parse_layup
-from fecm.report.content import render
-from fecm.report.report import page_of
-from fecm.results.exposures import first_failures
-from fecm.results.metrics import METRICS
-from fecm.results.result import Result
+from fecm import Result
+from fecm.deck import layup_text, parse_layup
+from fecm.report import page_of, render
+from fecm.results import METRICS, first_failures
 from tests.calls import assert_unusable, call
 from tests.decks import LONG, ROOT, small
 from tests.pages import Page, agrees, read_page

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 import fecm
-from fecm.mechanics.projectile import (
+from fecm import Result, Rod
+from fecm.mechanics import (
     AVERAGE,
     CONSISTENT,
     INTEGRATORS,
@@ -19,12 +20,10 @@ from fecm.mechanics.projectile import (
     STEPS,
     WILSON,
     Integrator,
-    Rod,
     RodIntegrator,
     RodState,
     report_rod,
 )
-from fecm.results.result import Result
 from tests.builders import displacement
 from tests.calls import call
 from tests.decks import DATA_CARDS, small

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import pytest
 
-from fecm.mechanics.roots import root
+from fecm.mechanics import root
 
 
 @pytest.mark.parametrize(

@@ -11,8 +11,9 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.deck.rules import Rule, Subject, declare
-from fecm.problem.findings_page import all_rules, findings_page
+from fecm.deck import Rule, Subject, declare
+from fecm.problem import all_rules
+from fecm.problem.findings_page import findings_page
 from tests import decks
 from tests.builders import square
 from tests.decks import DATA, DATA_CARDS, MESH, PLY_PROGRAM, PROGRAM, ROOT, small

@@ -18,11 +18,11 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import Ply, Result
 from fecm.api import Solver, load_deck
-from fecm.deck import model
-from fecm.deck.catalogue import MATERIALS
-from fecm.deck.grid import ElementGrid, grid_lines, uniform_section
-from fecm.deck.model import (
+from fecm.deck import (
+    MATERIALS,
+    ElementGrid,
     Integration,
     LaminateNumber,
     Laminates,
@@ -32,23 +32,26 @@ from fecm.deck.model import (
     Materials,
     NumberedLaminate,
     NumberedPly,
-    Ply,
     Shear,
     Zone,
     Zones,
+    grid_lines,
+    model,
+    uniform_section,
 )
-from fecm.mechanics.failure_monitor import UNKNOWN, FailureMonitor
-from fecm.mechanics.kernels import LIBRARY
-from fecm.mechanics.kernels.failure import CompiledMonitor
-from fecm.mechanics.laminate import LaminateSection, laminate
-from fecm.mechanics.mesh import equation_numbers
-from fecm.mechanics.ply_stresses import (
+from fecm.mechanics import (
+    LIBRARY,
+    UNKNOWN,
+    CompiledMonitor,
+    FailureMonitor,
+    LaminateSection,
     PlyStresses,
+    equation_numbers,
     equilibrium_shear_stiffness,
     residual_stresses,
+    symmetry_reduction,
 )
-from fecm.mechanics.symmetry import symmetry_reduction
-from fecm.results.result import Result
+from fecm.mechanics.laminate import laminate
 from fecm.verification import decks
 from tests.builders import Floats, table
 from tests.decks import DATA

@@ -6,11 +6,9 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import Deck
+from fecm.authoring import Case, Strike, strike_of_case
 from fecm.authoring import vary as strike_table
-from fecm.authoring.case import Case
-from fecm.authoring.strike import Strike
-from fecm.authoring.vary import strike_of_case
-from fecm.deck.model import Deck
 from fecm.sweeps import batch
 from tests.decks import model, small
 
@@ -72,7 +70,7 @@ def test_valid_cases_of_a_plate_need_no_cards(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(strike_table, "strike_of_case", counted)
     vary = {"velocity": np.linspace(60.0, 115.0, 8).tolist(), "k": np.linspace(1e6, 2e6, 8)}
     assert sweep(ROD, {**vary, "k": vary["k"].tolist()}).completed.all()
-    assert len(made) <= 2  # one is checked, and one asked for a law of the user's
+    assert len(made) <= 6  # of 64: those that are checked, and one asked for a law of the user's
 
 
 @pytest.mark.parametrize("text", [ROD, RIGID])

@@ -20,27 +20,28 @@ import pytest
 from numpy.typing import NDArray
 
 import fecm
+from fecm import ContactPoint, SweepResult
 from fecm.api import load_deck
-from fecm.authoring.case import Case, CasesError
-from fecm.authoring.cases import grid_cases, parse_vary, read_cases
-from fecm.authoring.vary import apply_case
+from fecm.authoring import Case, CasesError, apply_case, grid_cases, parse_vary, read_cases
 from fecm.deck import Deck
-from fecm.mechanics.contact_law import (
-    ContactPoint,
-    HystereticLaw,
-    LinearPermanent,
-    stack_parameters,
+from fecm.mechanics import AppliedForce, HystereticLaw, LinearPermanent, stack_parameters
+from fecm.problem import build_law, build_model, build_projectile
+from fecm.sweeps import (
+    LOST,
+    Convolution,
+    OtherSweepError,
+    Outcome,
+    PartialResults,
+    Task,
+    carry_out_plan,
+    checked_problem,
+    execute,
+    on_workers,
+    plate_response,
+    shares_plate,
+    tasks,
 )
-from fecm.mechanics.plate_motion import AppliedForce
-from fecm.problem.build import build_model
-from fecm.problem.parts import build_law, build_projectile
-from fecm.sweeps import execute
-from fecm.sweeps.api import carry_out_plan, checked_problem
-from fecm.sweeps.execute import LOST, OtherSweepError, PartialResults, on_workers
-from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.plan import Task, plan, shares_plate, tasks
-from fecm.sweeps.responses import Convolution, plate_response
-from fecm.sweeps.result import SweepResult
+from fecm.sweeps.plan import plan
 from tests.calls import Done, call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, model, small
 

@@ -11,10 +11,9 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.authoring.case import Case
-from fecm.authoring.vary import apply_case
-from fecm.problem.problem import Problem
-from fecm.sweeps.checks import JUDGED, doubtful_values
+from fecm.authoring import Case, apply_case
+from fecm.problem import Problem
+from fecm.sweeps import JUDGED, doubtful_values
 from tests.sound_plate import base, replaced, with_card
 
 

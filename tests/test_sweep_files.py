@@ -14,8 +14,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.sweeps.result import SweepResult
-from fecm.sweeps.summary import sweep_summary
+from fecm import SweepResult
+from fecm.sweeps import sweep_summary
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, PROGRAM
 from tests.decks import small as small_of

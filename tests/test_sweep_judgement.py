@@ -11,15 +11,12 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.authoring.vary import apply_case
+from fecm import DivergenceError, RigidMass
+from fecm.authoring import apply_case
 from fecm.deck import Deck
-from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent, stack_parameters
-from fecm.mechanics.plate_motion import DivergenceError
-from fecm.mechanics.projectile import RigidMass
-from fecm.results.metrics import SUMMARY
-from fecm.sweeps import batch
-from fecm.sweeps.outcome import Status
-from fecm.sweeps.responses import Hits, Impacts, TipSteps, balance_errors, by_numpy, impacts
+from fecm.mechanics import HystereticLaw, LinearPermanent, stack_parameters
+from fecm.results import SUMMARY
+from fecm.sweeps import Hits, Impacts, Status, TipSteps, balance_errors, batch, by_numpy, impacts
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, PROGRAM, small
 

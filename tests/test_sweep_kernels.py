@@ -9,16 +9,13 @@ import numpy as np
 import pytest
 
 import fecm
+from fecm import RigidMass, SweepResult
 from fecm._typing import Floats
 from fecm.api import load_deck
-from fecm.authoring.case import Case
-from fecm.mechanics import kernels
-from fecm.mechanics.contact_law import HystereticLaw, LinearPermanent
-from fecm.mechanics.projectile import RigidMass
-from fecm.problem.build import RunOptions, build_model
-from fecm.sweeps import batch, responses
-from fecm.sweeps.responses import plate_response
-from fecm.sweeps.result import SweepResult
+from fecm.authoring import Case
+from fecm.mechanics import HystereticLaw, LinearPermanent, kernels
+from fecm.problem import RunOptions, build_model
+from fecm.sweeps import batch, plate_response, responses
 from tests.test_kernels import compiled
 
 DECK = Path("decks/impact-115.inp").read_text().replace("LOOP       4000", "LOOP        600")

@@ -12,16 +12,11 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.authoring.case import Case, CasesError
-from fecm.authoring.cases import parse_vary, read_cases
-from fecm.authoring.values import VARIABLES, Changes
-from fecm.authoring.vary import apply_case
-from fecm.deck import Deck
-from fecm.deck.model import Impact, Indentation, Material, Patch
+from fecm.authoring import VARIABLES, Case, CasesError, Changes, apply_case, parse_vary, read_cases
+from fecm.deck import Deck, Impact, Indentation, Material, Patch
 from fecm.problem.generate import generate
-from fecm.results.exposures import largest_exposures
-from fecm.sweeps import batch
-from fecm.sweeps.summary import sweep_summary
+from fecm.results import largest_exposures
+from fecm.sweeps import batch, sweep_summary
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, model, small
 

@@ -18,20 +18,23 @@ import numpy as np
 import pytest
 
 from fecm._files import OutputError
-from fecm.authoring.cases import grid_cases
-from fecm.authoring.timing import with_time_step
-from fecm.sweeps import execute
-from fecm.sweeps.api import carry_out_plan, checked_problem
-from fecm.sweeps.batch import run_task
-from fecm.sweeps.execute import (
+from fecm.authoring import grid_cases, with_time_step
+from fecm.sweeps import (
     LOST,
     DamagedPartError,
     OtherSweepError,
+    Outcome,
     PartialResults,
+    Plan,
+    Task,
+    carry_out_plan,
+    checked_problem,
     exclusive_result,
+    execute,
+    run_task,
+    tasks,
 )
-from fecm.sweeps.outcome import Outcome
-from fecm.sweeps.plan import Plan, Task, plan, tasks
+from fecm.sweeps.plan import plan
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, model, small
 from tests.kill_runs import SWEEP, SWEPT

@@ -14,15 +14,25 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.deck.card import Card, FieldKind, Fields, _formatted, format_real, layout
-from fecm.deck.findings import Findings
-from fecm.deck.format import format_deck
+from fecm import Deck, read_deck
+from fecm.deck import (
+    Card,
+    Control,
+    FieldKind,
+    Fields,
+    Findings,
+    Reader,
+    Table,
+    TableReader,
+    format_deck,
+    format_real,
+    layout,
+    read_values,
+    write_rows,
+)
+from fecm.deck.card import _formatted
 from fecm.deck.mesh_cards import Boundary, Coordinates, Elements, Forces
-from fecm.deck.model import Control, Deck
-from fecm.deck.reader import Reader, read_deck
 from fecm.deck.segment import NumberedSegment
-from fecm.deck.table import Table, TableReader, write_rows
-from fecm.deck.values import read_values
 from fecm.problem.generate import generate
 from tests.decks import ROOT, small
 from tests.fuzz_decks import FORC, OWN, mutate

@@ -13,14 +13,16 @@ from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
 from fecm.api import load_deck
-from fecm.mechanics import element_matrices, kernels, time_step
-from fecm.mechanics.mesh import ElementBlock
-from fecm.mechanics.plate import PlateModel
-from fecm.mechanics.time_step import (
+from fecm.mechanics import (
+    ElementBlock,
+    PlateModel,
     critical_time_step,
     eigenvalue_bounds,
+    element_matrices,
+    kernels,
     safe_time_step,
     taken_time_step,
+    time_step,
 )
 
 from .builders import (

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from fecm._text import significant
-from fecm.deck.units import quantity
+from fecm.deck import quantity
 
 
 @pytest.mark.parametrize(

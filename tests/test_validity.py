@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import fecm
-from fecm.results.result import Result
+from fecm import Result
 from tests.calls import call
 from tests.decks import APPENDIX, MESH, PROGRAM, ROOT, small
 

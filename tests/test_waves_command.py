@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.plot.kinds import PlotError
-from fecm.studies.waves import FRONTS, MODES, Medium, WaveSurfaces, dispersion
+from fecm.plot import PlotError
+from fecm.studies import FRONTS, MODES, Medium, WaveSurfaces, dispersion
 from tests.builders import general_plate, report_plate, table
 from tests.calls import Done, assert_unusable, call
 from tests.decks import DATA_CARDS, LONG, small
@@ -239,7 +239,7 @@ def drawn(axes: Any) -> list[Any]:
 
 def test_the_picture_of_dispersion_shows_scaled_velocities_and_frequencies() -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot.studies import dispersion_picture
+    from fecm.plot import dispersion_picture
 
     medium = Medium(report_plate())
     curves = [dispersion(medium, angle, np.linspace(0.5, 20.0, 40)) for angle in (0.0, 90.0)]
@@ -261,7 +261,7 @@ def test_the_picture_of_dispersion_shows_scaled_velocities_and_frequencies() -> 
 
 def test_the_picture_of_speeds_is_polar_and_in_the_decks_units() -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot.studies import speeds_picture
+    from fecm.plot import speeds_picture
 
     surfaces = WaveSurfaces(Medium(report_plate()))
     units = {"length": "in", "force": "lbf", "time": "s"}
@@ -276,7 +276,7 @@ def test_the_picture_of_speeds_is_polar_and_in_the_decks_units() -> None:
 
 def test_the_picture_of_fronts_shows_circle_rays_fronts_and_cusps() -> None:
     pytest.importorskip("matplotlib")
-    from fecm.plot.studies import fronts_picture
+    from fecm.plot import fronts_picture
 
     surfaces = WaveSurfaces(Medium(report_plate()))
     times = (2e-6, 1e-5)

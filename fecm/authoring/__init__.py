@@ -1,1 +1,5 @@
 """Decks from plate, laminate, projectile and contact as objects."""
+
+from fecm._lazy import names_of_stub
+
+__getattr__, __dir__ = names_of_stub(__name__, __file__)

@@ -1,7 +1,5 @@
 """Decks: cards in, a typed model out, and back."""
 
-from fecm.deck.findings import CardPlace, DeckError, Finding, Findings
-from fecm.deck.model import Deck
-from fecm.deck.reader import Reader, read_deck
+from fecm._lazy import names_of_stub
 
-__all__ = ["CardPlace", "Deck", "DeckError", "Finding", "Findings", "Reader", "read_deck"]
+__getattr__, __dir__ = names_of_stub(__name__, __file__)

@@ -1,5 +1,5 @@
 """Waves, indentation tests and rod tests."""
 
-from fecm._errors import StudyError
+from fecm._lazy import names_of_stub
 
-__all__ = ["StudyError"]
+__getattr__, __dir__ = names_of_stub(__name__, __file__)

@@ -1,0 +1,19 @@
+"""Names of this room for other rooms and for tests; each is imported when it is first used."""
+
+from fecm.authoring.case import Case as Case
+from fecm.authoring.case import CasesError as CasesError
+from fecm.authoring.case import check_deck as check_deck
+from fecm.authoring.cases import grid_cases as grid_cases
+from fecm.authoring.cases import parse_vary as parse_vary
+from fecm.authoring.cases import read_cases as read_cases
+from fecm.authoring.mesh import InPlane as InPlane
+from fecm.authoring.parameters import ObjectError as ObjectError
+from fecm.authoring.plate import Support as Support
+from fecm.authoring.strike import Strike as Strike
+from fecm.authoring.strike import strike_of as strike_of
+from fecm.authoring.timing import with_time_step as with_time_step
+from fecm.authoring.values import NAMES as NAMES
+from fecm.authoring.values import VARIABLES as VARIABLES
+from fecm.authoring.values import Changes as Changes
+from fecm.authoring.vary import apply_case as apply_case
+from fecm.authoring.vary import strike_of_case as strike_of_case

@@ -1,0 +1,32 @@
+"""Names of this room for other rooms and for tests; each is imported when it is first used."""
+
+from fecm._errors import StudyError as StudyError
+from fecm.studies.estimate import QuickEstimate as QuickEstimate
+from fecm.studies.estimate import quick_estimate as quick_estimate
+from fecm.studies.estimate import velocity_at as velocity_at
+from fecm.studies.indentation_test.constants import ContactLawFit as ContactLawFit
+from fecm.studies.indentation_test.constants import fit_contact_law as fit_contact_law
+from fecm.studies.indentation_test.constants import fit_notes as fit_notes
+from fecm.studies.indentation_test.curves import FittedValue as FittedValue
+from fecm.studies.indentation_test.turns import divide as divide
+from fecm.studies.indentation_test.turns import read_test as read_test
+from fecm.studies.rod_test.filters import Filter as Filter
+from fecm.studies.rod_test.filters import FilterKind as FilterKind
+from fecm.studies.rod_test.filters import filter_of as filter_of
+from fecm.studies.rod_test.filters import recorded as recorded
+from fecm.studies.rod_test.pulse_test import Pulse as Pulse
+from fecm.studies.rod_test.pulse_test import RodHistory as RodHistory
+from fecm.studies.rod_test.pulse_test import calibrate_transducer as calibrate_transducer
+from fecm.studies.rod_test.pulse_test import default_time_step as default_time_step
+from fecm.studies.rod_test.pulse_test import force_row as force_row
+from fecm.studies.rod_test.pulse_test import gauss_pulse as gauss_pulse
+from fecm.studies.rod_test.pulse_test import pulse_of as pulse_of
+from fecm.studies.rod_test.pulse_test import simulate_pulse as simulate_pulse
+from fecm.studies.rod_test.pulse_test import sine_pulse as sine_pulse
+from fecm.studies.rod_test.pulse_test import table_pulse as table_pulse
+from fecm.studies.waves import FRONTS as FRONTS
+from fecm.studies.waves import MODES as MODES
+from fecm.studies.waves import Fronts as Fronts
+from fecm.studies.waves import Medium as Medium
+from fecm.studies.waves import WaveSurfaces as WaveSurfaces
+from fecm.studies.waves import dispersion as dispersion
