@@ -1,7 +1,4 @@
-"""Free memory, as the operating system reports it.
-
-Processors that a computation may use, and those that other work leaves free.
-"""
+"""Free memory and processors, as the operating system reports them."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""Values for :func:`json.dumps`.
-
-Tables of texts: for the terminal, for notebooks, and the header of a CSV.
-
-Values and foreign texts in one short line for any terminal.
-"""
+"""Texts for terminals, notebooks, JSON and CSV: values, tables, one short line."""
 
 from __future__ import annotations
 

@@ -1,9 +1,4 @@
-"""A case of a sweep: its values by name, and how the numbers in its texts are read.
-
-The checks of ``fecm check`` on the deck of a case: its first error is that of the case.
-
-Limits of quantities: what a search reaches, and what random values may exceed.
-"""
+"""A case of a sweep: its values by name, the check of its deck, and limits of quantities."""
 
 from __future__ import annotations
 

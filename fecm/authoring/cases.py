@@ -1,7 +1,4 @@
-"""Tables of cases: a CSV file, or mappings of Python.
-
-Grids: lists of values by name, of which all combinations are run.
-"""
+"""Tables and grids of cases: a CSV file, mappings of Python, all combinations of values."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Title of a new deck: plate, layup, ply and energy.
-
-The deck of an impact from plate, laminate, projectile and contact.
-"""
+"""The deck of an impact from plate, laminate, projectile and contact, with its title."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Contact patch, transverse shear, time step and program of an impact.
-
-Kinematics of a new deck: a linear plate, or one that stretches as it bends (von Kármán).
-"""
+"""Numerics of a new deck: contact patch, shear, kinematics, time step and program."""
 
 from __future__ import annotations
 

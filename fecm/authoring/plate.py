@@ -1,7 +1,4 @@
-"""Fixtures of drop-weight tests: a plate on the edges of a window.
-
-Mesh and supports of a plate.
-"""
+"""A plate: its mesh, its supports, and the fixtures of drop-weight tests."""
 
 from __future__ import annotations
 

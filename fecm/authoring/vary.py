@@ -1,6 +1,4 @@
-"""Apply the values of a case to a deck, or to the strike of its plate.
-
-Strikes of many cases on one plate as columns, for sweeps whose cases take microseconds.
+"""Values of a case applied to a deck or to its strike, of many cases as columns.
 
 A card, a projectile and a strike for every case would take longer than its impact.  Here values of
 cases are arrays.  Columns have only the cases whose values are certainly valid; the others get

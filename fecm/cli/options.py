@@ -1,7 +1,4 @@
-"""Types of options, and the options that several commands have.
-
-Help pages: options in groups, typical calls at their end, whole sentences about subcommands.
-"""
+"""Types of options, options of several commands, and the layout of help pages."""
 
 from __future__ import annotations
 

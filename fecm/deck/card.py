@@ -1,11 +1,7 @@
-"""Numbers and words as Fortran reads and writes them in the columns of a card.
-
-Cards: one line of a deck, cut into fields.
+"""Cards: one line of a deck cut into fields, its numbers as Fortran writes them, and typed records.
 
 Columns are counted from 1 and both ends of a field belong to it.  A card with a comma is read as
 values separated by commas, in the same order; everything from ``!`` on is a comment.
-
-Records: the values of one card as a plain typed object, which compares without the card.
 """
 
 from __future__ import annotations

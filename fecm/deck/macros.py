@@ -1,9 +1,7 @@
-"""The macro program: its cards, words, loops and the order of execution.
+"""The macro program: cards, words, loops, order of execution, and what it stores how often.
 
 A pass is the number of times that the innermost loop has been entered at its head, from 1; outside
 any loop it is 1.  LOOP 0 runs once.
-
-What a macro program stores, and how often.
 """
 
 from __future__ import annotations

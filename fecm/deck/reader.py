@@ -1,7 +1,4 @@
-"""Text of a deck: from a file or a stream, or given as it is.
-
-The card reader: a deck's text in, its models and all errors out, not just the first.
-"""
+"""The card reader: a deck's text in, its models and all errors out, not just the first."""
 
 from __future__ import annotations
 

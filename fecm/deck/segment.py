@@ -1,7 +1,4 @@
-"""The cards of a file in their order, from which the segments take theirs.
-
-Segments: a keyword card and the data that follow it, how they are read and how written.
-"""
+"""Segments: a keyword card and the data that follow it, read from cards and written."""
 
 from __future__ import annotations
 

@@ -1,9 +1,7 @@
-"""Names of a deck's units, for output and axes.
+"""Systems of units by names such as ``mm-N-s``, and names of units for output and axes.
 
 Numbers are never converted, except that text and pictures show masses in g and energies in J where
 the deck's own units of them are powers of ten of these.
-
-Consistent systems of units, by names such as ``mm-N-s`` and ``mm-ms-kg``.
 """
 
 from __future__ import annotations

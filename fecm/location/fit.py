@@ -1,7 +1,4 @@
-"""Least squares for the place and the history of a force that is nowhere negative.
-
-What of a fitted force the strains determine, and its contact.
-"""
+"""Least squares for the place and the history of a force, and what of it the strains determine."""
 
 from __future__ import annotations
 

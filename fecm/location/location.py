@@ -1,11 +1,4 @@
-"""Errors of the location of an impact.
-
-Writes locations into HDF5 files.
-
-The place and the force of an impact, as strain gages show them.
-
-Reads locations from HDF5 files.
-"""
+"""The place and the force of an impact as strain gages show them, and their files."""
 
 from __future__ import annotations
 

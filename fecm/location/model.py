@@ -1,8 +1,4 @@
-"""Measured strains as observations of functions that are known at equally spaced samples.
-
-Strains of gages as functions of the place and the history of a force.
-
-Strains of gages per force at every node, by reciprocity.
+"""Strains of gages as functions of the place and the history of a force, and observations of them.
 
 The strain of a gage is b u, with the row b of its strain-displacement relation.  The plate is
 linear and its mass diagonal, so that u after n steps is P_n(M^-1 K) M^-1 g for an impulse on the

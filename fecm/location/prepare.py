@@ -1,9 +1,4 @@
-"""Places that gages can't tell apart: images under a symmetry of the plate that gages share.
-
-The model of the strains of a table: samples, hats of the force, responses of the plate.
-
-Strains on a mesh of elements half as long, which show the error of the deck's mesh.
-"""
+"""Prepares a location: the model of the strains, places that gages confuse, a finer mesh."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Likely causes of strains that the model does not describe: exchanged gages, signs, gains, zeros.
+"""Whether a location is to be trusted, and likely causes of strains that do not fit.
 
 Every cause is tried at the candidate places and at the place of the strains as they are, with the
 hats of the search, and the likeliest ones at the place that they lead to.  Each gage counts by the
@@ -6,8 +6,6 @@ share of its squares that is left, so that a gage with a wrong factor does not o
 A cause whose effect shows in the sum of the squares of all gages, and not in the noise of the weak
 ones, is named too.  A gain that stands out when the gains of all gages are fitted is tried in any
 case: a gain of 1.3 may hide in the noise, and its fall of the misfit is small.
-
-Whether a location is to be trusted.
 """
 
 from __future__ import annotations

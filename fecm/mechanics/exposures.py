@@ -1,6 +1,4 @@
-"""Largest exposures over time, and the largest of those that count.
-
-Strains on the circle around the load within which plate theory does not hold.
+"""Largest exposures over time, in the elements and on the circle around the load.
 
 Exposures of plies are largest on this circle, r = R, and no point of an element lies on it.
 Strains are interpolated in the elements; where elements meet, they are the mean of both.

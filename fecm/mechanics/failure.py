@@ -1,12 +1,10 @@
-"""Failure criteria of plies: exposure and mode of stress states.
+"""Failure criteria of plies, fecm's own and those that users define: exposure and mode.
 
 The exposure f = 1/R is the reciprocal of the factor on all stresses that reaches failure; without
 residual stresses it is linear in the load.  Stresses are in the axes of the ply; a ply fails at
 f = 1.  Criteria: maximum stress, Tsai and Wu 1971, Hashin 1980 (with S_T = YC/2, for which the
 compressive matrix criterion is a sum of squares), Puck's plane criterion (Puck and Schürmann 1998)
 of unidirectional plies, and a quadratic criterion of the interlaminar shear stresses.
-
-Failure criteria of plies that users define: a check of what they return.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Stresses ply by ply, and the transverse shear stiffness from equilibrium.
+"""Stresses ply by ply, residual stresses, and the transverse shear stiffness from equilibrium.
+
+Stresses ply by ply, and the transverse shear stiffness from equilibrium.
 
 z runs from the struck face, -h/2, to h/2; ply 1 is at the struck face.  Stresses of a ply are in
 its own axes; interlaminar shear stresses are in the axes of the plate.  Both are linear in the

@@ -1,6 +1,4 @@
-"""Projectiles that users define by a mass and a stiffness matrix.
-
-The projectile: a rigid mass, or an elastic rod with implicit steps, report section 4.3.2.
+"""The projectile: a rigid mass, an elastic rod with implicit steps, or matrices of the user.
 
 Conventions: the dofs of a node are u and du/dx, node by node; x runs from the impacted end (node 1)
 into the rod.  Displacement, velocity and acceleration are positive away from the plate: an approach

@@ -1,4 +1,6 @@
-"""Static force over the deflection of a nonlinear plate under its contact load.
+"""Quick models of an impact without a mesh, and the static curve of a nonlinear plate.
+
+Static force over the deflection of a nonlinear plate under its contact load.
 
 Newton's method with a given deflection W of the plate under the load.  The force F is unknown; at a
 displacement u with the tangent K_T and the residual r = F P - f(u) a step (du, dF) solves

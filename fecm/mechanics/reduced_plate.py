@@ -1,4 +1,6 @@
-"""A nonlinear plate in a few modes, for many impacts at one place.
+"""A nonlinear plate in a few modes, and its motion under the contact forces of many impacts.
+
+A nonlinear plate in a few modes, for many impacts at one place.
 
 The deflection is a sum of bending modes q_i phi_i of the plate at rest.  The displacements u and v
 in the plane follow from s_ij = q_i q_j (A. A. Muravyov and S. A. Rizzi, Computers & Structures 81,

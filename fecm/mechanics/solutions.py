@@ -1,7 +1,4 @@
-"""Solutions with the sparse matrices: static ones, support reactions, natural modes.
-
-Buckling of a plate under its preload.
-"""
+"""Solutions with the sparse matrices: static ones, support reactions, natural modes, buckling."""
 
 from __future__ import annotations
 

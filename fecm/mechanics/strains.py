@@ -1,4 +1,6 @@
-"""Shallow curved panels: the midplane strains of the deflection (Donnell, Marguerre).
+"""Strains of plate elements: shallow curvature, assumed transverse shear, and fields over elements.
+
+Shallow curved panels: the midplane strains of the deflection (Donnell, Marguerre).
 
 The midplane z = -x^2/(2 R_x) - y^2/(2 R_y) - x y/R_xy of a shallow panel stretches as it deflects:
 
@@ -15,8 +17,6 @@ displacements at tying points only and interpolated between them.  9-node elemen
 in xi from +-1/sqrt(3) and quadratic in eta from 0 and +-sqrt(3/5), e_eta the other way round
 (Bucalem and Bathe 1993).  4-node elements: e_xi is constant in xi and linear
 in eta from +-1 (MITC4, Dvorkin and Bathe 1984).
-
-Strains and stress resultants at the points of every element (the listing's STRE).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Upper bounds of the highest frequencies of single elements, far cheaper than the frequencies.
+"""Critical time step of the plate, and upper bounds of the frequencies of single elements.
 
 The five fields u, v, w, theta_x and theta_y of an element, scaled by the roots of their masses, get
 the same bound of their energies, p1 f,x^2 + p2 f,y^2 + q f^2 at a point, so that a matrix with a
@@ -14,8 +14,6 @@ the whole has the larger eigenvalue of [[a + r, (r w)^(1/2)], [., w]] with the b
 of all else.
 
 Curvature: the strains w/R of a shallow panel are taken apart from those of u and v in the same way.
-
-Critical time step: 2 over the largest angular frequency of the plate with its lumped mass.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Pictures against time, and force against indentation (the report's figures 4.18, 4.19).
-
-Pictures of surface strains against time (the report's figures 4.12 to 4.17).
-"""
+"""Pictures against time: force, loop, energy, strains (figures 4.12 to 4.19 of the report)."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""Contents of a map of a sweep: what varies, what is shown, and what is marked.
-
-Maps of a sweep over two parameters: cells with contour lines, or coloured points.
-
-Maps of a sweep over one parameter: points, curves by the texts of another, rows of texts.
-
-Maps of a sweep: a quantity of every case over one or two varying parameters.
-"""
+"""Maps of a sweep: a quantity of every case over one or two varying parameters."""
 
 from __future__ import annotations
 

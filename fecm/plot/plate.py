@@ -1,7 +1,4 @@
-"""Pictures of the plate's deflection, along a line and from above (the report's figure 4.20).
-
-Pictures of the deflected plate in three dimensions, still and moving.
-"""
+"""Pictures of the plate's deflection: along a line, from above, in three dimensions, moving."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Pictures of tests: indentation (the report's figures 3.2 to 3.19), the rod (4.5 to 4.9).
-
-Pictures of waves in a laminate (the report's figures 2.4 to 2.12).
-"""
+"""Pictures of waves, indentation tests and the rod (figures 2.4 to 4.9 of the report)."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Whether the mesh resolves the bending waves of an impact.
-
-Impact on the static plate: deflection of the linear plate, curve of a nonlinear one, duration.
+"""Estimates before a run: waves that the mesh resolves, and the impact on the static plate.
 
 The kinetic energy of the projectile is stored in the plate and in the indentation.  Nothing here
 knows waves: a light projectile bends the plate less.

@@ -1,4 +1,6 @@
-"""Physical groups of the curves and surfaces in a file of Gmsh 4.1.
+"""Readers of mesh files: physical groups of Gmsh 4.1, bulk data of Nastran.
+
+Physical groups of the curves and surfaces in a file of Gmsh 4.1.
 
 meshio knows all groups of an entity that have names, and of those without a name the first alone.
 

@@ -1,7 +1,4 @@
-"""Distance between the supports of a plate.
-
-Sides of a plate's elements: its outline, its holes, and what lies outside its supports.
-"""
+"""Outline of a plate: sides of its elements, holes, supports, and the distance between supports."""
 
 from __future__ import annotations
 

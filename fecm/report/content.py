@@ -1,4 +1,6 @@
-"""What a page consists of: sections of tables, judgements, notes, pictures and listings.
+"""Content of a page, and its HTML.
+
+What a page consists of: sections of tables, judgements, notes, pictures and listings.
 
 Numbers keep their value beside the text that shows them, so that a reader's program can take them
 from the page: ``<data value="16169.7">16169.7 N</data>``.

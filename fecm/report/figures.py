@@ -1,7 +1,4 @@
-"""Pictures of results inside a page.
-
-Picture of a laminate: its plies with their angles, the struck face on top.
-"""
+"""Pictures inside a page: those of results, and of the laminate."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Compares one dataset of two results; :mod:`fecm.results.diff` says what is equal.
-
-A dataset is read in blocks of rows: memory does not grow with the results.
-
-Compares the datasets of two results.
+"""Compares the datasets of two results.
 
 Two numbers are equal if |a - b| <= atol + rtol*scale.  The scale is the largest finite absolute
 value of the complete dataset in both results, so that a zero crossing of a history is judged by the

@@ -1,4 +1,6 @@
-"""CSV: datasets of a result as tables in long form, for spreadsheets and data frames.
+"""Results for other programs: CSV, VTKHDF, and objects of pandas, xarray and PyVista.
+
+CSV: datasets of a result as tables in long form, for spreadsheets and data frames.
 
 Key columns come first (step and time, then node, element or point, from 1), then values.  Units
 follow the names in the header, as tables of measured data have them.  Numbers are written by
@@ -9,10 +11,6 @@ VTKHDF: a result as one file of time steps for ParaView and VTK.
 VTKHDF File Format, version 2.2, type UnstructuredGrid, temporal: the arrays of all time steps are
 concatenated, with the offset of each step.  The mesh is stored once, with all offsets 0.  Point
 n - 1 is node n, cell n - 1 element n.
-
-A result as objects of pandas, xarray and PyVista.
-
-Writes a result in the format of another program.
 """
 
 from __future__ import annotations

@@ -1,7 +1,4 @@
-"""Largest exposures of FAIL, and how often it was evaluated.
-
-When a run first reaches an exposure: time, force, energy, ply, mode and place.
-"""
+"""Exposures of FAIL: the largest, how often they were evaluated, and the first failure."""
 
 from __future__ import annotations
 

@@ -1,11 +1,4 @@
-"""Errors of results: files that can't be read or written, and data that a result lacks.
-
-Groups of a run's result: what each holds, and the macro that stores it.
-
-Messages about datasets that a result does not have: similar names, or what stores them.
-
-A group of a result: its datasets as attributes.
-"""
+"""Groups of a result, their datasets as attributes, and errors about what is missing."""
 
 from __future__ import annotations
 

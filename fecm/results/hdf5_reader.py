@@ -1,11 +1,9 @@
-"""Reads result files of runs, sweeps and locations: untrusted HDF5.
+"""Reads and checks result files of runs, sweeps and locations: untrusted HDF5.
 
 :func:`read` lists the contents of a file; numbers are read on demand.  Links, virtual datasets and
 external storage, through which HDF5 would read other files, are refused before any dataset is read.
 Any error of the library on a damaged file becomes a
 :class:`~fecm.results.schema.ResultFileError`.
-
-Checks of a file's contents against the schema.
 """
 
 from __future__ import annotations

@@ -1,6 +1,4 @@
-"""Writes result files: HDF5, renamed to their final name when complete.
-
-Sinks: destinations of a run's rows.
+"""Writes results: sinks for the rows of a run, and HDF5 files renamed when they are complete.
 
 Every dataset is created once with its full shape; then its rows are written in order.  The memory
 sink keeps arrays, the file sink (:mod:`fecm.results.hdf5_writer`) writes them at once.

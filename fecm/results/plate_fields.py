@@ -1,7 +1,4 @@
-"""Elements as the cells of VTK.
-
-Fields over the plate at stored time steps: what ParaView and PyVista show of a result.
-"""
+"""Fields over the plate at stored time steps, and its elements as the cells of VTK."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""Blocks of rows, in which datasets are read that may be larger than the memory.
-
-What a run has stored: datasets by path, attributes of groups, and the deck.
+"""What a run has stored: datasets by path, attributes of groups, and the deck.
 
 :class:`~fecm.results.result.Result` adds to it what can be computed from them.
 """

@@ -1,7 +1,4 @@
-"""Description of a result file: its groups and datasets.
-
-Summary of a run: in a few lines, and as values for `fecm info`.
-"""
+"""Summary of a run in a few lines, and the contents of a result file for `fecm info`."""
 
 from __future__ import annotations
 

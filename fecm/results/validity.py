@@ -1,6 +1,4 @@
-"""Range of the linear plate: the deflection up to which it holds, and its error beyond.
-
-The judge of results: where the model no longer holds, and the reasons to doubt a case.
+"""The judge of results: where the model no longer holds, and the reasons to doubt a case.
 
 Runs, cases of sweeps, searches, estimates and pictures all ask this module.  Its functions take
 many cases at once: arrays (cases,).

@@ -1,9 +1,4 @@
-"""Largest deflection, strain and indentation of a finished run, and where and when they occur.
-
-Notes about the membrane force of a nonlinear plate: its time step, and the threshold of DELA.
-
-Reasons to doubt the result of a finished run: notes for its reader, and its validity.
-"""
+"""Reasons to doubt the result of a finished run: largest values, notes, and validity."""
 
 from __future__ import annotations
 

@@ -1,9 +1,7 @@
-"""The recorder of steps: scalars of every step, gathered in blocks.
+"""The recorder of a run: scalars of every step in blocks, datasets and their rows in a sink.
 
 What can be computed from a block (transducer, projectile energies, energy balance) is computed when
 the block is full.
-
-The recorder of a run: it creates the datasets and stores their rows in a sink.
 """
 
 from __future__ import annotations

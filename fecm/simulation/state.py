@@ -1,7 +1,4 @@
-"""Why a run diverges, as far as its time step tells.
-
-State of a run, and the monitor of its energies and forces.
-"""
+"""State of a run, the monitor of its energies and forces, and why a run diverges."""
 
 from __future__ import annotations
 

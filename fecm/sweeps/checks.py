@@ -1,7 +1,4 @@
-"""Values of cases that look like a mistake, found before the sweep.
-
-Memory that a sweep needs.
-"""
+"""Checks before a sweep: values that look like a mistake, and the memory that it needs."""
 
 from __future__ import annotations
 

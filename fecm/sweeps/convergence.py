@@ -1,9 +1,7 @@
-"""Order, limit and error band of every quantity of a refinement study.
+"""Refinement studies: cases on finer meshes; order, limit and error band of every quantity.
 
 P. J. Roache, Verification and Validation in Computational Science and Engineering, 1998, chapter 5;
 the error band is his grid convergence index (J. Fluids Engineering 116, 1994, 405-413).
-
-Refinement studies: one deck on meshes of which each is twice as fine as the one before.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Partial results of a sweep, in a folder beside its result.
+"""Carries out the tasks of a sweep: workers, partial results for a resume, expected time.
+
+Partial results of a sweep, in a folder beside its result.
 
 One file per task, renamed into place when complete.  It has the fingerprint of its sweep and, at
 its end, a checksum that reveals damage.  Only regular files are read; the folder must not be a
@@ -8,8 +10,6 @@ Run tasks in this process, in worker processes on this machine, on a Dask cluste
 
 Tasks are independent, and their outcomes do not depend on where they run.  Each outcome is reported
 as soon as it is available, so that an interrupted sweep loses only the tasks in progress.
-
-Expected time of a sweep whose cases are run in full, from a few steps of one run.
 """
 
 from __future__ import annotations

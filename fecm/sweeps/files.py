@@ -1,9 +1,4 @@
-"""Results of a random sweep in a file.
-
-Writes results of sweeps into HDF5 files.
-
-Results of sweeps as CSV tables.
-"""
+"""Writes results of sweeps: HDF5 files, those of random sweeps included, and CSV tables."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Validity of cases, and the columns that are measured on request.
-
-Cases that are run one by one, as ``fecm run`` does.
-"""
+"""Cases that are run one by one, as ``fecm run`` does, and their validity."""
 
 from __future__ import annotations
 

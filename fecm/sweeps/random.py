@@ -1,10 +1,8 @@
-"""Correlated random values: a Gaussian copula joins the laws of the values.
+"""Random sweeps: designs of the samples, and correlations of the values.
 
 The values of each name keep their law.  Their normal scores, the values of the standard normal law
 at the same probabilities, have a joint normal distribution with the given correlations; those of a
 normal law are the values themselves, but for mean and scale.
-
-Random sweeps: designs of the samples that are drawn.
 """
 
 from __future__ import annotations

@@ -1,8 +1,6 @@
-"""Cases of a nonlinear plate in a few modes, all together: the model ``reduced``.
+"""Cases of a nonlinear plate in a few modes (the model ``reduced``), and full runs beside them.
 
 The theory is that of :mod:`~fecm.mechanics.reduced_plate`.
-
-Full runs beside the reduced model: those of the smallest, middle and largest energy.
 """
 
 from __future__ import annotations

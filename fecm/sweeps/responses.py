@@ -1,4 +1,6 @@
-"""Convolution of responses with forces that depend on the sums so far.
+"""Responses of the plate and of a rod to a unit force, and their convolution with forces.
+
+Convolution of responses with forces that depend on the sums so far.
 
 The sums are evaluated in blocks: a matrix product adds the contributions of earlier blocks, and
 those of steps within the block are added one by one.

@@ -1,7 +1,4 @@
-"""Result of a sweep: values and results of every case, and what can be made of them.
-
-Reads results of sweeps from HDF5 files.
-"""
+"""Result of a sweep: values and results of every case, from a sweep or from a file."""
 
 from __future__ import annotations
 

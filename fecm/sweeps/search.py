@@ -1,7 +1,4 @@
-"""Searches for the velocity at which the peak force of a case reaches a value.
-
-Searches by full runs for the velocity at which a quantity of a case reaches a value.
-"""
+"""Searches for the velocity at which a quantity of a case reaches a value."""
 
 from __future__ import annotations
 

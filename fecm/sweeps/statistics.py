@@ -1,7 +1,4 @@
-"""Statistics of random values: moments and quantiles, Sobol' indices, and probabilities.
-
-Results of a random sweep: statistics, sensitivity indices and probabilities.
-"""
+"""Results of a random sweep: statistics, sensitivity indices and probabilities."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Summary of a sweep: its cases in a few lines, and what they are worth.
-
-Lines of the result of a random sweep.
-"""
+"""Summary of a sweep in lines: its cases, what they are worth, and random results."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Plates whose fields of strains and resultants every mesh must reproduce.
-
-Failure of plies and interfaces in a field that is held (mm, N, s).
-"""
+"""Plates whose strains, resultants and failure every mesh must reproduce."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Studies by themselves: random values, refinement, identification, contact coefficients.
-
-The location of an impact from strain gages, and the reciprocity that it rests on.
-"""
+"""Studies by themselves: random values, refinement, identification, location."""
 
 from __future__ import annotations
 

@@ -1,4 +1,6 @@
-"""Midplane strains, curvatures and their derivatives by the compiled kernels.
+"""Strains and curvatures of elements by the compiled kernels.
+
+Midplane strains, curvatures and their derivatives by the compiled kernels.
 
 In: a displacement field, (numnp, 5).  Out: strains (elements, points, 6) and gradients (elements,
 2, 6), as :meth:`~fecm.mechanics.ply_stresses.PlyStresses.strains` has them; the curvatures alone,

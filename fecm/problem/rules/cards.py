@@ -1,7 +1,4 @@
-"""Names of nodes and elements in messages.
-
-Rules about segments that are missing or given twice.
-"""
+"""Rules about segments that are missing or given twice, and names of nodes in messages."""
 
 from __future__ import annotations
 

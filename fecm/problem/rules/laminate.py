@@ -1,7 +1,4 @@
-"""Rules about the MATE segment: integration orders, constants of the ply, layers, thickness.
-
-Rules about the SHEA segment.
-"""
+"""Rules about MATE and SHEA: integration orders, constants of the ply, layers, shear."""
 
 from __future__ import annotations
 

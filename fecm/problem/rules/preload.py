@@ -1,7 +1,4 @@
-"""Rules about the PREL segment: an initial membrane force.
-
-Rules about the plate under the compression of PREL.
-"""
+"""Rules about PREL: the initial membrane force, and buckling under it."""
 
 from __future__ import annotations
 

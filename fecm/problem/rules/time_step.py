@@ -1,7 +1,4 @@
-"""Rules about the time step of the program.
-
-Rules about the DAMP segment.
-"""
+"""Rules about the time step and the damping of the program."""
 
 from __future__ import annotations
 

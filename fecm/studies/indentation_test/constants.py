@@ -1,7 +1,4 @@
-"""Parameters of the contact law from an indentation test.
-
-Fits of an indentation test as text, as plain values and as an EXPE card.
-"""
+"""Parameters of the contact law from an indentation test, as text and as an EXPE card."""
 
 from __future__ import annotations
 

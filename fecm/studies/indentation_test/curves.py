@@ -1,4 +1,6 @@
-"""Least squares fits of the curves of an indentation test.
+"""Least squares fits of the curves of an indentation test, and of its permanent indentation.
+
+Least squares fits of the curves of an indentation test.
 
 k follows from the first loading (equation 3-1 with n = 3/2).  With this k, one fit of all unloading
 and reloading curves (equations 3-3 and 3-11) gives the power q, the peak alpha_m and the permanent

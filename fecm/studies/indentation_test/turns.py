@@ -1,9 +1,7 @@
-"""Turning points of an indentation test.
+"""Measured indentation tests, and their turning points.
 
 A stretch is a run of points between two turns.  A turn is a point from which the path retreats by
 more than a threshold above its noise.  Points within the noise of a turn belong to no stretch.
-
-Measured indentation tests: tables of indentation and force in any units.
 """
 
 from __future__ import annotations

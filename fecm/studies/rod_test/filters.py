@@ -1,4 +1,4 @@
-"""Filters of time histories.
+"""Time histories of results and of measured tables, and their filters.
 
 Filters with a given rise time model a transducer; others are channel frequency classes.
 
@@ -10,8 +10,6 @@ Channel frequency classes (CFC) are those of SAE J211-1: two poles forward and t
 that nothing is delayed.  Butterworth filters are those of amplifiers and of test software: causal,
 or forward and backward (zero-phase), which delays nothing and weakens twice.  Both kinds need equal
 time steps, and take the history as constant before the first and after the last sample.
-
-Time histories of results and of measured tables.
 """
 
 from __future__ import annotations

@@ -1,4 +1,6 @@
-"""Free rod under a force pulse on its end, report section 4.2, figures 4.7 to 4.9.
+"""Free rod under a force pulse, and the calibration of its transducer, report section 4.2.
+
+Free rod under a force pulse on its end, report section 4.2, figures 4.7 to 4.9.
 
 Elements, mass and integrator are those of the projectile in an impact; x is the distance from the
 struck end.  Forces are positive in compression, accelerations in the direction of the pulse, which

@@ -1,4 +1,6 @@
-"""Sheets of the wave fronts: eigenvalues, derivatives, branch tracking.
+"""Wave fronts: velocities, rays, positions and cusps, and their sheets, section 2.3.
+
+Sheets of the wave fronts: eigenvalues, derivatives, branch tracking.
 
 The squares of the five normal velocities are the eigenvalues of M^-1 L(n).  As functions of the
 normal they form sheets; sheets that cross are identified by their modes.

@@ -1,7 +1,4 @@
-"""The infinite laminate, and its properties in the axes of a wave's normal.
-
-Harmonic plane waves: phase velocities and frequencies, section 2.2.
-"""
+"""The infinite laminate, and harmonic plane waves in it: velocities, frequencies, section 2.2."""
 
 from __future__ import annotations
 
