@@ -16,6 +16,7 @@ from fecm._typing import Floats
 from fecm.api import load_deck
 from fecm.deck import Allowables
 from fecm.mechanics import (
+    CRITERIA,
     CompiledMonitor,
     Evaluations,
     FailureEnvelope,
@@ -259,7 +260,7 @@ def test_smallest_exposures_are_found_though_their_squares_are_zero() -> None:
     compiled, _ = one_laminate(stretches=True)
     (field,) = fields(plate(), 1, stretched=False)
     envelope = history(compiled, 1e-170 * field[None])
-    assert (envelope.plies.exposure.reshape(4, -1, 16)[0, :, 0] > 0.0).all()
+    assert (envelope.plies.exposure.reshape(len(CRITERIA), -1, 16)[0, :, 0] > 0.0).all()
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf])
@@ -342,7 +343,8 @@ def test_ply_and_place_are_those_of_the_largest_of_all_states(case: str, stretch
     found = monitor.located(monitor.update(envelope, given, times_of(given)), PlyPoints(x, y))
     exposure = monitor.every_state(envelope).exposure.reshape(-1, elements, points, plies, 2)
     away = np.where(monitor.counts[:, :, None, None], exposure, -1.0)
-    columns = [0, 1, 2, 3, *range(5, 1 + len(exposure))]  # 4 is that of the interfaces
+    count = len(CRITERIA)  # the column of the interfaces
+    columns = [*range(count), *range(count + 1, 1 + len(exposure))]
     for column, values in zip(columns, away, strict=True):
         element, point, ply, _ = np.unravel_index(int(values.argmax()), values.shape)
         assert found["exposure"][-1, column] == values.max()
@@ -393,7 +395,7 @@ def test_of_places_with_equal_exposures_that_with_the_lowest_number_is_told(
         return monitor.update(monitor.start(), np.array(given), times_of(np.array(given)))
 
     each = history(monitor, field[None])
-    exposure = each.plies.exposure.reshape(4, 12, 9, -1)
+    exposure = each.plies.exposure.reshape(len(CRITERIA), 12, 9, -1)
     np.testing.assert_array_equal(exposure, np.broadcast_to(exposure[:, :1], exposure.shape))
     found = places(field, 0.5 * field)
     elements = found.state[0, :-1] // (9 * monitor.states)

@@ -40,6 +40,7 @@ from fecm.deck import (
     uniform_section,
 )
 from fecm.mechanics import (
+    CRITERIA,
     LIBRARY,
     UNKNOWN,
     CompiledMonitor,
@@ -406,7 +407,7 @@ def test_stresses_and_exposures_are_those_of_each_elements_own_laminate() -> Non
         monitor = kind(several, of_plies)
         envelope = monitor.start()
         monitor.update(envelope, field[None], [1.0])
-        exposures = envelope.plies.exposure.reshape(4, 16, -1, 3, 2)
+        exposures = envelope.plies.exposure.reshape(len(CRITERIA), 16, -1, 3, 2)
         for (zone, rows), own in zip(plate.rows_by_laminate, of_plies, strict=True):
             assert not isinstance(rows, slice)
             alone = PlyStresses(problem.mesh, zone, rule, rows)
@@ -421,7 +422,7 @@ def test_stresses_and_exposures_are_those_of_each_elements_own_laminate() -> Non
             single = kind(alone, [own])
             wanted = single.start()
             single.update(wanted, field[None], [1.0])
-            expected = wanted.plies.exposure.reshape(4, len(rows), -1, count, 2)
+            expected = wanted.plies.exposure.reshape(len(CRITERIA), len(rows), -1, count, 2)
             np.testing.assert_allclose(exposures[:, rows, :, :count], expected, rtol=1e-12)
             assert (exposures[:, rows, :, count:] == UNKNOWN).all()
             between = envelope.interfaces.exposure[rows]
