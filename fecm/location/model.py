@@ -21,7 +21,7 @@ from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
 from fecm.mechanics.impact_steps import ImpactSteps, can_step
-from fecm.mechanics.interpolation import NDOF, local_shape_functions
+from fecm.mechanics.interpolation import NDOF, W, local_shape_functions
 from fecm.mechanics.mesh import MeshArrays, element_blocks
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import AppliedForce, PlateMotion
@@ -236,7 +236,6 @@ class StrainModel:
         return np.asarray(np.einsum("h,ghs->gs", force, self.every_hat(x, y, shift)))
 
 
-W = 2  # dof of the deflection
 ROWS = 16  # sampled fields of all dofs that are in memory at the same time
 
 

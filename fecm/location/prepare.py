@@ -25,7 +25,6 @@ from fecm.location.model import (
     Footprint,
     Sampling,
     StrainModel,
-    W,
     moving_plate,
     observe,
     responses,
@@ -33,7 +32,7 @@ from fecm.location.model import (
 )
 from fecm.location.search import BEFORE, Region
 from fecm.location.table import StrainTable
-from fecm.mechanics.interpolation import NDOF
+from fecm.mechanics.interpolation import NDOF, W
 from fecm.mechanics.mesh import MeshArrays, longest_sides
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.plate_motion import PlateMotion

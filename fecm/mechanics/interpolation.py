@@ -16,6 +16,7 @@ from fecm.mechanics.mesh import ElementBlock
 
 # Degrees of freedom of a node: u, v, w, theta_x, theta_y.
 NDOF = 5
+W = 2  # dof of the deflection; the rotations follow
 # Determinants of Jacobians that rounding may have changed, over the square of the coordinates.
 DOUBTFUL = 1.0e-10
 

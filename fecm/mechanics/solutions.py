@@ -13,6 +13,7 @@ from fecm._errors import FecmError
 from fecm._machine import require_memory
 from fecm._typing import Floats
 from fecm.mechanics.element_matrices import geometric_stiffness
+from fecm.mechanics.interpolation import W
 from fecm.mechanics.membrane import MembraneForces, tangent
 from fecm.mechanics.plate import UNLOADED, PlateModel
 from fecm.mechanics.symmetry import restrain_plane, with_codes
@@ -21,8 +22,6 @@ if TYPE_CHECKING:
     from scipy import sparse
     from scipy.sparse.linalg import SuperLU
 
-
-W = 2  # column of w in a field; the rotations follow
 
 # Residual relative to the load above which the stiffness is considered singular.
 SINGULAR = 1.0e-6

@@ -16,8 +16,9 @@ from fecm.deck.findings import Findings
 from fecm.deck.macros import Body, compile_program
 from fecm.deck.reader import ParsedProblem
 from fecm.deck.rules import apply, apply_first
+from fecm.mechanics.interpolation import W
 from fecm.problem.generate import generate, rod_diameters
-from fecm.problem.parts import W, has_assumed_shear, is_curved
+from fecm.problem.parts import has_assumed_shear, is_curved
 from fecm.problem.problem import Problem
 from fecm.problem.rules import (
     cards,

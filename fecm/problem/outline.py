@@ -7,8 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._typing import Bools, Indices
+from fecm.mechanics.interpolation import W
 from fecm.mechanics.mesh import Ints, MeshArrays, element_blocks, extent
-from fecm.problem.parts import W
 
 # Most nodes whose distances are compared.
 FREE = 3000

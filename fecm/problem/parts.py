@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from fecm.mechanics.ply_stresses import Residual
 
 # Dofs, from 0.
-W = 2
 THETA_X = 3
 
 

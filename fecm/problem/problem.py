@@ -15,6 +15,7 @@ from fecm.deck.macros import Body, WorkEstimate, estimate_work, flat, hits, move
 from fecm.deck.model import Deck
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.failure import CRITERIA, PlyExposure, largest_in_plies
+from fecm.mechanics.interpolation import W
 from fecm.mechanics.joints import ElementSides, coincident, sides_of
 from fecm.mechanics.laminate import LaminateSection, effective_rigidity, threshold_force
 from fecm.mechanics.mesh import (
@@ -34,7 +35,7 @@ from fecm.mechanics.symmetry import half_turn_images, restrain_resting_dofs
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
 from fecm.problem.contact_estimates import ContactStep, contact_step
 from fecm.problem.outline import Span, outside_supports, unsupported
-from fecm.problem.parts import W, build_plate, residuals_of_deck, rules, strengths_of_deck
+from fecm.problem.parts import build_plate, residuals_of_deck, rules, strengths_of_deck
 from fecm.results.validity import Judge, in_plane_of
 
 if TYPE_CHECKING:
@@ -344,18 +345,35 @@ class Problem:
     @property
     def worst_at_rest(self) -> PlyExposure | None:
         """Largest exposure before anything moves; None without stresses then, or strengths."""
-        preloaded = self.plate.is_preloaded
-        if not self.deck.has(model.Allowables) or (self.residuals is None and not preloaded):
+        worst = self.worst_under()
+        return None if worst is None else worst[0]
+
+    def worst_under(
+        self, *, preload: bool = True, cure: bool = True
+    ) -> tuple[PlyExposure, int] | None:
+        """Largest exposure under the preload, the residual stresses or both, and its laminate.
+
+        None without strengths or without these stresses.  The laminate is its number on the card.
+        """
+        residuals = self.residuals if cure else None
+        preload = preload and self.plate.is_preloaded
+        if not self.deck.has(model.Allowables) or (residuals is None and not preload):
             return None
-        strengths = strengths_of_deck(self.deck)
-        exposures: list[PlyExposure] = []
+        strengths, cards = strengths_of_deck(self.deck), list(self.deck.layers)
+        exposures: list[tuple[PlyExposure, int]] = []
         for number in self.used_laminates:
             laminate = self.plate.laminates[number]
-            stresses = uniform_stresses(laminate, self.plate.preload_strain)
-            if self.residuals is not None:
-                stresses += self.residuals[number].stresses
-            exposures += largest_in_plies(strengths[number], laminate.plies.constants, stresses)
-        return max(exposures, key=lambda one: one.exposure, default=None)
+            strain = self.plate.preload_strain if preload else np.zeros(3)
+            stresses = uniform_stresses(laminate, strain)
+            if residuals is not None:
+                stresses += residuals[number].stresses
+            exposures += [
+                (exposure, cards[number])
+                for exposure in largest_in_plies(
+                    strengths[number], laminate.plies.constants, stresses
+                )
+            ]
+        return max(exposures, key=lambda pair: pair[0].exposure, default=None)
 
     @cached_property
     def judge(self) -> Judge:

@@ -14,6 +14,7 @@ from fecm.deck.macros import flat
 from fecm.deck.model import Cure, Impact, Shear
 from fecm.deck.units import MASS, mass_in_si, unit_names, unit_of
 from fecm.deck.units import quantity as said_quantity
+from fecm.mechanics.interpolation import W
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
 from fecm.mechanics.solutions import SingularStiffnessError, compliance
@@ -21,7 +22,7 @@ from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.strains import midplane_height
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.estimates import MOST_SOLVED, resolution, said_error
-from fecm.problem.parts import W, build_projectile
+from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
 from fecm.problem.rules.preload import FEWEST_ELEMENTS
 

@@ -15,7 +15,7 @@ from fecm.deck.model import Gages, Ply
 from fecm.deck.units import units_of
 from fecm.identification.identify import identify
 from fecm.location.locate import locate
-from fecm.location.model import Sampling, W, moving_plate, responses, rows_of
+from fecm.location.model import Sampling, moving_plate, responses, rows_of
 from fecm.location.table import strain_table
 from fecm.mechanics.contact_law import hertz_coefficient
 from fecm.mechanics.half_space import (
@@ -23,7 +23,7 @@ from fecm.mechanics.half_space import (
     indentation_modulus,
     ply_stiffness,
 )
-from fecm.mechanics.interpolation import NDOF
+from fecm.mechanics.interpolation import NDOF, W
 from fecm.mechanics.plate_motion import AppliedForce, PlateMotion
 from fecm.mechanics.points import gages, patch_weights
 from fecm.sweeps.api import checked_problem

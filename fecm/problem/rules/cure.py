@@ -10,8 +10,6 @@ from fecm.deck.macros import flat
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import quantity, unit_names, unit_of
-from fecm.mechanics.failure import largest_in_plies
-from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
 from fecm.problem.rules.damage import FIBROUS
 from fecm.results.criteria import exposed
@@ -126,26 +124,13 @@ def cracks_at_rest(problem: Problem) -> Reports:
 
     Remedy: The values of CURE and ALLO, or another layup.
     """
-    card, residuals = problem.deck.last(model.Cure), problem.residuals
-    if not problem.deck.has(model.Allowables) or card is None or residuals is None:
-        return
-    strengths = strengths_of_deck(problem.deck)
-    laminates = list(problem.deck.layers)
-    exposures = [
-        (one, laminates[number])
-        for number in problem.used_laminates
-        for one in largest_in_plies(
-            strengths[number],
-            problem.plate.laminates[number].plies.constants,
-            residuals[number].stresses,
-        )
-    ]
-    worst, laminate = max(exposures, key=lambda pair: pair[0].exposure, default=(None, 0))
-    if worst is not None and worst.exposure >= 1.0:
-        where = exposed(problem.deck, laminate, worst)
+    card, worst = problem.deck.last(model.Cure), problem.worst_under(preload=False)
+    if card is not None and worst is not None and worst[0].exposure >= 1.0:
+        exposure, laminate = worst
+        where = exposed(problem.deck, laminate, exposure)
         message = (
             f"The laminate cracks before any load: the residual stresses of CURE reach exposure "
-            f"{worst.exposure:.3g} ({where})."
+            f"{exposure.exposure:.3g} ({where})."
         )
         yield Report(message, card.place(), "strengths and moduli must be in the same unit")
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.mechanics.interpolation import W
 from fecm.mechanics.strains import strain_of_deflection
-from fecm.problem.parts import W
 from fecm.problem.problem import Problem
 from fecm.problem.rules.cards import report_elements
 from fecm.problem.rules.nonlinear import ORDER, not_nine_nodes

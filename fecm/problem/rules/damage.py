@@ -11,10 +11,8 @@ from fecm.deck import model
 from fecm.deck.macros import Loop, every, flat
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.deck.units import MODULUS, TOUGHNESS, in_si, unit_names
-from fecm.mechanics.failure import largest_in_plies, puck_slope
+from fecm.mechanics.failure import puck_slope
 from fecm.mechanics.laminate import is_fabric
-from fecm.mechanics.ply_stresses import uniform_stresses
-from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
 from fecm.problem.rules.units import USED, has_real_moduli, likely_unit, looks_like, needed_unit
 from fecm.results.criteria import exposed
@@ -361,23 +359,11 @@ def preload_beyond_strength(problem: Problem) -> Reports:
 
     Remedy: A smaller preload; the units of PREL, force/length, and of ALLO.
     """
-    card = problem.deck.last(model.Preload)
-    if not problem.deck.has(model.Allowables) or card is None:
-        return
-    strengths, strain = strengths_of_deck(problem.deck), problem.plate.preload_strain
-    laminates = list(problem.deck.layers)
-    exposures = [
-        (one, laminates[number])
-        for number in problem.used_laminates
-        for laminate in [problem.plate.laminates[number]]
-        for one in largest_in_plies(
-            strengths[number], laminate.plies.constants, uniform_stresses(laminate, strain)
-        )
-    ]
-    worst, laminate = max(exposures, key=lambda pair: pair[0].exposure, default=(None, 0))
-    if worst is not None and worst.exposure >= 1.0:
-        what = exposed(problem.deck, laminate, worst)
-        message = f"The preload alone reaches exposure {worst.exposure:.3g} ({what})."
+    card, worst = problem.deck.last(model.Preload), problem.worst_under(cure=False)
+    if card is not None and worst is not None and worst[0].exposure >= 1.0:
+        exposure, laminate = worst
+        where = exposed(problem.deck, laminate, exposure)
+        message = f"The preload alone reaches exposure {exposure.exposure:.3g} ({where})."
         yield Report(message, card.place(), "PREL is a force per length, tension positive")
 
 

@@ -7,9 +7,9 @@ import math
 from fecm._typing import Bools
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.mechanics.interpolation import W
 from fecm.mechanics.mesh import distinct, extent
 from fecm.problem.estimates import ENOUGH_PER_WAVE, resolution, said_error
-from fecm.problem.parts import W
 from fecm.problem.problem import Problem
 
 W_DOF = W + 1  # number of w on the card

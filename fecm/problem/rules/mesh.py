@@ -8,10 +8,11 @@ from fecm._typing import Bools
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, declare, rule
 from fecm.mechanics.elements import CUBIC, TRIANGLE
+from fecm.mechanics.interpolation import W
 from fecm.mechanics.joints import hanging_nodes, merged
 from fecm.mechanics.mesh import distinct, holds_the_plane
 from fecm.problem.generate import place_of_element
-from fecm.problem.parts import THETA_X, W
+from fecm.problem.parts import THETA_X
 from fecm.problem.problem import Problem
 from fecm.problem.rules.cards import describe_elements, describe_nodes, report_elements
 

@@ -10,8 +10,9 @@ from fecm._typing import Bools
 from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.mechanics.elements import QUADRILATERAL
+from fecm.mechanics.interpolation import W
 from fecm.mechanics.mesh import holds_the_plane
-from fecm.problem.parts import THETA_X, W, has_assumed_shear
+from fecm.problem.parts import THETA_X, has_assumed_shear
 from fecm.problem.problem import Problem
 from fecm.problem.rules.cards import report_elements
 

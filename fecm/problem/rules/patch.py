@@ -10,10 +10,10 @@ from fecm._typing import Bools, Indices
 from fecm.deck import model
 from fecm.deck.macros import flat
 from fecm.deck.rules import Report, Reports, Subject, reports, rule
+from fecm.mechanics.interpolation import W
 from fecm.mechanics.mesh import MeshArrays, longest_sides
 from fecm.mechanics.points import DISC, HERTZ, RADIUS_PER_THICKNESS, PatchError
 from fecm.problem.contact_estimates import expected_peak
-from fecm.problem.parts import W
 from fecm.problem.problem import ContactPatch, Problem
 from fecm.problem.rules.contact import sphere_radius
 from fecm.results.exposures import RESOLVED

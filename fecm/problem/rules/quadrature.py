@@ -13,8 +13,9 @@ from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.mechanics import interpolation
 from fecm.mechanics import strains as assumed_shear
 from fecm.mechanics.elements import CUBIC, TRIANGLE
+from fecm.mechanics.interpolation import W
 from fecm.mechanics.mesh import ElementBlock, distinct
-from fecm.problem.parts import W, has_assumed_shear
+from fecm.problem.parts import has_assumed_shear
 from fecm.problem.problem import Problem
 from fecm.problem.rules.cards import describe_elements, report_elements
 
