@@ -17,6 +17,7 @@ from fecm._typing import AnyFile
 from fecm.deck.findings import DeckError, Finding, Severity
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader, load_text, read_deck
+from fecm.listing.slips import LISTING, REPORT, active_slips
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.failure import FailureCriterion, own_criteria
 from fecm.mechanics.own_law import own_law
@@ -34,7 +35,6 @@ from fecm.problem.memory import check_run_memory
 from fecm.problem.problem import Problem
 from fecm.problem.rules.quadrature import HOURGLASS
 from fecm.problem.rules.time_step import UNSTABLE
-from fecm.problem.slips import LISTING, REPORT, active_slips
 from fecm.problem.summary import ProblemSummary, deck_summary
 from fecm.results.hdf5_writer import MemorySink
 from fecm.results.result import Result, load

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 import pytest
 
-from fecm.problem import slips
+from fecm.listing import slips
 from tests.calls import assert_unusable, call, program
 from tests.decks import APPENDIX, DATA_CARDS, ROOT, small
 

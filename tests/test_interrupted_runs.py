@@ -21,7 +21,8 @@ import pytest
 
 import fecm
 from fecm.api import load_deck
-from fecm.problem import RunOptions, active_slips
+from fecm.listing import active_slips
+from fecm.problem import RunOptions
 from fecm.results import MemorySink
 from fecm.simulation import Checkpointer, Interpreter, Simulation, checkpoint_of, simulate
 from tests.calls import Done, call, program

@@ -40,7 +40,7 @@ from fecm.deck import (
     format_deck,
     read_deck,
 )
-from fecm.problem import MODES
+from fecm.listing import MODES
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ROOT, small
 

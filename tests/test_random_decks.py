@@ -14,8 +14,8 @@ import pytest
 
 import fecm
 from fecm._errors import FecmWarning
+from fecm.listing import LISTING, NAMES
 from fecm.mechanics import kernels
-from fecm.problem import LISTING, NAMES
 from tests.builders import distorted_square, simple_support, square
 from tests.test_element_decks import deck
 from tests.test_kernels import assert_close

@@ -33,9 +33,9 @@ from fecm.cli.options import FILE_PATH, MODE_OPTION, Format, format_option, typi
 from fecm.deck.findings import DeckError, Finding
 from fecm.deck.reader import load_text
 from fecm.deck.units import unit_names, unit_of
+from fecm.listing.slips import REPORT, active_slips
 from fecm.problem.build import RunOptions
 from fecm.problem.problem import Problem
-from fecm.problem.slips import REPORT, active_slips
 
 
 def count_findings(findings: Sequence[Finding]) -> str:

@@ -18,7 +18,7 @@ from fecm._errors import did_you_mean
 from fecm._inputs import InputError, parsed_file
 from fecm.cli.common import DASH
 from fecm.deck.units import NAMES, system_named
-from fecm.problem.slips import MODES, REPORT
+from fecm.listing.slips import MODES, REPORT
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem

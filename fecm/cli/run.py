@@ -33,6 +33,8 @@ from fecm.cli.options import (
     collected,
     typical,
 )
+from fecm.listing.printout import Printer
+from fecm.listing.slips import NAMES, active_slips
 from fecm.mechanics.failure import CriterionError, own_criteria
 from fecm.mechanics.own_law import LawError, own_law
 from fecm.mechanics.plate_motion import DivergenceError
@@ -50,7 +52,6 @@ from fecm.mechanics.stiffness_product import AUTO, SOLVERS
 from fecm.problem.build import ENERGY_LIMIT, RunOptions, check_run_options
 from fecm.problem.memory import check_run_memory
 from fecm.problem.problem import Problem
-from fecm.problem.slips import NAMES, active_slips
 from fecm.problem.summary import larger_steps
 from fecm.results import hdf5_writer
 from fecm.results.exposures import LargestExposure, largest_exposures
@@ -63,7 +64,6 @@ from fecm.simulation.checkpoint import (
     finished_before,
     spool_of,
 )
-from fecm.simulation.printout import Printer
 from fecm.simulation.run import run_program as simulate_run
 from fecm.simulation.simulation import Simulation
 

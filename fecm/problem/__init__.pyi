@@ -23,8 +23,4 @@ from fecm.problem.refine import RefineError as RefineError
 from fecm.problem.refine import refined_deck as refined_deck
 from fecm.problem.rules.time_step import clamped_frequency as clamped_frequency
 from fecm.problem.rules.units import likely_unit as likely_unit
-from fecm.problem.slips import LISTING as LISTING
-from fecm.problem.slips import MODES as MODES
-from fecm.problem.slips import NAMES as NAMES
-from fecm.problem.slips import active_slips as active_slips
 from fecm.problem.summary import deck_summary as deck_summary

@@ -56,7 +56,7 @@ PLATE_SLIPS = {"g12", "small-stiffness", "shear-order", "tapes", "jacobian", "ro
 class RunOptions:
     """Options of a run, by default the report's.  Raises OptionsError if a value is not valid."""
 
-    # Slips of the printed program that are on: see :func:`~fecm.problem.slips.active_slips`.
+    # Slips of the printed program that are on: see :func:`~fecm.listing.slips.active_slips`.
     slips: frozenset[str] = frozenset()
     # Computation of K·u, one of ``SOLVERS``: compiled kernels where there are any, else NumPy; or
     # one of them; or a sparse matrix.

@@ -11,6 +11,7 @@ import numpy as np
 from fecm._version import __version__
 from fecm.deck.model import Cure, Deck, Material
 from fecm.deck.units import unit_names
+from fecm.listing.slips import mode_of
 from fecm.mechanics import projectile
 from fecm.mechanics.failure import MODES, largest_in_plies
 from fecm.mechanics.own_law import law_name
@@ -18,7 +19,6 @@ from fecm.mechanics.plate_motion import DivergenceError
 from fecm.problem.build import RunOptions
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem, Threshold
-from fecm.problem.slips import mode_of
 from fecm.results.exposures import AT_REST, count_evaluations
 from fecm.results.hdf5_writer import ReadOnce, Sink
 from fecm.results.metrics import MOBILITY, VALIDITY

@@ -11,13 +11,13 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.deck.macros import load_factor
+from fecm.listing.printout import Printer
 from fecm.mechanics.impact_steps import SINGLY, TOGETHER
 from fecm.mechanics.solutions import Tangent
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.problem import Problem
 from fecm.results.hdf5_writer import Sink
 from fecm.simulation.interpreter import Interpreter
-from fecm.simulation.printout import Printer
 from fecm.simulation.recorder import Recorder
 from fecm.simulation.saved import restore, saved_values, subset
 from fecm.simulation.state import RunState

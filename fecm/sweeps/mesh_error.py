@@ -11,13 +11,13 @@ from fecm.authoring.case import CasesError, check_deck
 from fecm.authoring.timing import stable_time_step, with_time_step
 from fecm.deck.macros import flat
 from fecm.deck.model import Deck
+from fecm.listing.slips import active_slips
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import RunOptions
 from fecm.problem.estimates import resolution
 from fecm.problem.memory import check_run_memory
 from fecm.problem.problem import Problem
 from fecm.problem.refine import RefineError, refined_deck
-from fecm.problem.slips import active_slips
 from fecm.results.end import OPEN_PEAKS
 from fecm.results.exposures import largest_exposures
 from fecm.results.hdf5_writer import MemorySink

@@ -20,11 +20,11 @@ from fecm.deck.macros import WORDS
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.mesh_cards import DOF_NAMES
 from fecm.deck.model import Macro
+from fecm.mechanics.contact_law import ACR_POWER
 from fecm.mechanics.laminate import LaminateSection
 from fecm.mechanics.mesh import MeshArrays
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.strains import GENERALISED_STRAINS, RESULTANTS
-from fecm.problem.parts import build_constants
 
 CARRIAGE = {"1": "\f", "0": "\n", "-": "\n\n"}
 
@@ -152,14 +152,13 @@ class Printer:
                 self._nodes(mesh.forces, only=(mesh.forces != 0).any(axis=1))
 
     def _indentation(self, segment: model.Indentation) -> None:
-        law = build_constants(segment)
-        values: dict[str, float | str] = {"Contact coefficient k": law.k}
+        values: dict[str, float | str] = {"Contact coefficient k": segment.k}
         if segment.word:
             values["Critical indentation alpha_cr"] = segment.alpha_p
         else:
             values["Critical indentation alpha_p"] = segment.alpha_p
             values["Constant s_p"] = segment.s_p
-        values["Power of the unloading law q"] = law.q
+        values["Power of the unloading law q"] = ACR_POWER if segment.word else segment.q
         self._page("Indentation law", _values(values))
 
     def _nodes(self, values: NDArray[np.generic], only: NDArray[np.bool_] | None = None) -> None:
