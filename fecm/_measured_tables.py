@@ -47,7 +47,7 @@ UNITS = {
         "kip": 4448.2216152605, "kips": 4448.2216152605,
     },
     "time": {
-        "s": 1.0, "sec": 1.0, "secs": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3,
+        "s": 1.0, "sec": 1.0, "secs": 1.0, "second": 1.0, "seconds": 1.0, "ms": 1e-3, "msec": 1e-3,
         "us": 1e-6, "usec": 1e-6, "min": 60.0,
     },
     "strain": {
@@ -77,9 +77,13 @@ DIMENSIONS = {
     "strain": "strain",
 }
 REMARKS = {"filtered", "unfiltered", "raw", "smoothed", "corrected", "measured", "gefiltert"}
+UNMARKED = "write numbers without separators of thousands"
 NO_UNITS: Mapping[str, str] = MappingProxyType({})
 
 _COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")  # a number with a decimal comma
+# Numbers of a column whose marks may separate thousands: 950 and 1,060.
+_WHOLE = re.compile(r"[+-]?[0-9]{1,3}")
+_GROUPED = re.compile(r"[+-]?[1-9][0-9]{0,2}(?:[.,' \u00a0\u2019\u202f][0-9]{3})+(?:[.,][0-9]+)?")
 _BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
 _SEPARATOR = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
 
@@ -183,6 +187,8 @@ class MeasuredTable(NamedTuple):
         places = places or self.places(names, columns, units or NO_UNITS)
         if len(self.rows) < 2:
             raise StudyError(f"{self.path}: the table has fewer than two rows of numbers")
+        for name, place in zip(names, places, strict=True):
+            self.check_thousands(name, place)
         values = np.array([self._values(row, names, places) for row in self.rows])
         found = dict(zip(names, values.T, strict=True))
         if increasing:
@@ -198,6 +204,22 @@ class MeasuredTable(NamedTuple):
             if columns and columns[n].startswith("-"):
                 found[name] = -found[name]
         return found
+
+    def check_thousands(self, name: str, place: int) -> None:
+        """Raise StudyError if whole numbers up to 999 are beside such as 1,060.
+
+        Without decimals below 1000, three digits behind a mark are thousands.
+        """
+        written = [(line, row[place]) for line, row in self.rows if place < len(row)]
+        marked = [one for one in written if _GROUPED.fullmatch(one[1])]
+        whole = [text for _, text in written if _WHOLE.fullmatch(text)]
+        largest = max((abs(int(text)) for text in whole), default=0)
+        if marked and len(marked) + len(whole) == len(written) and largest >= 100:
+            line, text = marked[0]
+            text = text.replace(".", ",") if self.is_decimal_comma else text
+            raise StudyError(
+                f"{self.path}:{line}: {name} is {text!r} beside whole numbers; {UNMARKED}"
+            )
 
     def _check_increase(self, columns: Mapping[str, Floats], increasing: str) -> None:
         """Raise StudyError if a column does not increase; name one that does."""
@@ -228,7 +250,10 @@ class MeasuredTable(NamedTuple):
             value = _number(field)
             if value is None or not math.isfinite(value):
                 found = repr(field) if field else "empty"
-                raise StudyError(f"{self.path}:{line}: {name} is {found}, not a finite number")
+                hint = f"; {UNMARKED}" if _GROUPED.fullmatch(field) else ""
+                raise StudyError(
+                    f"{self.path}:{line}: {name} is {found}, not a finite number{hint}"
+                )
             values.append(value)
         return values
 

@@ -12,7 +12,7 @@ import pytest
 import fecm
 from fecm import FecmWarning
 from fecm._measured_tables import read_table
-from fecm.authoring import read_cases
+from fecm.authoring import CasesError, read_cases
 from fecm.location import strain_table
 from fecm.results import measurement_of
 from fecm.studies import StudyError, pulse_of, read_test, recorded
@@ -264,3 +264,36 @@ def test_a_pulse_in_milliseconds_without_a_unit_is_doubted(tmp_path: Path) -> No
             fecm.pulse_test(deck, path, duration=1e-4)
         doubted = any("as in `time (ms)`" in str(one.message) for one in caught)
         assert doubted == (head == "time" and scale == 1e3)
+
+
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("time (us)\tforce (N)\n0\t950\n1\t1,060\n2\t999\n", "'1,060' beside whole numbers"),
+        ("time (us);force (N)\n0;950\n1;1.060\n2;999\n", "'1.060' beside whole numbers"),
+        ("time (ms);force (N)\n0,1;950,5\n0,2;1.060,5\n", "'1.060,5', not a finite number"),
+        ("time (ms);force (N)\n0.1;950.5\n0.2;1'060.5\n", '"1\'060.5", not a finite number'),
+        ('time (ms),force (N)\n0.1,950.5\n0.2,"1,060.5"\n', "'1,060.5', not a finite number"),
+    ],
+)
+def test_separators_of_thousands_are_no_decimal_marks(
+    tmp_path: Path, text: str, written: str
+) -> None:
+    file = tmp_path / "force.csv"
+    file.write_text(text)
+    with pytest.raises(StudyError, match=f":3: force is {written}; write numbers without sep"):
+        read_table(file).columns(("time", "force"), units=DECK)
+
+
+def test_three_decimals_are_decimals_where_smaller_numbers_have_them_too(tmp_path: Path) -> None:
+    file = tmp_path / "force.csv"
+    file.write_text("time (s);force (N)\n0;0,950\n1;1,060\n2;999\n")
+    found = read_table(file).columns(("time", "force"), units=DECK)
+    assert found["force"].tolist() == [0.95, 1.06, 999.0]
+
+
+def test_thousands_in_a_table_of_cases_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "cases.txt"
+    file.write_text("velocity\tk\n900\t2e4\n1,100\t2e4\n")
+    with pytest.raises(CasesError, match=":3: velocity is '1,100' beside whole numbers"):
+        read_cases(file)

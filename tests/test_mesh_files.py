@@ -273,6 +273,8 @@ def test_include_is_followed_from_the_file_that_has_it(tmp_path: Path) -> None:
         ([f"CORD2R,{n},{n + 1},0.,0.,0.,0.,0.,1.,+\n+,1.,0.,0." for n in range(5, 2000)]
          + ["GRID,5,5", "CQUAD4,1,1,1,2,3,5"], "is within more than 100 other systems"),
         (["GRID,5,,1.e400", "CQUAD4,1,1,1,2,3,5"], "not a finite number"),
+        (["CQUAD8,1,1,1,2,3,4,5,6,7,8"], "bdf:8: CQUAD8 1 has more than 10 fields in a line"),
+        (["CORD2R,5,,50.,0.,0.,50.,0.,1.,51.,0.,0."], "bdf:8: CORD2R 5 has more than 10 fields"),
         ([], "has no elements of a plate"),
     ],
 )  # fmt: skip
@@ -288,3 +290,44 @@ def test_an_mcid_along_x_turns_nothing(tmp_path: Path) -> None:
         system = ["CORD2R,5,,1.,1.,0.,1.,1.,1.,+", "+,2.,1.,0."]
         mesh = read(tmp_path, bulk(*corners(), *system, f"CQUAD4,1,1,1,2,3,4,{angle}"))
         assert mesh.elements == 1
+
+
+SQUARE = "1, 0., 0.\n2, 1., 0.\n3, 1., 1.\n4, 0., 1.\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        (f"*Node\n{SQUARE}*Element, type=S4\n1, 1, 2, 3, 4\n*Node\n9, 0., 5.\n",
+         ":8: a second .Node; give the nodes of the plate in one"),
+        (f"*Node, system=C\n{SQUARE}*Element, type=S4\n1, 1, 2, 3, 4\n",
+         ":1: `.Node, system=C` makes or moves nodes"),
+        (f"*System\n1., 1.\n*Node\n{SQUARE}*Element, type=S4\n1, 1, 2, 3, 4\n",
+         ":1: `.System` makes or moves nodes"),
+        (f"*Node\n{SQUARE}*Element, type=S4\n1, 1, 2, 3, 4\n*Elgen, elset=all\n1, 4, 1, 1\n",
+         ":8: `.Elgen, elset=all` makes or moves nodes"),
+        (f"*Node\n{SQUARE}*Element, type=S4\n1, 1, 2, 3, 4\n*Nset, generate, nset=a\n4, 1, -3\n",
+         ":8: GENERATE has `4, 1, -3`; write first, last and a positive increment"),
+        (f"*Node\n{SQUARE}*Element, type=S4\n1, 1, 2, 3, 4\n*Nset, nset=a, generate\n1, 4\n",
+         ":8: GENERATE has `1, 4`"),
+        ("*Node\n1, 0., 0., 0.,\n2, 1., 0., 0.,\n*Element, type=S4\n1, 1, 2, 2, 1\n",
+         ":2: a comma is behind the last coordinate"),
+    ],
+)  # fmt: skip
+def test_what_meshio_leaves_out_of_abaqus_is_refused_with_line_and_remedy(
+    tmp_path: Path, text: str, message: str
+) -> None:
+    file = tmp_path / "plate.inp"
+    file.write_text(text)
+    with pytest.raises(fecm.MeshError, match=message):
+        fecm.Plate.from_mesh(file, "simple")
+
+
+def test_parametric_nodes_of_gmsh_are_named(tmp_path: Path) -> None:
+    file = tmp_path / "plate.msh"
+    nodes = "$ParametricNodes\n1\n1 0 0 0 0 1\n$EndParametricNodes\n"
+    file.write_text(
+        f"$MeshFormat\n2.2 0 8\n$EndMeshFormat\n{nodes}$Elements\n1\n1 15 2 1 1 1\n$EndElements\n"
+    )
+    with pytest.raises(fecm.MeshError, match=r":4: .*SaveParametric"):
+        fecm.Plate.from_mesh(file, "simple")

@@ -44,6 +44,11 @@ def read_cases(path: Path, system: str | None = None) -> list[Case]:
         check_known(name, f"{path}:{number}")
         if header.count(name) > 1:
             raise CasesError(f"{path}:{number}: column {name} is repeated")
+    try:
+        for place, name in enumerate(header):
+            table.check_thousands(name, place)
+    except StudyError as error:
+        raise CasesError(str(error)) from None
     cases: list[Case] = []
     for line, row in table.rows:
         if len(row) != len(header):

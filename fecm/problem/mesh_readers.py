@@ -370,9 +370,20 @@ def _cards(path: Path) -> Iterator[tuple[str, NastranCard]]:
             if keyword:
                 yield keyword, card
             keyword, card = name.rstrip("*").upper(), NastranCard(place, fields)
+        most = 6 if "*" in name else 10
+        if any(field.strip() for field in line.split(",")[most:]) and _is_used(keyword):
+            raise card.error(
+                keyword,
+                f"has more than {most} fields in a line; continue it in a line that begins with a "
+                "comma",
+            )
         expected = follows
     if keyword:
         yield keyword, card
+
+
+def _is_used(keyword: str) -> bool:
+    return keyword == "GRID" or keyword in ELEMENTS or _SYSTEM.fullmatch(keyword) is not None
 
 
 def _fields(line: str) -> tuple[list[str], str, str, str]:

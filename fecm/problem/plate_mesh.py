@@ -57,6 +57,19 @@ NASTRAN = (".bdf", ".fem", ".nas")
 BULK = re.compile(rb"^\s*BEGIN[ ,]+BULK", re.IGNORECASE | re.MULTILINE)
 # Elements of Abaqus that meshio knows by another name.
 ALIKE = {"S8": "S8R", "S6": "STRI65"}
+# Cards of Abaqus of which meshio reads one, or none.
+ABAQUS_ONCE = {
+    "Part": "write the part of the plate alone",
+    "Instance": "write the part of the plate alone",
+    "Node": "give the nodes of the plate in one, without points of reference",
+}
+ABAQUS_UNREAD = (
+    rb"\*(system|ngen|nfill|nmap|ncopy|elgen|elcopy)\s*(,|$)|\*node\s*,.*\bsystem\s*=\s*[cs]"
+)
+ABAQUS_GENERATE = re.compile(
+    rb"^\*(?:n|el)set\b[^\n]*\bgenerate\b[^\n]*\n((?:[^*\n][^\n]*\n?)*)",
+    re.IGNORECASE | re.MULTILINE,
+)
 SAME = 1e-9  # difference of coordinates, over the size of the mesh, that is none
 NO_AREA = 1e-12  # area over the square of the size that is none
 NAMED = 8  # most elements named in a message
@@ -256,8 +269,29 @@ def _check_whole(path: Path, text: bytes) -> None:
     elsewhere = suffix in XDMF and any(form.lower() != b"xml" for form in FORM.findall(text))
     if elsewhere or (abaqus and b"*include" in text.lower()):
         raise MeshError(f"{path} refers to other files, which are not read; put it into one file")
-    if abaqus and len(parts := _lines_with(text, rb"\*part\b")) > 1:
-        raise MeshError(f"{path}:{parts[1]}: a second *Part; write the part of the plate alone")
+    if abaqus:
+        _check_abaqus(path, text)
+
+
+def _check_abaqus(path: Path, text: bytes) -> None:
+    """Refuse what meshio leaves out of an input of Abaqus, or reads in another way."""
+    for card, remedy in ABAQUS_ONCE.items():
+        if len(lines := _lines_with(text, rb"\*%b\s*(,|$)" % card.encode())) > 1:
+            raise MeshError(f"{path}:{lines[1]}: a second *{card}; {remedy}")
+    for line in _lines_with(text, ABAQUS_UNREAD):
+        card = text.splitlines()[line - 1].decode("latin-1").strip()[:60]
+        raise MeshError(
+            f"{path}:{line}: `{card}` makes or moves nodes or elements, and is not read; write "
+            "all of them in full, with coordinates x and y"
+        )
+    for found in ABAQUS_GENERATE.finditer(text):
+        numbers = found[1].replace(b",", b" ").split()
+        if len(numbers) != 3 or not numbers[2].isdigit() or not int(numbers[2]):
+            line = text.count(b"\n", 0, found.start()) + 1
+            raise MeshError(
+                f"{path}:{line}: GENERATE has `{found[1].decode('latin-1').strip()[:60]}`; write "
+                "first, last and a positive increment in one line"
+            )
 
 
 def _why_unreadable(path: Path, text: bytes, error: BaseException, printed: str) -> str:
@@ -277,6 +311,15 @@ def _why_unreadable(path: Path, text: bytes, error: BaseException, printed: str)
     if path.suffix.lower() == ".inp" and "could not convert" in why:
         for line in _lines_with(text, rb"\s*[0-9]+\s*(,[^,\n]*)*,\s*,[^\n]*[0-9]"):
             return f"{path}:{line}: a coordinate is blank; write 0."
+        for line in _lines_with(text, rb"\s*[0-9]+\s*(,[^,\n]+){2,3},\s*$"):
+            return (
+                f"{path}:{line}: a comma is behind the last coordinate; delete those of all nodes"
+            )
+    if lines := _lines_with(text, rb"\$ParametricNodes\b"):
+        return (
+            f"{path}:{lines[0]}: meshio does not read $ParametricNodes; save the mesh without "
+            "Gmsh's Mesh.SaveParametric"
+        )
     what = f": {why[:200]}" if why else ""
     return f"{path} can't be read as a mesh by meshio{what}; save it as MSH 2.2 or VTK"
 
