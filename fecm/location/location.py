@@ -15,13 +15,11 @@ from fecm._arrays import read_only
 from fecm._errors import FecmError, OptionsError
 from fecm._files import ARGUMENT, check_outputs
 from fecm._typing import AnyFile, Array, Bools, Floats
-from fecm._version import __version__
 from fecm.deck.model import Deck
 from fecm.deck.units import unit_names, unit_of
 from fecm.results import schema
 from fecm.results.groups import NotStoredError, ResultFileError
 from fecm.results.pictures import plot_results
-from fecm.results.schema import Dataset
 from fecm.results.stored import deck_in
 
 if TYPE_CHECKING:
@@ -36,79 +34,33 @@ class LocateError(FecmError):
     exit_code = 1
 
 
-GROUPS = {
-    "locate": "place of the impact",
-    "locate/force": "fitted force at the peaks of its hats",
-    "locate/gages": "gages whose strains were fitted",
-    "locate/strains": "measured and fitted strains",
-}
-# Datasets by the attribute of a location.
-DATASETS = {
-    "place": Dataset("locate/place", ("ndm",), "place of the impact", "length"),
-    "covariance": Dataset("locate/covariance", (2, 2), "covariance of the place", "length^2"),
-    "candidates": Dataset(
-        "locate/candidates", ("candidates", "ndm"), "places that were tried first", "length"
-    ),
-    "candidate_misfit": Dataset(
-        "locate/misfit", ("candidates",), "misfit there over that of the place found"
-    ),
-    "time": Dataset("locate/force/time", ("rows",), "time", "time"),
-    "force": Dataset("locate/force/value", ("rows",), "fitted contact force", "force"),
-    "force_sd": Dataset("locate/force/sd", ("rows",), "its standard deviation", "force"),
-    "determined": Dataset(
-        "locate/force/determined", ("rows",), "1 if the strains determine the force", "", "i1"
-    ),
-    "gages": Dataset("locate/gages/number", ("gages",), "number of every gage", "", "i4"),
-    "gage_places": Dataset("locate/gages/place", ("gages", "ndm"), "its place", "length"),
-    "gains": Dataset("locate/gages/gain", ("gages",), "its gain; 1 if it was not fitted"),
-    "sd_gains": Dataset("locate/gages/gain_sd", ("gages",), "standard deviation of the gain"),
-    "strain_time": Dataset("locate/strains/time", ("rows",), "measured time", "time"),
-    "strains": Dataset("locate/strains/measured", ("rows", "gages"), "measured strain"),
-    "fitted": Dataset("locate/strains/fitted", ("rows", "gages"), "fitted strain"),
+# Paths of the datasets by the attribute of a location.
+PATHS = {
+    "place": "locate/place",
+    "covariance": "locate/covariance",
+    "candidates": "locate/candidates",
+    "candidate_misfit": "locate/misfit",
+    "time": "locate/force/time",
+    "force": "locate/force/value",
+    "force_sd": "locate/force/sd",
+    "determined": "locate/force/determined",
+    "gages": "locate/gages/number",
+    "gage_places": "locate/gages/place",
+    "gains": "locate/gages/gain",
+    "sd_gains": "locate/gages/gain_sd",
+    "strain_time": "locate/strains/time",
+    "strains": "locate/strains/measured",
+    "fitted": "locate/strains/fitted",
 }
 BY_TIME = ("strains", "fitted")  # arrays with the gages first
-
-
-def save_location(
-    path: Path,
-    arrays: Mapping[str, Array],
-    attributes: Mapping[str, Mapping[str, Any]],
-    deck_text: str,
-    *,
-    overwrite: bool,
-) -> None:
-    """Write the arrays of a location, by its attributes, and the attributes of groups.
-
-    Those of the file itself are under ``""``.
-    """
-    from fecm.results.hdf5_writer import result_writing  # h5py takes 60 ms to import
-
-    check_outputs([path], overwrite, allowed_by=ARGUMENT)
-    about = {
-        "format": schema.Form.LOCATION.value,
-        "format_version": schema.FORMAT_VERSION,
-        "fecm_version": __version__,
-    }
-    with result_writing(path, overwrite=overwrite) as sink:
-        sink.attributes("", about | dict(attributes[""]))
-        sink.text("deck", deck_text, "the cards of the deck of the plate")
-        for group, text in GROUPS.items():
-            sink.attributes(group, {"description": text, **attributes.get(group, {})})
-        for name, dataset in DATASETS.items():
-            values = arrays[name].T if name in BY_TIME else arrays[name]
-            sink.create(dataset, values.shape)
-            sink.write(dataset.path, 0, values)
-
-
 # Physical dimensions of the attributes; those of pure numbers are not here.
 DIMENSIONS = {
-    **dict.fromkeys(("x", "y", "sd_x", "sd_y", "candidates", "gage_places"), "length"),
-    "covariance": "length^2",
-    **dict.fromkeys(("force", "force_sd", "peak_force", "sd_peak_force", "peak_bias"), "force"),
+    **{name: schema.LOCATION_DATASETS[path].dimension for name, path in PATHS.items()},
+    **dict.fromkeys(("x", "y", "sd_x", "sd_y", "mesh_error"), "length"),
+    **dict.fromkeys(("peak_force", "sd_peak_force", "peak_bias"), "force"),
     **dict.fromkeys(("impulse", "sd_impulse"), "force*time"),
-    "mesh_error": "length",
-    **dict.fromkeys(("time", "time_of_peak", "contact_end", "determined_until"), "time"),
-    **dict.fromkeys(("strain_time", "shift", "sd_shift"), "time"),
+    **dict.fromkeys(("time_of_peak", "contact_end", "determined_until"), "time"),
+    **dict.fromkeys(("shift", "sd_shift"), "time"),
     "energy_bound": "force*length",
     "mass": "force*time^2/length",
 }
@@ -349,23 +301,28 @@ class Location:
         ResultWriteError
             If it can't be written.
         """
-        arrays = {name: getattr(self, name) for name in DATASETS if name != "place"}
-        save_location(
-            Path(path),
-            {**arrays, "place": np.array([self.x, self.y])},
-            {
-                "": self._about(),
-                "locate": self._of_place(),
-                "locate/force": self._present(*OF_FORCE, *OPTIONAL),
-            },
-            self.deck.to_text(),
-            overwrite=overwrite,
-        )
+        from fecm.results.hdf5_writer import result_writing  # h5py takes 60 ms to import
+
+        path = Path(path)
+        check_outputs([path], overwrite, allowed_by=ARGUMENT)
+        attributes = {
+            "locate": self._of_place(),
+            "locate/force": self._present(*OF_FORCE, *OPTIONAL),
+        }
+        with result_writing(path, schema.Form.LOCATION, overwrite=overwrite) as sink:
+            sink.attributes("", self._about())
+            sink.deck(self.deck.to_text())
+            for group in schema.FILES[schema.Form.LOCATION].groups:
+                sink.attributes(group, attributes.get(group, {}))
+            for name, place in PATHS.items():
+                values = np.array([self.x, self.y]) if name == "place" else getattr(self, name)
+                sink.store(place, values.T if name in BY_TIME else values)
 
     def _about(self) -> dict[str, Any]:
         """Attributes of the file."""
         units = {f"unit_{name}": unit for name, unit in self.units.items()}
-        return {"title": self.deck.title, "notes": list(self.notes), **units}
+        heading = schema.heading(schema.Form.LOCATION, self.deck.title)
+        return {**heading, "notes": list(self.notes), **units}
 
     def _of_place(self) -> dict[str, Any]:
         """Attributes of the group of the place."""
@@ -434,8 +391,9 @@ def _arrays(contents: FileContents) -> dict[str, Any]:
     """Arrays by the attribute of a location; KeyError or ValueError if one is missing or wrong."""
     sizes: dict[object, int] = {"ndm": 2, 2: 2}
     arrays: dict[str, Any] = {}
-    for name, dataset in DATASETS.items():
-        values: Array = contents[dataset.path]
+    for name, path in PATHS.items():
+        values: Array = contents[path]
+        dataset = schema.LOCATION_DATASETS[path]
         kinds = "iu" if dataset.dtype.startswith("i") else "f"
         axes = [(dataset.group, axis) if axis == "rows" else axis for axis in dataset.shape]
         fits = values.ndim == len(axes) and all(

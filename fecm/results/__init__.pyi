@@ -26,6 +26,7 @@ from fecm.results.groups import ResultFileError as ResultFileError
 from fecm.results.hdf5_reader import read as read
 from fecm.results.hdf5_writer import MemorySink as MemorySink
 from fecm.results.hdf5_writer import RowBuffer as RowBuffer
+from fecm.results.hdf5_writer import result_writing as result_writing
 from fecm.results.metrics import EXPOSURES as EXPOSURES
 from fecm.results.metrics import FOUND as FOUND
 from fecm.results.metrics import METRICS as METRICS
@@ -39,7 +40,10 @@ from fecm.results.metrics import impact_metrics as impact_metrics
 from fecm.results.pictures import RunKind as RunKind
 from fecm.results.pictures import SweepKind as SweepKind
 from fecm.results.schema import DATASETS as DATASETS
+from fecm.results.schema import FILES as FILES
 from fecm.results.schema import GROUP_TYPES as GROUP_TYPES
+from fecm.results.schema import Form as Form
+from fecm.results.schema import dataset_of as dataset_of
 from fecm.results.summary import about_run as about_run
 from fecm.results.summary import run_summary as run_summary
 from fecm.results.tapes import fortran_number as fortran_number

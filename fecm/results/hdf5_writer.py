@@ -10,6 +10,7 @@ import contextlib
 import io
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from enum import StrEnum
 from functools import cache
 from pathlib import Path
@@ -23,8 +24,8 @@ from fecm._typing import Array
 from fecm.deck.units import declared_units, unit_of
 from fecm.results import schema
 from fecm.results.criteria import criteria_of
-from fecm.results.groups import GROUPS, ResultWriteError
-from fecm.results.schema import Dataset
+from fecm.results.groups import ResultWriteError
+from fecm.results.schema import Dataset, Form
 from fecm.results.stored import Stored
 
 TEXT = h5py.string_dtype()
@@ -45,18 +46,20 @@ class Operation(StrEnum):
 
 
 class FileSink:
-    """Writes a result into an open HDF5 file."""
+    """Writes a result of a form into an open HDF5 file."""
 
-    def __init__(self, file: h5py.File, guarded: _Guarded) -> None:
+    def __init__(self, file: h5py.File, guarded: _Guarded, form: Form = Form.RUN) -> None:
         self._file = file
         self._guarded = guarded
+        self._form = form
+        self._described = schema.FILES[form].groups
         self._units: dict[str, str] = {}
         # Datasets, single texts, and attributes of groups that are stored so far, by path.
         self.arrays: dict[str, Any] = {}
         self.texts: dict[str, str] = {}
         self.groups: dict[str, dict[str, Any]] = {}
         # What was created, with its shape before `trim`: h5py takes 10 us to tell.
-        self._made: dict[str, tuple[schema.Dataset, tuple[int, ...]]] = {}
+        self._made: dict[str, tuple[Dataset, tuple[int, ...]]] = {}
         self._groups: dict[str, h5py.Group] = {"": file}
         self._scales: dict[str, h5py.Dataset] = {}
         self.axis_names = dict(schema.AXIS_NAMES)
@@ -71,8 +74,8 @@ class FileSink:
         if name not in self._groups:
             new = name not in self._file
             group = self._groups[name] = self._file.require_group(name)
-            if new and name in GROUPS:
-                _set_text(group, GROUPS[name].description, "description")
+            if new and name in self._described:
+                _set_text(group, self._described[name], "description")
         return self._groups[name]
 
     def attributes(self, group: str, values: Mapping[str, Any]) -> None:
@@ -88,8 +91,18 @@ class FileSink:
             else:
                 target.attrs[name] = value
 
-    def create(self, dataset: schema.Dataset, shape: tuple[int, ...]) -> None:
-        """Create a contiguous dataset of its full shape."""
+    def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
+        """Create a contiguous dataset of its full shape; see :meth:`known`."""
+        self.known(dataset.path, len(shape))
+        self._create(dataset, shape)
+
+    def known(self, path: str, rank: int) -> Dataset:
+        """Dataset of the schema; ValueError if it has none of this path."""
+        if (found := schema.dataset_of(path, rank, self._form)) is None:
+            raise ValueError(f"{path} is not in the schema of {self._form}")
+        return found
+
+    def _create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
         self._note(Operation.CREATE, path=dataset.path, shape=shape)
         # Low-level interface: create_dataset takes twice as long.
         place = h5py.h5s.create_simple(shape)
@@ -152,6 +165,26 @@ class FileSink:
         place.select_hyperslab((start, *[0] * (values.ndim - 1)), values.shape)
         dataset.id.write(h5py.h5s.create_simple(values.shape), place, values)
 
+    def store(self, path: str, values: Array, dimension: str = "") -> None:
+        """Store a whole dataset of the schema, numbers or texts; see :meth:`known`.
+
+        A dimension takes the place of that of the schema.
+        """
+        known = self.known(path, values.ndim)
+        if known.dtype == schema.TEXTS or values.dtype.kind in "US":
+            made = self.arrays[path] = self._text(path, values.tolist(), known.description)
+            self._made[path] = known, made.shape
+            return
+        if known.dtype == schema.ANY:
+            known = replace(known, dtype="i8" if values.dtype.kind in "iu" else "f8")
+        self._create(replace(known, dimension=dimension or known.dimension), values.shape)
+        self.write(path, 0, values)
+
+    def keep(self, path: str, values: Array) -> None:
+        """Store a dataset of a result of another version, which the schema lacks."""
+        self._create(Dataset(path, values.shape, "", dtype=values.dtype.name), values.shape)
+        self.write(path, 0, values)
+
     def check(self) -> None:
         """Raise the first error of writing, an OSError."""
         if self._guarded.error is not None:
@@ -172,18 +205,18 @@ class FileSink:
             del self._file[empty]
             self._groups.pop(empty, None)
 
-    def text(
-        self, path: str, value: str | list[str], description: str, axes: tuple[str, ...] = ()
-    ) -> None:
-        """Store a text, or texts along an axis."""
-        self._note(Operation.TEXT, path=path, value=value, description=description)
-        made = self._file.create_dataset(path, data=value, dtype=TEXT)
-        if isinstance(value, str):
-            self.texts[path] = value
-        else:
-            self.arrays[path] = made
-            self._made[path] = schema.Dataset(path, axes, description), (len(value),)
+    def deck(self, text: str) -> None:
+        """Store the text of the deck."""
+        self._note(Operation.TEXT, value=text)
+        self.texts["deck"] = text
+        self._text("deck", text, schema.FILES[self._form].deck)
+
+    def _text(self, path: str, value: str | list[str], description: str) -> h5py.Dataset:
+        """Create a dataset of a text or of texts."""
+        group, _, name = path.rpartition("/")
+        made = self._group(group).create_dataset(name, data=value, dtype=TEXT)
         made.attrs["description"] = description
+        return made
 
 
 @cache
@@ -200,13 +233,15 @@ def _set_text(item: h5py.HLObject, text: str, *names: str) -> None:
 
 
 @contextlib.contextmanager
-def result_writing(path: Path, *, overwrite: bool = True) -> Iterator[FileSink]:
-    """Open a result for writing; it gets its final name only on success.
+def result_writing(
+    path: Path, form: Form = Form.RUN, *, overwrite: bool = True
+) -> Iterator[FileSink]:
+    """Open a result of a form for writing; it gets its final name only on success.
 
     Raises ResultWriteError if the file can't be written; an existing file is then untouched.
     """
     with new_hdf5(path, overwrite=overwrite) as (file, guarded):
-        sink = FileSink(file, guarded)
+        sink = FileSink(file, guarded, form)
         yield sink
         sink.label_axes()
 
@@ -217,12 +252,11 @@ def save_result(stored: Stored, path: Path, *, overwrite: bool) -> None:
     with result_writing(path, overwrite=overwrite) as sink:
         sink.axis_names["criteria"] = criteria_of(stored.attributes_of("failure"))
         sink.attributes("", stored.attributes)
-        sink.text("deck", stored.deck_text, "the cards of the problem")
+        sink.deck(stored.deck_text)
         for name in stored:
             values = stored[name]
-            own = schema.Dataset(name, values.shape, "", dtype=values.dtype.name)
-            sink.create(schema.dataset_of(name, values.ndim) or own, values.shape)
-            sink.write(name, 0, values)
+            known = schema.dataset_of(name, values.ndim)
+            (sink.keep if known is None else sink.store)(name, values)
         for group in filter(None, stored._groups):
             sink.attributes(group, stored.attributes_of(group))
 
@@ -296,9 +330,9 @@ class MemorySink:
         if rows:
             self.arrays[path] = kept
 
-    def text(self, path: str, value: str, description: str) -> None:
-        """Store a text."""
-        self.texts[path] = value
+    def deck(self, text: str) -> None:
+        """Store the text of the deck."""
+        self.texts["deck"] = text
 
 
 Sink: TypeAlias = "MemorySink | FileSink"

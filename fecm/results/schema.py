@@ -1,23 +1,30 @@
-"""Schema of a result file: groups, and type, shape, description and dimension of every dataset.
+"""Schema of result files: groups, and type, shape, description and dimension of every dataset.
 
-Shapes use the sizes of a run: ``rows`` of the group, ``numnp``, ``ndm``, ``ndf``,
+:data:`FILES` has what each :class:`Form` of file holds: of a run, a sweep, or a location.  What is
+not in it can't be written.
+
+Shapes of a run use the sizes of a run: ``rows`` of the group, ``numnp``, ``ndm``, ``ndf``,
 ``numel``, ``nen``, ``npt`` and ``nps`` (points per element in tape8 and stresses), ``gages``;
 of ply stresses ``members`` (elements), ``npp`` (points per element), ``layers`` and :data:`FIXED`.
-The annotations of a group serve type checkers, editors and :data:`DATASETS`.
+The annotations of a group serve type checkers, editors and :data:`DATASETS`.  Those of a sweep use
+``cases``, ``steps``, ``combinations`` (of varied values), ``laws`` (random values), ``limits`` and
+``trials`` (of the reduced model).
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
-from typing import Annotated
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Floats
+from fecm._version import __version__
 from fecm.deck.mesh_cards import AXES, DOF_NAMES
 from fecm.results.criteria import ALL_CRITERIA
-from fecm.results.groups import ResultGroup
+from fecm.results.groups import GROUPS, ResultGroup
+from fecm.results.metrics import COLUMNS, RATIO, STATUS, VALIDITY, described
 
 Ints = NDArray[np.int64]
 Int32s = NDArray[np.int32]
@@ -50,15 +57,30 @@ class Kinematics(StrEnum):
 KINEMATICS = "kinematics"
 
 
+def heading(form: Form, title: str) -> dict[str, Any]:
+    """Attributes that every file has."""
+    return {
+        "format": form.value,
+        "format_version": FORMAT_VERSION,
+        "fecm_version": __version__,
+        "title": title,
+    }
+
+
+ANY = "any"  # integers, numbers or texts: the type of the values
+TEXTS = "texts"
+
+
 @dataclass(frozen=True)
 class Dataset:
     """One dataset of a result."""
 
-    path: str  # group and name
+    path: str  # group and name; ``*`` stands for any name
     shape: tuple[str | int, ...]  # sizes by name, or numbers
-    description: str
-    dimension: str = ""  # physical dimension; may be empty
-    dtype: str = "f8"  # NumPy's name of the type
+    description: str  # may contain {name}, {text} and {label}, see `_named`
+    dimension: str = ""  # physical dimension; may be empty, or OF_QUANTITY
+    dtype: str = "f8"  # NumPy's name of the type, ANY or TEXTS
+    outer: str = ""  # axis in front of the others, which only some results have
 
     @property
     def group(self) -> str:
@@ -69,6 +91,10 @@ class Dataset:
     def name(self) -> str:
         """Name in its group."""
         return self.path.rpartition("/")[2]
+
+    def with_outer(self) -> "Dataset":
+        """The dataset of a result that has the outer axis."""
+        return replace(self, shape=(self.outer, *self.shape))
 
 
 # Groups: each column has its type, sizes, description and, if it has one, dimension.
@@ -378,7 +404,13 @@ GROUP_TYPES: dict[str, type[ResultGroup]] = {
 }
 
 
-def _datasets(group: str, kind: type[ResultGroup], outer: str = "") -> Iterator[Dataset]:
+CURE_STRESS = "plies/cure_stress"  # residual stresses of CURE, of the entire plate
+# Datasets that have one axis more in front if there are several laminates; NaN at plies that a
+# laminate lacks.
+BY_LAMINATE = ("plies/z", "plies/material", CURE_STRESS)
+
+
+def _datasets(group: str, kind: type[ResultGroup], sizes_of_all: str = "") -> Iterator[Dataset]:
     """Datasets of a group, of these sizes unless they have their own."""
     for base in reversed(kind.__mro__):
         for name, column in getattr(base, "__annotations__", {}).items():
@@ -387,49 +419,221 @@ def _datasets(group: str, kind: type[ResultGroup], outer: str = "") -> Iterator[
             if column.__origin__ in (Exposure, CircleExposures):
                 yield from _datasets(path, column.__origin__, sizes)
             else:
-                shape = tuple(int(n) if n.isdigit() else n for n in (sizes or outer).split())
+                shape = tuple(int(n) if n.isdigit() else n for n in (sizes or sizes_of_all).split())
                 description, dimension = (*about, "")[:2]
-                yield Dataset(path, shape, description, dimension, DTYPES[column.__origin__])
+                outer = "laminates" if path in BY_LAMINATE else ""
+                kind_of = DTYPES[column.__origin__]
+                yield Dataset(path, shape, description, dimension, kind_of, outer)
 
 
 DATASETS = {d.path: d for name, kind in GROUP_TYPES.items() for d in _datasets(name, kind)}
 
-# A criterion of the plies, whose datasets those of users have too.
-_KNOWN_CRITERION = "failure/puck"
+# Datasets of numbered laminates, and of users' criteria of the plies.
+_NAMED_DATASETS = {
+    f"{group}/*/{dataset.name}": dataset
+    for group, known in (("laminate", "laminate"), ("failure", "failure/puck"))
+    for dataset in DATASETS.values()
+    if dataset.group == known
+}
 
 
 def criterion_datasets(name: str) -> list[Dataset]:
     """Datasets of a user's criterion of the plies."""
     return [
-        replace(dataset, path=f"failure/{name}/{dataset.name}")
-        for dataset in DATASETS.values()
-        if dataset.group == _KNOWN_CRITERION
+        replace(dataset, path=pattern.replace("*", name))
+        for pattern, dataset in _NAMED_DATASETS.items()
+        if pattern.startswith("failure/")
     ]
 
 
-CURE_STRESS = "plies/cure_stress"  # residual stresses of CURE, of the entire plate
+OF_QUANTITY = "of the quantity"  # dimension of a dataset whose name is that of a quantity
 
-# Datasets that have one axis more in front, `laminates`, if there are several; NaN at plies that a
-# laminate lacks.
-BY_LAMINATE = ("plies/z", "plies/material", CURE_STRESS)
+SWEEP_DATASETS = {
+    dataset.path: dataset
+    for dataset in (
+        # The writer gives the dimension of a value.
+        Dataset("cases/*", ("cases",), "{name} of every case", dtype=ANY),
+        Dataset(
+            f"summary/{STATUS}",
+            ("cases",),
+            "ok, still in contact, or why the case failed",
+            dtype=TEXTS,
+        ),
+        Dataset(
+            f"summary/{VALIDITY}",
+            ("cases",),
+            "ok, reasons to doubt the case, or failed",
+            dtype=TEXTS,
+        ),
+        Dataset("summary/*", ("cases",), "{text}", OF_QUANTITY, ANY),
+        Dataset("history/dt", ("cases",), "time step of every case", "time"),
+        Dataset("history/steps", ("cases",), "number of steps of every case", dtype="i8"),
+        Dataset(
+            "history/unsettled_steps",
+            ("cases",),
+            "steps whose contact iteration did not converge",
+            dtype="i8",
+        ),
+        Dataset("history/force", ("cases", "steps"), "contact force after every step", "force"),
+        Dataset(
+            "statistics/*",
+            ("statistics",),
+            "draws with a value, and their statistics: {label}",
+            OF_QUANTITY,
+            outer="combinations",
+        ),
+        *(
+            Dataset(f"sensitivity/*/{name}", shape, text, outer="combinations")
+            for name, shape, text in (
+                ("first", ("laws",), "first-order Sobol' index of every random value"),
+                ("total", ("laws",), "total Sobol' index of every random value"),
+                ("first_interval", ("laws", "bounds"), "its 95 % interval"),
+                ("total_interval", ("laws", "bounds"), "its 95 % interval"),
+            )
+        ),
+        Dataset("exceedance/quantity", ("limits",), "name of the quantity", dtype=TEXTS),
+        Dataset(
+            "exceedance/limit",
+            ("limits",),
+            "limit, in the unit of the quantity; NaN: the threshold of each case",
+        ),
+        *(
+            Dataset(f"exceedance/{name}", ("limits",), text, dtype=dtype, outer="combinations")
+            for name, text, dtype in (
+                ("probability", "probability that the quantity exceeds the limit", "f8"),
+                (
+                    "lower",
+                    "lower end of its 95 % interval, whatever the open draws are",
+                    "f8",
+                ),
+                (
+                    "upper",
+                    "upper end of its 95 % interval, whatever the open draws are",
+                    "f8",
+                ),
+                ("draws", "number of draws that have a value", "i8"),
+                ("open", "number of draws that ended before they had a value", "i8"),
+            )
+        ),
+        Dataset(
+            "reduced/case",
+            ("trials",),
+            "number of the case that was also run in full",
+            dtype="i8",
+        ),
+        *(
+            Dataset(f"reduced/{name}", ("trials",), text, dimension)
+            for name, text, dimension in (
+                ("peak_force", "largest contact force of the reduced model", "force"),
+                ("full_peak_force", "largest contact force of the full run", "force"),
+                (
+                    RATIO,
+                    "largest displacement under the load over the thickness, of the reduced model",
+                    "",
+                ),
+                (
+                    f"full_{RATIO}",
+                    "largest displacement under the load over the thickness, of the full run",
+                    "",
+                ),
+            )
+        ),
+    )
+}
+LOCATION_DATASETS = {
+    dataset.path: dataset
+    for dataset in (
+        Dataset("locate/place", ("ndm",), "place of the impact", "length"),
+        Dataset("locate/covariance", (2, 2), "covariance of the place", "length^2"),
+        Dataset(
+            "locate/candidates", ("candidates", "ndm"), "places that were tried first", "length"
+        ),
+        Dataset("locate/misfit", ("candidates",), "misfit there over that of the place found"),
+        Dataset("locate/force/time", ("rows",), "time", "time"),
+        Dataset("locate/force/value", ("rows",), "fitted contact force", "force"),
+        Dataset("locate/force/sd", ("rows",), "its standard deviation", "force"),
+        Dataset(
+            "locate/force/determined", ("rows",), "1 if the strains determine the force", "", "i1"
+        ),
+        Dataset("locate/gages/number", ("gages",), "number of every gage", "", "i4"),
+        Dataset("locate/gages/place", ("gages", "ndm"), "its place", "length"),
+        Dataset("locate/gages/gain", ("gages",), "its gain; 1 if it was not fitted"),
+        Dataset("locate/gages/gain_sd", ("gages",), "standard deviation of the gain"),
+        Dataset("locate/strains/time", ("rows",), "measured time", "time"),
+        Dataset("locate/strains/measured", ("rows", "gages"), "measured strain"),
+        Dataset("locate/strains/fitted", ("rows", "gages"), "fitted strain"),
+    )
+}
 
 
-def by_laminate(dataset: Dataset) -> Dataset:
-    """Dataset of several laminates."""
-    return replace(dataset, shape=("laminates", *dataset.shape))
+class FileSchema(NamedTuple):
+    """What a form of file holds beside its attributes."""
+
+    deck: str  # description of the text ``deck``
+    groups: Mapping[str, str]  # descriptions by path
+    datasets: Mapping[str, Dataset]  # by path, in which ``*`` stands for any name
 
 
-def dataset_of(path: str, rank: int) -> Dataset | None:
-    """Dataset of a path, with so many axes; None if it is not in the schema."""
-    group, name = path.partition("/")[0], path.rpartition("/")[2]
-    known = DATASETS.get(f"{group}/{name}" if group == "laminate" else path)
-    if known is None and group == "failure" and path.count("/") == 2:  # of a user's criterion
-        known = DATASETS.get(f"{_KNOWN_CRITERION}/{name}")
+FILES = {
+    Form.RUN: FileSchema(
+        "the cards of the problem",
+        {name: info.description for name, info in GROUPS.items()},
+        DATASETS | _NAMED_DATASETS,
+    ),
+    Form.SWEEP: FileSchema(
+        "the cards of the deck that was varied",
+        {
+            "cases": "values of what varies",
+            "summary": "what came out of every case",
+            "history": "time steps of every case, and its contact force if asked for",
+            "random": "laws of the random values",
+            "design": "design that the random values were drawn from",
+            "statistics": "statistics of every quantity over the draws",
+            "sensitivity": "Sobol' indices of every quantity",
+            "exceedance": "probabilities that quantities exceed limits",
+            "reduced": "full runs beside the reduced model",
+        },
+        SWEEP_DATASETS,
+    ),
+    Form.LOCATION: FileSchema(
+        "the cards of the deck of the plate",
+        {
+            "locate": "place of the impact",
+            "locate/force": "fitted force at the peaks of its hats",
+            "locate/gages": "gages whose strains were fitted",
+            "locate/strains": "measured and fitted strains",
+        },
+        LOCATION_DATASETS,
+    ),
+}
+
+
+def dataset_of(path: str, rank: int, form: Form = Form.RUN) -> Dataset | None:
+    """Dataset of a path, with so many axes; None if it is not in the schema of the form."""
+    datasets, parts = FILES[form].datasets, path.split("/")
+    known = datasets.get(path)
+    if known is None and len(parts) > 1:
+        pattern = datasets.get("/".join([parts[0], "*", *parts[2:]]))
+        known = pattern and _named(pattern, path)
     if known is None:
         return None
-    if path in BY_LAMINATE and rank > len(known.shape):
-        return by_laminate(known)
-    return replace(known, path=path)
+    return known.with_outer() if known.outer and rank > len(known.shape) else known
+
+
+def _named(dataset: Dataset, path: str) -> Dataset:
+    """The dataset of a name in the place of ``*``.
+
+    Its description has the name, or that of the quantity of this name: ``{text}``, or ``{label}``,
+    which is the name if the quantity is not one of fecm.
+    """
+    name = path.split("/")[1]
+    quantity = COLUMNS.get(name)
+    label = name if quantity is None else quantity.description
+    dimension = dataset.dimension
+    if dimension == OF_QUANTITY:
+        dimension = "" if quantity is None else quantity.dimension
+    description = dataset.description.format(name=name, text=described(name), label=label)
+    return replace(dataset, path=path, description=description, dimension=dimension)
 
 
 # Sizes of axes that every result has.

@@ -259,7 +259,7 @@ class Checkpointer:
                     raise CheckpointError(f"{self._spool} has an unknown dataset {entry['path']}")
                 self._sink.create(dataset, shape)
             case Operation.TEXT:
-                self._sink.text(entry["path"], entry["value"], entry["description"])
+                self._sink.deck(entry["value"])
             case Operation.WRITE:
                 dtype = np.dtype(entry["dtype"])
                 shape = tuple(entry["shape"])

@@ -25,13 +25,11 @@ from fecm.results.exposures import COARSENESS, LOAD_FACTOR
 from fecm.results.groups import STORED_BY
 from fecm.results.hdf5_writer import RowBuffer, Sink
 from fecm.results.schema import (
-    BY_LAMINATE,
     CONTACT,
     CURE_STRESS,
     DATASETS,
     FIXED,
     Dataset,
-    by_laminate,
     criterion_datasets,
 )
 from fecm.simulation.saved import subset
@@ -281,7 +279,7 @@ def _of_laminates(dataset: Dataset, model: ImpactModel) -> list[Dataset]:
         return [dataset]
     if dataset.group == LAMINATE:
         return [replace(dataset, path=f"{LAMINATE}/{n}/{dataset.name}") for n in model.laminates]
-    return [by_laminate(dataset) if dataset.path in BY_LAMINATE else dataset]
+    return [dataset.with_outer() if dataset.outer else dataset]
 
 
 def _padded(parts: Sequence[Floats]) -> Floats:

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from fecm._version import __version__
 from fecm.deck.model import Cure, Deck, Material
 from fecm.deck.units import unit_names
 from fecm.listing.slips import mode_of
@@ -23,7 +22,7 @@ from fecm.results.exposures import AT_REST, count_evaluations
 from fecm.results.hdf5_writer import ReadOnce, Sink
 from fecm.results.metrics import MOBILITY, VALIDITY
 from fecm.results.result import Result
-from fecm.results.schema import FORMAT_VERSION, KINEMATICS, Form, Kinematics
+from fecm.results.schema import KINEMATICS, Form, Kinematics, heading
 from fecm.simulation.judge import judge_run
 from fecm.simulation.macros import STORING, bind, bind_loop
 from fecm.simulation.simulation import Observer, Simulation
@@ -80,10 +79,7 @@ def _write_header(simulation: Simulation) -> None:
     sink, options, deck = simulation.sink, simulation.options, simulation.problem.deck
     plate = simulation.model.plate
     attributes = {
-        "format": Form.RUN.value,
-        "format_version": FORMAT_VERSION,
-        "fecm_version": __version__,
-        "title": deck.title,
+        **heading(Form.RUN, deck.title),
         "mode": mode_of(options.slips),
         "slips": sorted(options.slips),
         "solver": simulation.model.motion.solver,
@@ -93,7 +89,7 @@ def _write_header(simulation: Simulation) -> None:
         **_units(deck),
     }
     sink.attributes("", attributes)
-    sink.text("deck", deck.text or deck.to_text(), "the cards of the problem")
+    sink.deck(deck.text or deck.to_text())
     at_nodes = deck.require(Material).integration.points < 0 and "tapes" not in options.slips
     simulation.recorder.create("nodes" if at_nodes else "gauss")
     _write_cure(simulation)

@@ -7,17 +7,16 @@ import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fecm._typing import Floats
-from fecm._version import __version__
 from fecm.authoring.values import dimension_of
 from fecm.deck.units import column_name
 from fecm.results import schema
 from fecm.results.groups import ExportError, ResultFileError
-from fecm.results.metrics import COLUMNS, VERDICTS, described
+from fecm.results.metrics import VERDICTS
 from fecm.sweeps import reduced
 from fecm.sweeps.distributions import CustomDistribution, ValueDistribution
 from fecm.sweeps.outcome import Column, Forces
@@ -32,80 +31,39 @@ from fecm.sweeps.statistics import (
     Statistics,
     exceedances,
 )
-from fecm.sweeps.stored import StoredSweep
+from fecm.sweeps.stored import OWN_ARRAYS, StoredSweep
 
 if TYPE_CHECKING:
     from fecm.results.hdf5_reader import FileContents
     from fecm.results.hdf5_writer import FileSink
 
 
-# Description and axes of the parts of the indices.
-INDEX_PARTS: dict[str, tuple[str, tuple[str, ...]]] = {
-    "first": ("first-order Sobol' index of every random value", ("laws",)),
-    "total": ("total Sobol' index of every random value", ("laws",)),
-    "first_interval": ("its 95 % interval", ("laws", "bounds")),
-    "total_interval": ("its 95 % interval", ("laws", "bounds")),
-}
 OWN = "own"  # instead of the name of a law: that of an object, of which the file has a text
-RANDOM_GROUPS = {
-    "random": "laws of the random values",
-    "design": "design that the random values were drawn from",
-    "statistics": "statistics of every quantity over the draws",
-    "sensitivity": "Sobol' indices of every quantity",
-    "exceedance": "probabilities that quantities exceed limits",
-}
-LIMIT_PARTS = {
-    "quantity": "name of the quantity",
-    "limit": "limit, in the unit of the quantity; NaN: the threshold of each case",
-    "probability": "probability that the quantity exceeds the limit",
-    "lower": "lower end of its 95 % interval, whatever the open draws are",
-    "upper": "upper end of its 95 % interval, whatever the open draws are",
-    "draws": "number of draws that have a value",
-    "open": "number of draws that ended before they had a value",
-}
 
 
-class RandomDataset(NamedTuple):
-    """A dataset of the file."""
-
-    path: str
-    values: Column
-    text: str
-    dimension: str
-    axes: tuple[str, ...]
-
-
-def stored(random: RandomResult) -> Iterator[RandomDataset]:
-    """Every dataset of the file."""
-    first = ("combinations",) if random.combinations else ()
+def stored(random: RandomResult) -> Iterator[tuple[str, Column]]:
+    """Paths and values of the datasets of a random sweep."""
     for name, made in random.statistics.items():
-        text, dimension = COLUMNS.get(name, (name, ""))
         moments = np.stack([made.draws, made.mean, made.standard_deviation], axis=-1)
-        values = np.concatenate([moments, made.quantiles], axis=-1)
-        text = f"draws with a value, and their statistics: {text}"
-        yield RandomDataset(f"statistics/{name}", values, text, dimension, (*first, "statistics"))
+        yield f"statistics/{name}", np.concatenate([moments, made.quantiles], axis=-1)
     for name, found in random.sensitivity.items():
         for part, values in found._asdict().items():
-            text, axes = INDEX_PARTS[part]
-            yield RandomDataset(f"sensitivity/{name}/{part}", values, text, "", (*first, *axes))
+            yield f"sensitivity/{name}/{part}", values
     if len(random.exceedance.quantity):
         for part, values in random.exceedance._asdict().items():
-            own = () if part in ("quantity", "limit") else first
-            yield RandomDataset(
-                f"exceedance/{part}", values, LIMIT_PARTS[part], "", (*own, "limits")
-            )
+            yield f"exceedance/{part}", values
 
 
 def random_attributes(random: RandomResult) -> dict[str, dict[str, Any]]:
     """Attributes of the groups of the file."""
     design = random.design
-    empty = set() if random.sensitivity else {"sensitivity"}
-    empty |= set() if len(random.exceedance.quantity) else {"exceedance"}
-    made: dict[str, dict[str, Any]] = {
-        name: {"description": text} for name, text in RANDOM_GROUPS.items() if name not in empty
-    }
     about = {name: getattr(design, name) for name in ("kind", "samples", "seed", "sensitivity")}
-    made["design"] |= {**about, "names": list(design.laws), "notes": random.notes}
+    made: dict[str, dict[str, Any]] = {
+        "random": {},
+        "design": {**about, "names": list(design.laws), "notes": random.notes},
+    }
+    if random.sensitivity:
+        made["sensitivity"] = {}
     if design.correlation:
         made["design"]["correlation"] = np.array(design.correlation)
     for name, law in design.laws.items():
@@ -180,10 +138,11 @@ def _statistics(contents: FileContents, name: str, first: tuple[int, ...]) -> St
 
 
 def _indices(contents: FileContents, name: str, first: tuple[int, ...], laws: int) -> Indices:
-    sizes = {"laws": laws, "bounds": len(INTERVAL_ENDS)}
+    sizes: dict[str | int, int] = {"laws": laws, "bounds": len(INTERVAL_ENDS)}
+    axes = (schema.SWEEP_DATASETS[f"sensitivity/*/{part}"].shape for part in Indices._fields)
     return Indices(*(
-        _numbers(contents, f"sensitivity/{name}/{part}", (*first, *(sizes[axis] for axis in axes)))
-        for part, (_, axes) in INDEX_PARTS.items()
+        _numbers(contents, f"sensitivity/{name}/{part}", (*first, *(sizes[axis] for axis in shape)))
+        for part, shape in zip(Indices._fields, axes, strict=True)
     ))  # fmt: skip
 
 
@@ -201,15 +160,6 @@ def _exceedance(contents: FileContents, known: Iterable[str], first: tuple[int, 
 
 
 FORCE = "history/force"
-VERDICT_TEXTS = {
-    "status": "ok, still in contact, or why the case failed",
-    "validity": "ok, reasons to doubt the case, or failed",
-}
-GROUPS = {
-    "cases": "values of what varies",
-    "summary": "what came out of every case",
-    "history": "time steps of every case, and its contact force if asked for",
-}
 
 
 def save_sweep(
@@ -224,76 +174,39 @@ def save_sweep(
 
     if result.force is not None:
         forces = [(range(len(result)), result.force)]
-    with result_writing(path, overwrite=overwrite) as sink:
-        _write_attributes(sink, result)
-        for name, values in result.cases.items():
-            text = f"{name} of every case"
-            _write(sink, f"cases/{name}", values, text, dimension_of(name))
-        for name, values in result.summary.items():
-            text = VERDICT_TEXTS.get(name) or described(name)
-            _, dimension = COLUMNS.get(name, ("", ""))
-            _write(sink, f"summary/{name}", values, text, dimension)
-        _write(sink, "history/dt", result.dt, "time step of every case", "time")
-        _write(sink, "history/steps", result.steps, "number of steps of every case")
-        if result.unsettled_steps is not None:
-            text = "steps whose contact iteration did not converge"
-            _write(sink, "history/unsettled_steps", result.unsettled_steps, text)
+    with result_writing(path, schema.Form.SWEEP, overwrite=overwrite) as sink:
+        units = {f"unit_{name}": unit for name, unit in result.units.items()}
+        law = {"law": result.law} if result.law else {}
+        sink.attributes("", schema.heading(schema.Form.SWEEP, result.title) | units | law)
+        sink.deck(result.deck_text)
+        if result.random is not None:
+            sink.axis_names["laws"] = tuple(result.random.design.laws)
+            for group, values in random_attributes(result.random).items():
+                sink.attributes(group, values)
+        for group in ("cases", "summary"):
+            sink.attributes(group, {})
+        for name, column in result.cases.items():
+            sink.store(f"cases/{name}", column, dimension_of(name))
+        for name, column in result.summary.items():
+            sink.store(f"summary/{name}", column)
+        for name in OWN_ARRAYS:
+            if name != "force" and (column := getattr(result, name)) is not None:
+                sink.store(f"history/{name}", column)
         if forces and len(result):
             _write_forces(sink, len(result), int(result.steps.max()), forces)
-        for one in () if result.random is None else stored(result.random):
-            _write(sink, one.path, one.values, one.text, one.dimension, one.axes)
+        for name, column in () if result.random is None else stored(result.random):
+            sink.store(name, column)
         if result.reduced is not None:
             sink.attributes(reduced.GROUP, reduced.reduced_attributes(result.reduced))
-            for name, text in reduced.TEXTS.items():
-                values = result.reduced.columns[name]
-                dimension = reduced.DIMENSIONS.get(name, "")
-                place = f"{reduced.GROUP}/{name}"
-                _write(sink, place, values, text, dimension, ("trials",))
-        for group, text in GROUPS.items():
-            sink.attributes(group, {"description": text})
+            for name in reduced.TRIAL_COLUMNS:
+                sink.store(f"{reduced.GROUP}/{name}", result.reduced.columns[name])
         for name, limit in result.convergence.items():
             sink.attributes(f"convergence/{name}", vars(limit))
 
 
-def _write_attributes(sink: FileSink, result: StoredSweep) -> None:
-    """Write what is known of the sweep, its deck, and the groups of a random sweep."""
-    about = {
-        "format": schema.Form.SWEEP.value,
-        "format_version": schema.FORMAT_VERSION,
-        "fecm_version": __version__,
-        "title": result.title,
-    }
-    units = {f"unit_{name}": unit for name, unit in result.units.items()}
-    law = {"law": result.law} if result.law else {}
-    sink.attributes("", about | units | law)
-    sink.text("deck", result.deck_text, "the cards of the deck that was varied")
-    if result.random is not None:
-        sink.axis_names["laws"] = tuple(result.random.design.laws)
-        for group, values in random_attributes(result.random).items():
-            sink.attributes(group, values)
-
-
-def _write(
-    sink: FileSink,
-    name: str,
-    values: Column,
-    text: str,
-    dimension: str = "",
-    axes: tuple[str, ...] = ("cases",),
-) -> None:
-    """Write a dataset of numbers or of texts."""
-    if values.dtype.kind in "US":
-        sink.text(name, values.tolist(), text, axes)
-        return
-    dtype = "i8" if values.dtype.kind in "iu" else "f8"
-    sink.create(schema.Dataset(name, axes, text, dimension, dtype), values.shape)
-    sink.write(name, 0, values)
-
-
 def _write_forces(sink: FileSink, count: int, longest: int, forces: Iterable[Forces]) -> None:
     """Write contact forces as they come, NaN where a case has none."""
-    text = "contact force after every step"
-    sink.create(schema.Dataset(FORCE, ("cases", "steps"), text, "force"), (count, longest))
+    sink.create(schema.SWEEP_DATASETS[FORCE], (count, longest))
     for numbers, force in forces:
         rows = np.full((len(numbers), longest), np.nan)
         if force is not None:

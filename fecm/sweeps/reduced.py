@@ -31,6 +31,7 @@ from fecm.mechanics.reduced_plate import (
 from fecm.problem.problem import Problem
 from fecm.results.groups import ResultFileError
 from fecm.results.metrics import RATIO, IndentationMetrics
+from fecm.results.schema import SWEEP_DATASETS
 from fecm.sweeps.outcome import About, Column, Outcome, merge
 from fecm.sweeps.plan import MOST_MODES, Plan, Task
 from fecm.sweeps.responses import (
@@ -166,14 +167,7 @@ def largest_time_step(plate: ReducedPlate, strike: Strike) -> float:
 RunTasks = Callable[[Sequence[Task]], list[tuple[Task, Outcome]]]
 GROUP = "reduced"
 LIMIT = 0.02  # largest difference of the peaks, relative to that of the full run
-TEXTS = {
-    "case": "number of the case that was also run in full",
-    "peak_force": "largest contact force of the reduced model",
-    "full_peak_force": "largest contact force of the full run",
-    RATIO: "largest displacement under the load over the thickness, of the reduced model",
-    f"full_{RATIO}": "largest displacement under the load over the thickness, of the full run",
-}
-DIMENSIONS = {"peak_force": "force", "full_peak_force": "force"}
+TRIAL_COLUMNS = tuple(d.name for d in SWEEP_DATASETS.values() if d.group == GROUP)
 
 
 @dataclass(frozen=True)
@@ -340,8 +334,8 @@ def compared(modes: int, fulls: Sequence[Outcome], models: Sequence[Outcome]) ->
 
 def reduced_attributes(model: ReducedModel) -> dict[str, Any]:
     """Attributes of the group in the file."""
-    found = {"description": "full runs beside the reduced model", "modes": model.modes}
-    return found | ({"in_full": model.in_full} if model.in_full else {})
+    in_full = {"in_full": model.in_full} if model.in_full else {}
+    return {"modes": model.modes, **in_full}
 
 
 def reduced_of(contents: FileContents) -> ReducedModel | None:
@@ -351,7 +345,7 @@ def reduced_of(contents: FileContents) -> ReducedModel | None:
     try:
         modes = int(contents.groups[GROUP]["modes"])
         in_full = int(contents.groups[GROUP].get("in_full", 0))
-        columns = {name: contents[f"{GROUP}/{name}"] for name in TEXTS}
+        columns = {name: contents[f"{GROUP}/{name}"] for name in TRIAL_COLUMNS}
     except (KeyError, ValueError, TypeError) as error:
         message = f"{contents.path}: what is stored of the reduced model is incomplete ({error})"
         raise ResultFileError(message) from None

@@ -20,18 +20,18 @@ from fecm.deck.model import Deck
 from fecm.deck.units import unit_of
 from fecm.results.groups import NotStoredError, ResultFileError
 from fecm.results.metrics import COLUMNS, VALIDITY
+from fecm.results.schema import SWEEP_DATASETS
 from fecm.results.stored import deck_in
 from fecm.sweeps.convergence import Convergence, convergence
 from fecm.sweeps.outcome import Column, Status, was_run
 from fecm.sweeps.reduced import ReducedModel
 from fecm.sweeps.statistics import RandomResult, open_cases
 
+# Arrays beside the tables, and their dimensions.
+OWN_ARRAYS = ("dt", "steps", "unsettled_steps", "force")
 OWN_DIMENSIONS = {
-    "force": "force",
-    "dt": "time",
-    "steps": "",
-}  # of arrays that are not in the tables
-OWN_ARRAYS = (*OWN_DIMENSIONS, "unsettled_steps")
+    name: SWEEP_DATASETS[f"history/{name}"].dimension for name in ("force", "dt", "steps")
+}
 
 
 @dataclass(repr=False)
