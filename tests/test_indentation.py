@@ -10,13 +10,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fecm import ContactPoint, Law
+from fecm.listing import ListingLaw
 from fecm.mechanics import (
     RELOADING,
     UNLOADING,
     VIRGIN,
     HystereticLaw,
     LinearPermanent,
-    ListingLaw,
     LoadingHistory,
 )
 

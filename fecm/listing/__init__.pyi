@@ -1,6 +1,8 @@
 """Names of this room for other rooms and for tests; each is imported when it is first used."""
 
+from fecm.listing.law import ListingLaw as ListingLaw
 from fecm.listing.slips import LISTING as LISTING
 from fecm.listing.slips import MODES as MODES
 from fecm.listing.slips import NAMES as NAMES
 from fecm.listing.slips import active_slips as active_slips
+from fecm.listing.variant import MISREAD_DENSITY as MISREAD_DENSITY

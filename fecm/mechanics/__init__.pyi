@@ -5,7 +5,6 @@ from fecm.mechanics.contact_law import UNLOADING as UNLOADING
 from fecm.mechanics.contact_law import VIRGIN as VIRGIN
 from fecm.mechanics.contact_law import HystereticLaw as HystereticLaw
 from fecm.mechanics.contact_law import LinearPermanent as LinearPermanent
-from fecm.mechanics.contact_law import ListingLaw as ListingLaw
 from fecm.mechanics.contact_law import LoadingHistory as LoadingHistory
 from fecm.mechanics.contact_law import YangSunPermanent as YangSunPermanent
 from fecm.mechanics.contact_law import hertz_coefficient as hertz_coefficient

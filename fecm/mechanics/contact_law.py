@@ -272,13 +272,13 @@ class MeasuredLaw(Generic[Number]):
     def start(self) -> LoadingHistory[Number]:
         """Loading history before the first contact."""
         k = self.constants.k
-        zero = _like(k, 0.0)
+        zero = filled_like(k, 0.0)
         return LoadingHistory(
-            branch=_like(k, VIRGIN),
+            branch=filled_like(k, VIRGIN),
             f=k,
             b=zero,
-            w=_like(k, 1.0),
-            p=_like(k, LOADING_POWER),
+            w=filled_like(k, 1.0),
+            p=filled_like(k, LOADING_POWER),
             peak=zero,
             peak_force=zero,
             permanent=zero,
@@ -364,16 +364,22 @@ class HystereticLaw(MeasuredLaw[Number]):
         permanent = select(leaves, c.permanent(last.indentation), m.permanent)
         # Unloading starts on the first loading curve, or at the last point of a reloading curve.
         begin = select(leaves, peak_force, last.force)
-        down = _unloading(c.q, last, begin, peak=peak, peak_force=peak_force, permanent=permanent)
+        down = unloading_branch(
+            c.q, last, begin, peak=peak, peak_force=peak_force, permanent=permanent
+        )
         up = self._reloading(m, last)
         first = m._replace(
-            branch=_like(a, VIRGIN),
+            branch=filled_like(a, VIRGIN),
             f=c.k,
-            b=_like(a, 0.0),
-            w=_like(a, 1.0),
-            p=_like(a, LOADING_POWER),
+            b=filled_like(a, 0.0),
+            w=filled_like(a, 1.0),
+            p=filled_like(a, LOADING_POWER),
         )
-        return _choose(leaves | turns_down, down, _choose(turns_up, up, _choose(returns, first, m)))
+        return choose_history(
+            leaves | turns_down,
+            down,
+            choose_history(turns_up, up, choose_history(returns, first, m)),
+        )
 
     def _reloading(
         self, m: LoadingHistory[Number], last: ContactPoint[Number]
@@ -391,52 +397,14 @@ class HystereticLaw(MeasuredLaw[Number]):
             f=m.peak_force,
             b=origin,
             w=m.peak - origin,
-            p=select(level, _like(origin, 0.0), _like(origin, LOADING_POWER)),
+            p=select(level, filled_like(origin, 0.0), filled_like(origin, LOADING_POWER)),
             peak=m.peak,
             peak_force=m.peak_force,
             permanent=m.permanent,
         )
 
 
-@dataclass(frozen=True)
-class ListingLaw(MeasuredLaw[Number]):
-    """The printed program's law (the slip ``reload``), which never returns to an earlier branch.
-
-    The first trial whose force is below the last accepted one ends loading; the first trial on the
-    unloading curve whose force is not below it starts reloading.  Trials that the contact iteration
-    discards count.
-    """
-
-    def trial(
-        self, memory: LoadingHistory[Number], last: ContactPoint[Number], indentation: Number
-    ) -> tuple[Number, LoadingHistory[Number]]:
-        """Contact force at a trial indentation, and the loading history after the trial."""
-        m, c = memory, self.constants
-        force = branch_force(m, indentation)
-        leaves = (m.branch == VIRGIN) & (force < last.force)
-        if any_case(leaves):
-            a, f = last
-            down = _unloading(c.q, last, f, peak=a, peak_force=f, permanent=c.permanent(a))
-            m = _choose(leaves, down, m)
-            force = branch_force(m, indentation)
-        turns = (m.branch == UNLOADING) & (indentation > m.permanent) & (force >= last.force)
-        if any_case(turns):
-            f = m.peak_force * (m.w > 0.0)
-            up = m._replace(
-                branch=_like(f, RELOADING), f=f, b=m.permanent, p=_like(f, LOADING_POWER)
-            )
-            m = _choose(turns, up, m)
-            force = branch_force(m, indentation)
-        return force, m
-
-    def accept(
-        self, memory: LoadingHistory[Number], last: ContactPoint[Number], indentation: Number
-    ) -> LoadingHistory[Number]:
-        """Loading history after a step, which its trials have already changed."""
-        return memory
-
-
-def _unloading(
+def unloading_branch(
     q: float | Number,
     last: ContactPoint[Number],
     begin: Number,
@@ -471,11 +439,11 @@ def _curve(
 ) -> LoadingHistory[Number]:
     """A branch; its force is zero if its width is not positive."""
     return LoadingHistory(
-        branch=_like(f, branch),
+        branch=filled_like(f, branch),
         f=select(w > 0.0, f, 0.0),
         b=b,
         w=select(w > 0.0, w, 1.0),
-        p=_like(f, p),
+        p=filled_like(f, p),
         peak=peak,
         peak_force=peak_force,
         permanent=permanent,
@@ -499,7 +467,7 @@ def follow(
         begin = corner
 
 
-def _choose(
+def choose_history(
     condition: bool | Bools, yes: LoadingHistory[Number], no: LoadingHistory[Number]
 ) -> LoadingHistory[Number]:
     """`yes` where the condition holds, otherwise `no`."""
@@ -510,6 +478,6 @@ def _choose(
     return LoadingHistory(*chosen)
 
 
-def _like(number: Number, value: float | Number) -> Number:
+def filled_like(number: Number, value: float | Number) -> Number:
     """A value, for each case where the number is an array."""
     return np.full_like(number, value) if isinstance(number, np.ndarray) else value

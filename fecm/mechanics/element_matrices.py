@@ -35,7 +35,7 @@ class IntegrationRules:
     bending: Quadrature
     shear: Quadrature
     strains: Quadrature  # points of the stored strains
-    transposed_jacobian: bool = False  # transpose the inverse Jacobian (the slip ``jacobian``)
+    transposed_jacobian: bool = False  # transpose the inverse Jacobian
     # Take the transverse shear strains of :mod:`~fecm.mechanics.strains`.
     assumes_shear: bool = False
 

@@ -46,17 +46,17 @@ class ImpactState(ContactState[float]):
 
 @dataclass(frozen=True)
 class ImpactConditions:
-    """Conditions of the impact, with the slips that affect it as parameters."""
+    """Conditions of the impact."""
 
     load: Load  # the impact dof, or the nodal weights of a patch
     velocity: float  # approach velocity, length/time
-    # Whether the contact law takes the plate's motion into account (not with the slip ``target``).
+    # Whether the contact law takes the plate's motion into account.
     plate_moves: bool = True
-    # Whether the rod's du/dx start at the approach velocity (the slip ``rod-start``).
+    # Whether the rod's du/dx start at the approach velocity.
     strains_start_moving: bool = False
-    # Whether the rod keeps the constants of the first time step (the slip ``rod-dt``).
+    # Whether the rod keeps the constants of the first time step.
     keeps_first_step: bool = False
-    # Fraction of the contact force that acts on the plate; 1 without the slip ``rod-force``.
+    # Fraction of the contact force that acts on the plate.
     share: float = 1.0
 
 
@@ -103,7 +103,7 @@ class ImpactSystem:
     ) -> None:
         """Take one step with the load factor of FORC's values; changes the state.
 
-        A `force` replaces the contact force on the plate (the slip ``prop-contact``).  Raises
+        A `force` replaces the contact force on the plate.  Raises
         DivergenceError if indentation or force is no longer finite.
         """
         self.motion.advance(state.plate, dt, factor, self.applied(state, force))

@@ -73,7 +73,7 @@ def inverse_jacobian(
     """Inverse (ne, npt, 2, 2) and determinant (ne, npt) of the Jacobian.
 
     `local` has the derivatives of the shape functions by xi and eta, (npt, 2, nn).  The inverse has
-    dxi_a/dx_i in row i and column a; `transposed_jacobian` transposes it (the slip ``jacobian``).
+    dxi_a/dx_i in row i and column a; `transposed_jacobian` transposes it.
     """
     J: Array = jacobian(family, local)
     inverse = np.linalg.inv(J)

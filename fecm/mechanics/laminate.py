@@ -17,9 +17,9 @@ import numpy as np
 
 from fecm._typing import Floats
 
-# The slip ``small-stiffness`` sets entries of A, B and D below the first limit to 0, except
+# `without_small_entries` sets entries of A, B and D below the first limit to 0, except
 # rounding errors below the second one, relative to A h^n.
-LISTING_LEAST = 1.0e-6
+LEAST_ENTRY = 1.0e-6
 SOFT_CORE = 1.0 / 50.0  # G13 of a sandwich's core over that of its faces, at most
 ROUNDING = 1.0e-12
 # Of a fabric: least E2/E1, which is 0.8 to 1.2, and largest G12/E2.
@@ -137,12 +137,12 @@ class LaminateSection:
         return _constants(stiffness * 12.0 / self.thickness**3)
 
     def without_small_entries(self) -> LaminateSection:
-        """Set entries of A, B, D below 1e-6, but not rounding errors, to 0: the listing's CNPD."""
+        """Set entries of A, B, D below 1e-6, but not rounding errors, to 0."""
         scale = ROUNDING * np.abs(self.A).max()
 
         def cut(matrix: Floats, power: int) -> Floats:
             size = np.abs(matrix)
-            small = (size < LISTING_LEAST) & (size > scale * self.thickness**power)
+            small = (size < LEAST_ENTRY) & (size > scale * self.thickness**power)
             return np.where(small, 0.0, matrix)
 
         return replace(self, A=cut(self.A, 0), B=cut(self.B, 1), D=cut(self.D, 2))

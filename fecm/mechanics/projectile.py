@@ -149,7 +149,6 @@ REPORT_ELEMENTS = 20
 REPORT_LENGTH = 1.0
 REPORT_MODULUS = 30.0e6
 REPORT_DENSITY = 0.0006875
-LISTING_DENSITY = 0.0003225
 
 # The report's program uses the lumped mass, its text the consistent one (equation 4-24).
 MassMatrix = Literal["lumped", "consistent"]
@@ -432,7 +431,7 @@ class RodIntegrator:
     :math:`y' = T y + h f`.
 
     `K` is the stiffness, `m` the lumped mass (n,) or a mass matrix (n, n); `constants_dt` is the
-    time step of the method's constants if that is not `dt` (the slip ``rod-dt``).  `rigid` has the
+    time step of the method's constants if that is not `dt`.  `rigid` has the
     dofs of a unit rigid displacement, (n,), by default those of a rod.
 
     References

@@ -227,8 +227,8 @@ class StrainField:
             values, local = local_shape_functions(family, self.rule)
             # Rows: d/dxi, d/deta and value at every point, for one matrix product.
             table = np.concatenate([local[:, 0], local[:, 1], values])
-            slip = self.transposed_jacobian
-            inverse, _ = inverse_jacobian(family, local, transposed_jacobian=slip)
+            transposed = self.transposed_jacobian
+            inverse, _ = inverse_jacobian(family, local, transposed_jacobian=transposed)
             for start in range(0, len(family.rows), STRAIN_BLOCK):
                 cut = slice(start, start + STRAIN_BLOCK)
                 places = family.nodes[cut].T[:, None] * NDOF + np.array([2, 3, 4])[:, None]

@@ -186,7 +186,7 @@ def _stiffest(laminate: LaminateSection) -> float:
 
 
 def _mapping(block: ElementBlock, local: Floats, *, transposed: bool) -> Floats:
-    """Slopes dx_i/dxi_a at points, (ne, i, a, npt); `transposed` swaps i and a, a slip."""
+    """Slopes dx_i/dxi_a at points, (ne, i, a, npt); `transposed` swaps i and a."""
     slopes = mapping_slopes(block, local)
     return slopes.swapaxes(1, 2) if transposed else slopes
 

@@ -1,4 +1,4 @@
-"""Build the model of a run from a checked problem; active slips become parameters of its parts."""
+"""Build the model of a run from a checked problem and its options."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ from fecm._machine import free_processors
 from fecm._typing import Bools, Indices
 from fecm.deck import model
 from fecm.deck.macros import flat, moves_only
+from fecm.listing.variant import REPORT_PLATE, ImpactVariant, PlateVariant, Variant, variant_of
 from fecm.mechanics import contact_law
 from fecm.mechanics.failure import OwnCriterion
 from fecm.mechanics.impact import ImpactConditions, ImpactSystem
@@ -48,8 +49,6 @@ if TYPE_CHECKING:
 
 ENERGY_LIMIT = 0.1  # relative error of the energy balance that ends a run
 WORTH_SHARING = 100_000  # number of equations above which threads save more than they cost
-# Slips that change the plate or its loads.
-PLATE_SLIPS = {"g12", "small-stiffness", "shear-order", "tapes", "jacobian", "rod-force"}
 
 
 @dataclass(frozen=True)
@@ -125,6 +124,7 @@ class ImpactModel(NamedTuple):
     cure: Sequence[Residual] | None
     laminates: tuple[int, ...]  # numbers of the laminates on the cards
     materials: Ints | None  # of the plies of each laminate; None if there is one material
+    variant: Variant  # parameters of the parts that slips change
 
     @property
     def is_stressed_at_rest(self) -> bool:
@@ -134,18 +134,20 @@ class ImpactModel(NamedTuple):
 
 
 def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactModel:
-    """Build the model of a checked problem, with its own plate unless a slip changes that."""
+    """Build the model of a checked problem, with its own plate unless the options change that."""
     chosen = options or RunOptions()
-    deck, slips = problem.deck, chosen.slips
-    own = chosen.projectile or build_projectile(deck, slips)
+    deck, variant = problem.deck, variant_of(chosen.slips)
+    own = chosen.projectile or build_projectile(deck, variant.impact)
     rod = own.with_mass(chosen.rod_method.mass)
-    mesh, share = _mesh_with_rods_force(problem, slips)
-    plate, mobile = _plates(problem, mesh, slips)
+    mesh, share = problem.mesh, 1.0
+    if problem.contact is not None and variant.impact.nodal_force_scales:
+        mesh, share = _share_of_contact_force(problem)
+    plate, mobile = _plates(problem, mesh, variant.plate)
     motion, workers = _motion(problem, mobile, chosen)
     impact = None
     if problem.contact is not None:
-        conditions = _conditions(problem, motion.load(problem.contact), share, slips)
-        law = chosen.law or build_law(deck, slips)
+        conditions = _conditions(problem, motion.load(problem.contact), share, variant.impact)
+        law = chosen.law or build_law(deck, variant.impact)
         impact = ImpactSystem(motion, rod, law, conditions, STEPS[chosen.rod_method.integrator])
     compiled = motion.solver == KERNELS
     cure = residuals_of_deck(deck, plate.laminates)
@@ -159,10 +161,10 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     plies, failure = _stresses(problem, plate, motion, cure, chosen.criteria, under_load)
     read, station = (
         _gages(problem, mesh, plate),
-        build_station(deck, rod, slips, is_own=chosen.projectile is not None),
+        build_station(deck, rod, variant.impact, is_own=chosen.projectile is not None),
     )
     steps = None
-    if impact is not None and can_step(impact):
+    if impact is not None and not chosen.slips and can_step(impact):
         sums = None if read is None else motion.dof_sums(read.dof_indices, read.weights)
         steps = ImpactSteps(impact, sums, station.dof, workers.count)
     return ImpactModel(
@@ -185,16 +187,15 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         cure=cure,
         laminates=tuple(deck.layers),
         materials=materials_of_deck(deck),
+        variant=variant,
     )
 
 
-def _mesh_with_rods_force(problem: Problem, slips: frozenset[str]) -> tuple[MeshArrays, float]:
-    """The mesh, and the share of the contact force that acts on it, 1 but for ``rod-force``.
+def _share_of_contact_force(problem: Problem) -> tuple[MeshArrays, float]:
+    """The mesh, and the share of the contact force that acts on it: the nodal force of ROD's dof.
 
-    With that slip a FORC card may have replaced the unit force of ROD's dof, or added to it.
+    A FORC card may have replaced the unit force of this dof, or added to it.
     """
-    if problem.contact is None or "rod-force" not in slips:
-        return problem.mesh, 1.0
     card = problem.deck.require(model.Impact)
     hit = card.node - 1, card.dof - 1
     forces = generate(problem.deck, unit_force=True).forces
@@ -204,12 +205,12 @@ def _mesh_with_rods_force(problem: Problem, slips: frozenset[str]) -> tuple[Mesh
 
 
 def _plates(
-    problem: Problem, mesh: MeshArrays, slips: frozenset[str]
+    problem: Problem, mesh: MeshArrays, variant: PlateVariant
 ) -> tuple[PlateModel, PlateModel]:
     """The plate, and the plate with only the dofs free that the program moves."""
-    if not slips & PLATE_SLIPS:
+    if mesh is problem.mesh and variant == REPORT_PLATE:
         return problem.plate, problem.moving_plate
-    plate = build_plate(problem.deck, mesh, slips)
+    plate = build_plate(problem.deck, mesh, variant)
     if moves_only(problem.program):
         return plate, restrain_resting_dofs(plate, problem.contact)
     return plate, plate
@@ -228,15 +229,15 @@ def _motion(
 
 
 def _conditions(
-    problem: Problem, load: Load, share: float, slips: frozenset[str]
+    problem: Problem, load: Load, share: float, variant: ImpactVariant
 ) -> ImpactConditions:
     """Conditions of an impact; `share` is that of the contact force which acts on the plate."""
     return ImpactConditions(
         load=load,
         velocity=problem.deck.require(model.Impact).velocity,
-        plate_moves="target" not in slips,
-        strains_start_moving="rod-start" in slips,
-        keeps_first_step="rod-dt" in slips,
+        plate_moves=variant.plate_moves,
+        strains_start_moving=variant.strains_start_moving,
+        keeps_first_step=variant.keeps_first_step,
         share=share,
     )
 

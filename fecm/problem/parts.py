@@ -1,4 +1,4 @@
-"""Parts of a run that its deck alone determines; active slips become their parameters."""
+"""Parts of a run that its deck determines, with the parameters of its variant."""
 
 from __future__ import annotations
 
@@ -13,6 +13,8 @@ from fecm._typing import Indices
 from fecm.deck import model
 from fecm.deck.material_cards import MATERIAL
 from fecm.deck.model import Deck, RodDiameter
+from fecm.listing.law import ListingLaw
+from fecm.listing.variant import REPORT_IMPACT, REPORT_PLATE, ImpactVariant, PlateVariant
 from fecm.mechanics import contact_law
 from fecm.mechanics.contact_law import Number
 from fecm.mechanics.element_matrices import IntegrationRules
@@ -22,8 +24,6 @@ from fecm.mechanics.mesh import Ints, MeshArrays
 from fecm.mechanics.plate import UNLOADED, PlateModel
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
 from fecm.mechanics.projectile import (
-    LISTING_DENSITY,
-    REPORT_DENSITY,
     DeckProjectile,
     Projectile,
     RigidMass,
@@ -53,17 +53,17 @@ def rules(material: model.Material) -> tuple[Quadrature, Quadrature, Quadrature]
     return gauss(bending), gauss(shear), points
 
 
-def build_plate(deck: Deck, mesh: MeshArrays, slips: frozenset[str] = frozenset()) -> PlateModel:
-    """Build the plate of a deck with the active slips."""
+def build_plate(deck: Deck, mesh: MeshArrays, variant: PlateVariant = REPORT_PLATE) -> PlateModel:
+    """Build the plate of a deck."""
     bending, shear, points = rules(deck.require(model.Material))
-    first, *others = laminates_of_deck(deck, isotropic_g12="g12" in slips)
-    if "small-stiffness" in slips:
+    first, *others = laminates_of_deck(deck, isotropic_g12=variant.isotropic_g12)
+    if variant.cuts_small_stiffness:
         first = first.without_small_entries()
     used = IntegrationRules(
         bending=bending,
-        shear=bending if "shear-order" in slips else shear,
-        strains=bending if "tapes" in slips else points,
-        transposed_jacobian="jacobian" in slips,
+        shear=bending if variant.shear_at_bending_points else shear,
+        strains=bending if variant.strains_at_bending_points else points,
+        transposed_jacobian=variant.transposed_jacobian,
         assumes_shear=has_assumed_shear(deck),
     )
     preload, curved = deck.last(model.Preload), deck.last(model.Curvature)
@@ -79,10 +79,10 @@ def build_plate(deck: Deck, mesh: MeshArrays, slips: frozenset[str] = frozenset(
     )
 
 
-def build_projectile(deck: Deck, slips: frozenset[str] = frozenset()) -> DeckProjectile:
+def build_projectile(deck: Deck, variant: ImpactVariant = REPORT_IMPACT) -> DeckProjectile:
     """Build the projectile of a deck; without a PROJ segment the report's rod."""
     if (card := deck.last(model.Projectile)) is None:
-        return report_rod(LISTING_DENSITY if "density" in slips else REPORT_DENSITY)
+        return report_rod(variant.rod_density)
     if not card.elements:
         return RigidMass(card.size)
     return Rod(card.size, tuple(rod_diameters(card).tolist()), card.modulus, card.density)
@@ -115,28 +115,29 @@ def constants_of(
 
 
 def build_station(
-    deck: Deck, projectile: Projectile, slips: frozenset[str], *, is_own: bool = False
+    deck: Deck,
+    projectile: Projectile,
+    variant: ImpactVariant = REPORT_IMPACT,
+    *,
+    is_own: bool = False,
 ) -> Transducer:
-    """Build the transducer: PROJ's node, or the rod's middle (the next node under its slip).
+    """Build the transducer: PROJ's node, or the rod's middle.
 
     PROJ's is not that of a projectile of a user.
     """
-    sign = 1.0 if "station" in slips else -1.0
     if not isinstance(projectile, Rod):
-        return Transducer(0, sign)
+        return Transducer(0, variant.station_sign)
     card = None if is_own else deck.last(model.Projectile)
-    middle = projectile.elements // 2 + (2 if "station" in slips else 1)
-    return Transducer(middle if card is None or not card.transducer else card.transducer, sign)
+    middle = projectile.elements // 2 + 1 + variant.station_after_middle
+    node = middle if card is None or not card.transducer else card.transducer
+    return Transducer(node, variant.station_sign)
 
 
 def build_law(
-    deck: Deck, slips: frozenset[str] = frozenset()
-) -> contact_law.HystereticLaw | contact_law.ListingLaw:
-    """Build the contact law of a deck with the active slips."""
-    constants = build_constants(deck.require(model.Indentation))
-    if "reload" in slips:
-        return contact_law.ListingLaw(constants)
-    return contact_law.HystereticLaw(constants)
+    deck: Deck, variant: ImpactVariant = REPORT_IMPACT
+) -> contact_law.HystereticLaw | ListingLaw:
+    """Build the contact law of a deck."""
+    return variant.law(build_constants(deck.require(model.Indentation)))
 
 
 def laminate_numbers(deck: Deck) -> Indices:

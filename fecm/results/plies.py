@@ -227,7 +227,7 @@ class _Constants(NamedTuple):
 def _constants(
     deck: Deck, layups: Layup | list[Layup], count: int, isotropic_shear: bool
 ) -> _Constants:
-    """Constants of the plies; the slip ``g12`` takes isotropic plies by E and nu."""
+    """Constants of the plies; `isotropic_shear` takes isotropic plies by E and nu."""
 
     def g12(ply: Ply) -> float:
         if isotropic_shear and ply.e1 == ply.e2:

@@ -30,20 +30,20 @@ def set_time_step(run: Simulation, dt: float) -> None:
     run.state.dt = dt
     if not dt:
         plate, problem = run.model.motion.plate, run.problem
-        known = plate is problem.moving_plate  # unless a slip changes the plate
+        known = plate is problem.moving_plate  # unless the options change the plate
         critical = problem.critical_time_step if known else critical_time_step(plate)
         run.state.dt = dt = taken_time_step(critical)
         run.state.notes.append(f"DT 0: took {dt:g}, {SAFE:g} of the critical {critical:.4g}")
 
 
 def advance_clock(run: Simulation) -> None:
-    """TIME; does nothing under its slip."""
-    if "time" not in run.options.slips:
+    """TIME."""
+    if not run.model.variant.program.clock_stands:
         run.state.clock += run.state.dt
 
 
 def proportional_load(run: Simulation, n: float) -> None:
-    """PROP: read a table, or (under the slip ``prop``) take its value at t = 0."""
+    """PROP: read a table, or take its value at t = 0."""
     state, tables = run.state, run.problem.deck.tables
     if n > 0:
         if state.tables_read < len(tables):
@@ -52,7 +52,7 @@ def proportional_load(run: Simulation, n: float) -> None:
         state.constant_factor = 0.0
     elif state.table is not None:
         state.constant_factor = load_factor(tables[state.table], 0.0)
-    if "prop-contact" in run.options.slips:
+    if run.model.variant.program.prop_replaces_contact:
         state.prop_force = run.load_factor(state.clock)
 
 
@@ -61,21 +61,21 @@ def impact_step(run: Simulation, n: int) -> None:
     state, impact, system = run.state, run.state.impact, run.model.impact
     if system is None or impact is None:
         return
-    plate, recorder, slips = state.plate, run.recorder, run.options.slips
+    plate, recorder, program = state.plate, run.recorder, run.model.variant.program
     if not plate.step:
         recorder.steps.begin(plate, impact)
-        state.prop_force = None  # the listing's first impact step begins with PROP = 0
+        state.prop_force = None  # the first impact step begins with PROP = 0
     stores = not (plate.step + 1) % n
-    if "counter" in slips:
+    if program.counts_from_output:
         steps = state.steps_since_output + 1
         stores = steps == n
         state.steps_since_output = steps if steps < n else 0
-    if stores and "tapes" in slips:  # strains one step late
+    if stores and program.strains_precede_step:
         recorder.strains([plate.step + 1], [plate.time], run.displacement_field()[None])
     system.advance(impact, state.dt, run.force_factor(), state.prop_force)
     state.prop_force = None
     recorder.steps.step(plate, impact, run.force_factor(), on_tape9=stores)
-    if stores and "tapes" not in slips:
+    if stores and not program.strains_precede_step:
         recorder.strains([plate.step], [plate.time], run.displacement_field()[None])
     run.observe()
 
@@ -269,12 +269,12 @@ def store_stresses(run: Simulation, n: int) -> None:
 
 
 def store_sizes(run: Simulation) -> None:
-    """CHEC: store and print sizes; ends the program under its slip."""
+    """CHEC: store and print sizes."""
     plate = run.model.plate
     profile = plate.profile()
     run.sink.attributes("mesh", {"equations": plate.neq, "profile": profile})
     run.printer.check(plate, profile)
-    if "check-end" in run.options.slips:
+    if run.model.variant.program.ends_at_check:
         raise EndedError
 
 
@@ -303,7 +303,7 @@ def bind_loop(run: Simulation, body: Body) -> Passes | None:
     """Return what carries out passes of a loop together; None if its macros need single steps."""
     macros = [item for item in body if isinstance(item, Macro)]
     words = [macro.word for macro in macros]
-    if run.model.steps is None or run.options.slips or len(macros) < len(body):
+    if run.model.steps is None or len(macros) < len(body):
         return None
     if words.count("RODP") != 1 or len(set(words)) < len(words):
         return None

@@ -73,8 +73,7 @@ class Damped(NamedTuple):
 class StepRecorder:
     """Stores every step in `buffers`; of a plate alone energies and gages only.
 
-    The slip `tapes` stores contact on tape9 at every step instead of every N-th; `on_block` is
-    called with the columns of each block and the initial energy.
+    `on_block` is called with the columns of each block and the initial energy.
     """
 
     def __init__(
@@ -82,7 +81,6 @@ class StepRecorder:
         sink: Sink,
         buffers: Mapping[str, RowBuffer],
         model: ImpactModel,
-        tapes: bool,
         on_block: OnBlock,
     ) -> None:
         self._sink = sink
@@ -92,7 +90,7 @@ class StepRecorder:
         self._impact = model.impact
         self._station = model.station
         self._on_block = on_block
-        self._tapes = tapes
+        self._contact_at_every_step = model.variant.program.contact_at_every_step
         self._gages: DofSums | None = None
         gages = 0
         if model.impact is not None:
@@ -134,7 +132,7 @@ class StepRecorder:
             self._rod[self._count] = impact.rod.motion
             indentation, force = impact.contact
             row += [force, indentation, impact.plate_w, impact.contact_work, impact.rod.tip]
-            row.append(on_tape9 or self._tapes)
+            row.append(on_tape9 or self._contact_at_every_step)
         self._table[: len(row), self._count] = row
         self._count += 1
         if self._count == BLOCK:
@@ -315,7 +313,7 @@ class Recorder:
     """Stores the rows of a run, of which `sizes` has upper bounds, in a sink."""
 
     def __init__(
-        self, sink: Sink, model: ImpactModel, sizes: WorkEstimate, tapes: bool, on_block: OnBlock
+        self, sink: Sink, model: ImpactModel, sizes: WorkEstimate, on_block: OnBlock
     ) -> None:
         self._sink = sink
         self._model = model
@@ -328,11 +326,12 @@ class Recorder:
         if own:
             sink.axis_names["criteria"] = (*ALL_CRITERIA, *own)
         has_impact = model.impact is not None
+        contact_at_every_step = model.variant.program.contact_at_every_step
         self._room = {  # upper bound of the rows of each group
             **{group: sizes.passes[STORED_BY[group]] for group in AT_MACROS},
             "exposures": sizes.passes["FAIL"] + model.is_stressed_at_rest,
             "tape8": has_impact * sizes.contact_rows,
-            "tape9": has_impact * (sizes.steps if tapes else sizes.contact_rows),
+            "tape9": has_impact * (sizes.steps if contact_at_every_step else sizes.contact_rows),
             "history": has_impact * sizes.steps,
             "energy": sizes.steps,
             "gages": (model.gages is not None) * sizes.steps,
@@ -358,7 +357,7 @@ class Recorder:
             members = [p for p in self._datasets if p[0].group == group and p[0].shape[0] == "rows"]
             if members:
                 self._buffers[group] = RowBuffer(sink, members)
-        self.steps = StepRecorder(sink, self._buffers, model, tapes, on_block)
+        self.steps = StepRecorder(sink, self._buffers, model, on_block)
 
     def _shape(self, dataset: Dataset) -> tuple[int, ...]:
         """Shape of a dataset with all its rows."""

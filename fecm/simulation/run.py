@@ -90,7 +90,8 @@ def _write_header(simulation: Simulation) -> None:
     }
     sink.attributes("", attributes)
     sink.deck(deck.text or deck.to_text())
-    at_nodes = deck.require(Material).integration.points < 0 and "tapes" not in options.slips
+    at_points = simulation.model.variant.plate.strains_at_bending_points
+    at_nodes = deck.require(Material).integration.points < 0 and not at_points
     simulation.recorder.create("nodes" if at_nodes else "gauss")
     _write_cure(simulation)
 

@@ -59,8 +59,8 @@ class Simulation:
             state.impact = self.model.impact.start(state.plate)
         if self.model.failure is not None:
             state.failure = self.model.failure.start()
-        if "prop-contact" in options.slips:
-            state.prop_force = 1.0  # PROP's first value in the listing
+        if self.model.variant.program.prop_replaces_contact:
+            state.prop_force = 1.0  # PROP's first value
         self.interpreter = Interpreter(problem.program)
         pace = SINGLY if self.model.steps is None else TOGETHER
         # Steps between two calls of the observers.
@@ -68,8 +68,7 @@ class Simulation:
         limit = None if options.slips else options.energy_limit
         # Without a reference to the run, which would keep it alive.
         on_block = partial(state.monitor.add, limit=limit, threshold=problem.threshold)
-        tapes = "tapes" in options.slips
-        self.recorder = Recorder(self.sink, self.model, problem.work, tapes, on_block)
+        self.recorder = Recorder(self.sink, self.model, problem.work, on_block)
 
     @cached_property
     def tangent(self) -> Tangent:
@@ -82,16 +81,16 @@ class Simulation:
         self.__dict__.pop("tangent", None)
 
     def load_factor(self, clock: float) -> float:
-        """Load factor of PROP at a time of the clock; under its slip that of t = 0."""
+        """Load factor of PROP at a time of the clock."""
         state = self.state
-        if state.table is None or "prop" in self.options.slips:
+        if state.table is None or self.model.variant.program.table_stands:
             return state.constant_factor
         return load_factor(self.problem.deck.tables[state.table], clock)
 
     def force_factor(self, clock: float | None = None) -> float:
         """Factor of FORC's values at a time of the clock, by default now."""
         state = self.state
-        if "force-scale" in self.options.slips and state.impact is not None:
+        if self.model.variant.program.contact_scales_forces and state.impact is not None:
             contact = float(state.impact.contact.force)
             return contact if state.prop_force is None else state.prop_force
         return self.load_factor(state.clock if clock is None else clock)

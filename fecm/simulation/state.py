@@ -139,8 +139,8 @@ class RunState:
     # (numnp, 5): displacement about which TANG has formed the stiffness of a nonlinear plate
     linearised: Floats | None = None
     equilibrium_factor: float = 0.0  # load factor of the last equilibrium that CONV found
-    steps_since_output: int = 0  # impact steps since the last output (the slip ``counter``)
-    prop_force: float | None = None  # instead of the contact force (the slip ``prop-contact``)
+    steps_since_output: int = 0  # impact steps since the last output
+    prop_force: float | None = None  # instead of the contact force
     first_dt: float | None = None  # time step of the rod's constants
     monitor: Monitor = field(default_factory=Monitor)
     failure: FailureEnvelope | None = None  # largest exposures so far, of FAIL

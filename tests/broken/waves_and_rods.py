@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from fecm.listing import MISREAD_DENSITY
 from fecm.mechanics import (
     projectile,
 )
@@ -43,7 +44,7 @@ BREAKS: Breaks = {
         {"rod-waves": ("first free frequency, cons",)},
     ),
     "the density that is misread in the listing": (
-        value(projectile.report_rod, "__defaults__", (projectile.LISTING_DENSITY,)),
+        value(projectile.report_rod, "__defaults__", (MISREAD_DENSITY,)),
         {"rod-pulse": ("mass",)},
     ),
     "force of the wrong station": (

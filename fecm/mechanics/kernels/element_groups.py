@@ -296,12 +296,12 @@ class ElementGroup:
         if self.kind == ElementKind.FACTORIZED:
             return _in_lanes(self._coefficients(members))
         family = self.family.take(members)
-        assumed, slip = self._plate.rules.assumes_shear, self._plate.rules.transposed_jacobian
-        # Assumed shear strains don't have the slip.
-        slips = (slip, slip and not assumed)
+        assumed, swaps = self._plate.rules.assumes_shear, self._plate.rules.transposed_jacobian
+        # Assumed shear strains have the right Jacobian.
+        transposed_of = (swaps, swaps and not assumed)
         parts = [
             self._at_points(rule, family, members, transposed=transposed)
-            for rule, transposed in zip(self._rules, slips, strict=True)
+            for rule, transposed in zip(self._rules, transposed_of, strict=True)
         ]
         if assumed:
             parts += slopes_of_mapping(family)

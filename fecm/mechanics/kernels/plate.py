@@ -137,7 +137,7 @@ class PlateStruct(Structure):
         ("preload", Doubles),
         ("curvature", Doubles),
         ("nonlinear", c_int64),  # whether stretching follows from bending
-        ("transposed", c_int64),  # whether the inverse Jacobian is, the slip `jacobian`
+        ("transposed", c_int64),  # whether the inverse Jacobian is
         ("planes", c_int64),  # first dimension of `mass`: 1, or nd
         ("mass", Doubles),
         ("inverse", Doubles),

@@ -195,7 +195,7 @@ def rod_of(deck: Deck) -> Struck:
     projectile = build_projectile(deck)
     if isinstance(projectile, RigidMass):
         raise StudyError("the projectile is a rigid mass; a pulse needs a rod")
-    node = build_station(deck, projectile, frozenset()).node
+    node = build_station(deck, projectile).node
     station = (node - 1) * projectile.length / projectile.elements
     steps = [macro.value for macro in deck.macros if macro.word == "DT" and macro.value > 0.0]
     return Struck(projectile, station, steps[0] if steps else None, unit_names(deck))
