@@ -10,6 +10,7 @@ import pytest
 import fecm
 from fecm import DeckError, Result
 from fecm.api import Mode, load_deck
+from fecm.listing import NAMES, variant_of
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ready, small
 
@@ -178,3 +179,18 @@ def test_a_deck_that_listing_mode_refuses_is_unusable_input(tmp_path: Path) -> N
     assert call("check", deck, "--mode", "listing").exit_code == 1
     assert call("check", deck).exit_code == 0
     assert [path.name for path in tmp_path.iterdir()] == ["mixed.inp"]
+
+
+@pytest.mark.parametrize("slip", NAMES)
+def test_every_slip_changes_a_parameter_and_shares_it_with_no_other(slip: str) -> None:
+    def changed(slips: frozenset[str]) -> set[tuple[str, str]]:
+        return {
+            (part, name)
+            for part, values in variant_of(slips)._asdict().items()
+            for name, value in values._asdict().items()
+            if value != type(values)._field_defaults[name]
+        }
+
+    assert not changed(frozenset())
+    assert changed(frozenset({slip}))
+    assert not changed(frozenset({slip})) & changed(frozenset(NAMES) - {slip})

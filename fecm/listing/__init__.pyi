@@ -6,3 +6,5 @@ from fecm.listing.slips import MODES as MODES
 from fecm.listing.slips import NAMES as NAMES
 from fecm.listing.slips import active_slips as active_slips
 from fecm.listing.variant import MISREAD_DENSITY as MISREAD_DENSITY
+from fecm.listing.variant import Variant as Variant
+from fecm.listing.variant import variant_of as variant_of

@@ -58,7 +58,7 @@ def generate(
 
     The mesh is complete if there were no findings.  With `unit_force` the force of ROD's dof is set
     to 1 at ROD's place among the segments, so that it replaces an earlier FORC's value and a later
-    FORC's replaces it (the slip ``rod-force``).
+    FORC's replaces it.
     """
     noted = Findings() if findings is None else findings
     control = deck.control

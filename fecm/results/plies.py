@@ -11,6 +11,7 @@ import numpy as np
 
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.deck.model import Deck, Layer, Material, Ply
+from fecm.listing.variant import variant_of
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.mesh import element_blocks
@@ -132,6 +133,7 @@ class PlyGroup(PlyRows):
                 f"the result's deck does not have the {count} plies of its stresses"
             )
         layups = _layups(stored, deck, numbers[members])
+        variant = variant_of(frozenset(stored.slips)).plate
         points = points_of(
             stored,
             numbers[members],
@@ -148,7 +150,7 @@ class PlyGroup(PlyRows):
             angles=_of_layers(layups, count, lambda layer: layer.angle),
             under_load=stored["plies/under_load"][members] != 0,
             **chosen,
-            **_strains(chosen, _constants(deck, layups, count, "g12" in stored.slips)),
+            **_strains(chosen, _constants(deck, layups, count, variant.isotropic_g12)),
         )
 
 
