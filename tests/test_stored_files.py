@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,7 +12,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results import FILES, Form, dataset_of, read, result_writing
+from fecm.results import FILES, Form, ResultFileError, dataset_of, read, result_writing
 from tests.decks import LONG, small
 from tests.panels import TIME, scatter, struck
 from tests.test_nonlinear_decks import text
@@ -76,7 +77,7 @@ def test_every_dataset_of_a_file_is_in_the_schema_of_its_form(
         assert attributes["description"] == known.description, path
         if form is not Form.SWEEP or not path.startswith("cases/"):  # those follow the value
             assert attributes.get("dimension", "") == known.dimension, path
-        if known.dtype not in ("any", "texts"):
+        if known.dtype not in ("any", "numbers", "texts"):
             assert contents.dtypes[path] == np.dtype(known.dtype), path
         assert (path in contents.lists) <= (known.dtype in ("any", "texts")), path
 
@@ -133,6 +134,35 @@ def test_a_dataset_that_is_not_in_the_schema_is_not_written(
     with pytest.raises(ValueError, match=message), result_writing(target, form) as sink:
         sink.create(dataclasses.replace(known, path=path), (3,))
     assert not target.exists()
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "values"),
+    [
+        ("run", "history/force", np.ones(3)),
+        ("run", "history/step", np.ones(3)),
+        ("grid", "cases/velocity", np.ones(3)),
+        ("grid", "summary/peak_force", np.ones((4, 1))),
+        ("grid", "summary/validity", np.ones(4)),
+        ("grid", "history/force", np.ones(4)),
+        ("grid", "history/steps", np.ones(4)),
+        ("grid", "history/dt", np.ones(4, dtype="i8")),
+        ("location", "locate/place", np.ones(3)),
+        ("location", "locate/strains/fitted", np.ones((3, 2))),
+        ("location", "locate/gages/number", np.ones(3)),
+    ],
+)
+def test_a_file_whose_dataset_has_another_shape_or_type_is_refused(
+    files: dict[str, Path], tmp_path: Path, name: str, path: str, values: object
+) -> None:
+    damaged = tmp_path / "damaged.h5"
+    shutil.copy(files[name], damaged)
+    with h5py.File(damaged, "a") as file:
+        del file[path]
+        file[path] = values
+    load = {"run": fecm.load, "location": fecm.load_location}.get(name, fecm.load_sweep)
+    with pytest.raises(ResultFileError, match=rf"^{damaged}: "):
+        load(damaged)
 
 
 def test_a_name_takes_the_description_and_the_dimension_of_its_quantity() -> None:

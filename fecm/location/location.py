@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from fecm._arrays import read_only
 from fecm._errors import FecmError, OptionsError
 from fecm._files import ARGUMENT, check_outputs
-from fecm._typing import AnyFile, Array, Bools, Floats
+from fecm._typing import AnyFile, Bools, Floats
 from fecm.deck.model import Deck
 from fecm.deck.units import unit_names, unit_of
 from fecm.results import schema
@@ -389,22 +389,17 @@ def location_of(contents: FileContents) -> Location:
 
 def _arrays(contents: FileContents) -> dict[str, Any]:
     """Arrays by the attribute of a location; KeyError or ValueError if one is missing or wrong."""
-    sizes: dict[object, int] = {"ndm": 2, 2: 2}
-    arrays: dict[str, Any] = {}
+    from fecm.results.hdf5_reader import first_misfit  # h5py takes 60 ms to import
+
+    arrays = {name: contents[path] for name, path in PATHS.items()}
+    if misfit := first_misfit(contents, PATHS.values(), ndm=2):
+        raise ValueError(misfit.path)
     for name, path in PATHS.items():
-        values: Array = contents[path]
-        dataset = schema.LOCATION_DATASETS[path]
-        kinds = "iu" if dataset.dtype.startswith("i") else "f"
-        axes = [(dataset.group, axis) if axis == "rows" else axis for axis in dataset.shape]
-        fits = values.ndim == len(axes) and all(
-            sizes.setdefault(axis, size) == size
-            for axis, size in zip(axes, values.shape, strict=False)
-        )
-        if not fits or not values.size or values.dtype.kind not in kinds:
-            raise ValueError(dataset.path)
-        if not np.isfinite(values).all():
-            raise ValueError(f"{dataset.path} is not finite")
-        arrays[name] = values.T if name in BY_TIME else values
+        if not arrays[name].size:
+            raise ValueError(path)
+        if not np.isfinite(arrays[name]).all():
+            raise ValueError(f"{path} is not finite")
+    arrays |= {name: arrays[name].T for name in BY_TIME}
     arrays["determined"] = arrays["determined"] != 0
     return arrays
 

@@ -12,9 +12,9 @@ import contextlib
 import io
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -22,11 +22,12 @@ import numpy as np
 from fecm._errors import OptionsError
 from fecm._text import short_text
 from fecm._typing import AnyFile, Array
+from fecm.results import schema
 from fecm.results.criteria import OWN_CRITERIA, criteria_of
 from fecm.results.exposures import AT_REST, LOAD_FACTOR
 from fecm.results.groups import NotStoredError, ResultFileError, not_stored
 from fecm.results.metrics import MOBILITY
-from fecm.results.schema import FIXED, FORMAT_VERSION, Form, dataset_of
+from fecm.results.schema import FORMAT_VERSION, Form
 
 ELEMENTS = "mesh/elements"
 COORDINATES = "mesh/coordinates"
@@ -282,30 +283,48 @@ def _text(value: str | bytes) -> str:
     return raw.decode("utf-8", "replace")
 
 
-def shape_error(
-    shapes: Mapping[str, tuple[int, ...]], kinds: Mapping[str, str], criteria: int
-) -> str:
-    """Message about the first dataset with a wrong shape or type; empty if there is none.
+class Misfit(NamedTuple):
+    """A dataset whose shape or type is not that of the schema."""
 
-    `criteria` is the number of failure criteria.  The others are by path; kinds are NumPy's
-    letters: ``"f"``, ``"i"``, ``"u"`` or ``"b"``.
+    path: str
+    message: str
+
+
+# Kinds of numbers and texts, as NumPy's letters, by the first letter or the name of a type.
+KINDS = {"f": "f", "i": "iu", schema.NUMBERS: "fiu", schema.TEXTS: "O", schema.ANY: "fiubO"}
+
+
+def first_misfit(
+    contents: FileContents, paths: Iterable[str] | None = None, **sizes: int
+) -> Misfit | None:
+    """The first dataset, by default of all, whose shape or type is not that of the schema.
+
+    None if there is none.  `sizes` are those of axes that are known beforehand.
     """
-    sizes: dict[str | int, tuple[int, str]] = {n: (s, "every result") for n, s in FIXED.items()}
-    sizes["criteria"] = (criteria, "this result")
-    for path, shape in shapes.items():
-        if (dataset := dataset_of(path, len(shape))) is None:
+    form, failure = Form(contents.form), contents.groups.get("failure", {})
+    known_sizes: dict[str | int, tuple[int, str]] = {
+        name: (size, "every result") for name, size in (schema.FIXED | sizes).items()
+    }
+    known_sizes["criteria"] = (len(criteria_of(failure)), "this result")
+    for path in contents.shapes if paths is None else paths:
+        shape = contents.shapes[path]
+        dataset = schema.dataset_of(path, len(shape), form)
+        if dataset is None:
             continue
-        if kinds[path] not in ("f" if dataset.dtype.startswith("f") else "iu"):
-            return f"{path} has the wrong type: expected {dataset.dtype}"
+        kinds = KINDS.get(dataset.dtype) or KINDS[dataset.dtype[0]]
+        if contents.dtypes[path].kind not in kinds:
+            return Misfit(path, f"{path} has the wrong type: expected {dataset.dtype}")
         if len(shape) != len(dataset.shape):
-            return f"{path} has the shape {shape}, not ({', '.join(map(str, dataset.shape))})"
+            expected = ", ".join(map(str, dataset.shape))
+            return Misfit(path, f"{path} has the shape {shape}, not ({expected})")
         for name, size in zip(dataset.shape, shape, strict=True):
             known = (name, "every result") if isinstance(name, int) else (size, path)
             key = f"{dataset.group} {name}" if name == "rows" else name
-            expected, source = sizes.setdefault(key, known)
-            if size != expected:
-                return f"{path} has the shape {shape}, but {name} is {expected} in {source}"
-    return ""
+            needed, source = known_sizes.setdefault(key, known)
+            if size != needed:
+                message = f"{path} has the shape {shape}, but {name} is {needed} in {source}"
+                return Misfit(path, message)
+    return None
 
 
 # Attributes that are numbers, and lists of texts, by group.  A result without those of history and

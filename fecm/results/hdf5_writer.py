@@ -175,7 +175,7 @@ class FileSink:
             made = self.arrays[path] = self._text(path, values.tolist(), known.description)
             self._made[path] = known, made.shape
             return
-        if known.dtype == schema.ANY:
+        if known.dtype in (schema.ANY, schema.NUMBERS):
             known = replace(known, dtype="i8" if values.dtype.kind in "iu" else "f8")
         self._create(replace(known, dimension=dimension or known.dimension), values.shape)
         self.write(path, 0, values)

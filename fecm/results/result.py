@@ -441,13 +441,10 @@ def result_of(contents: FileContents, model: Deck | None = None) -> Result:
     Raises ResultFileError if a dataset has the wrong shape or type, or an attribute the wrong type.
     """
     # 1 ms, which the result of a run itself does not need.
-    from fecm.results.criteria import criteria_of
-    from fecm.results.hdf5_reader import attribute_error, shape_error
+    from fecm.results.hdf5_reader import attribute_error, first_misfit
 
-    kinds = {name: dtype.kind for name, dtype in contents.dtypes.items()}
-    criteria = len(criteria_of(contents.groups.get("failure", {})))
-    found = shape_error(contents.shapes, kinds, criteria) or attribute_error(contents.groups)
-    if found:
-        raise ResultFileError(f"{contents.path}: {found}")
+    misfit = first_misfit(contents)
+    if message := misfit.message if misfit else attribute_error(contents.groups):
+        raise ResultFileError(f"{contents.path}: {message}")
     attributes = {"": contents.attributes, **contents.groups}
     return Result(contents, contents.texts, attributes, model)

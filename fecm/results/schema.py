@@ -68,6 +68,7 @@ def heading(form: Form, title: str) -> dict[str, Any]:
 
 
 ANY = "any"  # integers, numbers or texts: the type of the values
+NUMBERS = "numbers"  # integers or numbers
 TEXTS = "texts"
 
 
@@ -79,7 +80,7 @@ class Dataset:
     shape: tuple[str | int, ...]  # sizes by name, or numbers
     description: str  # may contain {name}, {text} and {label}, see `_named`
     dimension: str = ""  # physical dimension; may be empty, or OF_QUANTITY
-    dtype: str = "f8"  # NumPy's name of the type, ANY or TEXTS
+    dtype: str = "f8"  # NumPy's name of the type, ANY, NUMBERS or TEXTS
     outer: str = ""  # axis in front of the others, which only some results have
 
     @property
@@ -465,7 +466,7 @@ SWEEP_DATASETS = {
             "ok, reasons to doubt the case, or failed",
             dtype=TEXTS,
         ),
-        Dataset("summary/*", ("cases",), "{text}", OF_QUANTITY, ANY),
+        Dataset("summary/*", ("cases",), "{text}", OF_QUANTITY, NUMBERS),
         Dataset("history/dt", ("cases",), "time step of every case", "time"),
         Dataset("history/steps", ("cases",), "number of steps of every case", dtype="i8"),
         Dataset(

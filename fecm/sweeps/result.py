@@ -18,7 +18,7 @@ from fecm.deck.units import declared_units, unit_names
 from fecm.mechanics.own_law import law_name
 from fecm.results import schema
 from fecm.results.groups import ResultFileError
-from fecm.results.metrics import COLUMNS, FOUND, RATIO, SUMMARY, THRESHOLD, VALIDITY, VERDICTS
+from fecm.results.metrics import COLUMNS, FOUND, RATIO, SUMMARY, THRESHOLD, VERDICTS
 from fecm.results.pictures import SweepKind, plot_results, report_results
 from fecm.sweeps import reduced as reduced_check
 from fecm.sweeps.files import FORCE, random_of
@@ -384,6 +384,8 @@ def sweep_of(contents: FileContents, *, history: bool = True) -> SweepResult:
     Without `history` the forces, which may be large, are not read.  Raises ResultFileError if data
     are missing, or their number of cases differs.
     """
+    from fecm.results.hdf5_reader import first_misfit  # h5py takes 60 ms to import
+
     path = contents.path
     cases, summary = _group(contents, "cases/"), _group(contents, "summary/")
     given = ("dt", "steps", "unsettled_steps")
@@ -392,12 +394,13 @@ def sweep_of(contents: FileContents, *, history: bool = True) -> SweepResult:
     if not (summary.keys() >= {*required} and steps.keys() >= {"dt", "steps"}):
         raise ResultFileError(f"{path}: the result of the sweep is incomplete")
     summary = {name: summary[name] for name in required} | summary  # in their order
-    shape = contents.shapes.get(FORCE)
-    if not _agree(cases, summary, steps, shape):
+    groups = ("history/", "cases/", "summary/")
+    if first_misfit(contents, [one for one in contents if one.startswith(groups)]):
         message = f"{path}: the data of this sweep do not match in type or number of cases"
         raise ResultFileError(message)
+    shape = contents.shapes.get(FORCE)
     counts, most = steps["steps"], np.inf if shape is None else shape[1]
-    if counts.dtype.kind not in "iu" or not ((counts >= 0) & (counts <= most)).all():
+    if not ((counts >= 0) & (counts <= most)).all():
         raise ResultFileError(f"{path}: history/steps does not match the stored steps")
     return SweepResult(
         cases=cases,
@@ -418,22 +421,5 @@ def sweep_of(contents: FileContents, *, history: bool = True) -> SweepResult:
 def _group(contents: FileContents, group: str) -> dict[str, Column]:
     """The datasets of a group by their names, numbers before texts."""
     names = sorted(contents, key=lambda name: name in contents.lists)
-    return {name.removeprefix(group): contents[name] for name in names if name.startswith(group)}
-
-
-def _agree(
-    cases: dict[str, Column],
-    summary: dict[str, Column],
-    steps: dict[str, Column],
-    forces: tuple[int, ...] | None,
-) -> bool:
-    """Whether all datasets have one value for every case, and of their kind."""
-    count = np.shape(steps["dt"])[:1]
-    if any(v.shape != count for v in (*cases.values(), *summary.values(), *steps.values())):
-        return False
-    if forces is not None and (len(forces) != 2 or forces[:1] != count):
-        return False
-    if any(v.dtype.kind not in "fiu" for name, v in summary.items() if name not in VERDICTS):
-        return False
-    validity = summary.get(VALIDITY)
-    return validity is None or not validity.size or validity.dtype.kind == "U"
+    members = [name for name in names if name.startswith(group) and name.count("/") == 1]
+    return {name.removeprefix(group): contents[name] for name in members}
