@@ -449,122 +449,70 @@ def criterion_datasets(name: str) -> list[Dataset]:
 
 OF_QUANTITY = "of the quantity"  # dimension of a dataset whose name is that of a quantity
 
-SWEEP_DATASETS = {
-    dataset.path: dataset
-    for dataset in (
-        # The writer gives the dimension of a value.
-        Dataset("cases/*", ("cases",), "{name} of every case", dtype=ANY),
-        Dataset(
-            f"summary/{STATUS}",
-            ("cases",),
-            "ok, still in contact, or why the case failed",
-            dtype=TEXTS,
-        ),
-        Dataset(
-            f"summary/{VALIDITY}",
-            ("cases",),
-            "ok, reasons to doubt the case, or failed",
-            dtype=TEXTS,
-        ),
-        Dataset("summary/*", ("cases",), "{text}", OF_QUANTITY, NUMBERS),
-        Dataset("history/dt", ("cases",), "time step of every case", "time"),
-        Dataset("history/steps", ("cases",), "number of steps of every case", dtype="i8"),
-        Dataset(
-            "history/unsettled_steps",
-            ("cases",),
-            "steps whose contact iteration did not converge",
-            dtype="i8",
-        ),
-        Dataset("history/force", ("cases", "steps"), "contact force after every step", "force"),
-        Dataset(
-            "statistics/*",
-            ("statistics",),
-            "draws with a value, and their statistics: {label}",
-            OF_QUANTITY,
-            outer="combinations",
-        ),
-        *(
-            Dataset(f"sensitivity/*/{name}", shape, text, outer="combinations")
-            for name, shape, text in (
-                ("first", ("laws",), "first-order Sobol' index of every random value"),
-                ("total", ("laws",), "total Sobol' index of every random value"),
-                ("first_interval", ("laws", "bounds"), "its 95 % interval"),
-                ("total_interval", ("laws", "bounds"), "its 95 % interval"),
-            )
-        ),
-        Dataset("exceedance/quantity", ("limits",), "name of the quantity", dtype=TEXTS),
-        Dataset(
-            "exceedance/limit",
-            ("limits",),
-            "limit, in the unit of the quantity; NaN: the threshold of each case",
-        ),
-        *(
-            Dataset(f"exceedance/{name}", ("limits",), text, dtype=dtype, outer="combinations")
-            for name, text, dtype in (
-                ("probability", "probability that the quantity exceeds the limit", "f8"),
-                (
-                    "lower",
-                    "lower end of its 95 % interval, whatever the open draws are",
-                    "f8",
-                ),
-                (
-                    "upper",
-                    "upper end of its 95 % interval, whatever the open draws are",
-                    "f8",
-                ),
-                ("draws", "number of draws that have a value", "i8"),
-                ("open", "number of draws that ended before they had a value", "i8"),
-            )
-        ),
-        Dataset(
-            "reduced/case",
-            ("trials",),
-            "number of the case that was also run in full",
-            dtype="i8",
-        ),
-        *(
-            Dataset(f"reduced/{name}", ("trials",), text, dimension)
-            for name, text, dimension in (
-                ("peak_force", "largest contact force of the reduced model", "force"),
-                ("full_peak_force", "largest contact force of the full run", "force"),
-                (
-                    RATIO,
-                    "largest displacement under the load over the thickness, of the reduced model",
-                    "",
-                ),
-                (
-                    f"full_{RATIO}",
-                    "largest displacement under the load over the thickness, of the full run",
-                    "",
-                ),
-            )
-        ),
-    )
-}
-LOCATION_DATASETS = {
-    dataset.path: dataset
-    for dataset in (
-        Dataset("locate/place", ("ndm",), "place of the impact", "length"),
-        Dataset("locate/covariance", (2, 2), "covariance of the place", "length^2"),
-        Dataset(
-            "locate/candidates", ("candidates", "ndm"), "places that were tried first", "length"
-        ),
-        Dataset("locate/misfit", ("candidates",), "misfit there over that of the place found"),
-        Dataset("locate/force/time", ("rows",), "time", "time"),
-        Dataset("locate/force/value", ("rows",), "fitted contact force", "force"),
-        Dataset("locate/force/sd", ("rows",), "its standard deviation", "force"),
-        Dataset(
-            "locate/force/determined", ("rows",), "1 if the strains determine the force", "", "i1"
-        ),
-        Dataset("locate/gages/number", ("gages",), "number of every gage", "", "i4"),
-        Dataset("locate/gages/place", ("gages", "ndm"), "its place", "length"),
-        Dataset("locate/gages/gain", ("gages",), "its gain; 1 if it was not fitted"),
-        Dataset("locate/gages/gain_sd", ("gages",), "standard deviation of the gain"),
-        Dataset("locate/strains/time", ("rows",), "measured time", "time"),
-        Dataset("locate/strains/measured", ("rows", "gages"), "measured strain"),
-        Dataset("locate/strains/fitted", ("rows", "gages"), "fitted strain"),
-    )
-}
+
+def _by_path(*datasets: Dataset) -> dict[str, Dataset]:
+    return {dataset.path: dataset for dataset in datasets}
+
+
+_CASES, _LIMITS, _TRIALS, _OUTER = ("cases",), ("limits",), ("trials",), "combinations"
+# fmt: off
+SWEEP_DATASETS = _by_path(
+    Dataset("cases/*", _CASES, "{name} of every case", "", ANY),  # the writer gives the dimension
+    Dataset(f"summary/{STATUS}", _CASES, "ok, still in contact, or why the case failed", "", TEXTS),
+    Dataset(f"summary/{VALIDITY}", _CASES, "ok, reasons to doubt the case, or failed", "", TEXTS),
+    Dataset("summary/*", _CASES, "{text}", OF_QUANTITY, NUMBERS),
+    Dataset("history/dt", _CASES, "time step of every case", "time"),
+    Dataset("history/steps", _CASES, "number of steps of every case", "", "i8"),
+    Dataset("history/unsettled_steps", _CASES,
+            "steps whose contact iteration did not converge", "", "i8"),
+    Dataset("history/force", ("cases", "steps"), "contact force after every step", "force"),
+    Dataset("statistics/*", ("statistics",),
+            "draws with a value, and their statistics: {label}", OF_QUANTITY, outer=_OUTER),
+    Dataset("sensitivity/*/first", ("laws",),
+            "first-order Sobol' index of every random value", outer=_OUTER),
+    Dataset("sensitivity/*/total", ("laws",),
+            "total Sobol' index of every random value", outer=_OUTER),
+    Dataset("sensitivity/*/first_interval", ("laws", "bounds"), "its 95 % interval", outer=_OUTER),
+    Dataset("sensitivity/*/total_interval", ("laws", "bounds"), "its 95 % interval", outer=_OUTER),
+    Dataset("exceedance/quantity", _LIMITS, "name of the quantity", "", TEXTS),
+    Dataset("exceedance/limit", _LIMITS,
+            "limit, in the unit of the quantity; NaN: the threshold of each case"),
+    Dataset("exceedance/probability", _LIMITS,
+            "probability that the quantity exceeds the limit", outer=_OUTER),
+    Dataset("exceedance/lower", _LIMITS,
+            "lower end of its 95 % interval, whatever the open draws are", outer=_OUTER),
+    Dataset("exceedance/upper", _LIMITS,
+            "upper end of its 95 % interval, whatever the open draws are", outer=_OUTER),
+    Dataset("exceedance/draws", _LIMITS, "number of draws that have a value", "", "i8", _OUTER),
+    Dataset("exceedance/open", _LIMITS,
+            "number of draws that ended before they had a value", "", "i8", _OUTER),
+    Dataset("reduced/case", _TRIALS, "number of the case that was also run in full", "", "i8"),
+    Dataset("reduced/peak_force", _TRIALS, "largest contact force of the reduced model", "force"),
+    Dataset("reduced/full_peak_force", _TRIALS, "largest contact force of the full run", "force"),
+    Dataset(f"reduced/{RATIO}", _TRIALS,
+            "largest displacement under the load over the thickness, of the reduced model"),
+    Dataset(f"reduced/full_{RATIO}", _TRIALS,
+            "largest displacement under the load over the thickness, of the full run"),
+)
+LOCATION_DATASETS = _by_path(
+    Dataset("locate/place", ("ndm",), "place of the impact", "length"),
+    Dataset("locate/covariance", (2, 2), "covariance of the place", "length^2"),
+    Dataset("locate/candidates", ("candidates", "ndm"), "places that were tried first", "length"),
+    Dataset("locate/misfit", ("candidates",), "misfit there over that of the place found"),
+    Dataset("locate/force/time", ("rows",), "time", "time"),
+    Dataset("locate/force/value", ("rows",), "fitted contact force", "force"),
+    Dataset("locate/force/sd", ("rows",), "its standard deviation", "force"),
+    Dataset("locate/force/determined", ("rows",),
+            "1 if the strains determine the force", "", "i1"),
+    Dataset("locate/gages/number", ("gages",), "number of every gage", "", "i4"),
+    Dataset("locate/gages/place", ("gages", "ndm"), "its place", "length"),
+    Dataset("locate/gages/gain", ("gages",), "its gain; 1 if it was not fitted"),
+    Dataset("locate/gages/gain_sd", ("gages",), "standard deviation of the gain"),
+    Dataset("locate/strains/time", ("rows",), "measured time", "time"),
+    Dataset("locate/strains/measured", ("rows", "gages"), "measured strain"),
+    Dataset("locate/strains/fitted", ("rows", "gages"), "fitted strain"),
+)
+# fmt: on
 
 
 class FileSchema(NamedTuple):
