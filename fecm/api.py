@@ -36,8 +36,8 @@ from fecm.problem.problem import Problem
 from fecm.problem.rules.quadrature import HOURGLASS
 from fecm.problem.rules.time_step import UNSTABLE
 from fecm.problem.summary import ProblemSummary, deck_summary
-from fecm.results.hdf5_writer import MemorySink
 from fecm.results.result import Result, load
+from fecm.results.sinks import MemorySink
 from fecm.simulation.run import simulate
 from fecm.simulation.simulation import Simulation
 

@@ -24,7 +24,7 @@ from fecm.mechanics.stiffness_product import AUTO, CSR, KERNELS, WORTH_GROUPING,
 from fecm.mechanics.strains import STRAINS
 from fecm.mechanics.time_step import PART
 from fecm.problem.problem import Problem
-from fecm.results.hdf5_writer import RowBuffer
+from fecm.results.sinks import RowBuffer
 
 NODE = 800  # bytes per node: mesh, state, fields, buffered rows
 PLACE = 60  # bytes per dof of an element: its indices, its forces, and the matrix that sums them

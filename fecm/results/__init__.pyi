@@ -24,8 +24,6 @@ from fecm.results.groups import ExportError as ExportError
 from fecm.results.groups import NotStoredError as NotStoredError
 from fecm.results.groups import ResultFileError as ResultFileError
 from fecm.results.hdf5_reader import read as read
-from fecm.results.hdf5_writer import MemorySink as MemorySink
-from fecm.results.hdf5_writer import RowBuffer as RowBuffer
 from fecm.results.hdf5_writer import result_writing as result_writing
 from fecm.results.metrics import EXPOSURES as EXPOSURES
 from fecm.results.metrics import FOUND as FOUND
@@ -44,6 +42,8 @@ from fecm.results.schema import FILES as FILES
 from fecm.results.schema import GROUP_TYPES as GROUP_TYPES
 from fecm.results.schema import Form as Form
 from fecm.results.schema import dataset_of as dataset_of
+from fecm.results.sinks import MemorySink as MemorySink
+from fecm.results.sinks import RowBuffer as RowBuffer
 from fecm.results.summary import about_run as about_run
 from fecm.results.summary import run_summary as run_summary
 from fecm.results.tapes import fortran_number as fortran_number

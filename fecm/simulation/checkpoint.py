@@ -27,8 +27,9 @@ from fecm.mechanics import kernels, projectile
 from fecm.mechanics.own_law import law_name
 from fecm.mechanics.stiffness_product import KERNELS
 from fecm.problem.problem import Problem
-from fecm.results.hdf5_writer import FileSink, Operation
+from fecm.results.hdf5_writer import FileSink
 from fecm.results.schema import dataset_of
+from fecm.results.sinks import Operation
 from fecm.simulation.simulation import Simulation
 
 FORMAT = 6

@@ -23,7 +23,6 @@ from fecm.problem.build import ImpactModel
 from fecm.results.criteria import ALL_CRITERIA, INTERLAMINAR, OWN_CRITERIA
 from fecm.results.exposures import COARSENESS, LOAD_FACTOR
 from fecm.results.groups import STORED_BY
-from fecm.results.hdf5_writer import RowBuffer, Sink
 from fecm.results.schema import (
     CONTACT,
     CURE_STRESS,
@@ -32,6 +31,7 @@ from fecm.results.schema import (
     Dataset,
     criterion_datasets,
 )
+from fecm.results.sinks import RowBuffer, Sink
 from fecm.simulation.saved import subset
 
 if TYPE_CHECKING:

@@ -19,10 +19,10 @@ from fecm.problem.build import RunOptions
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem, Threshold
 from fecm.results.exposures import AT_REST, count_evaluations
-from fecm.results.hdf5_writer import ReadOnce, Sink
 from fecm.results.metrics import MOBILITY, VALIDITY
 from fecm.results.result import Result
 from fecm.results.schema import KINEMATICS, Form, Kinematics, heading
+from fecm.results.sinks import ReadOnce, Sink
 from fecm.simulation.judge import judge_run
 from fecm.simulation.macros import STORING, bind, bind_loop
 from fecm.simulation.simulation import Observer, Simulation

@@ -16,7 +16,7 @@ from fecm.mechanics.impact_steps import SINGLY, TOGETHER
 from fecm.mechanics.solutions import Tangent
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.problem import Problem
-from fecm.results.hdf5_writer import Sink
+from fecm.results.sinks import Sink
 from fecm.simulation.interpreter import Interpreter
 from fecm.simulation.recorder import Recorder
 from fecm.simulation.saved import restore, saved_values, subset

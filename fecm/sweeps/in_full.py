@@ -27,7 +27,6 @@ from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
 from fecm.results.end import decided
 from fecm.results.exposures import band_of_largest, count_evaluations, largest_exposures
-from fecm.results.hdf5_writer import MemorySink
 from fecm.results.metrics import (
     BAND,
     EVALUATIONS,
@@ -43,6 +42,7 @@ from fecm.results.metrics import (
 )
 from fecm.results.result import Result
 from fecm.results.run_metrics import deflection_of
+from fecm.results.sinks import MemorySink
 from fecm.results.validity import Extent, reasons_of
 from fecm.simulation.recorder import exposures_of
 from fecm.simulation.run import run_program, simulate

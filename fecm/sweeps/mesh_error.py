@@ -20,8 +20,8 @@ from fecm.problem.problem import Problem
 from fecm.problem.refine import RefineError, refined_deck
 from fecm.results.end import OPEN_PEAKS
 from fecm.results.exposures import largest_exposures
-from fecm.results.hdf5_writer import MemorySink
 from fecm.results.run_metrics import end_of
+from fecm.results.sinks import MemorySink
 from fecm.results.stored import Stored
 from fecm.simulation.run import run_program
 from fecm.simulation.simulation import Simulation
