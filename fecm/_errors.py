@@ -45,19 +45,13 @@ class FecmWarning(UserWarning):
     """A reason to doubt a deck or the result of a run."""
 
 
+# A finding of a deck is shown once, however often the deck is used; filters of the user come first.
+warnings.filterwarnings("once", r"[^\n]*: warning\[W", FecmWarning, append=True)
+
+
 def warn(text: str) -> None:
     """Warn with a :class:`FecmWarning` of the first caller outside this package."""
     frame, level = sys._getframe(1), 2
     while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
         frame, level = frame.f_back, level + 1
     warnings.warn(FecmWarning(text), stacklevel=level)
-
-
-_said: set[str] = set()
-
-
-def warn_once(text: str) -> None:
-    """Warn, but not again of the same text in this process."""
-    if text not in _said:
-        warn(text)
-        _said.add(text)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import os
 import sys
 from collections.abc import Callable
@@ -57,13 +56,13 @@ def _shortage(what: str, count: int, free: int) -> str:
 
 
 def _of_machine() -> int | None:
-    with contextlib.suppress(OSError, ValueError, IndexError, AttributeError):
+    with suppress(OSError, ValueError, IndexError, AttributeError):
         if sys.platform in READERS:
             return READERS[sys.platform]()
         for line in MEMINFO.read_text().splitlines():
             if line.startswith("MemAvailable:"):
                 return 1024 * int(line.split()[1])
-    with contextlib.suppress(OSError, ValueError, AttributeError):
+    with suppress(OSError, ValueError, AttributeError):
         pages = os.sysconf("SC_AVPHYS_PAGES")
         if pages > 0:
             return pages * os.sysconf("SC_PAGE_SIZE")
@@ -103,11 +102,11 @@ READERS: dict[str, Callable[[], int | None]] = {"win32": _of_windows, "darwin": 
 def _of_groups() -> list[int]:
     """Remaining bytes of the process's control group and of those around it."""
     left: list[int] = []
-    with contextlib.suppress(OSError, ValueError, IndexError):
+    with suppress(OSError, ValueError, IndexError):
         (own,) = [line[3:] for line in CGROUP.read_text().splitlines() if line.startswith("0::")]
         folder = CGROUPS / own.strip("/")
         while folder != CGROUPS.parent:
-            with contextlib.suppress(OSError, ValueError):
+            with suppress(OSError, ValueError):
                 most = int((folder / "memory.max").read_text())  # "max" is not a number
                 left.append(most - int((folder / "memory.current").read_text()))
             folder = folder.parent

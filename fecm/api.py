@@ -9,7 +9,7 @@ from itertools import zip_longest
 from pathlib import Path
 from typing import Literal, NamedTuple
 
-from fecm._errors import OptionsError, warn, warn_once
+from fecm._errors import OptionsError, warn
 from fecm._files import ARGUMENT, check_outputs
 from fecm._progress import once_a_minute
 from fecm._text import html_table
@@ -385,15 +385,15 @@ def sole_problem(deck: str | Path | Deck, *, warns: bool = True) -> Problem:
         raise DeckError(prepared.findings, prepared.source)
     _check_one(prepared.problems)
     if warns:
-        _warn_of(prepared)
+        warn_of_findings(prepared)
     return prepared.problems[0]
 
 
-def _warn_of(prepared: LoadedDeck) -> None:
+def warn_of_findings(prepared: LoadedDeck) -> None:
     """Warn of the findings that are warnings."""
     for finding in prepared.findings:
         if finding.severity == "warning":
-            warn_once(finding.render(prepared.source))
+            warn(finding.render(prepared.source))
 
 
 def _run(
@@ -419,7 +419,7 @@ def _run(
     paths = [] if output is None else [numbered(Path(output), number) for number in numbers]
     check_outputs(paths, overwrite, [Path(prepared.source)], allowed_by=ARGUMENT)
     found = tuple(finding for finding in prepared.findings if finding.severity != "error")
-    _warn_of(prepared)
+    warn_of_findings(prepared)
     results: list[Result] = []
     for problem, path in zip_longest(prepared.problems, paths):
         check_run_memory(problem, solver=choices.solver, in_memory=path is None)

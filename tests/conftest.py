@@ -32,13 +32,6 @@ def pytest_collection_finish() -> None:
     gc.freeze()
 
 
-@pytest.fixture(autouse=True)
-def _nothing_said() -> None:
-    """Let each test see the warnings of its decks, which a process issues once."""
-    if "fecm._errors" in sys.modules:
-        sys.modules["fecm._errors"]._said.clear()
-
-
 @pytest.fixture(scope="session", autouse=True)
 def _few_pixels() -> Iterator[None]:
     """Draw pictures with few pixels."""

@@ -12,7 +12,6 @@ import re
 import shutil
 import subprocess
 import sys
-import warnings
 from collections.abc import Callable
 from functools import partial
 from importlib import import_module
@@ -182,12 +181,27 @@ def test_each_warning_of_a_deck_is_a_warning_in_python_at_the_users_line() -> No
     assert {warning.filename for warning in caught} == {__file__}
 
 
-def test_a_finding_of_a_deck_is_a_warning_once_in_a_process() -> None:
-    for times in (1, 0):
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
-            fecm.run_one(APPENDIX)
-        assert sum("warning[W415]" in str(one.message) for one in caught) == times
+TWICE = """
+import sys
+import fecm
+fecm.run_one(sys.argv[1])
+fecm.run_one(sys.argv[1])
+"""
+
+
+@pytest.mark.parametrize(("options", "times"), [([], 1), (["-W", "always"], 2)])
+def test_a_finding_is_a_warning_once_in_a_process_unless_the_user_filters_otherwise(
+    options: list[str], times: int, tmp_path: Path
+) -> None:
+    (tmp_path / "small.inp").write_text(small())
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONWARNINGS"}
+    done = subprocess.run(
+        [sys.executable, *options, "-c", TWICE, "small.inp"],
+        cwd=tmp_path, capture_output=True, text=True, check=True,
+        env=environment | {"PYTHONPATH": str(ROOT)},
+    )  # fmt: skip
+    assert done.stderr.count("warning[W415]") == times
+    assert done.stderr.count("the run ends in contact") == 2  # a doubt of each result
 
 
 def test_what_a_result_or_a_sweep_lacks_is_named_with_what_there_is(runs: Path) -> None:

@@ -193,7 +193,7 @@ class ImpactStruct(Structure):
 
 
 class Written(NamedTuple):
-    """Arrays that the kernel writes; see :class:`Rod` and :class:`Impact`."""
+    """Arrays that the kernel writes; see :class:`RodStruct` and :class:`ImpactStruct`."""
 
     motion: Floats
     records: Floats
@@ -239,7 +239,7 @@ def can_step(system: ImpactSystem) -> bool:
 
 
 class ImpactSteps:
-    """Bursts of steps of a system that :func:`supports` accepts.
+    """Bursts of steps of a system that :func:`can_step` accepts.
 
     `station` is the dof of the projectile whose deformation is recorded.
     """
@@ -307,7 +307,7 @@ class ImpactSteps:
     ) -> ImpactStruct:
         """What the kernel needs besides the plate, and where it writes."""
         law = self._system.law
-        assert isinstance(law, HystereticLaw)  # as `supports` has found
+        assert isinstance(law, HystereticLaw)  # as `can_step` has found
         integrator = self._system.rod_step(dt)
         T, h = self._modes.step(integrator)
         rod = RodStruct(

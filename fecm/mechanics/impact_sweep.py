@@ -1,7 +1,7 @@
 """Many impacts on one plate by the compiled kernels.
 
 In: the plate's response to a unit force, a projectile in its modes, and the values :class:`Given`
-of each case.  Out: the contact force of every step, and the values :class:`Found` of each case.
+of each case.  Out: the contact force of every step, and the values :class:`ResultRow` of each case.
 """
 
 from __future__ import annotations
@@ -51,14 +51,14 @@ class SweepStruct(Structure):
     The arrays, of which the last two are written:
 
     ============  ===================  ========================================================
-    `T`           (9, modes)           step of the modes; see ``impact_steps.Rod``
+    `T`           (9, modes)           step of the modes; see ``impact_steps.RodStruct``
     `h`           (3, modes)           the same per force on the tip
     `stiffness`   (modes,)             squares of the angular frequencies
     `tip_shape`   (modes,)             displacement of the tip
     `plate`       (steps,)             the plate's displacement per force 1, 2, ... steps ago
     `given`       (given, stride)      :class:`Given`, of which the first `cases` columns
     `force`       (cases, steps)       contact force
-    `found`       (found, stride)      :class:`Found`, likewise
+    `found`       (found, stride)      :class:`ResultRow`, likewise
     ============  ===================  ========================================================
     """
 

@@ -1,6 +1,7 @@
 """Style of the pictures: journal sizes and colours, units on the axes, legends beside the data.
 
-Axes hold numbers in the deck's units; their ticks show them times the factor of a :class:`Scale`.
+Axes hold numbers in the deck's units; their ticks show them times the factor of an
+:class:`AxisScale`.
 """
 
 from __future__ import annotations

@@ -249,7 +249,7 @@ def save_result(stored: Stored, path: Path, *, overwrite: bool) -> None:
 
 @contextlib.contextmanager
 def new_hdf5(path: Path, *, overwrite: bool = True) -> Iterator[tuple[h5py.File, _Guarded]]:
-    """Open an HDF5 file for writing; see :func:`writing`."""
+    """Open an HDF5 file for writing; see :func:`result_writing`."""
     with beside(path, overwrite=overwrite) as partial, _Guarded(partial, "w+") as guarded:
         with h5py.File(guarded, "w") as file:
             try:

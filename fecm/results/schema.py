@@ -309,7 +309,7 @@ class PlyRows(Rows):
 
 
 class Exposure(ResultGroup):
-    """Largest exposures of a criterion, with their times and modes; `Failure` names the sizes."""
+    """Largest exposures, times and modes of a criterion; `FailureGroup` names the sizes."""
 
     exposure: Annotated[Floats, "", "largest exposure over time"]
     time: Annotated[Floats, "", "its time", "time"]

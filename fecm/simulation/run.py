@@ -34,7 +34,7 @@ def simulate(
     options: RunOptions | None = None,
     observers: Sequence[Observer] = (),
 ) -> Simulation:
-    """Run a problem into a sink and return the finished simulation; see :func:`run`."""
+    """Run a problem into a sink and return the finished simulation; see :func:`run_program`."""
     simulation = Simulation(problem, sink, options or RunOptions(), observers=observers)
     run_program(simulation)
     return simulation

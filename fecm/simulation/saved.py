@@ -30,7 +30,7 @@ def saved_values(value: object, path: str, seen: set[int] | None = None) -> dict
 
 
 def restore(value: Any, path: str, stored: Mapping[str, Any], seen: set[int] | None = None) -> Any:
-    """Set a dataclass to the state that :func:`save` returned for another of the same type.
+    """Set a dataclass to the state that :func:`saved_values` returned for another of the same type.
 
     Returns the value; dataclasses and arrays are changed in place where they can be.
     """

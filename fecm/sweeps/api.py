@@ -15,11 +15,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecm._errors import warn, warn_once
+from fecm._errors import warn
 from fecm._files import ARGUMENT, check_outputs
 from fecm._machine import NotEnoughMemoryError, free_processors
 from fecm._progress import once_a_minute
-from fecm.api import LOGGER, LoadedDeck, Progress, load_deck
+from fecm.api import LOGGER, LoadedDeck, Progress, load_deck, warn_of_findings
 from fecm.authoring.case import Case, CasesError, Limit, parse_exceed
 from fecm.authoring.cases import CaseTable, checked, combined
 from fecm.deck.catalogue import system_of
@@ -196,7 +196,7 @@ def _outcomes(
     idle: execute.Idle,
     note: Callable[[str], None],
 ) -> list[tuple[Task, Outcome]]:
-    """Run tasks, or take their stored outcomes; see :func:`carry_out`."""
+    """Run tasks, or take their stored outcomes; see :func:`carry_out_plan`."""
     outcomes: list[tuple[Task, Outcome]] = []
     left: list[Task] = []
 
@@ -549,9 +549,7 @@ def _prepared(
         prepared = _first_built(build, cases)
     else:
         raise CasesError("give either deck or build")
-    for finding in prepared.findings:
-        if finding.severity == "warning":
-            warn_once(finding.render(prepared.source))
+    warn_of_findings(prepared)
     return prepared
 
 

@@ -289,7 +289,9 @@ def largest_exposure(outcome: Outcome) -> float:
 def velocity_at_level(
     start: float, level: float, reached: Callable[[float], float], name: str = "exposure"
 ) -> float:
-    """Find a velocity at which a value is at the level, or above it by at most :data:`ERROR`.
+    """Find a velocity at which a value is at the level, or slightly above it.
+
+    The value exceeds the level by at most :data:`LEVEL_EXCESS`, relative to the level.
 
     Secants in the logarithms, as the value is almost a power of the velocity; a bracket guards
     them once it is known.  Raises CasesError if there is none within 1/100 to 100 times the start.

@@ -172,7 +172,7 @@ class Exceedance(NamedTuple):
     quantity: NDArray[np.str_]
     limit: Floats
     probability: Floats
-    lower: Floats  # of :func:`bounds`, as `upper`
+    lower: Floats  # of :func:`exceedance_bounds`, as `upper`
     upper: Floats
     draws: NDArray[np.int64]
     open: NDArray[np.int64]

@@ -408,8 +408,8 @@ class Critical(NamedTuple):
 def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:
     """Fit alpha_cr = (alpha_m - alpha_0)^(5/2)/alpha_m^(3/2), equal for all cycles.
 
-    Parameters are those of :func:`line`.  A cycle below alpha_cr has no permanent indentation and
-    only bounds alpha_cr: such cycles are excluded if there are others.
+    Parameters are those of :func:`fit_permanent_line`.  A cycle below alpha_cr has no permanent
+    indentation and only bounds alpha_cr: such cycles are excluded if there are others.
     """
     own = (peaks - permanents) ** ACR_POWER / peaks**LOADING_POWER
     by_peak = own * (ACR_POWER / (peaks - permanents) - LOADING_POWER / peaks)
