@@ -163,7 +163,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         _gages(problem, mesh, plate),
         build_station(deck, rod, variant.impact, is_own=chosen.projectile is not None),
     )
-    steps = None
+    steps = None  # the kernels take many steps at once of the report's program only
     if impact is not None and not chosen.slips and can_step(impact):
         sums = None if read is None else motion.dof_sums(read.dof_indices, read.weights)
         steps = ImpactSteps(impact, sums, station.dof, workers.count)
