@@ -33,30 +33,29 @@ class LazyCommand(NamedTuple):
 
     module: str  # in which it has its name
     summary: str  # its line in ``fecm --help``
-    isolated: bool = False  # whether it reads result files and runs in a child process
 
 
 COMMANDS = {
     "check": LazyCommand("fecm.cli.decks", "Check decks without running them, and summarise them."),
-    "diff": LazyCommand("fecm.cli.diff", "Compare two results dataset by dataset.", True),
+    "diff": LazyCommand("fecm.cli.diff", "Compare two results dataset by dataset."),
     "estimate": LazyCommand("fecm.cli.estimate", "Estimate an impact and its damage threshold."),
     "example": LazyCommand("fecm.cli.example", "List the example decks and tables, or write one."),
-    "export": LazyCommand("fecm.cli.export", "Write RESULT for ParaView or a spreadsheet.", True),
+    "export": LazyCommand("fecm.cli.export", "Write RESULT for ParaView or a spreadsheet."),
     "fmt": LazyCommand("fecm.cli.decks", "Align the columns of decks."),
     "identify": LazyCommand("fecm.cli.identify", "Fit parameters to a measured contact force."),
     "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),
-    "info": LazyCommand("fecm.cli.info", "Describe the contents of RESULT.", True),
+    "info": LazyCommand("fecm.cli.info", "Describe the contents of RESULT."),
     "locate": LazyCommand("fecm.cli.locate", "Find place and force of an impact by strain gages."),
     "materials": LazyCommand(
         "fecm.cli.materials", "List the named plies of `fecm new`, or of a file."
     ),
     "new": LazyCommand("fecm.cli.new", "Write a deck from plate, layup, supports and impact."),
-    "plot": LazyCommand("fecm.cli.plot", "Draw the report's figures, or the map of a sweep.", True),
-    "report": LazyCommand("fecm.cli.report", "Write an HTML page about results.", True),
+    "plot": LazyCommand("fecm.cli.plot", "Draw the report's figures, or the map of a sweep."),
+    "report": LazyCommand("fecm.cli.report", "Write an HTML page about results."),
     "rod": LazyCommand("fecm.cli.rod", "The projectile's rod alone: pulses and calibration."),
     "run": LazyCommand("fecm.cli.run", "Run every problem in DECK and write its result."),
     "sweep": LazyCommand("fecm.cli.sweep", "Run DECK many times with varied parameters."),
-    "tapes": LazyCommand("fecm.cli.export", "Write tape3, tape8 and tape9 as text.", True),
+    "tapes": LazyCommand("fecm.cli.export", "Write tape3, tape8 and tape9 as text."),
     "verify": LazyCommand("fecm.cli.verify", "Compare fecm with closed forms and the literature."),
     "waves": LazyCommand("fecm.cli.waves", "Waves in a laminate."),
 }
@@ -70,11 +69,9 @@ class LazyGroup(click.Group):
         return sorted(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
-        """Import a command; an isolated one in a child process."""
+        """Import a command."""
         if (command := COMMANDS.get(cmd_name)) is None:
             return None
-        if command.isolated and not ctx.resilient_parsing:
-            isolation.fork()
         found: click.Command = getattr(import_module(command.module), f"{cmd_name}_command")
         return found
 
@@ -116,7 +113,7 @@ def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoR
     """Run the command line and leave with its exit status."""
     signals.install()
     streams.guard_streams()
-    isolation.switch.on = arguments is None
+    isolation.enabled = arguments is None
     warnings.showwarning = _show_warning
     os.environ["MPLBACKEND"] = "agg"  # pictures are files, whatever a notebook's environment says
     status = _status(arguments, prog_name)
