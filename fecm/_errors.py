@@ -25,6 +25,10 @@ class OptionsError(FecmError, ValueError):
     """An option has a value that is not possible, or not with this deck."""
 
 
+class ResultFileError(FecmError, ValueError):
+    """A file is not a readable result."""
+
+
 class StudyError(FecmError, ValueError):
     """A study can't be computed from these numbers, or their table is invalid."""
 

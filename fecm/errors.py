@@ -5,7 +5,7 @@ All of them are :class:`FecmError`.
 
 from __future__ import annotations
 
-from fecm._errors import FecmError, OptionsError, StudyError
+from fecm._errors import FecmError, OptionsError, ResultFileError, StudyError
 from fecm._extensions import ExtensionError
 from fecm._files import NoFolderError, OutputError, OutputExistsError
 from fecm._inputs import ContentError, InputError
@@ -33,7 +33,7 @@ from fecm.problem.plate_mesh import MeshError
 from fecm.problem.refine import RefineError
 from fecm.report.content import Jinja2Error, ReportError
 from fecm.results.diff import IncomparableError
-from fecm.results.groups import ExportError, NotStoredError, ResultFileError, ResultWriteError
+from fecm.results.groups import ExportError, NotStoredError, ResultWriteError
 from fecm.simulation.checkpoint import CheckpointError
 from fecm.sweeps.execute import DamagedPartError, OtherSweepError, SchedulerError
 from fecm.verification import UnknownCaseError

@@ -322,7 +322,7 @@ def test_tapes_are_replaced_only_when_asked_for_and_all_or_none(
         raise OSError(errno.ENOSPC, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("fecm.results.tapes._strain_lines", strains)
+        patch.setattr("fecm.listing.tapes._strain_lines", strains)
         assert call("tapes", "d.h5", "--overwrite").exit_code == 2
     assert Path("tape8").read_text() == "precious"
     assert names(folder) == ["d.h5", "d.inp", "out", "tape8", "two.inp"]

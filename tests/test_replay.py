@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 import fecm
 from fecm import Result
 from fecm.deck import ElementGrid, GridSection, Indentation, Material
+from fecm.listing import tape_texts
 from fecm.mechanics import ImpactSystem, PlateMotion
-from fecm.results import tape_texts
 from fecm.simulation import restore, saved_values
 from fecm.verification.decks import run_of_deck, struck_plate
 from tests.decks import APPENDIX, DATA, LONG, ready

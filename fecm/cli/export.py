@@ -11,6 +11,7 @@ from fecm.cli.common import DASH, RefusedError, echo, note
 from fecm.cli.isolation import reads
 from fecm.cli.options import DECK_PATH, FILE_PATH, NAMED_PATH, typical
 from fecm.cli.outputs import write_lines
+from fecm.listing.tapes import tape_texts, write_tapes
 from fecm.results import export as csv
 from fecm.results.export import ExportFormat
 from fecm.results.export import export_result as write
@@ -18,7 +19,6 @@ from fecm.results.groups import ExportError
 from fecm.results.hdf5_reader import FileContents, read
 from fecm.results.result import load, result_of
 from fecm.results.schema import Form
-from fecm.results.tapes import tape_texts, write_tapes
 
 
 @click.command(

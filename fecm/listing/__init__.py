@@ -1,4 +1,4 @@
-"""The printed program of the report: its slips, what they change, and its printed output."""
+"""The printed program of the report: its slips, what they change, its printed output and tapes."""
 
 from fecm._lazy import names_of_stub
 

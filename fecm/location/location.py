@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._arrays import read_only
-from fecm._errors import FecmError, OptionsError
+from fecm._errors import FecmError, OptionsError, ResultFileError
 from fecm._files import ARGUMENT, check_outputs
 from fecm._typing import AnyFile, Bools, Floats
 from fecm.deck.model import Deck
 from fecm.deck.units import unit_names, unit_of
 from fecm.results import schema
-from fecm.results.groups import NotStoredError, ResultFileError
+from fecm.results.groups import NotStoredError
 from fecm.results.pictures import plot_results
 from fecm.results.stored import deck_in
 

@@ -10,13 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fecm._errors import ResultFileError
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.deck.model import Deck, Impact
 from fecm.mechanics.elements import Quadrature
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.mesh import ElementBlock, element_blocks
 from fecm.plot.kinds import LackingError, PlotError
-from fecm.results.groups import NotStoredError, ResultFileError, remedy
+from fecm.results.groups import NotStoredError, remedy
 from fecm.results.plies import points_of, rows_at
 from fecm.results.result import Result
 

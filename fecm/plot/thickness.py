@@ -9,14 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fecm._errors import warn
+from fecm._errors import ResultFileError, warn
 from fecm._typing import Array, Floats
 from fecm.mechanics.mesh import element_blocks, element_centres
 from fecm.mechanics.points import containing_elements
 from fecm.plot import style
 from fecm.plot.data import mesh_of, on_plate, reach, require_datasets
 from fecm.plot.kinds import Picture, PlotError, Width
-from fecm.results.groups import NotStoredError, ResultFileError
+from fecm.results.groups import NotStoredError
 from fecm.results.plies import IN_PLANE, INTERLAMINAR, PlyResults, cure_stress_of, rows_at
 from fecm.results.result import Result
 

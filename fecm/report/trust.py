@@ -7,6 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fecm._errors import ResultFileError
 from fecm.api import load_deck
 from fecm.deck.macros import flat
 from fecm.listing.slips import LISTING
@@ -31,7 +32,6 @@ from fecm.results.exposures import (
     failure_verdict,
     largest_exposures,
 )
-from fecm.results.groups import ResultFileError
 from fecm.results.metrics import MOBILITY
 from fecm.results.result import Result
 from fecm.results.summary import UNDECIDED

@@ -1,4 +1,4 @@
-"""Results of runs: in memory, in HDF5 files and on the printed program's tapes."""
+"""Results of runs: in memory and in HDF5 files."""
 
 from fecm._lazy import names_of_stub
 

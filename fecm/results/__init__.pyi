@@ -1,5 +1,6 @@
 """Names of this room for other rooms and for tests; each is imported when it is first used."""
 
+from fecm._errors import ResultFileError as ResultFileError
 from fecm.results.comparison import measurement_of as measurement_of
 from fecm.results.criteria import ALL_CRITERIA as ALL_CRITERIA
 from fecm.results.criteria import is_isotropic as is_isotropic
@@ -22,7 +23,6 @@ from fecm.results.exposures import mesh_band as mesh_band
 from fecm.results.groups import GROUPS as GROUPS
 from fecm.results.groups import ExportError as ExportError
 from fecm.results.groups import NotStoredError as NotStoredError
-from fecm.results.groups import ResultFileError as ResultFileError
 from fecm.results.hdf5_reader import read as read
 from fecm.results.hdf5_writer import result_writing as result_writing
 from fecm.results.metrics import EXPOSURES as EXPOSURES
@@ -46,10 +46,6 @@ from fecm.results.sinks import MemorySink as MemorySink
 from fecm.results.sinks import RowBuffer as RowBuffer
 from fecm.results.summary import about_run as about_run
 from fecm.results.summary import run_summary as run_summary
-from fecm.results.tapes import fortran_number as fortran_number
-from fecm.results.tapes import read_tapes as read_tapes
-from fecm.results.tapes import tape_texts as tape_texts
-from fecm.results.tapes import write_tapes as write_tapes
 from fecm.results.validity import CURVED as CURVED
 from fecm.results.validity import LIMITS as LIMITS
 from fecm.results.validity import Extent as Extent

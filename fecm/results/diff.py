@@ -29,13 +29,13 @@ import numpy as np
 from fecm._errors import FecmError
 from fecm._typing import Array
 from fecm.deck.mesh_cards import DOF_NAMES
+from fecm.listing.tapes import CONTACT, SHEARS, TAPES, TapeText, W, last_digit, read_tapes
 from fecm.results.difference import TEXT, DatasetDifference, Difference, Listed, Position
 from fecm.results.groups import suggestion
 from fecm.results.hdf5_reader import FileContents, read
 from fecm.results.result import Result
-from fecm.results.schema import CONTACT, DATASETS, SCALES, Form, dataset_of
+from fecm.results.schema import DATASETS, SCALES, Form, dataset_of
 from fecm.results.stored import row_blocks
-from fecm.results.tapes import SHEARS, TAPES, TapeText, W, last_digit, read_tapes
 
 # Those of a resultant or strain that is zero in bending, and those of its bending counterpart.
 RESULTANTS = ("N_x", "N_y", "N_xy")

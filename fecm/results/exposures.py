@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from fecm._errors import ResultFileError
 from fecm._typing import Array, Floats
 from fecm.deck.material_cards import MATERIAL
 from fecm.results.criteria import (
@@ -20,7 +21,6 @@ from fecm.results.criteria import (
     plies_in_words,
     where,
 )
-from fecm.results.groups import ResultFileError
 from fecm.results.stored import Stored
 
 LOWER_BOUNDS = "the run ends in contact: exposures are lower bounds"

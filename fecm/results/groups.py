@@ -5,13 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
-from fecm._errors import FecmError
+from fecm._errors import FecmError, ResultFileError
 from fecm._text import html_table
 from fecm._typing import Array
-
-
-class ResultFileError(FecmError, ValueError):
-    """A file is not a readable result."""
 
 
 class NotStoredError(AttributeError, KeyError, ResultFileError):

@@ -19,13 +19,13 @@ from typing import Any, NamedTuple
 import h5py
 import numpy as np
 
-from fecm._errors import OptionsError
+from fecm._errors import OptionsError, ResultFileError
 from fecm._text import short_text
 from fecm._typing import AnyFile, Array
 from fecm.results import schema
 from fecm.results.criteria import OWN_CRITERIA, criteria_of
 from fecm.results.exposures import AT_REST, LOAD_FACTOR
-from fecm.results.groups import NotStoredError, ResultFileError, not_stored
+from fecm.results.groups import NotStoredError, not_stored
 from fecm.results.metrics import MOBILITY
 from fecm.results.schema import FORMAT_VERSION, Form
 

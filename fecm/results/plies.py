@@ -9,13 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fecm._errors import ResultFileError
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.deck.model import Deck, Layer, Material, Ply
 from fecm.listing.variant import variant_of
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.mesh import element_blocks
-from fecm.results.groups import NotStoredError, ResultFileError, remedy
+from fecm.results.groups import NotStoredError, remedy
 from fecm.results.schema import CURE_STRESS, PlyRows
 from fecm.results.stored import Stored
 

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from fecm._errors import warn
+from fecm._errors import ResultFileError, warn
 from fecm._text import html_table
 from fecm._typing import AnyFile, Floats
 from fecm.deck.model import Deck
 from fecm.results import schema
 from fecm.results.end import End
-from fecm.results.groups import NotStoredError, ResultFileError, ResultGroup, not_stored
+from fecm.results.groups import NotStoredError, ResultGroup, not_stored
 from fecm.results.run_metrics import end_of, metrics_of
 from fecm.results.stored import Stored
 

@@ -7,9 +7,9 @@ import math
 
 import numpy as np
 
+from fecm._errors import ResultFileError
 from fecm.deck.model import Impact
 from fecm.results.end import Deflection, End, time_to_decide
-from fecm.results.groups import ResultFileError
 from fecm.results.metrics import (
     INTEGERS,
     METRICS,

@@ -11,11 +11,12 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from fecm._arrays import read_only
+from fecm._errors import ResultFileError
 from fecm._typing import Array
 from fecm.deck.model import Deck
 from fecm.deck.reader import Reader
 from fecm.deck.units import declared_units, unit_of
-from fecm.results.groups import Attributes, NotStoredError, ResultFileError, not_stored
+from fecm.results.groups import Attributes, NotStoredError, not_stored
 from fecm.results.metrics import METRICS, VALIDITY
 from fecm.results.schema import KINEMATICS, Kinematics, dataset_of
 
@@ -104,11 +105,6 @@ class Stored:
         Empty in files of earlier versions and without impact steps.
         """
         return str(self.attributes.get(VALIDITY, ""))
-
-    @property
-    def has_listing_tapes(self) -> bool:
-        """Whether tape8 and tape9 are those of the printed program: the slip ``tapes``."""
-        return "tapes" in self.slips
 
     @property
     def still_in_contact(self) -> bool:

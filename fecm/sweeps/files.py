@@ -11,11 +11,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fecm._errors import ResultFileError
 from fecm._typing import Floats
 from fecm.authoring.values import dimension_of
 from fecm.deck.units import column_name
 from fecm.results import schema
-from fecm.results.groups import ExportError, ResultFileError
+from fecm.results.groups import ExportError
 from fecm.results.metrics import VERDICTS
 from fecm.sweeps import reduced
 from fecm.sweeps.distributions import CustomDistribution, ValueDistribution

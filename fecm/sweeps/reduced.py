@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from fecm._errors import ResultFileError
 from fecm._typing import Floats
 from fecm.authoring.case import CasesError
 from fecm.authoring.strike import Strike
@@ -29,7 +30,6 @@ from fecm.mechanics.reduced_plate import (
     reduced_plate,
 )
 from fecm.problem.problem import Problem
-from fecm.results.groups import ResultFileError
 from fecm.results.metrics import RATIO, IndentationMetrics
 from fecm.results.schema import SWEEP_DATASETS
 from fecm.sweeps.outcome import About, Column, Outcome, merge

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from fecm._errors import ResultFileError
 from fecm._files import ARGUMENT, check_outputs, open_for_writing
 from fecm._text import html_table
 from fecm._typing import AnyFile
@@ -17,7 +18,6 @@ from fecm.deck.model import Delamination
 from fecm.deck.units import declared_units, unit_names
 from fecm.mechanics.own_law import law_name
 from fecm.results import schema
-from fecm.results.groups import ResultFileError
 from fecm.results.metrics import COLUMNS, FOUND, RATIO, SUMMARY, THRESHOLD, VERDICTS
 from fecm.results.pictures import SweepKind, plot_results, report_results
 from fecm.sweeps import reduced as reduced_check

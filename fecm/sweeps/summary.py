@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from fecm._errors import ResultFileError
 from fecm._text import DIGITS, significant
 from fecm._typing import Bools
 from fecm.authoring.case import THRESHOLD, pair_of_text
@@ -15,7 +16,6 @@ from fecm.deck.model import Curvature, Preload, Segment
 from fecm.deck.units import column_name, quantity
 from fecm.problem.generate import generate
 from fecm.results.exposures import RESOLVED
-from fecm.results.groups import ResultFileError
 from fecm.results.metrics import FOUND_BAND, RATIO
 from fecm.results.validity import (
     BENT,

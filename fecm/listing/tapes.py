@@ -16,17 +16,15 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
+from fecm._errors import ResultFileError
 from fecm._files import beside
 from fecm._typing import Array, Floats
-from fecm.results.groups import ResultFileError
-from fecm.results.result import Result
-from fecm.results.schema import CONTACT
 
-TAPES = "tapes"  # form of a folder of tapes, as `Contents.form` of a file
+TAPES = "tapes"  # form of a folder of tapes, as `Contents.form` of a file; and the slip's name
 NAMES = ("tape3", "tape8", "tape9")
 WIDTH = 12  # characters per number
 DIGITS = 4  # of them
@@ -35,11 +33,23 @@ LABEL = 6  # characters of the number of an element or of a point
 SHEARS = {"tape8": ("gamma_yz", "gamma_xz"), "tape9": ("gamma_xz", "gamma_yz")}
 W = "tape3/w"
 CURVATURES = ("kappa_x", "kappa_y", "kappa_xy")
+CONTACT = ("force", "indentation", "transducer", "displacement", "velocity", "acceleration")
 _LABELS = re.compile(rb" *\d+")
 # Allowed letters are those of Infinity, NaN and the exponents' E and D.
 _FOREIGN = re.compile(rb"[^0-9+\-. EDINFTYA]", re.IGNORECASE)
 _NUMBER = re.compile(rb"([+-]?(?:\d+\.?\d*|\.\d+))(?:[ED]([+-]?\d+)|([+-]\d+))?", re.IGNORECASE)
 _SPECIAL = re.compile(rb"[+-]?(?:inf(?:inity)?|nan)", re.IGNORECASE)
+
+
+class OnTape(Protocol):
+    """What tapes are written from: datasets by path, and the slips of their run."""
+
+    @property
+    def slips(self) -> tuple[str, ...]:
+        """Names of the active slips."""
+
+    def __contains__(self, path: str) -> bool: ...
+    def __getitem__(self, path: str) -> Array: ...
 
 
 def fortran_e(value: float) -> str:
@@ -80,10 +90,10 @@ def _strain_lines(columns: Sequence[Array]) -> Iterator[str]:
             yield f"{element + 1:6d}{point + 1:6d}{text}"
 
 
-def tape_texts(result: Result) -> dict[str, Iterator[str]]:
+def tape_texts(result: OnTape) -> dict[str, Iterator[str]]:
     """Lines of every tape that the run stored, by name."""
     strains, contact = "tape8", "tape9"
-    if result.has_listing_tapes:
+    if TAPES in result.slips:
         strains, contact = contact, strains
 
     def columns(group: str, names: Iterable[str]) -> list[Array]:
@@ -103,7 +113,7 @@ def tape_texts(result: Result) -> dict[str, Iterator[str]]:
     return dict(sorted(texts.items()))
 
 
-def write_tapes(result: Result, folder: Path, *, overwrite: bool = True) -> list[Path]:
+def write_tapes(result: OnTape, folder: Path, *, overwrite: bool = True) -> list[Path]:
     """Write all tapes into a folder, or none; a missing folder is created.
 
     Returns the paths of the files.  Raises OSError if a file can't be written.
