@@ -15,12 +15,12 @@ from pathlib import Path
 
 import numpy as np
 
-from fecm.api import load_deck
 from fecm.plot import style
 from fecm.plot.kinds import Picture
 from fecm.plot.pictures import save_picture
+from fecm.problem.loading import load_deck
 from fecm.studies.estimate import LARGE, SMALL, quick_estimate
-from fecm.sweeps.api import carry_out_plan
+from fecm.sweeps.execute import carry_out_plan
 from fecm.sweeps.plan import plan
 from fecm.verification.decks import run_of_deck
 from fecm.verification.impacts import struck_square

@@ -22,11 +22,11 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the command line does
 
 from run import distorted, refined
 
-from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.reader import Reader
 from fecm.problem.build import RunOptions, build_model
-from fecm.sweeps.api import checked_problem
+from fecm.problem.loading import load_deck
+from fecm.sweeps.job import checked_problem
 
 
 def in_columns(text: str) -> str:

@@ -36,7 +36,6 @@ import numpy as np
 from figures import keep
 
 import fecm
-from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.deck.grid import ElementGrid, GridSection
 from fecm.deck.macros import compile_program
@@ -57,6 +56,7 @@ from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.stiffness_product import CSR, KERNELS, NUMPY
 from fecm.problem.build import RunOptions, build_model
 from fecm.problem.generate import generate
+from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
 from fecm.results import hdf5_writer
 from fecm.results.summary import about_run

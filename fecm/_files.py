@@ -31,9 +31,6 @@ NO_LINKS = {
     errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK, errno.EINVAL,
 }  # fmt: skip
 ATTEMPTS = 10  # to create a partial file while others remove it
-# What lets an existing file be replaced: an option of a command, or an argument in Python.
-OPTION = "--overwrite"
-ARGUMENT = "overwrite=True"
 
 
 class OutputError(FecmError, OSError):
@@ -53,14 +50,12 @@ def check_outputs(
     overwrite: bool,
     inputs: Iterable[Path] = (),
     own: Iterable[Path] = (),
-    *,
-    allowed_by: str = OPTION,
 ) -> None:
     """Refuse outputs that conflict, exist, or can't be written, before the computation.
 
     `inputs` are files that the command reads; they are never replaced.  `own` are other files that
     it writes, such as checkpoints: no output may have their names, none of them may be a folder,
-    and their names must not be too long.  Messages name `allowed_by` as the way to replace a file.
+    and their names must not be too long.
     """
     if Path("-") in (*paths, *own):
         raise OutputError("- is a standard stream, and this needs a file; give its name")
@@ -82,10 +77,10 @@ def check_outputs(
         if not target.parent.is_dir():
             raise NoFolderError(f"{path}: there is no folder {target.parent}")
         if mode is not None and not overwrite:
-            raise OutputExistsError(f"{path} exists already; {allowed_by} replaces it")
+            raise OutputExistsError(f"{path} exists already; overwrite=True replaces it")
         if path.is_symlink() and not overwrite:
             lack = f"{path} is a link to {target}, which does not exist"
-            raise OutputExistsError(f"{lack}; {allowed_by} creates it")
+            raise OutputExistsError(f"{lack}; overwrite=True creates it")
         if not _discard(partial_of(target)):
             raise OutputError(f"{path} is being written by another process")
 

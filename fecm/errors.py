@@ -10,6 +10,7 @@ from fecm._extensions import ExtensionError
 from fecm._files import NoFolderError, OutputError, OutputExistsError
 from fecm._inputs import ContentError, InputError
 from fecm._machine import NotEnoughMemoryError
+from fecm._watch import StoppedError
 from fecm.authoring.case import CasesError
 from fecm.authoring.parameters import ObjectError
 from fecm.deck.findings import DeckError
@@ -35,7 +36,8 @@ from fecm.report.content import Jinja2Error, ReportError
 from fecm.results.diff import IncomparableError
 from fecm.results.groups import ExportError, NotStoredError, ResultWriteError
 from fecm.simulation.checkpoint import CheckpointError
-from fecm.sweeps.execute import DamagedPartError, OtherSweepError, SchedulerError
+from fecm.sweeps.execute import SchedulerError
+from fecm.sweeps.partial_results import DamagedPartError, OtherSweepError
 from fecm.verification import UnknownCaseError
 
 __all__ = [
@@ -82,6 +84,7 @@ __all__ = [
     "RowsError",
     "SchedulerError",
     "SingularStiffnessError",
+    "StoppedError",
     "StudyError",
     "UnitsError",
     "UnknownCaseError",

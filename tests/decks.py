@@ -6,9 +6,8 @@ import re
 from pathlib import Path
 
 import fecm
-from fecm.api import load_deck
 from fecm.deck import Deck
-from fecm.problem import ImpactModel, build_model
+from fecm.problem import ImpactModel, build_model, load_deck
 
 ROOT = Path(__file__).parent.parent
 DATA = Path(__file__).parent / "data"

@@ -16,8 +16,8 @@ import time
 from collections import Counter
 from types import FrameType
 
-from fecm.api import load_deck
 from fecm.deck import Reader, format_deck
+from fecm.problem import load_deck
 from tests.decks import APPENDIX, small
 
 SECONDS = 1.0

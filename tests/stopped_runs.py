@@ -5,9 +5,8 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from fecm.api import load_deck
 from fecm.mechanics import AUTO
-from fecm.problem import Problem, RunOptions
+from fecm.problem import Problem, RunOptions, load_deck
 from fecm.results import hdf5_writer
 from fecm.simulation import Checkpointer, Simulation
 from fecm.simulation import run_program as simulate_run

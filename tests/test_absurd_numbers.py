@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.deck import DeckError
-from fecm.problem import deck_summary
+from fecm.problem import deck_summary, load_deck
 from tests.decks import PROGRAM, small
 from tests.fuzz_decks import FORC, OWN
 

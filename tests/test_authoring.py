@@ -10,7 +10,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import fecm
-from fecm.api import load_deck
 from fecm.deck import (
     MATERIALS,
     Allowables,
@@ -34,7 +33,7 @@ from fecm.deck import (
     uniform_section,
 )
 from fecm.mechanics import critical_time_step
-from fecm.problem import build_projectile
+from fecm.problem import build_projectile, load_deck
 from fecm.problem.generate import generate
 from tests.calls import assert_unusable, call, new
 from tests.decks import APPENDIX, LONG, small

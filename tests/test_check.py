@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
-from fecm.problem import deck_summary, parts, problem
+from fecm.problem import deck_summary, load_deck, parts, problem
 from tests import decks
 from tests.calls import call
 from tests.decks import APPENDIX, DATA, LONG, MESH, PROGRAM, ROOT

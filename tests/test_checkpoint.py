@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from fecm.api import load_deck
 from fecm.mechanics import kernels
+from fecm.problem import load_deck
 from fecm.results import RowBuffer, hdf5_writer
 from fecm.simulation import Checkpointer, CheckpointError, Simulation, checkpoint_of, spool_of
 from fecm.simulation import run_program as simulate_run

@@ -19,7 +19,6 @@ import pytest
 
 import fecm
 from fecm import Deck
-from fecm.api import load_deck
 from fecm.deck import (
     MATERIALS,
     Allowables,
@@ -41,6 +40,7 @@ from fecm.mechanics import (
     residual_stresses,
 )
 from fecm.mechanics.laminate import laminate
+from fecm.problem import load_deck
 from fecm.results import ALL_CRITERIA, EXPOSURES, LargestExposure, largest_exposures
 from fecm.simulation import Simulation, run_program
 from fecm.sweeps import in_full

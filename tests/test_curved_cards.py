@@ -8,9 +8,8 @@ from dataclasses import replace
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.deck import Finding, model
-from fecm.problem import clamped_frequency, needed_bytes
+from fecm.problem import clamped_frequency, load_deck, needed_bytes
 from fecm.verification import decks
 from tests.curved_panels import mesh, panel, shortly
 

@@ -13,10 +13,9 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import fecm
 from fecm import Deck, MeshError
-from fecm.api import load_deck
 from fecm.authoring import CasesError, ObjectError
 from fecm.deck import Boundary, Curvature
-from fecm.problem import deck_summary, restraint_codes
+from fecm.problem import deck_summary, load_deck, restraint_codes
 from fecm.problem.generate import generate
 from fecm.report import page_of, render
 from fecm.results import CURVED

@@ -10,10 +10,10 @@ import pytest
 from scipy.optimize import brentq
 
 from fecm import Result
-from fecm.api import load_deck
 from fecm.deck import model
 from fecm.mechanics import PlateModel
 from fecm.mechanics.laminate import laminate
+from fecm.problem import load_deck
 from fecm.studies import QuickEstimate, quick_estimate
 from fecm.verification import decks
 from tests import curved_panels

@@ -10,9 +10,9 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.api import load_deck
 from fecm.deck import ElementGrid, model, uniform_section
 from fecm.mechanics import gages, kernels
+from fecm.problem import load_deck
 from fecm.studies import quick_estimate
 from fecm.verification import decks
 from tests import curved_panels

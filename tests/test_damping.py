@@ -10,10 +10,9 @@ from scipy.linalg import eigh
 
 import fecm
 from fecm import Result
-from fecm.api import load_deck
 from fecm.deck import Damping
 from fecm.mechanics import PlateModel, PlateMotion
-from fecm.problem import build_plate
+from fecm.problem import build_plate, load_deck
 from tests.builders import Floats, table
 from tests.calls import call
 from tests.decks import DATA_CARDS, MESH, PROGRAM, ROOT, small

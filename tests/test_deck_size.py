@@ -11,7 +11,6 @@ import pytest
 
 from fecm import _machine
 from fecm._machine import NotEnoughMemoryError
-from fecm.api import load_deck
 from fecm.deck import (
     MOST,
     MOST_PROBLEMS,
@@ -27,7 +26,7 @@ from fecm.deck import (
     reader,
     segment,
 )
-from fecm.problem import generate
+from fecm.problem import generate, load_deck
 from fecm.problem.rules import gages as gage_rules
 from tests.calls import assert_unusable, call
 from tests.decks import DATA_CARDS, MESH, OWN_FINDINGS, PROGRAM, small

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.deck import Impact
+from fecm.problem import load_deck
 from fecm.studies import quick_estimate
 from tests.calls import call
 from tests.decks import MESH, PROGRAM, small

@@ -16,11 +16,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import trapezoid
 
 import fecm
-from fecm.api import Solver
 from fecm.authoring import CasesError
 from fecm.cli.interrupts import signals
 from fecm.mechanics import LIBRARY, OwnProjectile, puck
 from fecm.problem import build_law, build_projectile
+from fecm.simulation import Solver
 from tests.calls import assert_unusable, call
 from tests.decks import LONG, PROGRAM, small
 from tests.test_first_failure import failing

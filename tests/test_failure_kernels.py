@@ -13,7 +13,6 @@ import pytest
 import fecm
 from fecm import Ply, Strengths
 from fecm._typing import Floats
-from fecm.api import load_deck
 from fecm.deck import Allowables
 from fecm.mechanics import (
     CRITERIA,
@@ -30,7 +29,7 @@ from fecm.mechanics import (
 )
 from fecm.mechanics.kernels import failure as compiled_failure
 from fecm.mechanics.laminate import laminate
-from fecm.problem import build_model
+from fecm.problem import build_model, load_deck
 from fecm.results import MemorySink
 from fecm.simulation import Simulation, run_program
 from tests.builders import distorted_square, nothing, square, with_restraints

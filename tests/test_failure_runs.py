@@ -12,7 +12,6 @@ import pytest
 import fecm
 from fecm import Ply
 from fecm._text import jsonable
-from fecm.api import Solver
 from fecm.deck import Allowables
 from fecm.mechanics import (
     CRITERIA,
@@ -25,8 +24,9 @@ from fecm.mechanics import (
     interpolate,
 )
 from fecm.mechanics.laminate import laminate
+from fecm.problem import load_deck
 from fecm.results import MemorySink, about_run, largest_exposures, run_summary
-from fecm.simulation import simulate
+from fecm.simulation import Solver, simulate
 from fecm.sweeps import without_output
 from tests.builders import nothing, rules, square, table, with_restraints
 from tests.calls import call
@@ -87,7 +87,7 @@ def test_the_first_ply_fails_at_the_load_of_the_exact_solution(name: str) -> Non
 
 def test_exposures_are_the_largest_of_all_stored_displacements() -> None:
     found = fecm.run_one(failing())
-    (problem,) = fecm.api.load_deck(failing()).problems
+    (problem,) = load_deck(failing()).problems
     stresses = PlyStresses(problem.mesh, problem.laminate, problem.rules[2])
     card = problem.deck.require(Allowables)
     rows = [stresses.evaluate(field) for field in found["tape3/displacement"]]
@@ -136,7 +136,7 @@ def test_an_exposure_beyond_the_limit_exits_1_and_keeps_the_result(tmp_path: Pat
 )
 def test_strengths_are_positive(card: str, code: str) -> None:
     text = failing().replace("   200000.   200000.     7000.    28000.    13000.", card)
-    assert code in [finding.code for finding in fecm.api.load_deck(text).errors()]
+    assert code in [finding.code for finding in load_deck(text).errors()]
 
 
 def test_blank_shear_strengths_and_constants_take_their_defaults() -> None:
@@ -155,8 +155,8 @@ def test_blank_shear_strengths_and_constants_take_their_defaults() -> None:
 
 def test_fail_needs_strengths_and_report_mode() -> None:
     without = failing().replace(ALLO, "EXPE")
-    assert "E203" in [f.code for f in fecm.api.load_deck(without).errors()]
-    found = fecm.api.load_deck(failing(), mode="listing").errors()
+    assert "E203" in [f.code for f in load_deck(without).errors()]
+    found = load_deck(failing(), mode="listing").errors()
     assert {f.code for f in found} >= {"E603"}
 
 
@@ -181,7 +181,7 @@ def test_interlaminar_exposures_of_elements_without_nine_nodes_are_nan() -> None
 
 
 def test_a_sweep_evaluates_no_criteria_in_its_cases() -> None:
-    (problem,) = fecm.api.load_deck(failing()).problems
+    (problem,) = load_deck(failing()).problems
     sink = MemorySink()
     simulate(without_output(problem), sink)
     groups = {name.split("/")[0] for name in sink.arrays}

@@ -11,9 +11,9 @@ import pytest
 import fecm
 from fecm import Result
 from fecm._typing import Bools
-from fecm.api import load_deck
 from fecm.deck import Allowables
 from fecm.mechanics import CRITERIA, FailureEnvelope, Largest, Maxima, PlyStresses, exposure_of
+from fecm.problem import load_deck
 from fecm.results import evaluations_in_contact, first_failures
 from tests.calls import call
 from tests.decks import DATA_CARDS, DISC, PROGRAM, small

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.deck import Impact, Patch
 from fecm.mechanics import static_stiffness, static_support
-from fecm.problem import build_projectile
+from fecm.problem import build_projectile, load_deck
 from tests.calls import assert_unusable, call, new, new_deck
 
 WINDOW = "150x100 plate, w=0 along the window"

@@ -9,7 +9,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from fecm import Ply
-from fecm.api import load_deck
 from fecm.deck import (
     Allowables,
     Boundary,
@@ -45,6 +44,7 @@ from fecm.deck import (
     Zone,
     Zones,
 )
+from fecm.problem import load_deck
 from tests.decks import small
 from tests.fuzz_decks import examine, mutate
 

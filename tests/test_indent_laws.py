@@ -12,9 +12,9 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.api import load_deck
 from fecm.deck import CONTACTS, Indentation, format_deck
 from fecm.mechanics import YangSunPermanent, hertz_coefficient
+from fecm.problem import load_deck
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, small
 from tests.indentation_tests import K

@@ -9,10 +9,9 @@ import pytest
 
 import fecm
 from fecm import Ply
-from fecm.api import load_deck
 from fecm.deck import MASS, MATERIALS, NAMES, Allowables, Damping, Finding, convert
 from fecm.mechanics import MeshArrays
-from fecm.problem import clamped_frequency, likely_unit, unsupported
+from fecm.problem import clamped_frequency, likely_unit, load_deck, unsupported
 from tests.decks import DATA, ROOT
 from tests.sound_plate import STRENGTHS, Edit, base, found, replaced, strengths, with_card
 

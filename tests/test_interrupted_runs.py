@@ -20,9 +20,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.listing import active_slips
-from fecm.problem import RunOptions
+from fecm.problem import RunOptions, load_deck
 from fecm.results import MemorySink
 from fecm.simulation import Checkpointer, Interpreter, Simulation, checkpoint_of, simulate
 from tests.calls import Done, call, program

@@ -16,8 +16,8 @@ from matplotlib.text import Text
 
 import fecm
 from fecm import Deck, SweepResult
-from fecm.api import load_deck
 from fecm.plot import draw
+from fecm.problem import load_deck
 from fecm.results import (
     LIMITS,
     Deflection,

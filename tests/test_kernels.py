@@ -18,7 +18,6 @@ import pytest
 
 import fecm
 from fecm import Result, Rod
-from fecm.api import load_deck
 from fecm.mechanics import (
     COLUMNS,
     LANES,
@@ -50,7 +49,7 @@ from fecm.mechanics import (
     strains,
     symmetry_reduction,
 )
-from fecm.problem import Problem, RunOptions, build_model
+from fecm.problem import Problem, RunOptions, build_model, load_deck
 from tests.builders import (
     boundary,
     distorted_square,

@@ -9,8 +9,8 @@ import pytest
 
 import fecm
 from fecm import DeckError, Result
-from fecm.api import Mode, load_deck
-from fecm.listing import NAMES, variant_of
+from fecm.listing import NAMES, Mode, variant_of
+from fecm.problem import load_deck
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ready, small
 

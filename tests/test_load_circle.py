@@ -9,8 +9,8 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.api import load_deck
 from fecm.mechanics import CircleStresses, element_blocks, inner_corners
+from fecm.problem import load_deck
 from fecm.results import (
     FailureVerdict,
     LargestExposure,

@@ -8,7 +8,6 @@ import pytest
 
 import fecm
 from fecm import Ply
-from fecm.api import load_deck
 from fecm.deck import (
     WORDS,
     Allowables,
@@ -41,6 +40,7 @@ from fecm.deck import (
     read_deck,
 )
 from fecm.listing import MODES
+from fecm.problem import load_deck
 from tests.calls import call
 from tests.decks import DATA_CARDS, PROGRAM, ROOT, small
 

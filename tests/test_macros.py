@@ -10,10 +10,9 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.api import load_deck
 from fecm.deck import LoadTable, load_factor
 from fecm.mechanics import modes
-from fecm.problem import build_plate
+from fecm.problem import build_plate, load_deck
 from tests.calls import call
 from tests.decks import DATA, DATA_CARDS, MESH, PROGRAM, ROOT, small
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.deck import (
     MATERIALS,
     NAMES,
@@ -21,6 +20,7 @@ from fecm.deck import (
     UnitsError,
     system_named,
 )
+from fecm.problem import load_deck
 from tests.calls import Done, assert_unusable, call
 
 PLATE = (

@@ -22,9 +22,8 @@ import fecm._machine
 import fecm.deck.reader
 import fecm.problem.memory
 from fecm._machine import NotEnoughMemoryError, available_memory
-from fecm.api import load_deck
 from fecm.mechanics import critical_time_step
-from fecm.problem import build_plate, needed_bytes
+from fecm.problem import build_plate, load_deck, needed_bytes
 from fecm.sweeps import ADVANCED_BYTES, HISTORY_BYTES, MOST_TOGETHER
 from tests.calls import assert_unusable, call
 from tests.decks import small
@@ -120,7 +119,7 @@ def test_the_estimate_bounds_what_is_measured(tmp_path: Path) -> None:
 
 
 ALONE = """
-from fecm.api import load_deck
+from fecm.problem import load_deck
 from fecm.problem.memory import needed_bytes
 fecm.run({small!r}, output="small.h5")
 fecm.run({static!r}, output="static.h5")

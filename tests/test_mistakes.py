@@ -9,9 +9,8 @@ import pytest
 
 import fecm
 from fecm import DivergenceError, Result
-from fecm.api import load_deck
 from fecm.mechanics import critical_time_step
-from fecm.problem import build_plate
+from fecm.problem import build_plate, load_deck
 from tests.decks import DATA
 
 BASE = (DATA / "plate-100x100x2.inp").read_text()

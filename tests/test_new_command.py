@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.cli.new import new_command as command
 from fecm.deck import MATERIALS, Delamination, Impact, Material, Nonlinear, Shear
 from fecm.mechanics import Tangent, in_plane_pins, static_stiffness
-from fecm.problem import deck_summary
+from fecm.problem import deck_summary, load_deck
 from tests import closed_forms
 from tests.builders import DATA
 from tests.calls import assert_unusable, call, new, new_deck

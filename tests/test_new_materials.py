@@ -11,7 +11,6 @@ import pytest
 
 import fecm
 from fecm import Ply
-from fecm.api import load_deck
 from fecm.deck import (
     MATERIALS,
     Allowables,
@@ -26,6 +25,7 @@ from fecm.deck import (
     Zones,
     parse_plies,
 )
+from fecm.problem import load_deck
 from fecm.problem.plate_mesh import plate_mesh
 from fecm.results import is_isotropic, largest_exposures
 from tests.calls import Done, call

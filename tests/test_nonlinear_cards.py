@@ -12,11 +12,10 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.authoring import apply_case
 from fecm.deck import Boundary, Finding, Nonlinear, Preload, Shear
 from fecm.mechanics import critical_time_step
-from fecm.problem import build_plate
+from fecm.problem import build_plate, load_deck
 from fecm.problem.generate import generate
 from fecm.studies import StudyError
 from fecm.sweeps import checked_problem, shares_plate

@@ -13,7 +13,6 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.api import load_deck
 from fecm.deck import ElementGrid, model, uniform_section
 from fecm.mechanics import (
     IntegrationRules,
@@ -27,6 +26,7 @@ from fecm.mechanics import (
     strains_and_resultants,
 )
 from fecm.plot import draw
+from fecm.problem import load_deck
 from fecm.results import End, Extent, Judge, MemorySink, run_summary
 from fecm.simulation import Simulation, judge, simulate
 from fecm.verification import decks

@@ -12,12 +12,11 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.authoring import Case
 from fecm.deck import Impact
-from fecm.problem import NoCurveError, Problem, nonlinear_curve
+from fecm.problem import NoCurveError, Problem, load_deck, nonlinear_curve
 from fecm.studies import quick_estimate, velocity_at
-from fecm.sweeps import Outcome, batch, execute, in_full, tasks
+from fecm.sweeps import Outcome, batch, in_full, price, tasks
 from fecm.sweeps.plan import plan
 from tests.calls import call
 from tests.test_nonlinear_decks import STRUCK, forces, text
@@ -120,17 +119,17 @@ def test_the_number_of_runs_and_their_time_are_told_first(tmp_path: Path) -> Non
     assert re.search(r"response: 3 cases, one full run each: about [\d.]+ s", done.stderr)
     assert "3 cases: 3 beyond the contact law" in done.stdout
     problem = problem_of(DECK)
-    searched = execute.expected(problem, plan(problem, [{}], until=50.0), 0)
+    searched = price.expected(problem, plan(problem, [{}], until=50.0), 0)
     assert "1 case, about 5 full runs each: about " in searched
     assert searched.endswith(" s of computation")
 
 
 def test_the_expected_time_grows_with_the_work(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(execute, "_costs", lambda *_: (1.0, 0.01))  # seconds of a run, of a step
+    monkeypatch.setattr(price, "_costs", lambda *_: (1.0, 0.01))  # seconds of a run, of a step
     problem = problem_of(DECK)
 
     def told(cases: list[dict[str, Any]], workers: int = 1, **more: Any) -> str:
-        return execute.expected(problem, plan(problem, cases, **more), workers).split("about ")[-1]
+        return price.expected(problem, plan(problem, cases, **more), workers).split("about ")[-1]
 
     assert told([{"k": 5e4}]) == "7 s"
     assert told([{"k": 5e4 + n} for n in range(6)], 2) == "21 s by 2 workers"

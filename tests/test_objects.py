@@ -14,9 +14,9 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.deck import Impact, Indentation, Material, Patch, format_deck
 from fecm.mechanics import MeshArrays, static_stiffness
+from fecm.problem import load_deck
 from fecm.problem.generate import generate
 from tests.builders import DATA, table
 from tests.calls import assert_unusable, call

@@ -12,10 +12,9 @@ from matplotlib.collections import PolyCollection
 
 import fecm
 from fecm import Result
-from fecm.api import load_deck
 from fecm.deck import model
 from fecm.plot import NAMES, PlotError
-from fecm.problem import deck_summary
+from fecm.problem import deck_summary, load_deck
 from fecm.results import write_vtkhdf
 from tests.pictures import legend_of, plot
 from tests.test_failure_runs import of_fabric

@@ -16,7 +16,6 @@ import pytest
 
 import fecm
 from fecm import Deck, Ply, Result, _machine
-from fecm.api import Solver, load_deck
 from fecm.authoring import Case, apply_case, check_deck
 from fecm.deck import ElementGrid, Impact, Material, Patch, Preload, Projectile, uniform_section
 from fecm.mechanics import (
@@ -34,8 +33,9 @@ from fecm.mechanics import (
     uniform_stresses,
 )
 from fecm.mechanics.laminate import laminate
-from fecm.problem import clamped_frequency, deck_summary, strengths_of_deck
+from fecm.problem import clamped_frequency, deck_summary, load_deck, strengths_of_deck
 from fecm.results import run_summary
+from fecm.simulation import Solver
 from fecm.studies import quick_estimate
 from fecm.verification import decks
 from tests import stopped_runs

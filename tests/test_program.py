@@ -11,10 +11,10 @@ import pytest
 
 import fecm
 from fecm import Result
-from fecm.api import Mode, load_deck
 from fecm.deck import Findings, Macro, compile_program, estimate_work
+from fecm.listing import Mode
 from fecm.mechanics import critical_time_step
-from fecm.problem import RunOptions
+from fecm.problem import RunOptions, load_deck
 from fecm.results import MemorySink
 from fecm.simulation import Action, Interpreter, simulate
 from tests.decks import DATA_CARDS, PROGRAM, ready, small

@@ -14,7 +14,7 @@ from types import SimpleNamespace
 import pytest
 
 import fecm
-from fecm._progress import once_a_minute
+from fecm._watch import once_a_minute
 from fecm.cli import common
 from tests.calls import call
 from tests.decks import small
@@ -154,11 +154,10 @@ def test_a_minute_has_passed_once_a_minute() -> None:
 def test_the_log_of_a_library_call_gets_the_progress(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    for module in ("fecm.api", "fecm.sweeps.api"):
-        monkeypatch.setattr(f"{module}.once_a_minute", lambda: lambda: True)
+    monkeypatch.setattr("fecm._watch.once_a_minute", lambda: lambda: True)
     with caplog.at_level(logging.INFO, "fecm"):
         result = fecm.run_one(small())
         fecm.sweep(small(), {"k": [1e6, 2e6]})
     steps = len(result.force)
-    assert f"small plate: step {steps} of {steps}" in caplog.messages
-    assert caplog.messages[-2:] == ["small plate: 2 cases", "2 of 2 cases done"]
+    assert f"small plate: {steps} of {steps} done" in caplog.messages
+    assert caplog.messages[-2:] == ["small plate: 2 cases", "small plate: 2 of 2 done"]

@@ -11,7 +11,6 @@ from scipy.integrate import solve_ivp
 
 import fecm
 from fecm import Ply, Result, RigidMass, Rod
-from fecm.api import load_deck
 from fecm.deck import (
     Control,
     Deck,
@@ -26,7 +25,7 @@ from fecm.deck import (
     Projectile,
 )
 from fecm.mechanics import gages, report_rod
-from fecm.problem import build_plate, build_projectile
+from fecm.problem import build_plate, build_projectile, load_deck
 from fecm.problem.generate import generate
 from fecm.results import dataset_csv_lines
 from tests.decks import DATA_CARDS, LONG, MESH, OWN_FINDINGS, small

@@ -16,7 +16,6 @@ from scipy.special import beta, ellipk
 
 import fecm
 from fecm import Ply, Result
-from fecm.api import load_deck
 from fecm.mechanics import (
     SMALL_MASS,
     LaminateSection,
@@ -29,7 +28,7 @@ from fecm.mechanics import (
     threshold_force,
 )
 from fecm.mechanics.laminate import laminate
-from fecm.problem import wave_impedance
+from fecm.problem import load_deck, wave_impedance
 from fecm.results import run_summary
 from fecm.verification.decks import run_of_deck
 from fecm.verification.impacts import struck_square

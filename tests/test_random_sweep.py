@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.authoring import CasesError
+from fecm.problem import load_deck
 from fecm.results import ResultFileError
 from fecm.sweeps import (
     DESIGNS,
@@ -310,7 +311,7 @@ def test_the_same_seed_gives_the_same_bytes(folder: Path) -> None:
 
 
 def test_the_cases_of_a_design_identify_an_interrupted_sweep() -> None:
-    problem = fecm.api.load_deck(fecm.read_one(small())).problems[0]
+    problem = load_deck(fecm.read_one(small())).problems[0]
     made = {
         seed: plan(problem, random_cases(design, [{}]), design=design).fingerprint()
         for seed in (0, 1)

@@ -12,9 +12,9 @@ import pytest
 
 import fecm
 from fecm import RigidMass
-from fecm.api import load_deck
 from fecm.authoring import CasesError, strike_of
 from fecm.mechanics import HystereticLaw, LinearPermanent, ReducedPlate
+from fecm.problem import load_deck
 from fecm.results import RATIO
 from fecm.sweeps import (
     Hits,

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.deck import Deck
 from fecm.mechanics import PlateModel
-from fecm.problem import RefineError, refined_deck
+from fecm.problem import RefineError, load_deck, refined_deck
 from fecm.problem.generate import generate
 from tests.decks import LONG, MESH, small
 

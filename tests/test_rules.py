@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.deck import Rule, Subject, declare
-from fecm.problem import all_rules
+from fecm.problem import all_rules, load_deck
 from fecm.problem.findings_page import findings_page
 from tests import decks
 from tests.builders import square

@@ -19,7 +19,6 @@ import pytest
 
 import fecm
 from fecm import Ply, Result
-from fecm.api import Solver, load_deck
 from fecm.deck import (
     MATERIALS,
     ElementGrid,
@@ -53,6 +52,8 @@ from fecm.mechanics import (
     symmetry_reduction,
 )
 from fecm.mechanics.laminate import laminate
+from fecm.problem import load_deck
+from fecm.simulation import Solver
 from fecm.verification import decks
 from tests.builders import Floats, table
 from tests.decks import DATA

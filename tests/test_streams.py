@@ -307,7 +307,7 @@ def test_a_signal_while_a_sweep_is_written_ends_the_program_after_it(folder: Pat
 # A callback in which Python drops an exception, as those of imports are.
 IN_A_CALLBACK = """
 import os, signal, sys, weakref
-import fecm.cli.{module} as module
+import {module} as module
 from fecm.__main__ import main
 
 number = int(sys.argv.pop(1))
@@ -331,9 +331,9 @@ main()
 @pytest.mark.parametrize(
     ("module", "name", "arguments"),
     [
-        ("report", "check_page", ("report", "d.h5")),
-        ("export", "read", ("export", "d.h5", "--to", "vtkhdf")),
-        ("run", "check_outputs", ("run", "d.inp")),  # in the program's own process
+        ("fecm.cli.report", "check_page", ("report", "d.h5")),
+        ("fecm.cli.export", "read", ("export", "d.h5", "--to", "vtkhdf")),
+        ("fecm.simulation.job", "check_outputs", ("run", "d.inp")),  # in the program's own process
     ],
 )
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])

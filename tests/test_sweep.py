@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm import ContactPoint, SweepResult
-from fecm.api import load_deck
 from fecm.authoring import Case, CasesError, apply_case, grid_cases, parse_vary, read_cases
 from fecm.deck import Deck
 from fecm.mechanics import AppliedForce, HystereticLaw, LinearPermanent, stack_parameters
-from fecm.problem import build_law, build_model, build_projectile
+from fecm.problem import build_law, build_model, build_projectile, load_deck
 from fecm.sweeps import (
     LOST,
     Convolution,
+    Means,
     OtherSweepError,
     Outcome,
     PartialResults,
@@ -344,7 +344,7 @@ def test_a_worker_that_dies_costs_time_only() -> None:
             killed.append(children()[-1])
             os.kill(killed[0], signal.SIGKILL)
 
-    shared = carry_out_plan(problem, made, workers=2, done=kill)
+    shared = carry_out_plan(problem, made, Means(workers=2), done=kill)
     assert killed
     assert_same(shared, serial())
 
@@ -415,7 +415,7 @@ def test_a_dask_cluster_that_loses_a_worker_gives_the_same_rows(
         if len(finished) == 5:
             workers[0].kill()
 
-    found = carry_out_plan(problem, made, scheduler=address, done=kill)
+    found = carry_out_plan(problem, made, Means(scheduler=address), done=kill)
     assert workers[0].poll() is not None or workers[0].wait(10) is not None
     assert sorted(finished) == list(range(16))
     assert_same(found, serial())
@@ -429,6 +429,17 @@ def test_a_scheduler_that_does_not_answer_is_told(monkeypatch: pytest.MonkeyPatc
 
 
 # Interruption ------------------------------------------------------------------------------------
+
+
+class Notes(fecm.Watch):
+    """Keeps the notes of a job."""
+
+    def __init__(self) -> None:
+        self.notes: list[str] = []
+
+    def note(self, text: str) -> None:
+        """Keep a note."""
+        self.notes.append(text)
 
 
 def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
@@ -450,13 +461,13 @@ def test_an_interrupted_sweep_goes_on_where_it_was(tmp_path: Path) -> None:
     assert before == begun
     # A part that is not whole is run again.
     (again.folder / "task-000002.npz").write_bytes(b"PK\x03\x04 and no more")
-    notes: list[str] = []
-    found = carry_out_plan(problem, made, parts=again, note=notes.append)
+    watch = Notes()
+    found = carry_out_plan(problem, made, parts=again, watch=watch, keeps_forces=False)
     forces = [force for _, force in again.forces() if force is not None]
     at_once = fecm.sweep(deck, {"layup": layups}, history=True)
     assert_same(replace(found, force=np.vstack(forces)), at_once)
-    assert len(notes) == 1
-    assert "task-000002.npz is damaged; its cases are run again" in notes[0]
+    assert len(watch.notes) == 1
+    assert "task-000002.npz is damaged; its cases are run again" in watch.notes[0]
     with pytest.raises(OtherSweepError):
         PartialResults(path, "another one")
 

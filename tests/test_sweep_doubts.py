@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.authoring import Case, apply_case
-from fecm.problem import Problem
+from fecm.problem import Problem, load_deck
 from fecm.sweeps import JUDGED, doubtful_values
 from tests.sound_plate import base, replaced, with_card
 

@@ -11,10 +11,9 @@ import pytest
 import fecm
 from fecm import RigidMass, SweepResult
 from fecm._typing import Floats
-from fecm.api import load_deck
 from fecm.authoring import Case
 from fecm.mechanics import HystereticLaw, LinearPermanent, kernels
-from fecm.problem import RunOptions, build_model
+from fecm.problem import RunOptions, build_model, load_deck
 from fecm.sweeps import batch, plate_response, responses
 from tests.test_kernels import compiled
 

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.api import load_deck
 from fecm.authoring import apply_case
 from fecm.deck import Boundary, Deck
 from fecm.mechanics import critical_time_step
-from fecm.problem import is_coupled
+from fecm.problem import is_coupled, load_deck
 from fecm.problem.generate import generate
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, MESH, PROGRAM, model, small

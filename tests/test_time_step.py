@@ -12,7 +12,6 @@ from scipy import sparse
 from scipy.linalg import eigh
 from scipy.sparse.linalg import eigsh
 
-from fecm.api import load_deck
 from fecm.mechanics import (
     ElementBlock,
     PlateModel,
@@ -24,6 +23,7 @@ from fecm.mechanics import (
     taken_time_step,
     time_step,
 )
+from fecm.problem import load_deck
 
 from .builders import (
     distorted_square,

@@ -10,8 +10,8 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from checking import CASES, written
 
-from fecm.api import load_deck
 from fecm.mechanics.time_step import critical_time_step, safe_time_step
+from fecm.problem.loading import load_deck
 
 
 class TimeSteps:

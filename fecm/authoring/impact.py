@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple, get_args
 
 from fecm._errors import warn
-from fecm.api import load_deck
 from fecm.authoring.contact import (
     AnyContact,
     Sphere,
@@ -54,6 +53,7 @@ from fecm.deck.units import units_of
 from fecm.mechanics.laminate import are_cores
 from fecm.mechanics.points import RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
+from fecm.problem.loading import load_deck
 from fecm.problem.parts import projectile_segment
 
 LONGEST_LAYUP = 60  # characters; a longer one is replaced by the number of plies

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal, NamedTuple
 
-from fecm.api import load_deck
 from fecm.authoring.contact import parse_patch
 from fecm.authoring.parameters import ObjectError, check_positive
 from fecm.deck import model
@@ -18,6 +17,7 @@ from fecm.mechanics.points import HERTZ
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.estimates import contact_duration, static_deflection
 from fecm.problem.generate import generate
+from fecm.problem.loading import load_deck
 from fecm.problem.parts import build_plate, has_assumed_shear
 from fecm.problem.problem import Problem
 from fecm.results.validity import IN_PLANE_WORDS, LIMITS, InPlane

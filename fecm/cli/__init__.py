@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import errno
 import os
-import re
 import warnings
 from collections.abc import Sequence
 from importlib import import_module
@@ -20,8 +19,9 @@ import click
 from fecm._errors import FecmError, did_you_mean
 from fecm._text import printable
 from fecm._version import __version__
+from fecm._watch import StoppedError
 from fecm.cli import isolation, streams
-from fecm.cli.common import INTERRUPTED, UNUSABLE, echo, note
+from fecm.cli.common import INTERRUPTED, UNUSABLE, echo, note, with_options
 from fecm.cli.interrupts import SIGNALLED, signals
 
 if TYPE_CHECKING:
@@ -156,6 +156,9 @@ def _status(arguments: Sequence[str] | None, prog_name: str) -> int:
     except (KeyboardInterrupt, click.Abort):
         echo("fecm: interrupted", err=True)
         return INTERRUPTED
+    except StoppedError as stopped:
+        echo(f"fecm: {with_options(str(stopped))}", err=True)
+        return 128 + signals.received
     except (FecmError, OSError, MemoryError, ImportError) as error:
         return _report(error)
     except ExceptionGroup as group:
@@ -177,7 +180,7 @@ def _message(error: Exception) -> str:
         named = name and not isinstance(name, int)
         return printable(f"{name}: {error.strerror}" if named else error.strerror)
     if isinstance(error, FecmError):
-        return printable(re.sub("`(columns|units)`", r"--\1", str(error)))  # names of options
+        return printable(with_options(str(error)))
     if isinstance(error, MemoryError):
         return "there is not enough memory"
     if isinstance(error, ImportError):

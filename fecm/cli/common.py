@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 import sys
 import threading
 from collections.abc import Callable, Iterator
@@ -13,14 +14,20 @@ import click
 
 from fecm._errors import FecmError
 from fecm._files import open_for_writing
-from fecm._progress import MINUTE
 from fecm._text import jsonable, printable
+from fecm._watch import MINUTE, Watch
+from fecm.cli.interrupts import signals
 
 # Exit statuses.
 FAILED = 1  # a check
 UNUSABLE = 2
 INTERRUPTED = 130
 
+# Options whose names messages have in backticks.
+NAMED_IN_MESSAGES = (
+    "build|cases|columns|correlation|deck|design|exceed|full|measure|model|modes|random|refine|"
+    "samples|scheduler|seed|sensitivity|units|until|vary"
+)
 DASH = Path("-")  # standard input or output
 
 
@@ -53,7 +60,65 @@ def echo_json(value: object) -> None:
 def note(*texts: object) -> None:
     """Print notes on standard error."""
     for text in texts:
-        echo(f"fecm: note: {text}", err=True)
+        echo(f"fecm: note: {with_options(str(text))}", err=True)
+
+
+def with_options(text: str) -> str:
+    """Name the options of a command in a message that names the arguments of a call."""
+    text = re.sub(r"\bthe same call (?=resumes|with \w+=True\b)", "the same command ", text)
+    return re.sub(rf"`({NAMED_IN_MESSAGES})`|\b(force|overwrite|resume)=True\b", _named, text)
+
+
+def _named(argument: re.Match[str]) -> str:
+    """Name of an argument of a call as an option of a command."""
+    return f"--{argument[1] or argument[2]}"
+
+
+class TerminalWatch(Watch):
+    """Shows the progress and the notes of a job on standard error; a signal stops the job.
+
+    `advance` takes the number of new steps.  Notes wait until :meth:`close` if a bar is shown.
+    """
+
+    def __init__(self, advance: Callable[[int], object]) -> None:
+        self._advance = advance
+        self.done = 0
+        self._notes: list[str] = []
+
+    def advance(self, done: int, total: int) -> None:
+        """Move the bar."""
+        new, self.done = done - self.done, done
+        self._advance(new)
+
+    def note(self, text: str) -> None:
+        """Print a note."""
+        self._notes.append(text)
+        if not sys.stderr.isatty():
+            self.close()
+
+    def close(self) -> None:
+        """Print the notes that wait."""
+        note(*self._notes)
+        self._notes.clear()
+
+    def stops(self) -> bool:
+        """Whether a signal came; the bar shows that the job goes on."""
+        self._advance(0)
+        return bool(signals.received)
+
+
+@contextlib.contextmanager
+def watching(
+    label: str, length: int, remark: Callable[[object], str] | None = None
+) -> Iterator[TerminalWatch]:
+    """Show the progress of a job; see :func:`progress`."""
+    watch = TerminalWatch(lambda steps: None)
+    try:
+        with progress(label, length, remark) as advance:
+            watch._advance = advance
+            yield watch
+    finally:
+        watch.close()
 
 
 @contextlib.contextmanager

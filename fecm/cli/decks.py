@@ -18,7 +18,6 @@ from click import option
 from fecm._errors import FecmError
 from fecm._files import check_outputs
 from fecm._version import __version__
-from fecm.api import LoadedDeck, check_loaded, load_deck
 from fecm.cli.common import (
     DASH,
     CheckFailedError,
@@ -35,6 +34,8 @@ from fecm.deck.reader import load_text
 from fecm.deck.units import unit_names, unit_of
 from fecm.listing.slips import REPORT, active_slips
 from fecm.problem.build import RunOptions
+from fecm.problem.deck_check import check_loaded
+from fecm.problem.loading import LoadedDeck, load_deck
 from fecm.problem.problem import Problem
 
 
@@ -58,13 +59,25 @@ def load_valid(
     Errors that `--force` permits are permitted if `force`.  Raises RefusedError, whose message ends
     with `otherwise`, if the deck has other errors.
     """
+    return load_printed(deck, otherwise, mode, force=force, warnings=warnings).problems
+
+
+def load_printed(
+    deck: Path,
+    otherwise: str = "",
+    mode: str = REPORT,
+    *,
+    force: bool = True,
+    warnings: bool = True,
+) -> LoadedDeck:
+    """Load a deck whose findings go to standard error; see :func:`load_valid`."""
     loaded = load_deck(deck, mode)
     errors = loaded.errors(force)
     for finding in loaded.findings if warnings else errors:
         echo(finding.render(loaded.source), err=True)
     if errors:
         raise RefusedError(count_findings(errors) + otherwise)
-    return loaded.problems
+    return loaded
 
 
 def load_single(deck: Path, command: str) -> Problem:

@@ -12,7 +12,6 @@ from click import option
 from click.core import ParameterSource
 
 from fecm._files import check_outputs
-from fecm.api import load_deck
 from fecm.authoring.contact import Sphere, parse_patch
 from fecm.authoring.impact import Authored, ImpactParameters, Request, author
 from fecm.authoring.mesh import InPlane
@@ -52,6 +51,7 @@ from fecm.deck.macros import RowsOfPlies
 from fecm.deck.model import Deck, Indentation, Material, Nonlinear, Patch, Ply, Shear
 from fecm.mechanics.points import DISC, RADIUS_PER_THICKNESS
 from fecm.mechanics.projectile import RigidMass, Rod
+from fecm.problem.loading import load_deck
 from fecm.problem.plate_mesh import BOUNDARY
 
 RECTANGLE = ("size", "grading", "columns", "rows")  # besides the mesh

@@ -16,6 +16,7 @@ import click
 
 from fecm._errors import did_you_mean
 from fecm._inputs import InputError, parsed_file
+from fecm._options import Option, options_of
 from fecm.cli.common import DASH
 from fecm.deck.units import NAMES, system_named
 from fecm.listing.slips import MODES, REPORT
@@ -57,6 +58,56 @@ def collected(kind: type, name: str = "options") -> Callable[[Decorated], Decora
     return decorate
 
 
+def job_options(job: Any, **settings: Mapping[str, Any]) -> Callable[[Decorated], Decorated]:
+    """Options of a job (see :mod:`fecm._options`), in one mapping, the parameter `options`.
+
+    `settings` of click, such as the type, complete or replace those of some options.
+    """
+    declared = {n: one for n, one in options_of(job).items() if one[0].group}
+
+    def decorate(function: Decorated) -> Decorated:
+        @functools.wraps(function)
+        def command(**values: Any) -> None:
+            options = {name: values.pop(name) for name in declared}
+            function(options=options, **values)
+
+        for name, (about, default) in reversed(declared.items()):
+            command = _click_option(name, about, default, settings.get(name, {}))(command)
+        return command
+
+    return decorate
+
+
+def _click_option(name: str, about: Option, default: Any, settings: Mapping[str, Any]) -> Any:
+    """Option of click for an option of a job."""
+    flags = [about.flag or f"--{name.replace('_', '-')}"]
+    if about.flag == "-o":
+        flags.append("--output")
+    made: dict[str, Any] = {"help": about.help, "metavar": about.metavar}
+    if default is False:
+        made["is_flag"] = True
+    elif default == ():
+        made["multiple"] = True
+    elif default is not None:
+        made |= {"default": default, "show_default": "default" not in settings}
+    if about.choices:
+        is_long = len(about.choices) > MOST_CHOICES
+        made["type"] = OneOf(about.choices) if is_long else click.Choice(about.choices)
+    made |= settings
+    if made.get("multiple"):
+        made["help"] += "  May be repeated."
+    return click.option(*flags, name, **made)
+
+
+def groups_of(job: Any, own: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
+    """Options of a job by the headings of the help page, before those of the command itself."""
+    groups: dict[str, list[str]] = {title: [] for title in own}
+    for name, (about, _) in options_of(job).items():
+        if about.group:
+            groups[about.group].append(name)
+    return {title: [*names, *own[title]] for title, names in groups.items()}
+
+
 class NamedFile(click.Path):
     """Path of a file or folder, which is no standard stream."""
 
@@ -72,6 +123,7 @@ NAMED_PATH = NamedFile(path_type=Path)
 FILE_PATH = click.Path(path_type=Path, allow_dash=True)  # - is standard input or output
 
 
+MOST_CHOICES = 8  # that a help page lists in the place of the value
 WITH_UNIT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[a-zA-Zµμ/]*[a-zA-Zµμ]")
 
 

@@ -56,8 +56,8 @@ from fecm.results.pictures import report_results
 from fecm.results.validity import MEANING, Reason, reasons_of
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Filter, filter_of
-from fecm.sweeps.api import checked_problem
 from fecm.sweeps.batch import runs_of
+from fecm.sweeps.job import checked_problem
 from fecm.sweeps.plan import check_law, shares_plate
 from fecm.sweeps.search import Runs
 

@@ -4,6 +4,7 @@ from fecm.listing.law import ListingLaw as ListingLaw
 from fecm.listing.slips import LISTING as LISTING
 from fecm.listing.slips import MODES as MODES
 from fecm.listing.slips import NAMES as NAMES
+from fecm.listing.slips import Mode as Mode
 from fecm.listing.slips import active_slips as active_slips
 from fecm.listing.tapes import fortran_number as fortran_number
 from fecm.listing.tapes import read_tapes as read_tapes

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Literal
 
 from fecm._errors import OptionsError
 
-REPORT = "report"
-LISTING = "listing"
+Mode = Literal["report", "listing"]
+REPORT: Mode = "report"
+LISTING: Mode = "listing"
 MODES = (REPORT, LISTING)
 # Each has a row of the errata page, docs/errata.md.
 NAMES = (

@@ -20,7 +20,7 @@ from fecm.location.search import Region, SearchResult, best_fits, is_wide, narro
 from fecm.location.table import StrainSource, StrainTable, strain_table
 from fecm.location.verdict import BETTER, Cause, is_doubtful, judged, likely_cause
 from fecm.problem.problem import Problem
-from fecm.sweeps.api import checked_problem
+from fecm.sweeps.job import checked_problem
 
 CERTAIN = 2.0  # fall of the misfit by which no other cause is tried
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from fecm._arrays import read_only
 from fecm._errors import FecmError, OptionsError, ResultFileError
-from fecm._files import ARGUMENT, check_outputs
+from fecm._files import check_outputs
 from fecm._typing import AnyFile, Bools, Floats
 from fecm.deck.model import Deck
 from fecm.deck.units import unit_names, unit_of
@@ -304,7 +304,7 @@ class Location:
         from fecm.results.hdf5_writer import result_writing  # h5py takes 60 ms to import
 
         path = Path(path)
-        check_outputs([path], overwrite, allowed_by=ARGUMENT)
+        check_outputs([path], overwrite)
         attributes = {
             "locate": self._of_place(),
             "locate/force": self._present(*OF_FORCE, *OPTIONAL),

@@ -43,7 +43,7 @@ from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
 from fecm.problem.problem import Problem
 from fecm.problem.refine import refined_deck
-from fecm.sweeps.api import checked_problem
+from fecm.sweeps.job import checked_problem
 from fecm.sweeps.responses import plate_response
 
 SAME = 1e-9  # relative difference of equal stiffnesses and rows

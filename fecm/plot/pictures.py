@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from fecm._errors import FecmError, did_you_mean
-from fecm._files import ARGUMENT, beside, check_outputs
+from fecm._files import beside, check_outputs
 from fecm.plot.kinds import (
     KINDS,
     MISSING,
@@ -217,7 +217,7 @@ def draw_results(
         if ax is not None:
             raise PlotError("give path or ax, not both: ax.figure.savefig writes your own figure")
         check_suffix(kind, Path(path))
-        check_outputs([Path(path)], overwrite, allowed_by=ARGUMENT)
+        check_outputs([Path(path)], overwrite)
         picture = draw(kind, results, **options)
         save_picture(picture, Path(path), overwrite=overwrite)
         return picture.figure.axes[0]

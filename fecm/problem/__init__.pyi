@@ -8,6 +8,8 @@ from fecm.problem.estimates import NoCurveError as NoCurveError
 from fecm.problem.estimates import nonlinear_curve as nonlinear_curve
 from fecm.problem.findings_page import all_rules as all_rules
 from fecm.problem.generate import restraint_codes as restraint_codes
+from fecm.problem.loading import LoadedDeck as LoadedDeck
+from fecm.problem.loading import load_deck as load_deck
 from fecm.problem.memory import needed_bytes as needed_bytes
 from fecm.problem.outline import unsupported as unsupported
 from fecm.problem.parts import build_law as build_law

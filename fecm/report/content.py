@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from fecm._errors import FecmError
-from fecm._files import OPTION, beside, check_outputs
+from fecm._files import beside, check_outputs
 from fecm._text import DIGITS, printable
 from fecm._version import __version__
 from fecm.deck.units import quantity, thousands, with_prefix
@@ -243,9 +243,7 @@ def write(page: ReportPage, path: Path, *, overwrite: bool) -> None:
         partial.write_text(text, encoding="utf-8", newline="\n")
 
 
-def check_page(
-    path: Path, overwrite: bool, inputs: Iterable[Path] = (), *, allowed_by: str = OPTION
-) -> None:
+def check_page(path: Path, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
     """Refuse a page that can't be written, before anything is computed.
 
     Raises ReportError for a name without the suffix .html, OutputError if the file exists and may
@@ -256,4 +254,4 @@ def check_page(
     require_matplotlib()
     if path.suffix.lower() not in SUFFIXES:
         raise ReportError(f"{path}: a report is written as {SUFFIXES[0]}")
-    check_outputs([path], overwrite, inputs, allowed_by=allowed_by)
+    check_outputs([path], overwrite, inputs)

@@ -6,7 +6,6 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from fecm._files import OPTION
 from fecm.identification.identify import Identification
 from fecm.report.content import ReportError, ReportPage, check_page, write
 from fecm.report.identification import identification_page
@@ -49,8 +48,7 @@ def write_report(
     digests: Mapping[str, str] | None = None,
     *,
     overwrite: bool,
-    allowed_by: str = OPTION,
 ) -> None:
     """Write the page about results; see :func:`page_of` and :func:`fecm.report.content.write`."""
-    check_page(path, overwrite, allowed_by=allowed_by)
+    check_page(path, overwrite)
     write(page_of(results, digests), path, overwrite=overwrite)

@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from fecm._errors import ResultFileError
-from fecm.api import load_deck
 from fecm.deck.macros import flat
 from fecm.listing.slips import LISTING
 from fecm.problem.estimates import ENOUGH_PER_WAVE, said_error
+from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
 from fecm.problem.summary import deck_summary
 from fecm.report.content import (

@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from fecm._files import ARGUMENT, check_outputs, open_for_writing
+from fecm._files import check_outputs, open_for_writing
 from fecm._text import csv_line
 from fecm._typing import Array
 from fecm.deck.mesh_cards import AXES, DOF_NAMES
@@ -406,7 +406,7 @@ def export_result(
 
     `note` receives a sentence about what is exported incompletely, or is not final.
     """
-    check_outputs([path], overwrite, allowed_by=ARGUMENT)
+    check_outputs([path], overwrite)
     if form is ExportFormat.VTKHDF:
         if dataset:
             raise ExportError("a dataset is chosen for csv; vtkhdf holds all fields")

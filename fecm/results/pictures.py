@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from fecm._files import ARGUMENT
 from fecm._methods import function_of
 
 if TYPE_CHECKING:
@@ -47,4 +46,4 @@ def plot_results(
 def report_results(results: Mapping[str, Any], path: str | Path, *, overwrite: bool) -> None:
     """Write the page about results by their names; see :func:`fecm.report.report.write_report`."""
     write_report = function_of("Result.report")
-    write_report(results, Path(path), overwrite=overwrite, allowed_by=ARGUMENT)
+    write_report(results, Path(path), overwrite=overwrite)

@@ -35,6 +35,7 @@ from fecm.simulation.simulation import Simulation
 FORMAT = 6
 OTHER_FORMAT = "another kind of checkpoint"
 SOLVER = "another solver"
+STARTS_OVER = "overwrite=True without resume=True discards the checkpoint and starts over"
 CHUNK = 1_000_000  # bytes read at once when a spool is checked
 
 
@@ -57,6 +58,45 @@ def checkpoint_of(result: Path) -> Path:
 def spool_of(result: Path) -> Path:
     """Path of a result's spool."""
     return result.with_name(f"{result.name}.spool")
+
+
+def files_of(result: Path) -> tuple[Path, Path]:
+    """Checkpoint and spool of a result."""
+    return checkpoint_of(result), spool_of(result)
+
+
+def interrupted(paths: Sequence[Path], *, resume: bool, overwrite: bool) -> int | None:
+    """Return the place of the result in a list whose interrupted run is to be resumed, if any.
+
+    Raises CheckpointError if there is no checkpoint to resume from, or one that is neither resumed
+    nor overwritten.
+    """
+    stopped = [place for place, path in enumerate(paths) if checkpoint_of(path).exists()]
+    if resume and not stopped:
+        raise CheckpointError(f"there is no checkpoint {checkpoint_of(paths[0])} to resume from")
+    if stopped and not (resume or overwrite):
+        raise CheckpointError(
+            f"{checkpoint_of(paths[stopped[0]])} belongs to an interrupted run: resume=True "
+            "continues it, overwrite=True starts over"
+        )
+    return stopped[0] if resume else None
+
+
+@contextlib.contextmanager
+def resuming(result: Path) -> Iterator[None]:
+    """Say in a CheckpointError how to start over; other errors are those of a forged checkpoint."""
+    try:
+        yield
+    except CheckpointError as error:
+        raise CheckpointError(f"{error}; {STARTS_OVER}") from None
+    except (FecmError, MemoryError):
+        raise
+    except Exception as error:
+        # h5py's own errors are OSErrors without a number.
+        if isinstance(error, OSError) and (error.errno or type(error) is not OSError):
+            raise
+        text = f"the run can't resume from {checkpoint_of(result)} ({error})"
+        raise CheckpointError(f"{text}; {STARTS_OVER}") from None
 
 
 def identity(simulation: Simulation) -> dict[str, Any]:

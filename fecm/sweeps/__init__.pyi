@@ -1,7 +1,5 @@
 """Names of this room for other rooms and for tests; each is imported when it is first used."""
 
-from fecm.sweeps.api import carry_out_plan as carry_out_plan
-from fecm.sweeps.api import checked_problem as checked_problem
 from fecm.sweeps.batch import run_task as run_task
 from fecm.sweeps.checks import ADVANCED_BYTES as ADVANCED_BYTES
 from fecm.sweeps.checks import HISTORY_BYTES as HISTORY_BYTES
@@ -10,16 +8,20 @@ from fecm.sweeps.checks import doubtful_values as doubtful_values
 from fecm.sweeps.convergence import Convergence as Convergence
 from fecm.sweeps.distributions import ValueDistribution as ValueDistribution
 from fecm.sweeps.execute import LOST as LOST
-from fecm.sweeps.execute import DamagedPartError as DamagedPartError
-from fecm.sweeps.execute import OtherSweepError as OtherSweepError
-from fecm.sweeps.execute import PartialResults as PartialResults
+from fecm.sweeps.execute import Means as Means
 from fecm.sweeps.execute import SchedulerError as SchedulerError
-from fecm.sweeps.execute import exclusive_result as exclusive_result
+from fecm.sweeps.execute import carry_out_plan as carry_out_plan
 from fecm.sweeps.execute import on_workers as on_workers
 from fecm.sweeps.files import save_sweep as save_sweep
 from fecm.sweeps.in_full import without_output as without_output
+from fecm.sweeps.job import Sweep as Sweep
+from fecm.sweeps.job import checked_problem as checked_problem
 from fecm.sweeps.outcome import Outcome as Outcome
 from fecm.sweeps.outcome import Status as Status
+from fecm.sweeps.partial_results import DamagedPartError as DamagedPartError
+from fecm.sweeps.partial_results import OtherSweepError as OtherSweepError
+from fecm.sweeps.partial_results import PartialResults as PartialResults
+from fecm.sweeps.partial_results import exclusive_result as exclusive_result
 from fecm.sweeps.plan import MOST_TOGETHER as MOST_TOGETHER
 from fecm.sweeps.plan import Plan as Plan
 from fecm.sweeps.plan import Settings as Settings

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
+from typing import NamedTuple
 
 import numpy as np
 
@@ -171,10 +172,22 @@ def _steps(case: Case) -> float:
     return duration / dt if dt > 0.0 else 0.0
 
 
-def check_sweep_memory(
+class SweepMemory(NamedTuple):
+    """Parts of the memory of a sweep; bytes of a process depend on whether they are exact."""
+
+    stored: int  # bytes of the histories
+    at_once: int  # cases on this machine
+    of_process: Callable[[bool], int]
+
+    def needed(self, exact: bool = True) -> int:
+        """Bytes at once; an exact number takes longer."""
+        return self.stored + (self.at_once * self.of_process(exact) if self.at_once else 0)
+
+
+def sweep_memory(
     checked: Problem, made: Plan, workers: int, *, streamed: bool = False
-) -> None:
-    """Reject a sweep that needs more memory than is free, by a NotEnoughMemoryError.
+) -> SweepMemory:
+    """Memory of a sweep.
 
     `workers` are those on this machine; 0 if a cluster runs the cases.  If histories are
     `streamed` to files, only those of one task are held.
@@ -195,16 +208,25 @@ def check_sweep_memory(
     if settings.history:
         stored = HISTORY_BYTES * steps * (min(cases, MOST_TOGETHER) if streamed else cases)
 
-    def needed(exact: bool) -> int:
-        if not at_once:
-            return stored
-        one = needed_bytes(plate, in_memory=in_memory, exact=exact)
-        one += ADVANCED_BYTES * steps * runs_together(checked, made)
-        return stored + at_once * one
+    def of_process(exact: bool) -> int:
+        run = needed_bytes(plate, in_memory=in_memory, exact=exact)
+        return run + ADVANCED_BYTES * steps * runs_together(checked, made)
+
+    return SweepMemory(stored, at_once, of_process)
+
+
+def check_sweep_memory(
+    checked: Problem, made: Plan, workers: int, *, streamed: bool = False
+) -> None:
+    """Raise NotEnoughMemoryError for a sweep that needs more memory than is free.
+
+    The parameters are those of :func:`sweep_memory`.
+    """
+    memory = sweep_memory(checked, made, workers, streamed=streamed)
 
     def remedy(free: int) -> str:
-        if needed(True) - stored <= free:
+        if memory.needed() - memory.stored <= free:
             return "take fewer cases, or none of their histories"
-        return "take fewer workers" if at_once > 1 else "take fewer steps or a coarser mesh"
+        return "take fewer workers" if memory.at_once > 1 else "take fewer steps or a coarser mesh"
 
-    _machine.check_available_memory("the sweep", needed, remedy)
+    _machine.check_available_memory("the sweep", memory.needed, remedy)

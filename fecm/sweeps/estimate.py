@@ -8,15 +8,15 @@ from pathlib import Path
 
 from fecm._errors import warn
 from fecm._text import DIGITS, aligned, html_table
-from fecm.api import sole_problem
 from fecm.deck.model import Deck
 from fecm.deck.units import quantity, unit_names, unit_of
+from fecm.problem.loading import sole_problem
 from fecm.problem.problem import Problem
 from fecm.results.metrics import RATIO
 from fecm.results.validity import TOO_SOFT, Judge, unsafe
 from fecm.studies.estimate import QuickEstimate
 from fecm.studies.estimate import quick_estimate as by_quick_models
-from fecm.sweeps.api import carry_out_plan
+from fecm.sweeps.execute import carry_out_plan
 from fecm.sweeps.plan import plan
 
 RUN = "run"  # name of the row of the run itself

@@ -1,12 +1,4 @@
-"""Carries out the tasks of a sweep: workers, partial results for a resume, expected time.
-
-Partial results of a sweep, in a folder beside its result.
-
-One file per task, renamed into place when complete.  It has the fingerprint of its sweep and, at
-its end, a checksum that reveals damage.  Only regular files are read; the folder must not be a
-link.
-
-Run tasks in this process, in worker processes on this machine, on a Dask cluster or an executor.
+"""Carries out the tasks of a sweep: here, in worker processes, on a Dask cluster or an executor.
 
 Tasks are independent, and their outcomes do not depend on where they run.  Each outcome is reported
 as soon as it is available, so that an interrupted sweep loses only the tasks in progress.
@@ -14,206 +6,38 @@ as soon as it is available, so that an interrupted sweep loses only the tasks in
 
 from __future__ import annotations
 
-import hashlib
-import io
 import json
 import multiprocessing
 import os
 import pickle
-import shutil
 import signal
 import socket
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent import futures
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import nullcontext, suppress
+from dataclasses import replace
+from functools import partial
 from multiprocessing import resource_tracker
 from multiprocessing.synchronize import Event
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 from urllib.parse import urlsplit
-from zipfile import ZIP_STORED
-
-import numpy as np
 
 from fecm._errors import FecmError
-from fecm._files import OutputError, beside, held, make_folder, open_ordinary, packed
 from fecm._inputs import read_input
-from fecm._machine import free_processors
-from fecm._typing import Array
-from fecm.authoring.case import Case, CasesError
-from fecm.authoring.timing import duration_of, lengthened
-from fecm.authoring.values import REFINE
+from fecm._machine import NotEnoughMemoryError, free_processors
+from fecm._watch import SILENT, StoppedError, Watch
 from fecm.problem.problem import Problem
-from fecm.results.metrics import COLUMNS, GAGE, SUMMARY
 from fecm.sweeps.batch import run_task
-from fecm.sweeps.in_full import run_case_in_full, told
-from fecm.sweeps.outcome import About, Forces, Outcome
+from fecm.sweeps.checks import check_sweep_memory
+from fecm.sweeps.in_full import told
+from fecm.sweeps.outcome import Outcome, merge
+from fecm.sweeps.partial_results import DamagedPartError, PartialResults
 from fecm.sweeps.plan import Plan, Task, tasks
-from fecm.sweeps.search import USUAL
-
-CHECKSUM = hashlib.sha256().digest_size  # bytes of the checksum after the arrays of a file
-MOST_MARK = 1000  # bytes of the file with the fingerprint of the folder's sweep
-KINDS = {
-    About.STATUS: "U", About.VALIDITY: "U", About.DT: "f", About.STEPS: "iu",
-    About.UNSETTLED: "iu", About.REACHED: "f",
-}  # fmt: skip
-
-
-class OtherSweepError(FecmError, ValueError):
-    """The folder holds the outcomes of another sweep."""
-
-
-class DamagedPartError(FecmError, ValueError):
-    """A file of the folder is damaged, or belongs to another sweep."""
-
-
-def parts_of(result: Path) -> Path:
-    """Folder of the partial results of a sweep."""
-    return result.with_name(f".{result.name}.parts")
-
-
-def exclusive_result(result: Path) -> AbstractContextManager[None]:
-    """Keep other processes from this result; raises OutputError if one computes it."""
-    return held(parts_of(result), f"{result} is being computed by another process")
-
-
-class PartialResults:
-    """Outcomes of finished tasks of the sweep with a fingerprint, for its result file.
-
-    `restart` deletes the outcomes of another sweep, for which OtherSweepError is raised otherwise.
-    """
-
-    def __init__(self, result: Path, fingerprint: str, *, restart: bool = False) -> None:
-        self.folder = parts_of(result)
-        self.tasks: Sequence[Task] = ()  # those of all cases, once they are known
-        self._fingerprint = fingerprint
-        make_folder(self.folder)
-        mark = self.folder / "sweep.json"
-        # A sweep that was killed while it began has left a folder without outcomes.
-        outcomes = list(self.folder.glob("task-*"))
-        if outcomes and _fingerprint_in(mark) != fingerprint:
-            if not restart:
-                raise OtherSweepError(
-                    f"{self.folder} holds the outcomes of another sweep, or of another version of "
-                    "fecm; --overwrite deletes them"
-                )
-            for path in outcomes:
-                _remove(path)
-        _remove_folder(mark)
-        with beside(mark, follow=False) as partial:
-            partial.write_text(json.dumps({"fingerprint": fingerprint}))
-
-    def _path(self, task: Task) -> Path:
-        return self.folder / f"task-{task.number:06d}.npz"
-
-    def get(self, task: Task) -> Outcome | None:
-        """Outcome of a finished task, None if there is none.
-
-        Raises DamagedPartError if its file is damaged, or was not written by this sweep.
-        """
-        path = self._path(task)
-        try:
-            with open_ordinary(path) as file:
-                data = file.read()
-        except FileNotFoundError:
-            return None
-        except OutputError as error:
-            raise DamagedPartError(str(error)) from None
-        except OSError as error:
-            raise DamagedPartError(f"{path}: {error.strerror}") from None
-        packed_arrays, checksum = data[:-CHECKSUM], data[-CHECKSUM:]
-        if hashlib.sha256(packed_arrays).digest() != checksum:
-            raise DamagedPartError(f"{path} is damaged")
-        try:
-            arrays = _unpacked(packed_arrays)
-        except Exception:  # a forged file raises anything in zipfile and NumPy
-            raise DamagedPartError(f"{path} is damaged") from None
-        if str(arrays.pop("sweep", None)) != self._fingerprint:
-            raise DamagedPartError(f"{path} belongs to another sweep, or another version of fecm")
-        numbers = arrays.pop("numbers", np.empty(0))
-        if numbers.tolist() != list(task.numbers):
-            raise DamagedPartError(f"{path} holds other cases")
-        outcome = Outcome(list(task.numbers), arrays, arrays.pop("force", None))
-        if not _is_sound(outcome):
-            raise DamagedPartError(f"{path} does not hold the results of its cases")
-        return outcome
-
-    def put(self, task: Task, outcome: Outcome) -> None:
-        """Store the outcome of a task."""
-        numbers, sweep = np.array(outcome.numbers), np.array(self._fingerprint)
-        arrays = {**outcome.columns, "numbers": numbers, "sweep": sweep}
-        if outcome.force is not None:
-            arrays["force"] = outcome.force
-        data = packed(arrays)
-        path = self._path(task)
-        _remove_folder(path)
-        with beside(path, follow=False) as partial, partial.open("wb") as file:
-            file.write(data)
-            file.write(hashlib.sha256(data).digest())
-
-    def forces(self) -> Iterator[Forces]:
-        """Read the contact forces of one task after the other; None if all its cases failed."""
-        for task in self.tasks:
-            outcome = self.get(task)
-            yield task.numbers, None if outcome is None else outcome.force
-
-    def clear(self) -> None:
-        """Delete the folder."""
-        shutil.rmtree(self.folder, ignore_errors=True)
-
-
-def _fingerprint_in(mark: Path) -> str:
-    """Fingerprint of the sweep whose outcomes a folder holds; empty if it can't be read."""
-    try:
-        with open_ordinary(mark) as file:
-            return str(json.loads(file.read(MOST_MARK))["fingerprint"])
-    except (OSError, ValueError, LookupError, TypeError, RecursionError):
-        return ""
-
-
-def _unpacked(data: bytes) -> dict[str, Array]:
-    """Arrays of an .npz file."""
-    with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-        if any(member.compress_type != ZIP_STORED for member in stored.zip.infolist()):
-            raise ValueError("it is compressed")
-        return {name: np.asarray(stored[name]) for name in stored.files}
-
-
-def _is_sound(outcome: Outcome) -> bool:
-    """Whether the columns of an outcome are those of a sweep, and of the right shapes and types."""
-    columns, force, count = outcome.columns, outcome.force, len(outcome.numbers)
-    if not columns.keys() >= {*KINDS, *SUMMARY}:
-        return False
-    for name, values in columns.items():
-        is_gage = name.startswith(GAGE) and name.removeprefix(GAGE).isdecimal()
-        kinds = KINDS.get(About(name), "") if name in KINDS else "fiu"
-        known = is_gage or name in KINDS or name in COLUMNS
-        if not known or values.shape != (count,) or values.dtype.kind not in kinds:
-            return False
-    steps = columns[About.STEPS]
-    if (steps < 0).any():
-        return False
-    return force is None or (
-        force.dtype.kind == "f"
-        and force.shape[:1] == (count,)
-        and force.ndim == 2
-        and force.shape[1] <= steps.max(initial=0)
-    )
-
-
-def _remove(path: Path) -> None:
-    """Remove a file, link or folder; a link is not followed."""
-    _remove_folder(path)
-    path.unlink(missing_ok=True)
-
-
-def _remove_folder(path: Path) -> None:
-    """Remove a folder that has the name of a file, for which no file can replace it."""
-    if path.is_dir() and not path.is_symlink():
-        shutil.rmtree(path)
-
+from fecm.sweeps.reduced import ReducedModel, Trials, by_energy, count_held, trials
+from fecm.sweeps.result import SweepResult, sweep_result
 
 Done = Callable[[Task, Outcome], None]
 Idle = Callable[[], None]  # called regularly while workers run, to handle signals
@@ -423,78 +247,171 @@ def address_in(file: Path) -> str:
         raise SchedulerError(message) from None
 
 
-# Steps of a short run, which shows what a run costs before its steps; then runs of so many times
-# more steps follow, until one takes enough seconds longer.
-FEW = 10
-MORE = 8
-ENOUGH = 0.1
-UNITS = ((3600.0, "h"), (60.0, "min"), (1.0, "s"))
+class Means(NamedTuple):
+    """Where the tasks of a sweep are computed; in this process by default.
 
-
-def expected(problem: Problem, made: Plan, workers: int | None) -> str:
-    """Say how many full runs the cases of a plan take, and about how long.
-
-    The time is that of `workers` on this machine; 0 if a cluster runs the cases, None if their
-    number depends on the time.
+    Attributes
+    ----------
+    workers : int or None
+        Worker processes.  None: tasks begin in this process, see :func:`here_first`.
+    scheduler : str, distributed.Client or cluster, optional
+        Dask scheduler.
+    executor : concurrent.futures.Executor, optional
+        Any executor.
     """
+
+    workers: int | None = 1
+    scheduler: object = None
+    executor: futures.Executor | None = None
+
+    @property
+    def is_chosen(self) -> bool:
+        """Whether a scheduler or an executor is given."""
+        return self.scheduler is not None or self.executor is not None
+
+    @property
+    def here(self) -> int:
+        """Tasks that are computed at once on this machine."""
+        if self.scheduler is not None:
+            return 0
+        return self.workers or 1 if self.executor is None else _workers_of(self.executor)
+
+
+HERE = Means()
+
+
+def _workers_of(executor: futures.Executor) -> int:
+    """Workers of an executor on this machine; 0 if it does not say."""
+    return int(getattr(executor, "_max_workers", 0))
+
+
+def carry_out_plan(
+    problem: Problem,
+    made: Plan,
+    means: Means = HERE,
+    *,
+    parts: PartialResults | None = None,
+    watch: Watch = SILENT,
+    done: Done = lambda task, outcome: None,
+    keeps_forces: bool = True,
+) -> SweepResult:
+    """Compute the tasks of a plan.
+
+    Tasks that `parts` has stored are not computed again.  `done` is called with each task and its
+    outcome, including tasks finished earlier.  Without `keeps_forces` the result has no forces,
+    which `parts` has.
+
+    Raises
+    ------
+    SchedulerError
+        If the scheduler can't be used.
+    CasesError
+        If full runs show that the reduced model of the plan holds for no case.
+    StoppedError
+        If the watch stops the sweep.
+    """
+    finished = 0
     count = len(made.cases)
-    cases = f"{count} case{'' if count == 1 else 's'}"
-    runs = "one full run each"
-    each = 1
-    if made.settings.search is not None:
-        each, runs = USUAL, f"about {USUAL} full runs each"
-    chosen = made.cases
-    if made.settings.shares_motion:
-        chosen = tuple(task.cases[0] for task in tasks(problem, made))
-        if len(chosen) < count:
-            runs = f"{len(chosen)} full run{'' if len(chosen) == 1 else 's'}"
-            count = len(chosen)
-    text = f"a nonlinear plate has no impulse response: {cases}, {runs}"
-    try:
-        begin, step = _costs(problem, made)
-    except CasesError:  # no run of a few steps
-        return text
-    duration = duration_of(problem)
-    steps = sum(_full_steps(case, duration, problem.work.steps) for case in chosen)
-    seconds = each * (begin * count + step * steps)
-    if workers is None:
-        workers = free_processors() if seconds >= WORTH_WORKERS else 1
-    where = f" by {workers} workers" if workers > 1 else ""
-    if not workers:
-        where = " of computation"
-    return f"{text}: about {_rounded(seconds / max(1, min(workers, count)))}{where}"
+
+    def idle() -> None:
+        if watch.stops():
+            more = "" if parts is None else "; the same call resumes this sweep"
+            raise StoppedError(f"stopped after {finished} of {count} cases{more}")
+
+    def keep(task: Task, outcome: Outcome) -> None:
+        nonlocal finished
+        if not keeps_forces:
+            outcome.force = None
+        finished += len(task.numbers)
+        done(task, outcome)
+        watch.advance(finished, count)
+
+    most_workers = partial(_most_workers, problem, made, streamed=not keeps_forces)
+    run = partial(_outcomes, means, parts, most_workers, idle, watch)
+    if made.settings.modes is None:
+        model, whole = None, tasks(problem, made)
+    else:
+        model, whole = _by_model(problem, made, made.settings.modes, run, watch)
+    if parts is not None:
+        parts.tasks = whole
+    outcomes = [outcome for _, outcome in run(whole, keep)]
+    history = made.settings.history and keeps_forces
+    return sweep_result(made, merge(outcomes, history=history), model)
 
 
-def _costs(problem: Problem, made: Plan) -> tuple[float, float]:
-    """Seconds of a run before its steps, and of a step."""
-    first, few = _seconds(problem, made, FEW)
-    second, more = first, few
-    wanted = FEW
-    # Other work of the machine changes short times.
-    while second - first < ENOUGH and wanted < problem.work.steps:
-        wanted *= MORE
-        second, more = _seconds(problem, made, wanted)
-    if more == few:
-        return 0.0, second / more
-    step = max(0.0, second - first) / (more - few)
-    return max(0.0, first - step * few), step
+def _by_model(
+    problem: Problem,
+    made: Plan,
+    modes: int,
+    run: Callable[[Sequence[Task], Done], list[tuple[Task, Outcome]]],
+    watch: Watch,
+) -> tuple[ReducedModel, list[Task]]:
+    """Compare the reduced model with full runs; tasks of the cases, by the model or in full.
+
+    Raises CasesError if the model holds for no case.
+    """
+    ordered, count = by_energy(made), len(made.cases)
+    tried = Trials(made, count, lambda whole: run(whole, lambda task, outcome: None))
+    held = count_held(ordered, tried.failing)
+    model = replace(tried.compared(modes), in_full=len(ordered) - held)
+    if not held:
+        model.check()
+    in_full = set(ordered[held:])
+    if not in_full:
+        return model, tasks(problem, made)
+    watch.note(model.note)
+    rest = [case for case in range(count) if case not in in_full]
+    fulls = [task for task in trials(made, sorted(in_full), count) if task.settings.modes is None]
+    return model, [*tasks(problem, made, rest), *fulls]
 
 
-def _seconds(problem: Problem, made: Plan, steps: int) -> tuple[float, int]:
-    """Seconds of a run of about so many steps, and their number."""
-    short = lengthened(problem, min(1.0, steps / problem.work.steps))
-    begin = time.perf_counter()
-    run_case_in_full(0, short, made.settings.measures, law=made.settings.law)
-    return time.perf_counter() - begin, short.work.steps
+def _outcomes(
+    means: Means,
+    parts: PartialResults | None,
+    most_workers: Callable[[], int],
+    idle: Idle,
+    watch: Watch,
+    whole: Sequence[Task],
+    done: Done,
+) -> list[tuple[Task, Outcome]]:
+    """Compute tasks, or take their stored outcomes."""
+    outcomes: list[tuple[Task, Outcome]] = []
+    left: list[Task] = []
+
+    def keep(task: Task, outcome: Outcome, *, is_new: bool = True) -> None:
+        is_lost = any(text.startswith(LOST) for text in outcome.status)
+        if parts is not None and is_new and not is_lost:  # lost cases may be computed again
+            parts.put(task, outcome)
+        done(task, outcome)
+        outcomes.append((task, outcome))
+
+    for task in whole:
+        stored = None
+        try:
+            stored = None if parts is None else parts.get(task)
+        except DamagedPartError as error:
+            watch.note(f"{error}; its cases are run again")
+        if stored is None:
+            left.append(task)
+        else:
+            keep(task, stored, is_new=False)
+    if means.executor is not None:
+        on_executor(left, means.executor, keep, idle)
+    elif means.scheduler is not None:
+        on_dask(left, means.scheduler, keep, idle)
+    elif means.workers is None:
+        here_first(left, most_workers, keep, idle)
+    elif means.workers > 1 and len(left) > 1:
+        on_workers(left, means.workers, keep, idle)
+    else:
+        here(left, keep, idle)
+    return outcomes
 
 
-def _full_steps(case: Case, duration: float, steps: int) -> float:
-    """Steps of a case, counted by the elements of the deck, whose duration and steps are given."""
-    dt = float(case.get("dt", 0.0)) or duration / steps
-    return float(case.get(REFINE, 1)) ** 2 * float(case.get("duration", duration)) / dt
-
-
-def _rounded(seconds: float) -> str:
-    """A duration with two digits."""
-    size, unit = next(((s, u) for s, u in UNITS if seconds >= 2.0 * s), UNITS[-1])
-    return f"{float(f'{seconds / size:.2g}'):g} {unit}"
+def _most_workers(problem: Problem, made: Plan, *, streamed: bool) -> int:
+    """Worker processes for which processors and memory are free."""
+    for count in range(free_processors(), 1, -1):
+        with suppress(NotEnoughMemoryError):
+            check_sweep_memory(problem, made, count, streamed=streamed)
+            return count
+    return 1

@@ -9,7 +9,6 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.api import LoadedDeck, load_deck
 from fecm.authoring.case import Case, CasesError
 from fecm.authoring.strike import Strike, strike_of
 from fecm.authoring.timing import lengthened, with_clock
@@ -23,6 +22,7 @@ from fecm.mechanics.laminate import threshold_force
 from fecm.mechanics.own_law import LawError
 from fecm.mechanics.plate_motion import DivergenceError
 from fecm.problem.build import RunOptions
+from fecm.problem.loading import LoadedDeck, load_deck
 from fecm.problem.parts import strengths_of_deck
 from fecm.problem.problem import Problem
 from fecm.results.end import decided

@@ -6,15 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
-from fecm.api import Mode, Progress, load_one
+from fecm._watch import Progress
 from fecm.authoring.case import CasesError, check_deck
 from fecm.authoring.timing import stable_time_step, with_time_step
 from fecm.deck.macros import flat
 from fecm.deck.model import Deck
-from fecm.listing.slips import active_slips
+from fecm.listing.slips import Mode, active_slips
 from fecm.mechanics.time_step import taken_time_step
 from fecm.problem.build import RunOptions
 from fecm.problem.estimates import resolution
+from fecm.problem.loading import load_one
 from fecm.problem.memory import check_run_memory
 from fecm.problem.problem import Problem
 from fecm.problem.refine import RefineError, refined_deck

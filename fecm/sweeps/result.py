@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fecm._errors import ResultFileError
-from fecm._files import ARGUMENT, check_outputs, open_for_writing
+from fecm._files import check_outputs, open_for_writing
 from fecm._text import html_table
 from fecm._typing import AnyFile
 from fecm.deck.model import Delamination
@@ -117,7 +117,7 @@ class SweepResult(StoredSweep):
         """
         from fecm.sweeps.files import save_sweep  # h5py takes 60 ms to import
 
-        check_outputs([Path(path)], overwrite, allowed_by=ARGUMENT)
+        check_outputs([Path(path)], overwrite)
         save_sweep(self, Path(path), overwrite=overwrite)
 
     def to_dataframe(self) -> pandas.DataFrame:
@@ -216,7 +216,7 @@ class SweepResult(StoredSweep):
         from fecm.sweeps.files import csv_lines  # 2 ms at start
 
         lines = csv_lines(self, table)
-        check_outputs([Path(path)], overwrite, allowed_by=ARGUMENT)
+        check_outputs([Path(path)], overwrite)
         with open_for_writing(Path(path), overwrite=overwrite) as file:
             file.writelines(lines)
 

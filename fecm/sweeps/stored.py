@@ -14,10 +14,10 @@ import numpy as np
 from fecm._arrays import read_only
 from fecm._errors import FecmError, ResultFileError, did_you_mean
 from fecm._typing import Bools
-from fecm.api import load_deck
 from fecm.authoring.values import REFINE, dimension_of
 from fecm.deck.model import Deck
 from fecm.deck.units import unit_of
+from fecm.problem.loading import load_deck
 from fecm.results.groups import NotStoredError
 from fecm.results.metrics import COLUMNS, VALIDITY
 from fecm.results.schema import SWEEP_DATASETS

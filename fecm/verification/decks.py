@@ -10,11 +10,13 @@ import numpy as np
 from fecm import examples
 from fecm._errors import FecmWarning
 from fecm._typing import Floats
-from fecm.api import Mode, read_one, run_one
 from fecm.deck import model
 from fecm.deck.grid import ElementGrid, GridSection, grid_lines, uniform_section
 from fecm.deck.model import Control, Integration, Layer, Macro, NodeCodes, NodeValues, Ply
+from fecm.listing.slips import Mode
+from fecm.problem.loading import read_one
 from fecm.results.result import Result
+from fecm.simulation.job import run_one
 
 MITC = model.Shear(assumed=True)
 # The report's laminate (lb, in, s).

@@ -9,7 +9,6 @@ import numpy as np
 
 import fecm.verification.decks as decks
 from fecm._typing import Floats
-from fecm.api import load_deck
 from fecm.deck import model
 from fecm.deck.grid import ElementGrid, refined_sections, uniform_section
 from fecm.deck.model import Deck, Impact, Indentation, Patch, Projectile
@@ -18,10 +17,12 @@ from fecm.mechanics.quick_models import inelasticity, infinite_plate, static_pea
 from fecm.mechanics.solutions import static_stiffness
 from fecm.mechanics.time_step import critical_time_step, rounded_time_step
 from fecm.problem.generate import generate
+from fecm.problem.loading import load_deck
 from fecm.problem.parts import build_plate
 from fecm.results.end import Deflection, LastContact, decided, ends, peak_known
 from fecm.results.result import Result
-from fecm.sweeps.api import carry_out_plan, checked_problem
+from fecm.sweeps.execute import carry_out_plan
+from fecm.sweeps.job import checked_problem
 from fecm.sweeps.plan import plan
 from fecm.verification.case import Value, case
 from fecm.verification.parts import ALPHA_CR

@@ -26,9 +26,9 @@ from fecm.mechanics.half_space import (
 from fecm.mechanics.interpolation import NDOF, W
 from fecm.mechanics.plate_motion import AppliedForce, PlateMotion
 from fecm.mechanics.points import gages, patch_weights
-from fecm.sweeps.api import checked_problem
 from fecm.sweeps.convergence import convergence
 from fecm.sweeps.distributions import ValueDistribution
+from fecm.sweeps.job import checked_problem
 from fecm.sweeps.random import Design, matrix
 from fecm.sweeps.statistics import indices, statistics, wilson
 from fecm.verification.case import Value, case

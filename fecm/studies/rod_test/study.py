@@ -13,7 +13,6 @@ from numpy.typing import ArrayLike
 
 from fecm._errors import StudyError, warn
 from fecm._typing import Floats
-from fecm.api import sole_problem
 from fecm.authoring.laminate import system_asked
 from fecm.authoring.parameters import check_positive
 from fecm.deck.model import Deck
@@ -26,6 +25,7 @@ from fecm.mechanics.projectile import (
     RigidMass,
     Rod,
 )
+from fecm.problem.loading import sole_problem
 from fecm.problem.parts import build_projectile, build_station
 from fecm.studies.rod_test.filters import Filter, filter_of
 from fecm.studies.rod_test.pulse_test import (

@@ -10,12 +10,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from fecm._errors import StudyError
-from fecm.api import sole_problem
 from fecm.authoring.laminate import Laminate, stiffness_of_laminate
 from fecm.authoring.parameters import check_positive
 from fecm.deck.model import Deck
 from fecm.deck.units import unit_names
 from fecm.mechanics.laminate import LaminateSection as Stiffness
+from fecm.problem.loading import sole_problem
 from fecm.problem.problem import Problem
 from fecm.studies.waves.fronts import Cusp, Fronts, WaveSurfaces
 from fecm.studies.waves.harmonic import Dispersion, Medium, dispersion

@@ -1,0 +1,94 @@
+"""Options of jobs, declared once: fields of a dataclass, for Python and for a command.
+
+A field made by :func:`option` has its help.  The command line makes its options of the fields, and
+:func:`documented` puts them into the docstring of the class.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import re
+import textwrap
+from collections.abc import Callable, Sequence
+from dataclasses import field, fields
+from typing import Any, NamedTuple, ParamSpec, TypeVar
+
+P = ParamSpec("P")
+J = TypeVar("J")
+R = TypeVar("R")
+T = TypeVar("T")
+
+PLACE = "{parameters}"  # of the parameters in a docstring
+WIDTH = 92
+
+
+class Option(NamedTuple):
+    """What is known of an option besides name, type and default."""
+
+    help: str  # for Python and for the help page of the command
+    python: str  # what only Python offers
+    group: str  # heading on that page; empty if only Python has the option
+    choices: Sequence[str]
+    metavar: str | None
+    flag: str | None  # on the command line, if it is not --NAME
+    least: float | None  # smallest value
+
+
+def option(
+    default: Any,
+    help: str,
+    *,
+    python: str = "",
+    group: str = "",
+    choices: Sequence[str] = (),
+    metavar: str | None = None,
+    flag: str | None = None,
+    least: float | None = None,
+) -> Any:
+    """Return the field of an option; see :class:`Option`."""
+    about = Option(help, python, group, choices, metavar, flag, least)
+    return field(default=default, metadata={"option": about})
+
+
+def options_of(job: Any) -> dict[str, tuple[Option, Any]]:
+    """Options of a job by name, each with its default value."""
+    return {
+        one.name: (one.metadata["option"], one.default)
+        for one in fields(job)
+        if "option" in one.metadata
+    }
+
+
+def documented(job: type[T]) -> type[T]:
+    """Put the parameters of a job into its docstring."""
+    if job.__doc__:  # Python without docstrings has none
+        job.__doc__ = job.__doc__.replace(PLACE, _parameters(job))
+    return job
+
+
+def _parameters(job: Any) -> str:
+    lines = []
+    types = {one.name: one.type for one in fields(job)}
+    for name, (about, _) in options_of(job).items():
+        text = textwrap.fill(" ".join(f"{about.help} {about.python}".split()), WIDTH - 8)
+        lines += [f"{name} : {types[name]}", textwrap.indent(text, "    ")]
+    return textwrap.indent("\n".join(lines), "    ").strip()
+
+
+def with_parameters_of(job: Callable[P, J]) -> Callable[[Callable[[J], R]], Callable[P, R]]:
+    """Give a function of a job the parameters of the job, for its signature and docstring."""
+
+    def decorate(function: Callable[[J], R]) -> Callable[P, R]:
+        @functools.wraps(function)
+        def called(*arguments: P.args, **named: P.kwargs) -> R:
+            return function(job(*arguments, **named))
+
+        returns = inspect.signature(function).return_annotation
+        signature = inspect.signature(job).replace(return_annotation=returns)
+        called.__signature__ = signature  # type: ignore[attr-defined]
+        if called.__doc__:
+            called.__doc__ = re.sub(PLACE, lambda _: _parameters(job), called.__doc__)
+        return called
+
+    return decorate

@@ -1,0 +1,142 @@
+"""How long jobs report, and how they are stopped."""
+
+from __future__ import annotations
+
+import contextlib
+import logging
+import signal
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from time import monotonic
+
+from fecm._errors import FecmError, warn
+
+# Called with the number of steps or cases that are done, and the number of all.
+Progress = Callable[[int, int], object]
+
+LOGGER = logging.getLogger("fecm")
+MINUTE = 60.0  # seconds between two lines of a log
+WIDTH = 60  # of a line of progress
+
+
+class StoppedError(FecmError):
+    """A job was stopped before its end; the message says where."""
+
+
+class Watch:
+    """What a long job reports to, and asks whether to stop; this one is silent.
+
+    A job calls the methods between two steps or two cases.
+    """
+
+    def advance(self, done: int, total: int) -> None:
+        """Take note that so many of all steps or cases are done."""
+
+    def note(self, text: str) -> None:
+        """Take a message for the user."""
+
+    def stops(self) -> bool:
+        """Whether the job is to stop in good order."""
+        return False
+
+
+SILENT = Watch()
+
+
+class CallerWatch(Watch):
+    """Watch of a job that is called from Python.
+
+    Messages are warnings, the log has a line a minute, and SIGINT stops the job after the present
+    step.
+
+    Parameters
+    ----------
+    name : str
+        What the log calls the job.
+    progress : callable or bool, optional
+        Called with the number of steps or cases that are done, and the number of all.  True shows
+        them on standard error, with the seconds that are left.
+    """
+
+    def __init__(self, name: str, progress: Progress | bool | None = None) -> None:
+        self._name = name
+        self._progress = show_progress() if progress is True else progress or None
+        self._due = once_a_minute()
+        self._interrupted = False
+
+    def advance(self, done: int, total: int) -> None:
+        """Call the caller's function, and log a line a minute."""
+        if self._progress is not None:
+            self._progress(done, total)
+        if self._due():
+            LOGGER.info("%s: %d of %d done", self._name, done, total)
+
+    def note(self, text: str) -> None:
+        """Warn."""
+        warn(text)
+
+    def stops(self) -> bool:
+        """Whether SIGINT came in the block of :meth:`deferring_interrupts`."""
+        return self._interrupted
+
+    @contextlib.contextmanager
+    def deferring_interrupts(self) -> Iterator[None]:
+        """Let the first SIGINT stop the job in good order; another one interrupts it at once.
+
+        A job that was stopped ends in KeyboardInterrupt.  Only the main thread gets signals, and a
+        handler of the caller stays in place.
+        """
+        is_main = threading.current_thread() is threading.main_thread()
+        if not is_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
+            yield
+            return
+
+        def handle(number: int, frame: object) -> None:
+            self._interrupted = True
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+        signal.signal(signal.SIGINT, handle)
+        try:
+            yield
+        except StoppedError as stopped:
+            raise KeyboardInterrupt(str(stopped)) from None
+        finally:
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+def once_a_minute(clock: Callable[[], float] = monotonic) -> Callable[[], bool]:
+    """Return a function that says whether a minute has passed since it last said so."""
+    last = clock()
+
+    def due() -> bool:
+        nonlocal last
+        if clock() - last < MINUTE:
+            return False
+        last = clock()
+        return True
+
+    return due
+
+
+def show_progress(clock: Callable[[], float] = monotonic) -> Progress:
+    """Return a function that shows the progress in one line on standard error.
+
+    The line has the seconds that are left, at the average speed since the first call.
+    """
+    begin: float | None = None
+    first = 0
+
+    def show(done: int, total: int) -> None:
+        nonlocal begin, first
+        if begin is None:
+            begin, first = clock(), done
+        left = ""
+        if first < done < total:
+            seconds = (clock() - begin) * (total - done) / (done - first)
+            left = f", {seconds:.0f} s left"
+        end = "\n" if done >= total else ""
+        sys.stderr.write(f"\r{f'fecm: {done} of {total}{left}':<{WIDTH}}{end}")
+        sys.stderr.flush()
+
+    return show

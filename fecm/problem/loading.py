@@ -1,0 +1,119 @@
+"""Reads decks and checks them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+from fecm._errors import OptionsError, warn
+from fecm._typing import AnyFile
+from fecm.deck.findings import DeckError, Finding
+from fecm.deck.model import Deck
+from fecm.deck.reader import Reader, load_text, read_deck
+from fecm.listing.slips import LISTING, REPORT
+from fecm.problem.check import check_listing, check_problem
+from fecm.problem.problem import Problem
+from fecm.problem.rules.quadrature import HOURGLASS
+from fecm.problem.rules.time_step import UNSTABLE
+
+
+class LoadedDeck(NamedTuple):
+    """A file that was read and checked."""
+
+    source: str  # its name
+    problems: list[Problem]  # the problems that could be read
+    findings: list[Finding]  # all findings, in the deck's order
+
+    def errors(self, force: bool = False) -> list[Finding]:
+        """Findings that make the deck unusable; with `force`, without unstable motions."""
+        allowed = (UNSTABLE, HOURGLASS) if force else ()
+        return [f for f in self.findings if f.severity == "error" and f.code not in allowed]
+
+    def refuse_errors(self, force: bool = False) -> None:
+        """Raise DeckError, with all findings, if the deck is unusable."""
+        if self.errors(force):
+            raise DeckError(self.findings, self.source)
+
+    @property
+    def warnings(self) -> list[str]:
+        """Findings that are warnings, as texts."""
+        return [one.render(self.source) for one in self.findings if one.severity == "warning"]
+
+
+# What a deck may be given as: a file's path, its text, an open file, a model, or a deck that was
+# read before.
+AnyDeck = str | Path | AnyFile | Deck | LoadedDeck
+
+
+def load_deck(deck: AnyDeck, mode: str = REPORT) -> LoadedDeck:
+    """Read and check a deck without running it.
+
+    In listing mode blanks inside numbers are zeros, and decks that the printed program can't
+    compute are errors.  Raises OSError if the file can't be read.
+    """
+    if isinstance(deck, LoadedDeck):
+        return deck
+    if isinstance(deck, Deck):
+        text, source = deck.to_text(), "<deck>"
+    else:
+        text, source = load_text(deck)
+    listing = mode == LISTING
+    reader = Reader(text, blanks_are_zeros=listing)
+    problems: list[Problem] = []
+    for read in reader.problems():
+        if reader.findings.closed:
+            break
+        if (checked := check_problem(read, reader.findings, listing=listing)) is not None:
+            problems.append(checked)
+    if listing and not reader.findings.errors:
+        for problem in problems:
+            check_listing(problem, reader.findings)
+    return LoadedDeck(source, problems, list(reader.findings))
+
+
+def load_one(deck: AnyDeck, mode: str = REPORT) -> Problem:
+    """Load a deck with exactly one problem.
+
+    Raises DeckError if the deck has errors, OptionsError if it has several problems, or none.
+    """
+    loaded = load_deck(deck, mode)
+    loaded.refuse_errors()
+    check_single(loaded.problems)
+    return loaded.problems[0]
+
+
+def sole_problem(deck: AnyDeck, *, warns: bool = True) -> Problem:
+    """Checked problem of a deck that has one; with `warns`, warnings about it are FecmWarnings.
+
+    Raises DeckError if the deck has errors, apart from unstable motions.  Raises OptionsError if
+    the deck does not have exactly one problem.
+    """
+    loaded = load_deck(deck)
+    loaded.refuse_errors(force=True)
+    check_single(loaded.problems)
+    for text in loaded.warnings if warns else ():
+        warn(text)
+    return loaded.problems[0]
+
+
+def read_one(path_or_text: str | Path | AnyFile) -> Deck:
+    """Read a deck with exactly one problem; see :func:`read_deck`.
+
+    Raises
+    ------
+    DeckError
+        If the deck has errors.
+    OptionsError
+        If it has several problems, or none.
+    """
+    read = read_deck(path_or_text)
+    decks = [read] if isinstance(read, Deck) else read
+    check_single(decks)
+    return decks[0]
+
+
+def check_single(problems: Sequence[object]) -> None:
+    """Raise OptionsError unless there is exactly one problem."""
+    if len(problems) != 1:
+        raise OptionsError(f"the deck has {len(problems)} problems, not one")

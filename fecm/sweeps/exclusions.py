@@ -1,0 +1,132 @@
+"""Which options of a sweep exclude each other, and which need another one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from typing import TYPE_CHECKING, NamedTuple
+
+from fecm._options import options_of
+from fecm.authoring.case import CasesError
+from fecm.sweeps.plan import Measure
+from fecm.sweeps.search import Sought, search_of
+
+if TYPE_CHECKING:
+    from fecm.sweeps.job import Sweep
+
+# Names of what is given beside the options themselves.
+FUNCTION = "a function as measure"
+FAILURE = "failure as measure"
+PEAK = "until of the peak force"
+SEVERAL = "several workers"
+
+
+class Exclusion(NamedTuple):
+    """An option, others that can't be given with it, and why."""
+
+    option: str
+    others: tuple[str, ...]
+    reason: str
+
+
+class Need(NamedTuple):
+    """Options that need another one, and why."""
+
+    options: tuple[str, ...]
+    needed: str
+    reason: str
+
+
+EXCLUSIONS = (
+    Exclusion("deck", ("build",), "build makes the deck of every case"),
+    Exclusion("vary", ("cases",), "a table has all cases"),
+    Exclusion("cases", ("random",), "random values go with a grid"),
+    Exclusion(
+        "refine",
+        ("vary", "cases", "random", "until", "build", "measure"),
+        "a study of the mesh has cases and measures of its own",
+    ),
+    Exclusion("sensitivity", ("correlation",), "Sobol' indices are those of independent values"),
+    Exclusion("until", ("build", FUNCTION), "a search varies the velocity of the deck"),
+    Exclusion("until", ("full",), "the velocities are not known before the search"),
+    Exclusion(PEAK, (FAILURE,), "exposures need full runs, and this search takes none"),
+    Exclusion("model", ("build", FUNCTION), "the reduced model has forces and deflections only"),
+    Exclusion("model", ("until",), "searches take full runs"),
+    Exclusion("scheduler", ("executor", SEVERAL), "the cases are computed in one place"),
+    Exclusion("executor", (SEVERAL,), "the cases are computed in one place"),
+)
+OF_RANDOM = ("correlation", "samples", "seed", "design", "sensitivity", "exceed")
+NEEDS = (
+    Need(OF_RANDOM, "random", "they describe random values"),
+    Need(("random",), "samples", "a design has a number of samples"),
+    Need(("modes",), "model", "they are the modes of the reduced model"),
+)
+
+
+def check_options(job: Sweep) -> None:
+    """Raise CasesError if options exclude each other, or one lacks another or has another type."""
+    _check_types(job)
+    given = _given(job)
+    for option, others, reason in EXCLUSIONS:
+        for other in others:
+            if {option, other} <= given:
+                raise CasesError(f"{_quoted(option)} excludes {_quoted(other)}: {reason}")
+    for options, needed, reason in NEEDS:
+        if needed not in given and (lacking := [name for name in options if name in given]):
+            raise CasesError(f"{_quoted(lacking[0])} needs {_quoted(needed)}: {reason}")
+    if not given & {"deck", "build"}:
+        raise CasesError("give either deck or build")
+    if not given & {"vary", "cases", "random", "until", "refine"}:
+        raise CasesError("a sweep needs `vary`, `cases`, `random`, `refine` or `until`")
+
+
+def exclusions_table() -> list[str]:
+    """Rows of the table of the docs."""
+    lines = ["| option | not with | because |", "|---|---|---|"]
+    lines += [f"| {_code(o)} | {', '.join(map(_code, b))} | {r} |" for o, b, r in EXCLUSIONS]
+    lines += ["", "| option | needs | because |", "|---|---|---|"]
+    return [*lines, *(f"| {', '.join(map(_code, o))} | {_code(n)} | {r} |" for o, n, r in NEEDS)]
+
+
+def _given(job: Sweep) -> set[str]:
+    """Names of what is given."""
+    names = {"deck"} if job.deck is not None else set()
+    for name, (_, default) in options_of(job).items():
+        value = getattr(job, name)
+        is_simple = isinstance(value, str | int)
+        if value is None or value is False or (isinstance(value, tuple) and not value):
+            continue
+        if not (is_simple and value == default):
+            names.add(name)
+    if callable(job.measure):
+        names.add(FUNCTION)
+    elif Measure.FAILURE in (job.measure or ()):
+        names.add(FAILURE)
+    search = search_of(job.until)
+    if search is not None and search.quantity is Sought.PEAK_FORCE:
+        names.add(PEAK)
+    if (job.workers or 1) > 1:
+        names.add(SEVERAL)
+    return names
+
+
+def _check_types(job: Sweep) -> None:
+    """Raise CasesError if an option is not of its type."""
+    if job.build is not None and not callable(job.build):
+        raise CasesError(f"build is {job.build!r}, not a function")
+    if job.executor is not None and not isinstance(job.executor, Executor):
+        raise CasesError(f"executor is {job.executor!r}, not a concurrent.futures.Executor")
+    if job.progress is not None and not (isinstance(job.progress, bool) or callable(job.progress)):
+        raise CasesError(f"progress is {job.progress!r}, not a function")
+    if job.random is not None and not isinstance(job.random, Mapping | Sequence):
+        example = '{"k": "uniform:1e6,2e6"}'
+        raise CasesError(f"random is {job.random!r}; write a mapping such as {example}")
+
+
+def _quoted(option: str) -> str:
+    """An option as an argument; the command line shows its own name."""
+    return f"`{option}`" if option.isidentifier() else option
+
+
+def _code(option: str) -> str:
+    return f"`{option}`" if option.isidentifier() else option

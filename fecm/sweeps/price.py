@@ -1,0 +1,144 @@
+"""What a sweep takes: full runs, and their time on this machine."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+
+from fecm._machine import free_processors
+from fecm.authoring.case import Case, CasesError
+from fecm.authoring.timing import duration_of, lengthened
+from fecm.authoring.values import REFINE
+from fecm.problem.problem import Problem
+from fecm.results.metrics import SUMMARY
+from fecm.sweeps.batch import run_task
+from fecm.sweeps.execute import WORTH_WORKERS
+from fecm.sweeps.in_full import run_case_in_full
+from fecm.sweeps.plan import Plan, Task, shares_plate, tasks
+from fecm.sweeps.search import USUAL
+
+FEW_CASES = 64  # that show what a case costs once its plate is stepped
+# Steps of a short run, which shows what a run costs before its steps; then runs of so many times
+# more steps follow, until one takes enough seconds longer.
+FEW = 10
+MORE = 8
+ENOUGH = 0.1
+UNITS = ((3600.0, "h"), (60.0, "min"), (1.0, "s"))
+
+
+def expected(problem: Problem, made: Plan, workers: int | None) -> str:
+    """Say how many full runs the cases of a plan take, and about how long.
+
+    The time is that of `workers` on this machine; 0 if a cluster runs the cases, None if their
+    number depends on the time.
+    """
+    count = len(made.cases)
+    cases = f"{count} case{'' if count == 1 else 's'}"
+    runs = "one full run each"
+    if made.settings.search is not None:
+        runs = f"about {USUAL} full runs each"
+    chosen = _full_cases(problem, made)
+    if len(chosen) < count:
+        runs = f"{len(chosen)} full run{'' if len(chosen) == 1 else 's'}"
+        count = len(chosen)
+    text = f"a nonlinear plate has no impulse response: {cases}, {runs}"
+    _, seconds = _of_full_runs(problem, made, chosen)
+    if math.isnan(seconds):
+        return text
+    if workers is None:
+        workers = free_processors() if seconds >= WORTH_WORKERS else 1
+    where = f" by {workers} workers" if workers > 1 else ""
+    if not workers:
+        where = " of computation"
+    return f"{text}: about {_rounded(seconds / max(1, min(workers, count)))}{where}"
+
+
+def seconds_of(problem: Problem, made: Plan) -> tuple[int, float]:
+    """Steps of the plate that a sweep takes, and their seconds in one process.
+
+    The first case of a shared plate is computed, and then some more: their response stays in
+    memory for the sweep.  The seconds are NaN if they are not known.
+    """
+    settings = made.settings
+    if settings.build is not None:
+        return problem.work.steps * len(made.cases), math.nan
+    if settings.modes is None and (settings.in_full or not shares_plate(problem)):
+        return _of_full_runs(problem, made, _full_cases(problem, made))
+    whole = tasks(problem, made)
+    first = whole[0]
+    alone, some = (
+        replace(first, numbers=first.numbers[:count], cases=first.cases[:count])
+        for count in (1, FEW_CASES)
+    )
+    of_plate, of_cases = (_seconds_of_task(task) for task in (alone, some))
+    seconds = of_plate * len(whole) + of_cases / len(some.cases) * len(made.cases)
+    return problem.work.steps * len(whole), seconds
+
+
+def _seconds_of_task(task: Task) -> float:
+    begin = time.perf_counter()
+    run_task(task)
+    return time.perf_counter() - begin
+
+
+def output_bytes(problem: Problem, made: Plan) -> int:
+    """Size of the file of a sweep, about."""
+    columns = len(SUMMARY) + len(made.cases[0])
+    steps = problem.work.steps if made.settings.history else 0
+    return 8 * len(made.cases) * (columns + steps)
+
+
+def _full_cases(problem: Problem, made: Plan) -> Sequence[Case]:
+    """Cases of which each takes a full run: one for all that share a motion."""
+    if not made.settings.shares_motion:
+        return made.cases
+    return tuple(task.cases[0] for task in tasks(problem, made))
+
+
+def _of_full_runs(problem: Problem, made: Plan, chosen: Sequence[Case]) -> tuple[int, float]:
+    """Steps and seconds of the full runs of cases; NaN if a run of a few steps fails."""
+    each = 1 if made.settings.search is None else USUAL
+    duration = duration_of(problem)
+    steps = sum(_full_steps(case, duration, problem.work.steps) for case in chosen)
+    try:
+        begin, step = _costs(problem, made)
+    except CasesError:
+        return int(each * steps), math.nan
+    return int(each * steps), each * (begin * len(chosen) + step * steps)
+
+
+def _costs(problem: Problem, made: Plan) -> tuple[float, float]:
+    """Seconds of a run before its steps, and of a step."""
+    first, few = _seconds(problem, made, FEW)
+    second, more = first, few
+    wanted = FEW
+    # Other work of the machine changes short times.
+    while second - first < ENOUGH and wanted < problem.work.steps:
+        wanted *= MORE
+        second, more = _seconds(problem, made, wanted)
+    if more == few:
+        return 0.0, second / more
+    step = max(0.0, second - first) / (more - few)
+    return max(0.0, first - step * few), step
+
+
+def _seconds(problem: Problem, made: Plan, steps: int) -> tuple[float, int]:
+    """Seconds of a run of about so many steps, and their number."""
+    short = lengthened(problem, min(1.0, steps / problem.work.steps))
+    begin = time.perf_counter()
+    run_case_in_full(0, short, made.settings.measures, law=made.settings.law)
+    return time.perf_counter() - begin, short.work.steps
+
+
+def _full_steps(case: Case, duration: float, steps: int) -> float:
+    """Steps of a case, counted by the elements of the deck, whose duration and steps are given."""
+    dt = float(case.get("dt", 0.0)) or duration / steps
+    return float(case.get(REFINE, 1)) ** 2 * float(case.get("duration", duration)) / dt
+
+
+def _rounded(seconds: float) -> str:
+    """A duration with two digits."""
+    size, unit = next(((s, u) for s, u in UNITS if seconds >= 2.0 * s), UNITS[-1])
+    return f"{float(f'{seconds / size:.2g}'):g} {unit}"
