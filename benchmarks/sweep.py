@@ -34,7 +34,7 @@ from fecm.authoring.case import Case, Value
 from fecm.authoring.cases import parse_vary
 from fecm.authoring.vary import apply_case
 from fecm.mechanics import kernels
-from fecm.sweeps.batch import _prepared
+from fecm.sweeps.batch import _plate
 
 DECK = HERE.parent / "decks" / "impact-115.inp"
 VARY = ("--vary", "velocity=50:300:40", "--vary", "k=1e6:3e6:25")
@@ -138,7 +138,7 @@ def by_numpy() -> None:
     """Run a thousand cases without the kernels."""
     library, kernels.LIBRARY = kernels.LIBRARY, None
     try:
-        _prepared.cache_clear()
+        _plate.cache_clear()
         fecm.sweep(report(), vary_of(VARY))
     finally:
         kernels.LIBRARY = library

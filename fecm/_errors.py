@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
 import warnings
 from collections.abc import Iterable
 
-PACKAGE = __file__.removesuffix("_errors.py")  # folder of this package
+# Files of this package, and of the standard library where it calls this package.
+OURS = (__file__.removesuffix("_errors.py"), contextlib.__file__)
 
 
 class FecmError(Exception):
@@ -56,6 +58,6 @@ warnings.filterwarnings("once", r"[^\n]*: warning\[W", FecmWarning, append=True)
 def warn(text: str) -> None:
     """Warn with a :class:`FecmWarning` of the first caller outside this package."""
     frame, level = sys._getframe(1), 2
-    while frame.f_back is not None and frame.f_code.co_filename.startswith(PACKAGE):
+    while frame.f_back is not None and frame.f_code.co_filename.startswith(OURS):
         frame, level = frame.f_back, level + 1
     warnings.warn(FecmWarning(text), stacklevel=level)

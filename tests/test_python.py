@@ -101,7 +101,7 @@ from fecm.cli import main
 for option in ("--help", "--version"):
     with contextlib.suppress(SystemExit):
         main([option])
-names = ("numpy", "h5py", "fecm.api", "fecm.deck", "fecm.cli.run")
+names = ("numpy", "h5py", "fecm.simulation", "fecm.deck", "fecm.cli.run")
 print([name for name in names if name in sys.modules])
 """
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -128,7 +128,7 @@ UNUSED = {
         ),
         "--help": "scipy matplotlib pandas vtk",
     },
-    "fecm.api": {
+    "fecm.simulation.run": {
         "run small.inp -o run.h5": f"{ELSEWHERE} {NOT_IN_A_RUN} matplotlib fecm.plot hashlib "
         "zipfile json",
         "check small.inp": f"{ELSEWHERE} matplotlib fecm.plot numpy.ma hashlib zipfile json h5py",

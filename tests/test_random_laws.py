@@ -99,7 +99,7 @@ def test_pairs_a_matrix_and_a_named_table_are_the_same_correlations() -> None:
         ([[2.0, 0.5], [0.5, 1.0]], "1 on its diagonal"),
         ([[1.0, math.nan], [math.nan, 1.0]], "2 x 2 numbers"),
         ([1.0, 0.5], "2 x 2 numbers, one row for each of k, velocity"),
-        ("high", "2 x 2 numbers"),
+        ("high", "write NAME,NAME=RHO"),
         ({("k", "q"): 0.5}, r"\('k', 'q'\) is not a pair of random names \(k, velocity\)"),
         ({"k": 0.5}, "'k' is not a pair"),
         ({("k", "k"): 0.5}, "k, k is one name"),
@@ -117,7 +117,7 @@ def test_indices_of_correlated_values_are_refused() -> None:
     given: Any = {("k", "velocity"): 0.5}
     with pytest.raises(CasesError, match="Sobol' indices are those of independent values"):
         fecm.sweep(small(), random=PAIR, samples=16, correlation=given, sensitivity=True)
-    with pytest.raises(CasesError, match=r"correlation, samples.* need random values"):
+    with pytest.raises(CasesError, match=r"`correlation` needs `random`"):
         fecm.sweep(small(), {"k": [1e6]}, correlation=given)
 
 

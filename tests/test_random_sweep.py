@@ -482,7 +482,7 @@ def test_bad_input_is_one_line(folder: Path, options: tuple[object, ...], told: 
     [
         ({"samples": 16}, "random values"),
         ({"random": {}}, "random is"),
-        ({"random": {"k": "uniform:1,2"}}, "samples of random values must be an integer"),
+        ({"random": {"k": "uniform:1,2"}}, "`random` needs `samples`"),
         ({"random": {"k": 3.0}, "samples": 16}, "not a law"),
         ({"random": {"k": "uniform:1,2"}, "samples": 16, "seed": 0.5}, "seed of random values"),
         ({"random": {"k": "uniform:1,2"}, "samples": 16, "exceed": [3]}, "exceed is"),
@@ -497,7 +497,7 @@ def test_bad_input_is_one_line(folder: Path, options: tuple[object, ...], told: 
             "no quantity `contakts`",
         ),
         ({"random": {"k": "uniform:1,2"}, "samples": 16, "design": "halton"}, "lhs, sobol, mc"),
-        ({"random": {"k": "uniform:1,2"}, "cases": [{"q": 2.0}]}, "not with cases"),
+        ({"random": {"k": "uniform:1,2"}, "cases": [{"q": 2.0}]}, "`cases` excludes `random`"),
         ({"random": {"case": "uniform:1,2"}, "samples": 16, "build": len}, "name of the results"),
     ],
 )

@@ -12,7 +12,7 @@ import pytest
 
 import fecm
 from fecm import RigidMass
-from fecm.authoring import CasesError, strike_of
+from fecm.authoring import CasesError, impacts_from_cards, strike_of
 from fecm.mechanics import HystereticLaw, LinearPermanent, ReducedPlate
 from fecm.problem import load_deck
 from fecm.results import RATIO
@@ -21,7 +21,6 @@ from fecm.sweeps import (
     ReducedImpacts,
     ReducedModel,
     Task,
-    api,
     by_halvings,
     count_held,
     tasks,
@@ -47,7 +46,7 @@ GAGED = text(PROGRAM, data=BLOW + "GAGE\n1, .5, .5, .01, 0.\n\n")
 
 @pytest.fixture(scope="module")
 def swept() -> fecm.SweepResult:
-    """Impacts by the reduced model."""
+    """ComputedImpacts by the reduced model."""
     given = {"velocity": SPEEDS}
     return fecm.sweep(DECK, given, model="reduced", modes=ENOUGH, measure="max_deflection")
 
@@ -122,13 +121,13 @@ def test_three_full_runs_are_stored_beside_the_cases_and_shown(
 
 def test_too_few_modes_are_refused_before_the_sweep(monkeypatch: pytest.MonkeyPatch) -> None:
     ran: list[Task] = []
-    own = api._outcomes
+    own = execute._outcomes
 
-    def counted(whole: Any, **more: Any) -> Any:
-        ran.extend(whole)
-        return own(whole, **more)
+    def counted(*given: Any) -> Any:
+        ran.extend(given[-2])
+        return own(*given)
 
-    monkeypatch.setattr(api, "_outcomes", counted)
+    monkeypatch.setattr(execute, "_outcomes", counted)
     with pytest.raises(CasesError, match=r"1 mode differs by \+.* case 3; .*2%.*more modes"):
         fecm.sweep(DECK, {"velocity": [100.0, *SPEEDS]}, model="reduced", modes=1)
     # The largest energy and the smallest, each in full and by the model.
@@ -225,7 +224,7 @@ def test_cases_of_many_velocities_are_few_tasks() -> None:
 def test_a_rod_takes_a_step_in_which_a_wave_crosses_one_element_at_most() -> None:
     (problem,) = load_deck(text(PROGRAM, data=ROD)).problems
     made = reduced(problem, 1)
-    (times,) = by_halvings(made, {0: strike_of(problem.deck)})
+    (times,) = by_halvings(made, impacts_from_cards({0: strike_of(problem.deck)}))
     assert times > 0
     assert made.halved(times).dt <= 0.5 / 4 * (2e-4 / 1e7) ** 0.5
 
@@ -252,7 +251,7 @@ def test_a_stiff_contact_halves_the_time_step_of_its_cases() -> None:
     made = reduced(problem, 3)
     soft = strike_of(problem.deck)
     stiff = soft.with_constant("k", 1e4 * soft.law.k)
-    groups = by_halvings(made, {0: soft, 1: stiff, 2: soft})
+    groups = by_halvings(made, impacts_from_cards({0: soft, 1: stiff, 2: soft}))
     times = {number: n for n, group in groups.items() for number in group}
     assert times[0] == times[2] < times[1]
     halved = made.halved(times[1])

@@ -16,7 +16,16 @@ from fecm.authoring import apply_case
 from fecm.deck import Deck
 from fecm.mechanics import HystereticLaw, LinearPermanent, stack_parameters
 from fecm.results import SUMMARY
-from fecm.sweeps import Hits, Impacts, Status, TipSteps, balance_errors, batch, by_numpy, impacts
+from fecm.sweeps import (
+    ComputedImpacts,
+    Hits,
+    Status,
+    TipSteps,
+    backends,
+    balance_errors,
+    by_numpy,
+    impacts,
+)
 from tests.calls import call
 from tests.decks import DATA_CARDS, LONG, PROGRAM, small
 
@@ -62,12 +71,12 @@ def test_cases_together_keep_the_energy_as_well_as_their_runs_do(
 ) -> None:
     seen: list[float] = []
 
-    def watched(*arguments: Any) -> Impacts:
+    def watched(*arguments: Any) -> ComputedImpacts:
         made = impacts(*arguments)
         seen.extend(made.error.tolist())
         return made
 
-    monkeypatch.setattr(batch, "impacts", watched)
+    monkeypatch.setattr(backends, "impacts", watched)
     deck = fecm.read_one(small(STEPS))
     stiffnesses = [2e6, 1e8, 1e9]
     assert fecm.sweep(deck, {"k": stiffnesses}).completed.all()

@@ -14,7 +14,7 @@ from fecm._typing import Floats
 from fecm.authoring import Case
 from fecm.mechanics import HystereticLaw, LinearPermanent, kernels
 from fecm.problem import RunOptions, build_model, load_deck
-from fecm.sweeps import batch, plate_response, responses
+from fecm.sweeps import backends, batch, plate_response, responses
 from tests.test_kernels import compiled
 
 DECK = Path("decks/impact-115.inp").read_text().replace("LOOP       4000", "LOOP        600")
@@ -47,7 +47,7 @@ RODS = drawn(velocity=(20.0, 300.0), rod_length=(0.5, 2.0), k=(1e6, 3e6))
 
 def without_kernels(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(kernels, "LIBRARY", None)
-    batch._prepared.cache_clear()
+    batch._plate.cache_clear()
 
 
 @compiled
@@ -92,13 +92,13 @@ def test_a_case_has_the_same_bytes_with_any_others() -> None:
 @compiled
 def test_errors_of_the_energy_balance_are_those_of_numpy(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of cases that lose energy, some whose motion is not finite."""
-    seen: list[responses.Impacts] = []
+    seen: list[responses.ComputedImpacts] = []
 
-    def watched(*given: Any) -> responses.Impacts:
+    def watched(*given: Any) -> responses.ComputedImpacts:
         seen.append(responses.impacts(*given))
         return seen[-1]
 
-    monkeypatch.setattr(batch, "impacts", watched)
+    monkeypatch.setattr(backends, "impacts", watched)
     cases: list[Case] = [{"k": k} for k in (2e6, 1e9, 1e10, 1e300)]
     deck = DECK.replace("        600", "        200")
     fecm.sweep(deck, cases=cases)

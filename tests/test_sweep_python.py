@@ -26,7 +26,7 @@ from tests.decks import DATA_CARDS, PROGRAM, small
         ({"vary": {"velocity": np.array(5.0)}}, "velocity is one value"),
         ({"vary": {"velocity": []}}, "velocity has no values"),
         ({"vary": {"k": [None]}}, "k can't be None"),
-        ({"vary": "velocity"}, "write a mapping"),
+        ({"vary": "velocity"}, "write velocity=FROM"),
         ({"cases": {"velocity": 5.0}}, "case 0 is 'velocity', not a mapping"),
         ({"cases": [{"k": 1e6}, 2e6]}, "case 1 is 2000000.0, not a mapping"),
         ({"cases": 5.0}, "write a list of mappings"),
@@ -149,7 +149,7 @@ def test_the_callers_dask_client_stays_open_and_the_default() -> None:
      {"workers": 2, "executor": ThreadPoolExecutor(1)}],
 )  # fmt: skip
 def test_places_to_run_that_conflict_or_are_none_are_refused(options: dict[str, Any]) -> None:
-    with pytest.raises(fecm.FecmError, match=r"give only one of workers|is 5, not a"):
+    with pytest.raises(fecm.FecmError, match=r"excludes several workers|is 5, not a"):
         fecm.sweep(small(), {"k": [1e6]}, **options)
 
 
@@ -248,10 +248,10 @@ def test_readings_that_can_not_be_stored_are_the_status(readings: Any, reason: s
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"build": plate, "deck": small()}, "either deck or build"),
+        ({"build": plate, "deck": small()}, "`deck` excludes `build`"),
         ({"build": lambda case: None, "vary": {"a": [1]}}, "case 0: .*NoneType, not a Deck"),
         ({"build": lambda case: None, "workers": 2}, "build can't be sent to worker processes"),
-        ({"measure": readings, "deck": small(), "until": 9.0}, "until can't be given"),
+        ({"measure": readings, "deck": small(), "until": 9.0}, "`until` excludes a function"),
         ({"measure": 5, "deck": small()}, "measure is 5, not a function"),
         ({"build": plate, "vary": {"peak_force": [1.0]}}, "is a name of the results"),
         ({"build": plate, "vary": {"a": [1, "b"]}}, "a has numbers and texts"),

@@ -6,6 +6,7 @@ from fecm.authoring.case import check_deck as check_deck
 from fecm.authoring.cases import grid_cases as grid_cases
 from fecm.authoring.cases import parse_vary as parse_vary
 from fecm.authoring.cases import read_cases as read_cases
+from fecm.authoring.impacts import impacts_from_cards as impacts_from_cards
 from fecm.authoring.mesh import InPlane as InPlane
 from fecm.authoring.parameters import ObjectError as ObjectError
 from fecm.authoring.plate import Support as Support

@@ -19,7 +19,7 @@ from fecm.deck.catalogue import NU23, STANDARD, STEEL_MODULUS, STEEL_POISSON
 from fecm.deck.findings import Findings
 from fecm.deck.macros import compile_program
 from fecm.deck.units import MODULUS, in_si, unit_names, units_of
-from fecm.mechanics.contact_law import ContactParameters, Law, hertz_coefficient
+from fecm.mechanics.contact_law import ContactParameters, hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
 from fecm.mechanics.projectile import DeckProjectile, RigidMass, Rod
 from fecm.problem.check import check_impact, check_segment
@@ -38,7 +38,6 @@ class Strike(NamedTuple):
     indentation: model.Indentation | None
     card: model.Projectile | None  # None if the deck has the report's rod
     projectile: DeckProjectile
-    own_law: Law | None = None  # a user's, instead of that of EXPE
     delamination: model.Delamination | None = None  # toughness, whose threshold the force may reach
 
     @property

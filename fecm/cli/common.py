@@ -109,12 +109,16 @@ class TerminalWatch(Watch):
 
 @contextlib.contextmanager
 def watching(
-    label: str, length: int, remark: Callable[[object], str] | None = None
+    label: str, length: int, remark: Callable[[int], str] | None = None
 ) -> Iterator[TerminalWatch]:
-    """Show the progress of a job; see :func:`progress`."""
+    """Show the progress of a job; see :func:`progress`.
+
+    `remark` takes the number of steps or cases that are done.
+    """
     watch = TerminalWatch(lambda steps: None)
+    end = None if remark is None else lambda _: remark(watch.done)
     try:
-        with progress(label, length, remark) as advance:
+        with progress(label, length, end) as advance:
             watch._advance = advance
             yield watch
     finally:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import io
 import math
 import os
 import sys
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import quote
@@ -59,25 +60,24 @@ def load_valid(
     Errors that `--force` permits are permitted if `force`.  Raises RefusedError, whose message ends
     with `otherwise`, if the deck has other errors.
     """
-    return load_printed(deck, otherwise, mode, force=force, warnings=warnings).problems
-
-
-def load_printed(
-    deck: Path,
-    otherwise: str = "",
-    mode: str = REPORT,
-    *,
-    force: bool = True,
-    warnings: bool = True,
-) -> LoadedDeck:
-    """Load a deck whose findings go to standard error; see :func:`load_valid`."""
     loaded = load_deck(deck, mode)
     errors = loaded.errors(force)
     for finding in loaded.findings if warnings else errors:
         echo(finding.render(loaded.source), err=True)
     if errors:
         raise RefusedError(count_findings(errors) + otherwise)
-    return loaded
+    return loaded.problems
+
+
+@contextlib.contextmanager
+def refusing_errors(otherwise: str = "") -> Iterator[None]:
+    """Print the findings of a deck with errors, and raise RefusedError; see :func:`load_valid`."""
+    try:
+        yield
+    except DeckError as error:
+        echo(error, err=True)
+        errors = [finding for finding in error.findings if finding.severity == "error"]
+        raise RefusedError(count_findings(errors) + otherwise) from None
 
 
 def load_single(deck: Path, command: str) -> Problem:

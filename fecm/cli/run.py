@@ -17,7 +17,7 @@ from fecm.cli.common import (
     echo_json,
     watching,
 )
-from fecm.cli.decks import load_printed
+from fecm.cli.decks import refusing_errors
 from fecm.cli.interrupts import signals
 from fecm.cli.options import (
     DECK_PATH,
@@ -88,8 +88,11 @@ def run_command(
     checkpoint beside its output; --resume with the same options gives the same bytes.
     """
     options["output"] = options["output"] or Path(f"{deck.stem}.h5")
-    loaded = load_printed(deck, "; nothing was run", options["mode"], force=options["force"])
-    jobs = Run(loaded, **options).problems
+    with refusing_errors("; nothing was run"):
+        job = Run(deck, **options)
+    for finding in job.findings:
+        echo(finding.render(job.source), err=True)
+    jobs = job.problems
     if fail_limit is not None and not any(job.problem.work.passes["FAIL"] for job in jobs):
         raise RefusedError(f"--fail-limit needs the macro FAIL; {deck} has none")
     exceeded: list[str] = []

@@ -15,14 +15,13 @@ from fecm.authoring.cases import parse_vary
 from fecm.authoring.values import NAMES
 from fecm.cli.common import (
     FAILED,
-    RefusedError,
     TerminalWatch,
     echo,
     every_minute,
     note,
     watching,
 )
-from fecm.cli.decks import count_findings
+from fecm.cli.decks import refusing_errors
 from fecm.cli.interrupts import signals
 from fecm.cli.options import (
     DECK_PATH,
@@ -35,7 +34,6 @@ from fecm.cli.options import (
     list_of,
     typical,
 )
-from fecm.deck.findings import DeckError
 from fecm.mechanics.own_law import LawError
 from fecm.simulation.job import ProblemRun
 from fecm.sweeps.convergence import convergence_lines
@@ -144,7 +142,8 @@ def sweep_command(
             raise click.UsageError("give only one of --scheduler and --scheduler-file")
         options["scheduler"] = address_in(scheduler_file)
     options["output"] = options["output"] or Path(f"{deck.stem}-sweep.h5")
-    job = _job(deck, options)
+    with refusing_errors("; nothing was run"):
+        job = Sweep(deck, **options)
     note(*job.doubts, *job.expectation())
     result = _computed(job)
     _print(result, job)
@@ -159,31 +158,19 @@ def sweep_command(
         raise SystemExit(FAILED)
 
 
-def _job(deck: Path, options: dict[str, Any]) -> Sweep:
-    """The sweep of a deck, whose findings go to standard error if it has errors."""
-    try:
-        return Sweep(deck, **options)
-    except DeckError as error:
-        echo(error, err=True)
-        errors = [finding for finding in error.findings if finding.severity == "error"]
-        raise RefusedError(f"{count_findings(errors)}; nothing was run") from None
-
-
 def _computed(job: Sweep) -> SweepResult:
     """Compute the cases with a progress bar that shows the rate."""
     begin = time.monotonic()
     workers = job.workers
 
-    def rate(_: object) -> str:
+    def rate(done: int) -> str:
         seconds = time.monotonic() - begin
-        if not (seconds and watch.done):
-            return ""
         each = "" if workers is None else " per worker"
-        return f"{watch.done / seconds / (workers or 1):.3g} cases a second{each}"
+        return f"{done / seconds / (workers or 1):.3g} cases a second{each}" if done else ""
 
     with (
         signals.deferred(),
-        watching("fecm", len(job.all_cases), lambda item: rate(item)) as watch,
+        watching("fecm", len(job.all_cases), rate) as watch,
     ):
         return job.execute(watch, keeps_forces=False)
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from fecm._typing import Floats
 from fecm.authoring.case import Case
+from fecm.authoring.impacts import impacts_from_cards
 from fecm.authoring.strike import Strike
 from fecm.authoring.values import check_names
 from fecm.authoring.vary import strike_of_case
@@ -22,7 +23,7 @@ from fecm.mechanics.contact_law import Law
 from fecm.results.comparison import Measurement
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Filter
-from fecm.sweeps.search import Runs
+from fecm.sweeps.outcome import Backend, Outcome
 
 DELAY = "delay"  # measured time at which the approach of the projectile ends in a contact
 OFFSET = "offset"  # measured force without a contact
@@ -50,22 +51,23 @@ class ForceModel(NamedTuple):
     """Contact forces of a deck with trial values, all from one response of the plate."""
 
     deck: Deck
-    runs: Runs
+    backend: Backend
     sensor: Filter | None
     law: Law | None = None  # a user's contact law instead of the deck's
     computed: Callable[[int], object] = lambda forces: None  # called with the number of forces
 
-    def strike(self, values: Mapping[str, float]) -> Strike:
-        """Strike of the deck with values, under the law of this model."""
-        return fitted(self.deck, values)._replace(own_law=self.law)
+    def outcome(self, trials: Sequence[Strike], *, judged: bool) -> Outcome:
+        """Compute impacts on the plate of the deck, under the law of this model."""
+        impacts = impacts_from_cards(dict(enumerate(trials)), self.law)
+        return self.backend.outcomes(impacts, judged=judged)
 
     def histories(self, trials: Sequence[Mapping[str, float]]) -> tuple[Floats, Floats]:
         """Times, from one duration before the contact on, and forces (times, trials)."""
-        found = self.runs({n: self.strike(one) for n, one in enumerate(trials)}, False)
+        found = self.outcome([fitted(self.deck, one) for one in trials], judged=False)
         assert found.force is not None
         failed = np.flatnonzero(~np.isfinite(found.force).all(axis=1))
         if self.law is not None and len(failed):  # the run alone tells why
-            one = self.runs({0: self.strike(trials[failed[0]])}, True)
+            one = self.outcome([fitted(self.deck, trials[failed[0]])], judged=True)
             raise IdentifyError(str(one.status[0]))
         self.computed(len(trials))
         steps = found.force.shape[1]

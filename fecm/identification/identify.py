@@ -56,10 +56,10 @@ from fecm.results.pictures import report_results
 from fecm.results.validity import MEANING, Reason, reasons_of
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Filter, filter_of
-from fecm.sweeps.batch import runs_of
+from fecm.sweeps.backends import backend_of
 from fecm.sweeps.job import checked_problem
+from fecm.sweeps.outcome import Backend
 from fecm.sweeps.plan import check_law, shares_plate
-from fecm.sweeps.search import Runs
 
 CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
     **dict.fromkeys(("velocity", "energy"), Impact),
@@ -263,8 +263,8 @@ def identify(
 
 
 @lru_cache(maxsize=4)
-def _shared(deck: Deck) -> Runs:
-    """The function that runs cases of a deck by one response of its plate."""
+def _shared(deck: Deck) -> Backend:
+    """What computes impacts on the plate of a deck by its response."""
     problem = checked_problem(deck)
     if problem.deck.has(Nonlinear):
         raise StudyError(
@@ -275,7 +275,7 @@ def _shared(deck: Deck) -> Runs:
         loads = "FORC, EXCD, TANG, FORM and SOLV"
         needed = f"impact steps (RODP) of one size, and a plate without {loads}"
         raise StudyError(f"identify needs {needed}")
-    return runs_of(problem)
+    return backend_of(problem)
 
 
 def fit_deck(
@@ -353,7 +353,7 @@ def _identification(
     plates = {}
     if not fault:
         plates = plate_errors(
-            model, found, lambda deck: model._replace(deck=deck, runs=_shared(deck))
+            model, found, lambda deck: model._replace(deck=deck, backend=_shared(deck))
         )
     made = Identification(
         values=values,
@@ -437,7 +437,7 @@ def _notes(
             "deviations of a runs test): the model does not describe the measurement down to its "
             "noise; is a filter of the measurement not named by --filter?"
         )
-    fitted = model.runs({0: strike_of(found.deck)._replace(own_law=model.law)}, True)
+    fitted = model.outcome([strike_of(found.deck)], judged=True)
     if not fitted.fine[0]:
         yield f"the run of the fitted deck fails: {fitted.status[0]}"
     # A measurement may end before the peak does; what the model lacks biases the parameters.

@@ -18,6 +18,7 @@ from fecm._machine import format_bytes
 from fecm._options import documented, option, with_parameters_of
 from fecm._text import html_table
 from fecm._watch import LOGGER, SILENT, CallerWatch, Progress, StoppedError, Watch
+from fecm.deck.findings import Finding
 from fecm.listing.printout import Printer
 from fecm.listing.slips import MODES, NAMES, REPORT, Mode, active_slips
 from fecm.mechanics.contact_law import Law
@@ -229,8 +230,6 @@ class Run:
     )
 
     def __post_init__(self) -> None:
-        self._loaded = load_deck(self.deck, self.mode)
-        self.source = self._loaded.source
         self.options = RunOptions(
             active_slips(self.mode, self.slips),
             self.solver,
@@ -241,6 +240,8 @@ class Run:
             projectile=own_projectile(self.projectile),
             criteria=own_criteria(self.criteria),
         )
+        self._loaded = load_deck(self.deck, self.mode)
+        self.source = self._loaded.source
         self._loaded.refuse_errors(self.force)
         problems = self._loaded.problems
         for problem in problems:
@@ -254,18 +255,25 @@ class Run:
 
     def _with_files(self, problems: list[Problem], first: Path) -> list[ProblemRun]:
         """Give the problems their files, which are checked."""
-        from fecm.simulation import checkpoint  # 40 ms, with h5py
+        from fecm.simulation.checkpoint import (  # 40 ms, with h5py
+            CheckpointError,
+            files_of,
+            fingerprint,
+            finished_before,
+            interrupted,
+            resuming,
+        )
 
         names = range(1, len(problems) + 1)
         paths = [numbered(first, n) for n in names]
         prints = [numbered(Path(self.printed), n) if self.printed else None for n in names]
-        beside = [p for path in paths if path.name for p in checkpoint.files_of(path)]
+        beside = [p for path in paths if path.name for p in files_of(path)]
         check_outputs([*paths, *filter(None, prints)], True, [Path(self.source)], beside)
-        unfinished = checkpoint.interrupted(paths, resume=self.resume, overwrite=self.overwrite)
+        unfinished = interrupted(paths, resume=self.resume, overwrite=self.overwrite)
         before: list[str] = []
         if unfinished:
-            with checkpoint.resuming(paths[unfinished]):
-                before = checkpoint.finished_before(paths[unfinished])
+            with resuming(paths[unfinished]):
+                before = finished_before(paths[unfinished])
         finished: list[str] = []
         jobs = []
         for number, (problem, path, print_to) in enumerate(
@@ -283,10 +291,10 @@ class Run:
             )
             existing = [output for output in job.outputs if output.exists()]
             if number < len(before) and existing == job.outputs:
-                job.complete = before[number] == checkpoint.fingerprint(problem, job.outputs)
+                job.complete = before[number] == fingerprint(problem, job.outputs)
             is_finished = unfinished is not None and number < unfinished
             if is_finished and existing and not (job.complete or self.overwrite):
-                raise checkpoint.CheckpointError(
+                raise CheckpointError(
                     f"{existing[0]} is not what the interrupted run has written for problem "
                     f"{number + 1} of this deck; overwrite=True runs the problem again"
                 )
@@ -294,6 +302,11 @@ class Run:
                 check_outputs(job.outputs, self.overwrite)
             jobs.append(job)
         return jobs
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """Warnings and notes about the deck."""
+        return tuple(one for one in self._loaded.findings if one.severity != "error")
 
     @cached_property
     def price(self) -> Price:
@@ -350,7 +363,7 @@ class Run:
                     stack.enter_context(watch.deferring_interrupts())
                 result = job.execute(watch)
             LOGGER.info("%s: done", title)
-            result.findings = tuple(f for f in self._loaded.findings if f.severity != "error")
+            result.findings = self.findings
             results.append(result)
         return results
 

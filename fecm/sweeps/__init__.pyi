@@ -39,9 +39,9 @@ from fecm.sweeps.reduced import ReducedImpacts as ReducedImpacts
 from fecm.sweeps.reduced import ReducedModel as ReducedModel
 from fecm.sweeps.reduced import by_halvings as by_halvings
 from fecm.sweeps.reduced import count_held as count_held
+from fecm.sweeps.responses import ComputedImpacts as ComputedImpacts
 from fecm.sweeps.responses import Convolution as Convolution
 from fecm.sweeps.responses import Hits as Hits
-from fecm.sweeps.responses import Impacts as Impacts
 from fecm.sweeps.responses import TipSteps as TipSteps
 from fecm.sweeps.responses import balance_errors as balance_errors
 from fecm.sweeps.responses import by_numpy as by_numpy

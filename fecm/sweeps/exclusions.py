@@ -40,15 +40,15 @@ class Need(NamedTuple):
 EXCLUSIONS = (
     Exclusion("deck", ("build",), "build makes the deck of every case"),
     Exclusion("vary", ("cases",), "a table has all cases"),
-    Exclusion("cases", ("random",), "random values go with a grid"),
+    Exclusion("cases", ("random",), "random values go with `vary`"),
     Exclusion(
         "refine",
         ("vary", "cases", "random", "until", "build", "measure"),
-        "a study of the mesh has cases and measures of its own",
+        "a study of the mesh varies nothing else, and measures what it needs",
     ),
     Exclusion("sensitivity", ("correlation",), "Sobol' indices are those of independent values"),
     Exclusion("until", ("build", FUNCTION), "a search varies the velocity of the deck"),
-    Exclusion("until", ("full",), "the velocities are not known before the search"),
+    Exclusion("until", ("full",), "run the velocity found: `vary` velocity=FOUND and `full` 0"),
     Exclusion(PEAK, (FAILURE,), "exposures need full runs, and this search takes none"),
     Exclusion("model", ("build", FUNCTION), "the reduced model has forces and deflections only"),
     Exclusion("model", ("until",), "searches take full runs"),
@@ -100,7 +100,7 @@ def _given(job: Sweep) -> set[str]:
             names.add(name)
     if callable(job.measure):
         names.add(FUNCTION)
-    elif Measure.FAILURE in (job.measure or ()):
+    elif isinstance(job.measure, str | Sequence) and Measure.FAILURE in job.measure:
         names.add(FAILURE)
     search = search_of(job.until)
     if search is not None and search.quantity is Sought.PEAK_FORCE:
@@ -118,7 +118,8 @@ def _check_types(job: Sweep) -> None:
         raise CasesError(f"executor is {job.executor!r}, not a concurrent.futures.Executor")
     if job.progress is not None and not (isinstance(job.progress, bool) or callable(job.progress)):
         raise CasesError(f"progress is {job.progress!r}, not a function")
-    if job.random is not None and not isinstance(job.random, Mapping | Sequence):
+    laws = job.random
+    if laws is not None and laws != () and not (laws and isinstance(laws, Mapping | Sequence)):
         example = '{"k": "uniform:1e6,2e6"}'
         raise CasesError(f"random is {job.random!r}; write a mapping such as {example}")
 

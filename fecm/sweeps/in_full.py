@@ -10,8 +10,8 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.authoring.case import Case, CasesError
-from fecm.authoring.strike import Strike, strike_of
-from fecm.authoring.timing import lengthened, with_clock
+from fecm.authoring.strike import strike_of
+from fecm.authoring.timing import with_clock
 from fecm.authoring.values import name_fault
 from fecm.authoring.vary import apply_case
 from fecm.deck.macros import Body, Loop
@@ -47,10 +47,8 @@ from fecm.results.validity import Extent, reasons_of
 from fecm.simulation.recorder import exposures_of
 from fecm.simulation.run import run_program, simulate
 from fecm.simulation.simulation import Criteria, Simulation
-from fecm.sweeps import search as find_in_full
 from fecm.sweeps.outcome import About, Outcome, outcome_of
 from fecm.sweeps.plan import BuildFunction, Measure, MeasureFunction, Settings
-from fecm.sweeps.search import Sought
 
 
 class CasePeaks(NamedTuple):
@@ -126,32 +124,6 @@ FIELDS = ("DISP", "STRE", "PLYS", "REAC", "EIGE")  # macros that store or print 
 NEVER = 1e9  # steps between two rows of RODP
 
 
-def run_in_full(settings: Settings, number: int, case: Case) -> Outcome:
-    """Run a case on a plate of its own; a case that cannot be run has the reason as its status."""
-    try:
-        checked = problem_of_case(settings, case)
-        search, measure = settings.search, settings.measure
-        if search is not None and search.quantity is Sought.EXPOSURE:
-
-            def run(strike: Strike, factor: int) -> Outcome:
-                longer = checked if factor == 1 else lengthened(checked, factor)
-                deck = replace(longer, deck=strike.deck())
-                return run_case_in_full(number, deck, settings.measures, law=settings.law)
-
-            level, start = float(search.level), strike_of(checked.deck)
-            at_rest = checked.worst_at_rest
-            if at_rest is not None and at_rest.exposure >= level:
-                raise CasesError(f"the plate at rest has the exposure {at_rest.exposure:.4g}")
-            outcome = find_in_full.search_in_full(number, start, search.quantity, level, run)
-        else:
-            outcome = run_case_in_full(
-                number, checked, settings.measures, measure, case, law=settings.law
-            )
-    except CasesError as error:
-        return Outcome.failed({number: str(error)})
-    return outcome if settings.build else with_hit(outcome, checked, case)
-
-
 def problem_of_case(settings: Settings, case: Case) -> Problem:
     """The checked deck of a case with its time step; CasesError if the case cannot be run."""
     if settings.build is None:
@@ -191,11 +163,14 @@ def run_case_in_full(
     checked: Problem,
     measures: Sequence[Measure],
     measure: MeasureFunction | None = None,
-    case: Case | None = None,
+    names: Collection[str] = (),
     *,
     law: Law | None = None,
 ) -> Outcome:
-    """Run one case in full, without storing fields unless it is measured."""
+    """Run one case in full, without storing fields unless it is measured.
+
+    `names` are those of its values, which the columns of `measure` may not have.
+    """
     sink, program = MemorySink(), checked if measure else without_output(checked, measures)
     try:
         simulation = simulate(program, sink, RunOptions(law=law))
@@ -204,7 +179,7 @@ def run_case_in_full(
     result = Result(sink.arrays, sink.texts, sink.groups)
     outcome = _outcome(number, checked, measures, result, simulation.state.dt)
     if measure is not None:
-        outcome.columns |= _measured(measure, result, case or {})
+        outcome.columns |= _measured(measure, result, names)
     return outcome
 
 
@@ -311,7 +286,9 @@ def _outcome(
     return outcome
 
 
-def _measured(measure: MeasureFunction, result: Result, case: Case) -> dict[str, Floats]:
+def _measured(
+    measure: MeasureFunction, result: Result, names: Collection[str]
+) -> dict[str, Floats]:
     """Columns that the caller computes from the result of a case."""
     try:
         found = measure(result)
@@ -322,7 +299,7 @@ def _measured(measure: MeasureFunction, result: Result, case: Case) -> dict[str,
         raise CasesError(f"measure: {told(error)}") from error
     for name, value in values.items():
         fault = name_fault(name)
-        if name in case or name == "dt":
+        if name in names or name == "dt":
             fault = f"`{name}` is a name of the case; choose another"
         elif value.ndim or value.dtype.kind not in "biuf":
             fault = f"{name} is not a number"

@@ -1,16 +1,17 @@
-"""Outcomes of cases: their columns, and the contact forces of every step."""
+"""Outcomes of cases: their columns, and the contact forces of every step; what computes them."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from fecm._typing import Bools, Floats
+from fecm.authoring.impacts import Impacts
 from fecm.results.metrics import COLUMNS, SUMMARY, Metrics
 from fecm.results.validity import FAILED, VALID
 
@@ -86,6 +87,24 @@ class Outcome:
             About.REACHED: np.full(count, np.nan),
         }
         return cls(list(reasons), {name: np.full(count, np.nan) for name in SUMMARY} | about)
+
+
+class Backend(Protocol):
+    """Computes impacts on one plate, and keeps what they share."""
+
+    @property
+    def computes_together(self) -> bool:
+        """Whether many impacts take hardly longer than one."""
+
+    @property
+    def lengthens(self) -> bool:
+        """Whether a longer run takes little time, so that open values are decided by it."""
+
+    def outcomes(self, impacts: Impacts, *, judged: bool = True) -> Outcome:
+        """Compute impacts; if judged, those with doubtful energies in full."""
+
+    def lengthened(self, factor: int) -> Backend:
+        """Return the back end of a run so many times as long."""
 
 
 def outcome_of(

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fecm._errors import ResultFileError
-from fecm._typing import Floats
+from fecm._typing import Floats, Indices
 from fecm.authoring.case import CasesError
+from fecm.authoring.impacts import Impacts
 from fecm.authoring.strike import Strike
 from fecm.authoring.timing import duration_of
 from fecm.authoring.vary import strike_of_case
@@ -36,16 +37,15 @@ from fecm.sweeps.outcome import About, Column, Outcome, merge
 from fecm.sweeps.plan import MOST_MODES, Plan, Task
 from fecm.sweeps.responses import (
     BLOCK,
+    ComputedImpacts,
     Convolution,
     DeflectionRecord,
     Hits,
-    Impacts,
     TipState,
     TipSteps,
     Work,
     balance_errors,
 )
-from fecm.sweeps.search import Strikes
 
 if TYPE_CHECKING:
     from fecm.results.hdf5_reader import FileContents
@@ -61,7 +61,7 @@ MOST_HALVINGS = 10
 
 @dataclass(frozen=True)
 class ReducedImpacts:
-    """Impacts on a reduced plate with one time step."""
+    """ComputedImpacts on a reduced plate with one time step."""
 
     plate: ReducedPlate
     dt: float
@@ -76,7 +76,7 @@ class ReducedImpacts:
         """The same with a time step that is halved so many times."""
         return replace(self, dt=self.dt / 2**times, steps=self.steps * 2**times)
 
-    def impacts(self, hits: Hits) -> Impacts:
+    def impacts(self, hits: Hits) -> ComputedImpacts:
         """Compute impacts step by step, all cases together."""
         cases = len(hits.speed)
         flexibility, none = self.plate.flexibility, np.zeros(cases)
@@ -110,7 +110,7 @@ class ReducedImpacts:
                 done.append(state.contact_work + motion.energy(state.contact.force))
         permanent = law.permanent(state.memory, state.contact)
         last = law.of_law(state.contact).indentation
-        return Impacts(
+        return ComputedImpacts(
             force=force,
             indentation=IndentationMetrics(deepest, last, permanent),
             unconverged_steps=state.unconverged_steps,
@@ -131,14 +131,15 @@ def reduced(checked: Problem, modes: int) -> ReducedImpacts:
     return ReducedImpacts(plate, duration / steps, steps)
 
 
-def by_halvings(made: ReducedImpacts, strikes: Strikes) -> Mapping[int, Strikes]:
-    """Strikes by how often their time step is halved, so that it resolves the contact."""
-    groups: dict[int, dict[int, Strike]] = {}
-    for number, strike in strikes.items():
-        largest = max(largest_time_step(made.plate, strike), made.dt / 2**MOST_HALVINGS)
+def by_halvings(made: ReducedImpacts, impacts: Impacts) -> Mapping[int, Indices]:
+    """Rows of impacts by how often their time step is halved, so that it resolves the contact."""
+    groups: dict[int, list[int]] = {}
+    for row in range(len(impacts)):
+        step = largest_time_step(made.plate, impacts.cards(row))
+        largest = max(step, made.dt / 2**MOST_HALVINGS)
         times = max(0, math.ceil(math.log2(made.dt / largest)))
-        groups.setdefault(times, {})[number] = strike
-    return groups
+        groups.setdefault(times, []).append(row)
+    return {times: np.array(rows) for times, rows in groups.items()}
 
 
 def largest_time_step(plate: ReducedPlate, strike: Strike) -> float:

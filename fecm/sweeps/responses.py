@@ -258,7 +258,7 @@ class TipSteps:
         return TipState(tip + self.weight * acceleration, velocity, acceleration)
 
 
-class Impacts(NamedTuple):
+class ComputedImpacts(NamedTuple):
     """Histories of many impacts on one plate."""
 
     force: Floats  # (steps, cases): contact force after every step
@@ -275,7 +275,7 @@ class Work(NamedTuple):
     excess: Floats  # (cases,): largest dt^2/8 m a^2 of the impact node; see :func:`balance_errors`
 
 
-def impacts(response: Floats, dt: float, node_mass: float, hits: Hits) -> Impacts:
+def impacts(response: Floats, dt: float, node_mass: float, hits: Hits) -> ComputedImpacts:
     """Compute many impacts on a plate from its response to a unit force, (steps,).
 
     `node_mass` is the mass that the contact force accelerates: the lumped mass of the impact node,
@@ -287,7 +287,7 @@ def impacts(response: Floats, dt: float, node_mass: float, hits: Hits) -> Impact
     return by_numpy(response, node_mass, TipSteps(hits, dt, len(response)))[0]
 
 
-def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Impacts, Work]:
+def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[ComputedImpacts, Work]:
     """Compute impacts step by step, all cases together; see :func:`impacts`."""
     law, speed = tips.hits.law, tips.hits.speed
     steps, cases = len(response), len(speed)
@@ -324,7 +324,9 @@ def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Impact
     indentation = IndentationMetrics(deepest, state.contact.indentation, permanent)
     work = Work(np.array(done), node_mass * largest_ddw**2 / (8.0 * tips.dt**2))
     error = balance_errors(force, work, tips)
-    return Impacts(force, indentation, state.unconverged_steps, record.deflection, error), work
+    return ComputedImpacts(
+        force, indentation, state.unconverged_steps, record.deflection, error
+    ), work
 
 
 class DeflectionRecord:
@@ -389,7 +391,7 @@ def _by_kernels(
     node_mass: float,
     hits: Hits,
     constants: ContactParameters[Floats],
-) -> Impacts:
+) -> ComputedImpacts:
     """Compute impacts by the compiled kernels, and projectiles by their modes."""
     law = kernel_law(constants)
     rows: dict[Given, float | Floats] = {
@@ -412,7 +414,7 @@ def _by_kernels(
         )
     lost = found[ResultRow.LOST] + node_mass * found[ResultRow.LARGEST_DDW] ** 2 / (8.0 * dt**2)
     initial = found[ResultRow.INITIAL]
-    return Impacts(
+    return ComputedImpacts(
         force=force.T,
         indentation=IndentationMetrics(
             found[ResultRow.DEEPEST], found[ResultRow.INDENTATION], found[ResultRow.PERMANENT]

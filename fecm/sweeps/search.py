@@ -4,23 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import replace
 from enum import StrEnum
-from itertools import compress
 from typing import NamedTuple
 
 import numpy as np
 
 from fecm._typing import Bools, Floats
 from fecm.authoring.case import NO_THRESHOLD, PEAK_FORCE, THRESHOLD, CasesError, parse_exceed
-from fecm.authoring.strike import Strike
+from fecm.authoring.impacts import Impacts
 from fecm.deck.model import Deck, Delamination, Impact
 from fecm.results.exposures import FEWEST
 from fecm.results.metrics import BAND, EVALUATIONS, EXPOSURES, FOUND_BAND
-from fecm.sweeps.outcome import About, Outcome, merge
+from fecm.sweeps.outcome import About, Backend, Outcome, merge
 
 Until = float | str | Mapping[str, float | str]  # what a search reaches; see :func:`search_of`
-Strikes = Mapping[int, Strike]  # by the numbers of their cases, ascending
-Runs = Callable[[Strikes, bool], Outcome]  # runs strikes; doubtful ones in full if they are judged
 RANGE = 100.0  # of velocities relative to the deck's
 FIRST_VELOCITIES = 25  # of the first round of a search
 VELOCITY_ERROR = 1e-6  # relative error of the velocity found
@@ -78,71 +76,80 @@ def search_of(until: Until | None) -> Search | None:
     return Search(Sought(name), level)
 
 
-def search_by_response(
-    strikes: Strikes, forces: Mapping[int, float], longer: Callable[[int], Runs]
-) -> Outcome:
-    """Run cases at the velocities at which the peak of each reaches its force.
+def search(backend: Backend, impacts: Impacts, quantity: Sought, levels: Floats) -> Outcome:
+    """Compute impacts at the velocities at which a quantity of each reaches its level, (rows,).
 
-    Cases whose peak there is open are searched again in longer runs: `longer` returns what runs
-    strikes so many times as long.
+    A back end that computes many impacts together gets rounds of velocities from 1/100 to 100 times
+    those of the impacts, of which the lowest counts; another one gets one velocity after the other,
+    from those of the impacts on.  Where the value is open, runs are repeated, longer.
     """
-    left, parts = dict(strikes), []
+    if backend.computes_together:
+        return _search_together(backend, impacts, levels)
+    rows = range(len(impacts))
+    return merge([_search_row(backend, impacts, row, quantity, float(levels[row])) for row in rows])
+
+
+def _search_together(backend: Backend, impacts: Impacts, forces: Floats) -> Outcome:
+    """Search the velocities of peak forces; those that are open in longer runs."""
+    left, parts = np.arange(len(impacts)), []
     for factor in LONGER:
-        runs, numbers = longer(factor), list(left)
-        together = -(-len(numbers) // factor)  # as many forces in memory as at first
-        for start in range(0, len(numbers), together):
-            some = {number: left[number] for number in numbers[start : start + together]}
-            outcome, still_open = _searched(some, forces, runs)
+        longer, still_open = backend.lengthened(factor), []
+        together = -(-len(left) // factor)  # as many forces in memory as at first
+        for start in range(0, len(left), together):
+            rows = left[start : start + together]
+            outcome, is_open = _searched(longer, impacts.select(rows), forces[rows])
             parts.append(outcome)
-            left = {n: one for n, one in left.items() if n not in some or n in still_open}
-        if not left:
+            still_open.append(rows[is_open])
+        left = np.concatenate(still_open)
+        if not len(left):
             return merge(parts)
     text = f"it is open even in a run {LONGER[-1]} times as long"
-    reasons = {n: f"no peak force of {forces[n]:.6g}: {text}" for n in left}
+    reasons = {
+        impacts.numbers[row]: f"no peak force of {forces[row]:.6g}: {text}" for row in left.tolist()
+    }
     return merge([*parts, Outcome.failed(reasons)])
 
 
-def with_found(outcome: Outcome, strikes: Strikes) -> Outcome:
-    """Add the velocities that were found, and their energies: those of the strikes."""
-    velocity = np.array([one.velocity for one in strikes.values()])
-    mass = np.array([one.projectile.total_mass for one in strikes.values()])
-    outcome.columns |= {"found_velocity": velocity, "found_energy": 0.5 * mass * velocity**2}
+def _with_velocities(outcome: Outcome, impacts: Impacts) -> Outcome:
+    """Add the velocities that were found, and their energies: those of the impacts."""
+    outcome.columns |= {"found_velocity": impacts.velocity, "found_energy": impacts.energy}
     return outcome
 
 
-def _searched(
-    strikes: Strikes, forces: Mapping[int, float], runs: Runs
-) -> tuple[Outcome, set[int]]:
-    """Search the velocities of cases: outcome of those that are decided, and the open ones."""
+def _searched(backend: Backend, impacts: Impacts, forces: Floats) -> tuple[Outcome, Bools]:
+    """Search velocities: outcome of the impacts that are decided, and which are open."""
 
     def tried(pairs: list[tuple[int, float]]) -> Outcome:
-        trials = [strikes[case].with_velocity(velocity) for case, velocity in pairs]
-        return runs(dict(enumerate(trials)), False)
+        rows, velocities = np.array([row for row, _ in pairs]), np.array([v for _, v in pairs])
+        return backend.outcomes(impacts.at_velocities(rows, velocities), judged=False)
 
-    starts = {case: one.velocity for case, one in strikes.items()}
-    searched = lowest_velocities(starts, forces, lambda pairs: tried(pairs).columns[About.REACHED])
-    reasons = {case: v for case, v in searched.items() if isinstance(v, str)}
-    still_open: set[int] = set()
+    starts = dict(enumerate(impacts.velocity.tolist()))
+    levels = dict(enumerate(forces.tolist()))
+    searched = lowest_velocities(starts, levels, lambda pairs: tried(pairs).columns[About.REACHED])
+    reasons = {row: v for row, v in searched.items() if isinstance(v, str)}
+    is_open = np.zeros(len(impacts), dtype=bool)
     # What is not reached in a run that is too short may be reached in a longer one.
-    if low := [case for case, text in reasons.items() if text.startswith(BELOW)]:
-        highest = tried([(case, starts[case] * RANGE) for case in low])
-        lacking = np.isnan(highest.columns[PEAK_FORCE])
-        still_open = set(compress(low, lacking))
-    parts = [Outcome.failed({n: text for n, text in reasons.items() if n not in still_open})]
+    if low := [row for row, text in reasons.items() if text.startswith(BELOW)]:
+        highest = tried([(row, starts[row] * RANGE) for row in low])
+        is_open[low] = np.isnan(highest.columns[PEAK_FORCE])
+    failed = {impacts.numbers[row]: v for row, v in reasons.items() if not is_open[row]}
+    parts = [Outcome.failed(failed)]
 
-    velocities = {case: v for case, v in searched.items() if isinstance(v, float)}
+    velocities = {row: v for row, v in searched.items() if isinstance(v, float)}
     if velocities:
-        hit = {case: strikes[case].with_velocity(v) for case, v in velocities.items()}
-        outcome = with_found(runs(hit, True), hit)
-        is_open = outcome.fine & np.isnan(outcome.columns[PEAK_FORCE])
-        still_open |= {outcome.numbers[row] for row in np.flatnonzero(is_open)}
-        parts += _decided(outcome, forces, ~is_open)
-    return merge(parts), still_open
+        rows = np.array(list(velocities))
+        numbers = [impacts.numbers[row] for row in velocities]
+        trials = impacts.at_velocities(rows, np.array(list(velocities.values())))
+        hit = replace(trials, numbers=numbers)
+        outcome = _with_velocities(backend.outcomes(hit), hit)
+        open_rows = outcome.fine & np.isnan(outcome.columns[PEAK_FORCE])
+        is_open[rows[open_rows]] = True
+        parts += _decided(outcome, forces[rows], ~open_rows)
+    return merge(parts), is_open
 
 
-def _decided(outcome: Outcome, forces: Mapping[int, float], known: Bools) -> list[Outcome]:
+def _decided(outcome: Outcome, force: Floats, known: Bools) -> list[Outcome]:
     """Outcomes of the cases whose peak is known; those whose peak is not the force have failed."""
-    force = np.array([forces[number] for number in outcome.numbers])
     reached, velocity = outcome.columns[About.REACHED], outcome.columns["found_velocity"]
     right = outcome.fine & known & (np.abs(reached - force) <= ROUGH * force)
     reasons = {}
@@ -206,27 +213,34 @@ APART = 1e-3  # least relative distance of the trials that give a slope
 NAMES = {Sought.PEAK_FORCE: "peak force", Sought.EXPOSURE: "exposure"}
 
 
-def search_in_full(
-    number: int,
-    start: Strike,
-    quantity: Sought,
-    level: float,
-    run: Callable[[Strike, int], Outcome],
+def _search_row(
+    backend: Backend, impacts: Impacts, row: int, quantity: Sought, level: float
 ) -> Outcome:
-    """Run a case at the velocity at which its peak force or largest exposure reaches a level.
+    """Search the velocity of one impact; the reason is its status if no velocity is found."""
+    number = impacts.numbers[row]
+    try:
+        return _search_in_turn(backend, impacts, row, quantity, level)
+    except CasesError as error:
+        return Outcome.failed({number: str(error)})
 
-    Every trial is a full run: exposures need the whole plate, and a nonlinear plate has no impulse
-    response.  `run` takes a strike and how many times as long the run is; one that leaves the
-    value open is repeated, longer.  Raises CasesError with the reason if no velocity is found.
-    """
+
+def _search_in_turn(
+    backend: Backend, impacts: Impacts, row: int, quantity: Sought, level: float
+) -> Outcome:
+    """Search the velocity of one impact; CasesError with the reason if no velocity is found."""
     outcomes: dict[float, Outcome] = {}
     factors = list(LONGER)  # those that are left
     largest = largest_exposure if quantity is Sought.EXPOSURE else peak_force
 
+    def trial(velocity: float) -> Impacts:
+        alone = impacts.at_velocities(np.array([row]), np.array([velocity]))
+        return replace(alone, numbers=[impacts.numbers[row]])
+
     def reached(velocity: float) -> float:
         at = f"at velocity {velocity:.6g}"
         while factors:
-            outcome = outcomes[velocity] = run(start.with_velocity(velocity), factors[0])
+            outcome = backend.lengthened(factors[0]).outcomes(trial(velocity))
+            outcomes[velocity] = outcome
             if not outcome.fine[0]:
                 raise CasesError(f"{at}: {outcome.status[0]}")
             try:
@@ -239,8 +253,9 @@ def search_in_full(
         text = f"open even in a run {LONGER[-1]} times as long"
         raise CasesError(f"{at} the largest {NAMES[quantity]} is {text}")
 
-    velocity = velocity_at_level(start.velocity, level, reached, NAMES[quantity])
-    outcome = with_found(outcomes[velocity], {number: start.with_velocity(velocity)})
+    start = float(impacts.velocity[row])
+    velocity = velocity_at_level(start, level, reached, NAMES[quantity])
+    outcome = _with_velocities(outcomes[velocity], trial(velocity))
     if quantity is Sought.EXPOSURE:
         exposures = {v: largest_exposure(one) for v, one in outcomes.items()}
         _add_band(outcome, velocity, level, exposures)

@@ -1,0 +1,208 @@
+"""Impacts on one plate as columns: velocity, contact law, projectile and toughness of many cases.
+
+A card, a projectile and a strike for every case would take longer than its impact.  The rules of
+the cards check the values as arrays; an invalid case has its message from the rule of its card.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._typing import Bools, Floats, Indices
+from fecm.authoring.case import Case, CasesError
+from fecm.authoring.strike import Strike, strike_of
+from fecm.authoring.values import FAILURE_NAMES, plate_values
+from fecm.authoring.vary import strike_of_case
+from fecm.deck import model
+from fecm.deck.model import Deck
+from fecm.mechanics.contact_law import ContactParameters, Law, stack_parameters
+from fecm.mechanics.projectile import DeckProjectile, RigidMass
+from fecm.problem.parts import constants_of
+from fecm.problem.problem import Problem
+from fecm.problem.rules.contact import limits_of
+
+UNIT = RigidMass(1.0)
+CONSTANTS = ("k", "alpha_p", "s_p", "q")
+MASSES = ("mass", "rod_mass")
+AS_COLUMNS = {"velocity", "energy", *CONSTANTS, *MASSES, *FAILURE_NAMES}
+
+
+@dataclass(frozen=True)
+class Impacts:
+    """Impacts on one plate, a row for each; arrays are (rows,)."""
+
+    numbers: list[int]  # of the cases, ascending
+    velocity: Floats
+    constants: ContactParameters[Floats]
+    kinds: list[DeckProjectile]  # of projectiles; all rigid masses are a unit mass
+    kind: Indices  # places in them
+    mass: Floats
+    scale: Floats  # mass and stiffness over those of the kind
+    toughness: Floats  # G_IIc, force/length; NaN without a DELA segment
+    own_law: Law | None  # a user's contact law instead of the constants
+    cards: Callable[[int], Strike]  # the impact of a row as cards
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+    @property
+    def energy(self) -> Floats:
+        """Kinetic energy of the projectile before the impact, force*length."""
+        return 0.5 * self.mass * self.velocity**2
+
+    def select(self, rows: NDArray[np.intp]) -> Impacts:
+        """Return the impacts of some rows."""
+        return replace(self._of(rows), numbers=[self.numbers[row] for row in rows.tolist()])
+
+    def at_velocities(self, rows: NDArray[np.intp], velocity: Floats) -> Impacts:
+        """Return trials: impacts of rows, which may repeat, at other velocities."""
+
+        def cards(row: int) -> Strike:
+            return self.cards(int(rows[row])).with_velocity(float(velocity[row]))
+
+        trials, numbers = self._of(rows), list(range(len(rows)))
+        return replace(trials, numbers=numbers, velocity=velocity, cards=cards)
+
+    def deck(self, row: int) -> Deck:
+        """Return the deck of the plate with the impact of a row."""
+        return self.cards(row).deck()
+
+    def _of(self, rows: NDArray[np.intp]) -> Impacts:
+        return replace(
+            self,
+            velocity=self.velocity[rows],
+            constants=self.constants.of_cases(rows),
+            kind=self.kind[rows],
+            mass=self.mass[rows],
+            scale=self.scale[rows],
+            toughness=self.toughness[rows],
+            cards=lambda row: self.cards(int(rows[row])),
+        )
+
+
+def impacts_of(
+    checked: Problem, numbers: Sequence[int], cases: Sequence[Case], own_law: Law | None = None
+) -> tuple[Impacts | None, dict[int, str]]:
+    """Impacts of cases on the plate of a problem, and why other cases have none, by their numbers.
+
+    The impacts are None if no case has one.
+    """
+    as_columns = _from_values(checked, numbers, cases, own_law)
+    valid = set() if as_columns is None else set(as_columns.numbers)
+    strikes: dict[int, Strike] = {}
+    reasons: dict[int, str] = {}
+    for number, case in zip(numbers, cases, strict=True):
+        if number in valid:
+            continue
+        try:
+            strike = strike_of_case(checked.deck, case)
+            strike.check(checked)
+            strikes[number] = strike
+        except CasesError as error:
+            reasons[number] = str(error)
+    if not strikes:
+        return as_columns, reasons
+    if as_columns is not None:
+        strikes |= {number: as_columns.cards(row) for row, number in enumerate(as_columns.numbers)}
+    return impacts_from_cards(dict(sorted(strikes.items())), own_law), reasons
+
+
+def impacts_from_cards(strikes: Mapping[int, Strike], own_law: Law | None = None) -> Impacts:
+    """Impacts that are given as cards, by the numbers of their cases."""
+    rows = list(strikes.values())
+    units = [UNIT if isinstance(one.projectile, RigidMass) else one.projectile for one in rows]
+    kinds = {unit: place for place, unit in enumerate(dict.fromkeys(units))}
+    mass = np.array([one.projectile.total_mass for one in rows])
+    return Impacts(
+        numbers=list(strikes),
+        velocity=np.array([one.velocity for one in rows]),
+        constants=stack_parameters([one.law for one in rows]),
+        kinds=list(kinds),
+        kind=np.array([kinds[unit] for unit in units], dtype=np.intp),
+        mass=mass,
+        scale=np.where([unit is UNIT for unit in units], mass, 1.0),
+        toughness=np.array([_toughness(one) for one in rows]),
+        own_law=own_law,
+        cards=rows.__getitem__,
+    )
+
+
+def _from_values(
+    checked: Problem, numbers: Sequence[int], cases: Sequence[Case], own_law: Law | None
+) -> Impacts | None:
+    """Impacts of the cases whose values are valid; None if columns can't hold the values."""
+    own = strike_of(checked.deck)
+    names = cases[0].keys() - plate_values(cases[0]).keys()
+    if own.impact is None or own.indentation is None or not _fits_columns(own, names):
+        return None
+    values = {name: np.array([float(case[name]) for case in cases]) for name in names}
+    columns, valid = _columns(own, own.indentation, values, len(cases))
+    rows = np.flatnonzero(valid)
+    try:  # what does not depend on these values is the same for all
+        for row in rows[:1].tolist():
+            strike_of_case(checked.deck, cases[row]).check(checked)
+    except CasesError:
+        return None
+    impacts = replace(
+        columns,
+        numbers=list(numbers),
+        own_law=own_law,
+        cards=lambda row: strike_of_case(checked.deck, cases[row]),
+    )
+    if len(rows) == len(cases):
+        return impacts
+    return impacts.select(rows) if len(rows) else None
+
+
+def _fits_columns(own: Strike, names: Collection[str]) -> bool:
+    """Whether columns can hold values of these names: a rod of another mass is another kind."""
+    rigid = isinstance(own.projectile, RigidMass)
+    return AS_COLUMNS.issuperset(names) and (rigid or not {*MASSES}.intersection(names))
+
+
+def _columns(
+    own: Strike, law: model.Indentation, values: Mapping[str, Floats], count: int
+) -> tuple[Impacts, Bools]:
+    """Columns of cases with values by name, the others of their deck; and which are valid."""
+    projectile, rigid = own.projectile, isinstance(own.projectile, RigidMass)
+    total = next((values[name] for name in MASSES if name in values), projectile.total_mass)
+    mass = np.array(np.broadcast_to(total, count))
+    valid = mass > 0.0
+    velocity = np.array(np.broadcast_to(values.get("velocity", own.velocity), count))
+    with np.errstate(all="ignore"):
+        if "energy" in values:
+            valid &= values["energy"] >= 0.0
+            velocity = np.sqrt(2.0 * values["energy"] / mass)
+        valid &= velocity >= 0.0
+    given = [
+        np.array(np.broadcast_to(values.get(name, constant), count))
+        for name, constant in zip(CONSTANTS, law.values(), strict=True)
+    ]
+    for within, _ in limits_of(law.word, *given):
+        valid &= within
+    toughness = np.array(np.broadcast_to(values.get("giic", _toughness(own)), count))
+    if "giic" in values:
+        valid &= toughness > 0.0
+    columns = Impacts(
+        numbers=[],
+        velocity=velocity,
+        constants=constants_of(law.word, *given),
+        kinds=[UNIT if rigid else projectile],
+        kind=np.zeros(count, dtype=np.intp),
+        mass=mass,
+        scale=mass if rigid else np.ones(count),
+        toughness=toughness,
+        own_law=None,
+        cards=lambda row: own,
+    )
+    return columns, valid
+
+
+def _toughness(one: Strike) -> float:
+    """Toughness of a strike; NaN without a DELA segment."""
+    return math.nan if one.delamination is None else one.delamination.toughness

@@ -1,0 +1,277 @@
+"""Back ends of a sweep: what computes impacts on one plate.
+
+A linear plate is stepped once under a unit force, and every impact follows by convolution with its
+response.  A nonlinear plate is run in full for each impact, or reduced to some bending modes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fecm._machine import require_memory
+from fecm._typing import Floats
+from fecm.authoring.impacts import Impacts
+from fecm.authoring.timing import lengthened
+from fecm.deck.macros import flat
+from fecm.mechanics import kernels
+from fecm.mechanics.contact_law import HystereticLaw, Law
+from fecm.mechanics.own_law import CaseByCase
+from fecm.mechanics.time_step import taken_time_step
+from fecm.problem.build import build_model
+from fecm.problem.problem import Problem
+from fecm.results.metrics import GAGE, Projectiles, impact_metrics
+from fecm.simulation.judge import ENERGY_WARNING
+from fecm.sweeps.checks import ADVANCED_BYTES
+from fecm.sweeps.in_full import CasePeaks, judge_cases, run_case_in_full, thresholds_of
+from fecm.sweeps.outcome import Backend, Outcome, merge, outcome_of
+from fecm.sweeps.plan import Measure, MeasureFunction, shares_plate
+from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
+from fecm.sweeps.responses import (
+    ComputedImpacts,
+    Hits,
+    impacts,
+    largest_sums,
+    plate_response,
+)
+
+# Contact forces that are computed before they are evaluated, where none are stored: 16 MB, which
+# the C library keeps for the next ones and does not give back to the system.
+FORCES = 2_000_000
+
+
+def backend_of(
+    problem: Problem,
+    measures: Sequence[Measure] = (),
+    *,
+    modes: int | None = None,
+    history: bool = True,
+) -> Backend:
+    """Return what computes impacts on the plate of a problem, in bending modes if they are given.
+
+    Forces are kept with `history`.
+    """
+    if modes is not None:
+        return BendingModes(problem, measures, modes, history)
+    if shares_plate(problem):
+        return ImpulseResponse(problem, measures, history)
+    return FullRuns(problem, measures)
+
+
+@dataclass
+class ImpulseResponse:
+    """A linear plate: stepped once under a unit force; every impact by convolution."""
+
+    problem: Problem
+    measures: Sequence[Measure] = ()
+    history: bool = True
+    computes_together = True
+    lengthens = True
+    _longer: dict[int, ImpulseResponse] = field(default_factory=dict)
+
+    @cached_property
+    def response(self) -> PlateResponse:
+        """Response of the plate to a unit force."""
+        return _plate_response(self.problem, gages=Measure.GAGES in self.measures)
+
+    def outcomes(self, impacts: Impacts, *, judged: bool = True) -> Outcome:
+        """Compute impacts; see :class:`Backend`."""
+        most = max(1, FORCES // self.response.steps)
+        by_kernels = kernels.LIBRARY is not None and impacts.own_law is None
+        if len(impacts) <= most or self.history or not by_kernels:  # NumPy likes many at a time
+            return self._outcome(impacts, judged=judged)
+        parts = np.split(np.arange(len(impacts)), range(most, len(impacts), most))
+        outcomes = [self._outcome(impacts.select(rows), judged=judged) for rows in parts]
+        return merge(outcomes, history=False)
+
+    def _outcome(self, impacts: Impacts, *, judged: bool) -> Outcome:
+        return _outcome_together(
+            self.problem, self.response, self.measures, impacts, judged, history=self.history
+        )
+
+    def lengthened(self, factor: int) -> ImpulseResponse:
+        """Return the back end of a run so many times as long."""
+        if factor == 1:
+            return self
+        if factor not in self._longer:
+            problem = lengthened(self.problem, factor)
+            self._longer[factor] = ImpulseResponse(problem, self.measures, self.history)
+        return self._longer[factor]
+
+
+@dataclass
+class BendingModes:
+    """A nonlinear plate in some bending modes; impacts are advanced together."""
+
+    problem: Problem
+    measures: Sequence[Measure]
+    modes: int
+    history: bool = True
+    computes_together = True
+    lengthens = False
+
+    @cached_property
+    def plate(self) -> ReducedImpacts:
+        """The reduced plate; CasesError if it can't be reduced."""
+        return reduced(self.problem, self.modes)
+
+    def outcomes(self, impacts: Impacts, *, judged: bool = True) -> Outcome:
+        """Compute impacts; those with the same halvings of the time step together."""
+        parts = []
+        for times, rows in by_halvings(self.plate, impacts).items():
+            plate, some = self.plate.halved(times), impacts.select(rows)
+            parts.append(
+                _outcome_together(
+                    self.problem, plate, self.measures, some, judged, history=self.history
+                )
+            )
+        return merge(parts)
+
+    def lengthened(self, factor: int) -> BendingModes:
+        """Return the back end of a run so many times as long."""
+        return replace(self, problem=lengthened(self.problem, factor)) if factor != 1 else self
+
+
+@dataclass
+class FullRuns:
+    """Any plate: one full run for each impact."""
+
+    problem: Problem
+    measures: Sequence[Measure] = ()
+    measure: MeasureFunction | None = None  # computes more columns from the result of a run
+    names: Collection[str] = ()  # of the values of the case, which these columns may not have
+    computes_together = False
+    lengthens = False
+
+    def outcomes(self, impacts: Impacts, *, judged: bool = True) -> Outcome:
+        """Run each impact."""
+        return merge([self._outcome(impacts, row) for row in range(len(impacts))])
+
+    def _outcome(self, impacts: Impacts, row: int) -> Outcome:
+        problem = replace(self.problem, deck=impacts.deck(row))
+        return run_case_in_full(
+            impacts.numbers[row],
+            problem,
+            self.measures,
+            self.measure,
+            self.names,
+            law=impacts.own_law,
+        )
+
+    def lengthened(self, factor: int) -> FullRuns:
+        """Return the back end of a run so many times as long."""
+        return replace(self, problem=lengthened(self.problem, factor)) if factor != 1 else self
+
+
+class PlateResponse(NamedTuple):
+    """Response of a plate to a unit force in its first step of size `dt`, and the mass it moves."""
+
+    response: Floats
+    dt: float
+    node_mass: float
+    strains: dict[str, Floats]  # response of every gage that is measured, by the name of its column
+
+    @property
+    def steps(self) -> int:
+        """Number of steps."""
+        return len(self.response)
+
+    def impacts(self, hits: Hits) -> ComputedImpacts:
+        """Compute many impacts."""
+        return impacts(self.response, self.dt, self.node_mass, hits)
+
+
+def _plate_response(checked: Problem, *, gages: bool) -> PlateResponse:
+    setup = build_model(checked)
+    assert setup.impact is not None  # the program has impact steps
+    load, steps = setup.impact.contact.load, checked.work.steps
+    dt = next(macro.value for macro in flat(checked.program) if macro.word == "DT")
+    dt = dt or taken_time_step(checked.critical_time_step)
+    measured = setup.gages if gages else None
+    names, sums = [], None
+    if measured is not None:
+        names = [f"{GAGE}{number}" for number in measured.numbers]
+        sums = setup.motion.dof_sums(measured.dof_indices, measured.weights)
+    with np.errstate(all="ignore"):
+        response, strains = plate_response(setup.motion, load, dt, steps, sums)
+    return PlateResponse(
+        response, dt, 1.0 / load.inverse_mass, dict(zip(names, strains, strict=True))
+    )
+
+
+class _ByKind(NamedTuple):
+    """Impacts with those of the same projectile next to one another."""
+
+    numbers: list[int]
+    hits: Hits
+    projectiles: Projectiles
+    toughness: Floats
+    back: NDArray[np.intp]  # rows in the order of the impacts
+
+
+def _by_kind(given: Impacts) -> _ByKind:
+    order = np.argsort(given.kind, kind="stable")
+    rows = given.select(order)
+    law: Law[Floats] = HystereticLaw(rows.constants)
+    if rows.own_law is not None:
+        law = CaseByCase(rows.own_law, len(rows))
+    return _ByKind(
+        numbers=rows.numbers,
+        hits=Hits(rows.kinds, rows.kind, rows.scale, law, rows.velocity),
+        projectiles=Projectiles(rows.mass, rows.velocity),
+        toughness=rows.toughness,
+        back=np.argsort(order),
+    )
+
+
+def _outcome_together(
+    checked: Problem,
+    plate: PlateResponse | ReducedImpacts,
+    measures: Sequence[Measure],
+    given: Impacts,
+    judged: bool,
+    *,
+    history: bool,
+) -> Outcome:
+    """Compute impacts on a plate; if judged, those with doubtful energies in full."""
+    steps, dt = plate.steps, plate.dt
+    require_memory(ADVANCED_BYTES * steps * len(given), f"{len(given)} cases of {steps} steps")
+    with np.errstate(all="ignore"):
+        ordered = _by_kind(given)
+        struck = plate.impacts(ordered.hits)
+        metrics = impact_metrics(
+            struck.force,
+            np.add.accumulate(np.full(steps, dt)),
+            struck.indentation,
+            ordered.projectiles,
+            struck.plate,
+            thresholds_of(checked, ordered.toughness),
+            checked.judge.mobility,
+        )
+        strains = plate.strains if judged else {}
+        peaks = {name: CasePeaks(*largest_sums(r, struck.force)) for name, r in strains.items()}
+    outcome = outcome_of(
+        ordered.numbers,
+        metrics,
+        last=struck.force[-1],
+        steps=steps,
+        dt=dt,
+        unsettled=struck.unconverged_steps,
+        force=struck.force.T if history else None,
+    )
+    largest = struck.indentation.largest
+    judge_cases(outcome, checked, measures, metrics, peaks=peaks, indentation=largest)
+    outcome = outcome.select(ordered.back)
+
+    settled = (struck.error < ENERGY_WARNING) & (struck.unconverged_steps == 0)
+    doubtful = ~settled[ordered.back]
+    if not (judged and doubtful.any()):
+        return outcome
+    # Cases near the limits of a run are run in full, which accepts or rejects them.
+    full = FullRuns(checked, measures).outcomes(given.select(np.flatnonzero(doubtful)))
+    return merge([outcome.select(np.flatnonzero(~doubtful)), full])
