@@ -89,10 +89,10 @@ def run_command(
     """
     options["output"] = options["output"] or Path(f"{deck.stem}.h5")
     with refusing_errors("; nothing was run"):
-        job = Run(deck, **options)
-    for finding in job.findings:
-        echo(finding.render(job.source), err=True)
-    jobs = job.problems
+        run = Run(deck, **options)
+    for finding in run.findings:
+        echo(finding.render(run.source), err=True)
+    jobs = run.problems
     if fail_limit is not None and not any(job.problem.work.passes["FAIL"] for job in jobs):
         raise RefusedError(f"--fail-limit needs the macro FAIL; {deck} has none")
     exceeded: list[str] = []
