@@ -8,6 +8,7 @@ import pytest
 import fecm
 from fecm import Deck, Ply
 from fecm.deck import Control, Integration, Layer, Material
+from fecm.listing import PlateVariant
 from fecm.mechanics import (
     LaminateSection,
     reduced_stiffness,
@@ -178,7 +179,7 @@ def material(ply: Ply, total: float) -> Material:
 def laminate_of(material: Material, *, isotropic_g12: bool = False) -> LaminateSection:
     """Laminate of a deck with this MATE segment."""
     deck = Deck("", Control(4, 1, len(material.layers), 2, 5, 4), (material,), ())
-    return laminates_of_deck(deck, isotropic_g12=isotropic_g12)[0]
+    return laminates_of_deck(deck, PlateVariant(isotropic_g12=isotropic_g12))[0]
 
 
 def test_a_decks_stiffness_is_the_layers_and_its_inertia_the_cards() -> None:

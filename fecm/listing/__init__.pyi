@@ -11,5 +11,6 @@ from fecm.listing.tapes import read_tapes as read_tapes
 from fecm.listing.tapes import tape_texts as tape_texts
 from fecm.listing.tapes import write_tapes as write_tapes
 from fecm.listing.variant import MISREAD_DENSITY as MISREAD_DENSITY
+from fecm.listing.variant import PlateVariant as PlateVariant
 from fecm.listing.variant import Variant as Variant
 from fecm.listing.variant import variant_of as variant_of

@@ -36,6 +36,12 @@ def active_slips(mode: str = REPORT, single: Iterable[str] = ()) -> frozenset[st
     return names
 
 
+def refuse_on_nonlinear(slips: frozenset[str]) -> None:
+    """Raise OptionsError if one of the slips is for linear plates only."""
+    if "jacobian" in slips:
+        raise OptionsError("the slip jacobian is for linear plates only, and the deck has NONL")
+
+
 def mode_of(slips: frozenset[str]) -> str:
     """Mode of a result with these slips."""
     return LISTING if slips == frozenset(NAMES) else REPORT

@@ -1,15 +1,21 @@
 """What slips change in the parts of a run, as parameters of these parts.
 
-The defaults are the report's.  No part asks which slips are active, or in which mode it is.
+The defaults are the report's.  A part asks its variant for a value, a rule or a factor; which slips
+are active, or which mode it is in, it does not know.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import NamedTuple
 
+from fecm.deck.macros import LoadTable, WorkEstimate, load_factor
+from fecm.deck.material_cards import Ply
 from fecm.listing.law import ListingLaw
 from fecm.mechanics.contact_law import ContactParameters, HystereticLaw
+from fecm.mechanics.element_matrices import IntegrationRules
+from fecm.mechanics.laminate import LaminateSection
 from fecm.mechanics.projectile import REPORT_DENSITY
 
 MISREAD_DENSITY = 0.0003225  # of the report's rod, in the listing
@@ -23,6 +29,25 @@ class PlateVariant(NamedTuple):
     shear_at_bending_points: bool = False  # L1 holds for transverse shear too
     strains_at_bending_points: bool = False  # L1 holds for stored strains too
     transposed_jacobian: bool = False
+
+    def ply(self, ply: Ply) -> Ply:
+        """Constants of a ply of the deck."""
+        if self.isotropic_g12 and ply.e1 == ply.e2:
+            return replace(ply, g12=ply.e1 / (2.0 * (1.0 + ply.nu12)))
+        return ply
+
+    def laminate(self, laminate: LaminateSection) -> LaminateSection:
+        """Stiffness of the laminate of MATE."""
+        return laminate.without_small_entries() if self.cuts_small_stiffness else laminate
+
+    def rules(self, rules: IntegrationRules) -> IntegrationRules:
+        """Quadrature rules of the plate."""
+        return replace(
+            rules,
+            shear=rules.bending if self.shear_at_bending_points else rules.shear,
+            strains=rules.bending if self.strains_at_bending_points else rules.strains,
+            transposed_jacobian=self.transposed_jacobian,
+        )
 
 
 class ImpactVariant(NamedTuple):
@@ -41,14 +66,38 @@ class ImpactVariant(NamedTuple):
 class ProgramVariant(NamedTuple):
     """Parameters of the macro program."""
 
-    clock_stands: bool = False  # TIME does nothing
+    clock_rate: float = 1.0  # of TIME's clock
+    last_words: frozenset[str] = frozenset()  # macros that end the program
     table_stands: bool = False  # PROP has the table's value at t = 0
     prop_replaces_contact: bool = False  # as the force on the plate, in the step after PROP
     contact_scales_forces: bool = False  # FORC's values have the contact force as factor
     counts_from_output: bool = False  # RODP's N counts steps since the last output
     strains_precede_step: bool = False  # strains of the field before RODP's step
     contact_at_every_step: bool = False  # on tape9, instead of every N-th
-    ends_at_check: bool = False  # CHEC ends the program
+
+    def table_factor(self, table: LoadTable, clock: float, first: float) -> float:
+        """Load factor of a table at a time of the clock; `first` is that of the last PROP."""
+        return first if self.table_stands else load_factor(table, clock)
+
+    def prop_force(self, factor: float) -> float | None:
+        """Force on the plate in the step after PROP, of its load factor; None is the contact's."""
+        return factor if self.prop_replaces_contact else None
+
+    def force_factor(self, factor: float, contact: float | None) -> float:
+        """Factor of FORC's values, of the load factor and the force of an impact on the plate."""
+        return factor if contact is None or not self.contact_scales_forces else contact
+
+    def is_output(self, step: int, since: int, every: int) -> bool:
+        """Whether RODP stores strains at a step, `since` steps after the last that it stored."""
+        return since == every if self.counts_from_output else not step % every
+
+    def has_contact(self, is_output: bool) -> bool:
+        """Whether RODP stores the contact of a step."""
+        return is_output or self.contact_at_every_step
+
+    def contact_rows(self, work: WorkEstimate) -> int:
+        """Largest number of steps whose contact is stored."""
+        return work.steps if self.contact_at_every_step else work.contact_rows
 
 
 REPORT_PLATE = PlateVariant()
@@ -61,6 +110,14 @@ class Variant(NamedTuple):
     plate: PlateVariant
     impact: ImpactVariant
     program: ProgramVariant
+
+    @property
+    def is_report(self) -> bool:
+        """Whether no slip is active."""
+        return self == REPORT
+
+
+REPORT = Variant(REPORT_PLATE, REPORT_IMPACT, ProgramVariant())
 
 
 def variant_of(slips: frozenset[str]) -> Variant:
@@ -83,13 +140,13 @@ def variant_of(slips: frozenset[str]) -> Variant:
         station_sign=1.0 if "station" in slips else -1.0,
     )
     program = ProgramVariant(
-        clock_stands="time" in slips,
+        clock_rate=float("time" not in slips),
+        last_words=frozenset({"CHEC"} if "check-end" in slips else ()),
         table_stands="prop" in slips,
         prop_replaces_contact="prop-contact" in slips,
         contact_scales_forces="force-scale" in slips,
         counts_from_output="counter" in slips,
         strains_precede_step="tapes" in slips,
         contact_at_every_step="tapes" in slips,
-        ends_at_check="check-end" in slips,
     )
     return Variant(plate, impact, program)

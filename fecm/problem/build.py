@@ -13,6 +13,7 @@ from fecm._machine import free_processors
 from fecm._typing import Bools, Indices
 from fecm.deck import model
 from fecm.deck.macros import flat, moves_only
+from fecm.listing.slips import refuse_on_nonlinear
 from fecm.listing.variant import REPORT_PLATE, ImpactVariant, PlateVariant, Variant, variant_of
 from fecm.mechanics import contact_law
 from fecm.mechanics.failure import OwnCriterion
@@ -97,8 +98,7 @@ def check_run_options(problem: Problem, options: RunOptions) -> None:
             f"the solver {CSR} has one matrix for all displacements, and the plate is nonlinear "
             f"(NONL); take one of {known}"
         )
-    if "jacobian" in options.slips:
-        raise OptionsError("the slip jacobian is for linear plates only, and the deck has NONL")
+    refuse_on_nonlinear(options.slips)
 
 
 class ImpactModel(NamedTuple):
@@ -164,7 +164,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         build_station(deck, rod, variant.impact, is_own=chosen.projectile is not None),
     )
     steps = None  # the kernels take many steps at once of the report's program only
-    if impact is not None and not chosen.slips and can_step(impact):
+    if impact is not None and variant.is_report and can_step(impact):
         sums = None if read is None else motion.dof_sums(read.dof_indices, read.weights)
         steps = ImpactSteps(impact, sums, station.dof, workers.count)
     return ImpactModel(

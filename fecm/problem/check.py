@@ -60,9 +60,9 @@ ELEMENT_ERRORS = ("E303", "E304", "E305")  # after which the numbers of elements
 
 
 def check_problem(
-    problem: ParsedProblem, findings: Findings, *, listing: bool = False
+    problem: ParsedProblem, findings: Findings, *, uses_l2: bool = True
 ) -> Problem | None:
-    """Check a problem, in listing mode or not; None without a control card."""
+    """Check a problem; None without a control card.  Its L2 counts if the run `uses_l2`."""
     deck, unsound = problem.deck, problem.unsound
     if deck is None:
         return None
@@ -73,7 +73,7 @@ def check_problem(
 
     compiled = compile_program(deck.macros, findings)
     apply(cards.OF_SEGMENTS, findings, deck, unsound)
-    checked = _generated(deck, compiled, unsound, findings, listing=listing)
+    checked = _generated(deck, compiled, unsound, findings, uses_l2=uses_l2)
     _check_each_segment(checked, findings, unsound)
     with np.errstate(all="ignore"):  # numbers out of range end in a finding
         if sound():
@@ -84,7 +84,7 @@ def check_problem(
 
 
 def _generated(
-    deck: model.Deck, compiled: Body, unsound: set[str], findings: Findings, *, listing: bool
+    deck: model.Deck, compiled: Body, unsound: set[str], findings: Findings, *, uses_l2: bool
 ) -> Problem:
     """Generate the mesh and check it as far as it is complete."""
     errors, element_errors = findings.error_count, _element_errors(findings)
@@ -98,7 +98,7 @@ def _generated(
         apply(mesh.OF_NODES, findings, checked)
         if checked.mesh.given.all():
             apply(mesh.OF_PLACES, findings, checked)
-            _check_shapes(checked, findings, listing=listing)
+            _check_shapes(checked, findings, uses_l2=uses_l2)
     return checked
 
 
@@ -106,16 +106,16 @@ def _element_errors(findings: Findings) -> int:
     return sum(findings.counts[code] for code in ELEMENT_ERRORS)
 
 
-def _check_shapes(checked: Problem, findings: Findings, *, listing: bool) -> None:
+def _check_shapes(checked: Problem, findings: Findings, *, uses_l2: bool) -> None:
     """Check Jacobians, lumped masses and zero-energy modes where the orders are valid.
 
-    Listing mode takes L1 for L2, so that nothing is wrong with L2; assumed strains need no L2.
+    Nothing is wrong with an L2 that is not used; assumed strains need none.
     """
     material = checked.deck.last(model.Material)
     if material is None or laminate.unknown_stress_points(material):
         return
     apply(quadrature.OF_SHAPES, findings, checked)
-    if not listing and not has_assumed_shear(checked.deck):
+    if uses_l2 and not has_assumed_shear(checked.deck):
         apply(quadrature.OF_SHEAR_ORDER, findings, checked)
 
 

@@ -64,7 +64,7 @@ def load_deck(deck: AnyDeck, mode: str = REPORT) -> LoadedDeck:
     for read in reader.problems():
         if reader.findings.closed:
             break
-        if (checked := check_problem(read, reader.findings, listing=listing)) is not None:
+        if (checked := check_problem(read, reader.findings, uses_l2=not listing)) is not None:
             problems.append(checked)
     if listing and not reader.findings.errors:
         for problem in problems:

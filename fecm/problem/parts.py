@@ -56,21 +56,15 @@ def rules(material: model.Material) -> tuple[Quadrature, Quadrature, Quadrature]
 def build_plate(deck: Deck, mesh: MeshArrays, variant: PlateVariant = REPORT_PLATE) -> PlateModel:
     """Build the plate of a deck."""
     bending, shear, points = rules(deck.require(model.Material))
-    first, *others = laminates_of_deck(deck, isotropic_g12=variant.isotropic_g12)
-    if variant.cuts_small_stiffness:
-        first = first.without_small_entries()
+    first, *others = laminates_of_deck(deck, variant)
     used = IntegrationRules(
-        bending=bending,
-        shear=bending if variant.shear_at_bending_points else shear,
-        strains=bending if variant.strains_at_bending_points else points,
-        transposed_jacobian=variant.transposed_jacobian,
-        assumes_shear=has_assumed_shear(deck),
+        bending=bending, shear=shear, strains=points, assumes_shear=has_assumed_shear(deck)
     )
     preload, curved = deck.last(model.Preload), deck.last(model.Curvature)
     return PlateModel(
         mesh,
-        first,
-        used,
+        variant.laminate(first),
+        variant.rules(used),
         preload=UNLOADED if preload is None else preload.forces,
         nonlinear=deck.has(model.Nonlinear),
         others=tuple(others),
@@ -153,32 +147,25 @@ def _laminate_of(
     layers: Sequence[model.Layer],
     plies: Mapping[int, model.Ply],
     thickness: float | None,
-    *,
-    isotropic_g12: bool,
 ) -> LaminateSection:
     chosen = [plies[layer.material] for layer in layers]
-    if isotropic_g12:
-        chosen = [_with_isotropic_g12(ply) if ply.e1 == ply.e2 else ply for ply in chosen]
     angles = [layer.angle for layer in layers]
     thicknesses = [layer.thickness for layer in layers]
     return laminate(chosen, angles, thicknesses, thickness)
 
 
-def _with_isotropic_g12(ply: model.Ply) -> model.Ply:
-    return replace(ply, g12=ply.e1 / (2.0 * (1.0 + ply.nu12)))
-
-
-def laminates_of_deck(deck: Deck, *, isotropic_g12: bool = False) -> list[LaminateSection]:
+def laminates_of_deck(deck: Deck, variant: PlateVariant = REPORT_PLATE) -> list[LaminateSection]:
     """Laminates of a deck with its shear correction factor, that of MATE first.
 
     Raises LookupError without a MATE segment.
     """
     shear = deck.last(model.Shear) or model.Shear()
-    material, plies = deck.require(model.Material), deck.plies
+    material = deck.require(model.Material)
+    plies = {number: variant.ply(ply) for number, ply in deck.plies.items()}
     found: list[LaminateSection] = []
     for number, layers in deck.layers.items():
         total = material.integration.thickness if number == MATERIAL else None
-        plain = _laminate_of(layers, plies, total, isotropic_g12=isotropic_g12)
+        plain = _laminate_of(layers, plies, total)
         stiffness = equilibrium_shear_stiffness(plain) if shear.equilibrium else plain.shear
         found.append(replace(plain, shear=shear.factor * stiffness))
     return found
@@ -255,8 +242,6 @@ def _are_coupled(
     layers = [material.layers, *(one.layers for one in (laminates.laminates if laminates else ()))]
     try:
         with np.errstate(all="ignore"):
-            return any(
-                _laminate_of(own, plies, None, isotropic_g12=False).is_coupled for own in layers
-            )
+            return any(_laminate_of(own, plies, None).is_coupled for own in layers)
     except (ArithmeticError, LookupError, ValueError):
         return False

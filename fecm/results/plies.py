@@ -12,7 +12,7 @@ import numpy as np
 from fecm._errors import ResultFileError
 from fecm._typing import Array, Bools, Floats, Indices
 from fecm.deck.model import Deck, Layer, Material, Ply
-from fecm.listing.variant import variant_of
+from fecm.listing.variant import PlateVariant, variant_of
 from fecm.mechanics.elements import HIGHEST_ORDER, Quadrature, gauss, nodal
 from fecm.mechanics.interpolation import local_shape_functions
 from fecm.mechanics.mesh import element_blocks
@@ -151,7 +151,7 @@ class PlyGroup(PlyRows):
             angles=_of_layers(layups, count, lambda layer: layer.angle),
             under_load=stored["plies/under_load"][members] != 0,
             **chosen,
-            **_strains(chosen, _constants(deck, layups, count, variant.isotropic_g12)),
+            **_strains(chosen, _constants(deck, layups, count, variant)),
         )
 
 
@@ -228,25 +228,21 @@ class _Constants(NamedTuple):
 
 
 def _constants(
-    deck: Deck, layups: Layup | list[Layup], count: int, isotropic_shear: bool
+    deck: Deck, layups: Layup | list[Layup], count: int, variant: PlateVariant
 ) -> _Constants:
-    """Constants of the plies; `isotropic_shear` takes isotropic plies by E and nu."""
-
-    def g12(ply: Ply) -> float:
-        if isotropic_shear and ply.e1 == ply.e2:
-            return ply.e1 / (2.0 * (1.0 + ply.nu12))
-        return ply.g12
-
-    plies = deck.plies
+    """Constants of the plies."""
+    plies = {number: variant.ply(ply) for number, ply in deck.plies.items()}
     if len(plies) == 1:
         (ply,) = plies.values()
-        return _Constants(ply.e1, ply.e2, ply.nu12, g12(ply))
+        return _Constants(ply.e1, ply.e2, ply.nu12, ply.g12)
 
     def of(value: Callable[[Ply], float]) -> Floats:
         values = _of_layers(layups, count, lambda layer: value(plies[layer.material]))
         return values[..., None] if values.ndim == 1 else values[:, None, :, None]
 
-    return _Constants(of(lambda p: p.e1), of(lambda p: p.e2), of(lambda p: p.nu12), of(g12))
+    return _Constants(
+        of(lambda p: p.e1), of(lambda p: p.e2), of(lambda p: p.nu12), of(lambda p: p.g12)
+    )
 
 
 def _strains(stresses: Mapping[str, Floats], ply: _Constants) -> dict[str, Floats]:

@@ -388,7 +388,7 @@ def _gravity(simulation: Simulation, result: Result) -> Iterator[str]:
 def _numerical(simulation: Simulation) -> Iterator[str]:
     """Notes of the energy balance and the contact iteration; slips excuse both."""
     state = simulation.state
-    has_slips = bool(simulation.options.slips)
+    has_slips = not simulation.model.variant.is_report
     error, step = state.monitor.worst_error, state.monitor.worst_step
     if error > ENERGY_WARNING:
         off = f"the energy balance is off by {error:.2%} of the supplied energy, at step {step}"
@@ -476,7 +476,7 @@ def _bent(simulation: Simulation, result: Result, peak: RunPeak) -> str:
     if simulation.problem.has_impact:
         error, meaning = limits.softness(peak.value / h), unsafe(curved=limits.curved)
         note = f"{note}: {error}; {meaning}"
-    return note if simulation.options.slips else f"{note}; {REMEDY}"
+    return f"{note}; {REMEDY}" if simulation.model.variant.is_report else note
 
 
 def _size(result: Result, value: float, thickness: float) -> str:

@@ -38,8 +38,7 @@ def set_time_step(run: Simulation, dt: float) -> None:
 
 def advance_clock(run: Simulation) -> None:
     """TIME."""
-    if not run.model.variant.program.clock_stands:
-        run.state.clock += run.state.dt
+    run.state.clock += run.model.variant.program.clock_rate * run.state.dt
 
 
 def proportional_load(run: Simulation, n: float) -> None:
@@ -52,8 +51,7 @@ def proportional_load(run: Simulation, n: float) -> None:
         state.constant_factor = 0.0
     elif state.table is not None:
         state.constant_factor = load_factor(tables[state.table], 0.0)
-    if run.model.variant.program.prop_replaces_contact:
-        state.prop_force = run.load_factor(state.clock)
+    state.prop_force = run.model.variant.program.prop_force(run.load_factor(state.clock))
 
 
 def impact_step(run: Simulation, n: int) -> None:
@@ -65,16 +63,14 @@ def impact_step(run: Simulation, n: int) -> None:
     if not plate.step:
         recorder.steps.begin(plate, impact)
         state.prop_force = None  # the first impact step begins with PROP = 0
-    stores = not (plate.step + 1) % n
-    if program.counts_from_output:
-        steps = state.steps_since_output + 1
-        stores = steps == n
-        state.steps_since_output = steps if steps < n else 0
+    steps = state.steps_since_output + 1
+    state.steps_since_output = steps if steps < n else 0
+    stores = program.is_output(plate.step + 1, steps, n)
     if stores and program.strains_precede_step:
         recorder.strains([plate.step + 1], [plate.time], run.displacement_field()[None])
     system.advance(impact, state.dt, run.force_factor(), state.prop_force)
     state.prop_force = None
-    recorder.steps.step(plate, impact, run.force_factor(), on_tape9=stores)
+    recorder.steps.step(plate, impact, run.force_factor(), on_tape9=program.has_contact(stores))
     if stores and not program.strains_precede_step:
         recorder.strains([plate.step], [plate.time], run.displacement_field()[None])
     run.observe()
@@ -274,8 +270,6 @@ def store_sizes(run: Simulation) -> None:
     profile = plate.profile()
     run.sink.attributes("mesh", {"equations": plate.neq, "profile": profile})
     run.printer.check(plate, profile)
-    if run.model.variant.program.ends_at_check:
-        raise EndedError
 
 
 ACTIONS: dict[str, Callable[..., bool | None]] = {
@@ -313,7 +307,14 @@ def bind_loop(run: Simulation, body: Body) -> Passes | None:
     return None
 
 
+def _end_after(action: Action) -> None:
+    action()
+    raise EndedError
+
+
 def bind(run: Simulation, macro: Macro) -> Action:
     """Return the action of a macro."""
     values = [macro_number(macro)] if WORDS[macro.word].value else []
-    return partial(ACTIONS[macro.word], run, *values)
+    action: Action = partial(ACTIONS[macro.word], run, *values)
+    is_last = macro.word in run.model.variant.program.last_words
+    return partial(_end_after, action) if is_last else action

@@ -90,7 +90,6 @@ class StepRecorder:
         self._impact = model.impact
         self._station = model.station
         self._on_block = on_block
-        self._contact_at_every_step = model.variant.program.contact_at_every_step
         self._gages: DofSums | None = None
         gages = 0
         if model.impact is not None:
@@ -132,7 +131,7 @@ class StepRecorder:
             self._rod[self._count] = impact.rod.motion
             indentation, force = impact.contact
             row += [force, indentation, impact.plate_w, impact.contact_work, impact.rod.tip]
-            row.append(on_tape9 or self._contact_at_every_step)
+            row.append(on_tape9)
         self._table[: len(row), self._count] = row
         self._count += 1
         if self._count == BLOCK:
@@ -326,12 +325,11 @@ class Recorder:
         if own:
             sink.axis_names["criteria"] = (*ALL_CRITERIA, *own)
         has_impact = model.impact is not None
-        contact_at_every_step = model.variant.program.contact_at_every_step
         self._room = {  # upper bound of the rows of each group
             **{group: sizes.passes[STORED_BY[group]] for group in AT_MACROS},
             "exposures": sizes.passes["FAIL"] + model.is_stressed_at_rest,
             "tape8": has_impact * sizes.contact_rows,
-            "tape9": has_impact * (sizes.steps if contact_at_every_step else sizes.contact_rows),
+            "tape9": has_impact * model.variant.program.contact_rows(sizes),
             "history": has_impact * sizes.steps,
             "energy": sizes.steps,
             "gages": (model.gages is not None) * sizes.steps,

@@ -12,6 +12,7 @@ from fecm.deck.model import Cure, Deck, Material
 from fecm.deck.units import unit_names
 from fecm.listing.slips import mode_of
 from fecm.mechanics import projectile
+from fecm.mechanics.elements import nodal
 from fecm.mechanics.failure import MODES, largest_in_plies
 from fecm.mechanics.own_law import law_name
 from fecm.mechanics.plate_motion import DivergenceError
@@ -90,8 +91,8 @@ def _write_header(simulation: Simulation) -> None:
     }
     sink.attributes("", attributes)
     sink.deck(deck.text or deck.to_text())
-    at_points = simulation.model.variant.plate.strains_at_bending_points
-    at_nodes = deck.require(Material).integration.points < 0 and not at_points
+    points = deck.require(Material).integration.points
+    at_nodes = points < 0 and plate.rules.strains is nodal(-points)
     simulation.recorder.create("nodes" if at_nodes else "gauss")
     _write_cure(simulation)
 

@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from fecm._typing import Floats
-from fecm.deck.macros import load_factor
 from fecm.listing.printout import Printer
 from fecm.mechanics.impact_steps import SINGLY, TOGETHER
 from fecm.mechanics.solutions import Tangent
@@ -59,13 +58,13 @@ class Simulation:
             state.impact = self.model.impact.start(state.plate)
         if self.model.failure is not None:
             state.failure = self.model.failure.start()
-        if self.model.variant.program.prop_replaces_contact:
-            state.prop_force = 1.0  # PROP's first value
+        self._program = self.model.variant.program
+        state.prop_force = self._program.prop_force(1.0)  # PROP's first value
         self.interpreter = Interpreter(problem.program)
         pace = SINGLY if self.model.steps is None else TOGETHER
         # Steps between two calls of the observers.
         self.interval = pace.interval(self.model.plate.neq)
-        limit = None if options.slips else options.energy_limit
+        limit = options.energy_limit if self.model.variant.is_report else None
         # Without a reference to the run, which would keep it alive.
         on_block = partial(state.monitor.add, limit=limit, threshold=problem.threshold)
         self.recorder = Recorder(self.sink, self.model, problem.work, on_block)
@@ -83,17 +82,20 @@ class Simulation:
     def load_factor(self, clock: float) -> float:
         """Load factor of PROP at a time of the clock."""
         state = self.state
-        if state.table is None or self.model.variant.program.table_stands:
+        if state.table is None:
             return state.constant_factor
-        return load_factor(self.problem.deck.tables[state.table], clock)
+        table = self.problem.deck.tables[state.table]
+        return self._program.table_factor(table, clock, state.constant_factor)
 
     def force_factor(self, clock: float | None = None) -> float:
         """Factor of FORC's values at a time of the clock, by default now."""
         state = self.state
-        if self.model.variant.program.contact_scales_forces and state.impact is not None:
-            contact = float(state.impact.contact.force)
-            return contact if state.prop_force is None else state.prop_force
-        return self.load_factor(state.clock if clock is None else clock)
+        factor = self.load_factor(state.clock if clock is None else clock)
+        contact = None
+        if state.impact is not None:
+            force = float(state.impact.contact.force)
+            contact = force if state.prop_force is None else state.prop_force
+        return self._program.force_factor(factor, contact)
 
     def displacement_field(self) -> Floats:
         """Displacement of every dof of every node, (numnp, 5)."""
