@@ -35,30 +35,52 @@ class LazyCommand(NamedTuple):
     summary: str  # its line in ``fecm --help``
 
 
-COMMANDS = {
-    "check": LazyCommand("fecm.cli.decks", "Check decks without running them, and summarise them."),
-    "diff": LazyCommand("fecm.cli.diff", "Compare two results dataset by dataset."),
-    "estimate": LazyCommand("fecm.cli.estimate", "Estimate an impact and its damage threshold."),
-    "example": LazyCommand("fecm.cli.example", "List the example decks and tables, or write one."),
-    "export": LazyCommand("fecm.cli.export", "Write RESULT for ParaView or a spreadsheet."),
-    "fmt": LazyCommand("fecm.cli.decks", "Align the columns of decks."),
-    "identify": LazyCommand("fecm.cli.identify", "Fit parameters to a measured contact force."),
-    "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),
-    "info": LazyCommand("fecm.cli.info", "Describe the contents of RESULT."),
-    "locate": LazyCommand("fecm.cli.locate", "Find place and force of an impact by strain gages."),
-    "materials": LazyCommand(
-        "fecm.cli.materials", "List the named plies of `fecm new`, or of a file."
-    ),
-    "new": LazyCommand("fecm.cli.new", "Write a deck from plate, layup, supports and impact."),
-    "plot": LazyCommand("fecm.cli.plot", "Draw the report's figures, or the map of a sweep."),
-    "report": LazyCommand("fecm.cli.report", "Write an HTML page about results."),
-    "rod": LazyCommand("fecm.cli.rod", "The projectile's rod alone: pulses and calibration."),
-    "run": LazyCommand("fecm.cli.run", "Run every problem in DECK and write its result."),
-    "sweep": LazyCommand("fecm.cli.sweep", "Run DECK many times with varied parameters."),
-    "tapes": LazyCommand("fecm.cli.export", "Write tape3, tape8 and tape9 as text."),
-    "verify": LazyCommand("fecm.cli.verify", "Compare fecm with closed forms and the literature."),
-    "waves": LazyCommand("fecm.cli.waves", "Waves in a laminate."),
+# By the headings of ``fecm --help``.
+GROUPED = {
+    "Make a deck": {
+        "new": LazyCommand("fecm.cli.new", "Write a deck from plate, layup, supports and impact."),
+        "example": LazyCommand(
+            "fecm.cli.example", "List the example decks and tables, or write one."
+        ),
+        "materials": LazyCommand(
+            "fecm.cli.materials", "List the named plies of `fecm new`, or of a file."
+        ),
+        "fmt": LazyCommand("fecm.cli.decks", "Align the columns of decks."),
+    },
+    "Run it": {
+        "run": LazyCommand("fecm.cli.run", "Run every problem in DECK and write its result."),
+        "info": LazyCommand("fecm.cli.info", "Describe the contents of RESULT."),
+        "plot": LazyCommand("fecm.cli.plot", "Draw the report's figures, or the map of a sweep."),
+        "report": LazyCommand("fecm.cli.report", "Write an HTML page about results."),
+        "export": LazyCommand("fecm.cli.export", "Write RESULT for ParaView or a spreadsheet."),
+        "tapes": LazyCommand("fecm.cli.export", "Write tape3, tape8 and tape9 as text."),
+    },
+    "Judge": {
+        "check": LazyCommand(
+            "fecm.cli.decks", "Check decks without running them, and summarise them."
+        ),
+        "estimate": LazyCommand(
+            "fecm.cli.estimate", "Estimate an impact and its damage threshold."
+        ),
+        "diff": LazyCommand("fecm.cli.diff", "Compare two results dataset by dataset."),
+        "verify": LazyCommand(
+            "fecm.cli.verify", "Compare fecm with closed forms and the literature."
+        ),
+    },
+    "Many impacts": {
+        "sweep": LazyCommand("fecm.cli.sweep", "Run DECK many times with varied parameters."),
+    },
+    "Measurements": {
+        "identify": LazyCommand("fecm.cli.identify", "Fit parameters to a measured contact force."),
+        "locate": LazyCommand(
+            "fecm.cli.locate", "Find place and force of an impact by strain gages."
+        ),
+        "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),
+        "rod": LazyCommand("fecm.cli.rod", "The projectile's rod alone: pulses and calibration."),
+        "waves": LazyCommand("fecm.cli.waves", "Waves in a laminate."),
+    },
 }
+COMMANDS = {name: one for commands in GROUPED.values() for name, one in commands.items()}
 
 
 class LazyGroup(click.Group):
@@ -86,8 +108,9 @@ class LazyGroup(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands with their summaries."""
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, COMMANDS[name].summary) for name in sorted(COMMANDS)])
+        for title, commands in GROUPED.items():
+            with formatter.section(title):
+                formatter.write_dl([(name, one.summary) for name, one in commands.items()])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete the name of a command or an option."""
@@ -102,11 +125,17 @@ class LazyGroup(click.Group):
 
 @click.group(
     cls=LazyGroup,
+    epilog="\b\nTypical calls:\n  fecm example drop-weight.inp\n  fecm run drop-weight.inp",
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100},
 )
 @click.version_option(__version__, prog_name="fecm")
 def cli() -> None:
-    """Impact on laminated composite plates, from the punched-card decks of NASA CR-168057."""
+    """Compute what happens when something hits a laminated composite plate.
+
+    A deck, a text file, describes plate, projectile and contact.  fecm steps both through the
+    impact and gives contact force, deflection, strains, ply stresses and failure.  It also reads
+    the punched-card decks of NASA CR-168057, whose program it replays.
+    """
 
 
 def main(arguments: Sequence[str] | None = None, prog_name: str = "fecm") -> NoReturn:
