@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import click
 from click import option
 
-from fecm.authoring.case import CasesError, parse_exceed
-from fecm.authoring.cases import parse_vary
+from fecm.authoring.case import CasesError
 from fecm.authoring.values import NAMES
 from fecm.cli.common import (
     FAILED,
@@ -37,11 +35,9 @@ from fecm.cli.options import (
 from fecm.mechanics.own_law import LawError
 from fecm.simulation.job import ProblemRun
 from fecm.sweeps.convergence import convergence_lines
-from fecm.sweeps.distributions import parse_random
 from fecm.sweeps.execute import address_in
 from fecm.sweeps.job import Sweep
 from fecm.sweeps.plan import MEASURES, MOST_MODES
-from fecm.sweeps.random import parse_correlation
 from fecm.sweeps.result import SweepResult
 from fecm.sweeps.search import parse_until
 from fecm.sweeps.summary import remarks, sweep_summary, sweep_verdict, tables
@@ -58,14 +54,9 @@ GROUPS: dict[str, list[str]] = {
 }
 
 
-def _texts(parse: Callable[[str], object], form: str) -> dict[str, Any]:
-    """Settings of an option of several texts, which a function checks before the deck is read."""
-
-    def checked(text: str) -> str:
-        parse(text)
-        return text
-
-    return {"type": Parsed(checked, form, NAMED), "multiple": True}
+def _texts(form: str) -> dict[str, Any]:
+    """Settings of an option of several texts of a form, which the sweep reads."""
+    return {"type": Parsed(str, form, NAMED), "multiple": True}
 
 
 @click.command(
@@ -82,13 +73,13 @@ def _texts(parse: Callable[[str], object], form: str) -> dict[str, Any]:
 @click.argument("deck", type=DECK_PATH)
 @job_options(
     Sweep,
-    vary=_texts(lambda text: parse_vary(text, "m-N-s"), "NAME=VALUES"),
+    vary=_texts("NAME=VALUES"),
     cases={"type": DECK_PATH},
     refine={"type": list_of("FACTOR,...", click.IntRange(1, 8))},
-    random=_texts(parse_random, "NAME=LAW"),
-    correlation=_texts(parse_correlation, "NAME,NAME=RHO"),
+    random=_texts("NAME=LAW"),
+    correlation=_texts("NAME,NAME=RHO"),
     samples={"type": int},
-    exceed=_texts(parse_exceed, "QUANTITY=VALUE"),
+    exceed=_texts("QUANTITY=VALUE"),
     until={"type": Parsed(parse_until, "QUANTITY=VALUE")},
     measure={"type": list_of("NAME,...", OneOf(MEASURES))},
     modes={"type": click.IntRange(1, MOST_MODES)},
