@@ -51,7 +51,7 @@ def option(
     return field(default=default, metadata={"option": about})
 
 
-def options_of(job: Any) -> dict[str, tuple[Option, Any]]:
+def declared_options(job: Any) -> dict[str, tuple[Option, Any]]:
     """Options of a job by name, each with its default value."""
     return {
         one.name: (one.metadata["option"], one.default)
@@ -70,7 +70,7 @@ def documented(job: type[T]) -> type[T]:
 def _parameters(job: Any) -> str:
     lines = []
     types = {one.name: one.type for one in fields(job)}
-    for name, (about, _) in options_of(job).items():
+    for name, (about, _) in declared_options(job).items():
         text = textwrap.fill(" ".join(f"{about.help} {about.python}".split()), WIDTH - 8)
         lines += [f"{name} : {types[name]}", textwrap.indent(text, "    ")]
     return textwrap.indent("\n".join(lines), "    ").strip()

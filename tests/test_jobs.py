@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm._options import options_of
+from fecm._options import declared_options
 from fecm._watch import show_progress
 from fecm.errors import CasesError, CheckpointError, OptionsError, OtherSweepError, StoppedError
 from fecm.simulation import Solver
@@ -166,7 +166,7 @@ def test_what_needs_an_output_file_is_refused_without_one() -> None:
 @pytest.mark.parametrize(("command", "job"), [("run", fecm.Run), ("sweep", fecm.Sweep)])
 def test_the_command_has_the_options_of_the_job_with_their_help(command: str, job: type) -> None:
     page = " ".join(call(command, "--help").stdout.split())
-    for name, (about, _) in options_of(job).items():
+    for name, (about, _) in declared_options(job).items():
         if about.group and name not in ("output", "workers"):
             assert (about.flag or f"--{name.replace('_', '-')}") in page
             assert about.help.split(".")[0].split("-")[0] in page

@@ -16,7 +16,7 @@ import click
 
 from fecm._errors import did_you_mean
 from fecm._inputs import InputError, parsed_file
-from fecm._options import Option, options_of
+from fecm._options import Option, declared_options
 from fecm.cli.common import DASH
 from fecm.deck.units import NAMES, system_named
 from fecm.listing.slips import MODES, REPORT
@@ -63,7 +63,7 @@ def job_options(job: Any, **settings: Mapping[str, Any]) -> Callable[[Decorated]
 
     `settings` of click, such as the type, complete or replace those of some options.
     """
-    declared = {n: one for n, one in options_of(job).items() if one[0].group}
+    declared = {n: one for n, one in declared_options(job).items() if one[0].group}
 
     def decorate(function: Decorated) -> Decorated:
         @functools.wraps(function)
@@ -102,7 +102,7 @@ def _click_option(name: str, about: Option, default: Any, settings: Mapping[str,
 def groups_of(job: Any, own: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
     """Options of a job by the headings of the help page, before those of the command itself."""
     groups: dict[str, list[str]] = {title: [] for title in own}
-    for name, (about, _) in options_of(job).items():
+    for name, (about, _) in declared_options(job).items():
         if about.group:
             groups[about.group].append(name)
     return {title: [*names, *own[title]] for title, names in groups.items()}

@@ -44,7 +44,7 @@ UNKNOWN = -1.0  # exposure that no criterion can find
 AllStrengths = failure.Strengths | Sequence[Sequence[failure.Strengths | None]]
 
 
-class Run(NamedTuple):
+class PlyRun(NamedTuple):
     """Neighbouring plies of the same strengths: states from the lower face of one to another's."""
 
     strengths: failure.Strengths
@@ -58,14 +58,14 @@ class Run(NamedTuple):
 
 def _runs(
     strengths: Sequence[failure.Strengths | None], plies: Sequence[PlyConstants]
-) -> list[Run]:
+) -> list[PlyRun]:
     """Runs of plies with strengths; fabrics are apart."""
-    found: list[Run] = []
+    found: list[PlyRun] = []
     first = 0
     for (own, fabric), group in groupby(zip(strengths, map(is_fabric, plies), strict=True)):
         end = first + len(list(group))
         if own is not None:
-            found.append(Run(own, slice(2 * first, 2 * end), fabric))
+            found.append(PlyRun(own, slice(2 * first, 2 * end), fabric))
         first = end
     return found
 
@@ -83,7 +83,7 @@ class Representatives(NamedTuple):
         return cls(np.arange(count), np.arange(count), np.ones(count))
 
     @classmethod
-    def outermost(cls, z: Floats, stiffness: Floats, runs: Sequence[Run]) -> Self:
+    def outermost(cls, z: Floats, stiffness: Floats, runs: Sequence[PlyRun]) -> Self:
         """Those farthest from the midplane, of states at z, (states,).
 
         The stiffness is their stresses per midplane strain, (components, states).  States without
@@ -105,10 +105,10 @@ class Representatives(NamedTuple):
         share = np.divide(np.abs(z), most, out=np.ones_like(z), where=most > 0.0)
         return cls(states, of, share)
 
-    def placed(self, run: Run) -> Run:
+    def placed(self, run: PlyRun) -> PlyRun:
         """A run of all states as one of those that are evaluated."""
         ends = np.searchsorted(self.states, [run.states.start, run.states.stop]).tolist()
-        return Run(run.strengths, slice(*ends), run.fabric)
+        return PlyRun(run.strengths, slice(*ends), run.fabric)
 
 
 class ZoneCriteria:
@@ -533,7 +533,7 @@ class FailureMonitor:
         self,
         numbers: Sequence[int],
         zone: ZoneCriteria,
-        run: Run,
+        run: PlyRun,
         plies: Maxima,
         strains: Floats,
         time: float,

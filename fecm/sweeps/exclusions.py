@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from typing import TYPE_CHECKING, NamedTuple
 
-from fecm._options import options_of
+from fecm._options import declared_options
 from fecm.authoring.case import CasesError
 from fecm.sweeps.plan import Measure
 from fecm.sweeps.search import Sought, search_of
@@ -91,7 +91,7 @@ def exclusions_table() -> list[str]:
 def _given(job: Sweep) -> set[str]:
     """Names of what is given."""
     names = {"deck"} if job.deck is not None else set()
-    for name, (_, default) in options_of(job).items():
+    for name, (_, default) in declared_options(job).items():
         value = getattr(job, name)
         is_simple = isinstance(value, str | int)
         if value is None or value is False or (isinstance(value, tuple) and not value):
