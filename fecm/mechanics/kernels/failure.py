@@ -19,7 +19,7 @@ import numpy as np
 from fecm._typing import Floats
 from fecm.mechanics.exposures import Evaluations, FailureEnvelope
 from fecm.mechanics.failure import CRITERIA, MODES, Strengths, puck_limits, puck_slope
-from fecm.mechanics.failure_monitor import FailureMonitor, Run, ZoneCriteria
+from fecm.mechanics.failure_monitor import FailureMonitor, PlyRun, ZoneCriteria
 from fecm.mechanics.kernels import LIBRARY, Codes, Doubles, Longs, Structure, filled, floats
 from fecm.mechanics.kernels.strains import MidplaneStruct, midplanes
 
@@ -269,7 +269,7 @@ class CompiledMonitor(FailureMonitor):
         )
         return _Kept(self, structure, strain, [*families, *runs, *zones])
 
-    def _run(self, zone: ZoneCriteria, run: Run, strains: int) -> PliesStruct:
+    def _run(self, zone: ZoneCriteria, run: PlyRun, strains: int) -> PliesStruct:
         """The structure of plies of the same strengths."""
         stress = filled(zone.in_plane[6 - strains :, :, run.states])
         rows = None if isinstance(zone.points, slice) else zone.points
