@@ -18,6 +18,7 @@ import yaml
 from jsonschema import Draft202012Validator, FormatChecker
 
 import fecm
+from tests import schemas
 from tests.calls import Done, assert_unusable, call
 from tests.decks import APPENDIX, DATA, LONG, PLY_PROGRAM, ROOT, small
 
@@ -188,6 +189,13 @@ def test_outputs_of_check_run_info_and_diff_are_as_their_schemas_say(folder: Pat
     own = ("--tol", "history=1e-6,1", "--exclude", "tape3")
     validate("diff", said("diff", "c.h5", "d.h5"), said("diff", "c.h5", "e.h5", *own, status=1))
     validate("diff", said("diff", "a.h5", "c.h5", status=1), said("diff", "s.h5", "s.h5"))
+
+
+def test_the_schemas_are_those_of_the_types_of_the_outputs() -> None:
+    # Write them anew by: python -m tests.schemas docs/schemas
+    assert sorted(path.stem for path in SCHEMAS.iterdir()) == sorted(schemas.OUTPUTS)
+    for name in schemas.OUTPUTS:
+        assert (SCHEMAS / f"{name}.json").read_text(encoding="utf-8") == schemas.text_of(name)
 
 
 def test_a_schema_refuses_what_the_command_does_not_print(folder: Path) -> None:

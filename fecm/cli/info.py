@@ -6,7 +6,7 @@ import math
 import platform
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal, TypedDict
 
 import click
 import numpy as np
@@ -21,7 +21,7 @@ from fecm.deck.units import declared_units
 from fecm.results.hdf5_reader import FileContents, read
 from fecm.results.result import result_of
 from fecm.results.schema import Form
-from fecm.results.summary import about_run, describe_groups
+from fecm.results.summary import GroupJson, RunJson, about_run, describe_groups
 
 # Attributes of the file that are keys of the JSON output, of runs and of others.
 RUN_KEYS = ("title", "mode", "slips", "fecm_version", "format", "format_version")
@@ -86,10 +86,54 @@ def info_command(result: Path, form: Format) -> None:
         click.echo("\n".join(_page(about)))
 
 
+class FileJson(TypedDict):
+    """What is said of every file in JSON."""
+
+    file: str
+    size: int
+    title: str | None
+    fecm_version: str | None
+    format_version: int
+    units: Annotated[dict[str, str], "Names of the units; empty if the deck names none."]
+    attributes: dict[str, Any]
+    groups: list[GroupJson]
+    texts: dict[str, TextJson]
+
+
+class TextJson(TypedDict):
+    """A text of a file in JSON."""
+
+    lines: int
+
+
+class RunFileJson(FileJson, RunJson):
+    """The file of a run in JSON."""
+
+    format: Literal[Form.RUN]
+    mode: str | None
+    slips: list[str] | None
+
+
+class SweepFileJson(FileJson):
+    """The file of a sweep in JSON."""
+
+    format: Literal[Form.SWEEP]
+    summary: list[str]
+    cases: int
+    failed: int
+
+
+class LocationFileJson(FileJson):
+    """The file of a location in JSON."""
+
+    format: Literal[Form.LOCATION]
+    summary: list[str]
+
+
 def _about(contents: FileContents) -> dict[str, Any]:
     """What is shown, under the keys of the JSON output."""
     if contents.form == Form.SWEEP:
-        extent = _about_sweep(contents)
+        extent: dict[str, Any] = _about_sweep(contents)
     elif contents.form == Form.LOCATION:
         # 5 ms, which the result of a run does not need.
         from fecm.location.location import location_of
@@ -97,7 +141,7 @@ def _about(contents: FileContents) -> dict[str, Any]:
 
         extent = {"summary": summary_lines(location_of(contents))}
     else:
-        extent = about_run(result_of(contents))
+        extent = {**about_run(result_of(contents))}
     if extent.get("still_in_contact") and PERMANENT in contents.groups["history"]:
         contents.groups["history"][PERMANENT] = math.nan  # unknown before the end of the contact
     attributes, lines = contents.attributes, extent.pop("summary")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import click
 from click import option
@@ -37,7 +37,7 @@ from fecm.mechanics.plate_motion import DivergenceError
 from fecm.mechanics.solutions import SingularStiffnessError
 from fecm.problem.summary import larger_steps
 from fecm.results.exposures import largest_exposures
-from fecm.results.summary import about_run
+from fecm.results.summary import RunJson, about_run
 from fecm.simulation.job import ProblemRun, Run
 
 # Headings of the help page, with options of the command itself.
@@ -48,6 +48,15 @@ GROUPS: dict[str, list[str]] = {
     "Interrupted runs": [],
     "Limits": ["fail_limit"],
 }
+
+
+class ProblemRunJson(RunJson):
+    """The run of a problem in JSON."""
+
+    title: str
+    result: str
+    printed: str | None
+    units: Annotated[dict[str, str], "Names of the units; empty if the deck names none."]
 
 
 @click.command(

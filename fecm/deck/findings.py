@@ -6,10 +6,11 @@ warning, ``N`` for a note.  Lines and columns are counted from 1.
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator
 from enum import StrEnum
-from typing import NamedTuple
+from typing import Annotated, Literal, NamedTuple, TypedDict
 
 from fecm._errors import FecmError
 
@@ -25,6 +26,22 @@ class Severity(StrEnum):
     ERROR = "error"  # the deck is refused
     WARNING = "warning"
     NOTE = "note"
+
+
+class FindingJson(TypedDict):
+    """A finding in JSON."""
+
+    kind: Literal["finding"]
+    severity: Annotated[str, Severity]
+    code: Annotated[str, re.compile("^[EWN][0-9]{3}$")]
+    message: str
+    file: str
+    line: Annotated[int | None, "From 1; null if no single card is the cause."]
+    column: Annotated[int | None, "First column of the field, from 1."]
+    end_column: Annotated[int | None, "Last column of the field."]
+    field: str
+    card: str
+    hint: str
 
 
 SEVERITIES = {"E": Severity.ERROR, "W": Severity.WARNING, "N": Severity.NOTE}  # by a code's letter
@@ -65,7 +82,7 @@ class Finding(NamedTuple):
         """What the first letter of the code says."""
         return SEVERITIES[self.code[0]]
 
-    def to_dict(self, source: str) -> dict[str, object]:
+    def to_dict(self, source: str) -> FindingJson:
         """The finding as plain values, for JSON; `source` is the name of the deck's file."""
         place = self.place
         return {

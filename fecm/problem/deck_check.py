@@ -49,7 +49,7 @@ class DeckCheck:
 
     def to_dicts(self) -> list[dict[str, object]]:
         """Findings and problems as plain values: the lines of ``fecm check --format json``."""
-        found = [finding.to_dict(self.source) for finding in self.findings]
+        found = [{**finding.to_dict(self.source)} for finding in self.findings]
         head = {"kind": "summary", "file": self.source}
         return [*found, *({**head, **problem.to_dict()} for problem in self.problems)]
 

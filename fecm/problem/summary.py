@@ -5,11 +5,12 @@ from __future__ import annotations
 import math
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
 from fecm._machine import format_bytes
-from fecm._typing import Floats
+from fecm._typing import FiniteFloat, Floats
 from fecm.deck.macros import flat
 from fecm.deck.model import Cure, Impact, Shear
 from fecm.deck.units import MASS, mass_in_si, unit_names, unit_of
@@ -139,30 +140,30 @@ class ProblemSummary:
     steps: int
     nonlinear: bool
     free_in_plane: int
-    preload: tuple[float, float, float]
-    curvature: tuple[float, float, float]
-    rise: float
-    A: Floats
-    B: Floats
-    D: Floats
-    shear: Floats
+    preload: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+    curvature: tuple[FiniteFloat, FiniteFloat, FiniteFloat]
+    rise: FiniteFloat
+    A: Annotated[Floats, (3, 3)]
+    B: Annotated[Floats, (3, 3)]
+    D: Annotated[Floats, (3, 3)]
+    shear: Annotated[Floats, (2, 2)]
     plate_mass: float
     projectile_mass: float
     critical_time_step: float
     buckling_factor: float | None
     elements_per_buckle: float | None
-    time_steps: tuple[float, ...]
+    time_steps: tuple[FiniteFloat, ...]
     output_bytes: int
-    elements_per_wave: float | None
-    mesh_error: float | None
-    equilibrium_change: float | None
+    elements_per_wave: FiniteFloat | None
+    mesh_error: FiniteFloat | None
+    equilibrium_change: FiniteFloat | None
     units: dict[str, str]
     laminate: int | None
     leaves_out_equilibrium: bool
-    velocity: float | None
-    energy: float | None
-    cure: float | None
-    threshold: float | None
+    velocity: FiniteFloat | None
+    energy: FiniteFloat | None
+    cure: FiniteFloat | None
+    threshold: FiniteFloat | None
 
     def to_dict(self) -> dict[str, object]:
         """Plain values, for JSON."""

@@ -4,12 +4,69 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Annotated, Literal, NamedTuple, TypedDict
 
 from fecm._text import html_table, printable, shown_apart
 
 MAX = "max"  # the usual scale of differences, in words
 TEXT = "text"  # the type of a dataset of texts
+
+
+class PositionJson(TypedDict):
+    """A position in JSON; its other indices follow under the names of their axes."""
+
+    index: list[int]
+    step: int | None
+    time: float | None
+
+
+class DatasetDifferenceJson(TypedDict):
+    """A dataset of both results in JSON."""
+
+    name: str
+    same: bool
+    shape_a: list[int]
+    shape_b: list[int]
+    dtype_a: str
+    dtype_b: str
+    largest_difference: float | None
+    relative: float | None
+    maximum: float | None
+    scale: float | None
+    tolerance: float | None
+    differing: int | None
+    at: PositionJson | None
+    a: float | str | None
+    b: float | str | None
+    first: PositionJson | None
+
+
+class DifferenceJson(TypedDict):
+    """Output of `fecm diff --format json`."""
+
+    verdict: Literal["same", "different"]
+    a: str
+    b: str
+    rtol: float
+    atol: float
+    last_digit: Annotated[
+        bool, "Whether numbers of tapes are compared to their last digit, not by rtol and atol."
+    ]
+    tol: Annotated[dict[str, list[float]], "Own tolerances: a relative, and an absolute one."]
+    datasets: list[DatasetDifferenceJson]
+    only_in_a: list[str]
+    only_in_b: list[str]
+    excluded: list[str]
+    listed: list[ListedJson]
+
+
+class ListedJson(TypedDict):
+    """An attribute or a text that differs, in JSON."""
+
+    name: str
+    a: object
+    b: object
+    line: int | None
 
 
 @dataclass(frozen=True)
@@ -44,9 +101,9 @@ class Position:
             words.append(f"index {', '.join(map(str, self.index))}")
         return ", ".join(words)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> PositionJson:
         """Plain values, for JSON."""
-        return {"index": list(self.index), "step": self.step, "time": self.time, **self.axes}
+        return {"index": list(self.index), "step": self.step, "time": self.time, **self.axes}  # type: ignore[typeddict-item]
 
 
 @dataclass
@@ -144,7 +201,7 @@ class DatasetDifference:
         share = f"{self.relative:.2g} of {self.scale_name} {self.scale:.6g}"
         return f"largest {self.largest_difference:.3g} ({share}), {text}"
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> DatasetDifferenceJson:
         """Plain values, for JSON."""
         numbers = self.comparable and not self.holds_texts
         finite = numbers and math.isfinite(self.largest_difference)
@@ -162,10 +219,10 @@ class DatasetDifference:
             "scale": self.scale if numbers else None,
             "tolerance": self.tolerance if numbers else None,
             "differing": self.differing if self.comparable else None,
-            "at": self.at and self.at.to_dict(),
+            "at": self.at.to_dict() if self.at else None,
             "a": values[0],
             "b": values[1],
-            "first": self.first and self.first.to_dict(),
+            "first": self.first.to_dict() if self.first else None,
         }
 
 
@@ -300,7 +357,7 @@ class Difference:
         ]
         return [*lines, *(f"listed     {item}" for item in self.listed), self.verdict]
 
-    def to_dict(self, *, same: bool = True) -> dict[str, Any]:
+    def to_dict(self, *, same: bool = True) -> DifferenceJson:
         """Plain values: what ``fecm diff --format json`` prints.
 
         Parameters
@@ -320,5 +377,8 @@ class Difference:
             "only_in_a": self.only_in_a,
             "only_in_b": self.only_in_b,
             "excluded": self.excluded,
-            "listed": [item._asdict() for item in self.listed],
+            "listed": [
+                {"name": item.name, "a": item.a, "b": item.b, "line": item.line}
+                for item in self.listed
+            ],
         }

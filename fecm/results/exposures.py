@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from enum import StrEnum
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple, TypedDict, cast
 
 import numpy as np
 
@@ -288,23 +288,38 @@ class FirstFailure:
     FAIL evaluates every N-th pass, so that the time lies between two evaluations.  It is
     interpolated linearly between them, force and energy are those of this time.  Mode, ply and
     place are those of the largest exposure at the later evaluation.
+
+    Attributes
+    ----------
+    criterion, mode : str
+        Names of the criterion and of its mode.
+    ply : int
+        Its number from 1 at the struck face; of an interface that of the ply above it.
+    x, y : float
+        Place.
+    time : float
+        When the criterion first reaches the level.
+    earliest, latest : float
+        The last evaluation below the level, 0 before the first evaluation, and the next one.
+    force : float
+        Contact force at this time; NaN without impact.
+    energy : float
+        Work of the contact force so far on plate and indentation: what the projectile has given up
+        of its kinetic energy, force*length; NaN without impact.
+    materials : tuple of str
+        Material of the ply, or of both plies of an interface; empty if all plies are of one.
     """
 
     criterion: str
     mode: str
-    ply: int  # from 1 at the struck face; of an interface the ply above it
-    # Place.
+    ply: int
     x: float
     y: float
     time: float
-    # The last evaluation below the level, 0 before the first evaluation, and the next one.
     earliest: float
     latest: float
-    force: float  # contact force; NaN without impact
-    # Work of the contact force so far on plate and indentation: what the projectile has given up of
-    # its kinetic energy (force*length); NaN without impact.
+    force: float
     energy: float
-    # Names of the material of the ply, or of both plies; empty if all plies are of one.
     materials: tuple[str, ...] = ()
 
     @property
@@ -391,7 +406,37 @@ def _history(stored: Stored) -> _History:
     return _History(time, force, work)
 
 
-def failure_metrics(stored: Stored) -> dict[str, Any]:
+class ExposureHistoryJson(TypedDict):
+    """Largest exposures outside the load so far, at every evaluation of FAIL."""
+
+    time: list[float]
+    exposure: Annotated[dict[str, list[float]], "A number for every time, by criterion."]
+
+
+class CureJson(TypedDict, total=False):
+    """What a run with FAIL and CURE says of residual stresses, in JSON."""
+
+    at_rest: Annotated[
+        dict[str, float], "Largest exposure of the residual stresses alone, by criterion."
+    ]
+    load_factor: Annotated[
+        dict[str, float],
+        "Factor on the load's stresses at the largest exposure at which it is 1, by criterion.",
+    ]
+
+
+class FailureJson(CureJson):
+    """What a run with FAIL says of it, in JSON."""
+
+    evaluations_in_contact: Annotated[int | None, "Null in results of older versions."]
+    largest: Annotated[dict[str, float], "Largest exposure outside the load, by criterion."]
+    history: ExposureHistoryJson
+    first: Annotated[
+        list[Annotated[dict[str, Any], FirstFailure]], "First failures, the earliest first."
+    ]
+
+
+def failure_metrics(stored: Stored) -> FailureJson:
     """Evaluations, largest exposures and first failures of a run with FAIL, as plain values.
 
     ``history`` has the largest exposures so far at every evaluation.  With CURE also the exposures
@@ -413,7 +458,7 @@ def failure_metrics(stored: Stored) -> dict[str, Any]:
     }
 
 
-def _of_cure(stored: Stored) -> dict[str, dict[str, float]]:
+def _of_cure(stored: Stored) -> CureJson:
     """Attributes of the criteria that runs with CURE have, by criterion."""
     criteria = criteria_of(stored.attributes_of("failure"))
     known = {name: stored.attributes_of(f"failure/{name}") for name in criteria}
@@ -421,4 +466,4 @@ def _of_cure(stored: Stored) -> dict[str, dict[str, float]]:
         attribute: {name: float(own[attribute]) for name, own in known.items() if attribute in own}
         for attribute in (AT_REST, LOAD_FACTOR)
     }
-    return {attribute: values for attribute, values in found.items() if values}
+    return cast("CureJson", {name: values for name, values in found.items() if values})

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any, TypedDict, cast
 
 import numpy as np
 
 from fecm._text import DIGITS, significant
-from fecm._typing import Floats
+from fecm._typing import FiniteFloat, Floats
 from fecm.deck.units import quantity as shown_quantity
 from fecm.deck.units import unit_of
 from fecm.results.criteria import spelt
 from fecm.results.end import End
 from fecm.results.exposures import (
+    FailureJson,
     FailureVerdict,
     LargestExposure,
     evaluations_in_contact,
@@ -33,7 +34,55 @@ if TYPE_CHECKING:
     from fecm.results.hdf5_reader import FileContents
 
 
-def describe_groups(contents: FileContents) -> list[dict[str, Any]]:
+class DatasetJson(TypedDict):
+    """A dataset of a result file in JSON."""
+
+    name: str
+    shape: Sequence[int]
+    dtype: str
+    description: str
+    dimension: str
+    unit: str
+    min: FiniteFloat | None
+    max: FiniteFloat | None
+    not_finite: int
+    different: Annotated[int | None, "Number of different texts; null for numbers."]
+
+
+class GroupJson(TypedDict):
+    """A group of a result file in JSON."""
+
+    name: str
+    description: str
+    rows: int | None
+    attributes: dict[str, Any]
+    datasets: list[DatasetJson]
+
+
+class MetricsJson(TypedDict, total=False):
+    """Metrics of a run in JSON: numbers by name, and what FAIL found."""
+
+    failure: Annotated[FailureJson, "Of decks with FAIL."]
+
+
+class RunJson(TypedDict):
+    """What is said of a run in JSON."""
+
+    steps: int
+    time: Annotated[Annotated[list[float], (2,)] | None, "First and last; null without steps."]
+    still_in_contact: bool
+    end: Annotated[End | None, "State of the contact at the end; null without impact steps."]
+    validity: Annotated[
+        str,
+        "ok, or the reasons to doubt the result, separated by semicolons; empty without impact "
+        "steps.",
+    ]
+    notes: list[str]
+    metrics: MetricsJson
+    summary: list[str]
+
+
+def describe_groups(contents: FileContents) -> list[GroupJson]:
     """Describe the groups and datasets of a result file, of a run or of a sweep.
 
     Of each group ``name`` (empty for the file itself), ``description``, ``rows`` (stored instants,
@@ -42,10 +91,10 @@ def describe_groups(contents: FileContents) -> list[dict[str, Any]]:
     of the finite numbers (None without any), ``not_finite`` and, for texts, the number of
     ``different`` ones.
     """
-    members: dict[str, list[dict[str, Any]]] = {name: [] for name in contents.groups}
+    members: dict[str, list[DatasetJson]] = {name: [] for name in contents.groups}
     for path in _sorted(contents, DATASETS):
         members.setdefault(path.rpartition("/")[0], []).append(_describe(contents, path))
-    groups: list[dict[str, Any]] = []
+    groups: list[GroupJson] = []
     for name in _sorted(members, GROUPS):
         attributes = dict(contents.groups.get(name, {})) if name else {}
         description = str(attributes.pop("description", ""))
@@ -68,7 +117,7 @@ def _sorted(names: Iterable[str], known: Iterable[str]) -> list[str]:
     return sorted(names, key=lambda name: (order.get(name, len(order)), name))
 
 
-def _describe(contents: FileContents, path: str) -> dict[str, Any]:
+def _describe(contents: FileContents, path: str) -> DatasetJson:
     """Shape, type, attributes and range of one dataset."""
     attributes, texts = contents.attributes_of(path), contents.lists.get(path)
     minimum, maximum, not_finite = (None, None, 0) if texts is not None else _range(contents, path)
@@ -76,7 +125,9 @@ def _describe(contents: FileContents, path: str) -> dict[str, Any]:
         "name": path,
         "shape": contents.shapes[path],
         "dtype": str(contents.dtypes[path]) if texts is None else "text",
-        **{key: str(attributes.get(key, "")) for key in ("description", "dimension", "unit")},
+        "description": str(attributes.get("description", "")),
+        "dimension": str(attributes.get("dimension", "")),
+        "unit": str(attributes.get("unit", "")),
         "min": minimum,
         "max": maximum,
         "not_finite": not_finite,
@@ -454,7 +505,7 @@ def run_text(result: Stored) -> list[str]:
     return [result.title or "(no title)", *(f"  {line}" for line in lines)]
 
 
-def about_run(result: Stored) -> dict[str, Any]:
+def about_run(result: Stored) -> RunJson:
     """Steps, first and last time, metrics and summary of a run."""
     steps = len(result["history/time"]) if "history/time" in result else 0
     missing = _missing(result)
@@ -470,13 +521,14 @@ def about_run(result: Stored) -> dict[str, Any]:
     }
 
 
-def _metrics(result: Stored) -> dict[str, Any]:
+def _metrics(result: Stored) -> MetricsJson:
     """Impact metrics, and those of FAIL under ``failure``."""
     if "failure/x" not in result:
-        return metrics_of(result)
+        return cast("MetricsJson", metrics_of(result))
     from fecm.results.exposures import failure_metrics  # 1 ms, for FAIL only
 
-    return {**metrics_of(result), "failure": failure_metrics(result)}
+    found = {**metrics_of(result), "failure": failure_metrics(result)}
+    return cast("MetricsJson", found)
 
 
 def _missing(result: Stored) -> list[str]:

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from fecm._typing import FiniteFloat
 from fecm._watch import Progress
 from fecm.authoring.case import CasesError, check_deck
 from fecm.authoring.timing import stable_time_step, with_time_step
@@ -52,7 +53,7 @@ class MeshErrorEstimate:
     refined_peak_force: float
     elements: int
     refined_elements: int
-    distance: float
+    distance: FiniteFloat
     undecided: bool
     exposures: dict[str, float]
     refined_exposures: dict[str, float]
