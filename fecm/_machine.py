@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -21,12 +20,11 @@ class NotEnoughMemoryError(MemoryError, FecmError):
 
 
 def available_memory() -> int | None:
-    """Bytes that can be allocated without swapping; None if the system does not report them.
+    """Bytes that can be allocated without swapping; None if they are not known.
 
-    On Linux the smallest of the kernel's estimate (MemAvailable, proc(5)) and the remainders of the
-    limits of the control groups, such as those of a container or a batch job (memory.max,
-    cgroups(7)); on macOS the free and the inactive pages; on Windows the least of free memory and
-    of what the process may still commit.
+    The smallest of the machine's (MemAvailable of proc(5) on Linux, elsewhere what psutil tells,
+    where it is installed) and the remainders of the limits of the control groups, such as those of
+    a container or a batch job (memory.max, cgroups(7)).
     """
     known = [count for count in (_of_machine(), *_of_groups()) if count is not None]
     return max(0, min(known)) if known else None
@@ -56,47 +54,15 @@ def _shortage(what: str, count: int, free: int) -> str:
 
 
 def _of_machine() -> int | None:
-    with suppress(OSError, ValueError, IndexError, AttributeError):
-        if sys.platform in READERS:
-            return READERS[sys.platform]()
+    with suppress(OSError, ValueError, IndexError):
         for line in MEMINFO.read_text().splitlines():
             if line.startswith("MemAvailable:"):
                 return 1024 * int(line.split()[1])
-    with suppress(OSError, ValueError, AttributeError):
-        pages = os.sysconf("SC_AVPHYS_PAGES")
-        if pages > 0:
-            return pages * os.sysconf("SC_PAGE_SIZE")
+    with suppress(ImportError):
+        import psutil
+
+        return int(psutil.virtual_memory().available)
     return None
-
-
-def _of_windows() -> int | None:
-    """The least of free memory and free page file, fields of MEMORYSTATUSEX after its length."""
-    import ctypes
-
-    size = 64
-    status = (ctypes.c_uint64 * (size // 8))(size)
-    if not ctypes.CDLL("kernel32").GlobalMemoryStatusEx(ctypes.byref(status)):
-        return None
-    free, to_commit = status[2], status[4]
-    return min(free, to_commit)
-
-
-def _of_macos() -> int | None:
-    """The head of vm_statistics64: free, active and inactive pages."""
-    import ctypes
-
-    system = ctypes.CDLL(None)
-    system.mach_host_self.restype = ctypes.c_uint32
-    pages = (ctypes.c_uint32 * 64)()
-    size = ctypes.c_uint32(len(pages))
-    of_memory = 4  # HOST_VM_INFO64
-    if system.host_statistics64(system.mach_host_self(), of_memory, pages, ctypes.byref(size)):
-        return None
-    free, _, inactive = pages[:3]
-    return (free + inactive) * os.sysconf("SC_PAGE_SIZE")
-
-
-READERS: dict[str, Callable[[], int | None]] = {"win32": _of_windows, "darwin": _of_macos}
 
 
 def _of_groups() -> list[int]:

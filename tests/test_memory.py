@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-import ctypes
-import mmap
 import os
 import re
 import subprocess
 import sys
 import threading
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -358,54 +356,17 @@ def test_the_system_reports_its_free_memory() -> None:
     assert 10 * MEGABYTE < free < 2**46
 
 
-class MemoryStatus(ctypes.Structure):
-    """MEMORYSTATUSEX of sysinfoapi.h."""
-
-    _fields_ = [
-        ("length", ctypes.c_uint32),
-        ("load", ctypes.c_uint32),
-        ("total", ctypes.c_uint64),
-        ("free", ctypes.c_uint64),
-        ("page_file", ctypes.c_uint64),
-        ("free_page_file", ctypes.c_uint64),
-        ("virtual", ctypes.c_uint64 * 3),
-    ]
-
-
-class System:
-    """The functions of Windows and macOS that tell the memory, as their headers declare them."""
-
-    def __init__(self, fails: bool) -> None:
-        self.fails = fails
-        self.mach_host_self = lambda: 7
-
-    def GlobalMemoryStatusEx(self, status: Any) -> int:
-        """Windows."""
-        given = MemoryStatus.from_buffer(status._obj)
-        assert given.length == ctypes.sizeof(given) == ctypes.sizeof(status._obj)
-        given.total, given.free, given.free_page_file = 16 * 10**9, 6 * 10**9, 5 * 10**9
-        return int(not self.fails)
-
-    def host_statistics64(self, host: int, flavor: int, pages: Any, size: Any) -> int:
-        """MacOS."""
-        assert (host, flavor) == (7, 4)
-        assert size._obj.value == len(pages) >= 38
-        pages[:4] = 2_000_000, 900_000, 500_000, 300_000  # free, active, inactive, wired
-        return int(self.fails)
-
-
-@pytest.mark.parametrize(
-    ("platform", "free"), [("win32", 5 * 10**9), ("darwin", 2_500_000 * mmap.PAGESIZE)]
-)
-def test_free_memory_of_windows_and_macos_is_read_from_their_structures(
-    monkeypatch: pytest.MonkeyPatch, platform: str, free: int
+def test_free_memory_is_that_of_psutil_where_the_system_has_no_file_of_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(sys, "platform", platform)
+    monkeypatch.setattr(fecm._machine, "MEMINFO", tmp_path / "missing")
     monkeypatch.setattr(fecm._machine, "_of_groups", list)
-    monkeypatch.setattr(ctypes, "CDLL", lambda name: System(fails=False))
-    assert available_memory() == free
-    monkeypatch.setattr(ctypes, "CDLL", lambda name: System(fails=True))
+    told = SimpleNamespace(virtual_memory=lambda: SimpleNamespace(available=5 * MEGABYTE))
+    monkeypatch.setitem(sys.modules, "psutil", told)
+    assert available_memory() == 5 * MEGABYTE
+    monkeypatch.setitem(sys.modules, "psutil", None)
     assert available_memory() is None
+    fecm._machine.require_memory(10**18, "a matrix")  # unknown memory is no reason to refuse
 
 
 def test_rows_of_a_file_are_read_without_the_others(
