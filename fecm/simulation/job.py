@@ -492,7 +492,9 @@ class ProblemRun:
             if self.resumes:
                 checkpointer.restore(simulation)
                 watch.note(f"{path} resumes after step {simulation.state.plate.step}")
-            yield run_program(simulation)
+            result = run_program(simulation)
+            watch.advance(simulation.state.plate.step, self.problem.work.steps)
+            yield result
         checkpointer.clear()
         for text in simulation.state.notes:
             watch.note(text)

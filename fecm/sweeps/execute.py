@@ -35,14 +35,13 @@ from fecm.sweeps.checks import check_sweep_memory
 from fecm.sweeps.in_full import told
 from fecm.sweeps.outcome import Outcome, merge
 from fecm.sweeps.partial_results import DamagedPartError, PartialResults
-from fecm.sweeps.plan import Plan, Task, tasks
+from fecm.sweeps.plan import WORTH_WORKERS, Plan, Task, tasks
 from fecm.sweeps.reduced import ReducedModel, Trials, by_energy, count_held, trials
 from fecm.sweeps.result import SweepResult, sweep_result
 
 Done = Callable[[Task, Outcome], None]
 Idle = Callable[[], None]  # called regularly while workers run, to handle signals
 DEATHS = 3  # of workers without a finished task, after which the remaining tasks count as lost
-WORTH_WORKERS = 10.0  # seconds that tasks take, from which on workers are worth their start
 LOOK = 0.5  # polling interval in seconds
 PATIENCE = 5.0  # seconds for the scheduler to answer
 LOST = "lost with its worker"

@@ -47,6 +47,7 @@ MOST_REDUCED = 256  # of the reduced model, whose steps cost more
 REDUCED = "reduced"  # name of that model
 MODES = 21  # bending modes of the reduced model
 MOST_MODES = 40
+WORTH_WORKERS = 10.0  # seconds that tasks take, from which on workers are worth their start
 MOST_IN_MOTION = 16  # full runs in one motion
 # Names that keep the critical time step of the deck.
 _KEEPING = {*names_of(Changes.FAILURE, Changes.STRIKE, Changes.PLACE), "duration"}

@@ -14,11 +14,11 @@ from fecm.authoring.values import REFINE
 from fecm.problem.problem import Problem
 from fecm.results.metrics import SUMMARY
 from fecm.sweeps.batch import run_task
-from fecm.sweeps.execute import WORTH_WORKERS
 from fecm.sweeps.in_full import run_case_in_full
-from fecm.sweeps.plan import Plan, Task, shares_plate, tasks
+from fecm.sweeps.plan import WORTH_WORKERS, Plan, Task, shares_plate, tasks
 from fecm.sweeps.search import USUAL
 
+FILE = 35_000  # bytes of a file with few cases: groups, attributes, the deck
 FEW_CASES = 64  # that show what a case costs once its plate is stepped
 # Steps of a short run, which shows what a run costs before its steps; then runs of so many times
 # more steps follow, until one takes enough seconds longer.
@@ -87,7 +87,7 @@ def output_bytes(problem: Problem, made: Plan) -> int:
     """Size of the file of a sweep, about."""
     columns = len(SUMMARY) + len(made.cases[0])
     steps = problem.work.steps if made.settings.history else 0
-    return 8 * len(made.cases) * (columns + steps)
+    return FILE + 8 * len(made.cases) * (columns + steps)
 
 
 def _full_cases(problem: Problem, made: Plan) -> Sequence[Case]:
