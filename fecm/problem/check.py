@@ -129,8 +129,9 @@ def _check_each_segment(checked: Problem, findings: Findings, unsound: set[str])
     if (others := checked.deck.last(model.Laminates)) is not None:
         for one in others.laminates:
             apply(laminate.OF_LAYERS, findings, one)
-    if unsound.isdisjoint(zones.KEYWORDS) and apply(zones.OF_DECK, findings, checked.deck):
-        apply(zones.OF_CURE, findings, checked.deck)
+    of_materials = (*zones.OF_DECK, *damage.OF_MATERIALS)
+    if unsound.isdisjoint(zones.KEYWORDS) and apply(of_materials, findings, checked.deck):
+        apply(cure.OF_MATERIALS, findings, checked.deck)
 
 
 def check_impact(checked: Problem, findings: Findings) -> None:
@@ -247,7 +248,7 @@ def check_program(checked: Problem, findings: Findings) -> None:
 
 def check_values(checked: Problem, findings: Findings) -> None:
     """Warn of the valid values of a sound problem that look like a mistake."""
-    apply((*laminate.VALUES, *zones.VALUES), findings, checked)
+    apply((*laminate.VALUES, *zones.VALUES, *damage.OF_LAYERS), findings, checked)
     apply(units.VALUES, findings, checked)
     apply(preload.VALUES, findings, checked)
     if is_curved(checked.deck):

@@ -8,10 +8,11 @@ from fecm._typing import Floats
 from fecm.deck import model
 from fecm.deck.macros import flat
 from fecm.deck.material_cards import MATERIAL
-from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.deck.rules import Report, Reports, Subject, reports, rule
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.problem.problem import Problem
 from fecm.problem.rules.damage import FIBROUS
+from fecm.problem.rules.zones import material_numbers
 from fecm.results.criteria import exposed
 
 LARGEST_BETA = 0.1  # strain per per cent of weight
@@ -230,6 +231,23 @@ def cure_without_stresses(problem: Problem) -> Reports:
         yield Report(message, card.place(), "put FAIL, with ALLO, into the loop of RODP")
 
 
+@reports("E453")
+def missing_expansions(deck: model.Deck) -> Reports:
+    """Find materials of layers without coefficients of expansion, and unknown ones with them."""
+    if (card := deck.last(model.Cure)) is None or not deck.has(model.Material):
+        return
+    known = material_numbers(deck)
+    for one in card.expansions:
+        if one.material not in known:
+            only = ", ".join(map(str, sorted(known)))
+            message = f"The deck has no material {one.material}, only {only}."
+            yield Report(message, one.place("material"), FIELDS)
+    used = {layer.material for layers in deck.layers.values() for layer in layers}
+    for number in sorted(used - {MATERIAL, *(one.material for one in card.expansions)}):
+        yield Report(f"CURE has no card of material {number}.", card.place(), FIELDS)
+
+
+OF_MATERIALS = (missing_expansions,)
 OF_CURE = (missing_expansion, implausible_expansion)
 VALUES = (
     implausible_moisture,

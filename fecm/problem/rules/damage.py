@@ -9,12 +9,13 @@ import numpy as np
 
 from fecm.deck import model
 from fecm.deck.macros import Loop, every, flat
-from fecm.deck.rules import Report, Reports, Subject, rule
+from fecm.deck.rules import Report, Reports, Subject, reports, rule
 from fecm.deck.units import MODULUS, TOUGHNESS, in_si, unit_names
 from fecm.mechanics.failure import puck_slope
 from fecm.mechanics.laminate import is_fabric
 from fecm.problem.problem import Problem
 from fecm.problem.rules.units import USED, has_real_moduli, likely_unit, looks_like, needed_unit
+from fecm.problem.rules.zones import material_numbers, unknown_material
 from fecm.results.criteria import exposed
 
 # Strengths over the modulus of their direction.  Annealed glass has 1e-4, soft matrices 0.1.
@@ -422,6 +423,44 @@ def limited_slope(problem: Problem) -> Reports:
         yield Report(message, card.place(), "check YT and S12")
 
 
+@reports("E497")
+def strengths_of_missing_material(deck: model.Deck) -> Reports:
+    """Find materials of ALLO that the deck does not have."""
+    if (card := deck.last(model.Allowables)) is not None:
+        known = material_numbers(deck)
+        for one in (card, *card.others):
+            if one.material not in known:
+                yield unknown_material(one.material, known, one.place("material"))
+
+
+@rule("W498", Subject.DAMAGE)
+def layers_without_strengths(problem: Problem) -> Reports:
+    """FAIL has no strengths of some layers.
+
+    Their exposures are not known (NaN), nor are those of the interfaces beside them.
+
+    Remedy: A pair of cards on ALLO for their material.
+    """
+    deck, card = problem.deck, problem.deck.last(model.Allowables)
+    if card is None or all(macro.word != "FAIL" for macro in flat(problem.program)):
+        return
+    for n, (number, layers) in enumerate(deck.layers.items()):
+        if n not in problem.used_laminates:
+            continue
+        missing = [i for i, one in enumerate(layers, start=1) if card.of(one.material) is None]
+        if missing:
+            materials = sorted({layers[i - 1].material for i in missing})
+            named = "layer" if len(missing) == 1 else "layers"
+            listed = ", ".join(map(str, missing))
+            of = " and ".join(map(str, materials))
+            message = (
+                f"ALLO has no strengths of {named} {listed} of laminate {number}, material {of}."
+            )
+            yield Report(message, card.place(), "their exposures are NaN")
+
+
+OF_MATERIALS = (strengths_of_missing_material,)
+OF_LAYERS = (layers_without_strengths,)
 OF_STRENGTHS = (invalid_strength, invalid_constant_of_criterion)
 OF_DELAMINATION = (invalid_delamination,)
 OF_THRESHOLD = (coupled_threshold, twisted_threshold)

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from fecm.deck import model
-from fecm.deck.card import Record
 from fecm.deck.findings import CardPlace
-from fecm.deck.macros import flat
 from fecm.deck.material_cards import MATERIAL
-from fecm.deck.rules import Report, Reports, Subject, reports, rule
+from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.mechanics.laminate import LaminateSection
 from fecm.problem.problem import Problem
-from fecm.problem.rules.cure import FIELDS
 
 LARGEST_COUPLING = 0.02  # of I1 over I0 h without a warning
 # Segments whose unreadable cards would be missing materials and laminates.
@@ -29,7 +26,13 @@ def _laminates(deck: model.Deck) -> tuple[model.NumberedLaminate, ...]:
     return () if card is None else card.laminates
 
 
-def _numbers(deck: model.Deck) -> set[int]:
+def unknown_material(number: int, known: set[int], place: CardPlace | None) -> Report:
+    """Report a material that is not among those of the deck."""
+    numbers = ", ".join(map(str, sorted(known)))
+    return Report(f"The deck has no material {number}.", place, f"its materials are {numbers}")
+
+
+def material_numbers(deck: model.Deck) -> set[int]:
     """Numbers of the materials."""
     return {MATERIAL, *(one.number for one in _materials(deck))}
 
@@ -69,16 +72,10 @@ def missing_material(deck: model.Deck) -> Reports:
 
     Remedy: The material's cards on MATS, or another number.
     """
-    known = _numbers(deck)
-    strengths = deck.last(model.Allowables)
-    given: list[tuple[int, Record]] = [(layer.material, layer) for layer in _in_layers(deck)]
-    if strengths is not None:
-        given += [(one.material, one) for one in (strengths, *strengths.others)]
-    for number, record in given:
-        if number not in known:
-            numbers = ", ".join(map(str, sorted(known)))
-            message = f"The deck has no material {number}."
-            yield Report(message, record.place("material"), f"its materials are {numbers}")
+    known = material_numbers(deck)
+    for layer in _in_layers(deck):
+        if layer.material not in known:
+            yield unknown_material(layer.material, known, layer.place("material"))
     for laminate in _laminates(deck):
         if not laminate.layers:
             message = f"Laminate {laminate.number} has no layers."
@@ -106,22 +103,6 @@ def invalid_zone(deck: model.Deck) -> Reports:
             numbers = ", ".join(map(str, sorted(known)))
             message = f"The deck has no laminate {zone.laminate}."
             yield Report(message, zone.place("laminate"), f"its laminates are {numbers}")
-
-
-@reports("E453")
-def missing_expansions(deck: model.Deck) -> Reports:
-    """Find materials of layers without coefficients of expansion, and unknown ones with them."""
-    if (card := deck.last(model.Cure)) is None or not deck.has(model.Material):
-        return
-    known = _numbers(deck)
-    for one in card.expansions:
-        if one.material not in known:
-            only = ", ".join(map(str, sorted(known)))
-            message = f"The deck has no material {one.material}, only {only}."
-            yield Report(message, one.place("material"), FIELDS)
-    used = {layer.material for layers in deck.layers.values() for layer in layers}
-    for number in sorted(used - {MATERIAL, *(one.material for one in card.expansions)}):
-        yield Report(f"CURE has no card of material {number}.", card.place(), FIELDS)
 
 
 @rule("W500", Subject.LAMINATE)
@@ -199,32 +180,5 @@ def soft_core(problem: Problem) -> Reports:
             yield Report(message, shear.place() or _place(deck, number), "use SHEA EQUI")
 
 
-@rule("W498", Subject.DAMAGE)
-def layers_without_strengths(problem: Problem) -> Reports:
-    """FAIL has no strengths of some layers.
-
-    Their exposures are not known (NaN), nor are those of the interfaces beside them.
-
-    Remedy: A pair of cards on ALLO for their material.
-    """
-    deck, card = problem.deck, problem.deck.last(model.Allowables)
-    if card is None or all(macro.word != "FAIL" for macro in flat(problem.program)):
-        return
-    for n, (number, layers) in enumerate(deck.layers.items()):
-        if n not in problem.used_laminates:
-            continue
-        missing = [i for i, one in enumerate(layers, start=1) if card.of(one.material) is None]
-        if missing:
-            materials = sorted({layers[i - 1].material for i in missing})
-            named = "layer" if len(missing) == 1 else "layers"
-            listed = ", ".join(map(str, missing))
-            of = " and ".join(map(str, materials))
-            message = (
-                f"ALLO has no strengths of {named} {listed} of laminate {number}, material {of}."
-            )
-            yield Report(message, card.place(), "their exposures are NaN")
-
-
 OF_DECK = (number_taken, missing_material, invalid_zone)
-OF_CURE = (missing_expansions,)
-VALUES = (unused, coupled_inertia, soft_core, layers_without_strengths)
+VALUES = (unused, coupled_inertia, soft_core)
