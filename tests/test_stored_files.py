@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import shutil
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -12,12 +14,13 @@ import numpy as np
 import pytest
 
 import fecm
-from fecm.results import FILES, Form, ResultFileError, dataset_of, read, result_writing
+from fecm.results import FILES, Form, MemorySink, ResultFileError, dataset_of, read, result_writing
 from tests.decks import LONG, small
 from tests.panels import TIME, scatter, struck
 from tests.test_nonlinear_decks import text
 from tests.test_nonlinear_sweeps import BLOW, PROGRAM
 
+ROOT = Path(__file__).resolve().parents[1]
 LAWS = {"velocity": "normal:100,5", "k": "lognormal:1.9e6,.15"}
 ONE = {"velocity": "normal:100,5"}
 SHARES = {"peak_force": [70.0, 85.0]}
@@ -134,6 +137,20 @@ def test_a_dataset_that_is_not_in_the_schema_is_not_written(
     with pytest.raises(ValueError, match=message), result_writing(target, form) as sink:
         sink.create(dataclasses.replace(known, path=path), (3,))
     assert not target.exists()
+
+
+def test_a_result_in_memory_has_only_datasets_of_the_schema() -> None:
+    known = FILES[Form.RUN].datasets["tape3/w"]
+    with pytest.raises(ValueError, match="tape3/colour is not in the schema"):
+        MemorySink().create(dataclasses.replace(known, path="tape3/colour"), (3, 2))
+
+
+def test_the_page_of_datasets_is_that_of_the_schema() -> None:
+    code = [sys.executable, "docs/datasets.py", "/dev/stdout"]
+    page = subprocess.run(code, cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert page == (ROOT / "docs/datasets.md").read_text("utf-8")
+    # One row for each dataset of each form.
+    assert page.count("\n| `/") == sum(len(file.datasets) for file in FILES.values())
 
 
 @pytest.mark.parametrize(

@@ -84,9 +84,7 @@ class FileSink:
 
     def known(self, path: str, rank: int) -> Dataset:
         """Dataset of the schema; ValueError if it has none of this path."""
-        if (found := schema.dataset_of(path, rank, self._form)) is None:
-            raise ValueError(f"{path} is not in the schema of {self._form}")
-        return found
+        return schema.required_dataset(path, rank, self._form)
 
     def _create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
         self._note(Operation.CREATE, path=dataset.path, shape=shape)

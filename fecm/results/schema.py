@@ -569,6 +569,13 @@ def dataset_of(path: str, rank: int, form: Form = Form.RUN) -> Dataset | None:
     return known.with_outer() if known.outer and rank > len(known.shape) else known
 
 
+def required_dataset(path: str, rank: int, form: Form = Form.RUN) -> Dataset:
+    """Dataset of a path that is written; ValueError if it is not in the schema of the form."""
+    if (dataset := dataset_of(path, rank, form)) is None:
+        raise ValueError(f"{path} is not in the schema of {form}")
+    return dataset
+
+
 def _named(dataset: Dataset, path: str) -> Dataset:
     """The dataset of a name in the place of ``*``.
 

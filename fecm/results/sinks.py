@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 
 from fecm._typing import Array
-from fecm.results.schema import Dataset
+from fecm.results.schema import Dataset, required_dataset
 
 if TYPE_CHECKING:
     from fecm.results.hdf5_writer import FileSink
@@ -43,7 +43,8 @@ class MemorySink:
         self.groups.setdefault(group, {}).update(values)
 
     def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
-        """Create a dataset."""
+        """Create a dataset; ValueError if it is not in the schema."""
+        required_dataset(dataset.path, len(shape))
         self.arrays[dataset.path] = np.zeros(shape, dtype=dataset.dtype)
 
     def write(self, path: str, start: int, rows: Array) -> None:
