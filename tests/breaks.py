@@ -114,9 +114,9 @@ def of_one_material(right: Any, layers: Any, plies: Any, *others: Any, **kwargs:
     return right(layers, dict.fromkeys(plies, plies[1]), *others, **kwargs)
 
 
-def without_shea(right: Any, deck: Any, **kwargs: Any) -> Any:
+def without_shea(right: Any, deck: Any, *others: Any) -> Any:
     kept = tuple(segment for segment in deck.segments if not isinstance(segment, Shear))
-    return right(replace(deck, segments=kept), **kwargs)
+    return right(replace(deck, segments=kept), *others)
 
 
 def without_coupling(names: str) -> Break:
