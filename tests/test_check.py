@@ -402,3 +402,11 @@ def test_the_summary_has_impact_kinematics_cure_and_threshold() -> None:
     ):
         assert line in lines
     assert "delamination        from " in lines
+
+
+def test_the_coupling_of_a_symmetric_laminate_is_printed_as_zero() -> None:
+    (problem,) = fecm.check(ROOT / "decks/impact-115.inp").problems
+    assert np.abs(problem.B).max() > 0.0  # rounding
+    lines = problem.lines()
+    start = next(n for n, line in enumerate(lines) if line.startswith("  B "))
+    assert [line.split()[-3:] for line in lines[start : start + 3]] == [["0", "0", "0"]] * 3

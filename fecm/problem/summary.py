@@ -29,6 +29,7 @@ from fecm.problem.rules.preload import FEWEST_ELEMENTS
 
 ROOM = 0.6  # share of the critical time step below which the step that DT 0 takes is shown
 LABEL_WIDTH = 20  # of the lines of a summary, at least
+ROUNDING = 1e-12  # of entries of a matrix, relative to their size
 
 
 def leaves_out_equilibrium(problem: Problem) -> bool:
@@ -186,9 +187,13 @@ class ProblemSummary:
         lines += [f"  {name:20}{getattr(self, name)}" for name in counts]
         if self.laminate:
             lines.append(f"  laminate            {self.laminate}, under the load")
+        sizes = {"A": float(np.abs(self.A).max()), "D": float(np.abs(self.D).max())}
+        sizes["B"] = math.sqrt(sizes["A"] * sizes["D"])  # which B can reach
         for name, dimension in (("A", "force/length"), ("B", "force"), ("D", "force*length")):
-            lines += _matrix(name, getattr(self, name), unit_of(dimension, self.units))
-        lines += _matrix("shear xz, yz", self.shear, unit_of("force/length", self.units))
+            unit = unit_of(dimension, self.units)
+            lines += _matrix(name, getattr(self, name), unit, sizes[name])
+        unit = unit_of("force/length", self.units)
+        lines += _matrix("shear xz, yz", self.shear, unit, float(np.abs(self.shear).max()))
         if self.leaves_out_equilibrium:
             lines.append(f"  shear factor        1; {self._said_change()}")
 
@@ -309,8 +314,8 @@ def _rise(plate: PlateModel) -> float:
     return float(np.ptp(midplane_height(plate.mesh.coordinates[plate.mesh.used], plate.curvature)))
 
 
-def _matrix(name: str, values: Floats, unit: str) -> list[str]:
-    """A matrix, its rounding errors shown as zeros."""
-    shown = np.where(np.abs(values) < 1e-12 * max(1.0, np.abs(values).max()), 0.0, values)
+def _matrix(name: str, values: Floats, unit: str, size: float) -> list[str]:
+    """Lines of a matrix; what is rounding beside numbers of a size is 0."""
+    shown = np.where(np.abs(values) < ROUNDING * size, 0.0, values)
     first, *rest = (" ".join(f"{value:12.5g}" for value in row) for row in shown)
     return [f"  {name:18}{first}  {unit}".rstrip(), *(f"{'':20}{row}" for row in rest)]
