@@ -26,7 +26,7 @@ def _close_figures() -> object:
 
 
 def test_the_commands_and_snippets_of_the_readme_run(tmp_path: Path) -> None:
-    assert len(list(outputs(ROOT / "README.md", tmp_path))) == 2
+    assert len(list(outputs(ROOT / "README.md", tmp_path))) == 1
 
 
 @pytest.mark.long
