@@ -60,7 +60,7 @@ UNITS = {
 _MICRO = str.maketrans("µμε", "uue")  # both letters for micro are in use
 # Names of columns in the tables of test rigs, by the quantity; the first is that of fecm.
 WORDS = {
-    "time": ("time", "zeit", "temps", "tempo", "tiempo", "t"),
+    "time": ("time", "zeit", "temps", "tempo", "tiempo", "t", "x_value", "x-axis"),
     "force": (
         *("force", "load", "contact force", "impact force", "tup load", "kraft", "last"),
         *("effort", "forza", "fuerza", "carga", "f"),
@@ -125,8 +125,9 @@ class MeasuredTable(NamedTuple):
         missing, or two can't be told apart.
         """
         places = []
-        for order, name in enumerate(names):
-            column = (columns[order] if columns else "").removeprefix("-")
+        wanted = [column.removeprefix("-") for column in columns or [""] * len(names)]
+        self._check_numbers(wanted)
+        for name, order, column in zip(names, range(len(names)), wanted, strict=True):
             if column.isdecimal() and int(column) and column not in self.names:
                 places.append(int(column) - 1)
             elif not self.head[1] and not column:
@@ -149,6 +150,17 @@ class MeasuredTable(NamedTuple):
             taken = ", ".join(f"column {n + 1} as {name}" for n, name in enumerate(names))
             warn(f"{self.path} has no names of columns: {taken}")
         return places
+
+    def _check_numbers(self, wanted: Sequence[str]) -> None:
+        """Raise StudyError if columns are given by numbers that are names of other columns."""
+        numbered = all(column.isdecimal() for column in wanted)
+        names = [n for n in wanted if numbered and self.names[int(n) - 1 : int(n)] != [n]]
+        if names and (both := [n for n in names if n in self.names]):
+            verb = "is a name" if len(both) == 1 else "are names"
+            raise StudyError(
+                f"{self.path}: {' and '.join(both)} {verb} of columns, and numbers of others; "
+                "rename them in the file, or name one of the columns by a text"
+            )
 
     def _place(self, words: Sequence[str], dimension: str, unit: str) -> int | None:
         """Number of the column with the first of some names that the table has."""
@@ -189,10 +201,11 @@ class MeasuredTable(NamedTuple):
             raise StudyError(f"{self.path}: the table has fewer than two rows of numbers")
         for name, place in zip(names, places, strict=True):
             self.check_thousands(name, place)
-        values = np.array([self._values(row, names, places) for row in self.rows])
+        rows = [self.head, *self.rows] if self._head_is_row(places) else self.rows
+        values = np.array([self._values(row, names, places) for row in rows])
         found = dict(zip(names, values.T, strict=True))
         if increasing:
-            self._check_increase(found, increasing)
+            self._check_increase(found, increasing, [line for line, _ in rows])
         for n, (name, place) in enumerate(zip(names, places, strict=True)):
             dimension = DIMENSIONS.get(name, "strain" if name.startswith("gage ") else "")
             own, said = self.unit(place), stated[n] if stated else ""
@@ -208,7 +221,9 @@ class MeasuredTable(NamedTuple):
     def check_thousands(self, name: str, place: int) -> None:
         """Raise StudyError if whole numbers up to 999 are beside such as 1,060.
 
-        Without decimals below 1000, three digits behind a mark are thousands.
+        Without decimals below 1000, three digits behind a mark are thousands.  A warning says so
+        where nothing tells: every comma of the table has one to three digits before it, of which
+        the first is not 0, and three behind it.
         """
         written = [(line, row[place]) for line, row in self.rows if place < len(row)]
         marked = [one for one in written if _GROUPED.fullmatch(one[1])]
@@ -220,8 +235,36 @@ class MeasuredTable(NamedTuple):
             raise StudyError(
                 f"{self.path}:{line}: {name} is {text!r} beside whole numbers; {UNMARKED}"
             )
+        if marked and self._has_only_groups:
+            line, text = marked[0]
+            warn(
+                f"{self.path}:{line}: {name}, {text.replace('.', ',')!r}, is taken as {text}; if "
+                f"its comma separates thousands, {UNMARKED}"
+            )
 
-    def _check_increase(self, columns: Mapping[str, Floats], increasing: str) -> None:
+    @property
+    def _has_only_groups(self) -> bool:
+        """Whether every comma of the table may separate thousands."""
+        fields = chain.from_iterable(row for _, row in self.rows)
+        marked = [f for f in fields if "." in f and _number(f) is not None]
+        return self.is_decimal_comma and all(map(_GROUPED.fullmatch, marked))
+
+    def _head_is_row(self, places: Sequence[int]) -> bool:
+        """Whether the line taken for names has numbers in some columns, as oscilloscopes write it.
+
+        Different whole numbers from 1 are names, of gages or channels.
+        """
+        fields = [self.head[1][place] for place in places if place < len(self.head[1])]
+        if len(fields) < len(places) or any(_number(field) is None for field in fields):
+            return False
+        if len(set(fields)) < len(fields) or not all(f.isdecimal() and int(f) for f in fields):
+            return True
+        warn(f"{self.path}:{self.head[0]}: {', '.join(fields)} are taken as names, not as a row")
+        return False
+
+    def _check_increase(
+        self, columns: Mapping[str, Floats], increasing: str, lines: Sequence[int]
+    ) -> None:
         """Raise StudyError if a column does not increase; name one that does."""
         rises = {name: column[1:] > column[:-1] for name, column in columns.items()}
         if rises[increasing].all():
@@ -231,7 +274,7 @@ class MeasuredTable(NamedTuple):
         others = [n for n in columns if n != increasing and rises[n].all()]
         swapped = f"; are {increasing} and {others[0]} swapped?" if others else ""
         raise StudyError(
-            f"{self.path}:{self.rows[row + 1][0]}: {increasing} must increase: {after:g} "
+            f"{self.path}:{lines[row + 1]}: {increasing} must increase: {after:g} "
             f"follows {before:g}{swapped}"
         )
 

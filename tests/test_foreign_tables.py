@@ -297,3 +297,105 @@ def test_thousands_in_a_table_of_cases_are_refused(tmp_path: Path) -> None:
     file.write_text("velocity\tk\n900\t2e4\n1,100\t2e4\n")
     with pytest.raises(CasesError, match=":3: velocity is '1,100' beside whole numbers"):
         read_cases(file)
+
+
+def newtons(row: str, count: int = 5) -> str:
+    """Rows of times from -0.2 ms at 0.1 ms, and of 10, 20, 30 ... N."""
+    return "".join(row.format(t=1e-4 * (n - 2), n=n, f=10.0 * (n + 1)) for n in range(count))
+
+
+TEKTRONIX = (
+    "Record Length,2.5e+03,,-0.0002,10.0,\nSample Interval,1e-04,,-0.0001,20.0,\n"
+    "Source,CH1,,0.0,30.0,\nVertical Units,V,,0.0001,40.0,\n,,,0.0002,50.0,\n,,,0.0003,60.0,\n"
+)
+SCOPES = {  # name: text, columns, factor of the time
+    "Tektronix TDS": (TEKTRONIX, ("4", "5"), 1.0),
+    "Tektronix MDO": (
+        "Model,MDO3024\n\nHorizontal Units,S\nRecord Length,5\n,,\nLabel,,\nTIME,CH1\n"
+        + newtons("{t:e},{f}\n"),
+        ("TIME", "CH1"),
+        1.0,
+    ),
+    "LeCroy": (
+        "LECROYWR62Xi,20123,Waveform\nSegments,1,SegmentSize,5\nSegment,TrigTime,TimeSince\n"
+        "#1,27-Jan-2015 13:05:10,0\nTime,Ampl\n" + newtons("{t:e},{f}\n"),
+        ("Time", "Ampl"),
+        1.0,
+    ),
+    "Keysight": ("x-axis,1\nsecond,N\n" + newtons("{t:E},{f:E}\n"), ("x-axis", "1"), 1.0),
+    "Rigol": ("Time(s),CH1\n" + newtons("{t:e},{f:e},\n").replace(",\n", "\n"), ("1", "2"), 1.0),
+    "LabVIEW": (
+        "LabVIEW Measurement\t\nSeparator\tTab\nX_Columns\tOne\nTime\t13:05:10,123\n"
+        "***End_of_Header***\t\n\t\nChannels\t1\nX_Dimension\tTime\nX0\t0,0\nDelta_X\t0,0001\n"
+        "***End_of_Header***\t\t\nX_Value\tForce\tComment\n"
+        + newtons("{t:f}\t{f:f}\n").replace(".", ","),
+        (),
+        1.0,
+    ),
+    "PicoScope": (
+        "Time,Channel A\n(ms),(N)\n\n" + newtons("{t:f},{f}\n"),
+        ("Time", "Channel A"),
+        1e-3,
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "columns", "size"), SCOPES.values(), ids=SCOPES)
+def test_records_of_oscilloscopes_keep_every_sample(
+    tmp_path: Path, text: str, columns: tuple[str, ...], size: float
+) -> None:
+    file = tmp_path / "scope.csv"
+    file.write_text(text)
+    found = measurement_of(file, DECK, columns)
+    samples = np.arange(len(found.time))
+    assert len(samples) >= 5
+    np.testing.assert_allclose(found.time, size * 1e-4 * (samples - 2), atol=1e-15)
+    np.testing.assert_allclose(found.force, 10.0 * (samples + 1))
+
+
+@pytest.mark.parametrize(
+    ("text", "columns", "words"),
+    [
+        (TEKTRONIX, (), "one must be named time"),
+        ("X,CH1,Start,Increment\nSequence,Volt,-3e-6,5e-9\n0,1,,\n1,2,,\n", (), "are X, CH1, "),
+        ("X,CH1,Start,Increment\nSequence,Volt,-3e-6,5e-9\n0,1,,\n1,2,,\n", ("1", "2"),
+         ":2: time is 'Sequence', not a finite number"),
+        ("x-axis,1,2\nsecond,Volt,Volt\n0,1,2\n1,2,3\n", ("x-axis", "1"),
+         "unknown unit of force `Volt`"),
+        ("x-axis,1,2\nsecond,Volt,Volt\n0,1,2\n1,2,3\n", ("1", "2"),
+         "1 and 2 are names of columns, and numbers of others"),
+        ("X_Value\tForce\tLoad cell\n\t1.0\t2.0\n\t2.0\t2.0\n", (), "time is empty"),
+    ],
+)  # fmt: skip
+def test_records_without_a_time_or_in_volts_are_refused(
+    tmp_path: Path, text: str, columns: tuple[str, ...], words: str
+) -> None:
+    file = tmp_path / "scope.csv"
+    file.write_text(text)
+    with pytest.raises(StudyError, match=rf"^[^\n]*{words}[^\n]*$"):
+        measurement_of(file, DECK, columns)
+
+
+def test_a_first_row_with_a_remark_is_filtered_too(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    file.write_text("0,1,trigger\n1,2\n2,3\n")
+    assert recorded(file).values.tolist() == [1.0, 2.0, 3.0]
+
+
+def test_columns_that_are_named_by_numbers_keep_their_names(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    file.write_text("note,7,8\na,0,5\nb,1,6\n,2,7\n,3,8\n")
+    with pytest.warns(FecmWarning, match=":1: 7, 8 are taken as names, not as a row"):
+        assert measurement_of(file, DECK, ("2", "3")).force.tolist() == [5.0, 6.0, 7.0, 8.0]
+
+
+def test_a_comma_that_may_separate_thousands_is_noted_once_nothing_tells(tmp_path: Path) -> None:
+    file = tmp_path / "force.csv"
+    file.write_text("time (us)\tforce (N)\n0\t1,060\n1\t1,250\n2\t1,125\n")
+    with pytest.warns(FecmWarning, match=":2: force, '1,060', is taken as 1.060; if its comma"):
+        found = measurement_of(file, DECK)
+    assert found.force.tolist() == [1.06, 1.25, 1.125]
+    file.write_text("time (us)\tforce (N)\n0,5\t1,060\n1,5\t1,250\n2,5\t1,125\n")
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert measurement_of(file, DECK).force.tolist() == [1.06, 1.25, 1.125]

@@ -250,17 +250,18 @@ def _of_result(path: Path, result: Result, column: str | None) -> TimeHistory:
 
 def _of_table(path: Path, column: str | None) -> TimeHistory:
     table = read_table(path)
-    heads, clock, value = table.head[1], "", column or ""
+    heads = table.head[1]
     if heads and column and not (column.isdecimal() or table.has(column)):
         raise StudyError(f"{path} has no column {column}; it has {', '.join(table.names)}")
-    if heads and not table.has("time"):
-        clock = "1"
-    if heads and not value:
-        first = table.places(["time"])[0] if not clock else 0
-        value = TRANSDUCER if table.has(TRANSDUCER) else "2" if first == 0 else "1"
-        if value != TRANSDUCER and len(heads) > 2:
-            warn(f"{path}: the column {heads[int(value) - 1]} is filtered; --column takes another")
-    places = table.places(("time", "value"), (clock, value))
+    if not (heads or column):
+        places = table.places(("time", "value"))
+    else:
+        clock = table.places(["time"])[0] if heads and table.has("time") else 0
+        value = column or (TRANSDUCER if table.has(TRANSDUCER) else "")
+        place = table.places(["value"], [value])[0] if value else int(clock == 0)
+        if not value and len(heads) > 2:
+            warn(f"{path}: the column {heads[place]} is filtered; --column takes another")
+        places = [clock, place]
     time, values = table.columns(("time", "value"), places=places, increasing="time").values()
     unit = table.unit(places[0])
     name = table.names[places[1]] if heads else "value"
