@@ -10,8 +10,9 @@ import pytest
 from fecm import Result
 from fecm._errors import FecmWarning
 from fecm._typing import Array
+from fecm.mechanics import CRITERIA
 from fecm.plot import PlotError, draw, outline
-from fecm.results import largest_exposures, run_summary
+from fecm.results import ALL_CRITERIA, largest_exposures, run_summary
 from tests.decks import DATA_CARDS, DISC, PLY_PROGRAM, PROGRAM, small
 from tests.pictures import legend_of, plot, run
 
@@ -121,7 +122,6 @@ def test_thickness_of_elements_without_nine_nodes_shows_in_plane_stresses(plies:
 # Exposures --------------------------------------------------------------------------------------
 
 STRENGTHS = "ALLO\n200000,200000,7000,28000,13000\n\n"
-CRITERIA = ("max_stress", "tsai_wu", "hashin", "puck")
 
 
 @pytest.fixture(scope="module")
@@ -226,7 +226,7 @@ def test_all_criteria_mark_their_values_and_interfaces_have_their_own_bars(
     values = [failing[f"failure/{name}/exposure"][~under].max(axis=(0, 2)) for name in CRITERIA]
     widths = [bar.get_width() for bar in bars.patches]
     np.testing.assert_array_equal(widths[:2], np.max(values, axis=0))
-    marks = bars.get_lines()[:4]
+    marks = bars.get_lines()[: len(CRITERIA)]
     np.testing.assert_array_equal([line.get_xdata() for line in marks], values)
     heights = np.array([line.get_ydata() for line in marks])
     assert np.diff(heights, axis=0).min() > 0.1  # values may coincide, their marks do not
@@ -247,8 +247,8 @@ def test_rings_in_the_bars_are_the_printed_exposures_and_the_map_shows_the_large
 ) -> None:
     arrays = {path: failing[path] for path in failing}
     circle = arrays["failure/circle/exposure"].copy()
-    circle[3] = 50.0  # Puck
-    circle[4] = between
+    circle[ALL_CRITERIA.index("puck")] = 50.0
+    circle[-1] = between
     arrays["failure/circle/exposure"] = circle
     groups = {name: getattr(failing, name).attributes for name in ("failure", "patch")}
     raised = Result(arrays, {"deck": failing.deck_text}, {"": failing.attributes, **groups})
@@ -293,7 +293,7 @@ def test_an_outline_leaves_out_the_sides_between_cells() -> None:
 
 
 def test_exposures_that_can_not_be_shown_are_refused(failing: Result) -> None:
-    words = "no criterion 'strain'; there are max_stress, tsai_wu, hashin, puck, interlaminar"
+    words = f"no criterion 'strain'; there are {', '.join(ALL_CRITERIA)}"
     with pytest.raises(PlotError, match=words):
         plot(failing, "failure", quantity="strain")
     arrays = {path: failing[path] for path in failing}

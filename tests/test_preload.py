@@ -462,9 +462,9 @@ def test_exposures_begin_with_those_of_the_preload(solver: Solver) -> None:
     assert result["exposures/step"].tolist() == [0, 20, 40]
     assert result["exposures/time"][0] == 0.0
     first = [one.exposure for one in expected]
-    assert result["exposures/exposure"][0, :4] == pytest.approx(first, rel=1e-12)
+    assert result["exposures/exposure"][0, : len(first)] == pytest.approx(first, rel=1e-12)
     # Bending adds to them: linear exposures of stress states exactly so.
-    assert np.all(result["exposures/exposure"][1, :4] > first)
+    assert np.all(result["exposures/exposure"][1, : len(first)] > first)
     assert result["failure/max_stress/exposure"].min() > 0.0
 
 

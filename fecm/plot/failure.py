@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import cycle
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -35,7 +36,7 @@ if TYPE_CHECKING:
 
 BETWEEN = "interlaminar"
 NAMES = (*CRITERIA, BETWEEN)
-COLOUR_OF = dict(zip(NAMES, style.COLOURS, strict=False))
+COLOUR_OF = dict(zip(NAMES, cycle(style.COLOURS), strict=False))
 RED = "#C00000"
 LIMIT: style.Look = {"color": RED, "linewidth": 1.0}
 HATCH: style.Look = {"facecolor": "white", "edgecolor": "0.55", "hatch": "//////"}
@@ -43,7 +44,7 @@ OPEN: style.Look = {"mfc": "none", "ls": "none"}
 LARGEST: style.Look = OPEN | {"color": RED, "marker": "o", "ms": 5.0, "mew": 0.9}
 CIRCLE: style.Look = {"color": "black", "linewidth": 0.6, "linestyle": style.DASHED}
 # Marks of the criteria in the bars, in lanes below each other, as values may coincide.
-LANE = 0.17  # of the distance of two bars
+LANE = 0.68 / len(CRITERIA)  # of the distance of two bars
 FILLED: style.Look = {"ls": "none", "mew": 0.0, "zorder": 3.5}
 MARKS: tuple[style.Look, ...] = (
     FILLED | {"marker": "s", "ms": 2.0},
@@ -281,7 +282,7 @@ def _bars(axes: Axes, found: DrawnExposures) -> dict[str, Artist]:
         if alone:
             entries[alone.replace("_", " ")] = Patch(color=COLOUR_OF[alone])
         else:
-            for lane, ((name, values), mark) in enumerate(zip(plies.items(), MARKS, strict=False)):
+            for lane, ((name, values), mark) in enumerate(zip(plies.items(), cycle(MARKS))):
                 place = number + LANE * (lane - (len(plies) - 1) / 2.0)
                 (drawn,) = axes.plot(values, place, color=COLOUR_OF[name], **mark)
                 entries[name.replace("_", " ")] = drawn
