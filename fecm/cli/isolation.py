@@ -18,7 +18,7 @@ import signal
 import sys
 from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import Any, NoReturn, TypeVar
+from typing import Any, NoReturn
 
 from fecm._files import clear_partials
 from fecm._machine import available_memory, format_bytes
@@ -34,7 +34,7 @@ PATIENCE = 120.0  # processor time for each file (s), unless FECM_PATIENCE says 
 SPEED = 100_000  # bytes of the files for each further second
 PR_SET_PDEATHSIG = 1  # prctl(2): signal that a process gets when its parent ends
 
-Command = TypeVar("Command", bound=Callable[..., None])
+Command = Callable[..., None]
 
 enabled = False  # `main` turns it on for a process of its own
 
@@ -89,7 +89,7 @@ def reads(*names: str) -> Callable[[Command], Command]:
                 )
                 raise RefusedError(message) from None
 
-        return command  # type: ignore[return-value]
+        return command
 
     return decorate
 
