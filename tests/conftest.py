@@ -11,6 +11,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+# Threads of BLAS beside several workers wait for each other; NumPy reads this when it is imported.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # A busy machine fails no example.
 settings.register_profile("fecm", deadline=None)
 settings.load_profile("fecm")

@@ -199,7 +199,9 @@ def test_the_scatter_of_toughness_has_its_share_in_the_scatter_of_the_margin(
     assert table[1].split()[0] == "giic"
 
 
-@pytest.mark.parametrize("options", [("--vary", "GIIc=.1,.2"), ("--random", "GIIc=normal:1,.1")])
+@pytest.mark.parametrize(
+    "options", [("--vary", "GIIc=.1,.2"), ("--random", "GIIc=normal:1,.1", "--samples", "16")]
+)
 def test_a_name_in_other_letters_is_suggested(options: tuple[str, ...], tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(tough(400))
     done = call("sweep", "d.inp", *options, "-o", "s.h5", cwd=tmp_path)

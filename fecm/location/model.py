@@ -13,9 +13,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
+from scipy.sparse import csr_array
 
 from fecm._typing import Bools, Floats, Indices
 from fecm.mechanics.elements import Quadrature
@@ -50,8 +52,9 @@ class Observation:
     points: int  # measured times
     step: float  # usual time between two of them
     interval: float  # between two samples
-    # Samples of the rows, (rows,), or values of the rows per sample, (rows, samples).
-    rows: Indices | Floats
+    # Samples of the rows, (rows,), or a matrix of the values of the rows per sample, (rows,
+    # samples), sparse if it interpolates.
+    rows: Any
 
     @property
     def count(self) -> int:
@@ -60,7 +63,11 @@ class Observation:
 
     def of(self, samples: Floats) -> Floats:
         """Rows of functions with samples, (..., samples): (..., rows)."""
-        return samples[..., self.rows] if self.rows.ndim == 1 else samples @ self.rows.T
+        if self.rows.ndim == 1:
+            return samples[..., self.rows]
+        *outer, count = samples.shape
+        rows = self.rows @ samples.reshape(-1, count).T
+        return np.ascontiguousarray(rows.T).reshape(*outer, -1)
 
 
 def observe(time: Floats, strains: Floats, interval: float, count: int) -> Observation:
@@ -77,7 +84,7 @@ def observe(time: Floats, strains: Floats, interval: float, count: int) -> Obser
         matrix, values = factor[:count, :count], factor[:count, count:].T
         left = (factor[count:, count:] ** 2).sum(axis=0)
         return Observation(values, left, len(time), step, interval, matrix)
-    return Observation(strains, left, len(time), step, interval, matrix)
+    return Observation(strains, left, len(time), step, interval, csr_array(matrix))
 
 
 def interpolation(places: Floats, count: int) -> Floats:
@@ -217,15 +224,15 @@ class StrainModel:
         """Samples of the strains of every hat of a force that starts at `shift`."""
         first = self.first_hat(x, y)
         gages, count = first.shape
+        if shift:
+            places = np.arange(float(count)) - shift / self.observation.interval
+            first = first @ interpolation(places, count).T
         every = np.zeros((gages, self.hats, count))
         for hat in range(self.hats):
             late = hat * self.width
             if late < count:
                 every[:, hat, late:] = first[:, : count - late]
-        if not shift:
-            return every
-        places = np.arange(float(count)) - shift / self.observation.interval
-        return every @ interpolation(places, count).T
+        return every
 
     def design(self, x: float, y: float, shift: float = 0.0) -> Floats:
         """Observed strains per coefficient of the force, (gages, rows, hats)."""
