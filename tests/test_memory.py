@@ -25,6 +25,8 @@ from fecm.problem import build_plate, load_deck, needed_bytes
 from fecm.sweeps import ADVANCED_BYTES, HISTORY_BYTES, MOST_TOGETHER
 from tests.calls import assert_unusable, call
 from tests.decks import small
+from tests.test_nonlinear_decks import text
+from tests.test_nonlinear_sweeps import BLOW, PROGRAM
 
 MEGABYTE = 10**6
 
@@ -245,6 +247,91 @@ def test_the_estimate_of_a_sweep_bounds_what_is_measured(
     assert measured <= estimated <= 2 * measured
 
 
+SOFT = text(PROGRAM, data=BLOW)
+SWEEP_ALONE = """
+from fecm.sweeps.checks import sweep_memory
+fecm.run({small!r}, output="small.h5")
+fecm.run({static!r}, output="static.h5")
+fecm.sweep({small!r}, random={{"velocity": "normal:50,1"}}, samples=16)
+fecm.sweep({nonlinear!r}, {{"velocity": [300.0, 400.0]}}, model="reduced", modes=4)
+before = peak()
+sweep = fecm.Sweep("plate.inp", workers=1, **{given})
+memory = sweep_memory(sweep.problem, sweep.plan, 1)
+sweep.execute()
+print(peak() - before, memory.needed())
+"""
+SPEEDS = np.linspace(1000.0, 3000.0, 1000).tolist()
+
+
+@pytest.mark.linux
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("mesh", "duration", "options", "given"),
+    [
+        ("40x40", "2e-4", "--kinematics linear", {"vary": {"velocity": SPEEDS[::20]}}),
+        ("40x40", "4e-4", "--kinematics linear", {"vary": {"velocity": SPEEDS}}),
+        (
+            "20x20",
+            "4e-4",
+            "--kinematics linear",
+            {"vary": {"velocity": SPEEDS[::2]}, "history": True},
+        ),
+        ("40x40", "1e-4", "--kinematics linear", {"vary": {"thickness": [1.0, 1.2, 1.4]}}),
+        (
+            "60x60",
+            "1e-4",
+            "--kinematics linear",
+            {"random": {"velocity": "normal:2000,100"}, "samples": 256},
+        ),
+        (
+            "40x40",
+            "2e-4",
+            "--kinematics linear",
+            {"vary": {"k": [1e5, 2e5]}, "until": {"peak_force": 200.0}},
+        ),
+        (
+            "10x10",
+            "4e-4",
+            "--nonlinear",
+            {"vary": {"velocity": SPEEDS[:500:25]}, "model": "reduced"},
+        ),
+        (
+            "20x20",
+            "1e-4",
+            "--nonlinear",
+            {"vary": {"velocity": SPEEDS[:500:25]}, "model": "reduced"},
+        ),
+        ("10x10", "4e-4", "--nonlinear", {"vary": {"velocity": SPEEDS[::400]}}),
+        ("30x30", "3e-5", "--nonlinear", {"vary": {"velocity": SPEEDS[::400]}}),
+        (
+            "20x20",
+            "1e-4",
+            "--kinematics linear --damage",
+            {"vary": {"velocity": SPEEDS[::400]}, "measure": "failure"},
+        ),
+    ],
+)
+def test_the_estimate_of_a_sweep_is_near_what_is_measured(
+    tmp_path: Path, mesh: str, duration: str, options: str, given: dict[str, object]
+) -> None:
+    of_plate = ["--velocity", "3000mm/s", "--projectile", "mass:2e-4", "--units", "mm-N-s"]
+    kept = [*HIT[: HIT.index("--velocity")], "--contact", "estimate:6", "--support", "clamped"]
+    layup = ["--duration", duration, "--mesh", mesh, *options.split()]
+    done = call("new", tmp_path / "plate.inp", *kept, *of_plate, *layup)
+    assert done.exit_code == 0, done.stderr
+    static = f"{small().partition('MACR')[0]}MACR\nLMAS\nEIGE\nEND\nSTOP\n"
+    program = OWN + SWEEP_ALONE.format(small=small(), static=static, nonlinear=SOFT, given=given)
+    ran = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", program],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    measured, estimate = map(int, ran.stdout.split())
+    assert 0.7 * measured <= estimate <= 2.0 * measured
+
+
 def test_the_steps_of_a_sweep_are_those_of_its_longest_case(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -262,7 +349,7 @@ def test_the_steps_of_a_sweep_are_those_of_its_longest_case(
 
 @pytest.mark.parametrize(
     ("options", "free", "remedy"),
-    [((), 50, "fewer steps"), (("--workers", "3"), 400, "fewer workers"),
+    [((), 50, "fewer steps"), (("--workers", "3"), 100, "fewer workers"),
      (("--history",), 400, "none of their histories")],
 )  # fmt: skip
 def test_a_sweep_that_needs_more_than_is_free_is_refused_with_both_numbers(

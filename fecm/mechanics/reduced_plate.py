@@ -328,15 +328,20 @@ def _in_plane(plate: PlateModel) -> PlateModel:
     return with_codes(plate, codes)
 
 
+def bytes_of_pairs(plate: PlateModel, neq: int, modes: int) -> int:
+    """Memory of the pairs: their loads and solutions, and the strains of some elements."""
+    count = modes * (modes + 1) // 2
+    elements = min(BLOCK, max(len(family.rows) for family in plate.families))
+    return 8 * count * (3 * neq + 4 * elements * 3 * len(plate.rules.bending.xi))
+
+
 def _integrated(plate: PlateModel, plane: PlateModel, shapes: Floats) -> Pairs:
     """Integrals over the pairs of modes, (neq, m)."""
     from scipy import sparse  # 0.16 s, which most runs don't need
 
     modes = shapes.shape[1]
     count = modes * (modes + 1) // 2
-    # Loads of the pairs and their solutions, and the strains of some elements.
-    bytes_of_pairs = 8 * count * (3 * plane.neq + 4 * BLOCK * 3 * len(plate.rules.bending.xi))
-    require_memory(bytes_of_pairs, "the reduced model of the plate")
+    require_memory(bytes_of_pairs(plate, plane.neq, modes), "the reduced model of the plate")
     fields = np.stack([plate.field(shape, 0.0) for shape in shapes.T], axis=2)  # (numnp, 5, m)
     cubic, quartic = np.zeros((modes, count)), np.zeros((count, count))
     loads = np.zeros((plane.neq, count))

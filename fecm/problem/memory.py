@@ -19,6 +19,7 @@ from fecm.mechanics import interpolation
 from fecm.mechanics.impact_steps import FIELDS, TOGETHER
 from fecm.mechanics.plate import ASSEMBLED, BLOCK, PlateModel
 from fecm.mechanics.projectile import REPORT_ELEMENTS
+from fecm.mechanics.reduced_plate import MORE_VECTORS, VECTORS_PER_MODE, bytes_of_pairs
 from fecm.mechanics.solutions import DENSE, FACTORS
 from fecm.mechanics.stiffness_product import AUTO, CSR, KERNELS, WORTH_GROUPING, resolved
 from fecm.mechanics.strains import STRAINS
@@ -131,6 +132,19 @@ def _fields(checked: Problem) -> int:
     # The vectors of the kernels have gone when strains are computed.
     strains = len(STRAINS) * control.numel * len(checked.rules[2].xi) if work.contact_rows else 0
     return 8 * rows * (field + max(n, strains))
+
+
+def reduction_bytes(model: PlateModel, modes: int) -> int:
+    """Memory of the reduction of a plate to some bending modes."""
+    n, in_plane = model.neq, int(np.count_nonzero(model.mesh.equations[:, :2]))
+    vectors = min(n, VECTORS_PER_MODE * modes + MORE_VECTORS)
+    factors = _factors(model, {"TANG"})
+    return (
+        ASSEMBLED * model.entries
+        + factors
+        + 8 * n * vectors
+        + bytes_of_pairs(model, in_plane, modes)
+    )
 
 
 def _buckling(model: PlateModel) -> int:

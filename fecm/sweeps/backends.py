@@ -30,7 +30,7 @@ from fecm.simulation.judge import ENERGY_WARNING
 from fecm.sweeps.checks import ADVANCED_BYTES
 from fecm.sweeps.in_full import CasePeaks, judge_cases, run_case_in_full, thresholds_of
 from fecm.sweeps.outcome import Backend, Outcome, merge, outcome_of
-from fecm.sweeps.plan import Measure, MeasureFunction, shares_plate
+from fecm.sweeps.plan import FORCES, Measure, MeasureFunction, shares_plate
 from fecm.sweeps.reduced import ReducedImpacts, by_halvings, reduced
 from fecm.sweeps.responses import (
     ComputedImpacts,
@@ -39,10 +39,6 @@ from fecm.sweeps.responses import (
     largest_sums,
     plate_response,
 )
-
-# Contact forces that are computed before they are evaluated, where none are stored: 16 MB, which
-# the C library keeps for the next ones and does not give back to the system.
-FORCES = 2_000_000
 
 
 def backend_of(

@@ -17,10 +17,10 @@ from fecm.deck.findings import Finding, Findings
 from fecm.mechanics.kernels import LIBRARY
 from fecm.mechanics.mesh import element_centres
 from fecm.problem.check import check_segments, check_values
-from fecm.problem.memory import needed_bytes
+from fecm.problem.memory import needed_bytes, reduction_bytes
 from fecm.problem.problem import Problem
 from fecm.sweeps.in_full import stores_rows, without_output
-from fecm.sweeps.plan import MOST_TOGETHER, Plan, Task, runs_together, tasks
+from fecm.sweeps.plan import FORCES, MOST_TOGETHER, Plan, Task, runs_together, tasks
 
 THICKNESS = "thickness"
 LAMINATE = names_of(Changes.LAMINATE)
@@ -210,9 +210,20 @@ def sweep_memory(
 
     def of_process(exact: bool) -> int:
         run = needed_bytes(plate, in_memory=in_memory, exact=exact)
-        return run + ADVANCED_BYTES * steps * runs_together(checked, made)
+        if settings.modes is not None:  # beside the full runs of some cases
+            run = max(run, reduction_bytes(checked.plate, settings.modes))
+        return run + ADVANCED_BYTES * steps * _held_together(checked, made, steps)
 
     return SweepMemory(stored, at_once, of_process)
+
+
+def _held_together(checked: Problem, made: Plan, steps: int) -> int:
+    """Most runs whose forces are held at once."""
+    together, settings = runs_together(checked, made), made.settings
+    by_kernels = LIBRARY is not None and settings.law is None and settings.modes is None
+    if settings.history or not by_kernels:
+        return together
+    return min(together, max(1, FORCES // steps))
 
 
 def check_sweep_memory(

@@ -43,6 +43,9 @@ from fecm.sweeps.search import FIRST_VELOCITIES, Search, Sought, Until, search_o
 BuildFunction = Callable[[dict[str, Any]], Deck]  # of a case, whose values are any
 MeasureFunction = Callable[[Result], Mapping[str, float]]
 MOST_TOGETHER = 2048  # cases advanced together
+# Contact forces that are computed before they are evaluated, where none are stored: 16 MB, which
+# the C library keeps for the next ones and does not give back to the system.
+FORCES = 2_000_000
 MOST_REDUCED = 256  # of the reduced model, whose steps cost more
 REDUCED = "reduced"  # name of that model
 MODES = 21  # bending modes of the reduced model
