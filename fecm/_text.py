@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
-from typing import TypeAlias
+from typing import NamedTuple, TypeAlias
 
 Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | float | bool | None"
 
@@ -49,6 +49,27 @@ def csv_line(texts: Iterable[str]) -> str:
     line = io.StringIO()
     csv.writer(line, lineterminator="\n").writerow(texts)
     return line.getvalue()
+
+
+class Row(NamedTuple):
+    """What is said of one quantity; terminals, pages and notebooks show the same rows."""
+
+    label: str  # empty if the row continues the one before
+    text: str
+
+
+LABEL_WIDTH = 18  # of the labels in a terminal
+
+
+def row_lines(rows: Iterable[Row], width: int = LABEL_WIDTH) -> list[str]:
+    """Lines of rows for a terminal.
+
+    Examples
+    --------
+    >>> row_lines([Row("peak force", "86.2 lb"), Row("", "in contact 2")])
+    ['peak force        86.2 lb', '                  in contact 2']
+    """
+    return [f"{label:{width}}{text}".rstrip() for label, text in rows]
 
 
 def html_table(title: str, rows: Iterable[tuple[str, str]]) -> str:

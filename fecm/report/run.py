@@ -44,12 +44,11 @@ from fecm.results.exposures import (
 from fecm.results.metrics import INTEGERS, METRICS
 from fecm.results.result import Result
 from fecm.results.summary import (
-    LABEL_WIDTH,
     UNDECIDED,
     elastic_doubt,
     later_contact,
     radii_of,
-    run_summary,
+    run_rows,
 )
 
 WORDS = {
@@ -240,8 +239,9 @@ def _results(results: Mapping[str, Result]) -> list[PageBlock]:
         return _metrics(results)
     blocks: list[PageBlock] = []
     for name, result in results.items():
-        lines = ((line[:LABEL_WIDTH].strip(), line[LABEL_WIDTH:]) for line in run_summary(result))
-        blocks += page_table(lines, caption=f"Summary of {name}" if len(results) > 1 else "Summary")
+        blocks += page_table(
+            run_rows(result), caption=f"Summary of {name}" if len(results) > 1 else "Summary"
+        )
     return blocks
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fecm._errors import ResultFileError
+from fecm._text import Row
 from fecm._typing import Floats, Indices
 from fecm.authoring.case import CasesError
 from fecm.authoring.impacts import Impacts
@@ -201,19 +202,19 @@ class ReducedModel:
     def _modes(self) -> str:
         return f"{self.modes} mode{'' if self.modes == 1 else 's'}"
 
-    def lines(self) -> Iterator[str]:
+    def rows(self) -> Iterator[Row]:
         """What the summary of the sweep says of the model."""
-        yield f"reduced model     {self._modes} of bending; difference from full runs:"
+        yield Row("reduced model", f"{self._modes} of bending; difference from full runs:")
         rows = zip(
             self.columns["case"], self.difference("peak_force"), self.difference(RATIO), strict=True
         )
         for case, peak, w in rows:
             of_w = "open" if np.isnan(w) else f"{w:+.3%}"
-            yield f"{'':18}peak {peak:+.2%}, w {of_w} (case {case})"
+            yield Row("", f"peak {peak:+.2%}, w {of_w} (case {case})")
         if self.in_full:
             cases = "1 case" if self.in_full == 1 else f"{self.in_full} cases"
-            yield f"{'':18}{cases} of the largest energies: in full, as above {LIMIT:.0%}"
-        yield f"{'':18}slopes and strains are not judged"
+            yield Row("", f"{cases} of the largest energies: in full, as above {LIMIT:.0%}")
+        yield Row("", "slopes and strains are not judged")
 
     def check(self) -> None:
         """Raise CasesError if a peak differs by more than the limit."""

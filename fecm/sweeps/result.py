@@ -28,11 +28,10 @@ from fecm.sweeps.reduced import ReducedModel
 from fecm.sweeps.statistics import evaluate
 from fecm.sweeps.stored import StoredSweep
 from fecm.sweeps.summary import (
-    LABEL_WIDTH,
     doubtful_counts,
     reasons,
     remarks,
-    sweep_summary,
+    sweep_rows,
     sweep_verdict,
 )
 
@@ -79,8 +78,7 @@ class SweepResult(StoredSweep):
 
     def _repr_html_(self) -> str:
         """Table of the summary, for notebooks."""
-        lines = ((line[:LABEL_WIDTH].strip(), line[LABEL_WIDTH:]) for line in sweep_summary(self))
-        return html_table(repr(self)[1:-1], lines)
+        return html_table(repr(self)[1:-1], sweep_rows(self))
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from fecm._errors import ResultFileError
-from fecm._text import DIGITS, significant
+from fecm._text import DIGITS, Row, row_lines, significant
 from fecm._typing import Bools
 from fecm.authoring.case import THRESHOLD, pair_of_text
 from fecm.deck.model import Curvature, Preload, Segment
@@ -32,7 +32,6 @@ from fecm.sweeps.random import pairs_of
 from fecm.sweeps.statistics import QUANTILES, RandomResult
 from fecm.sweeps.stored import StoredSweep
 
-LABEL_WIDTH = 18  # of the lines of the summary
 GIVEN = 6  # digits of the values of a case, unless others are closer
 MOST_REASONS = 5  # of failure, that the summary lists
 WEIGHED = ("mass", "rod_mass", "energy")  # values that the summary shows in g and J
@@ -41,23 +40,28 @@ SAME_PLACE = 1e-9  # distance from the place given, relative to its coordinates,
 
 
 def sweep_summary(result: StoredSweep) -> list[str]:
-    """Return summary lines: number of cases, smallest and largest peak or velocity, failures."""
+    """Return the lines of :func:`sweep_rows`."""
+    return row_lines(sweep_rows(result))
+
+
+def sweep_rows(result: StoredSweep) -> list[Row]:
+    """Summarise a sweep: number of cases, smallest and largest peak or velocity, failures."""
     fine = result.completed
     failed = Counter(result["status"][~fine].tolist())
-    lines = [f"cases             {len(result)}"]
+    rows = [Row("cases", f"{len(result)}")]
     if result.law:
-        lines.append(f"contact law       {result.law}, instead of EXPE")
-    lines += [*_extremes(result), *_moved(result)]
+        rows.append(Row("contact law", f"{result.law}, instead of EXPE"))
+    rows += [*_extremes(result), *_moved(result)]
     for reason, times in failed.most_common(MOST_REASONS):
-        lines.append(f"failed            {times}: {reason}")
+        rows.append(Row("failed", f"{times}: {reason}"))
     if (others := len(failed) - MOST_REASONS) > 0:
-        lines.append(f"failed            for {others} other reason{'s' * (others > 1)}")
+        rows.append(Row("failed", f"for {others} other reason{'s' * (others > 1)}"))
     if result.random is not None and failed:
-        lines.append(f"failed share      {(~fine).mean():.3%} of the draws")
-    return [*lines, *(() if result.reduced is None else result.reduced.lines())]
+        rows.append(Row("failed share", f"{(~fine).mean():.3%} of the draws"))
+    return [*rows, *(() if result.reduced is None else result.reduced.rows())]
 
 
-def _extremes(result: StoredSweep) -> Iterator[str]:
+def _extremes(result: StoredSweep) -> Iterator[Row]:
     """The cases with the smallest and the largest peak, or velocity found."""
     what, names = "peak", ["peak_force"]
     if "found_velocity" in result.summary:
@@ -69,8 +73,8 @@ def _extremes(result: StoredSweep) -> Iterator[str]:
         texts = [quantity(result[name][case], result.unit(name), DIGITS) for name in names]
         values = ", ".join(f"{name} {_shown(result, name, int(case))}" for name in result.cases)
         given = f" ({values})" if values else ""
-        label = f"{size} {what:{LABEL_WIDTH - 2 - len(size)}}"
-        yield f"{label} {', '.join(texts)}{given}{_found_band(result, int(case))}"
+        text = f"{', '.join(texts)}{given}{_found_band(result, int(case))}"
+        yield Row(f"{size} {what}", text)
 
 
 def _found_band(result: StoredSweep, case: int) -> str:
@@ -84,7 +88,7 @@ def _found_band(result: StoredSweep, case: int) -> str:
     return f"; finer meshes {quantity(low, unit, 3)} to {quantity(high, unit, 3)}"
 
 
-def _moved(result: StoredSweep) -> Iterator[str]:
+def _moved(result: StoredSweep) -> Iterator[Row]:
     """How far the places that were hit are from those given."""
     if "at" not in result.cases or "hit_x" not in result.summary:
         return
@@ -92,7 +96,7 @@ def _moved(result: StoredSweep) -> Iterator[str]:
     moved = np.hypot(*(asked - (result["hit_x"], result["hit_y"])))
     if count := np.count_nonzero(moved > SAME_PLACE * np.abs(asked).max()):
         distance = f"{np.nanmax(moved):.4g} {result.unit('hit_x')}".rstrip()
-        yield f"moved             {count}: to the nearest node, up to {distance} away"
+        yield Row("moved", f"{count}: to the nearest node, up to {distance} away")
 
 
 def _shown(result: StoredSweep, name: str, case: int) -> str:
