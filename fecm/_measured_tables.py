@@ -88,6 +88,20 @@ _BRACKETS = re.compile(r"[(\[]([^)\]]*)[)\]]")
 _SEPARATOR = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
 
 
+class TableColumn(NamedTuple):
+    """A column that is read as a quantity, such as force, a strain, or any other."""
+
+    name: str
+    place: int  # from 0
+    unit: str = ""  # in the file; empty if it names none
+    is_negated: bool = False
+
+    @property
+    def dimension(self) -> str:
+        """Dimension of the quantity; empty if its numbers are never converted."""
+        return DIMENSIONS.get(self.name, "strain" if self.name.startswith("gage ") else "")
+
+
 class MeasuredTable(NamedTuple):
     """Rows of a file below the names and units of its columns; both are empty if it has none."""
 
@@ -106,50 +120,44 @@ class MeasuredTable(NamedTuple):
         """Whether a column has a name of a quantity."""
         return any(same_name(word, one) for word in WORDS.get(name, (name,)) for one in self.names)
 
-    def unit(self, place: int) -> str:
-        """Unit of a column; empty if the table names none."""
-        return self.units[place] if place < len(self.units) else ""
+    def column(self, name: str, place: int, *, is_negated: bool = False) -> TableColumn:
+        """The column of a number as a quantity."""
+        unit = self.units[place] if place < len(self.units) else ""
+        return TableColumn(name, place, unit, is_negated)
 
-    def places(
+    def find(
         self,
         names: Sequence[str],
         columns: Sequence[str] | None = None,
         units: Mapping[str, str] = NO_UNITS,
-    ) -> list[int]:
-        """Numbers of the columns of quantities, which have a name of :data:`WORDS` or their own.
+    ) -> list[TableColumn]:
+        """Columns of quantities, which have a name of :data:`WORDS` or their own.
 
         `columns` has the names or the numbers (from 1) that the user gave, empty if none; None if
-        the user can't give them.  In a table without names the first columns are taken, with a
-        warning that says so.  Of several columns with the same name, the one in the unit of
-        `units`, or else the first one in a known unit, is taken.  Raises StudyError if a column is
-        missing, or two can't be told apart.
+        the user can't give them.  A minus before one changes the sign.  In a table without names
+        the first columns are taken, with a warning that says so.  Of several columns with the same
+        name, the one in the unit of `units`, or else the first one in a known unit, is taken.
+        Raises StudyError if a column is missing, or two can't be told apart.
         """
-        places = []
-        wanted = [column.removeprefix("-") for column in columns or [""] * len(names)]
+        found, given = [], columns or [""] * len(names)
+        wanted = [column.removeprefix("-") for column in given]
         self._check_numbers(wanted)
-        for name, order, column in zip(names, range(len(names)), wanted, strict=True):
+        remedy = f"`columns` of {' and '.join(names)} selects others by name or number"
+        if columns is None:
+            remedy = "rename it in the file"
+        for order, (name, column) in enumerate(zip(names, wanted, strict=True)):
             if column.isdecimal() and int(column) and column not in self.names:
-                places.append(int(column) - 1)
+                place = int(column) - 1
             elif not self.head[1] and not column:
-                places.append(order)
+                place = order
             else:
-                words = (column,) if column else WORDS.get(name, (name,))
-                dimension = DIMENSIONS.get(name, "")
-                if (place := self._place(words, dimension, units.get(dimension, ""))) is None:
-                    listing = ", ".join(self.head[1])[:80] or "unnamed"
-                    others = f" (or {', '.join(words[1:])})" if words[1:] else ""
-                    remedy = f"`columns` of {' and '.join(names)} selects others by name or number"
-                    if columns is None:
-                        remedy = "rename it in the file"
-                    raise StudyError(
-                        f"{self.path}: the columns are {listing}; one must be named "
-                        f"{words[0]}{others}; {remedy}"
-                    )
-                places.append(place)
-        if not (self.head[1] or any(columns or ())):
+                unit = units.get(DIMENSIONS.get(name, ""), "")
+                place = self._place(name, column, unit, remedy)
+            found.append(self.column(name, place, is_negated=column != given[order]))
+        if not (self.head[1] or any(wanted)):
             taken = ", ".join(f"column {n + 1} as {name}" for n, name in enumerate(names))
             warn(f"{self.path} has no names of columns: {taken}")
-        return places
+        return found
 
     def _check_numbers(self, wanted: Sequence[str]) -> None:
         """Raise StudyError if columns are given by numbers that are names of other columns."""
@@ -162,60 +170,61 @@ class MeasuredTable(NamedTuple):
                 "rename them in the file, or name one of the columns by a text"
             )
 
-    def _place(self, words: Sequence[str], dimension: str, unit: str) -> int | None:
-        """Number of the column with the first of some names that the table has."""
-        for word in words:
-            places = [n for n, name in enumerate(self.names) if same_name(word, name)]
+    def _place(self, quantity: str, given: str, unit: str, remedy: str) -> int:
+        """Number of the column with a given name, or else the first of a quantity's names."""
+        words = (given,) if given else WORDS.get(quantity, (quantity,))
+        word = next((word for word in words if any(same_name(word, n) for n in self.names)), "")
+        places = [n for n, name in enumerate(self.names) if word and same_name(word, name)]
+        if len(places) > 1:  # in several units
             exact = [n for n in places if self.head[1][n] == word != unit_free(word)]
-            if len(places) > 1:  # in several units
-                own = {n: plain_unit(self.units[n]) for n in places}
-                known = [n for n in places if own[n] and own[n] in UNITS.get(dimension, {})]
-                wanted = exact or [n for n in known if own[n] == plain_unit(unit)]
-                distinct = len({own[n] for n in known}) == len(known)
-                places = wanted if len(wanted) == 1 else known[: distinct and not wanted]
-                return places[0] if places else None
-            if places:
-                return places[0]
-        return None
+            own = {n: plain_unit(self.units[n]) for n in places}
+            sizes = UNITS.get(DIMENSIONS.get(quantity, ""), {})
+            known = [n for n in places if own[n] and own[n] in sizes]
+            wanted = exact or [n for n in known if own[n] == plain_unit(unit)]
+            distinct = len({own[n] for n in known}) == len(known)
+            places = wanted if len(wanted) == 1 else known[: distinct and not wanted]
+        if places:
+            return places[0]
+        listing = ", ".join(self.head[1])[:80] or "unnamed"
+        others = f" (or {', '.join(words[1:])})" if words[1:] else ""
+        raise StudyError(
+            f"{self.path}: the columns are {listing}; one must be named {words[0]}{others}; "
+            f"{remedy}"
+        )
 
-    def columns(
+    def values(
         self,
-        names: Sequence[str],
-        columns: Sequence[str] | None = None,
+        columns: Sequence[TableColumn],
         units: Mapping[str, str] | None = None,
         *,
         stated: Sequence[str] = (),
-        places: Sequence[int] = (),
         increasing: str = "",
-    ) -> dict[str, Floats]:
-        """Numbers of some columns, (rows,) each, by name, in `units` by dimension.
+    ) -> list[Floats]:
+        """Numbers of some columns, (rows,) each, in `units` by dimension.
 
-        Without `units`, nothing is converted.  `columns` is that of :meth:`places`, unless `places`
-        are given; a minus before one changes the sign.  `stated` are the units of a table that
-        names none.  Raises StudyError as :meth:`places`, and if a unit is unknown or has none to be
-        converted to, a field is not a finite number, there are fewer than two rows, or the values
-        of the column `increasing` do not increase.
+        Without `units`, nothing is converted.  `stated` are the units of a table that names none.
+        Raises StudyError if a unit is unknown or has none to be converted to, a field is not a
+        finite number, there are fewer than two rows, or the values of the column `increasing` do
+        not increase.
         """
-        places = places or self.places(names, columns, units or NO_UNITS)
         if len(self.rows) < 2:
             raise StudyError(f"{self.path}: the table has fewer than two rows of numbers")
-        for name, place in zip(names, places, strict=True):
-            self.check_thousands(name, place)
-        rows = [self.head, *self.rows] if self._head_is_row(places) else self.rows
-        values = np.array([self._values(row, names, places) for row in rows])
-        found = dict(zip(names, values.T, strict=True))
+        for column in columns:
+            self.check_thousands(column.name, column.place)
+        rows = [self.head, *self.rows] if self._head_is_row(columns) else self.rows
+        found = list(np.array([self._row(row, columns) for row in rows]).T)
         if increasing:
-            self._check_increase(found, increasing, [line for line, _ in rows])
-        for n, (name, place) in enumerate(zip(names, places, strict=True)):
-            dimension = DIMENSIONS.get(name, "strain" if name.startswith("gage ") else "")
-            own, said = self.unit(place), stated[n] if stated else ""
-            where = f"{self.path}: {name}"
+            named = {column.name: values for column, values in zip(columns, found, strict=True)}
+            self._check_increase(named, increasing, [line for line, _ in rows])
+        for n, column in enumerate(columns):
+            own, said = column.unit, stated[n] if stated else ""
+            where, dimension = f"{self.path}: {column.name}", column.dimension
             if own and said and factor(where, own, said, dimension) != 1.0:
                 raise StudyError(f"{where} is in {own}, and `units` says {said}")
             if units is not None and dimension:
-                found[name] *= factor(where, said or own, units.get(dimension, ""), dimension)
-            if columns and columns[n].startswith("-"):
-                found[name] = -found[name]
+                found[n] *= factor(where, said or own, units.get(dimension, ""), dimension)
+            if column.is_negated:
+                found[n] = -found[n]
         return found
 
     def check_thousands(self, name: str, place: int) -> None:
@@ -235,7 +244,7 @@ class MeasuredTable(NamedTuple):
             raise StudyError(
                 f"{self.path}:{line}: {name} is {text!r} beside whole numbers; {UNMARKED}"
             )
-        if marked and self._has_only_groups:
+        if marked and self.is_decimal_comma and self._has_only_groups:
             line, text = marked[0]
             warn(
                 f"{self.path}:{line}: {name}, {text.replace('.', ',')!r}, is taken as {text}; if "
@@ -244,18 +253,18 @@ class MeasuredTable(NamedTuple):
 
     @property
     def _has_only_groups(self) -> bool:
-        """Whether every comma of the table may separate thousands."""
+        """Whether every decimal comma of the table may separate thousands."""
         fields = chain.from_iterable(row for _, row in self.rows)
         marked = [f for f in fields if "." in f and _number(f) is not None]
-        return self.is_decimal_comma and all(map(_GROUPED.fullmatch, marked))
+        return all(map(_GROUPED.fullmatch, marked))
 
-    def _head_is_row(self, places: Sequence[int]) -> bool:
+    def _head_is_row(self, columns: Sequence[TableColumn]) -> bool:
         """Whether the line taken for names has numbers in some columns, as oscilloscopes write it.
 
         Different whole numbers from 1 are names, of gages or channels.
         """
-        fields = [self.head[1][place] for place in places if place < len(self.head[1])]
-        if len(fields) < len(places) or any(_number(field) is None for field in fields):
+        fields = [self.head[1][one.place] for one in columns if one.place < len(self.head[1])]
+        if len(fields) < len(columns) or any(_number(field) is None for field in fields):
             return False
         if len(set(fields)) < len(fields) or not all(f.isdecimal() and int(f) for f in fields):
             return True
@@ -278,8 +287,8 @@ class MeasuredTable(NamedTuple):
             f"follows {before:g}{swapped}"
         )
 
-    def _values(self, row: Row, names: Sequence[str], places: Sequence[int]) -> list[float]:
-        """Return the numbers of one row in the order of `names`."""
+    def _row(self, row: Row, columns: Sequence[TableColumn]) -> list[float]:
+        """Return the numbers of one row in the order of `columns`."""
         line, fields = row
         if self.head[1] and len(fields) > len(self.head[1]):
             raise StudyError(
@@ -288,14 +297,14 @@ class MeasuredTable(NamedTuple):
                 "columns by semicolons or tabs"
             )
         values = []
-        for name, place in zip(names, places, strict=True):
-            field = fields[place] if place < len(fields) else ""
+        for column in columns:
+            field = fields[column.place] if column.place < len(fields) else ""
             value = _number(field)
             if value is None or not math.isfinite(value):
                 found = repr(field) if field else "empty"
                 hint = f"; {UNMARKED}" if _GROUPED.fullmatch(field) else ""
                 raise StudyError(
-                    f"{self.path}:{line}: {name} is {found}, not a finite number{hint}"
+                    f"{self.path}:{line}: {column.name} is {found}, not a finite number{hint}"
                 )
             values.append(value)
         return values

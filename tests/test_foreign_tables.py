@@ -282,14 +282,13 @@ def test_separators_of_thousands_are_no_decimal_marks(
     file = tmp_path / "force.csv"
     file.write_text(text)
     with pytest.raises(StudyError, match=f":3: force is {written}; write numbers without sep"):
-        read_table(file).columns(("time", "force"), units=DECK)
+        measurement_of(file, DECK)
 
 
 def test_three_decimals_are_decimals_where_smaller_numbers_have_them_too(tmp_path: Path) -> None:
     file = tmp_path / "force.csv"
     file.write_text("time (s);force (N)\n0;0,950\n1;1,060\n2;999\n")
-    found = read_table(file).columns(("time", "force"), units=DECK)
-    assert found["force"].tolist() == [0.95, 1.06, 999.0]
+    assert measurement_of(file, DECK).force.tolist() == [0.95, 1.06, 999.0]
 
 
 def test_thousands_in_a_table_of_cases_are_refused(tmp_path: Path) -> None:

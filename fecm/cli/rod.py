@@ -289,29 +289,28 @@ def calibrate_command(
     the accelerometer on a free target.  V_F is converted to the unit of V_a.  The slope of V_F over
     V_a gives c_F = (c_a / m) V_F / V_a.
     """
-    measured, names = read_table(test), ("time", "V_F", "V_a")
-    places = measured.places(names, columns or ())
-    units = [measured.unit(place) for place in places]
+    measured = read_table(test)
+    found = measured.find(("time", "V_F", "V_a"), columns or ())
+    units = [column.unit for column in found]
     if bool(units[1]) != bool(units[2]):
         raise RefusedError(
             f"{test}: one of V_F and V_a is in {units[1] or units[2]}; name both units"
         )
-    time, v_f, v_a = measured.columns(
-        names, columns, {"time": units[0], "voltage": units[2]}, places=places, increasing="time"
-    ).values()
+    target = {"time": units[0], "voltage": units[2]}
+    time, v_f, v_a = measured.values(found, target, increasing="time")
     try:
-        found = fit_sensitivity(v_f, v_a, mass, c_a, through_origin=through_origin)
+        fit = fit_sensitivity(v_f, v_a, mass, c_a, through_origin=through_origin)
     except StudyError as error:
         raise RefusedError(f"{test}: {error}") from None
     units[1] = units[2]
-    if found.slope < 0.0:
+    if fit.slope < 0.0:
         note("the slope is negative: V_F and V_a have opposite signs; --columns time,V_F,-V_a")
-    targets.draw("studies:calibration_picture", time, v_f, v_a, found, units)
+    targets.draw("studies:calibration_picture", time, v_f, v_a, fit, units)
     if form is Format.JSON:
-        click.echo(json.dumps(vars(found)))
+        click.echo(json.dumps(vars(fit)))
         return
-    click.echo(f"points            {found.points}")
-    click.echo(f"slope V_F/V_a     {found.slope:.6g} ± {found.slope_error:.2g}")
-    click.echo(f"offset of V_F     {found.offset:.6g} ± {found.offset_error:.2g}")
-    click.echo(f"R²                {found.r_squared:.6f}")
-    click.echo(f"sensitivity c_F   {found.sensitivity:.6g} ± {found.sensitivity_error:.2g}")
+    click.echo(f"points            {fit.points}")
+    click.echo(f"slope V_F/V_a     {fit.slope:.6g} ± {fit.slope_error:.2g}")
+    click.echo(f"offset of V_F     {fit.offset:.6g} ± {fit.offset_error:.2g}")
+    click.echo(f"R²                {fit.r_squared:.6f}")
+    click.echo(f"sensitivity c_F   {fit.sensitivity:.6g} ± {fit.sensitivity_error:.2g}")

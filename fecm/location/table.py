@@ -169,11 +169,11 @@ def _from_file(path: Path, units: Mapping[str, str], numbers: Sequence[int]) -> 
         return _from_long(table, name, units, numbers)
     width = len(table.rows[0][1]) if table.rows else 0
     heads = table.head[1] or [f"column {n}" for n in range(1, width + 1)]
-    clock = table.places(["time"])[0] if table.has("time") or not table.head[1] else 0
-    gages = _numbered(name, {n: head for n, head in enumerate(heads) if n != clock}, numbers)
-    keys = ["time", *(f"gage {gage}" for gage in gages.values())]
-    places = [clock, *gages]
-    time, *strains = table.columns(keys, units=units, places=places, increasing="time").values()
+    named = table.has("time") or not table.head[1]
+    clock = table.find(["time"])[0] if named else table.column("time", 0)
+    gages = _numbered(name, {n: head for n, head in enumerate(heads) if n != clock.place}, numbers)
+    columns = [clock, *(table.column(f"gage {gage}", place) for place, gage in gages.items())]
+    time, *strains = table.values(columns, units, increasing="time")
     return _made(name, time, list(gages.values()), strains)
 
 
@@ -181,7 +181,7 @@ def _from_long(
     table: MeasuredTable, name: str, units: Mapping[str, str], numbers: Sequence[int]
 ) -> StrainTable:
     """A row for every time and gage, as ``fecm export`` writes them."""
-    time, gage, strain = table.columns(("time", "gage", "strain"), units=units).values()
+    time, gage, strain = table.values(table.find(("time", "gage", "strain"), units=units), units)
     gages = [number for number in numbers if (gage == number).any()]
     if unknown := sorted(set(gage.tolist()) - set(gages)):
         known = ", ".join(map(str, numbers))

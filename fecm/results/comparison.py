@@ -154,9 +154,8 @@ def _from_file(
 ) -> Measurement:
     table = read_table(path)
     column = "transducer" if table.has("transducer") and not table.has("force") else "force"
-    time, force = table.columns(
-        ("time", column), columns, units, stated=stated, increasing="time"
-    ).values()
+    found = table.find(("time", column), columns, units)
+    time, force = table.values(found, units, stated=stated, increasing="time")
     return Measurement(printable(path.name), column, time, force)
 
 

@@ -239,14 +239,14 @@ def read_test(
     OSError if the file cannot be read.
     """
     table = read_table(path)
-    places = table.places(NAMES, columns)
-    stated = (table.unit(places[0]), table.unit(places[1]))
+    length, load = table.find(NAMES, columns)
+    stated = (length.unit, load.unit)
     if units is None and any(stated) and not all(stated):
         text = f"{path}: one column is in {stated[0] or stated[1]}, the other has no unit"
         raise StudyError(f"{text}; state both, or give both in `units`")
     names = units or (_system(*stated) if any(stated) else None)
     target = dict(zip(("length", "force"), names, strict=True)) if names else {}
-    indentation, force = table.columns(NAMES, columns, target, places=places).values()
+    indentation, force = table.values((length, load), target)
     if names and any(stated):
         stated = (stated[0] or names[0], stated[1] or names[1])
     return Test(indentation, force, target, stated)

@@ -254,15 +254,15 @@ def _of_table(path: Path, column: str | None) -> TimeHistory:
     if heads and column and not (column.isdecimal() or table.has(column)):
         raise StudyError(f"{path} has no column {column}; it has {', '.join(table.names)}")
     if not (heads or column):
-        places = table.places(("time", "value"))
+        found = table.find(("time", "value"))
     else:
-        clock = table.places(["time"])[0] if heads and table.has("time") else 0
+        clock = table.find(["time"])[0].place if heads and table.has("time") else 0
         value = column or (TRANSDUCER if table.has(TRANSDUCER) else "")
-        place = table.places(["value"], [value])[0] if value else int(clock == 0)
+        place = table.find(["value"], [value])[0].place if value else int(clock == 0)
         if not value and len(heads) > 2:
             warn(f"{path}: the column {heads[place]} is filtered; --column takes another")
-        places = [clock, place]
-    time, values = table.columns(("time", "value"), places=places, increasing="time").values()
-    unit = table.unit(places[0])
-    name = table.names[places[1]] if heads else "value"
+        found = [table.column("time", clock), table.column("value", place)]
+    time, values = table.values(found, increasing="time")
+    unit = found[0].unit
+    name = table.names[found[1].place] if heads else "value"
     return TimeHistory(name, time, values, dimension="", units={"time": unit} if unit else {})

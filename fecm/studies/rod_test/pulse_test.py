@@ -94,9 +94,9 @@ def _table(text: str, units: Mapping[str, str]) -> Pulse:
     path = Path(text)
     if not path.is_file():
         raise StudyError(f"{text} is neither a file nor a pulse; use {USAGE}")
-    time, force = (
-        read_table(path).columns(("time", "force"), None, units, increasing="time").values()
-    )
+    table = read_table(path)
+    found = table.find(("time", "force"), units=units)
+    time, force = table.values(found, units, increasing="time")
     if time[-1] <= 0.0:
         raise StudyError(f"{path}: the pulse ends before time 0")
     return table_pulse(time, force)
