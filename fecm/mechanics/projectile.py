@@ -60,7 +60,7 @@ class OwnProjectile:
     """
 
     def __init__(self, given: LinearProjectile) -> None:
-        self.name = type(given).__name__
+        self.name: str = type(given).__name__
         if isinstance(given, type):
             raise ProjectileError(
                 f"projectile {given.__name__} is a class; pass an object of it: "
@@ -81,7 +81,7 @@ class OwnProjectile:
         self.rigid: Floats = np.ones(len(M))
         self._check_free(K)
         self._inertia = M
-        self.total_mass = float(self.rigid @ M @ self.rigid)
+        self.total_mass: float = float(self.rigid @ M @ self.rigid)
 
     def _check_free(self, K: Floats) -> None:
         """Raise ProjectileError unless only the rigid motion has no force."""

@@ -230,7 +230,7 @@ class Run:
     )
 
     def __post_init__(self) -> None:
-        self.options = RunOptions(
+        self.options: RunOptions = RunOptions(
             active_slips(self.mode, self.slips),
             self.solver,
             self.threads,
@@ -241,17 +241,18 @@ class Run:
             criteria=own_criteria(self.criteria),
         )
         self._loaded = load_deck(self.deck, self.mode)
-        self.source = self._loaded.source
+        self.source: str = self._loaded.source
         self._loaded.refuse_errors(self.force)
         problems = self._loaded.problems
         for problem in problems:
             check_run_options(problem, self.options)
+        self.problems: list[ProblemRun]
         if self.output is not None:
             self.problems = self._with_files(problems, Path(self.output))
             return
         if self.printed or self.resume or self.checkpoint is not None:
             raise OptionsError("printed, resume and checkpoint need an output file")
-        self.problems = [ProblemRun(one, self.options) for one in problems]
+        self.problems = [ProblemRun(problem, self.options) for problem in problems]
 
     def _with_files(self, problems: list[Problem], first: Path) -> list[ProblemRun]:
         """Give the problems their files, which are checked."""

@@ -278,11 +278,11 @@ class Sweep:
         cases, design = self._cases(loaded)
         self._check_sendable(own_measure, law)
         self._loaded = loaded or _first_built(self.build, cases)
-        (self.problem,) = self._loaded.problems
+        self.problem: Problem = self._loaded.problems[0]
         if self.refine is not None:
             cases, measures = refined_cases(self.problem, self.refine), (Measure.DEFLECTION,)
         self._prepare_outputs(len(cases))
-        self.plan = plan(
+        self.plan: Plan = plan(
             self.problem,
             cases,
             history=self.history,
@@ -352,7 +352,7 @@ class Sweep:
         chosen = tuple(dict.fromkeys(self.full))
         if chosen and max(chosen) >= count:
             raise CasesError(f"`full` {max(chosen)}: the cases are 0 to {count - 1}")
-        self.path = None if self.output is None else Path(self.output)
+        self.path: Path | None = None if self.output is None else Path(self.output)
         self.full_paths: dict[int, Path] = {}
         if self.path is None:
             if chosen:
