@@ -163,7 +163,7 @@ def _computed(job: Sweep) -> SweepResult:
         signals.deferred(),
         watching("fecm", len(job.all_cases), rate) as watch,
     ):
-        return job.execute(watch, keeps_forces=False)
+        return job.compute(watch, keeps_forces=False)
 
 
 def _print(result: SweepResult, job: Sweep) -> None:

@@ -15,7 +15,6 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecm._errors import warn
 from fecm._files import check_outputs
 from fecm._options import documented, option, with_parameters_of
 from fecm._text import html_table
@@ -431,18 +430,15 @@ class Sweep:
         memory = sweep_memory(problem, made, self._means.here, streamed=self._streams)
         return Price(steps, output_bytes(problem, made), memory.needed(), seconds)
 
-    def execute(self, watch: Watch | None = None, *, keeps_forces: bool = True) -> SweepResult:
-        """Compute the cases that are not stored, and write the result.
-
-        Doubts before the start, and the numbers of failed and doubtful cases, are notes of the
-        watch; without one they are :class:`FecmWarning`.
+    def execute(self, watch: Watch | None = None) -> SweepResult:
+        """Compute the cases that are not stored, write the result, and run the cases of `full`.
 
         Parameters
         ----------
         watch : Watch, optional
-            Gets the progress and the notes, and may stop the sweep.
-        keeps_forces : bool
-            Keep the forces of `history` in the result, beside the file.
+            Gets the progress and the notes, and may stop the sweep.  Without one the progress goes
+            to `progress`, and the warnings of the deck, :attr:`doubts` and the notes of the result
+            are :class:`FecmWarning`.
 
         Returns
         -------
@@ -465,32 +461,33 @@ class Sweep:
         OSError
             If a file can't be written.
         """
-        is_called = watch is None
         watch = watch or CallerWatch(self.title, self.progress)
-        if is_called:
-            for text in (*self._loaded.warnings, *self.doubts):
-                warn(text)
+        for text in (*self._loaded.warnings, *self.doubts):
+            watch.note(text)
+        result = self.compute(watch)
+        for text in result.notes:
+            watch.note(text)
+        for run in self.full_runs().values():
+            run.execute(watch)
+        return result
+
+    def compute(self, watch: Watch, *, keeps_forces: bool = True) -> SweepResult:
+        """Compute the cases that are not stored and write the result; see :meth:`execute`.
+
+        Without `keeps_forces`, the forces of `history` are in the file alone.
+        """
         streams = self._streams and not keeps_forces
-        workers = self._means.here
-        check_sweep_memory(self.problem, self.plan, workers, streamed=streams)
+        check_sweep_memory(self.problem, self.plan, self._means.here, streamed=streams)
         LOGGER.info("%s: %d cases", self.title, len(self.all_cases))
         with contextlib.ExitStack() as stack:
             parts = None
             if self._streams and self.path is not None:
                 stack.enter_context(exclusive_result(self.path))
                 parts = PartialResults(
-                    self.path,
-                    self.plan.fingerprint(),
-                    restart=self.overwrite,
-                    resume=self.resume,
+                    self.path, self.plan.fingerprint(), restart=self.overwrite, resume=self.resume
                 )
             result = self._computed(parts, watch, keeps_forces=keeps_forces or parts is None)
             self._save(result, parts, watch)
-        if is_called:
-            for text in result.notes:
-                warn(text)
-            for run in self.full_runs().values():
-                run.execute(watch)
         return result
 
     def _computed(
