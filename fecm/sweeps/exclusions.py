@@ -83,9 +83,12 @@ def check_options(job: Sweep) -> None:
 def exclusions_table() -> list[str]:
     """Rows of the table of the docs."""
     lines = ["| option | not with | because |", "|---|---|---|"]
-    lines += [f"| {_code(o)} | {', '.join(map(_code, b))} | {r} |" for o, b, r in EXCLUSIONS]
+    lines += [f"| {_quoted(o)} | {', '.join(map(_quoted, b))} | {r} |" for o, b, r in EXCLUSIONS]
     lines += ["", "| option | needs | because |", "|---|---|---|"]
-    return [*lines, *(f"| {', '.join(map(_code, o))} | {_code(n)} | {r} |" for o, n, r in NEEDS)]
+    return [
+        *lines,
+        *(f"| {', '.join(map(_quoted, o))} | {_quoted(n)} | {r} |" for o, n, r in NEEDS),
+    ]
 
 
 def _given(job: Sweep) -> set[str]:
@@ -125,9 +128,5 @@ def _check_types(job: Sweep) -> None:
 
 
 def _quoted(option: str) -> str:
-    """An option as an argument; the command line shows its own name."""
-    return f"`{option}`" if option.isidentifier() else option
-
-
-def _code(option: str) -> str:
+    """Mark the name of an argument, which the command line replaces by its own."""
     return f"`{option}`" if option.isidentifier() else option
