@@ -51,7 +51,7 @@ def csv_line(texts: Iterable[str]) -> str:
     return line.getvalue()
 
 
-class Row(NamedTuple):
+class SummaryRow(NamedTuple):
     """What is said of one quantity; terminals, pages and notebooks show the same rows."""
 
     label: str  # empty if the row continues the one before
@@ -61,12 +61,12 @@ class Row(NamedTuple):
 LABEL_WIDTH = 18  # of the labels in a terminal
 
 
-def row_lines(rows: Iterable[Row], width: int = LABEL_WIDTH) -> list[str]:
+def row_lines(rows: Iterable[SummaryRow], width: int = LABEL_WIDTH) -> list[str]:
     """Lines of rows for a terminal.
 
     Examples
     --------
-    >>> row_lines([Row("peak force", "86.2 lb"), Row("", "in contact 2")])
+    >>> row_lines([SummaryRow("peak force", "86.2 lb"), SummaryRow("", "in contact 2")])
     ['peak force        86.2 lb', '                  in contact 2']
     """
     return [f"{label:{width}}{text}".rstrip() for label, text in rows]

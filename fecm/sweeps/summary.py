@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from fecm._errors import ResultFileError
-from fecm._text import DIGITS, Row, row_lines, significant
+from fecm._text import DIGITS, SummaryRow, row_lines, significant
 from fecm._typing import Bools
 from fecm.authoring.case import THRESHOLD, pair_of_text
 from fecm.deck.model import Curvature, Preload, Segment
@@ -44,24 +44,24 @@ def sweep_summary(result: StoredSweep) -> list[str]:
     return row_lines(sweep_rows(result))
 
 
-def sweep_rows(result: StoredSweep) -> list[Row]:
+def sweep_rows(result: StoredSweep) -> list[SummaryRow]:
     """Summarise a sweep: number of cases, smallest and largest peak or velocity, failures."""
     fine = result.completed
     failed = Counter(result["status"][~fine].tolist())
-    rows = [Row("cases", f"{len(result)}")]
+    rows = [SummaryRow("cases", f"{len(result)}")]
     if result.law:
-        rows.append(Row("contact law", f"{result.law}, instead of EXPE"))
+        rows.append(SummaryRow("contact law", f"{result.law}, instead of EXPE"))
     rows += [*_extremes(result), *_moved(result)]
     for reason, times in failed.most_common(MOST_REASONS):
-        rows.append(Row("failed", f"{times}: {reason}"))
+        rows.append(SummaryRow("failed", f"{times}: {reason}"))
     if (others := len(failed) - MOST_REASONS) > 0:
-        rows.append(Row("failed", f"for {others} other reason{'s' * (others > 1)}"))
+        rows.append(SummaryRow("failed", f"for {others} other reason{'s' * (others > 1)}"))
     if result.random is not None and failed:
-        rows.append(Row("failed share", f"{(~fine).mean():.3%} of the draws"))
+        rows.append(SummaryRow("failed share", f"{(~fine).mean():.3%} of the draws"))
     return [*rows, *(() if result.reduced is None else result.reduced.rows())]
 
 
-def _extremes(result: StoredSweep) -> Iterator[Row]:
+def _extremes(result: StoredSweep) -> Iterator[SummaryRow]:
     """The cases with the smallest and the largest peak, or velocity found."""
     what, names = "peak", ["peak_force"]
     if "found_velocity" in result.summary:
@@ -74,7 +74,7 @@ def _extremes(result: StoredSweep) -> Iterator[Row]:
         values = ", ".join(f"{name} {_shown(result, name, int(case))}" for name in result.cases)
         given = f" ({values})" if values else ""
         text = f"{', '.join(texts)}{given}{_found_band(result, int(case))}"
-        yield Row(f"{size} {what}", text)
+        yield SummaryRow(f"{size} {what}", text)
 
 
 def _found_band(result: StoredSweep, case: int) -> str:
@@ -88,7 +88,7 @@ def _found_band(result: StoredSweep, case: int) -> str:
     return f"; finer meshes {quantity(low, unit, 3)} to {quantity(high, unit, 3)}"
 
 
-def _moved(result: StoredSweep) -> Iterator[Row]:
+def _moved(result: StoredSweep) -> Iterator[SummaryRow]:
     """How far the places that were hit are from those given."""
     if "at" not in result.cases or "hit_x" not in result.summary:
         return
@@ -96,7 +96,7 @@ def _moved(result: StoredSweep) -> Iterator[Row]:
     moved = np.hypot(*(asked - (result["hit_x"], result["hit_y"])))
     if count := np.count_nonzero(moved > SAME_PLACE * np.abs(asked).max()):
         distance = f"{np.nanmax(moved):.4g} {result.unit('hit_x')}".rstrip()
-        yield Row("moved", f"{count}: to the nearest node, up to {distance} away")
+        yield SummaryRow("moved", f"{count}: to the nearest node, up to {distance} away")
 
 
 def _shown(result: StoredSweep, name: str, case: int) -> str:
