@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Annotated
@@ -10,11 +11,12 @@ from typing import Annotated
 import numpy as np
 
 from fecm._machine import format_bytes
+from fecm._text import DIGITS, SummaryRow, row_lines
 from fecm._typing import FiniteFloat, Floats
 from fecm.deck.macros import flat
 from fecm.deck.model import Cure, Impact, Shear
 from fecm.deck.units import MASS, mass_in_si, unit_names, unit_of
-from fecm.deck.units import quantity as said_quantity
+from fecm.deck.units import quantity as readable_quantity
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
@@ -171,90 +173,109 @@ class ProblemSummary:
         values = vars(self).items()
         return {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in values}
 
-    def rows(self) -> list[tuple[str, str]]:
-        """Labels and texts of the lines after the title."""
-        lines = self.lines()[1:]
-        return [(line[:LABEL_WIDTH].strip(), line[LABEL_WIDTH:].strip()) for line in lines]
-
     def lines(self) -> list[str]:
-        """Lines of text, as ``fecm check`` prints them."""
+        """Return the lines of text that ``fecm check`` prints."""
+        lines = row_lines(self.rows(), LABEL_WIDTH)
+        return [self.title or "(no title)", *(f"  {line}" for line in lines)]
 
-        def quantity(value: float, dimension: str) -> str:
-            return f"{value:.4g} {unit_of(dimension, self.units)}".rstrip()
-
-        lines = [self.title or "(no title)"]
-        counts = ("nodes", "elements", "equations", "layers")
-        lines += [f"  {name:20}{getattr(self, name)}" for name in counts]
+    def rows(self) -> list[SummaryRow]:
+        """Return a row for each quantity."""
+        rows = [
+            SummaryRow(name, str(getattr(self, name)))
+            for name in ("nodes", "elements", "equations", "layers")
+        ]
         if self.laminate:
-            lines.append(f"  laminate            {self.laminate}, under the load")
-        sizes = {"A": float(np.abs(self.A).max()), "D": float(np.abs(self.D).max())}
-        sizes["B"] = math.sqrt(sizes["A"] * sizes["D"])  # which B can reach
-        for name, dimension in (("A", "force/length"), ("B", "force"), ("D", "force*length")):
-            unit = unit_of(dimension, self.units)
-            lines += _matrix(name, getattr(self, name), unit, sizes[name])
-        unit = unit_of("force/length", self.units)
-        lines += _matrix("shear xz, yz", self.shear, unit, float(np.abs(self.shear).max()))
-        if self.leaves_out_equilibrium:
-            lines.append(f"  shear factor        1; {self._said_change()}")
+            rows.append(SummaryRow("laminate", f"{self.laminate}, under the load"))
+        rows += self._stiffness_rows()
+        rows += self._plate_rows()
+        rows += self._impact_rows()
+        rows += self._program_rows()
+        return rows
 
+    def _quantity(self, value: float, dimension: str) -> str:
+        """Format a value with its unit."""
+        return f"{value:.{DIGITS}g} {unit_of(dimension, self.units)}".rstrip()
+
+    def _stiffness_rows(self) -> Iterator[SummaryRow]:
+        """Stiffness matrices of the laminate under the load, and its shear factor."""
+        largest_a, largest_d, largest_shear = (
+            float(np.abs(matrix).max()) for matrix in (self.A, self.D, self.shear)
+        )
+        largest_b = math.sqrt(largest_a * largest_d)  # the bound on entries of B
+        for label, matrix, dimension, size in (
+            ("A", self.A, "force/length", largest_a),
+            ("B", self.B, "force", largest_b),
+            ("D", self.D, "force*length", largest_d),
+            ("shear xz, yz", self.shear, "force/length", largest_shear),
+        ):
+            yield from _matrix_rows(label, matrix, unit_of(dimension, self.units), size)
+        if self.leaves_out_equilibrium:
+            yield SummaryRow("shear factor", f"1; {self._effect_of_equilibrium()}")
+
+    def _plate_rows(self) -> Iterator[SummaryRow]:
+        """Kinematics, preload, curvature, cure and delamination threshold."""
+        quantity = self._quantity
         if self.nonlinear:
-            of_all = f"{self.free_in_plane} of {self.nodes} nodes"
-            lines.append(f"  kinematics          von Kármán plate, u and v free at {of_all}")
+            share = f"{self.free_in_plane} of {self.nodes} nodes"
+            yield SummaryRow("kinematics", f"von Kármán plate, u and v free at {share}")
         elif self.energy is not None:
-            lines.append("  kinematics          linear plate")
+            yield SummaryRow("kinematics", "linear plate")
         if any(self.preload):
             named = zip(("N0x", "N0y", "N0xy"), self.preload, strict=True)
-            forces = ", ".join(f"{name} {quantity(n, 'force/length')}" for name, n in named)
-            lines.append(f"  preload             {forces}")
-
+            forces = (f"{name} {quantity(force, 'force/length')}" for name, force in named)
+            yield SummaryRow("preload", ", ".join(forces))
         if any(self.curvature):
             named = zip(("Rx", "Ry", "Rxy"), self.curvature, strict=True)
-            radii = [f"{name} {quantity(1.0 / one, 'length')}" for name, one in named if one]
-            shape = ", ".join([*radii, f"rise {quantity(self.rise, 'length')}"])
-            lines.append(f"  curved panel        {shape}")
-
+            radii = [f"{name} {quantity(1.0 / k, 'length')}" for name, k in named if k]
+            rise = f"rise {quantity(self.rise, 'length')}"
+            yield SummaryRow("curved panel", ", ".join([*radii, rise]))
         if self.cure is not None:
-            lines.append(f"  cure                {self.cure:+g} K")
+            yield SummaryRow("cure", f"{self.cure:+g} K")
         if self.threshold is not None:
-            lines.append(f"  delamination        from {quantity(self.threshold, 'force')}")
+            yield SummaryRow("delamination", f"from {quantity(self.threshold, 'force')}")
 
-        def mass(value: float) -> str:
-            known = mass_in_si(value, self.units)
-            return quantity(value, MASS) + (f" ({known})" if known else "")
+    def _impact_rows(self) -> Iterator[SummaryRow]:
+        """Masses, velocity and energy."""
 
-        lines += [
-            f"  plate mass          {mass(self.plate_mass)}",
-            f"  projectile mass     {mass(self.projectile_mass)}",
-            f"  critical time step  {quantity(self.critical_time_step, 'time')}",
-        ]
+        def mass_text(mass: float) -> str:
+            in_si = mass_in_si(mass, self.units)
+            return self._quantity(mass, MASS) + (f" ({in_si})" if in_si else "")
+
+        yield SummaryRow("plate mass", mass_text(self.plate_mass))
+        yield SummaryRow("projectile mass", mass_text(self.projectile_mass))
         if self.velocity is not None and self.energy is not None:
-            energy = said_quantity(self.energy, unit_of("force*length", self.units), 4)
-            velocity = quantity(self.velocity, "length/time")
-            lines.insert(-1, f"  impact              {velocity}, {energy}")
+            energy = readable_quantity(self.energy, unit_of("force*length", self.units), DIGITS)
+            velocity = self._quantity(self.velocity, "length/time")
+            yield SummaryRow("impact", f"{velocity}, {energy}")
+
+    def _program_rows(self) -> Iterator[SummaryRow]:
+        """Time steps, resolution of the mesh, and size of the result."""
+        critical = self.critical_time_step
+        yield SummaryRow("critical time step", self._quantity(critical, "time"))
         if self.buckling_factor is not None:
             from fecm.mechanics.solutions import FAR  # 0.3 ms, for PREL only
 
             far = math.isinf(self.buckling_factor)
-            times = f"more than {FAR:g}" if far else f"{self.buckling_factor:.4g}"
+            times = f"more than {FAR:g}" if far else f"{self.buckling_factor:.{DIGITS}g}"
             count = self.elements_per_buckle
             bound = "at most " if count is not None and count < FEWEST_ELEMENTS else ""
-            lines.append(f"  buckling load       {bound}{times} times the preload")
+            yield SummaryRow("buckling load", f"{bound}{times} times the preload")
         for dt in dict.fromkeys(self.time_steps):
-            dt = dt or SAFE * self.critical_time_step
-            share = dt / self.critical_time_step
-            more = ""
+            step = dt or SAFE * critical
+            share = step / critical
+            longer = ""
             if share < ROOM:
-                taken = taken_time_step(self.critical_time_step)
-                more = f"; DT 0 takes {taken:.3g}: {taken / dt:.1f} times fewer steps"
-            lines.append(f"  DT                  {quantity(dt, 'time')} ({share:.0%} of it{more})")
+                default = taken_time_step(critical)
+                longer = f"; DT 0 takes {default:.3g}: {default / step:.1f} times fewer steps"
+            yield SummaryRow("DT", f"{self._quantity(step, 'time')} ({share:.0%} of it{longer})")
         if self.elements_per_wave is not None:
             error = "" if self.mesh_error is None else f" ({said_error(self.mesh_error)})"
-            lines.append(f"  elements per wave   {self.elements_per_wave:.1f}{error}")
-        size = format_bytes(self.output_bytes)
-        return [*lines, f"  impact steps        {self.steps}", f"  output              {size}"]
+            yield SummaryRow("elements per wave", f"{self.elements_per_wave:.1f}{error}")
+        yield SummaryRow("impact steps", str(self.steps))
+        yield SummaryRow("output", format_bytes(self.output_bytes))
 
-    def _said_change(self) -> str:
-        """What SHEA EQUI would change."""
+    def _effect_of_equilibrium(self) -> str:
+        """Say how much SHEA EQUI would change."""
         if self.equilibrium_change is not None:
             return f"SHEA EQUI changes the static deflection by {self.equilibrium_change:+.1%}"
         if self.elements > MOST_SOLVED:
@@ -314,8 +335,9 @@ def _rise(plate: PlateModel) -> float:
     return float(np.ptp(midplane_height(plate.mesh.coordinates[plate.mesh.used], plate.curvature)))
 
 
-def _matrix(name: str, values: Floats, unit: str, size: float) -> list[str]:
-    """Lines of a matrix; what is rounding beside numbers of a size is 0."""
-    shown = np.where(np.abs(values) < ROUNDING * size, 0.0, values)
-    first, *rest = (" ".join(f"{value:12.5g}" for value in row) for row in shown)
-    return [f"  {name:18}{first}  {unit}".rstrip(), *(f"{'':20}{row}" for row in rest)]
+def _matrix_rows(label: str, matrix: Floats, unit: str, size: float) -> Iterator[SummaryRow]:
+    """Rows of a matrix.  Entries that are rounding errors beside `size` are shown as 0."""
+    shown = np.where(np.abs(matrix) < ROUNDING * size, 0.0, matrix)
+    first, *others = (" ".join(f"{value:12.5g}" for value in row) for row in shown)
+    yield SummaryRow(label, f"{first}  {unit}".rstrip())
+    yield from (SummaryRow("", row) for row in others)

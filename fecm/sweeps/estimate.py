@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from fecm._errors import warn
-from fecm._text import DIGITS, aligned, html_table
+from fecm._text import DIGITS, SummaryRow, aligned, html_table, row_lines
 from fecm.deck.model import Deck
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.problem.loading import sole_problem
@@ -19,6 +19,7 @@ from fecm.studies.estimate import quick_estimate as by_quick_models
 from fecm.sweeps.execute import carry_out_plan
 from fecm.sweeps.plan import plan
 
+LABEL_WIDTH = 12  # of the labels in a terminal
 RUN = "run"  # name of the row of the run itself
 # Columns of the table, and their dimensions.
 COLUMNS = {
@@ -105,33 +106,31 @@ class Estimate:
             "models": [{"model": name, **asdict(one)} for name, one in self.models.items()],
         }
 
-    def __str__(self) -> str:
+    def rows(self) -> list[SummaryRow]:
+        """Return a row for each quantity that the models share."""
         free = " (the plate is free: no static model)" if math.isnan(self.stiffness) else ""
-        lines = [
-            f"class       M/M_plate = {self.mass_ratio:.4g}, {self.response}",
-            f"lambda      {self.inelasticity:.4g}",
-            f"stiffness   {self._text(self.stiffness, 'force/length')}{free}",
-            *(f"{about:<12}{text}" for about, text in self.remarks.items()),
+        return [
+            SummaryRow("class", f"M/M_plate = {self.mass_ratio:.4g}, {self.response}"),
+            SummaryRow("lambda", f"{self.inelasticity:.4g}"),
+            SummaryRow("stiffness", f"{self._text(self.stiffness, 'force/length')}{free}"),
+            *(SummaryRow(subject, text) for subject, text in self.remarks.items()),
         ]
+
+    def __str__(self) -> str:
         table = [["model", *(name.replace("_", " ") for name in COLUMNS)]]
-        table += (self._row(name, one) for name, one in self.models.items())
-        return "\n".join(
-            [self.title or "(no title)", *(f"  {line}" for line in (*lines, *aligned(table)))]
-        )
+        table += (self._row(name, model) for name, model in self.models.items())
+        lines = [*row_lines(self.rows(), LABEL_WIDTH), *aligned(table)]
+        return "\n".join([self.title or "(no title)", *(f"  {line}" for line in lines)])
 
     def _repr_html_(self) -> str:
         """Table of the models and of the run, for notebooks."""
-        rows = [
-            ("class", f"M/M_plate = {self.mass_ratio:.4g}, {self.response}"),
-            ("lambda", f"{self.inelasticity:.4g}"),
-            ("stiffness", self._text(self.stiffness, "force/length")),
-            *self.remarks.items(),
-        ]
-        for name, one in self.models.items():
-            model, *cells = self._row(name, one)
+        rows = self.rows()
+        for name, model in self.models.items():
+            label, *cells = self._row(name, model)
             named = zip(COLUMNS, cells, strict=True)
-            rows.append((model, ", ".join(f"{n.replace('_', ' ')} {cell}" for n, cell in named)))
-        rows += (("note", note) for note in self.notes)
+            text = ", ".join(f"{column.replace('_', ' ')} {cell}" for column, cell in named)
+            rows.append(SummaryRow(label, text))
+        rows += (SummaryRow("note", note) for note in self.notes)
         return html_table(self.title or "(no title)", rows)
 
     def _row(self, model: str, one: ModelEstimate) -> list[str]:
