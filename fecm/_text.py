@@ -84,7 +84,10 @@ def html_table(title: str, rows: Iterable[tuple[str, str]]) -> str:
     return f"<table><caption>{escape(title)}</caption>{''.join(cells)}</table>"
 
 
-DIGITS = 4  # of computed values that are printed; the model's errors are per cent
+# Significant digits that are printed.  Errors of the model are some per cent; JSON and HDF5 keep
+# all digits.
+DIGITS = 4  # of computed values
+DECK_DIGITS = 6  # of values that the deck gives
 
 
 def printable(text: str) -> str:

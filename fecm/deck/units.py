@@ -13,7 +13,7 @@ from functools import lru_cache
 from typing import Any
 
 from fecm._errors import FecmError
-from fecm._text import printable, significant
+from fecm._text import DIGITS, printable, significant
 from fecm.deck.model import Deck, Units
 
 # Units that are known by name, in m, N and s.
@@ -136,13 +136,13 @@ def with_prefix(unit: str, power: int) -> str:
     return "t" if name == "Mg" else name
 
 
-def quantity(value: float, unit: str, digits: int = 6) -> str:
+def quantity(value: float, unit: str, digits: int = DIGITS) -> str:
     """A value with its unit: 20 g instead of 2e-05 N*s^2/mm, 1.5 J instead of 1500 N*mm."""
     power, name = readable(value, unit, digits)
     return f"{significant(value / 10.0**power, digits)} {name}".rstrip()
 
 
-def readable(value: float, unit: str, digits: int = 6) -> tuple[int, str]:
+def readable(value: float, unit: str, digits: int = DIGITS) -> tuple[int, str]:
     """Power of ten, and its name, in which a mass or an energy has a few digits; else 0, `unit`."""
     base, _ = PREFIXED.get(unit, ("", 0))
     if base in ("g", "J") and 0.0 < abs(value) < math.inf:
@@ -155,7 +155,7 @@ def readable(value: float, unit: str, digits: int = 6) -> tuple[int, str]:
 def mass_in_si(mass: float, names: dict[str, str]) -> str:
     """A mass in g, kg or t; empty if the deck's units are not known."""
     unit = in_si(MASS, names)
-    return "" if unit is None else quantity(mass * unit, "N*s^2/m", 4)
+    return "" if unit is None else quantity(mass * unit, "N*s^2/m")
 
 
 # Systems that help and completion name; any other of known units is accepted.

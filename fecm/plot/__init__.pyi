@@ -14,6 +14,7 @@ from fecm.plot.location import location_picture as location_picture
 from fecm.plot.mesh import Support as Support
 from fecm.plot.mesh import support_masks as support_masks
 from fecm.plot.pictures import draw as draw
+from fecm.plot.pictures import draw_results as draw_results
 from fecm.plot.pictures import save_picture as save_picture
 from fecm.plot.plate import profile as profile
 from fecm.plot.studies import dispersion_picture as dispersion_picture

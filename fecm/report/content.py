@@ -25,12 +25,11 @@ from fecm._errors import FecmError
 from fecm._files import beside, check_outputs
 from fecm._text import DIGITS, printable
 from fecm._version import __version__
-from fecm.deck.units import quantity, thousands, with_prefix
+from fecm.deck.units import quantity
 from fecm.plot.pictures import require_matplotlib
 
 UNKNOWN = "–"  # of a value that is not known
 MOST_TEXT = 200_000  # characters of a listing
-SCALED = ("N", "kN", "s", "ms", "us", "µs")  # units that take a prefix
 
 
 class TrustLevel(StrEnum):
@@ -130,21 +129,10 @@ class ReportPage(NamedTuple):
     sections: tuple[PageSection, ...]
 
 
-def value_with_unit(value: float, unit: str = "", digits: int = DIGITS) -> str:
-    """A value with its unit; forces and times with a prefix, as 16.2 kN of 16200 N."""
-    if unit in SCALED and 0.0 < abs(value) < math.inf:
-        power = thousands(float(f"{abs(value):.{digits}g}"))
-        if name := with_prefix(unit, power):
-            return f"{value / 10.0**power:.{digits}g} {name}"
-    return quantity(value, unit, digits)
-
-
 def number_with_unit(value: float, unit: str = "", digits: int = DIGITS) -> Cell:
     """A number with its unit; a dash for one that is not known."""
     return (
-        UNKNOWN
-        if math.isnan(value)
-        else ShownNumber(float(value), value_with_unit(value, unit, digits))
+        UNKNOWN if math.isnan(value) else ShownNumber(float(value), quantity(value, unit, digits))
     )
 
 

@@ -14,10 +14,11 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from fecm.deck.model import Layer
+from fecm.deck.units import quantity
 from fecm.plot.kinds import PictureKind, PlotError
 from fecm.plot.pictures import draw
 from fecm.plot.style import RC, panels
-from fecm.report.content import PageBlock, PagePicture, value_with_unit
+from fecm.report.content import PageBlock, PagePicture
 from fecm.results.result import Result
 
 if TYPE_CHECKING:
@@ -91,7 +92,7 @@ def _with_peaks(kind: PictureKind, caption: str, results: Mapping[str, Result]) 
     peaks = []
     for name, result in results.items():
         if "history/force" in result and len(force := result["history/force"]):
-            size = value_with_unit(float(force.max()), result.unit("force"))
+            size = quantity(float(force.max()), result.unit("force"))
             peaks.append(f"{name}: {size}" if len(results) > 1 else size)
     return f"{caption[:-1]}; largest force {', '.join(peaks)}." if peaks else caption
 
@@ -103,7 +104,7 @@ def of_run(name: str, result: Result) -> Iterator[PageBlock]:
         time = float(result["history/time"][result["history/plate_w"].argmax()])
         stored = result["tape3/time"]
         near = float(stored[np.abs(stored - time).argmin()])
-        said = value_with_unit(near, result.unit("time"), 4)
+        said = quantity(near, result.unit("time"))
         caption = f"Deflection at the stored time nearest to its peak, {said}"
         yield from drawn(PictureKind.CONTOUR, results, f"{caption}.", times=[near])
     yield from drawn(

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fecm._text import DECK_DIGITS
 from fecm.deck import model
 from fecm.deck.catalogue import material_names
 from fecm.deck.layup import layup_text
@@ -47,7 +48,6 @@ PLY = (
     ("g23", MODULUS),
     ("nu12", ""),
 )
-GIVEN = 5  # digits of values of the deck
 STRENGTHS = ("xt", "xc", "yt", "yc", "s12", "s13", "s23")
 LAW = (COEFFICIENT, "length", "", "")  # dimensions of the constants of EXPE
 
@@ -204,10 +204,10 @@ def _program(problem: Problem) -> Iterator[tuple[Cell, ...]]:
 
 def _in_units(deck: model.Deck, value: float, dimension: str) -> Cell:
     """A value in the units of the deck."""
-    return number_with_unit(float(value), unit_of(dimension, unit_names(deck)), GIVEN)
+    return number_with_unit(float(value), unit_of(dimension, unit_names(deck)), DECK_DIGITS)
 
 
 def _mass(deck: model.Deck, mass: float) -> str:
     """A mass in g or kg where the units are known."""
     names = unit_names(deck)
-    return mass_in_si(mass, names) or quantity(mass, unit_of(MASS, names), GIVEN)
+    return mass_in_si(mass, names) or quantity(mass, unit_of(MASS, names), DECK_DIGITS)

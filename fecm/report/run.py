@@ -28,7 +28,6 @@ from fecm.report.content import (
     number_with_unit,
     page_table,
     sections,
-    value_with_unit,
     worst,
 )
 from fecm.report.model import impactor, of_problem, plate_extent
@@ -222,9 +221,9 @@ def _scene(result: Result, problem: Problem) -> str:
     hits = impactor(result, deck)
     if hits is None:
         return "An impact"
-    weight = mass_in_si(hits.mass, units) or quantity(hits.mass, unit_of(MASS, units), 4)
+    weight = mass_in_si(hits.mass, units) or quantity(hits.mass, unit_of(MASS, units))
     speed = f"{hits.velocity:.4g} {unit_of('length/time', units)}".rstrip()
-    energy = quantity(hits.energy, unit_of("force*length", units), 4)
+    energy = quantity(hits.energy, unit_of("force*length", units))
     layup = layup_text([layer.angle for layer in deck.require(model.Material).layers])
     thickness = f"{problem.laminate.thickness:.4g} {unit_of('length', units)}".rstrip()
     return (
@@ -365,5 +364,5 @@ def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> It
 
 
 def _said(result: Result, value: float, dimension: str) -> str:
-    """A quantity in four digits."""
-    return value_with_unit(float(value), unit_of(dimension, result.units), 4)
+    """Format a value with the unit of its dimension."""
+    return quantity(float(value), unit_of(dimension, result.units))

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from fecm._text import DECK_DIGITS
 from fecm.deck.units import quantity, short_name, unit_of
 from fecm.plot.kinds import PictureKind
 from fecm.report import figures
@@ -26,7 +27,6 @@ from fecm.report.content import (
     page_table,
     sections,
     share,
-    value_with_unit,
     worst,
 )
 from fecm.results.metrics import RATIO, VERDICTS, described
@@ -69,16 +69,16 @@ def _sentences(sweep: SweepResult) -> Iterator[str]:
     yield f"A sweep over {names}; {sweep_verdict(sweep)}."
     if (random := sweep.random) is not None and not random.combinations:
         found = random.exceedance
-        for row, (quantity, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
+        for row, (name, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
             p, low, high, count, is_open = (float(values[row]) for values in found[2:])
             lacking = random.design.draws - int(count)
-            said = "its threshold" if np.isnan(limit) else f"{limit:.6g} {sweep.unit(quantity)}"
+            said = "its threshold" if np.isnan(limit) else f"{limit:.6g} {sweep.unit(name)}"
             chances = chance(p, low, high, int(is_open), lacking)
-            yield f"The probability that {quantity} exceeds {said.rstrip()} is {chances}."
+            yield f"The probability that {name} exceeds {said.rstrip()} is {chances}."
     values = _fine(sweep, what)
     if np.isfinite(values).any():
         unit = sweep.unit(what)
-        ends = [value_with_unit(float(end), unit) for end in (np.nanmin(values), np.nanmax(values))]
+        ends = [quantity(float(end), unit) for end in (np.nanmin(values), np.nanmax(values))]
         known = int(np.isfinite(values).sum())
         some = f" in the {known} of {len(values)} cases that have it" if known < len(values) else ""
         yield f"{what.replace('_', ' ').capitalize()}: {' to '.join(ends)}{some}."
@@ -195,7 +195,7 @@ def _case(sweep: SweepResult, case: int) -> str:
         return f"{case}"
     values = {name: column[case].item() for name, column in sweep.cases.items()}
     texts = [
-        f"{name} {quantity(value, sweep.unit(name), 5)}"
+        f"{name} {quantity(value, sweep.unit(name), DECK_DIGITS)}"
         if isinstance(value, float)
         else f"{name} {value}"
         for name, value in values.items()
@@ -305,7 +305,7 @@ def _provenance(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> It
     """Checksums, time steps, and the deck."""
     text = sweep.deck_text
     unit = unit_of("time", sweep.units)
-    steps = [value_with_unit(dt, unit) for dt in np.unique(sweep.dt).tolist()]
+    steps = [quantity(dt, unit, DECK_DIGITS) for dt in np.unique(sweep.dt).tolist()]
     rows: list[tuple[Cell, ...]] = [
         ("cases", ShownNumber(len(sweep), str(len(sweep)))),
         ("size of the time step", ", ".join(steps[:4]) + (", …" if len(steps) > 4 else "")),

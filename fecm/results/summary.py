@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict, cast
 
 import numpy as np
 
-from fecm._text import DIGITS, SummaryRow, row_lines, significant
+from fecm._text import DECK_DIGITS, DIGITS, SummaryRow, row_lines, significant
 from fecm._typing import FiniteFloat, Floats
 from fecm.deck.units import quantity as shown_quantity
 from fecm.deck.units import unit_of
@@ -149,7 +149,6 @@ def _range(contents: FileContents, path: str) -> tuple[float | None, float | Non
 
 
 NEAR = 0.05  # of the time of the peak, up to which a row is that of the peak
-GIVEN = 6  # digits of values of the deck; computed ones have DIGITS
 LISTED = 6  # most contacts and frequencies listed individually
 # Parts by the caller of the run: attribute, name, and the segment of the deck that they replace.
 OWN_PARTS = (("law", "contact law", "EXPE"), ("projectile", "projectile", "PROJ"))
@@ -230,10 +229,10 @@ def _curved(result: Stored) -> list[SummaryRow]:
     if "mesh/z" not in result:
         return []
     named = [
-        f"R{axis} {_quantity(result, one, 'length', GIVEN)}"
+        f"R{axis} {_quantity(result, one, 'length', DECK_DIGITS)}"
         for axis, one in radii_of(result).items()
     ]
-    rise = _quantity(result, float(np.ptp(result["mesh/z"])), "length", GIVEN)
+    rise = _quantity(result, float(np.ptp(result["mesh/z"])), "length", DECK_DIGITS)
     return [SummaryRow("curved panel", ", ".join([*named, f"rise {rise}"]))]
 
 
@@ -242,7 +241,7 @@ def _preload(result: Stored) -> list[SummaryRow]:
     given = result.attributes_of("laminate")
     forces = {f"N_{name}": given.get(f"N0_{name}") for name in ("x", "y", "xy")}
     named = [
-        f"{name} = {_quantity(result, force, 'force/length', GIVEN)}"
+        f"{name} = {_quantity(result, force, 'force/length', DECK_DIGITS)}"
         for name, force in forces.items()
         if isinstance(force, float) and force
     ]

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from fecm._errors import warn
-from fecm._text import DIGITS, SummaryRow, aligned, html_table, row_lines
+from fecm._text import SummaryRow, aligned, html_table, row_lines
 from fecm.deck.model import Deck
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.problem.loading import sole_problem
@@ -144,11 +144,7 @@ class Estimate:
 
     def _text(self, value: float, dimension: str, missing: str = "-") -> str:
         """A value with its unit."""
-        return (
-            missing
-            if math.isnan(value)
-            else quantity(value, unit_of(dimension, self.units), DIGITS)
-        )
+        return missing if math.isnan(value) else quantity(value, unit_of(dimension, self.units))
 
 
 def estimate(deck: str | Path | Deck) -> Estimate:
