@@ -1,11 +1,11 @@
-"""Texts for terminals, notebooks, JSON and CSV: values, tables, one short line."""
+"""Texts for terminals, JSON and CSV: values, and one short line."""
 
 from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Iterable, Mapping, Sequence
-from typing import NamedTuple, TypeAlias
+from collections.abc import Iterable, Mapping
+from typing import TypeAlias
 
 Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | float | bool | None"
 
@@ -35,12 +35,6 @@ def jsonable(value: object) -> Json:
             return str(value)
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Lines of a table, each column as wide as its longest text."""
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(map(str.ljust, row, widths)).rstrip() for row in rows]
-
-
 def csv_line(texts: Iterable[str]) -> str:
     """A line of CSV with its end; texts with commas or quotes are quoted."""
     import csv  # only where a table is written
@@ -49,39 +43,6 @@ def csv_line(texts: Iterable[str]) -> str:
     line = io.StringIO()
     csv.writer(line, lineterminator="\n").writerow(texts)
     return line.getvalue()
-
-
-class SummaryRow(NamedTuple):
-    """What is said of one quantity; terminals, pages and notebooks show the same rows."""
-
-    label: str  # empty if the row continues the one before
-    text: str
-
-
-LABEL_WIDTH = 18  # of the labels in a terminal
-
-
-def row_lines(rows: Iterable[SummaryRow], width: int = LABEL_WIDTH) -> list[str]:
-    """Lines of rows for a terminal.
-
-    Examples
-    --------
-    >>> row_lines([SummaryRow("peak force", "86.2 lb"), SummaryRow("", "in contact 2")])
-    ['peak force        86.2 lb', '                  in contact 2']
-    """
-    return [f"{label:{width}}{text}".rstrip() for label, text in rows]
-
-
-def html_table(title: str, rows: Iterable[tuple[str, str]]) -> str:
-    """Return a table of two columns with a title."""
-    from html import escape  # 1 ms, only in notebooks
-
-    cells = (
-        f"<tr><th style='text-align:left'>{escape(name)}</th>"
-        f"<td style='text-align:left'>{escape(text)}</td></tr>"
-        for name, text in rows
-    )
-    return f"<table><caption>{escape(title)}</caption>{''.join(cells)}</table>"
 
 
 # Significant digits that are printed.  Errors of the model are some per cent; JSON and HDF5 keep

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from functools import cache
 from pathlib import Path
 
@@ -12,7 +13,6 @@ from numpy.typing import NDArray
 
 import fecm
 from fecm.authoring import CasesError
-from fecm.cli.identify import _page
 from fecm.deck import Indentation
 from fecm.identification import IdentifyError
 from fecm.plot import force_fit_picture
@@ -88,10 +88,10 @@ def test_fitted_values_have_the_units_of_the_deck() -> None:
     assert found.units == {"length": "mm", "force": "N", "time": "s"}
     units = {name: found.unit(name) for name in found.values}
     assert units == {"k": "N/mm^1.5", "mass": "N*s^2/mm", "delay": "s", "offset": "N"}
-    (line,) = (line for line in _page(found, "N") if line.startswith("mass "))
-    _, value, _, _, unit, _, start = line.split()
+    (line,) = (line for line in str(found).split("\n") if line.startswith("mass ") and " g" in line)
+    _, value, unit, _, _, start, _ = line.split()
     assert float(value) == pytest.approx(1e6 * found.values["mass"], rel=1e-4)  # g in a tonne
-    assert (unit, start) == ("g,", "23")
+    assert (unit, start) == ("g", "23")
     with pytest.raises(KeyError, match="velocity was not fitted"):
         found.unit("velocity")
 
@@ -219,8 +219,13 @@ def test_the_command_prints_values_errors_correlations_and_cards(folder: Path) -
         cwd=folder,
     )
     assert done.exit_code == 0
-    for text in ("velocity     100 ±", "from 115", "correlation", "converged    yes", "ROD\n"):
-        assert text in done.stdout
+    for text in (
+        r"velocity +100 in/s +\S+ in/s +115 in/s",
+        "correlation",
+        "converged    yes",
+        "ROD",
+    ):
+        assert re.search(text, done.stdout)
     fitted = fecm.read_one(folder / "fitted.inp")
     assert fitted.require(fecm.deck.model.Impact).velocity == pytest.approx(100.0, rel=1e-4)
     assert (folder / "fit.png").read_bytes().startswith(b"\x89PNG")

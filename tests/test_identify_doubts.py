@@ -262,7 +262,7 @@ def test_the_command_fails_where_values_are_not_to_be_used(tmp_path: Path) -> No
     assert "fit offset too" in done.stderr
     done = call("identify", "d.inp", "offset.csv", "--free", f"{free},offset", cwd=tmp_path)
     assert done.exit_code == 0
-    assert "1 % more in the deck   thickness          e1" in done.stdout
+    assert "1 % more in the deck  thickness  e1" in done.stdout
 
 
 # A filter that nobody named ----------------------------------------------------------------------

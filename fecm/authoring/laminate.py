@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from fecm._errors import did_you_mean
-from fecm._text import html_table
+from fecm._table import Row, Table, html_table
 from fecm._typing import Floats
 from fecm.authoring.parameters import ObjectError, check_numbers, check_positive
 from fecm.deck import catalogue
@@ -200,12 +200,12 @@ class Laminate:
     def _repr_html_(self) -> str:
         """Table of plies, stiffness and engineering constants, for notebooks."""
         angles = "/".join(f"{ply.angle:g} {ply.name}".rstrip() for ply in self.plies)
-        rows = [("angles", shorten(angles, 200))]
+        rows: list[Row] = [("angles", shorten(angles, 200))]
         try:
             rows += _stiffness_rows(*stiffness_of_laminate(self, None, []))
         except ObjectError as error:
             rows.append(("note", str(error)))
-        return html_table(repr(self), rows)
+        return html_table(Table(tuple(rows), title=repr(self)))
 
     def _bound(self, ply: LaminatePly) -> Ply | NamedPly | None:
         """Material of a ply; None if it has none."""

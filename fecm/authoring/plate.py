@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple, Self
 
 from numpy.typing import ArrayLike
 
-from fecm._text import html_table
+from fecm._table import Table, html_table
 from fecm.authoring.parameters import ObjectError, check_positive, number_pair
 from fecm.deck import grid as grids
 from fecm.deck.grid import EDGES, SUPPORTS, GridSection
@@ -121,7 +121,9 @@ class Plate:
     def _repr_html_(self) -> str:
         """Table of what the plate is made of, for notebooks."""
         values = ((one.name, getattr(self, one.name)) for one in fields(self) if one.repr)
-        return html_table("Plate", [(name, str(value)) for name, value in values if value])
+        return html_table(
+            Table(tuple((name, str(value)) for name, value in values if value), title="Plate")
+        )
 
     @classmethod
     def rectangle(

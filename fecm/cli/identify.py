@@ -27,8 +27,9 @@ from fecm.cli.options import (
 from fecm.cli.outputs import OutputPaths, write_lines
 from fecm.cli.rod import FILTER_HELP
 from fecm.deck.model import Deck
-from fecm.deck.units import readable, unit_names, unit_of
-from fecm.identification.identify import CARDS, FREE, Identification, fit_deck
+from fecm.deck.units import unit_names
+from fecm.identification.identify import FREE, fit_deck
+from fecm.identification.result import Identification
 from fecm.mechanics.own_law import own_law
 from fecm.report.content import check_page
 from fecm.results.comparison import Measurement, measurement_of
@@ -132,9 +133,9 @@ def identify_command(options: IdentifyOptions) -> None:
         note(f"wrote {options.page}")
     note(*found.notes)
     if options.form is Format.JSON:
-        echo_json(_document(found))
+        echo_json(found.to_dict())
     else:
-        echo("\n".join(_page(found, unit_of("force", units))))
+        echo(found)
     if not found.accepted:
         raise SystemExit(FAILED)
 
@@ -150,61 +151,3 @@ def _fit(deck: Deck, measured: Measurement, options: IdentifyOptions) -> Identif
     with every_minute(lambda minutes: f"fecm: {forces} trial forces after {minutes} min"):
         law = own_law(options.law)
         return fit_deck(deck, measured, options.free, options.sensor, law, computed)
-
-
-def _document(found: Identification) -> dict[str, object]:
-    """JSON of a fit."""
-    return {
-        **({"law": found.law} if found.law else {}),
-        "values": {
-            name: {"value": value, "error": found.errors[name], "start": found.start[name]}
-            for name, value in found.values.items()
-        },
-        "correlation": found.correlation.tolist(),
-        "points": len(found.time),
-        "dof": found.dof,
-        "rms": found.rms,
-        "share": found.share,
-        "converged": found.converged,
-        "accepted": found.accepted,
-        "plate_errors": found.plate_errors,
-        "notes": list(found.notes),
-        "cards": found.cards(),
-    }
-
-
-def _page(found: Identification, force: str) -> list[str]:
-    """Lines about a fit; `force` is the unit of the force."""
-    rms = f"{found.rms:.4g} {force}".rstrip()
-    lines = [
-        f"points       {len(found.time)}, {found.dof} degrees of freedom",
-        f"residual     {rms} rms, {100.0 * found.share:.2g} % of the peak",
-        f"converged    {'yes' if found.converged else 'no'}",
-        f"accepted     {'yes' if found.accepted else 'no'}",
-    ]
-    if found.law:
-        lines.append(f"law          {found.law}, instead of EXPE")
-    for name, value in found.values.items():
-        power, unit = readable(value, found.unit(name), digits=5)
-        best, error, start = (
-            number / 10.0**power for number in (value, found.errors[name], found.start[name])
-        )
-        spread = f"{best:.5g} ± {error:.2g} {unit}".rstrip()
-        lines.append(f"{name:<11}  {spread}, from {start:.5g}")
-    if len(found.values) > 1:
-        lines.append("correlation  " + "".join(f"{name:>12}" for name in found.values))
-        for name, row in zip(found.values, found.correlation, strict=True):
-            lines.append(f"  {name:<11}" + "".join(f"{value:12.3f}" for value in row))
-    return [*lines, *_plate_errors(found), found.cards()]
-
-
-def _plate_errors(found: Identification) -> list[str]:
-    """Table of the changes of the values with 1 % more of a property of the plate."""
-    if not found.plate_errors:
-        return []
-    lines = ["1 % more in the deck" + "".join(f"{name:>12}" for name in found.plate_errors)]
-    for name, value in found.values.items():
-        changes = [changes[name] for changes in found.plate_errors.values()]
-        texts = [f"{c / value:+.2%}" if name in CARDS and value else f"{c:+.2g}" for c in changes]
-        lines.append(f"  {name:<18}" + "".join(f"{text:>12}" for text in texts))
-    return lines

@@ -12,7 +12,8 @@ import click
 import numpy as np
 
 from fecm._inputs import lines_of
-from fecm._text import aligned, printable, short_text
+from fecm._table import aligned
+from fecm._text import printable, short_text
 from fecm._version import __version__
 from fecm.cli.common import echo_json
 from fecm.cli.isolation import reads

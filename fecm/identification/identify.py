@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -14,9 +14,8 @@ import numpy as np
 from fecm._errors import warn
 from fecm._typing import Floats
 from fecm.authoring.strike import strike_of
-from fecm.authoring.values import dimension_of
 from fecm.deck.model import Deck, Impact, Indentation, Nonlinear, Projectile
-from fecm.deck.units import unit_names, unit_of
+from fecm.deck.units import unit_names
 from fecm.identification.alignment import IdentifyError, check_measured, lags
 from fecm.identification.fitting import (
     DELAY,
@@ -46,13 +45,12 @@ from fecm.identification.misfit import (
     undescribed,
     wrong_model,
 )
+from fecm.identification.result import CARDS, Identification
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import law_name, own_law
 from fecm.mechanics.projectile import RigidMass
 from fecm.problem.parts import build_projectile
 from fecm.results.comparison import Measurement, measurement_of
-from fecm.results.groups import NotStoredError
-from fecm.results.pictures import report_results
 from fecm.results.validity import MEANING, Reason, reasons_of
 from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Filter, filter_of
@@ -61,130 +59,9 @@ from fecm.sweeps.job import checked_problem
 from fecm.sweeps.outcome import Backend
 from fecm.sweeps.plan import check_law, shares_plate
 
-CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
-    **dict.fromkeys(("velocity", "energy"), Impact),
-    **dict.fromkeys(("k", "alpha_p", "s_p", "q"), Indentation),
-    **dict.fromkeys(("mass", "rod_length", "rod_modulus", "rod_density"), Projectile),
-}
 FREE = (*CARDS, *OF_RECORD)
 CORRELATED = 0.99  # a finding reports a larger correlation of two parameters
 UNIT_OFFSET = 0.01  # size of an offset over the peak of the deck's own run
-
-
-@dataclass(frozen=True)
-class Identification:
-    """Parameters fitted to a measured force.
-
-    Attributes
-    ----------
-    values, errors : dict of str to float
-        Fitted values and their standard errors, by name.
-    start : dict of str to float
-        Values before the fit.
-    correlation : ndarray (names, names)
-        Correlation matrix of the values, in their order.
-    time, force, model : ndarray (points,)
-        Measured times and forces that were fitted, and the fitted force at these times.
-    converged : bool
-        Whether the fit has converged.
-    accepted : bool
-        Whether the fit has converged, the model describes the data, and no delay or offset is
-        missing among the parameters.
-    plate_errors : dict of str to dict
-        Changes of the fitted values with 1 % more ``"thickness"`` and 1 % more ``"e1"`` of the
-        plate in the deck, linearised.
-    deck : Deck
-        The deck with the fitted values, rounded to five digits.
-    notes : tuple of str
-        Reasons to doubt the values.
-    law : str
-        Name of the contact law that took the place of EXPE, which the deck has all the same; empty
-        if none did.
-    """
-
-    values: dict[str, float]
-    errors: dict[str, float]
-    start: dict[str, float]
-    correlation: Floats
-    time: Floats
-    force: Floats
-    model: Floats
-    converged: bool
-    accepted: bool
-    plate_errors: dict[str, dict[str, float]]
-    deck: Deck
-    notes: tuple[str, ...]
-    law: str = ""
-
-    @property
-    def residual(self) -> Floats:
-        """Measured minus fitted force, (points,)."""
-        return self.force - self.model
-
-    @property
-    def dof(self) -> int:
-        """Degrees of freedom: points minus parameters."""
-        return len(self.time) - len(self.values)
-
-    @property
-    def rms(self) -> float:
-        """Standard deviation of the residual, with `dof` in its denominator (force)."""
-        return float(np.sqrt(self.residual @ self.residual / self.dof))
-
-    @property
-    def share(self) -> float:
-        """`rms` over the measured peak force."""
-        return self.rms / float(self.force.max())
-
-    @property
-    def units(self) -> dict[str, str]:
-        """Names of the units of length, force and time; empty if the deck names none."""
-        return unit_names(self.deck)
-
-    def unit(self, name: str) -> str:
-        """Unit of a fitted value; empty for a pure number, or if the deck names no units.
-
-        Raises
-        ------
-        NotStoredError
-            If no such value was fitted; a KeyError.
-        """
-        if name not in self.values:
-            raise NotStoredError(f"{name} was not fitted; there are {', '.join(self.values)}")
-        return unit_of(OF_RECORD.get(name) or dimension_of(name), self.units)
-
-    def report(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write an HTML page to hand on, as ``fecm identify --report`` does.
-
-        The page is one file: verdict, fitted values, their errors, pictures, deck.
-
-        Parameters
-        ----------
-        path : str or Path
-            File to write, ``.html``.
-        overwrite : bool
-            Replace an existing file.
-
-        Raises
-        ------
-        ReportError
-            If the name has another suffix.
-        FileExistsError
-            If the file exists and may not be replaced.
-        ImportError
-            If Jinja2 or matplotlib is not installed.
-
-        Examples
-        --------
-        >>> found.report("impact.html")  # doctest: +SKIP
-        """
-        report_results({"the measurement": self}, path, overwrite=overwrite)
-
-    def cards(self) -> str:
-        """Cards of the deck with fitted values."""
-        kinds = dict.fromkeys(CARDS[name] for name in self.values if name in CARDS)
-        segments = (self.deck.require(kind) for kind in kinds)
-        return "\n".join(line for s in segments for line in s.cards(self.deck.control)).rstrip()
 
 
 def identify(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from fecm._text import SummaryRow, row_lines
+from fecm._table import Row, label_lines
 from fecm.deck.units import quantity
 from fecm.location.location import Location
 
@@ -19,7 +19,7 @@ def location_lines(found: Location) -> list[str]:
         return quantity(value, found.unit(name), DIGITS)
 
     length = found.unit("x")
-    rows = [
+    rows: list[Row] = [
         ("x", f"{found.x:.5g} ± {found.sd_x:.2g} {length}".rstrip()),
         ("y", f"{found.y:.5g} ± {found.sd_y:.2g} {length}".rstrip()),
         ("correlation", f"{found.correlation:.2f}"),
@@ -58,7 +58,7 @@ def location_lines(found: Location) -> list[str]:
         gains = zip(found.gages.tolist(), found.gains, found.sd_gains, strict=True)
         rows += [(f"gain of gage {n}", f"{gain:.4f} ± {sd:.2g}") for n, gain, sd in gains]
     rows.append(("accepted", "yes" if found.accepted else "no"))
-    return row_lines(SummaryRow(*row) for row in rows)
+    return label_lines(rows)
 
 
 def _mesh(found: Location) -> str:

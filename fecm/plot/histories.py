@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from fecm.identification.identify import Identification
+    from fecm.identification.result import Identification
 
 
 Results = Mapping[str, Result]

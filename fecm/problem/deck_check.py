@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fecm._text import html_table
+from fecm._table import Table, html_table
 from fecm.deck.findings import Finding, Severity
 from fecm.listing.slips import Mode, active_slips
 from fecm.problem.loading import AnyDeck, LoadedDeck, load_deck
@@ -59,10 +59,9 @@ class DeckCheck:
 
     def _repr_html_(self) -> str:
         """Table of the findings and of each problem, for notebooks."""
-        rows = [(f"{one.severity} {one.code}", one.message) for one in self.findings]
-        for problem in self.problems:
-            rows += [("title", problem.title), *problem.rows()]
-        return html_table(repr(self)[1:-1], rows)
+        rows = tuple((f"{item.severity} {item.code}", item.message) for item in self.findings)
+        findings = Table(rows, title=repr(self)[1:-1])
+        return html_table(findings, *(problem.table() for problem in self.problems))
 
     def __repr__(self) -> str:
         counts = {"error": len(self.errors), "warning": len(self.warnings)}

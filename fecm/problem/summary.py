@@ -11,7 +11,8 @@ from typing import Annotated
 import numpy as np
 
 from fecm._machine import format_bytes
-from fecm._text import DIGITS, SummaryRow, row_lines
+from fecm._table import Row, Table, text_lines
+from fecm._text import DIGITS
 from fecm._typing import FiniteFloat, Floats
 from fecm.deck.macros import flat
 from fecm.deck.model import Cure, Impact, Shear
@@ -175,28 +176,28 @@ class ProblemSummary:
 
     def lines(self) -> list[str]:
         """Return the lines of text that ``fecm check`` prints."""
-        lines = row_lines(self.rows(), LABEL_WIDTH)
-        return [self.title or "(no title)", *(f"  {line}" for line in lines)]
+        table = self.table()
+        return [table.title, *(f"  {line}" for line in text_lines(table, LABEL_WIDTH))]
 
-    def rows(self) -> list[SummaryRow]:
-        """Return a row for each quantity."""
-        rows = [
-            SummaryRow(name, str(getattr(self, name)))
+    def table(self) -> Table:
+        """Return a table with a row for each quantity."""
+        rows: list[Row] = [
+            (name, str(getattr(self, name)))
             for name in ("nodes", "elements", "equations", "layers")
         ]
         if self.laminate:
-            rows.append(SummaryRow("laminate", f"{self.laminate}, under the load"))
+            rows.append(("laminate", f"{self.laminate}, under the load"))
         rows += self._stiffness_rows()
         rows += self._plate_rows()
         rows += self._impact_rows()
         rows += self._program_rows()
-        return rows
+        return Table(tuple(rows), title=self.title or "(no title)")
 
     def _quantity(self, value: float, dimension: str) -> str:
         """Format a value with its unit."""
         return f"{value:.{DIGITS}g} {unit_of(dimension, self.units)}".rstrip()
 
-    def _stiffness_rows(self) -> Iterator[SummaryRow]:
+    def _stiffness_rows(self) -> Iterator[Row]:
         """Stiffness matrices of the laminate under the load, and its shear factor."""
         largest_a, largest_d, largest_shear = (
             float(np.abs(matrix).max()) for matrix in (self.A, self.D, self.shear)
@@ -210,48 +211,48 @@ class ProblemSummary:
         ):
             yield from _matrix_rows(label, matrix, unit_of(dimension, self.units), size)
         if self.leaves_out_equilibrium:
-            yield SummaryRow("shear factor", f"1; {self._effect_of_equilibrium()}")
+            yield ("shear factor", f"1; {self._effect_of_equilibrium()}")
 
-    def _plate_rows(self) -> Iterator[SummaryRow]:
+    def _plate_rows(self) -> Iterator[Row]:
         """Kinematics, preload, curvature, cure and delamination threshold."""
         quantity = self._quantity
         if self.nonlinear:
             share = f"{self.free_in_plane} of {self.nodes} nodes"
-            yield SummaryRow("kinematics", f"von Kármán plate, u and v free at {share}")
+            yield ("kinematics", f"von Kármán plate, u and v free at {share}")
         elif self.energy is not None:
-            yield SummaryRow("kinematics", "linear plate")
+            yield ("kinematics", "linear plate")
         if any(self.preload):
             named = zip(("N0x", "N0y", "N0xy"), self.preload, strict=True)
             forces = (f"{name} {quantity(force, 'force/length')}" for name, force in named)
-            yield SummaryRow("preload", ", ".join(forces))
+            yield ("preload", ", ".join(forces))
         if any(self.curvature):
             named = zip(("Rx", "Ry", "Rxy"), self.curvature, strict=True)
             radii = [f"{name} {quantity(1.0 / k, 'length')}" for name, k in named if k]
             rise = f"rise {quantity(self.rise, 'length')}"
-            yield SummaryRow("curved panel", ", ".join([*radii, rise]))
+            yield ("curved panel", ", ".join([*radii, rise]))
         if self.cure is not None:
-            yield SummaryRow("cure", f"{self.cure:+g} K")
+            yield ("cure", f"{self.cure:+g} K")
         if self.threshold is not None:
-            yield SummaryRow("delamination", f"from {quantity(self.threshold, 'force')}")
+            yield ("delamination", f"from {quantity(self.threshold, 'force')}")
 
-    def _impact_rows(self) -> Iterator[SummaryRow]:
+    def _impact_rows(self) -> Iterator[Row]:
         """Masses, velocity and energy."""
 
         def mass_text(mass: float) -> str:
             in_si = mass_in_si(mass, self.units)
             return self._quantity(mass, MASS) + (f" ({in_si})" if in_si else "")
 
-        yield SummaryRow("plate mass", mass_text(self.plate_mass))
-        yield SummaryRow("projectile mass", mass_text(self.projectile_mass))
+        yield ("plate mass", mass_text(self.plate_mass))
+        yield ("projectile mass", mass_text(self.projectile_mass))
         if self.velocity is not None and self.energy is not None:
             energy = readable_quantity(self.energy, unit_of("force*length", self.units), DIGITS)
             velocity = self._quantity(self.velocity, "length/time")
-            yield SummaryRow("impact", f"{velocity}, {energy}")
+            yield ("impact", f"{velocity}, {energy}")
 
-    def _program_rows(self) -> Iterator[SummaryRow]:
+    def _program_rows(self) -> Iterator[Row]:
         """Time steps, resolution of the mesh, and size of the result."""
         critical = self.critical_time_step
-        yield SummaryRow("critical time step", self._quantity(critical, "time"))
+        yield ("critical time step", self._quantity(critical, "time"))
         if self.buckling_factor is not None:
             from fecm.mechanics.solutions import FAR  # 0.3 ms, for PREL only
 
@@ -259,7 +260,7 @@ class ProblemSummary:
             times = f"more than {FAR:g}" if far else f"{self.buckling_factor:.{DIGITS}g}"
             count = self.elements_per_buckle
             bound = "at most " if count is not None and count < FEWEST_ELEMENTS else ""
-            yield SummaryRow("buckling load", f"{bound}{times} times the preload")
+            yield ("buckling load", f"{bound}{times} times the preload")
         for dt in dict.fromkeys(self.time_steps):
             step = dt or SAFE * critical
             share = step / critical
@@ -267,12 +268,12 @@ class ProblemSummary:
             if share < ROOM:
                 default = taken_time_step(critical)
                 longer = f"; DT 0 takes {default:.3g}: {default / step:.1f} times fewer steps"
-            yield SummaryRow("DT", f"{self._quantity(step, 'time')} ({share:.0%} of it{longer})")
+            yield ("DT", f"{self._quantity(step, 'time')} ({share:.0%} of it{longer})")
         if self.elements_per_wave is not None:
             error = "" if self.mesh_error is None else f" ({said_error(self.mesh_error)})"
-            yield SummaryRow("elements per wave", f"{self.elements_per_wave:.1f}{error}")
-        yield SummaryRow("impact steps", str(self.steps))
-        yield SummaryRow("output", format_bytes(self.output_bytes))
+            yield ("elements per wave", f"{self.elements_per_wave:.1f}{error}")
+        yield ("impact steps", str(self.steps))
+        yield ("output", format_bytes(self.output_bytes))
 
     def _effect_of_equilibrium(self) -> str:
         """Say how much SHEA EQUI would change."""
@@ -335,9 +336,9 @@ def _rise(plate: PlateModel) -> float:
     return float(np.ptp(midplane_height(plate.mesh.coordinates[plate.mesh.used], plate.curvature)))
 
 
-def _matrix_rows(label: str, matrix: Floats, unit: str, size: float) -> Iterator[SummaryRow]:
+def _matrix_rows(label: str, matrix: Floats, unit: str, size: float) -> Iterator[Row]:
     """Rows of a matrix.  Entries that are rounding errors beside `size` are shown as 0."""
     shown = np.where(np.abs(matrix) < ROUNDING * size, 0.0, matrix)
     first, *others = (" ".join(f"{value:12.5g}" for value in row) for row in shown)
-    yield SummaryRow(label, f"{first}  {unit}".rstrip())
-    yield from (SummaryRow("", row) for row in others)
+    yield (label, f"{first}  {unit}".rstrip())
+    yield from (("", row) for row in others)

@@ -23,6 +23,7 @@ from typing import NamedTuple
 
 from fecm._errors import FecmError
 from fecm._files import beside, check_outputs
+from fecm._table import Cell, Row, ShownNumber, Table
 from fecm._text import DIGITS, printable
 from fecm._version import __version__
 from fecm.deck.units import quantity
@@ -41,16 +42,6 @@ class TrustLevel(StrEnum):
     UNJUDGED = "not judged"
 
 
-class ShownNumber(NamedTuple):
-    """A number and the text that shows it."""
-
-    value: float
-    text: str
-
-
-Cell = str | ShownNumber
-
-
 class Judgement(NamedTuple):
     """A quantity, its size, and whether it is within the range of the model."""
 
@@ -61,34 +52,15 @@ class Judgement(NamedTuple):
 
 
 @dataclass(frozen=True)
-class PageBlock:
-    """A part of a section; each kind has its template, a macro in page.html."""
-
-    @property
-    def kind(self) -> str:
-        """Name of the macro."""
-        return type(self).__name__.removeprefix("Page").lower()
-
-
-@dataclass(frozen=True)
-class PageTable(PageBlock):
-    """A table; the first cell of a row is its heading."""
-
-    header: tuple[str, ...]  # empty for a table of names and values
-    rows: tuple[tuple[Cell, ...], ...]
-    caption: str = ""
-
-
-@dataclass(frozen=True)
-class Judgements(PageBlock):
+class Judgements:
     """A table of judgements."""
 
     rows: tuple[Judgement, ...]
-    caption: str = ""
+    title: str = ""
 
 
 @dataclass(frozen=True)
-class Notes(PageBlock):
+class Notes:
     """Sentences, as a list."""
 
     texts: tuple[str, ...]
@@ -96,7 +68,7 @@ class Notes(PageBlock):
 
 
 @dataclass(frozen=True)
-class PagePicture(PageBlock):
+class PagePicture:
     """A picture inside the page."""
 
     source: str  # ``data:`` address
@@ -106,11 +78,15 @@ class PagePicture(PageBlock):
 
 
 @dataclass(frozen=True)
-class Listing(PageBlock):
+class Listing:
     """A long text, folded."""
 
     title: str
     text: str
+
+
+# Parts of a section.  Each kind has a macro of its name in page.html.
+PageBlock = Table | Judgements | Notes | PagePicture | Listing
 
 
 class PageSection(NamedTuple):
@@ -143,12 +119,10 @@ def share(value: float, digits: int = 3) -> Cell:
     )
 
 
-def page_table(
-    rows: Iterable[Sequence[Cell]], header: Sequence[str] = (), caption: str = ""
-) -> list[PageBlock]:
-    """A table as a list of blocks, which is empty without rows."""
-    found = tuple(tuple(row) for row in rows)
-    return [PageTable(tuple(header), found, caption)] if found else []
+def page_table(rows: Iterable[Row], header: Sequence[str] = (), title: str = "") -> list[PageBlock]:
+    """Return a list of one table, which is empty without rows."""
+    table = Table(tuple(rows), tuple(header), title)
+    return [table] if table.rows else []
 
 
 def note_list(texts: Iterable[str], title: str = "") -> list[PageBlock]:
@@ -212,9 +186,15 @@ def render(page: ReportPage) -> str:
         finalize=_shown,
     )
     environment.filters["repr"] = repr
+    environment.filters["kind"] = _kind
     template = environment.from_string(room.joinpath("page.html").read_text("utf-8"))
     style = room.joinpath("page.css").read_text("utf-8")
     return template.render(page=page, style=style, version=__version__)
+
+
+def _kind(block: PageBlock) -> str:
+    """Name of the macro of a block."""
+    return type(block).__name__.removeprefix("Page").lower()
 
 
 def _shown(value: object) -> object:

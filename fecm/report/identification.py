@@ -5,17 +5,16 @@ from __future__ import annotations
 import hashlib
 from collections.abc import Iterator
 
+from fecm._table import ShownNumber
 from fecm.deck.units import readable, unit_names, unit_of
-from fecm.identification.identify import CARDS, Identification
+from fecm.identification.result import Identification, identification_tables
 from fecm.plot.histories import force_fit_picture
 from fecm.report.content import (
-    Cell,
     Judgement,
     Judgements,
     PageBlock,
     PagePicture,
     ReportPage,
-    ShownNumber,
     TrustLevel,
     listing,
     note_list,
@@ -40,10 +39,11 @@ def identification_page(name: str, found: Identification) -> ReportPage:
         verdict.append("The fit has converged, with doubts: see Trust.")
     else:
         verdict.append("The fit has converged and describes the measurement.")
+    _, *results = identification_tables(found)  # the first is judged under Trust
     body = sections(
         [
             ("Trust", [Judgements(tuple(_judgements(found))), *note_list(found.notes, "Notes")]),
-            ("Results", _results(found)),
+            ("Results", results),
             ("Pictures", [_picture(found)]),
             ("Provenance", _provenance(found)),
         ]
@@ -77,32 +77,6 @@ def _judgements(found: Identification) -> Iterator[Judgement]:
     yield Judgement(TrustLevel.UNJUDGED, "points", ShownNumber(count, str(count)), words)
 
 
-def _results(found: Identification) -> Iterator[PageBlock]:
-    """Values with errors, their correlations, and what errors of the plate do to them."""
-    rows: list[tuple[Cell, ...]] = []
-    for name, value in found.values.items():
-        unit = found.unit(name)
-        cells = (value, found.errors[name], found.start[name])
-        rows.append((name, *(number_with_unit(cell, unit) for cell in cells)))
-    yield from page_table(rows, ("parameter", "value", "standard error", "start"), "Fitted values")
-    if len(found.values) > 1:
-        rows = [
-            (name, *(number_with_unit(float(value), digits=3) for value in row))
-            for name, row in zip(found.values, found.correlation, strict=True)
-        ]
-        yield from page_table(rows, ("", *found.values), "Correlations")
-    rows = []
-    for name, value in found.values.items():
-        relative = name in CARDS and value
-        changes = [changes[name] for changes in found.plate_errors.values()]
-        rows.append(
-            (name, *(share(c / value) if relative else number_with_unit(c) for c in changes))
-        )
-    if found.plate_errors:
-        caption = "Change of the values with 1 % more of a property of the plate in the deck"
-        yield from page_table(rows, ("parameter", *found.plate_errors), caption)
-
-
 def _picture(found: Identification) -> PageBlock:
     """Measured and fitted force, and the residual."""
     picture = force_fit_picture(found, unit_names(found.deck))
@@ -114,6 +88,6 @@ def _provenance(found: Identification) -> Iterator[PageBlock]:
     """Cards with the fitted values, and the deck."""
     text = found.deck.to_text()
     checksum = hashlib.sha256(text.encode()).hexdigest()
-    yield from page_table([("fitted deck, SHA-256", checksum)], caption="Checksum")
+    yield from page_table([("fitted deck, SHA-256", checksum)], title="Checksum")
     yield listing("The fitted cards", found.cards())
     yield listing("The fitted deck", text)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from fecm._table import Cell, Row, ShownNumber
 from fecm._text import DECK_DIGITS
 from fecm.deck import model
 from fecm.deck.catalogue import material_names
@@ -28,10 +29,8 @@ from fecm.mechanics.projectile import RigidMass
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
 from fecm.report.content import (
-    Cell,
     PageBlock,
     PagePicture,
-    ShownNumber,
     number_with_unit,
     page_table,
 )
@@ -55,15 +54,15 @@ LAW = (COEFFICIENT, "length", "", "")  # dimensions of the constants of EXPE
 def of_problem(result: Result, problem: Problem) -> Iterator[PageBlock]:
     """Tables and pictures of a problem."""
     deck = problem.deck
-    yield from page_table(_plate(result, problem), caption="Plate")
+    yield from page_table(_plate(result, problem), title="Plate")
     for number_of, layers in deck.layers.items():
         layup = layup_text([layer.angle for layer in layers])
         name = f"Laminate {number_of}: {layup}" if len(deck.layers) > 1 else f"Laminate {layup}"
         words = f"{name}, {len(layers)} plies, the struck face on top."
         yield PagePicture(inside(stack(layers, material_names(deck))), words, words)
     yield from _materials(deck)
-    yield from page_table(_impact(result, deck), caption="Projectile and contact")
-    yield from page_table(_program(problem), caption="Program")
+    yield from page_table(_impact(result, deck), title="Projectile and contact")
+    yield from page_table(_program(problem), title="Program")
 
 
 def plate_extent(problem: Problem) -> str:
@@ -74,7 +73,7 @@ def plate_extent(problem: Problem) -> str:
     return f"{a} × {b} {unit}".rstrip()
 
 
-def _plate(result: Result, problem: Problem) -> Iterator[tuple[Cell, ...]]:
+def _plate(result: Result, problem: Problem) -> Iterator[Row]:
     """Plate, mesh, supports and what loads it."""
     from fecm.plot.mesh import support_masks
 
@@ -170,7 +169,7 @@ def impactor(result: Result, deck: model.Deck) -> Impactor | None:
     return Impactor(name, mass, velocity, 0.5 * mass * velocity**2)
 
 
-def _impact(result: Result, deck: model.Deck) -> Iterator[tuple[Cell, ...]]:
+def _impact(result: Result, deck: model.Deck) -> Iterator[Row]:
     """Projectile, its velocity and energy, contact law, patch and toughness."""
     hits, law = impactor(result, deck), deck.last(model.Indentation)
     in_units = partial(_in_units, deck)
@@ -193,7 +192,7 @@ def _impact(result: Result, deck: model.Deck) -> Iterator[tuple[Cell, ...]]:
         yield "mode II toughness", in_units(toughness.toughness, TOUGHNESS)
 
 
-def _program(problem: Problem) -> Iterator[tuple[Cell, ...]]:
+def _program(problem: Problem) -> Iterator[Row]:
     """Time steps and the words of the macro program."""
     steps = [m.value for m in flat(problem.program) if m.word == "DT"]
     yield "impact steps", ShownNumber(problem.work.steps, str(problem.work.steps))

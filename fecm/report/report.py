@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 
-from fecm.identification.identify import Identification
+from fecm.identification.result import Identification
 from fecm.report.content import ReportError, ReportPage, check_page, write
 from fecm.report.identification import identification_page
 from fecm.report.run import run_page

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 
+from fecm._table import Cell, Row, ShownNumber
 from fecm.deck import model
 from fecm.deck.layup import layup_text
 from fecm.deck.units import MASS, mass_in_si, quantity, unit_names, unit_of
@@ -15,13 +17,11 @@ from fecm.problem.problem import Problem
 from fecm.report import figures
 from fecm.report.content import (
     UNKNOWN,
-    Cell,
     Judgement,
     Judgements,
     PageBlock,
     PageSection,
     ReportPage,
-    ShownNumber,
     TrustLevel,
     listing,
     note_list,
@@ -47,7 +47,7 @@ from fecm.results.summary import (
     elastic_doubt,
     later_contact,
     radii_of,
-    run_rows,
+    run_table,
 )
 
 WORDS = {
@@ -120,7 +120,7 @@ def _several(
     trust: list[PageBlock] = []
     for name, result in results.items():
         doubts = tuple(one for one in judged[name] if one.level is not TrustLevel.WITHIN)
-        trust += [Judgements(doubts, caption=name)] if doubts else []
+        trust += [Judgements(doubts, title=name)] if doubts else []
         trust += note_list(result.notes, f"Notes of {name}")
     models = {name: _model_row(one, problems[name]) for name, one in results.items()}
     names = list(dict.fromkeys(key for row in models.values() for key in row))
@@ -238,16 +238,15 @@ def _results(results: Mapping[str, Result]) -> list[PageBlock]:
         return _metrics(results)
     blocks: list[PageBlock] = []
     for name, result in results.items():
-        blocks += page_table(
-            run_rows(result), caption=f"Summary of {name}" if len(results) > 1 else "Summary"
-        )
+        title = f"Summary of {name}" if len(results) > 1 else "Summary"
+        blocks.append(replace(run_table(result), title=title))
     return blocks
 
 
 def _metrics(results: Mapping[str, Result]) -> list[PageBlock]:
     """Impact metrics with a column for each result."""
     metrics = {name: result.metrics for name, result in results.items()}
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     if any(result.end in UNDECIDED for result in results.values()):
         bounds = [_lower_bound(result) for result in results.values()]
         rows.append(("largest force by the end", *bounds, "lower bound of the peak force"))
@@ -294,7 +293,7 @@ def _threshold(result: Result) -> list[PageBlock]:
     if not known:
         return []
     unit = unit_of("force", result.units)
-    rows: list[tuple[Cell, ...]] = [
+    rows: list[Row] = [
         ("threshold force", number_with_unit(float(known["force"]), unit)),
         ("number of delaminations", str(known.get("number", UNKNOWN))),
     ]
@@ -313,14 +312,14 @@ def _threshold(result: Result) -> list[PageBlock]:
                 number_with_unit(threshold_energy(result), unit_of("force*length", result.units)),
             )
         )
-    return page_table(rows, caption="Delamination threshold")
+    return page_table(rows, title="Delamination threshold")
 
 
 def _criteria(result: Result) -> list[PageBlock]:
     """Largest exposure and first failure of every criterion."""
     length, time, force = (unit_of(name, result.units) for name in ("length", "time", "force"))
     first = {one.criterion: one for one in first_failures(result)}
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     for one in largest_exposures(result):
         reached = first.get(one.criterion)
         rows.append(

@@ -8,18 +8,17 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from fecm._table import Cell, Row, ShownNumber
 from fecm._text import DECK_DIGITS
 from fecm.deck.units import quantity, short_name, unit_of
 from fecm.plot.kinds import PictureKind
 from fecm.report import figures
 from fecm.report.content import (
     UNKNOWN,
-    Cell,
     Judgement,
     Judgements,
     PageBlock,
     ReportPage,
-    ShownNumber,
     TrustLevel,
     listing,
     note_list,
@@ -120,7 +119,7 @@ def _judgements(sweep: SweepResult) -> Iterator[Judgement]:
 def _varied(sweep: SweepResult) -> list[PageBlock]:
     """Names, numbers and ranges of the values of the cases."""
     laws = {} if sweep.random is None else sweep.random.design.laws
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     for name, values in sweep.cases.items():
         different = list(dict.fromkeys(values.tolist()))
         unit = sweep.unit(name)
@@ -138,7 +137,7 @@ def _varied(sweep: SweepResult) -> list[PageBlock]:
 
 def _extremes(sweep: SweepResult) -> list[PageBlock]:
     """The cases with the smallest and the largest value of every quantity."""
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     for name, column in sweep.summary.items():
         if name in VERDICTS or column.dtype.kind != "f" or column.ndim > 1:
             continue
@@ -160,7 +159,7 @@ def _extremes(sweep: SweepResult) -> list[PageBlock]:
 
 def _convergence(sweep: SweepResult) -> list[PageBlock]:
     """Order, limit and error band of the quantities of a refinement study."""
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     for name, one in sweep.convergence.items():
         unit, finest = sweep.unit(name), float(sweep[name][-1])
         sizes = (
@@ -221,7 +220,7 @@ def _random(sweep: SweepResult, random: RandomResult) -> Iterator[PageBlock]:
             *_drawn(sweep, design),
             ("seed", ShownNumber(design.seed, str(design.seed))),
         ],
-        caption="Random sweep",
+        title="Random sweep",
     )
     count = len(next(iter(random.combinations.values()), [0]))
     for combination in range(min(count, MOST_COMBINATIONS)):
@@ -238,7 +237,7 @@ def _statistics(
     sweep: SweepResult, random: RandomResult, place: tuple[int, ...], caption: str
 ) -> list[PageBlock]:
     """Mean, standard deviation and quantiles of the most important quantities."""
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     for name in (name for name in MAIN if name in random.statistics):
         own, unit = random.statistics[name], sweep.unit(name)
         values = [own.mean[place], own.standard_deviation[place], *own.quantiles[place]]
@@ -254,7 +253,7 @@ def _exceedance(
 ) -> list[PageBlock]:
     """Probabilities that quantities exceed limits, with their intervals."""
     found = random.exceedance
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     for row, (name, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
         p, low, high, draws, is_open = (float(values[(*place, row)]) for values in found[2:])
         level = (
@@ -277,7 +276,7 @@ def _indices(
     if name is None:
         return
     columns = [np.asarray(values[place]).tolist() for values in random.sensitivity[name]]
-    rows: list[tuple[Cell, ...]] = []
+    rows: list[Row] = []
     for law, first, total, *intervals in zip(random.design.laws, *columns, strict=True):
         cells: list[Cell] = []
         for value, (low, high) in zip((first, total), intervals, strict=True):
@@ -306,12 +305,12 @@ def _provenance(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> It
     text = sweep.deck_text
     unit = unit_of("time", sweep.units)
     steps = [quantity(dt, unit, DECK_DIGITS) for dt in np.unique(sweep.dt).tolist()]
-    rows: list[tuple[Cell, ...]] = [
+    rows: list[Row] = [
         ("cases", ShownNumber(len(sweep), str(len(sweep)))),
         ("size of the time step", ", ".join(steps[:4]) + (", …" if len(steps) > 4 else "")),
         ("deck, SHA-256", hashlib.sha256(text.encode()).hexdigest()),
     ]
     if name in digests:
         rows.append(("result, SHA-256", digests[name]))
-    yield from page_table(rows, caption="Checksums")
+    yield from page_table(rows, title="Checksums")
     yield listing("The deck", text)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from fecm._errors import ResultFileError
+from fecm._table import Cell, ShownNumber
 from fecm.deck.macros import flat
 from fecm.listing.slips import LISTING
 from fecm.problem.estimates import ENOUGH_PER_WAVE, said_error
@@ -16,9 +17,7 @@ from fecm.problem.problem import Problem
 from fecm.problem.summary import deck_summary
 from fecm.report.content import (
     UNKNOWN,
-    Cell,
     Judgement,
-    ShownNumber,
     TrustLevel,
     number_with_unit,
     share,

@@ -6,7 +6,8 @@ import math
 from dataclasses import dataclass, field
 from typing import Annotated, Literal, NamedTuple, TypedDict
 
-from fecm._text import html_table, printable, shown_apart
+from fecm._table import Row, Table, html_table
+from fecm._text import printable, shown_apart
 
 MAX = "max"  # the usual scale of differences, in words
 TEXT = "text"  # the type of a dataset of texts
@@ -330,10 +331,13 @@ class Difference:
 
     def _repr_html_(self) -> str:
         """Table of the datasets that differ and of what is listed, for notebooks."""
-        rows = [(found.name, str(found)) for found in self.datasets if not found.same]
+        rows: list[Row] = [
+            (dataset.name, str(dataset)) for dataset in self.datasets if not dataset.same
+        ]
         rows += ((name, "only in A") for name in self.only_in_a)
         rows += ((name, "only in B") for name in self.only_in_b)
-        return html_table(repr(self)[1:-1], [*rows, *(("listed", str(one)) for one in self.listed)])
+        rows += (("listed", str(item)) for item in self.listed)
+        return html_table(Table(tuple(rows), title=repr(self)[1:-1]))
 
     def lines(self, *, same: bool = True) -> list[str]:
         """Return one line per dataset, what is listed, and the verdict.

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 from fecm._errors import FecmError, ResultFileError
-from fecm._text import html_table
+from fecm._table import Table, html_table
 from fecm._typing import Array
 
 
@@ -194,4 +194,4 @@ class ResultGroup:
 
     def _repr_html_(self) -> str:
         """Table of the datasets, for notebooks."""
-        return html_table(self._name, self._shapes().items())
+        return html_table(Table(tuple(self._shapes().items()), title=self._name))

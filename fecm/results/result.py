@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from fecm._errors import ResultFileError, warn
-from fecm._text import html_table
+from fecm._table import Table, html_table
 from fecm._typing import AnyFile, Floats
 from fecm.deck.model import Deck
 from fecm.results import schema
@@ -402,11 +402,10 @@ class Result(Stored, schema.ContactRows):
 
     def _repr_html_(self) -> str:
         """Table of the summary and the notes, for notebooks."""
-        from fecm.results.summary import run_rows  # 4 ms at start
+        from fecm.results.summary import run_table  # 4 ms at start
 
-        return html_table(
-            repr(self)[1:-1], [*run_rows(self), *(("note", note) for note in self.notes)]
-        )
+        notes = tuple(("note", note) for note in self.notes)
+        return html_table(Table(run_table(self).rows + notes, title=repr(self)[1:-1]))
 
 
 def load(path: str | Path | AnyFile) -> Result:

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any, TypedDict, cast
 
 import numpy as np
 
-from fecm._text import DECK_DIGITS, DIGITS, SummaryRow, row_lines, significant
+from fecm._table import Row, Table, label_lines, text_lines
+from fecm._text import DECK_DIGITS, DIGITS, significant
 from fecm._typing import FiniteFloat, Floats
 from fecm.deck.units import quantity as shown_quantity
 from fecm.deck.units import unit_of
@@ -160,61 +161,59 @@ UNDECIDED = {
 }
 
 
-def _search(what: str, until: str) -> SummaryRow:
-    """SummaryRow of the command that finds the impact energy at which something is reached."""
+def _search(what: str, until: str) -> Row:
+    """Row of the command that finds the impact energy at which something is reached."""
     command = f"fecm sweep DECK --find velocity --until {until}"
-    return SummaryRow("", f"{command} finds the impact energy of {what}")
+    return ("", f"{command} finds the impact energy of {what}")
 
 
 def run_summary(result: Stored) -> list[str]:
-    """Summarise a result in lines, in the deck's units."""
-    return row_lines(run_rows(result))
+    """Return the rows of :func:`run_table` as lines of text."""
+    return text_lines(run_table(result))
 
 
-def run_rows(result: Stored) -> list[SummaryRow]:
-    """Summarise a result in rows, in the deck's units."""
+def run_table(result: Stored) -> Table:
+    """Return the summary of a result, in the deck's units."""
+    return Table(tuple(_run_rows(result)), title=result.title or "(no title)")
+
+
+def _run_rows(result: Stored) -> list[Row]:
     quantity = partial(_quantity, result)
-    lines = [
-        SummaryRow(what, f"{result.attributes[name]}, instead of {card}")
+    lines: list[Row] = [
+        (what, f"{result.attributes[name]}, instead of {card}")
         for name, what, card in OWN_PARTS
         if name in result.attributes
     ]
     clock = "history/time" if "history/force" in result else "energy/time"
     if clock in result:
         time = result[clock]
-        lines.append(SummaryRow("steps", f"{len(time)}, up to time {quantity(time[-1], 'time')}"))
+        lines.append(("steps", f"{len(time)}, up to time {quantity(time[-1], 'time')}"))
     lines += _curved(result)
     lines += _preload(result)
     if "history/force" in result:
         lines += _impact(result)
     elif "tape3/w" in result and (w := result["tape3/w"]).any():
         row, node = np.unravel_index(int(np.abs(w).argmax()), w.shape)
-        lines.append(
-            SummaryRow("largest w", f"{quantity(w[row, node], 'length')} at node {node + 1}")
-        )
+        lines.append(("largest w", f"{quantity(w[row, node], 'length')} at node {node + 1}"))
     elif "tape3/w" in result:
-        lines.append(SummaryRow("largest w", "0: nothing moved the plate"))
+        lines.append(("largest w", "0: nothing moved the plate"))
     if text := _membrane(result):
-        lines.append(SummaryRow("membrane", text))
+        lines.append(("membrane", text))
     if result.threshold:
-        lines.append(SummaryRow("delamination", f"{_delamination(result)}{_delaminations(result)}"))
+        lines.append(("delamination", f"{_delamination(result)}{_delaminations(result)}"))
         if math.isfinite(float(result.threshold["time"])):
             lines.append(_search("the threshold", "peak_force=threshold"))
     lines += _exposures(result)
     if "failure/x" in result and (count := np.count_nonzero(result["failure/under_load"])):
-        lines.append(
-            SummaryRow("left out", f"{count} points under the load or at corners of supports")
-        )
+        lines.append(("left out", f"{count} points under the load or at corners of supports"))
     if "modes/angular_frequency" in result:
         found = result["modes/angular_frequency"]
         texts = ", ".join(significant(omega) for omega in found[:LISTED])
         more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
         lines.append(
-            SummaryRow(
-                "frequencies", f"{texts}{more} {result.unit('modes/angular_frequency')}".rstrip()
-            )
+            ("frequencies", f"{texts}{more} {result.unit('modes/angular_frequency')}".rstrip())
         )
-    return lines or [SummaryRow("nothing was stored", "")]
+    return lines or [("nothing was stored", "")]
 
 
 def radii_of(result: Stored) -> dict[str, float]:
@@ -224,7 +223,7 @@ def radii_of(result: Stored) -> dict[str, float]:
     return {axis: float(one) for axis, one in radii.items() if isinstance(one, int | float)}
 
 
-def _curved(result: Stored) -> list[SummaryRow]:
+def _curved(result: Stored) -> list[Row]:
     """Line of the radii and the rise of a curved panel."""
     if "mesh/z" not in result:
         return []
@@ -233,10 +232,10 @@ def _curved(result: Stored) -> list[SummaryRow]:
         for axis, one in radii_of(result).items()
     ]
     rise = _quantity(result, float(np.ptp(result["mesh/z"])), "length", DECK_DIGITS)
-    return [SummaryRow("curved panel", ", ".join([*named, f"rise {rise}"]))]
+    return [("curved panel", ", ".join([*named, f"rise {rise}"]))]
 
 
-def _preload(result: Stored) -> list[SummaryRow]:
+def _preload(result: Stored) -> list[Row]:
     """Line of the initial membrane force of PREL."""
     given = result.attributes_of("laminate")
     forces = {f"N_{name}": given.get(f"N0_{name}") for name in ("x", "y", "xy")}
@@ -245,7 +244,7 @@ def _preload(result: Stored) -> list[SummaryRow]:
         for name, force in forces.items()
         if isinstance(force, float) and force
     ]
-    return [SummaryRow("preload", ", ".join(named))] if named else []
+    return [("preload", ", ".join(named))] if named else []
 
 
 def _membrane(result: Stored) -> str:
@@ -289,29 +288,29 @@ def _delaminations(result: Stored) -> str:
     return f" ({'; '.join([f'for {count}, as in DELA', *texts])})"
 
 
-def _exposures(result: Stored) -> list[SummaryRow]:
+def _exposures(result: Stored) -> list[Row]:
     """Lines about the largest exposures and the first failure."""
     largest, first = largest_exposures(result), _first_failures(result)
     reached = {one.criterion: one.force for one in first if not math.isnan(one.force)}
-    lines = []
+    lines: list[Row] = []
     for exposure in largest:
         force = reached.get(exposure.criterion)
         known = "" if force is None else f"; reaches 1 at {_quantity(result, force, 'force')}"
         text = f"{_exposure(result, exposure)}{known}{_at_rest(exposure)}"
-        lines.append(SummaryRow(spelt(exposure.criterion), text))
+        lines.append((spelt(exposure.criterion), text))
     count = evaluations_in_contact(result)
     if count is not None and "history/force" in result:
-        lines.append(SummaryRow("evaluations", f"{count} of FAIL during contact"))
+        lines.append(("evaluations", f"{count} of FAIL during contact"))
     is_open = "open, as finer meshes may decide otherwise; on this mesh "
     is_open = is_open if failure_verdict(largest) is FailureVerdict.OPEN else ""
     if first:
-        lines.append(SummaryRow("first failure", f"{is_open}{_first_failure(result, first[0])}"))
+        lines.append(("first failure", f"{is_open}{_first_failure(result, first[0])}"))
         if not math.isnan(first[0].force):
             lines.append(_search("the first failure", "exposure=1"))
     elif largest and count:
         ends = " by the end of the run, which is in contact: open"
         ends = ends if result.still_in_contact else ""
-        lines.append(SummaryRow("first failure", f"{is_open}none{ends}"))
+        lines.append(("first failure", f"{is_open}none{ends}"))
     return lines
 
 
@@ -392,21 +391,19 @@ def _quantity(result: Stored, value: float, dimension: str, digits: int = DIGITS
     return shown_quantity(value, unit_of(dimension, result.units), digits)
 
 
-def _impact(result: Stored) -> list[SummaryRow]:
+def _impact(result: Stored) -> list[Row]:
     """Lines about forces, contacts, indentation and energy of an impact."""
-    lines = [SummaryRow("peak force", _peak_force(result))]
+    lines = [("peak force", _peak_force(result))]
     if intervals := _intervals(result):
         indentation, w = result["history/indentation"], result["history/plate_w"]
         lines += [
-            SummaryRow("contact", _contacts(result, intervals)),
-            SummaryRow(
-                "largest indent", f"{_largest(result, indentation)}, permanent {_left(result)}"
-            ),
-            SummaryRow("largest w", f"{_at_least(result)}{_largest(result, w, ' under the load')}"),
+            ("contact", _contacts(result, intervals)),
+            ("largest indent", f"{_largest(result, indentation)}, permanent {_left(result)}"),
+            ("largest w", f"{_at_least(result)}{_largest(result, w, ' under the load')}"),
         ]
         if not math.isnan(metrics_of(result)["rebound_velocity"]):
-            lines.append(SummaryRow("rebound", _rebound(result)))
-    return [*lines, SummaryRow("energy balance", _energy_balance(result))]
+            lines.append(("rebound", _rebound(result)))
+    return [*lines, ("energy balance", _energy_balance(result))]
 
 
 def _peak_force(result: Stored) -> str:
@@ -507,7 +504,7 @@ def elastic_doubt(result: Stored, peak: float) -> str:
 
 def run_text(result: Stored) -> list[str]:
     """Title, summary and notes: what ``fecm run`` prints."""
-    notes = row_lines(SummaryRow("note", note) for note in result.notes)
+    notes = label_lines(("note", note) for note in result.notes)
     lines = [*(_missing(result) or run_summary(result)), *notes]
     return [result.title or "(no title)", *(f"  {line}" for line in lines)]
 

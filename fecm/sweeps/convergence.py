@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fecm._text import aligned
+from fecm._table import aligned
 from fecm._typing import Floats
 from fecm.authoring.case import Case, CasesError
 from fecm.authoring.timing import stable_time_step

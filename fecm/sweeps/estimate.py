@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from fecm._errors import warn
-from fecm._text import SummaryRow, aligned, html_table, row_lines
+from fecm._table import Row, Table, html_table, text_lines
 from fecm.deck.model import Deck
 from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.problem.loading import sole_problem
@@ -106,41 +106,37 @@ class Estimate:
             "models": [{"model": name, **asdict(one)} for name, one in self.models.items()],
         }
 
-    def rows(self) -> list[SummaryRow]:
-        """Return a row for each quantity that the models share."""
+    def tables(self) -> tuple[Table, Table]:
+        """Return what the models share, and the models with the run."""
         free = " (the plate is free: no static model)" if math.isnan(self.stiffness) else ""
-        return [
-            SummaryRow("class", f"M/M_plate = {self.mass_ratio:.4g}, {self.response}"),
-            SummaryRow("lambda", f"{self.inelasticity:.4g}"),
-            SummaryRow("stiffness", f"{self._text(self.stiffness, 'force/length')}{free}"),
-            *(SummaryRow(subject, text) for subject, text in self.remarks.items()),
+        shared: list[Row] = [
+            ("class", f"M/M_plate = {self.mass_ratio:.4g}, {self.response}"),
+            ("lambda", f"{self.inelasticity:.4g}"),
+            ("stiffness", f"{self._text(self.stiffness, 'force/length')}{free}"),
+            *self.remarks.items(),
         ]
+        models = tuple(self._row(name, model) for name, model in self.models.items())
+        header = ("model", *(name.replace("_", " ") for name in COLUMNS))
+        return Table(tuple(shared), title=self.title or "(no title)"), Table(models, header)
 
     def __str__(self) -> str:
-        table = [["model", *(name.replace("_", " ") for name in COLUMNS)]]
-        table += (self._row(name, model) for name, model in self.models.items())
-        lines = [*row_lines(self.rows(), LABEL_WIDTH), *aligned(table)]
-        return "\n".join([self.title or "(no title)", *(f"  {line}" for line in lines)])
+        shared, models = self.tables()
+        lines = [*text_lines(shared, LABEL_WIDTH), *text_lines(models)]
+        return "\n".join([shared.title, *(f"  {line}" for line in lines)])
 
     def _repr_html_(self) -> str:
-        """Table of the models and of the run, for notebooks."""
-        rows = self.rows()
-        for name, model in self.models.items():
-            label, *cells = self._row(name, model)
-            named = zip(COLUMNS, cells, strict=True)
-            text = ", ".join(f"{column.replace('_', ' ')} {cell}" for column, cell in named)
-            rows.append(SummaryRow(label, text))
-        rows += (SummaryRow("note", note) for note in self.notes)
-        return html_table(self.title or "(no title)", rows)
+        """Tables of the estimate and its notes, for notebooks."""
+        notes = (Table(tuple(("note", note) for note in self.notes)),) if self.notes else ()
+        return html_table(*self.tables(), *notes)
 
-    def _row(self, model: str, one: ModelEstimate) -> list[str]:
-        """Cells of a model."""
-        cells = [model if one.applies else f"{model} (out of range)"]
-        for name, dimension in COLUMNS.items():
-            # Of the models force and duration are known, of the run only if its contact ends.
-            missing = "open" if name in ("peak_force", "duration") else "-"
-            cells.append(self._text(getattr(one, name), dimension, missing))
-        return cells
+    def _row(self, name: str, model: ModelEstimate) -> Row:
+        """Return the row of a model."""
+        cells = [name if model.applies else f"{name} (out of range)"]
+        for column, dimension in COLUMNS.items():
+            # Force and duration of a model are known, those of the run only if its contact ends.
+            missing = "open" if column in ("peak_force", "duration") else "-"
+            cells.append(self._text(getattr(model, column), dimension, missing))
+        return tuple(cells)
 
     def _text(self, value: float, dimension: str, missing: str = "-") -> str:
         """A value with its unit."""

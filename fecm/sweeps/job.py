@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from fecm._files import check_outputs
 from fecm._options import documented, option, with_parameters_of
-from fecm._text import html_table
+from fecm._table import Row, Table, html_table
 from fecm._watch import LOGGER, CallerWatch, Progress, Watch
 from fecm.authoring.case import Case, CasesError, Limit, parse_exceed
 from fecm.authoring.cases import CaseTable, checked, combined, grid_cases, parse_vary, read_cases
@@ -544,9 +544,10 @@ class Sweep:
     def _repr_html_(self) -> str:
         """Names, output and price, for notebooks."""
         names = ", ".join(self.all_cases[0])
-        rows = [("title", self.title), ("names", names), ("price", str(self.price))]
+        rows: list[Row] = [("title", self.title), ("names", names), ("price", str(self.price))]
         rows += [("result", str(self.path))] * (self.path is not None)
-        return html_table(repr(self)[1:-1], [*rows, *(("doubt", text) for text in self.doubts)])
+        rows += (("doubt", text) for text in self.doubts)
+        return html_table(Table(tuple(rows), title=repr(self)[1:-1]))
 
 
 def checked_problem(deck: AnyDeck) -> Problem:

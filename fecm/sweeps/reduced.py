@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from fecm._errors import ResultFileError
-from fecm._text import SummaryRow
+from fecm._table import Row
 from fecm._typing import Floats, Indices
 from fecm.authoring.case import CasesError
 from fecm.authoring.impacts import Impacts
@@ -202,19 +202,19 @@ class ReducedModel:
     def _modes(self) -> str:
         return f"{self.modes} mode{'' if self.modes == 1 else 's'}"
 
-    def rows(self) -> Iterator[SummaryRow]:
+    def rows(self) -> Iterator[Row]:
         """What the summary of the sweep says of the model."""
-        yield SummaryRow("reduced model", f"{self._modes} of bending; difference from full runs:")
+        yield ("reduced model", f"{self._modes} of bending; difference from full runs:")
         rows = zip(
             self.columns["case"], self.difference("peak_force"), self.difference(RATIO), strict=True
         )
         for case, peak, w in rows:
             of_w = "open" if np.isnan(w) else f"{w:+.3%}"
-            yield SummaryRow("", f"peak {peak:+.2%}, w {of_w} (case {case})")
+            yield ("", f"peak {peak:+.2%}, w {of_w} (case {case})")
         if self.in_full:
             cases = "1 case" if self.in_full == 1 else f"{self.in_full} cases"
-            yield SummaryRow("", f"{cases} of the largest energies: in full, as above {LIMIT:.0%}")
-        yield SummaryRow("", "slopes and strains are not judged")
+            yield ("", f"{cases} of the largest energies: in full, as above {LIMIT:.0%}")
+        yield ("", "slopes and strains are not judged")
 
     def check(self) -> None:
         """Raise CasesError if a peak differs by more than the limit."""

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from fecm._errors import ResultFileError
 from fecm._files import check_outputs, open_for_writing
-from fecm._text import html_table
+from fecm._table import Table, html_table
 from fecm._typing import AnyFile
 from fecm.deck.model import Delamination
 from fecm.deck.units import declared_units, unit_names
@@ -78,7 +78,7 @@ class SweepResult(StoredSweep):
 
     def _repr_html_(self) -> str:
         """Table of the summary, for notebooks."""
-        return html_table(repr(self)[1:-1], sweep_rows(self))
+        return html_table(Table(tuple(sweep_rows(self)), title=repr(self)[1:-1]))
 
     @property
     def notes(self) -> tuple[str, ...]:

@@ -9,7 +9,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from fecm._errors import ResultFileError
-from fecm._text import DIGITS, SummaryRow, row_lines, significant
+from fecm._table import Row, label_lines
+from fecm._text import DIGITS, significant
 from fecm._typing import Bools
 from fecm.authoring.case import THRESHOLD, pair_of_text
 from fecm.deck.model import Curvature, Preload, Segment
@@ -41,27 +42,27 @@ SAME_PLACE = 1e-9  # distance from the place given, relative to its coordinates,
 
 def sweep_summary(result: StoredSweep) -> list[str]:
     """Return the lines of :func:`sweep_rows`."""
-    return row_lines(sweep_rows(result))
+    return label_lines(sweep_rows(result))
 
 
-def sweep_rows(result: StoredSweep) -> list[SummaryRow]:
+def sweep_rows(result: StoredSweep) -> list[Row]:
     """Summarise a sweep: number of cases, smallest and largest peak or velocity, failures."""
     fine = result.completed
     failed = Counter(result["status"][~fine].tolist())
-    rows = [SummaryRow("cases", f"{len(result)}")]
+    rows: list[Row] = [("cases", f"{len(result)}")]
     if result.law:
-        rows.append(SummaryRow("contact law", f"{result.law}, instead of EXPE"))
+        rows.append(("contact law", f"{result.law}, instead of EXPE"))
     rows += [*_extremes(result), *_moved(result)]
     for reason, times in failed.most_common(MOST_REASONS):
-        rows.append(SummaryRow("failed", f"{times}: {reason}"))
+        rows.append(("failed", f"{times}: {reason}"))
     if (others := len(failed) - MOST_REASONS) > 0:
-        rows.append(SummaryRow("failed", f"for {others} other reason{'s' * (others > 1)}"))
+        rows.append(("failed", f"for {others} other reason{'s' * (others > 1)}"))
     if result.random is not None and failed:
-        rows.append(SummaryRow("failed share", f"{(~fine).mean():.3%} of the draws"))
+        rows.append(("failed share", f"{(~fine).mean():.3%} of the draws"))
     return [*rows, *(() if result.reduced is None else result.reduced.rows())]
 
 
-def _extremes(result: StoredSweep) -> Iterator[SummaryRow]:
+def _extremes(result: StoredSweep) -> Iterator[Row]:
     """The cases with the smallest and the largest peak, or velocity found."""
     what, names = "peak", ["peak_force"]
     if "found_velocity" in result.summary:
@@ -74,7 +75,7 @@ def _extremes(result: StoredSweep) -> Iterator[SummaryRow]:
         values = ", ".join(f"{name} {_shown(result, name, int(case))}" for name in result.cases)
         given = f" ({values})" if values else ""
         text = f"{', '.join(texts)}{given}{_found_band(result, int(case))}"
-        yield SummaryRow(f"{size} {what}", text)
+        yield (f"{size} {what}", text)
 
 
 def _found_band(result: StoredSweep, case: int) -> str:
@@ -88,7 +89,7 @@ def _found_band(result: StoredSweep, case: int) -> str:
     return f"; finer meshes {quantity(low, unit, 3)} to {quantity(high, unit, 3)}"
 
 
-def _moved(result: StoredSweep) -> Iterator[SummaryRow]:
+def _moved(result: StoredSweep) -> Iterator[Row]:
     """How far the places that were hit are from those given."""
     if "at" not in result.cases or "hit_x" not in result.summary:
         return
@@ -96,7 +97,7 @@ def _moved(result: StoredSweep) -> Iterator[SummaryRow]:
     moved = np.hypot(*(asked - (result["hit_x"], result["hit_y"])))
     if count := np.count_nonzero(moved > SAME_PLACE * np.abs(asked).max()):
         distance = f"{np.nanmax(moved):.4g} {result.unit('hit_x')}".rstrip()
-        yield SummaryRow("moved", f"{count}: to the nearest node, up to {distance} away")
+        yield ("moved", f"{count}: to the nearest node, up to {distance} away")
 
 
 def _shown(result: StoredSweep, name: str, case: int) -> str:

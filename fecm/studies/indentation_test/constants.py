@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from fecm._text import aligned
+from fecm._table import aligned
 from fecm._typing import Floats
 from fecm.authoring.contact import Contact
 from fecm.deck.model import Indentation

@@ -1,0 +1,233 @@
+"""Result of a fit to a measured force, and the tables that terminals, notebooks and pages show."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fecm._table import Cell, Row, ShownNumber, Table, html_table, text_lines
+from fecm._typing import Floats
+from fecm.authoring.values import dimension_of
+from fecm.deck.model import Deck, Impact, Indentation, Projectile
+from fecm.deck.units import quantity, readable, unit_names, unit_of
+from fecm.identification.fitting import OF_RECORD
+from fecm.results.groups import NotStoredError
+from fecm.results.pictures import report_results
+
+CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
+    **dict.fromkeys(("velocity", "energy"), Impact),
+    **dict.fromkeys(("k", "alpha_p", "s_p", "q"), Indentation),
+    **dict.fromkeys(("mass", "rod_length", "rod_modulus", "rod_density"), Projectile),
+}
+DIGITS = 5  # of fitted values; their errors have two
+LABEL_WIDTH = 13
+PLATE_ERRORS = "Change of the values with 1 % more of a property of the plate in the deck"
+
+
+@dataclass(frozen=True)
+class Identification:
+    """Parameters fitted to a measured force.
+
+    Attributes
+    ----------
+    values, errors : dict of str to float
+        Fitted values and their standard errors, by name.
+    start : dict of str to float
+        Values before the fit.
+    correlation : ndarray (names, names)
+        Correlation matrix of the values, in their order.
+    time, force, model : ndarray (points,)
+        Measured times and forces that were fitted, and the fitted force at these times.
+    converged : bool
+        Whether the fit has converged.
+    accepted : bool
+        Whether the fit has converged, the model describes the data, and no delay or offset is
+        missing among the parameters.
+    plate_errors : dict of str to dict
+        Changes of the fitted values with 1 % more ``"thickness"`` and 1 % more ``"e1"`` of the
+        plate in the deck, linearised.
+    deck : Deck
+        The deck with the fitted values, rounded to five digits.
+    notes : tuple of str
+        Reasons to doubt the values.
+    law : str
+        Name of the contact law that took the place of EXPE, which the deck has all the same; empty
+        if none did.
+    """
+
+    values: dict[str, float]
+    errors: dict[str, float]
+    start: dict[str, float]
+    correlation: Floats
+    time: Floats
+    force: Floats
+    model: Floats
+    converged: bool
+    accepted: bool
+    plate_errors: dict[str, dict[str, float]]
+    deck: Deck
+    notes: tuple[str, ...]
+    law: str = ""
+
+    @property
+    def residual(self) -> Floats:
+        """Measured minus fitted force, (points,)."""
+        return self.force - self.model
+
+    @property
+    def dof(self) -> int:
+        """Degrees of freedom: points minus parameters."""
+        return len(self.time) - len(self.values)
+
+    @property
+    def rms(self) -> float:
+        """Standard deviation of the residual, with `dof` in its denominator (force)."""
+        return float(np.sqrt(self.residual @ self.residual / self.dof))
+
+    @property
+    def share(self) -> float:
+        """`rms` over the measured peak force."""
+        return self.rms / float(self.force.max())
+
+    @property
+    def units(self) -> dict[str, str]:
+        """Names of the units of length, force and time; empty if the deck names none."""
+        return unit_names(self.deck)
+
+    def unit(self, name: str) -> str:
+        """Unit of a fitted value; empty for a pure number, or if the deck names no units.
+
+        Raises
+        ------
+        NotStoredError
+            If no such value was fitted; a KeyError.
+        """
+        if name not in self.values:
+            raise NotStoredError(f"{name} was not fitted; there are {', '.join(self.values)}")
+        return unit_of(OF_RECORD.get(name) or dimension_of(name), self.units)
+
+    def report(self, path: str | Path, *, overwrite: bool = False) -> None:
+        """Write an HTML page to hand on, as ``fecm identify --report`` does.
+
+        The page is one file: verdict, fitted values, their errors, pictures, deck.
+
+        Parameters
+        ----------
+        path : str or Path
+            File to write, ``.html``.
+        overwrite : bool
+            Replace an existing file.
+
+        Raises
+        ------
+        ReportError
+            If the name has another suffix.
+        FileExistsError
+            If the file exists and may not be replaced.
+        ImportError
+            If Jinja2 or matplotlib is not installed.
+
+        Examples
+        --------
+        >>> found.report("impact.html")  # doctest: +SKIP
+        """
+        report_results({"the measurement": self}, path, overwrite=overwrite)
+
+    def cards(self) -> str:
+        """Cards of the deck with fitted values."""
+        kinds = dict.fromkeys(CARDS[name] for name in self.values if name in CARDS)
+        segments = (self.deck.require(kind) for kind in kinds)
+        return "\n".join(line for s in segments for line in s.cards(self.deck.control)).rstrip()
+
+    def to_dict(self) -> dict[str, object]:
+        """Return plain values, as ``fecm identify --format json`` prints them."""
+        return {
+            **({"law": self.law} if self.law else {}),
+            "values": {
+                name: {"value": value, "error": self.errors[name], "start": self.start[name]}
+                for name, value in self.values.items()
+            },
+            "correlation": self.correlation.tolist(),
+            "points": len(self.time),
+            "dof": self.dof,
+            "rms": self.rms,
+            "share": self.share,
+            "converged": self.converged,
+            "accepted": self.accepted,
+            "plate_errors": self.plate_errors,
+            "notes": list(self.notes),
+            "cards": self.cards(),
+        }
+
+    def __str__(self) -> str:
+        tables = ["\n".join(text_lines(t, LABEL_WIDTH)) for t in identification_tables(self)]
+        return "\n\n".join([*tables, self.cards()])
+
+    def __repr__(self) -> str:
+        verdict = "accepted" if self.accepted else "not accepted"
+        return f"<fecm identification of {', '.join(self.values)}: {verdict}>"
+
+    def _repr_html_(self) -> str:
+        """Tables of the fit and its notes, for notebooks."""
+        notes = (Table(tuple(("note", note) for note in self.notes)),) if self.notes else ()
+        return html_table(*identification_tables(self), *notes)
+
+
+def identification_tables(fit: Identification) -> Iterator[Table]:
+    """Return the quality of a fit, its values, their correlations, and the effect of the plate."""
+    yield _quality(fit)
+    values = tuple(_value_row(fit, name) for name in fit.values)
+    yield Table(values, ("parameter", "value", "standard error", "start"), "Fitted values")
+    if len(fit.values) > 1:
+        rows = tuple(
+            _row(name, (_number(value, f"{value:.3f}") for value in row))
+            for name, row in zip(fit.values, fit.correlation.tolist(), strict=True)
+        )
+        yield Table(rows, ("correlation", *fit.values), "Correlations")
+    if fit.plate_errors:
+        rows = tuple(_plate_error_row(fit, name) for name in fit.values)
+        yield Table(rows, ("1 % more in the deck", *fit.plate_errors), PLATE_ERRORS)
+
+
+def _quality(fit: Identification) -> Table:
+    """Return the number of points, the residual, and whether the fit is accepted."""
+    rms = quantity(fit.rms, unit_of("force", fit.units))
+    rows: list[Row] = [
+        ("points", f"{len(fit.time)}, {fit.dof} degrees of freedom"),
+        ("residual", f"{rms} rms, {100.0 * fit.share:.2g} % of the peak"),
+        ("converged", "yes" if fit.converged else "no"),
+        ("accepted", "yes" if fit.accepted else "no"),
+    ]
+    if fit.law:
+        rows.append(("law", f"{fit.law}, instead of EXPE"))
+    return Table(tuple(rows), title="Fit")
+
+
+def _value_row(fit: Identification, name: str) -> Row:
+    """Return a parameter with its value, standard error and start."""
+    power, unit = readable(fit.values[name], fit.unit(name), DIGITS)
+
+    def cell(value: float, digits: int = DIGITS) -> ShownNumber:
+        return _number(value, f"{value / 10.0**power:.{digits}g} {unit}".rstrip())
+
+    return name, cell(fit.values[name]), cell(fit.errors[name], 2), cell(fit.start[name])
+
+
+def _plate_error_row(fit: Identification, name: str) -> Row:
+    """Return the changes of a parameter, relative to its value if the deck has it."""
+    value = fit.values[name]
+    changes = [errors[name] for errors in fit.plate_errors.values()]
+    if name in CARDS and value:
+        return _row(name, (_number(c / value, f"{c / value:+.2%}") for c in changes))
+    return _row(name, (_number(c, f"{c:+.2g}") for c in changes))
+
+
+def _row(label: str, cells: Iterable[Cell]) -> Row:
+    return (label, *cells)
+
+
+def _number(value: float, text: str) -> ShownNumber:
+    return ShownNumber(float(value), text)
