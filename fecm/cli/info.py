@@ -138,9 +138,8 @@ def _about(contents: FileContents) -> dict[str, Any]:
     elif contents.form == Form.LOCATION:
         # 5 ms, which the result of a run does not need.
         from fecm.location.location import location_of
-        from fecm.location.summary import location_lines as summary_lines
 
-        extent = {"summary": summary_lines(location_of(contents))}
+        extent = {"summary": str(location_of(contents)).split("\n")}
     else:
         extent = {**about_run(result_of(contents))}
     if extent.get("still_in_contact") and PERMANENT in contents.groups["history"]:

@@ -24,9 +24,7 @@ from fecm.cli.options import (
 )
 from fecm.cli.outputs import OutputPaths
 from fecm.location.locate import located
-from fecm.location.location import Location
 from fecm.location.prepare import LocationSettings
-from fecm.location.summary import location_lines, values
 
 
 @dataclass(frozen=True)
@@ -143,19 +141,8 @@ def locate_command(options: LocateOptions) -> None:
         note(f"wrote {options.output}")
     note(*found.notes)
     if options.form is Format.JSON:
-        echo_json(document(found))
+        echo_json(found.to_dict())
     else:
-        echo("\n".join(location_lines(found)))
+        echo(found)
     if not found.accepted:
         raise SystemExit(FAILED)
-
-
-def document(found: Location) -> dict[str, object]:
-    """JSON of a location."""
-    force = {
-        "time": found.time.tolist(),
-        "value": found.force.tolist(),
-        "sd": found.force_sd.tolist(),
-        "determined": found.determined.tolist(),
-    }
-    return {**values(found), "units": found.units, "force": force, "notes": list(found.notes)}

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 from fecm._arrays import read_only
 from fecm._errors import FecmError, OptionsError, ResultFileError
 from fecm._files import check_outputs
+from fecm._table import Row, Table, html_table, text_lines
 from fecm._typing import AnyFile, Bools, Floats
 from fecm.deck.model import Deck
-from fecm.deck.units import unit_names, unit_of
+from fecm.deck.units import quantity, unit_names, unit_of
 from fecm.results import schema
 from fecm.results.groups import NotStoredError
 from fecm.results.pictures import plot_results
@@ -65,6 +66,8 @@ DIMENSIONS = {
     "mass": "force*time^2/length",
 }
 POINTS = 181  # of an ellipse
+DIGITS = 5  # of a location
+BIASED = 0.1  # bias of a peak over its standard deviation, from which on it is shown
 # Numbers that are attributes of the group of the force, or of the place.
 OF_FORCE = ("determined_until", "peak_force", "time_of_peak", "impulse")
 # Those that may be missing: of the contact if it has not ended, of the errors in files of fecm 1.
@@ -318,6 +321,42 @@ class Location:
                 values = np.array([self.x, self.y]) if name == "place" else getattr(self, name)
                 sink.store(place, values.T if name in BY_TIME else values)
 
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, as ``fecm locate --format json`` prints them."""
+        names = (
+            *("x", "y", "sd_x", "sd_y", "correlation", "peak_force", "time_of_peak"),
+            *("contact_end", "sd_peak_force", "peak_bias", "impulse", "sd_impulse", "mesh_error"),
+            *("mass", "energy_bound", "determined_until", "noise", "noise_given", "misfit"),
+            *("shift", "sd_shift", "accepted"),
+        )
+        return {
+            **{name: getattr(self, name) for name in names},
+            "second": None if self.second is None else self.second._asdict(),
+            "gages": self.gages.tolist(),
+            "gains": self.gains.tolist(),
+            "sd_gains": self.sd_gains.tolist(),
+            "units": self.units,
+            "force": {
+                "time": self.time.tolist(),
+                "value": self.force.tolist(),
+                "sd": self.force_sd.tolist(),
+                "determined": self.determined.tolist(),
+            },
+            "notes": list(self.notes),
+        }
+
+    def __str__(self) -> str:
+        return "\n".join(text_lines(location_table(self)))
+
+    def __repr__(self) -> str:
+        verdict = "accepted" if self.accepted else "not accepted"
+        return f"<fecm location at ({self.x:.4g}, {self.y:.4g}): {verdict}>"
+
+    def _repr_html_(self) -> str:
+        """Table of the location and its notes, for notebooks."""
+        rows = (*location_table(self).rows, *(("note", note) for note in self.notes))
+        return html_table(Table(rows, title=repr(self)[1:-1]))
+
     def _about(self) -> dict[str, Any]:
         """Attributes of the file."""
         units = {f"unit_{name}": unit for name, unit in self.units.items()}
@@ -338,6 +377,88 @@ class Location:
         """Attributes of these names that are not None."""
         values = {name: getattr(self, name) for name in names}
         return {name: value for name, value in values.items() if value is not None}
+
+
+def location_table(location: Location) -> Table:
+    """Return the summary of a location, in the deck's units."""
+
+    def shown(name: str, value: float) -> str:
+        return quantity(value, location.unit(name), DIGITS)
+
+    length = location.unit("x")
+    rows: list[Row] = [
+        ("x", f"{location.x:.5g} ± {location.sd_x:.2g} {length}".rstrip()),
+        ("y", f"{location.y:.5g} ± {location.sd_y:.2g} {length}".rstrip()),
+        ("correlation", f"{location.correlation:.2f}"),
+        (
+            "peak force",
+            f"{_with_error(location, 'peak_force')} at {shown('time', location.time_of_peak)}",
+        ),
+    ]
+    if location.peak_bias is not None and location.peak_bias > BIASED * (
+        location.sd_peak_force or 0.0
+    ):
+        bias = quantity(location.peak_bias, location.unit("peak_bias"), 2)
+        rows.append(("", f"the largest of noisy values, too high by about {bias}"))
+    rows += [
+        ("impulse", f"{_with_error(location, 'impulse')} until {shown('time', _end(location))}"),
+        ("contact", f"until {shown('time', _end(location))} at least"),
+    ]
+    if location.energy_bound is not None:
+        bound = shown("energy_bound", location.energy_bound)
+        least = shown("energy_bound", 0.25 * location.energy_bound)
+        rows += [
+            ("energy bound", f"{bound} would be stopped by this impulse; a projectile that"),
+            ("", f"rebounds had less (down to {least}), one that moves on had more"),
+        ]
+    noise, misfit = "from the residual", "1, as the noise is that of the residual"
+    if location.noise_given:
+        noise, misfit = "as given", f"{location.misfit:.3g} times the noise"
+    rows += [
+        ("noise", f"strain {location.noise:.3g}, {noise}"),
+        ("misfit", misfit),
+        ("second place", _rival(location)),
+        ("mesh", _mesh(location)),
+        ("determined until", shown("time", location.determined_until)),
+    ]
+    if location.sd_shift:
+        rows.append(
+            ("shift", f"{location.shift:.4g} ± {location.sd_shift:.2g} {location.unit('shift')}")
+        )
+    if location.sd_gains.any():
+        gains = zip(location.gages.tolist(), location.gains, location.sd_gains, strict=True)
+        rows += [(f"gain of gage {n}", f"{gain:.4f} ± {sd:.2g}") for n, gain, sd in gains]
+    rows.append(("accepted", "yes" if location.accepted else "no"))
+    return Table(tuple(rows), title=location.deck.title or "(no title)")
+
+
+def _mesh(location: Location) -> str:
+    """How far a finer mesh moves the place."""
+    if location.mesh_error is None:
+        return "its error is unknown"
+    moved = quantity(location.mesh_error, location.unit("mesh_error"), 2)
+    return f"elements half as long move the place by {moved}"
+
+
+def _with_error(location: Location, name: str) -> str:
+    """A value with its standard deviation, if that is known."""
+    error = getattr(location, f"sd_{name}")
+    spread = "" if error is None else f" ± {error:.2g}"
+    return f"{getattr(location, name):.5g}{spread} {location.unit(name)}".rstrip()
+
+
+def _end(location: Location) -> float:
+    """Time until which the impulse is taken."""
+    return location.determined_until if location.contact_end is None else location.contact_end
+
+
+def _rival(location: Location) -> str:
+    if location.second is None:
+        return "none: the misfit has one minimum"
+    x, y, ratio = location.second
+    return (
+        f"{x:.4g}, {y:.4g} {location.unit('x')}".rstrip() + f", misfit {ratio:.3g} times as large"
+    )
 
 
 def load_location(path: str | Path | AnyFile) -> Location:
