@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import re
 import sys
-from collections.abc import Iterable, Mapping
-from typing import TypeAlias
+from collections.abc import Iterable, Iterator, Mapping
+from types import SimpleNamespace
+from typing import Any, TypeAlias
 
 Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | float | bool | None"
 
@@ -35,14 +37,28 @@ def jsonable(value: object) -> Json:
             return str(value)
 
 
-def csv_line(texts: Iterable[str]) -> str:
-    """A line of CSV with its end; texts with commas or quotes are quoted."""
-    import csv  # only where a table is written
-    import io
+FORMULA = re.compile(r"[=+@\x00-\x1f-]")  # how a formula of a spreadsheet begins
 
-    line = io.StringIO()
-    csv.writer(line, lineterminator="\n").writerow(texts)
-    return line.getvalue()
+
+def csv_lines(rows: Iterable[Iterable[object]]) -> Iterator[str]:
+    r"""Return the lines of a CSV table, with line ends.
+
+    Numbers are written as Python's repr, which preserves every bit.  An apostrophe precedes texts
+    that a spreadsheet would read as formulas.
+
+    Examples
+    --------
+    >>> list(csv_lines([("time (s)", "force (N)"), (2e-07, 0.1)]))
+    ['time (s),force (N)\n', '2e-07,0.1\n']
+    """
+    import csv  # only where a table is written
+
+    echo: Any = SimpleNamespace(write=str)  # writerow returns what write returns
+    writer = csv.writer(echo, lineterminator="\n")
+    for row in rows:
+        yield writer.writerow(
+            [f"'{v}" if isinstance(v, str) and FORMULA.match(v) else v for v in row]
+        )
 
 
 # Significant digits that are printed.  Errors of the model are some per cent; JSON and HDF5 keep

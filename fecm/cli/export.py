@@ -126,8 +126,8 @@ def _write_sweep(
     if target != ExportFormat.CSV:
         raise ExportError("a sweep has no fields; --to csv writes its cases")
     # 50 ms, which the result of a run does not need.
-    from fecm.sweeps.files import csv_lines
+    from fecm.sweeps.files import sweep_csv_lines
     from fecm.sweeps.result import sweep_of
 
     cases = sweep_of(contents, history=name == "history")
-    write_lines(csv_lines(cases, name), path, overwrite=overwrite)
+    write_lines(sweep_csv_lines(cases, name), path, overwrite=overwrite)

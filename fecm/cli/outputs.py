@@ -12,7 +12,7 @@ from typing import Any
 import click
 
 from fecm._files import check_outputs, open_for_writing
-from fecm._text import csv_line
+from fecm._text import csv_lines
 from fecm.cli.common import DASH, RefusedError, note
 from fecm.cli.options import FILE_PATH, NAMED_PATH, Decorated, stack_options
 from fecm.deck.units import column_name, unit_of
@@ -83,11 +83,10 @@ class OutputPaths:
         `columns` has the dimension of each column, empty for pure numbers and texts; `units` are
         the names of the units of length, force and time, empty if they are not known.
         """
-        header = csv_line(
+        header = [
             column_name(name, unit_of(dimension, units)) for name, dimension in columns.items()
-        )
-        lines = (",".join(map(str, row)) + "\n" for row in rows)
-        write_lines(chain([header], lines), self.table, overwrite=self._overwrite)
+        ]
+        write_lines(csv_lines(chain([header], rows)), self.table, overwrite=self._overwrite)
         if self.table != DASH:
             note(f"wrote {self.table}")
 

@@ -26,7 +26,7 @@ import h5py
 import numpy as np
 
 from fecm._files import check_outputs, open_for_writing
-from fecm._text import csv_line
+from fecm._text import csv_lines
 from fecm._typing import Array
 from fecm.deck.mesh_cards import AXES, DOF_NAMES
 from fecm.deck.units import column_name
@@ -99,9 +99,8 @@ def dataset_csv_lines(
         values = ["tape3/displacement"]  # w is one of its columns
     instants = [result[path] for path in clock]
     if not values:  # only step or time
-        return _lines(
-            _headings(result, clock), zip(*(times.tolist() for times in instants), strict=True)
-        )
+        header = _headings(result, clock)
+        return csv_lines([header, *zip(*(times.tolist() for times in instants), strict=True)])
     values = [path for path in values if path not in LABELS.values()] or values
     arrays = [result[path] for path in values]
     if plain == "plies" and len(values) > len(PLIES):
@@ -125,13 +124,8 @@ def dataset_csv_lines(
     for size, length in axes:
         path = LABELS.get(str(size), "")
         numbers.append(result[path].tolist() if path in result else range(1, length + 1))
-    return _lines((*_headings(result, clock), *keys, *columns), _rows(arrays, instants, numbers))
-
-
-def _lines(header: Sequence[str], rows: Iterator[tuple[float, ...]]) -> Iterator[str]:
-    """Lines of a header and of rows of numbers."""
-    texts = (",".join(map(repr, row)) + "\n" for row in rows)
-    return itertools.chain([csv_line(header)], texts)
+    header = (*_headings(result, clock), *keys, *columns)
+    return csv_lines(itertools.chain([header], _rows(arrays, instants, numbers)))
 
 
 def _members(result: Stored, name: str) -> list[str]:

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import csv
-import re
 from collections.abc import Iterable, Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from fecm._errors import ResultFileError
+from fecm._text import csv_lines
 from fecm._typing import Floats
 from fecm.authoring.values import dimension_of
 from fecm.deck.units import column_name
@@ -218,30 +216,22 @@ def _write_forces(sink: FileSink, count: int, longest: int, forces: Iterable[For
             sink.write(FORCE, numbers[start], some)
 
 
-FORMULA = re.compile(r"[=+@\x00-\x1f-]")  # how a formula begins
 CASES = "cases"
 HISTORY = "history"
 
 
-def csv_lines(sweep: StoredSweep, name: str = CASES) -> Iterator[str]:
+def sweep_csv_lines(sweep: StoredSweep, name: str = CASES) -> Iterator[str]:
     """Return the lines of a CSV table, with line ends.
 
     ``"cases"`` has the values and results of every case, ``"history"`` the contact force after
     every step of every case that was run.  Cases count from 0, steps from 1.  Units follow the
-    names in the header.  Numbers are written as Python's repr, which preserves every bit.  An
-    apostrophe precedes texts that a spreadsheet would read as formulas.  Raises ExportError if
-    there is no such table.
+    names in the header.  Raises ExportError if there is no such table.
     """
     if name not in (CASES, HISTORY):
         raise ExportError(f"unknown table {name}; a sweep has {CASES} and {HISTORY}")
     if name == HISTORY and sweep.force is None:
         raise ExportError("the sweep has no stored forces; run it again with --history")
-    echo: Any = SimpleNamespace(write=str)  # writerow returns what write returns
-    writer = csv.writer(echo, lineterminator="\n")
-    return (
-        writer.writerow([f"'{v}" if isinstance(v, str) and FORMULA.match(v) else v for v in row])
-        for row in (_case_rows(sweep) if name == CASES else _step_rows(sweep))
-    )
+    return csv_lines(_case_rows(sweep) if name == CASES else _step_rows(sweep))
 
 
 def _case_rows(sweep: StoredSweep) -> Iterator[Iterable[Any]]:

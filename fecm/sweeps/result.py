@@ -211,9 +211,9 @@ class SweepResult(StoredSweep):
         >>> found = fecm.sweep(deck, {"velocity": [100.0, 115.0, 130.0]})
         >>> found.export("velocities.csv")
         """
-        from fecm.sweeps.files import csv_lines  # 2 ms at start
+        from fecm.sweeps.files import sweep_csv_lines  # 2 ms at start
 
-        lines = csv_lines(self, table)
+        lines = sweep_csv_lines(self, table)
         check_outputs([Path(path)], overwrite)
         with open_for_writing(Path(path), overwrite=overwrite) as file:
             file.writelines(lines)
