@@ -1,4 +1,4 @@
-"""The root of the package's errors."""
+"""Base class of the package's errors, errors without a room, and warnings."""
 
 from __future__ import annotations
 
@@ -36,9 +36,9 @@ class StudyError(FecmError, ValueError):
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """End of a message about an unknown name: the most similar known one; empty if none is.
+    """Return the end of a message about an unknown name: the most similar known name.
 
-    Upper and lower case are alike.
+    It is empty if no name is similar. Upper and lower case are alike.
     """
     import difflib  # 1 ms, only after a mistake
 
@@ -48,7 +48,7 @@ def did_you_mean(name: str, known: Iterable[str]) -> str:
 
 
 class FecmWarning(UserWarning):
-    """A reason to doubt a deck or the result of a run."""
+    """Reason to doubt a deck or the result of a run."""
 
 
 # A finding of a deck is shown once, however often the deck is used; filters of the user come first.
@@ -56,7 +56,7 @@ warnings.filterwarnings("once", r"[^\n]*: warning\[W", FecmWarning, append=True)
 
 
 def warn(text: str) -> None:
-    """Warn with a :class:`FecmWarning` of the first caller outside this package."""
+    """Issue a :class:`FecmWarning` at the first caller outside this package."""
     frame, level = sys._getframe(1), 2
     while frame.f_back is not None and frame.f_code.co_filename.startswith(OURS):
         frame, level = frame.f_back, level + 1

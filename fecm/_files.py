@@ -1,9 +1,9 @@
-"""Output files: each is written completely, or an existing file is left unchanged.
+"""Output files. Each is written completely, or an existing file stays unchanged.
 
-A file is written under a temporary name, synced, and renamed when it is complete.  This partial
-file is locked, so that two processes never write the same output at the same time; one without a
-lock was left by a process that has ended, and is removed.  On Windows, which has no such locks, an
-open file can't be removed, which does the same.
+A file is written under a temporary name, synced, and renamed when it is complete. The partial file
+is locked, so that two processes never write the same output at the same time. A partial file
+without a lock was left by a process that has ended; it is removed. Windows has no such locks, but
+it refuses to remove an open file, which has the same effect.
 """
 
 from __future__ import annotations
@@ -53,9 +53,9 @@ def check_outputs(
 ) -> None:
     """Refuse outputs that conflict, exist, or can't be written, before the computation.
 
-    `inputs` are files that the command reads; they are never replaced.  `own` are other files that
-    it writes, such as checkpoints: no output may have their names, none of them may be a folder,
-    and their names must not be too long.
+    `inputs` are files that the command reads; they are never replaced. `own` are other files that
+    it writes, such as checkpoints. No output may have their names, none may be a folder, and their
+    names must not be too long.
     """
     if Path("-") in (*paths, *own):
         raise OutputError("- is a standard stream, and this needs a file; give its name")
@@ -86,7 +86,7 @@ def check_outputs(
 
 
 def _keys(path: Path) -> set[object]:
-    """Real path, and device and inode of an existing file: common to all paths of a file."""
+    """Return what all paths of a file share: its real path, and device and inode if it exists."""
     keys: set[object] = {os.path.realpath(path)}
     with contextlib.suppress(OSError):
         found = path.stat()
@@ -95,7 +95,7 @@ def _keys(path: Path) -> set[object]:
 
 
 def _mode(path: Path) -> int | None:
-    """Type and permissions of a file, following links; None if it does not exist."""
+    """Return type and permissions of a file, following links; None if it does not exist."""
     try:
         return path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
@@ -109,7 +109,7 @@ def _refuse_special(path: Path, mode: int | None) -> None:
 
 
 def _refuse_folder(path: Path) -> None:
-    """Refuse a file of the program itself whose name a folder has, or is too long."""
+    """Refuse a file of the program if a folder has its name, or if its name is too long."""
     for name in (path, partial_of(path)):
         try:
             mode = name.lstat().st_mode
@@ -126,7 +126,7 @@ def _refuse_folder(path: Path) -> None:
 
 
 def final(path: Path) -> Path:
-    """Target of a symbolic link, which need not exist; any other path itself."""
+    """Return the target of a symbolic link, which need not exist; any other path as it is."""
     if not path.is_symlink():
         return path
     target = Path(os.path.realpath(path))
@@ -136,7 +136,7 @@ def final(path: Path) -> Path:
 
 
 def partial_of(path: Path) -> Path:
-    """Temporary name under which a file is written."""
+    """Return the temporary name under which a file is written."""
     return path.with_name(f".{path.stem}.partial{path.suffix}")
 
 
@@ -144,13 +144,13 @@ def partial_of(path: Path) -> Path:
 def beside(path: Path, *, overwrite: bool = True, follow: bool = True) -> Iterator[Path]:
     """Yield the path of an empty partial file, which is renamed if the block succeeds.
 
-    It has the suffix of the final name, by which some writers choose their format.  A replaced file
-    keeps its permissions and, where the user may set them, its owner and group; other hard links to
-    it keep the old contents.
+    The partial file has the suffix of the final name, as some writers choose the format by the
+    suffix. A replaced file keeps its permissions and, where the user may set them, its owner and
+    group. Other hard links to it keep the old contents.
 
-    `overwrite` replaces an existing file, even one created during the block; `follow` the target of
-    a symbolic link instead of the link.  Raises OSError if the file can't be written; an existing
-    one is then unchanged.
+    `overwrite` replaces an existing file, even one created during the block. `follow` replaces the
+    target of a symbolic link instead of the link. Raises OSError if the file can't be written; an
+    existing file then stays unchanged.
     """
     target = final(path) if follow else path
     partial = partial_of(target)
@@ -185,7 +185,7 @@ def open_for_writing(path: Path, *, overwrite: bool) -> Iterator[TextIO]:
 
 @contextlib.contextmanager
 def naming(path: Path, partial: Path | None = None) -> Iterator[None]:
-    """Add the file's name to operating system errors without one, or with its temporary name."""
+    """Add the file's name to operating system errors that lack it or have its temporary name."""
     try:
         yield
     except OSError as error:
@@ -252,10 +252,10 @@ def _lock(handle: int, *, wait: bool = False) -> bool:
 
 
 def make_folder(folder: Path) -> None:
-    """Make a folder named by the program itself, if there is none.
+    """Create a folder of the program, unless it exists.
 
-    Raises OutputError if a link or a file has the name: what is written or deleted in the folder
-    must not be elsewhere.
+    Raises OutputError if a link or a file has the name, as files in the folder are written and
+    deleted.
     """
     try:
         folder.mkdir()
@@ -267,10 +267,10 @@ def make_folder(folder: Path) -> None:
 
 @contextlib.contextmanager
 def held(folder: Path, message: str) -> Iterator[None]:
-    """Make a folder if there is none, and lock it.
+    """Create a folder unless it exists, and lock it.
 
-    Raises OutputError with this message if another process holds the lock, and another one if the
-    folder can't be used, see :func:`make_folder`.
+    Raises OutputError with this message if another process holds the lock, and with another message
+    if the folder can't be used; see :func:`make_folder`.
     """
     make_folder(folder)
     try:
@@ -287,7 +287,7 @@ def held(folder: Path, message: str) -> Iterator[None]:
 
 
 def _is(handle: int, path: Path) -> bool:
-    """Whether a path still leads to an open file."""
+    """Return whether a path still leads to an open file."""
     try:
         return os.path.samestat(os.fstat(handle), path.lstat())
     except OSError:
@@ -352,7 +352,7 @@ def _rename_exclusively(partial: Path, target: Path) -> None:
 
 
 def open_ordinary(path: Path, flags: int = os.O_RDONLY) -> BinaryIO:
-    """Open a regular file named by the program itself; OutputError for a link, device or FIFO."""
+    """Open a regular file of the program; raise OutputError for a link, device or FIFO."""
     if path.is_symlink():
         raise OutputError(f"{path} is a link")
     handle = os.open(path, flags | NO_FOLLOW | NO_WAIT, 0o666)
@@ -363,10 +363,10 @@ def open_ordinary(path: Path, flags: int = os.O_RDONLY) -> BinaryIO:
 
 
 def packed(arrays: Mapping[str, Any]) -> memoryview:
-    """Contents of an .npz file of arrays.
+    """Return the contents of an .npz file of arrays.
 
-    Built in memory: if the disk is full, NumPy before version 2 leaves the archive open, which
-    reports the error again when the program ends.
+    The file is built in memory. If the disk is full, NumPy before version 2 leaves the archive open
+    and reports the error again when the program ends.
     """
     import numpy as np  # 100 ms, which other users of this module do without
 
@@ -376,7 +376,7 @@ def packed(arrays: Mapping[str, Any]) -> memoryview:
 
 
 def clear_partials(folders: Iterable[Path]) -> None:
-    """Remove the partial files in some folders that no process is writing."""
+    """Remove the partial files in folders that no process is writing."""
     for folder in folders:
         for partial in folder.glob(".*.partial*"):
             with contextlib.suppress(OSError):

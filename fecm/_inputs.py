@@ -1,6 +1,6 @@
-"""Files that the user names, read within bounds: regular files of a size that memory holds.
+"""Input files, read within bounds: regular files of a size that fits in memory.
 
-Text is UTF-8, UTF-16 with a byte order mark, or else Windows-1252.  Lines end at LF, CRLF or CR.
+Text is UTF-8, UTF-16 with a byte order mark, or else Windows-1252. Lines end at LF, CRLF or CR.
 """
 
 from __future__ import annotations
@@ -31,12 +31,15 @@ class InputError(FecmError, OSError):
 
 
 class ContentError(FecmError, ValueError):
-    """The text of a file is not what was expected; the message names the file."""
+    """The text of a file is invalid; the message names the file."""
 
 
 @contextlib.contextmanager
 def open_input(path: Path) -> Iterator[BinaryIO]:
-    """Open a regular file; raises InputError for devices and FIFOs, which may never end."""
+    """Open a regular file.
+
+    Raises InputError for devices and FIFOs, which may never end.
+    """
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | NO_WAIT)) as file:
         if not stat.S_ISREG(os.fstat(file.fileno()).st_mode):
             raise InputError(f"{path} is not a regular file")
@@ -44,10 +47,10 @@ def open_input(path: Path) -> Iterator[BinaryIO]:
 
 
 def read_input(path: Path, most: int = LARGEST) -> bytes:
-    """Contents of a regular file of at most `most` bytes.
+    """Return the contents of a regular file of at most `most` bytes.
 
     Raises InputError for any other file, NotEnoughMemoryError if there is not enough memory to work
-    with its contents, and OSError if it can't be read.
+    with the contents, and OSError if the file can't be read.
     """
     with open_input(path) as file:
         size = os.fstat(file.fileno()).st_size
@@ -60,10 +63,10 @@ def read_input(path: Path, most: int = LARGEST) -> bytes:
 
 
 def decoded(data: bytes, name: str) -> str:
-    """Text of a file.  A byte order mark of UTF-8 stays.
+    """Decode the text of a file.
 
-    Bytes that Windows-1252 does not define become U+FFFD.  Raises InputError if the file is not
-    text.
+    A byte order mark of UTF-8 stays. Bytes that Windows-1252 does not define become U+FFFD. Raises
+    InputError if the file is not text.
 
     >>> decoded("5 €".encode("cp1252"), "a"), decoded("5 €".encode("utf-16"), "a")
     ('5 €', '5 €')
@@ -81,7 +84,7 @@ def decoded(data: bytes, name: str) -> str:
 
 
 def lines_of(text: str) -> list[str]:
-    r"""Lines of a text without their ends.
+    r"""Split a text into lines without their ends.
 
     ``str.splitlines`` also splits at form feeds, U+0085 and U+2028.
 
@@ -93,9 +96,9 @@ def lines_of(text: str) -> list[str]:
 
 
 def parsed_file(path: Path, parse: Callable[[str], T]) -> T:
-    """What a function makes of the text of a file of settings.
+    """Apply a parser to the text of a file of settings and return its result.
 
-    A ValueError of the function becomes a ContentError; raises InputError and OSError as
+    A ValueError of the parser becomes a ContentError. Raises InputError and OSError as
     :func:`read_input`.
     """
     text = decoded(read_input(path, LARGEST_SETTINGS), str(path)).removeprefix("\ufeff")
@@ -106,7 +109,10 @@ def parsed_file(path: Path, parse: Callable[[str], T]) -> T:
 
 
 def parsed_toml(text: str) -> dict[str, Any]:
-    """Tables of a TOML text; raises ValueError if it is not TOML, or nested too deeply."""
+    """Parse a TOML text.
+
+    Raises ValueError if the text is not TOML, or nested too deeply.
+    """
     import tomllib  # 2 ms, and few commands read TOML
 
     for number, line in enumerate(lines_of(text), start=1):

@@ -1,7 +1,7 @@
-"""Names of a package that are imported when they are first used.
+"""Lazy names of a package: each is imported when it is first used.
 
 The stub ``__init__.pyi`` of the package says where each name comes from, for type checkers and for
-Python alike.  So a package has its names once, and importing it imports nothing else.
+Python alike. A package therefore states its names once, and importing it imports nothing else.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from pathlib import Path
 def names_of_stub(
     package: str, file: str
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """Return ``__getattr__`` and ``__dir__`` of a package, from its name and its ``__file__``."""
+    """Return ``__getattr__`` and ``__dir__`` of a package from its name and ``__file__``."""
 
     @cache
     def origins() -> dict[str, tuple[str, str]]:
-        """Module of each name, and its name there."""
+        """Return the module of each name, and its name there."""
         stub = ast.parse(Path(file).with_suffix(".pyi").read_text("utf-8"))
         return {
             alias.asname or alias.name: (statement.module or package, alias.name)

@@ -16,15 +16,16 @@ UNNOTICED = 100_000_000  # bytes that are allocated without a check
 
 
 class NotEnoughMemoryError(MemoryError, FecmError):
-    """More memory is needed than is free; the message contains both numbers."""
+    """A computation needs more memory than is free; the message contains both numbers."""
 
 
 def available_memory() -> int | None:
-    """Bytes that can be allocated without swapping; None if they are not known.
+    """Return the bytes that can be allocated without swapping; None if they are not known.
 
-    The smallest of the machine's (MemAvailable of proc(5) on Linux, elsewhere what psutil tells,
-    where it is installed) and the remainders of the limits of the control groups, such as those of
-    a container or a batch job (memory.max, cgroups(7)).
+    This is the smallest of the free memory of the machine and the remainders of the limits of its
+    control groups, such as a container or a batch job (memory.max, cgroups(7)). The free memory of
+    the machine is MemAvailable of proc(5) on Linux, and elsewhere the value of psutil, if it is
+    installed.
     """
     known = [count for count in (_of_machine(), *_of_groups()) if count is not None]
     return max(0, min(known)) if known else None
@@ -41,7 +42,7 @@ def check_available_memory(
 ) -> None:
     """Refuse a computation that needs more memory than is free.
 
-    `needed` gives the bytes: a quick bound for False, the best estimate for True; `remedy` advice.
+    `needed` returns bytes: a quick bound for False, the best estimate for True. `remedy` is advice.
     """
     free = available_memory()
     if free is not None and needed(False) > free and (count := needed(True)) > free:
@@ -66,7 +67,7 @@ def _of_machine() -> int | None:
 
 
 def _of_groups() -> list[int]:
-    """Remaining bytes of the process's control group and of those around it."""
+    """Yield the remaining bytes of the control groups of the process."""
     left: list[int] = []
     with suppress(OSError, ValueError, IndexError):
         (own,) = [line[3:] for line in CGROUP.read_text().splitlines() if line.startswith("0::")]
@@ -91,22 +92,25 @@ LOADS = Path("/proc/loadavg")  # proc(5), on Linux
 
 
 def available_processors() -> int:
-    """Processors that this process may use."""
+    """Return the number of processors that this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
 
 
 def free_processors() -> int:
-    """Processors that this process may use and other work leaves free, at least 1."""
+    """Return the number of processors that this process may use and other work leaves free.
+
+    It is at least 1.
+    """
     return max(1, min(available_processors(), round((os.cpu_count() or 1) - _busy())))
 
 
 def _busy() -> float:
-    """Processors that other work uses: the load of the last minute, or less if less runs now.
+    """Return the number of processors that other work uses.
 
-    The load contains work that has just ended, such as an earlier run.  It is 0 where the system
-    does not tell it.
+    This is the load of the last minute, or the number of running processes if that is less, as the
+    load contains work that has just ended. It is 0 where the system does not report it.
     """
     try:
         load = os.getloadavg()[0]

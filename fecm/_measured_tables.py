@@ -1,9 +1,9 @@
 """Tables of other programs: text files with a header of column names.
 
-Columns are separated by tabs, semicolons, commas or blanks; unless it separates them, a comma may
-be the decimal mark.  A first line such as ``sep=;`` names the separator.  Blank lines and lines
-that begin with # are skipped, and so is what a test rig writes above the names (preamble).  A unit
-follows its name in brackets, or is in the line below the names.  Names are not case-sensitive.
+Tabs, semicolons, commas or blanks separate columns. A comma may be the decimal mark unless it
+separates columns. A first line such as ``sep=;`` names the separator. Blank lines and lines that
+start with # are skipped. So is the preamble that a test rig writes above the names. A unit follows
+its name in brackets, or is in the line below the names. Names are not case-sensitive.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ _SEPARATOR = re.compile(r'"?sep=(.)"?\s*', re.IGNORECASE)
 
 
 class TableColumn(NamedTuple):
-    """A column that is read as a quantity, such as force, a strain, or any other."""
+    """Column that is read as a quantity, such as force or strain."""
 
     name: str
     place: int  # from 0
@@ -103,7 +103,7 @@ class TableColumn(NamedTuple):
 
 
 class MeasuredTable(NamedTuple):
-    """Rows of a file below the names and units of its columns; both are empty if it has none."""
+    """Rows of a file below its names and units. Both are empty if the file has none."""
 
     path: Path
     head: Row  # number and fields of the line of names
@@ -117,11 +117,11 @@ class MeasuredTable(NamedTuple):
         return [unit_free(name) for name in self.head[1]]
 
     def has(self, name: str) -> bool:
-        """Whether a column has a name of a quantity."""
+        """Return whether a column has a name of a quantity."""
         return any(same_name(word, one) for word in WORDS.get(name, (name,)) for one in self.names)
 
     def column(self, name: str, place: int, *, is_negated: bool = False) -> TableColumn:
-        """The column of a number as a quantity."""
+        """Return the column of a number as a quantity."""
         unit = self.units[place] if place < len(self.units) else ""
         return TableColumn(name, place, unit, is_negated)
 
@@ -131,13 +131,14 @@ class MeasuredTable(NamedTuple):
         columns: Sequence[str] | None = None,
         units: Mapping[str, str] = NO_UNITS,
     ) -> list[TableColumn]:
-        """Columns of quantities, which have a name of :data:`WORDS` or their own.
+        """Return the columns of quantities.
 
-        `columns` has the names or the numbers (from 1) that the user gave, empty if none; None if
-        the user can't give them.  A minus before one changes the sign.  In a table without names
-        the first columns are taken, with a warning that says so.  Of several columns with the same
-        name, the one in the unit of `units`, or else the first one in a known unit, is taken.
-        Raises StudyError if a column is missing, or two can't be told apart.
+        A column has a name of :data:`WORDS`, or the name of the quantity. `columns` has the names
+        or numbers (from 1) that the user gave. It is empty if the user gave none, and None if the
+        user can't give any. A minus before one changes the sign. In a table without names the first
+        columns are taken, with a warning. If several columns have the same name, the one in the
+        unit of `units` is taken, or else the first one in a known unit. Raises StudyError if a
+        column is missing, or if two columns can't be told apart.
         """
         found, given = [], columns or [""] * len(names)
         wanted = [column.removeprefix("-") for column in given]
@@ -171,7 +172,7 @@ class MeasuredTable(NamedTuple):
             )
 
     def _place(self, quantity: str, given: str, unit: str, remedy: str) -> int:
-        """Number of the column with a given name, or else the first of a quantity's names."""
+        """Return the index of the column with a given name, or of the first name of a quantity."""
         words = (given,) if given else WORDS.get(quantity, (quantity,))
         word = next((word for word in words if any(same_name(word, n) for n in self.names)), "")
         places = [n for n, name in enumerate(self.names) if word and same_name(word, name)]
@@ -200,12 +201,12 @@ class MeasuredTable(NamedTuple):
         stated: Sequence[str] = (),
         increasing: str = "",
     ) -> list[Floats]:
-        """Numbers of some columns, (rows,) each, in `units` by dimension.
+        """Return the numbers of columns, (rows,) each, in `units` by dimension.
 
-        Without `units`, nothing is converted.  `stated` are the units of a table that names none.
-        Raises StudyError if a unit is unknown or has none to be converted to, a field is not a
-        finite number, there are fewer than two rows, or the values of the column `increasing` do
-        not increase.
+        Without `units`, nothing is converted. `stated` has the units of a table that names none.
+        Raises StudyError if a unit is unknown or can't be converted, a field is not a finite
+        number, there are fewer than two rows, or the values of the column `increasing` do not
+        increase.
         """
         if len(self.rows) < 2:
             raise StudyError(f"{self.path}: the table has fewer than two rows of numbers")
@@ -228,11 +229,11 @@ class MeasuredTable(NamedTuple):
         return found
 
     def check_thousands(self, name: str, place: int) -> None:
-        """Raise StudyError if whole numbers up to 999 are beside such as 1,060.
+        """Raise StudyError if commas may be decimal marks or separators of thousands.
 
-        Without decimals below 1000, three digits behind a mark are thousands.  A warning says so
-        where nothing tells: every comma of the table has one to three digits before it, of which
-        the first is not 0, and three behind it.
+        Whole numbers up to 999 beside numbers such as 1,060 show that a comma separates thousands.
+        A warning is issued if the table does not decide: every comma has one to three digits before
+        it, the first of which is not 0, and three digits behind it.
         """
         written = [(line, row[place]) for line, row in self.rows if place < len(row)]
         marked = [one for one in written if _GROUPED.fullmatch(one[1])]
@@ -259,9 +260,9 @@ class MeasuredTable(NamedTuple):
         return all(map(_GROUPED.fullmatch, marked))
 
     def _head_is_row(self, columns: Sequence[TableColumn]) -> bool:
-        """Whether the line taken for names has numbers in some columns, as oscilloscopes write it.
+        """Return whether the line of names has numbers in some columns, as oscilloscopes write it.
 
-        Different whole numbers from 1 are names, of gages or channels.
+        Different whole numbers from 1 are names of gages or channels.
         """
         fields = [self.head[1][one.place] for one in columns if one.place < len(self.head[1])]
         if len(fields) < len(columns) or any(_number(field) is None for field in fields):
@@ -314,7 +315,7 @@ class MeasuredTable(NamedTuple):
 
 
 def plain_unit(unit: str) -> str:
-    """A unit with u for micro.
+    """Return a unit with u for micro.
 
     >>> plain_unit("µm/m")
     'um/m'
@@ -333,9 +334,10 @@ def unit_size(source: str | Path, unit: str, dimension: str) -> float:
 
 
 def factor(source: str, unit: str, deck: str, dimension: str) -> float:
-    """Factor from a unit of a table to the deck's; 1 if the table names none.
+    """Return the factor from a unit of a table to the unit of the deck.
 
-    Raises StudyError if one is unknown, unless they are the same.
+    It is 1 if the table names no unit. Raises StudyError if a unit is unknown, unless both are the
+    same.
     """
     if not unit or unit == deck:
         return 1.0
@@ -349,7 +351,7 @@ def factor(source: str, unit: str, deck: str, dimension: str) -> float:
 
 
 def unit_in(name: str) -> str:
-    """The unit in brackets behind the name of a column; empty if there is none.
+    """Return the unit in brackets behind the name of a column; empty if the name has no unit.
 
     >>> unit_in("force (filtered) [kN]")
     'kN'
@@ -359,12 +361,12 @@ def unit_in(name: str) -> str:
 
 
 def same_name(one: str, other: str) -> bool:
-    """Whether two names denote the same column."""
+    """Return whether two names denote the same column."""
     return unit_free(one).casefold() == unit_free(other).casefold()
 
 
 def unit_free(name: str) -> str:
-    """Name of a column without its unit."""
+    """Return the name of a column without its unit."""
     return re.split(r"[(\[]", name)[0].strip()
 
 
@@ -372,11 +374,11 @@ def unit_free(name: str) -> str:
 
 
 def read_table(path: Path, most: int = sys.maxsize) -> MeasuredTable:
-    """Read a table; the first line contains names, and the second units, if they aren't numbers.
+    """Read a table of names, units if there are any, and rows.
 
-    Raises StudyError if there are more than `most` lines, or the file is not a table;
-    NotEnoughMemoryError if its fields take more memory than is free; OSError if the file cannot be
-    read or is not text.
+    Raises StudyError if there are more than `most` lines, or the file is not a table. Raises
+    NotEnoughMemoryError if its fields take more memory than is free, OSError if the file can't be
+    read.
     """
     rows, is_decimal_comma = _rows(path, most)
     skipped, named, below = _heading(rows)
@@ -389,10 +391,10 @@ def read_table(path: Path, most: int = sys.maxsize) -> MeasuredTable:
 
 
 def _heading(rows: list[Row]) -> tuple[int, bool, bool]:
-    """Lines above the names, whether there are names, and whether a line of units is below them.
+    """Return the index of the names, whether there are names, and whether units are below them.
 
-    The names are above the first line of numbers, or above their units.  A line with both texts and
-    numbers above the numbers is a row of the table with a wrong field, unless it has a known name.
+    The names are above the first line of numbers, or above their units. A line of both texts and
+    numbers is a row with a wrong field, unless it has a known name.
     """
     first = next((n for n, row in enumerate(rows) if _is_numeric(row)), -1)
     if first < 1:  # some tables of cases have no line of numbers alone
@@ -410,7 +412,7 @@ def _heading(rows: list[Row]) -> tuple[int, bool, bool]:
 
 
 def _rows(path: Path, most: int) -> tuple[list[Row], bool]:
-    """Fields of every line with content, and whether they may have decimal commas."""
+    """Return the fields of every line with content, and whether they may have decimal commas."""
     data = read_input(path)
     line_count = 1 + max(data.count(b"\n"), data.count(b"\r"))
     field_count = line_count + sum(data.count(mark) for mark in (b",", b";", b"\t", b" "))
@@ -443,7 +445,10 @@ def _rows(path: Path, most: int) -> tuple[list[Row], bool]:
 
 
 def _fields(line: str, separator: str) -> list[str]:
-    """Fields of a line without the empty ones at its end; by blanks, units stay at their names."""
+    """Split a line into fields, without empty fields at its end.
+
+    If blanks separate fields, units stay with their names.
+    """
     fields = [
         f.strip() for f in next(csv.reader([line], delimiter=separator, skipinitialspace=True))
     ]
@@ -461,7 +466,7 @@ def _fields(line: str, separator: str) -> list[str]:
 
 
 def _separator(lines: Sequence[str]) -> str:
-    """The separator that makes the most lines of numbers, or else is in the most lines."""
+    """Return the separator that gives the most lines of numbers, or else is in the most lines."""
 
     def numbers(mark: str) -> int:
         return sum(_is_numeric((0, _fields(line, mark))) for line in lines)
@@ -473,13 +478,13 @@ def _separator(lines: Sequence[str]) -> str:
 
 
 def _has_word(row: Row) -> bool:
-    """Whether a row has a name in :data:`WORDS`."""
+    """Return whether a row has a name in :data:`WORDS`."""
     words = set(chain.from_iterable(WORDS.values()))
     return any(unit_free(field).casefold() in words for field in row[1])
 
 
 def _is_numeric(row: Row) -> bool:
-    """Whether a row has two numbers or more, and nothing else."""
+    """Return whether a row consists of two or more numbers."""
     fields = [field for field in row[1] if field]
     return len(fields) > 1 and all(
         _COMMA.fullmatch(field) or _number(field) is not None for field in fields
@@ -487,7 +492,7 @@ def _is_numeric(row: Row) -> bool:
 
 
 def _is_of_units(row: Row) -> bool:
-    """Whether a row names units: all of them in brackets, or one of them known."""
+    """Return whether a row names units: all in brackets, or at least one known unit."""
     fields = [field for field in row[1] if field]
     known = {unit.casefold() for sizes in UNITS.values() for unit in sizes}
     if all(field[0] in "([" and field[-1] in ")]" for field in fields):

@@ -1,7 +1,7 @@
 """Options of jobs, declared once: fields of a dataclass, for Python and for a command.
 
-A field made by :func:`option` has its help.  The command line makes its options of the fields, and
-:func:`documented` puts them into the docstring of the class.
+A field made by :func:`option` has its help text. The command line derives its options from the
+fields, and :func:`documented` adds them to the docstring of the class.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ WIDTH = 92
 
 
 class Option(NamedTuple):
-    """What is known of an option besides name, type and default."""
+    """Help and constraints of an option; the field has its name, type and default."""
 
     help: str  # for Python and for the help page of the command
     python: str  # what only Python offers
@@ -52,7 +52,7 @@ def option(
 
 
 def declared_options(job: Any) -> dict[str, tuple[Option, Any]]:
-    """Options of a job by name, each with its default value."""
+    """Return the options of a job by name, with their default values."""
     return {
         one.name: (one.metadata["option"], one.default)
         for one in fields(job)
@@ -61,7 +61,7 @@ def declared_options(job: Any) -> dict[str, tuple[Option, Any]]:
 
 
 def documented(job: type[T]) -> type[T]:
-    """Put the parameters of a job into its docstring."""
+    """Add the parameters of a job to its docstring."""
     if job.__doc__:  # Python without docstrings has none
         job.__doc__ = job.__doc__.replace(PLACE, _parameters(job))
     return job
@@ -77,7 +77,7 @@ def _parameters(job: Any) -> str:
 
 
 def with_parameters_of(job: Callable[P, J]) -> Callable[[Callable[[J], R]], Callable[P, R]]:
-    """Give a function of a job the parameters of the job, for its signature and docstring."""
+    """Give a function the signature and the documented parameters of a job."""
 
     def decorate(function: Callable[[J], R]) -> Callable[P, R]:
         @functools.wraps(function)

@@ -1,6 +1,6 @@
-"""Tables: what is said about a deck, a result or a fit, in a terminal, a notebook and on a page.
+"""Tables: summaries of decks, results and fits for terminals, notebooks and pages.
 
-A quantity is described once, as a row.  Terminals, notebooks and report pages show the same rows.
+A quantity is described once, as a row. Terminals, notebooks and report pages show the same rows.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import NamedTuple, TypeAlias
 
 
 class ShownNumber(NamedTuple):
-    """A number and the text that shows it."""
+    """Number and the text that shows it."""
 
     value: float
     text: str
@@ -25,7 +25,7 @@ LABEL_WIDTH = 18  # of the labels in a terminal
 
 @dataclass(frozen=True)
 class Table:
-    """Rows about one subject.
+    """Title, header and rows of cells.
 
     Attributes
     ----------

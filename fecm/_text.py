@@ -1,4 +1,4 @@
-"""Texts for terminals, JSON and CSV: values, and one short line."""
+"""Texts for terminals, JSON and CSV."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Json: TypeAlias = "dict[str, Json] | list[Json] | str | int | float | bool | Non
 def jsonable(value: object) -> Json:
     """Convert to a value that :func:`json.dumps` writes as valid JSON.
 
-    Infinities and NaN become texts, and so does any other type.
+    Infinities, NaN and values of any other type become texts.
 
     Examples
     --------
@@ -84,7 +84,7 @@ def significant(value: float, digits: int = DIGITS) -> str:
 
 
 def short_text(value: object, width: int = 60, *, exact: bool = False) -> str:
-    """Format a value in one short line; numbers to six digits, or exactly."""
+    """Format a value in one short line, numbers to six digits or exactly."""
     if isinstance(value, list | tuple):
         text = "[" + ", ".join(short_text(item, width, exact=exact) for item in value) + "]"
     elif isinstance(value, float):

@@ -1,4 +1,4 @@
-"""How long jobs report, and how they are stopped."""
+"""Progress of long jobs, and requests to stop them."""
 
 from __future__ import annotations
 
@@ -25,19 +25,19 @@ class StoppedError(FecmError):
 
 
 class Watch:
-    """What a long job reports to, and asks whether to stop; this one is silent.
+    """Receiver of progress and messages of a long job, which also asks it whether to stop.
 
-    A job calls the methods between two steps or two cases.
+    This base class is silent. A job calls the methods between two steps or two cases.
     """
 
     def advance(self, done: int, total: int) -> None:
-        """Take note that so many of all steps or cases are done."""
+        """Receive the number of steps or cases that are done, and their total."""
 
     def note(self, text: str) -> None:
-        """Take a message for the user."""
+        """Receive a message for the user."""
 
     def stops(self) -> bool:
-        """Whether the job is to stop in good order."""
+        """Return whether the job should stop in good order."""
         return False
 
 
@@ -47,8 +47,7 @@ SILENT = Watch()
 class CallerWatch(Watch):
     """Watch of a job that is called from Python.
 
-    Messages are warnings, the log has a line a minute, and SIGINT stops the job after the present
-    step.
+    Messages are warnings. The log has a line a minute. SIGINT stops the job after the present step.
 
     Parameters
     ----------
@@ -73,19 +72,19 @@ class CallerWatch(Watch):
             LOGGER.info("%s: %d of %d done", self._name, done, total)
 
     def note(self, text: str) -> None:
-        """Warn."""
+        """Issue a warning."""
         warn(text)
 
     def stops(self) -> bool:
-        """Whether SIGINT came in the block of :meth:`deferring_interrupts`."""
+        """Return whether SIGINT came in the block of :meth:`deferring_interrupts`."""
         return self._interrupted
 
     @contextlib.contextmanager
     def deferring_interrupts(self) -> Iterator[None]:
-        """Let the first SIGINT stop the job in good order; another one interrupts it at once.
+        """Let the first SIGINT stop the job in good order, and the second one at once.
 
-        A job that was stopped ends in KeyboardInterrupt.  Only the main thread gets signals, and a
-        handler of the caller stays in place.
+        A stopped job ends in KeyboardInterrupt. Only the main thread gets signals. A handler of the
+        caller stays in place.
         """
         is_main = threading.current_thread() is threading.main_thread()
         if not is_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -106,7 +105,7 @@ class CallerWatch(Watch):
 
 
 def once_a_minute(clock: Callable[[], float] = monotonic) -> Callable[[], bool]:
-    """Return a function that says whether a minute has passed since it last said so."""
+    """Return a function that returns whether a minute has passed since it last returned True."""
     last = clock()
 
     def due() -> bool:

@@ -1,14 +1,11 @@
 """Content of a page, and its HTML.
 
-What a page consists of: sections of tables, judgements, notes, pictures and listings.
+A page consists of sections of tables, judgements, notes, pictures and listings. Numbers keep their
+value beside the text that shows them, so that a program can read them from the page: ``<data
+value="16169.7">16170 N</data>``.
 
-Numbers keep their value beside the text that shows them, so that a reader's program can take them
-from the page: ``<data value="16169.7">16169.7 N</data>``.
-
-From the content of a page to its HTML.
-
-The page is one file: style and pictures stand inside, nothing is fetched, no script runs.  Equal
-content gives equal bytes.  Jinja2, an optional library, fills the template and escapes all texts.
+The page is one file. It contains style and pictures, fetches nothing and runs no script. Equal
+content gives equal bytes. Jinja2, an optional library, fills the template and escapes all texts.
 """
 
 from __future__ import annotations
@@ -34,7 +31,7 @@ MOST_TEXT = 200_000  # characters of a listing
 
 
 class TrustLevel(StrEnum):
-    """Whether a number may be trusted, in words."""
+    """Level of trust in a number."""
 
     WITHIN = "within range"
     DOUBTFUL = "doubtful"
@@ -43,7 +40,7 @@ class TrustLevel(StrEnum):
 
 
 class Judgement(NamedTuple):
-    """A quantity, its size, and whether it is within the range of the model."""
+    """Quantity, its size, and its level of trust."""
 
     level: TrustLevel
     name: str
@@ -53,7 +50,7 @@ class Judgement(NamedTuple):
 
 @dataclass(frozen=True)
 class Judgements:
-    """A table of judgements."""
+    """Table of judgements."""
 
     rows: tuple[Judgement, ...]
     title: str = ""
@@ -61,7 +58,7 @@ class Judgements:
 
 @dataclass(frozen=True)
 class Notes:
-    """Sentences, as a list."""
+    """List of sentences."""
 
     texts: tuple[str, ...]
     title: str = ""
@@ -79,7 +76,7 @@ class PagePicture:
 
 @dataclass(frozen=True)
 class Listing:
-    """A long text, folded."""
+    """Long text, folded."""
 
     title: str
     text: str
@@ -90,14 +87,14 @@ PageBlock = Table | Judgements | Notes | PagePicture | Listing
 
 
 class PageSection(NamedTuple):
-    """A heading and what stands below it."""
+    """Heading and the blocks below it."""
 
     title: str
     blocks: tuple[PageBlock, ...]
 
 
 class ReportPage(NamedTuple):
-    """A page about one or more results."""
+    """Page about one or more results."""
 
     title: str
     verdict: tuple[str, ...]  # sentences
@@ -106,14 +103,14 @@ class ReportPage(NamedTuple):
 
 
 def number_with_unit(value: float, unit: str = "", digits: int = DIGITS) -> Cell:
-    """A number with its unit; a dash for one that is not known."""
+    """Return a number with its unit, or a dash if the number is not known."""
     return (
         UNKNOWN if math.isnan(value) else ShownNumber(float(value), quantity(value, unit, digits))
     )
 
 
 def share(value: float, digits: int = 3) -> Cell:
-    """A ratio in per cent."""
+    """Return a ratio in per cent."""
     return (
         UNKNOWN if math.isnan(value) else ShownNumber(float(value), f"{100.0 * value:.{digits}g} %")
     )
@@ -126,13 +123,13 @@ def page_table(rows: Iterable[Row], header: Sequence[str] = (), title: str = "")
 
 
 def note_list(texts: Iterable[str], title: str = "") -> list[PageBlock]:
-    """A list of sentences as a list of blocks, which is empty without sentences."""
+    """Return a list of one list of sentences, which is empty without sentences."""
     found = tuple(dict.fromkeys(texts))
     return [Notes(found, title)] if found else []
 
 
 def listing(title: str, text: str) -> Listing:
-    """A listing, cut where it would make the page large; its checksum is that of the whole text."""
+    """Return a listing, cut where it would make the page large."""
     if len(text) <= MOST_TEXT:
         return Listing(title, text)
     kept = text[:MOST_TEXT].rpartition("\n")[0]
@@ -141,13 +138,13 @@ def listing(title: str, text: str) -> Listing:
 
 
 def sections(given: Iterable[tuple[str, Iterable[PageBlock]]]) -> tuple[PageSection, ...]:
-    """Sections of titles and blocks; those without blocks are left out."""
+    """Return sections of titles and blocks, without those that have no blocks."""
     found = ((title, tuple(blocks)) for title, blocks in given)
     return tuple(PageSection(title, blocks) for title, blocks in found if blocks)
 
 
 def worst(judgements: Iterable[Judgement]) -> TrustLevel:
-    """The worst level of some judgements."""
+    """Return the worst level of judgements."""
     order = (TrustLevel.OUTSIDE, TrustLevel.DOUBTFUL)
     levels = {one.level for one in judgements}
     return next((level for level in order if level in levels), TrustLevel.WITHIN)
@@ -158,7 +155,7 @@ SUFFIXES = (".html", ".htm")
 
 
 class ReportError(FecmError, ValueError):
-    """A page can't be made of these results."""
+    """A page can't be made from these results."""
 
 
 class Jinja2Error(FecmError, ImportError):
@@ -193,12 +190,12 @@ def render(page: ReportPage) -> str:
 
 
 def _kind(block: PageBlock) -> str:
-    """Name of the macro of a block."""
+    """Return the name of the macro of a block."""
     return type(block).__name__.removeprefix("Page").lower()
 
 
 def _shown(value: object) -> object:
-    """Texts without control characters, which HTML does not allow."""
+    """Return a text without control characters, which HTML does not allow."""
     if type(value) is not str:
         return value
     return "\n".join(printable(line) for line in value.split("\n"))
@@ -214,9 +211,9 @@ def write(page: ReportPage, path: Path, *, overwrite: bool) -> None:
 def check_page(path: Path, overwrite: bool, inputs: Iterable[Path] = ()) -> None:
     """Refuse a page that can't be written, before anything is computed.
 
-    Raises ReportError for a name without the suffix .html, OutputError if the file exists and may
-    not be replaced, is one of the inputs, or can't be written, ImportError without Jinja2 or
-    matplotlib.
+    Raises ReportError if the suffix of the name is not .html. Raises OutputError if the file can't
+    be written, is one of the inputs, or exists and may not be replaced. Raises ImportError without
+    Jinja2 or matplotlib.
     """
     require_jinja2()
     require_matplotlib()

@@ -1,4 +1,4 @@
-"""Pictures inside a page: those of results, and of the laminate."""
+"""Pictures inside a page: pictures of results, and of the laminate."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ DOTS = 200  # of pixels, per inch
 
 
 def inside(figure: Figure) -> str:
-    """A figure as a ``data:`` address: SVG, or PNG where that would be large, as of fine meshes."""
+    """Return a figure as a ``data:`` address: SVG, or PNG where SVG would be large."""
     found = _bytes(figure, "svg")
     kind = "image/svg+xml"
     if len(found) > LARGEST:
@@ -39,7 +39,7 @@ def inside(figure: Figure) -> str:
 
 
 def _bytes(figure: Figure, form: str) -> bytes:
-    """A figure in a format; equal figures give equal bytes."""
+    """Return a figure in a format. Equal figures give equal bytes."""
     import matplotlib
 
     from fecm.plot.style import RC, UNDATED
@@ -59,7 +59,7 @@ def drawn(
     wide: bool = False,
     **options: Any,
 ) -> Iterator[PageBlock]:
-    """A picture of a kind; nothing if the results lack what it shows."""
+    """Yield a picture of a kind, unless the results lack what it shows."""
     with warnings.catch_warnings(action="ignore"):
         try:
             picture = draw(kind, results, **options)
@@ -69,7 +69,7 @@ def drawn(
 
 
 def of_runs(results: Mapping[str, Result]) -> Iterator[PageBlock]:
-    """Histories of one or more runs in the same pictures."""
+    """Yield the histories of one or more runs in the same pictures."""
     histories: tuple[tuple[PictureKind, str, dict[str, Any]], ...] = (
         (PictureKind.FORCE, "Contact force against time.", {}),
         (PictureKind.LOOP, "Contact force against indentation.", {"against": "indentation"}),
@@ -86,7 +86,7 @@ def of_runs(results: Mapping[str, Result]) -> Iterator[PageBlock]:
 
 
 def _with_peaks(kind: PictureKind, caption: str, results: Mapping[str, Result]) -> str:
-    """A caption with the peak forces of the results."""
+    """Return a caption with the peak forces of the results."""
     if kind != PictureKind.FORCE:
         return caption
     peaks = []
@@ -98,7 +98,7 @@ def _with_peaks(kind: PictureKind, caption: str, results: Mapping[str, Result]) 
 
 
 def of_run(name: str, result: Result) -> Iterator[PageBlock]:
-    """Pictures of the plate of one run."""
+    """Yield pictures of the plate of one run."""
     results = {name: result}
     if "history/plate_w" in result and "tape3/time" in result and len(result["tape3/time"]):
         time = float(result["history/time"][result["history/plate_w"].argmax()])
@@ -127,9 +127,9 @@ HEIGHTS = (1.5, 5.5)  # smallest and largest height of the plies (in)
 
 
 def stack(layers: Sequence[Layer], names: Mapping[int, str]) -> Figure:
-    """Draw the plies from the struck face on, as high as they are thick.
+    """Draw the plies from the struck face down, to scale.
 
-    `names` are those of the materials, by number; they are left out if there is one.
+    `names` has the names of the materials by number. They are left out if there is one material.
     """
     edges = np.concatenate([[0.0], np.cumsum([layer.thickness for layer in layers])])
     several = len({layer.material for layer in layers}) > 1

@@ -1,4 +1,4 @@
-"""Page about parameters that were fitted to a measured force."""
+"""Page about parameters fitted to a measured force."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from fecm.report.figures import inside
 
 
 def identification_page(name: str, found: Identification) -> ReportPage:
-    """Page about a fit; `name` is that of the measurement."""
+    """Return the page about a fit. `name` is the name of the measurement."""
     values = ", ".join(_said(found, key) for key in found.values)
     verdict = [f"Fitted to {name}: {values}."]
     level = TrustLevel.WITHIN
@@ -54,7 +54,7 @@ def identification_page(name: str, found: Identification) -> ReportPage:
 
 
 def _said(found: Identification, name: str) -> str:
-    """A parameter with its standard error."""
+    """Format a parameter with its standard error."""
     value = found.values[name]
     power, unit = readable(value, found.unit(name), digits=5)
     best, error = value / 10.0**power, found.errors[name] / 10.0**power
@@ -62,7 +62,7 @@ def _said(found: Identification, name: str) -> str:
 
 
 def _judgements(found: Identification) -> Iterator[Judgement]:
-    """Convergence and residual."""
+    """Judge convergence and residual."""
     for name, fine in (("converged", found.converged), ("accepted", found.accepted)):
         yield Judgement(
             TrustLevel.WITHIN if fine else TrustLevel.OUTSIDE, name, "yes" if fine else "no"
@@ -78,14 +78,14 @@ def _judgements(found: Identification) -> Iterator[Judgement]:
 
 
 def _picture(found: Identification) -> PageBlock:
-    """Measured and fitted force, and the residual."""
+    """Draw the measured force, the fitted force, and the residual."""
     picture = force_fit_picture(found, unit_names(found.deck))
     caption = "Measured and fitted contact force, and the residual."
     return PagePicture(inside(picture.figure), caption, caption)
 
 
 def _provenance(found: Identification) -> Iterator[PageBlock]:
-    """Cards with the fitted values, and the deck."""
+    """Yield the cards with the fitted values, and the deck."""
     text = found.deck.to_text()
     checksum = hashlib.sha256(text.encode()).hexdigest()
     yield from page_table([("fitted deck, SHA-256", checksum)], title="Checksum")

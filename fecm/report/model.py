@@ -52,7 +52,7 @@ LAW = (COEFFICIENT, "length", "", "")  # dimensions of the constants of EXPE
 
 
 def of_problem(result: Result, problem: Problem) -> Iterator[PageBlock]:
-    """Tables and pictures of a problem."""
+    """Yield the tables and pictures of a problem."""
     deck = problem.deck
     yield from page_table(_plate(result, problem), title="Plate")
     for number_of, layers in deck.layers.items():
@@ -66,7 +66,7 @@ def of_problem(result: Result, problem: Problem) -> Iterator[PageBlock]:
 
 
 def plate_extent(problem: Problem) -> str:
-    """Extent of the plate."""
+    """Return the extent of the plate as a text."""
     unit = unit_of("length", unit_names(problem.deck))
     low, high = (f(problem.mesh.coordinates[:, :2], axis=0) for f in (np.min, np.max))
     a, b = (f"{side:.5g}" for side in high - low)
@@ -74,7 +74,7 @@ def plate_extent(problem: Problem) -> str:
 
 
 def _plate(result: Result, problem: Problem) -> Iterator[Row]:
-    """Plate, mesh, supports and what loads it."""
+    """Yield rows about the plate, its mesh, supports and loads."""
     from fecm.plot.mesh import support_masks
 
     deck, plate = problem.deck, problem.plate
@@ -108,12 +108,12 @@ def _plate(result: Result, problem: Problem) -> Iterator[Row]:
 
 
 def _rounded(matrix: np.ndarray) -> np.ndarray:
-    """A matrix with its rounding errors as zeros."""
+    """Return a matrix with its rounding errors as zeros."""
     return np.where(np.abs(matrix) < 1e-9 * max(1.0, np.abs(matrix).max()), 0.0, matrix)
 
 
 def _materials(deck: model.Deck) -> Iterator[PageBlock]:
-    """Constants and strengths of the plies of every material."""
+    """Yield tables of constants and strengths of the plies of every material."""
     plies = dict(sorted(deck.plies.items()))
     names = _headings(deck)
     header = ["constant", *(names[number] for number in plies)]
@@ -138,14 +138,14 @@ def _materials(deck: model.Deck) -> Iterator[PageBlock]:
 
 
 def _headings(deck: model.Deck) -> dict[int, str]:
-    """Numbers and names of the materials, by number."""
+    """Return numbers and names of the materials, by number."""
     names = {number: f"material {number}" for number in deck.plies}
     named = material_names(deck)
     return {n: name if named[n] == name else f"{n}: {named[n]}" for n, name in names.items()}
 
 
 class Impactor(NamedTuple):
-    """What hits the plate in a run; slips and a user's projectile differ from the deck's."""
+    """Projectile of a run. Slips and a user's projectile differ from the deck."""
 
     name: str
     mass: float
@@ -154,7 +154,10 @@ class Impactor(NamedTuple):
 
 
 def impactor(result: Result, deck: model.Deck) -> Impactor | None:
-    """Projectile of a run; None without impact.  Its mass follows from the energy put in."""
+    """Return the projectile of a run; None without impact.
+
+    Its mass follows from the initial energy.
+    """
     impact = deck.last(model.Impact)
     if impact is None:
         return None
@@ -170,7 +173,7 @@ def impactor(result: Result, deck: model.Deck) -> Impactor | None:
 
 
 def _impact(result: Result, deck: model.Deck) -> Iterator[Row]:
-    """Projectile, its velocity and energy, contact law, patch and toughness."""
+    """Yield rows about projectile, velocity, energy, contact law, patch and toughness."""
     hits, law = impactor(result, deck), deck.last(model.Indentation)
     in_units = partial(_in_units, deck)
     if hits is None or law is None:
@@ -193,7 +196,7 @@ def _impact(result: Result, deck: model.Deck) -> Iterator[Row]:
 
 
 def _program(problem: Problem) -> Iterator[Row]:
-    """Time steps and the words of the macro program."""
+    """Yield rows about the time steps and the words of the macro program."""
     steps = [m.value for m in flat(problem.program) if m.word == "DT"]
     yield "impact steps", ShownNumber(problem.work.steps, str(problem.work.steps))
     if steps:
@@ -202,11 +205,11 @@ def _program(problem: Problem) -> Iterator[Row]:
 
 
 def _in_units(deck: model.Deck, value: float, dimension: str) -> Cell:
-    """A value in the units of the deck."""
+    """Return a value in the units of the deck."""
     return number_with_unit(float(value), unit_of(dimension, unit_names(deck)), DECK_DIGITS)
 
 
 def _mass(deck: model.Deck, mass: float) -> str:
-    """A mass in g or kg where the units are known."""
+    """Format a mass in g or kg where the units are known."""
     names = unit_names(deck)
     return mass_in_si(mass, names) or quantity(mass, unit_of(MASS, names), DECK_DIGITS)

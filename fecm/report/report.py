@@ -1,4 +1,4 @@
-"""Reports: the page of a run, of several runs, of a sweep, of a fit."""
+"""Report pages of a run, several runs, a sweep, or a fit."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Reported = Result | SweepResult | Identification
 
 
 def digest(path: Path) -> str:
-    """SHA-256 of a file."""
+    """Return the SHA-256 of a file."""
     with path.open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
 
@@ -26,9 +26,9 @@ def digest(path: Path) -> str:
 def page_of(
     results: Mapping[str, Reported], digests: Mapping[str, str] | None = None
 ) -> ReportPage:
-    """Page about the results of one or more runs, of one sweep, or of one fit, by their names.
+    """Return the page about results by name: one or more runs, one sweep, or one fit.
 
-    Raises ReportError if a sweep or a fit is not alone.
+    Raises ReportError if a sweep or a fit is not the only result.
     """
     runs = {name: one for name, one in results.items() if isinstance(one, Result)}
     if len(runs) == len(results):

@@ -1,4 +1,4 @@
-"""Page about the results of runs: one in full, or several side by side."""
+"""Page about the results of runs: one run in full, or several side by side."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ WORDS = {
 
 
 def run_page(results: Mapping[str, Result], digests: Mapping[str, str]) -> ReportPage:
-    """Page about the results of one or more runs.
+    """Return the page about the results of one or more runs.
 
     Parameters
     ----------
@@ -96,7 +96,7 @@ def _single(
     warnings: list[str],
     judged: list[Judgement],
 ) -> tuple[PageSection, ...]:
-    """Sections about one result."""
+    """Return the sections about one result."""
     named = {name: result}
     trust: list[PageBlock] = [Judgements(tuple(judged))] if judged else []
     trust += note_list(result.notes, "Notes of the run")
@@ -116,7 +116,7 @@ def _several(
     problems: Mapping[str, Problem | None],
     judged: Mapping[str, list[Judgement]],
 ) -> tuple[PageSection, ...]:
-    """Sections about several results, a column each."""
+    """Return the sections about several results, with a column for each."""
     trust: list[PageBlock] = []
     for name, result in results.items():
         doubts = tuple(one for one in judged[name] if one.level is not TrustLevel.WITHIN)
@@ -136,14 +136,14 @@ def _several(
 
 
 def _common_pictures(results: Mapping[str, Result]) -> list[PageBlock]:
-    """Histories of all results in the same pictures, which need the same units."""
+    """Draw the histories of all results in the same pictures, if their units are the same."""
     if len({tuple(one.units.items()) for one in results.values()}) > 1:
         return note_list(["The results have different units: they have no pictures in common."])
     return list(figures.of_runs(results))
 
 
 def _model_row(result: Result, problem: Problem | None) -> dict[str, Cell]:
-    """What distinguishes the models of several results."""
+    """Return what distinguishes the models of several results."""
     if problem is None:
         return {}
     deck, units = problem.deck, unit_names(problem.deck)
@@ -169,7 +169,7 @@ def _model_row(result: Result, problem: Problem | None) -> dict[str, Cell]:
 
 
 def _sentence(result: Result, problem: Problem | None) -> str:
-    """What was hit by what, and what came of it, in one sentence."""
+    """Say in one sentence what hit what, and what happened."""
     said = partial(_said, result)
     if "history/force" not in result or not len(result["history/force"]):
         return "No impact: see Results."
@@ -216,7 +216,7 @@ def _sentence(result: Result, problem: Problem | None) -> str:
 
 
 def _scene(result: Result, problem: Problem) -> str:
-    """What hits what, and how hard."""
+    """Say what hits what, and how hard."""
     deck, units = problem.deck, unit_names(problem.deck)
     hits = impactor(result, deck)
     if hits is None:
@@ -233,7 +233,7 @@ def _scene(result: Result, problem: Problem) -> str:
 
 
 def _results(results: Mapping[str, Result]) -> list[PageBlock]:
-    """Metrics of impacts, or what the summary says of a result without impact."""
+    """Return the metrics of impacts, or the summary of a result without impact."""
     if any(result.metrics for result in results.values()):
         return _metrics(results)
     blocks: list[PageBlock] = []
@@ -244,7 +244,7 @@ def _results(results: Mapping[str, Result]) -> list[PageBlock]:
 
 
 def _metrics(results: Mapping[str, Result]) -> list[PageBlock]:
-    """Impact metrics with a column for each result."""
+    """Return a table of impact metrics with a column for each result."""
     metrics = {name: result.metrics for name, result in results.items()}
     rows: list[Row] = []
     if any(result.end in UNDECIDED for result in results.values()):
@@ -268,7 +268,7 @@ def _metrics(results: Mapping[str, Result]) -> list[PageBlock]:
 
 
 def _elastic_peaks(results: Mapping[str, Result]) -> str:
-    """Peaks that are those of an elastic plate only, in brackets."""
+    """List, in brackets, the peaks that are elastic predictions only."""
     doubts = {
         name: elastic_doubt(one, float(one["history/force"].max(initial=0.0)))
         for name, one in results.items()
@@ -281,14 +281,14 @@ def _elastic_peaks(results: Mapping[str, Result]) -> str:
 
 
 def _lower_bound(result: Result) -> Cell:
-    """Largest force of a run whose peak is open."""
+    """Return the largest force of a run whose peak is open."""
     if result.end not in UNDECIDED:
         return UNKNOWN
     return number_with_unit(float(result["history/force"].max()), unit_of("force", result.units))
 
 
 def _threshold(result: Result) -> list[PageBlock]:
-    """Threshold of delamination with its band."""
+    """Return a table of the delamination threshold and its band."""
     known = result.threshold
     if not known:
         return []
@@ -316,7 +316,7 @@ def _threshold(result: Result) -> list[PageBlock]:
 
 
 def _criteria(result: Result) -> list[PageBlock]:
-    """Largest exposure and first failure of every criterion."""
+    """Return a table of the largest exposure and the first failure of every criterion."""
     length, time, force = (unit_of(name, result.units) for name in ("length", "time", "force"))
     first = {one.criterion: one for one in first_failures(result)}
     rows: list[Row] = []
@@ -340,7 +340,7 @@ def _criteria(result: Result) -> list[PageBlock]:
 
 
 def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> Iterator[PageBlock]:
-    """Version, solver and checksums, and the decks."""
+    """Yield version, solver, checksums, and the decks."""
     import hashlib
 
     texts = {name: result.deck_text for name, result in results.items()}

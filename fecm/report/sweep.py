@@ -45,7 +45,10 @@ MOST_COMBINATIONS = 12  # of varied values, whose statistics are listed
 
 
 def sweep_page(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> ReportPage:
-    """Page about the result of a sweep; `digests` is the SHA-256 of its file, by its name."""
+    """Return the page about the result of a sweep.
+
+    `digests` has the SHA-256 of its file, by its name.
+    """
     judged = list(_judgements(sweep))
     level = worst(judged)
     drawn = [] if sweep.random is None else _random(sweep, sweep.random)
@@ -62,7 +65,7 @@ def sweep_page(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> Rep
 
 
 def _sentences(sweep: SweepResult) -> Iterator[str]:
-    """What was varied, and what came of it."""
+    """Yield sentences about what was varied and what resulted."""
     what = FOUND if FOUND in sweep.summary else PEAK
     names = ", ".join(sweep.cases) or "nothing"
     yield f"A sweep over {names}; {sweep_verdict(sweep)}."
@@ -84,12 +87,12 @@ def _sentences(sweep: SweepResult) -> Iterator[str]:
 
 
 def _fine(sweep: SweepResult, name: str) -> np.ndarray:
-    """A quantity of the cases that were run, NaN for the others."""
+    """Return a quantity of the cases, NaN for cases that failed."""
     return np.where(sweep.completed, sweep[name], np.nan)
 
 
 def _judgements(sweep: SweepResult) -> Iterator[Judgement]:
-    """Counts of cases by their status and validity."""
+    """Yield the numbers of cases by status and validity."""
     count = len(sweep)
     failed = int((~sweep.completed).sum())
     valid = int((sweep.validity == "ok").sum())
@@ -117,7 +120,7 @@ def _judgements(sweep: SweepResult) -> Iterator[Judgement]:
 
 
 def _varied(sweep: SweepResult) -> list[PageBlock]:
-    """Names, numbers and ranges of the values of the cases."""
+    """Yield a table of the names, numbers and ranges of the varied values."""
     laws = {} if sweep.random is None else sweep.random.design.laws
     rows: list[Row] = []
     for name, values in sweep.cases.items():
@@ -136,7 +139,7 @@ def _varied(sweep: SweepResult) -> list[PageBlock]:
 
 
 def _extremes(sweep: SweepResult) -> list[PageBlock]:
-    """The cases with the smallest and the largest value of every quantity."""
+    """Yield a table of the cases with the smallest and the largest value of each quantity."""
     rows: list[Row] = []
     for name, column in sweep.summary.items():
         if name in VERDICTS or column.dtype.kind != "f" or column.ndim > 1:
@@ -158,7 +161,7 @@ def _extremes(sweep: SweepResult) -> list[PageBlock]:
 
 
 def _convergence(sweep: SweepResult) -> list[PageBlock]:
-    """Order, limit and error band of the quantities of a refinement study."""
+    """Yield a table of order, limit and error band of the quantities of a refinement study."""
     rows: list[Row] = []
     for name, one in sweep.convergence.items():
         unit, finest = sweep.unit(name), float(sweep[name][-1])
@@ -175,7 +178,7 @@ def _convergence(sweep: SweepResult) -> list[PageBlock]:
 
 
 def _reduced(sweep: SweepResult) -> list[PageBlock]:
-    """Full runs beside the reduced model."""
+    """Return a table of full runs beside the reduced model."""
     found = sweep.reduced
     if found is None:
         return []
@@ -189,7 +192,7 @@ def _reduced(sweep: SweepResult) -> list[PageBlock]:
 
 
 def _case(sweep: SweepResult, case: int) -> str:
-    """Number and values of a case."""
+    """Format the number and the values of a case."""
     if len(sweep.cases) > MOST_NAMED:
         return f"{case}"
     values = {name: column[case].item() for name, column in sweep.cases.items()}
@@ -203,7 +206,7 @@ def _case(sweep: SweepResult, case: int) -> str:
 
 
 def _drawn(sweep: SweepResult, design: Design) -> Iterator[tuple[str, str]]:
-    """Rows that tell draws and cases from the samples, where their numbers differ."""
+    """Yield rows with the numbers of draws and cases, where they differ from the samples."""
     if design.sensitivity:
         yield "draws", f"{design.draws}, two per sample; statistics and probabilities use them"
     if len(sweep) != design.draws:
@@ -211,7 +214,7 @@ def _drawn(sweep: SweepResult, design: Design) -> Iterator[tuple[str, str]]:
 
 
 def _random(sweep: SweepResult, random: RandomResult) -> Iterator[PageBlock]:
-    """Design, statistics, probabilities and sensitivity indices of a random sweep."""
+    """Yield tables of design, statistics, probabilities and sensitivity indices."""
     design = random.design
     yield from page_table(
         [
@@ -236,7 +239,7 @@ def _random(sweep: SweepResult, random: RandomResult) -> Iterator[PageBlock]:
 def _statistics(
     sweep: SweepResult, random: RandomResult, place: tuple[int, ...], caption: str
 ) -> list[PageBlock]:
-    """Mean, standard deviation and quantiles of the most important quantities."""
+    """Return a table of mean, standard deviation and quantiles of the main quantities."""
     rows: list[Row] = []
     for name in (name for name in MAIN if name in random.statistics):
         own, unit = random.statistics[name], sweep.unit(name)
@@ -251,7 +254,7 @@ def _statistics(
 def _exceedance(
     sweep: SweepResult, random: RandomResult, place: tuple[int, ...], caption: str
 ) -> list[PageBlock]:
-    """Probabilities that quantities exceed limits, with their intervals."""
+    """Return a table of the probabilities of exceeding limits, with their intervals."""
     found = random.exceedance
     rows: list[Row] = []
     for row, (name, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
@@ -271,7 +274,7 @@ def _exceedance(
 def _indices(
     sweep: SweepResult, random: RandomResult, place: tuple[int, ...], label: str
 ) -> Iterator[PageBlock]:
-    """Sobol' indices of the most important quantity."""
+    """Return a table of Sobol' indices of the main quantity."""
     name = next((name for name in MAIN if name in random.sensitivity), None)
     if name is None:
         return
@@ -287,7 +290,7 @@ def _indices(
 
 
 def _pictures(name: str, sweep: SweepResult) -> Iterator[PageBlock]:
-    """The map of a sweep; of a random one probabilities, indices and scatter."""
+    """Yield the map of a sweep; probabilities, indices and scatter of a random sweep."""
     named = {name: sweep}
     what = described(FOUND if FOUND in sweep.summary else PEAK).capitalize()
     if sweep.random is not None:
@@ -301,7 +304,7 @@ def _pictures(name: str, sweep: SweepResult) -> Iterator[PageBlock]:
 
 
 def _provenance(name: str, sweep: SweepResult, digests: Mapping[str, str]) -> Iterator[PageBlock]:
-    """Checksums, time steps, and the deck."""
+    """Yield checksums, time steps, and the deck."""
     text = sweep.deck_text
     unit = unit_of("time", sweep.units)
     steps = [quantity(dt, unit, DECK_DIGITS) for dt in np.unique(sweep.dt).tolist()]

@@ -1,4 +1,4 @@
-"""How far a result may be trusted: every quantity that bounds the model, and its size."""
+"""Trust in a result: every quantity that bounds the model, and its size."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ ENDS = {
 
 
 def deck_problem(result: Result) -> tuple[Problem | None, list[str]]:
-    """The problem of a result's deck, None if it can't be read, and the warnings about it."""
+    """Return the problem of a result's deck, None if it can't be read, and the warnings about it."""
     try:
         loaded = load_deck(result.deck, result.mode)  # the text of a file could be another's path
     except (ResultFileError, ValueError):
@@ -89,7 +89,7 @@ def deck_problem(result: Result) -> tuple[Problem | None, list[str]]:
 
 
 def judgements(result: Result, problem: Problem | None) -> Iterator[Judgement]:
-    """Judge a result by what its file holds, and by its deck."""
+    """Judge a result by the contents of its file and by its deck."""
     reasons = reasons_of(result.validity)
     if problem is None:
         words = "the result holds no deck that can be read: mesh and limits are not judged"
@@ -114,7 +114,7 @@ def judgements(result: Result, problem: Problem | None) -> Iterator[Judgement]:
 
 
 def _reached(result: Result, problem: Problem, reasons: list[str]) -> Iterator[Judgement]:
-    """Deflection, strain and indentation against the limits of the model."""
+    """Compare deflection, strain and indentation with the limits of the model."""
     if "history/plate_w" not in result:
         return
     limits = problem.judge
@@ -160,7 +160,7 @@ def _reached(result: Result, problem: Problem, reasons: list[str]) -> Iterator[J
 
 
 def _failure(result: Result) -> Iterator[Judgement]:
-    """Exposures of the plies, and how often they were evaluated."""
+    """Judge the exposures of the plies, and how often they were evaluated."""
     largest = largest_exposures(result)
     if not largest:
         yield Judgement(TrustLevel.UNJUDGED, "failure of plies", UNKNOWN, "the deck has no FAIL")
@@ -189,7 +189,7 @@ def _failure(result: Result) -> Iterator[Judgement]:
 
 
 def _threshold(result: Result) -> Iterator[Judgement]:
-    """Peak force against the threshold of delamination."""
+    """Compare the peak force with the delamination threshold."""
     if "history/force" not in result:
         return
     if not result.threshold:
@@ -206,7 +206,7 @@ def _threshold(result: Result) -> Iterator[Judgement]:
 
 
 def _mesh(problem: Problem) -> Iterator[Judgement]:
-    """Mesh, time step, contact patch and shear stiffness."""
+    """Judge mesh, time step, contact patch and shear stiffness."""
     summary = deck_summary(problem)
     if (count := summary.elements_per_wave) is not None:
         coarse = count < ENOUGH_PER_WAVE
@@ -235,7 +235,7 @@ def _mesh(problem: Problem) -> Iterator[Judgement]:
 
 
 def _load(problem: Problem) -> Judgement:
-    """The contact force as a patch, or at a point."""
+    """Judge whether the contact force acts on a patch or at a point."""
     name, patch = "contact force", problem.patch
     if patch is None:
         words = "the peak depends on the element under a point force; PATC gives it a size"
@@ -245,7 +245,7 @@ def _load(problem: Problem) -> Judgement:
 
 
 def _numerical(result: Result) -> Iterator[Judgement]:
-    """Energy balance and contact iteration."""
+    """Judge the energy balance and the contact iteration."""
     initial = result.attributes_of("energy").get("initial")
     if "energy/balance_error" in result and isinstance(initial, float) and initial > 0.0:
         worst = float(np.abs(result["energy/balance_error"]).max(initial=0.0)) / initial
@@ -260,7 +260,7 @@ def _numerical(result: Result) -> Iterator[Judgement]:
 
 
 def _mode(result: Result) -> Iterator[Judgement]:
-    """Slips of the printed program that are active."""
+    """Name the active slips of the printed program."""
     if result.mode == LISTING:
         words = "the printed program of 1982 with its slips, not the text of the report"
         yield Judgement(TrustLevel.DOUBTFUL, "mode", "listing", words)

@@ -1,10 +1,12 @@
 """Checkpoints: the complete state of a run, stored beside its result.
 
-There are two files.  The checkpoint holds the state; it is written under another name, synced and
-renamed.  The spool holds the operations on the result file so far, each a line of JSON, followed by
-the bytes of its rows if it has any; it only grows, and repeating them gives a file of the same
-bytes.  A checkpoint names its part of the spool by length and checksum, so that the last checkpoint
-is valid however a run ends.  A resumed run gives the same bytes as an uninterrupted one.
+A checkpoint is two files. The checkpoint file holds the state. It is written under another name,
+synced and renamed. The spool holds the operations on the result file so far. Each operation is a
+line of JSON, followed by the bytes of its rows, if it has any. The spool only grows, and repeating
+its operations gives a result file of the same bytes.
+
+A checkpoint names its part of the spool by length and checksum. The last checkpoint is therefore
+valid however a run ends. A resumed run gives the same bytes as an uninterrupted one.
 """
 
 from __future__ import annotations
@@ -40,36 +42,36 @@ CHUNK = 1_000_000  # bytes read at once when a spool is checked
 
 
 class CheckpointError(FecmError, ValueError):
-    """The checkpoint, or its spool, can't be used."""
+    """A checkpoint, or its spool, can't be used."""
 
 
 class SpoolPart(NamedTuple):
-    """The part of a spool that a checkpoint names."""
+    """Part of a spool that a checkpoint names."""
 
     length: int = 0  # bytes
     checksum: int = 0  # their CRC
 
 
 def checkpoint_of(result: Path) -> Path:
-    """Path of a result's checkpoint."""
+    """Return the path of a result's checkpoint."""
     return result.with_name(f"{result.name}.checkpoint")
 
 
 def spool_of(result: Path) -> Path:
-    """Path of a result's spool."""
+    """Return the path of a result's spool."""
     return result.with_name(f"{result.name}.spool")
 
 
 def files_of(result: Path) -> tuple[Path, Path]:
-    """Checkpoint and spool of a result."""
+    """Return the paths of a result's checkpoint and spool."""
     return checkpoint_of(result), spool_of(result)
 
 
 def interrupted(paths: Sequence[Path], *, resume: bool, overwrite: bool) -> int | None:
-    """Return the place of the result in a list whose interrupted run is to be resumed, if any.
+    """Return the index of the result whose interrupted run is to be resumed, or None.
 
-    Raises CheckpointError if there is no checkpoint to resume from, or one that is neither resumed
-    nor overwritten.
+    Raises CheckpointError if there is no checkpoint to resume from, or if a checkpoint is neither
+    resumed nor overwritten.
     """
     stopped = [place for place, path in enumerate(paths) if checkpoint_of(path).exists()]
     if resume and not stopped:
@@ -84,7 +86,10 @@ def interrupted(paths: Sequence[Path], *, resume: bool, overwrite: bool) -> int 
 
 @contextlib.contextmanager
 def resuming(result: Path) -> Iterator[None]:
-    """Say in a CheckpointError how to start over; other errors are those of a forged checkpoint."""
+    """Say in a CheckpointError how to start over.
+
+    Any other error comes from a forged checkpoint and becomes a CheckpointError.
+    """
     try:
         yield
     except CheckpointError as error:
@@ -100,7 +105,10 @@ def resuming(result: Path) -> Iterator[None]:
 
 
 def identity(simulation: Simulation) -> dict[str, Any]:
-    """Properties that a run and its checkpoint must have in common, by what differs otherwise."""
+    """Return the properties that must match between a run and its checkpoint.
+
+    The keys are the messages for a mismatch.
+    """
     options = simulation.options
     return {
         OTHER_FORMAT: FORMAT,
@@ -122,7 +130,7 @@ def identity(simulation: Simulation) -> dict[str, Any]:
 
 
 def _deck_hash(problem: Problem) -> str:
-    """Hash of the cards of a problem."""
+    """Return the hash of the cards of a problem."""
     import hashlib  # 3 ms, and few runs have a checkpoint
 
     deck = problem.deck
@@ -130,7 +138,7 @@ def _deck_hash(problem: Problem) -> str:
 
 
 def fingerprint(problem: Problem, outputs: Sequence[Path]) -> str:
-    """Hash of a problem's cards and of its outputs."""
+    """Return the hash of a problem's cards and outputs."""
     import hashlib  # 3 ms, and few decks have a second problem
 
     whole = hashlib.sha256(_deck_hash(problem).encode())
@@ -141,7 +149,7 @@ def fingerprint(problem: Problem, outputs: Sequence[Path]) -> str:
 
 
 def finished_before(result: Path) -> list[str]:
-    """Fingerprints of the problems that were finished before the one whose run has stopped.
+    """Return the fingerprints of the problems that finished before the interrupted one.
 
     Raises CheckpointError if the checkpoint of `result` can't be used, OSError if it can't be read.
     """
@@ -154,7 +162,10 @@ def finished_before(result: Path) -> list[str]:
 
 
 def _difference(what: str, theirs: object, own: object) -> str:
-    """How a checkpoint differs from the run, as far as it helps; begins with a blank."""
+    """Describe how a checkpoint differs from the run, starting with a blank.
+
+    The text is empty if the difference would not help.
+    """
     if what == SOLVER and theirs == KERNELS and kernels.LIBRARY is None:
         return ", the compiled kernels, which this installation lacks"
     if what == SOLVER:
@@ -163,11 +174,11 @@ def _difference(what: str, theirs: object, own: object) -> str:
 
 
 class Checkpointer:
-    """Writes and reads the checkpoints of a run, beside the final path of its result.
+    """Writer and reader of the checkpoints of a run, beside the final path of its result.
 
-    Rows are not kept in memory: they are read back from the result when they are spooled.  A spool
-    without a checkpoint, which a killed run has left, is removed; the lock of `sink` shows that no
-    other run is writing it.  `finished` are the fingerprints of the problems before this one.
+    Rows are not kept in memory: they are read back from the result when they are spooled. A killed
+    run may leave a spool without a checkpoint. It is removed; the lock of `sink` shows that no
+    other run is writing it. `finished` has the fingerprints of the problems before this one.
     """
 
     def __init__(self, result: Path, sink: FileSink, finished: Sequence[str] = ()) -> None:
@@ -222,9 +233,9 @@ class Checkpointer:
         self._written = time.monotonic()
 
     def _append(self, file: BinaryIO) -> SpoolPart:
-        """Append the new operations to the spool and sync it; return the whole.
+        """Append the new operations to the spool, sync it, and return its length and checksum.
 
-        The next call overwrites them unless a checkpoint names them.
+        The next call overwrites the new operations unless a checkpoint names them.
         """
         import json  # 2 ms
 
@@ -249,10 +260,10 @@ class Checkpointer:
         return SpoolPart(file.tell(), checksum)
 
     def restore(self, simulation: Simulation) -> None:
-        """Set a new simulation and its result to the state of the checkpoint.
+        """Restore a new simulation and its result to the state of the checkpoint.
 
-        Raises CheckpointError if checkpoint or spool are missing, damaged, or belong to another
-        run.  Raises OSError if they can't be read or the result can't be written.
+        Raises CheckpointError if the checkpoint or the spool is missing, damaged, or belongs to
+        another run. Raises OSError if they can't be read or the result can't be written.
         """
         with _reading(self._checkpoint):
             about, arrays = _read(self._checkpoint)
@@ -270,7 +281,7 @@ class Checkpointer:
             simulation.restore({**about["values"], **arrays})
 
     def _replay(self, file: BinaryIO, part: SpoolPart) -> None:
-        """Repeat the operations of the first part of a spool on the result."""
+        """Repeat the operations in the first part of a spool on the result."""
         import json  # 2 ms
 
         found = 0
@@ -315,7 +326,7 @@ class Checkpointer:
 
 
 def _read(path: Path) -> tuple[dict[str, Any], dict[str, Array]]:
-    """JSON values and arrays of a checkpoint."""
+    """Read the JSON values and the arrays of a checkpoint."""
     import json  # 2 ms
     import zipfile  # 10 ms
 

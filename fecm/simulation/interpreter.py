@@ -15,11 +15,11 @@ Position = Sequence[tuple[int, int]]  # index of the next item and pass of every
 
 
 class EndedError(Exception):
-    """The program ends before its last macro."""
+    """The program ended before its last macro."""
 
 
 class _BoundLoop(NamedTuple):
-    """A loop whose macros are actions; the program itself is a loop of one pass."""
+    """Loop whose macros are bound to actions. The program itself is a loop of one pass."""
 
     items: list[_Item]
     last_pass: int = 1
@@ -30,7 +30,7 @@ _Item: TypeAlias = Action | _BoundLoop
 
 
 class _Frame:
-    """An open loop: its next item and its pass."""
+    """Open loop with its next item and its pass."""
 
     __slots__ = ("index", "loop", "number")
 
@@ -41,7 +41,7 @@ class _Frame:
 
 
 class Interpreter:
-    """Carries out a nested program."""
+    """Interpreter of a nested program."""
 
     def __init__(self, program: Body) -> None:
         self._program = program
@@ -63,7 +63,7 @@ class Interpreter:
         return self._stack[-1].loop.last_pass - self.current_pass
 
     def skip(self, passes: int) -> None:
-        """Go on at the begin of a later pass of the innermost loop."""
+        """Continue at the start of a later pass of the innermost loop."""
         self._stack[-1].number += passes
 
     def run(
@@ -73,11 +73,12 @@ class Interpreter:
         on_macro: Callable[[], object] = lambda: None,
         bind_loop: Callable[[Body], Passes | None] = lambda body: None,
     ) -> None:
-        """Carry out the program, from a `position` on; a ValueError if it has no such one.
+        """Run the program, optionally from a `position`.
 
-        `bind` returns the action of a macro and is called once per card; `on_macro` is called after
-        each macro, each loop and each pass of an empty loop.  `bind_loop` returns a function that
-        carries out passes of a loop together and calls :meth:`skip`; None if there is none.
+        `bind` returns the action of a macro and is called once per card. `on_macro` is called after
+        each macro, each loop and each pass of an empty loop. `bind_loop` returns a function that
+        runs several passes of a loop together and calls :meth:`skip`, or None if the loop needs
+        single steps. Raises ValueError if the program has no such position.
         """
         stack = self._stack
         try:
@@ -115,7 +116,7 @@ class Interpreter:
 def _bound(
     body: Body, bind: Callable[[Macro], Action], bind_loop: Callable[[Body], Passes | None]
 ) -> list[_Item]:
-    """Actions and loops of a body."""
+    """Bind the macros of a body to actions, and its loops to bound loops."""
     return [
         _BoundLoop(_bound(item.body, bind, bind_loop), item.count, bind_loop(item.body))
         if isinstance(item, Loop)
@@ -125,7 +126,10 @@ def _bound(
 
 
 def _frames(program: _BoundLoop, position: Position) -> list[_Frame]:
-    """Frames of a position.  Raises ValueError if the program has no such position."""
+    """Return the open loops at a position.
+
+    Raises ValueError if the program has no such position.
+    """
     frames: list[_Frame] = []
     loop: _Item = program
     for index, number in position:

@@ -52,7 +52,7 @@ ENOUGH = 0.2  # seconds of steps that show what a step costs
 
 
 class Price(NamedTuple):
-    """What a job takes.
+    """Steps, bytes, memory and seconds that a job takes.
 
     Attributes
     ----------
@@ -82,10 +82,10 @@ class Price(NamedTuple):
 @documented
 @dataclass(eq=False, repr=False)
 class Run:
-    """A deck that is ready to run.
+    """Deck that is ready to run.
 
-    The deck, the options and the output files are checked at once; :attr:`price` says what the run
-    takes, and :meth:`execute` carries it out.
+    The deck, the options and the output files are checked at once. :attr:`price` says what the run
+    takes, and :meth:`execute` runs it.
 
     Parameters
     ----------
@@ -255,7 +255,7 @@ class Run:
         self.problems = [ProblemRun(problem, self.options) for problem in problems]
 
     def _with_files(self, problems: list[Problem], first: Path) -> list[ProblemRun]:
-        """Give the problems their files, which are checked."""
+        """Check the output files, and assign them to the problems."""
         from fecm.simulation.checkpoint import (  # 40 ms, with h5py
             CheckpointError,
             files_of,
@@ -311,7 +311,7 @@ class Run:
 
     @cached_property
     def price(self) -> Price:
-        """What the run takes; the time is measured by its first steps."""
+        """What the run takes. The time is estimated from the first steps."""
         prices = [job.price for job in self.problems]
         steps, written, memory, seconds = zip(*prices, strict=True) if prices else ((),) * 4
         return Price(sum(steps), sum(written), max(memory, default=0), math.fsum(seconds))
@@ -319,9 +319,9 @@ class Run:
     def execute(self) -> Result | list[Result]:
         """Run the problems that are not complete.
 
-        Each warning about the deck and each reason to doubt the result is a
-        :class:`FecmWarning`.  With an output file, an interrupt writes a checkpoint, from which
-        the same run with ``resume=True`` continues.
+        Each warning about the deck and each reason to doubt the result is a :class:`FecmWarning`.
+        With an output file, an interrupt writes a checkpoint. The same run with ``resume=True``
+        continues from it.
 
         Returns
         -------
@@ -351,7 +351,7 @@ class Run:
         return results[0] if len(results) == 1 else results
 
     def _execute(self) -> list[Result]:
-        """Run the problems; return a result of each."""
+        """Run the problems and return their results."""
         for text in self._loaded.warnings:
             warn(text)
         results = []
@@ -373,7 +373,7 @@ class Run:
         return f"<fecm run of {self.source}: {count} problem{'' if count == 1 else 's'}>"
 
     def _repr_html_(self) -> str:
-        """Title, files and price of each problem, for notebooks."""
+        """Return a table of the title, file and price of each problem, for notebooks."""
         rows: list[Row] = []
         for job in self.problems:
             rows += [("title", job.problem.deck.title), ("price", str(job.price))]
@@ -383,7 +383,7 @@ class Run:
 
 @dataclass(eq=False, repr=False)
 class ProblemRun:
-    """A problem of a deck that is ready to run."""
+    """Problem of a deck that is ready to run."""
 
     problem: Problem
     options: RunOptions
@@ -398,12 +398,12 @@ class ProblemRun:
 
     @property
     def outputs(self) -> list[Path]:
-        """Result and printed output."""
+        """Paths of the result and the printed output."""
         return [path for path in (self.path, self.printed) if path is not None]
 
     @cached_property
     def price(self) -> Price:
-        """What the run takes; the time is measured by its first steps."""
+        """What the run takes. The time is estimated from the first steps."""
         problem, in_memory = self.problem, self.path is None
         return Price(
             problem.work.steps,
@@ -413,17 +413,17 @@ class ProblemRun:
         )
 
     def execute(self, watch: Watch = SILENT) -> Result:
-        """Carry out the run and return its result; see :meth:`executing`."""
+        """Run the problem and return its result; see :meth:`executing`."""
         with self.executing(watch) as result:
             pass
         return result if self.path is None else load(self.path)
 
     @contextlib.contextmanager
     def executing(self, watch: Watch = SILENT) -> Iterator[Result]:
-        """Carry out the run and yield its result, whose file is still open.
+        """Run the problem and yield its result, whose file is still open.
 
-        After the block the file has its final name.  If the watch stops the run, its checkpoint is
-        written first.  Of a problem that is complete the result is read.
+        The file gets its final name after the block. If the watch stops the run, a checkpoint is
+        written first. The result of a problem that is already complete is read from its file.
 
         Raises
         ------
@@ -455,7 +455,7 @@ class ProblemRun:
 
     @contextlib.contextmanager
     def _into_file(self, path: Path, watch: Watch) -> Iterator[Result]:
-        """Carry out the run into its file."""
+        """Run the problem into its result file."""
         from fecm.results.hdf5_writer import result_writing  # 25 ms with h5py
         from fecm.simulation.checkpoint import Checkpointer, resuming
 
@@ -502,7 +502,7 @@ class ProblemRun:
         self._finish()
 
     def _finish(self) -> None:
-        """Add the fingerprint of the problem to those of the deck."""
+        """Add the fingerprint of the problem to the fingerprints of the deck."""
         if self.finished is not None:
             from fecm.simulation.checkpoint import fingerprint
 
@@ -510,7 +510,7 @@ class ProblemRun:
 
 
 def _observer(watch: Watch, problem: Problem) -> Callable[[Simulation], None]:
-    """Function that reports the steps of a run without a file."""
+    """Return a function that reports the steps of a run without a file."""
 
     def on_step(simulation: Simulation) -> None:
         step = simulation.state.plate.step
@@ -522,11 +522,11 @@ def _observer(watch: Watch, problem: Problem) -> Callable[[Simulation], None]:
 
 
 class _EnoughError(Exception):
-    """The steps so far show what a step costs."""
+    """The steps so far show how long a step takes."""
 
 
 def _seconds(problem: Problem, options: RunOptions) -> float:
-    """Seconds of a run on this machine, by its first steps; NaN if they fail."""
+    """Estimate the seconds of a run on this machine from its first steps; NaN if they fail."""
     steps, done, took = problem.work.steps, 0, 0.0
     begin = time.perf_counter()
 
@@ -551,8 +551,8 @@ def _seconds(problem: Problem, options: RunOptions) -> float:
 def run(job: Run) -> Result | list[Result]:
     """Run every problem of a deck.
 
-    The parameters and their errors are those of :class:`Run`, the errors of the computation those
-    of :meth:`Run.execute`.
+    :class:`Run` has the parameters and their errors. :meth:`Run.execute` has the errors of the
+    computation.
 
     Parameters
     ----------
@@ -596,5 +596,8 @@ def run_one(job: Run) -> Result:
 
 
 def numbered(path: Path, number: int) -> Path:
-    """Output of problem `number`: the path itself, then with ``-2``, ``-3`` before its suffix."""
+    """Return the output path of problem `number`.
+
+    The first problem has the path itself; the others have ``-2``, ``-3`` before its suffix.
+    """
     return path if number == 1 else path.with_name(f"{path.stem}-{number}{path.suffix}")

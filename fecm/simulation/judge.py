@@ -1,4 +1,4 @@
-"""Reasons to doubt the result of a finished run: largest values, notes, and validity."""
+"""Judgement of a finished run: largest values, notes, and validity."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ MEMBRANE = ("eps_xx", "eps_yy", "gamma_xy")
 
 
 class RunPeak(NamedTuple):
-    """Largest value of a quantity, and when and where it occurs."""
+    """Largest value of a quantity, with its time and place."""
 
     value: float
     time: float
@@ -58,14 +58,14 @@ NO_PEAK = RunPeak(0.0, 0.0, 0.0, 0.0)
 
 
 def largest_deflection(simulation: Simulation, result: Result) -> RunPeak:
-    """Largest deflection, less the rigid motions of a plate that is not held."""
+    """Return the largest deflection, without the rigid motion of a plate that is not held."""
     return max(_deflections(simulation, result), default=NO_PEAK)
 
 
 def largest_strain(simulation: Simulation, result: Result) -> RunPeak:
-    """Largest principal strain of both faces, away from the load, and of gages.
+    """Return the largest principal strain of both faces, away from the load, and of the gages.
 
-    Zero if no strain of the elements comes near :data:`~fecm.results.validity.STRAIN`.
+    It is zero if no strain of the elements comes near :data:`~fecm.results.validity.STRAIN`.
     """
     stored = [
         *_face_strains(simulation, result, "tape8"),
@@ -77,22 +77,25 @@ def largest_strain(simulation: Simulation, result: Result) -> RunPeak:
 
 
 def largest_slope(result: Result) -> RunPeak:
-    """Largest slope of a nonlinear plate at its stored rows."""
+    """Return the largest slope of a nonlinear plate at its stored rows."""
     return max(_of_membrane(result, "largest_slope"), default=NO_PEAK)
 
 
 def membrane_force(result: Result) -> RunPeak:
-    """Largest principal membrane force of a nonlinear plate at its stored rows."""
+    """Return the largest principal membrane force of a nonlinear plate at its stored rows."""
     return max(_of_membrane(result, "largest_force"), default=NO_PEAK)
 
 
 def largest_indentation(simulation: Simulation, result: Result) -> RunPeak:
-    """Largest indentation in contact."""
+    """Return the largest indentation in contact."""
     return max(_indentations(simulation, result), default=NO_PEAK)
 
 
 def _deflections(simulation: Simulation, result: Result) -> Iterator[RunPeak]:
-    """Peaks of the deflections that are stored: of all nodes by DISP, under the load at steps."""
+    """Yield the peaks of the stored deflections.
+
+    DISP stores all nodes; every step stores the deflection under the load.
+    """
     problem = simulation.problem
     free = rigid_deflections(problem.mesh)
     x, y = problem.mesh.coordinates[:, :2].T
@@ -115,9 +118,9 @@ def _indentations(simulation: Simulation, result: Result) -> Iterator[RunPeak]:
 
 
 def _face_strains(simulation: Simulation, result: Result, group: str) -> Iterator[RunPeak]:
-    """Peaks of the strains of a group, `tape8` without membrane strains or `stresses`.
+    """Yield the peaks of the face strains in a group, with the uniform strain of the preload.
 
-    With the uniform strain of the preload.
+    The group is `tape8` without membrane strains, or `stresses`.
     """
     model, problem = simulation.model, simulation.problem
     half = model.plate.thicknesses / 2.0
@@ -148,7 +151,7 @@ def _gage_strains(simulation: Simulation, result: Result) -> Iterator[RunPeak]:
 
 
 def _of_membrane(result: Result, name: str) -> Iterator[RunPeak]:
-    """Peaks of the rows of ``membrane``, whose places are not stored."""
+    """Return the peak of a dataset of ``membrane``, whose places are not stored."""
     for times, (values,) in _blocks(result, "membrane", [name]):
         row = int(values.argmax())
         yield RunPeak(float(values[row]), float(times[row]))
@@ -157,7 +160,7 @@ def _of_membrane(result: Result, name: str) -> Iterator[RunPeak]:
 def _blocks(
     result: Result, group: str, names: Iterable[str]
 ) -> Iterator[tuple[Floats, list[Floats]]]:
-    """Times and datasets of a group, block by block; nothing if they are not stored."""
+    """Yield times and datasets of a group, block by block, if they are stored."""
     paths = [f"{group}/{name}" for name in names]
     if paths[-1] in result:
         times = result[f"{group}/time"]
@@ -167,13 +170,13 @@ def _blocks(
 
 
 def _peak(values: Floats, times: Floats, x: Array, y: Array) -> RunPeak:
-    """The largest of values, (rows, ...), at places (...)."""
+    """Return the largest of values, (rows, ...), at places (...)."""
     row, *at = np.unravel_index(int(values.argmax()), values.shape)
     return RunPeak(float(values[row, *at]), float(times[row]), float(x[*at]), float(y[*at]))
 
 
 def _peak_at(values: Floats, times: Floats, place: tuple[float, float]) -> RunPeak:
-    """The largest of values, (rows,), at one place."""
+    """Return the largest of values, (rows,), at one place."""
     return _peak(values, times, *map(np.asarray, place))
 
 
@@ -184,17 +187,17 @@ STRETCHED = 0.2
 
 
 def doubts(simulation: Simulation, result: Result) -> Iterator[str]:
-    """Notes about the stored rows of a nonlinear plate; none of a linear one."""
+    """Yield notes about the stored rows of a nonlinear plate."""
     if "membrane/largest_force" in result:
         yield from _time_step(simulation, result)
         yield from _delamination(simulation, result)
 
 
 def _time_step(simulation: Simulation, result: Result) -> Iterator[str]:
-    """Note of a membrane force that brings the largest frequency near to 2/DT.
+    """Yield a note if a membrane force brings the largest frequency near 2/DT.
 
-    w^2 <= w_linear^2 + N k^2/(rho h), where k is that of the shortest wave of the mesh, whose
-    length is the shortest side: nodes are half a side apart.
+    w^2 <= w_linear^2 + N k^2/(rho h), where k is the wave number of the shortest wave of the mesh.
+    Its length is the shortest side, as nodes are half a side apart.
     """
     from fecm.mechanics.stretching import principal_values  # 0.5 ms, for NONL only
 
@@ -225,7 +228,7 @@ def _time_step(simulation: Simulation, result: Result) -> Iterator[str]:
 
 
 def _delamination(simulation: Simulation, result: Result) -> Iterator[str]:
-    """Note of a load under which the plate stretches when DELA's threshold is reached."""
+    """Yield a note if the plate stretches under the load when it reaches DELA's threshold."""
     crossing = simulation.state.monitor.crossing
     if simulation.problem.threshold is None or "membrane/force_at_load" not in result:
         return
@@ -258,14 +261,14 @@ LATER = 1.1  # peak of a later contact over that of the first, above which a not
 
 
 class RunVerdict(NamedTuple):
-    """What speaks against a result."""
+    """Reasons to doubt a result, and its largest values."""
 
     notes: list[str]  # sentences; empty if there is no doubt
     validity: str  # ``"ok"`` or reasons; empty without impact steps
 
 
 class Doubt(NamedTuple):
-    """A quantity beyond the range of the model."""
+    """Quantity beyond the range of the model."""
 
     reason: Reason
     note: str
@@ -296,7 +299,7 @@ def judge_run(simulation: Simulation, result: Result) -> RunVerdict:
 
 
 def _remedy(result: Result, end: End) -> str:
-    """How many steps decide whether the plate touches the projectile again."""
+    """Say how many steps decide whether the plate touches the projectile again."""
     if end is not End.AGAIN:
         return ""
     if (steps := steps_to_decide(result)) is None:
@@ -305,7 +308,7 @@ def _remedy(result: Result, end: End) -> str:
 
 
 def _later_peak(result: Result) -> Iterator[str]:
-    """Note of a peak force that a later contact has raised."""
+    """Yield a note if a later contact has raised the peak force."""
     metrics, unit = result.metrics, result.units.get("force", "")
     if metrics["peak_force"] > LATER * metrics["first_peak"]:
         first = f"{metrics['first_peak']:.4g} {unit}".rstrip()
@@ -316,7 +319,7 @@ def _later_peak(result: Result) -> Iterator[str]:
 
 
 def _late_values(result: Result, end: End) -> Iterator[str]:
-    """Note of deflections and exposures that are largest near the end of the run."""
+    """Yield a note if deflections and exposures are largest near the end of the run."""
     if end is not End.OVER:
         return
     times, w = result["history/time"], result["history/plate_w"]
@@ -336,10 +339,10 @@ def _late_values(result: Result, end: End) -> Iterator[str]:
 
 
 def _pull(simulation: Simulation, result: Result) -> Iterator[str]:
-    """Note of supports that pull where they can only push.
+    """Yield a note if supports pull that can only push.
 
     The pull is computed for a static load. A light projectile is gone before its wave reaches the
-    supports: the note needs a deflection at the peak that is near to the static one.
+    supports, so the note requires that the deflection at the peak is near the static deflection.
     """
     problem = simulation.problem
     contact, force = problem.contact, result["history/force"]
@@ -359,11 +362,11 @@ def _pull(simulation: Simulation, result: Result) -> Iterator[str]:
 
 
 def _gravity(simulation: Simulation, result: Result) -> Iterator[str]:
-    """Note of a projectile so heavy and slow that its weight counts.
+    """Yield a note if the projectile is so heavy and slow that its weight counts.
 
-    Until it turns, the weight does the work M g w, where w is the way of the projectile. On a
-    linear spring with the energy E this raises the force by x + (1 + x^2)^(1/2) - 1, where
-    x = M g w/(2 E) is the weight over the peak force.
+    Until the projectile turns, its weight does the work M g w, where w is its displacement. On a
+    linear spring with the energy E this raises the force by x + (1 + x^2)^(1/2) - 1, where x = M g
+    w/(2 E) is the weight over the peak force.
     """
     impact, unit = simulation.model.impact, in_si("length/time^2", result.units)
     if impact is None or unit is None:
@@ -386,7 +389,7 @@ def _gravity(simulation: Simulation, result: Result) -> Iterator[str]:
 
 
 def _numerical(simulation: Simulation) -> Iterator[str]:
-    """Notes of the energy balance and the contact iteration; slips excuse both."""
+    """Yield notes about the energy balance and the contact iteration; slips excuse both."""
     state = simulation.state
     has_slips = not simulation.model.variant.is_report
     error, step = state.monitor.worst_error, state.monitor.worst_step
@@ -399,7 +402,7 @@ def _numerical(simulation: Simulation) -> Iterator[str]:
 
 
 def _few_evaluations(simulation: Simulation, result: Result) -> Iterator[str]:
-    """Note of a contact in which FAIL is evaluated so rarely that maxima are missed."""
+    """Yield a note if FAIL is evaluated so rarely in a contact that maxima are missed."""
     if simulation.state.failure is None:
         return
     yield from _coarse_elements(simulation, result)
@@ -413,7 +416,7 @@ def _few_evaluations(simulation: Simulation, result: Result) -> Iterator[str]:
 
 
 def _coarse_elements(simulation: Simulation, result: Result) -> Iterator[str]:
-    """Note of elements so large that exposures at the load are lower bounds."""
+    """Yield a note if the elements are so large that exposures at the load are lower bounds."""
     monitor = simulation.model.failure
     if monitor is None or monitor.around is None or monitor.around.coarseness <= RESOLVED:
         return
@@ -429,7 +432,7 @@ def _coarse_elements(simulation: Simulation, result: Result) -> Iterator[str]:
 
 
 def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:
-    """Deflection, strain, indentation and exposures beyond their limits."""
+    """Yield deflection, strain, indentation and exposures that are beyond their limits."""
     with np.errstate(all="ignore"):
         deflection = largest_deflection(simulation, result)
         slope = largest_slope(result)
@@ -466,7 +469,7 @@ def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:
 
 
 def _bent(simulation: Simulation, result: Result, peak: RunPeak) -> str:
-    """Note of a deflection beyond the linear plate."""
+    """Yield a note if the deflection is beyond the linear plate."""
     limits = simulation.problem.judge
     is_free = rigid_deflections(simulation.problem.mesh).size > 0
     what = "deflection, less its rigid motion," if is_free else "deflection"
@@ -480,13 +483,13 @@ def _bent(simulation: Simulation, result: Result, peak: RunPeak) -> str:
 
 
 def _size(result: Result, value: float, thickness: float) -> str:
-    """A length, and its ratio to the thickness."""
+    """Format a length and its ratio to the thickness."""
     length = f"{value:.4g} {result.units.get('length', '')}".rstrip()
     return f"{length} = {value / thickness:.3g} h"
 
 
 def _reached(result: Result, what: str, value: str, peak: RunPeak) -> str:
-    """Begin of a note: what a quantity reaches, and where and when."""
+    """Return the start of a note: the value that a quantity reaches, where and when."""
     time = f"time {peak.time:.6g} {result.units.get('time', '')}".rstrip()
     if not math.isnan(peak.x):
         time = f"({peak.x:.6g}, {peak.y:.6g}), {time}"

@@ -1,6 +1,6 @@
-"""The words of the macro program, one function each.
+"""Words of the macro program, one function each.
 
-A word with a number on its card receives it.  An action returns True to leave the innermost loop.
+A word with a number on its card receives it. An action returns True to leave the innermost loop.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from fecm.simulation.simulation import Simulation
 
 
 def set_time_step(run: Simulation, dt: float) -> None:
-    """DT; 0 takes a fraction of the critical time step."""
+    """Execute DT; 0 takes a fraction of the critical time step."""
     run.state.dt = dt
     if not dt:
         plate, problem = run.model.motion.plate, run.problem
@@ -37,12 +37,12 @@ def set_time_step(run: Simulation, dt: float) -> None:
 
 
 def advance_clock(run: Simulation) -> None:
-    """TIME."""
+    """Execute TIME."""
     run.state.clock += run.model.variant.program.clock_rate * run.state.dt
 
 
 def proportional_load(run: Simulation, n: float) -> None:
-    """PROP: read a table, or take its value at t = 0."""
+    """Execute PROP: read a table, or take its value at t = 0."""
     state, tables = run.state, run.problem.deck.tables
     if n > 0:
         if state.tables_read < len(tables):
@@ -55,7 +55,7 @@ def proportional_load(run: Simulation, n: float) -> None:
 
 
 def impact_step(run: Simulation, n: int) -> None:
-    """RODP: one impact step; contact and strains at every N-th."""
+    """Execute RODP: one impact step. Contact and strains are stored at every N-th step."""
     state, impact, system = run.state, run.state.impact, run.model.impact
     if system is None or impact is None:
         return
@@ -77,11 +77,7 @@ def impact_step(run: Simulation, n: int) -> None:
 
 
 def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
-    """Carry out passes of a loop with RODP in one call of the kernels.
-
-    Returns False where a single step has to be taken: the first one, one with another DT, and that
-    of the last pass.
-    """
+    """Run passes of a loop with RODP in one call of the kernels."""
     state, plate, steps = run.state, run.state.plate, run.model.steps
     impact, recorder = state.impact, run.recorder
     if impact is None or steps is None or not plate.step:
@@ -118,7 +114,7 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
 
 
 def central_difference(run: Simulation) -> None:
-    """EXCD: one step of the plate alone, under the nodal forces."""
+    """Execute EXCD: one step of the plate under the nodal forces."""
     state, plate = run.state, run.state.plate
     if not plate.step:
         run.recorder.steps.begin(plate, state.impact)
@@ -136,7 +132,7 @@ PINNED = (
 
 
 def form_tangent(run: Simulation) -> None:
-    """TANG: the stiffness, of a nonlinear plate about its present displacement."""
+    """Execute TANG: form the stiffness, of a nonlinear plate about its present displacement."""
     if run.model.plate.nonlinear:
         run.linearise(run.displacement_field())
         if run.tangent.pins and PINNED not in run.state.notes:
@@ -145,12 +141,12 @@ def form_tangent(run: Simulation) -> None:
 
 
 def form_residual(run: Simulation) -> None:
-    """FORM."""
+    """Execute FORM."""
     run.state.residual = run.model.motion.unbalanced(run.state.plate, run.force_factor())
 
 
 def solve_statics(run: Simulation) -> None:
-    """SOLV."""
+    """Execute SOLV."""
     state = run.state
     if not state.factorised or state.residual is None:
         return
@@ -163,7 +159,7 @@ def solve_statics(run: Simulation) -> None:
 
 
 def leave_if_converged(run: Simulation) -> bool:
-    """CONV: leave the loop if the last SOLV met the tolerance."""
+    """Execute CONV: leave the loop if the last SOLV met the tolerance."""
     state = run.state
     if state.converged:
         state.equilibrium_factor = run.force_factor()
@@ -174,7 +170,7 @@ def leave_if_converged(run: Simulation) -> bool:
 
 
 def _not_in_equilibrium(run: Simulation, symptom: str) -> str:
-    """What to say of a load for which Newton's method fails."""
+    """Return the message about a load for which Newton's method fails."""
     factor, reached = run.force_factor(), run.state.equilibrium_factor
     return (
         f"{symptom} at the load factor {factor:g}; the last equilibrium was at {reached:g}. "
@@ -183,17 +179,17 @@ def _not_in_equilibrium(run: Simulation, symptom: str) -> str:
 
 
 def form_mass(run: Simulation, *, consistent: bool) -> None:
-    """LMAS or CMAS."""
+    """Execute LMAS or CMAS."""
     run.state.consistent_mass = consistent
 
 
 def set_tolerance(run: Simulation, tolerance: float) -> None:
-    """TOL."""
+    """Execute TOL."""
     run.state.tolerance = tolerance
 
 
 def find_modes(run: Simulation, n: int) -> None:
-    """EIGE: the lowest modes, of a nonlinear plate about its present displacement."""
+    """Execute EIGE: find the lowest modes, of a nonlinear plate about its present displacement."""
     state, plate = run.state, run.model.plate
     about = run.displacement_field() if plate.nonlinear else None
     found = modes(plate, n, consistent=state.consistent_mass, field=about)
@@ -205,7 +201,7 @@ def find_modes(run: Simulation, n: int) -> None:
 
 
 def _at_passes(word: str, run: Simulation, n: int) -> None:
-    """DISP, PLYS or FAIL at every N-th pass."""
+    """Execute DISP, PLYS or FAIL at every N-th pass."""
     if not run.interpreter.current_pass % n:
         plate = run.state.plate
         STORING[word](run, [plate.step], [plate.time], run.displacement_field()[None])
@@ -245,7 +241,7 @@ AT_PASSES = ("DISP", "PLYS", "FAIL")  # those that are macros of their own
 
 
 def store_reactions(run: Simulation) -> None:
-    """REAC."""
+    """Execute REAC."""
     plate = run.state.plate
     force = reactions(run.model.plate, run.displacement_field(), run.force_factor())
     run.recorder.row("reactions", plate.step, plate.time, {"force": force})
@@ -253,7 +249,7 @@ def store_reactions(run: Simulation) -> None:
 
 
 def store_stresses(run: Simulation, n: int) -> None:
-    """STRE."""
+    """Execute STRE."""
     if run.interpreter.current_pass % n:
         return
     plate, model, points = run.state.plate, run.model.plate, run.model.stress_points
@@ -265,7 +261,7 @@ def store_stresses(run: Simulation, n: int) -> None:
 
 
 def store_sizes(run: Simulation) -> None:
-    """CHEC: store and print sizes."""
+    """Execute CHEC: store and print sizes."""
     plate = run.model.plate
     profile = plate.profile()
     run.sink.attributes("mesh", {"equations": plate.neq, "profile": profile})
@@ -294,7 +290,10 @@ ACTIONS: dict[str, Callable[..., bool | None]] = {
 
 
 def bind_loop(run: Simulation, body: Body) -> Passes | None:
-    """Return what carries out passes of a loop together; None if its macros need single steps."""
+    """Return a function that runs passes of a loop together.
+
+    Returns None if the macros of the loop need single steps.
+    """
     macros = [item for item in body if isinstance(item, Macro)]
     words = [macro.word for macro in macros]
     if run.model.steps is None or len(macros) < len(body):

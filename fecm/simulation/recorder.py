@@ -1,7 +1,6 @@
-"""The recorder of a run: scalars of every step in blocks, datasets and their rows in a sink.
+"""Recorder of a run: scalars of every step in blocks, datasets and their rows in a sink.
 
-What can be computed from a block (transducer, projectile energies, energy balance) is computed when
-the block is full.
+Transducer force, projectile energies and energy balance are computed when a block is full.
 """
 
 from __future__ import annotations
@@ -63,7 +62,7 @@ OnBlock = Callable[[Columns, float], object]
 
 
 class Damped(NamedTuple):
-    """State of the damping after the last step that is stored."""
+    """State of the damping after the last stored step."""
 
     time: float = 0.0
     power: float = 0.0
@@ -71,7 +70,7 @@ class Damped(NamedTuple):
 
 
 class StepRecorder:
-    """Stores every step in `buffers`; of a plate alone energies and gages only.
+    """Recorder of every step in `buffers`. A plate without impact has energies and gages only.
 
     `on_block` is called with the columns of each block and the initial energy.
     """
@@ -117,7 +116,7 @@ class StepRecorder:
     ) -> None:
         """Add a row for the state after a step, with the load factor of the nodal forces.
 
-        Its contact is stored `on_tape9` if asked for.
+        Its contact is stored `on_tape9` if requested.
         """
         applied = None
         if self._impact is not None and impact is not None:
@@ -138,13 +137,13 @@ class StepRecorder:
             self.flush()
 
     def _strains(self, sums: Floats) -> Floats:
-        """Strains of the gages, (..., gages), of their weighted sums."""
+        """Return the strains of the gages, (..., gages), from their weighted sums."""
         return sums if self._gage_array is None else self._gage_array.strains(sums)
 
     def add(self, plate: PlateState, columns: Columns, sums: Floats, on_tape9: Array) -> None:
-        """Add rows for many steps, and the contact of some of them to tape9.
+        """Add rows for many steps, and the contact of some steps to tape9.
 
-        `sums` are the weighted sums of the gages, (steps, rows).
+        `sums` has the weighted sums of the gages, (steps, rows).
         """
         work = np.full(len(sums), plate.external_work)
         given = {**columns, "external_work": work, "on_tape9": on_tape9}
@@ -159,7 +158,7 @@ class StepRecorder:
                 self.flush()
 
     def state(self) -> dict[str, Any]:
-        """Rows that are not stored yet, and how many are."""
+        """Return the rows that are not stored yet, and their number."""
         self._add_projectile()
         return {
             "rows": self._table[:, : self._count].copy(),
@@ -205,7 +204,7 @@ class StepRecorder:
         self._count = self._known = 0
 
     def _add_damping(self, table: dict[str, Floats]) -> None:
-        """Add the work of damping: its power v C v is 2 a times the plate's kinetic energy."""
+        """Add the work of damping. Its power v C v is 2 a times the plate's kinetic energy."""
         last, time = self._damped, table["time"]
         power = 2.0 * self._motion.damping * table["plate_kinetic"]
         means = 0.5 * (power + np.concatenate([[last.power], power[:-1]]))
@@ -233,7 +232,10 @@ class StepRecorder:
         self._table[len(SCALARS) : len(NAMES), rows] = [columns[name] for name in PROJECTILE]
 
     def _transducer(self, force: Floats, deformation: Floats) -> Floats:
-        """Force at the transducer: E A du/dx of its node; the contact force on a rigid mass."""
+        """Return the force at the transducer, E A du/dx of its node.
+
+        A rigid mass has the contact force instead.
+        """
         sign = self._station.sign
         rod = None if self._impact is None else self._impact.rod
         if not isinstance(rod, Rod):
@@ -251,7 +253,7 @@ AT_MACROS = ("tape3", "tape8", "stresses", "plies", "exposures", "reactions", "m
 
 
 def _absent(model: ImpactModel) -> set[str]:
-    """Datasets that a run lacks although it has their group."""
+    """Return the datasets that a run lacks although it has their group."""
     absent = set()
     if not model.motion.damping:
         absent.add("energy/damping_work")
@@ -271,7 +273,7 @@ def _absent(model: ImpactModel) -> set[str]:
 
 
 def _of_laminates(dataset: Dataset, model: ImpactModel) -> list[Dataset]:
-    """A dataset as a plate of one laminate has it, or of several."""
+    """Return a dataset in the form for a plate of one laminate, or of several."""
     if not model.plate.others:
         return [dataset]
     if dataset.group == LAMINATE:
@@ -280,9 +282,9 @@ def _of_laminates(dataset: Dataset, model: ImpactModel) -> list[Dataset]:
 
 
 def _padded(parts: Sequence[Floats]) -> Floats:
-    """Arrays of plies of each laminate, (laminates, plies, ...), NaN at those that one lacks.
+    """Return arrays of plies of each laminate, (laminates, plies, ...), padded with NaN.
 
-    Those of a single laminate, (plies, ...).
+    A single laminate gives (plies, ...).
     """
     if len(parts) == 1:
         return parts[0]
@@ -296,7 +298,7 @@ def _padded(parts: Sequence[Floats]) -> Floats:
 def exposures_of(
     monitor: FailureMonitor, found: FailureEnvelope, places: PlyPoints
 ) -> dict[str, Array]:
-    """Datasets of the largest exposures of criteria, those of plies as (states,)."""
+    """Return the datasets of the largest exposures by criterion, exposures of plies as (states,)."""
     arrays, plies = {}, monitor.every_state(found)
     for part in ("exposure", "time", "mode"):
         for name, values in zip(monitor.criteria, getattr(plies, part), strict=True):
@@ -309,7 +311,7 @@ def exposures_of(
 
 
 class Recorder:
-    """Stores the rows of a run, of which `sizes` has upper bounds, in a sink."""
+    """Recorder of the rows of a run in a sink. `sizes` has upper bounds of their numbers."""
 
     def __init__(
         self, sink: Sink, model: ImpactModel, sizes: WorkEstimate, on_block: OnBlock
@@ -358,7 +360,7 @@ class Recorder:
         self.steps = StepRecorder(sink, self._buffers, model, on_block)
 
     def _shape(self, dataset: Dataset) -> tuple[int, ...]:
-        """Shape of a dataset with all its rows."""
+        """Return the shape of a dataset with all its rows."""
         mesh, gages = self._model.plate.mesh, self._model.gages
         numbers = {
             "rows": self._room.get(dataset.group, 0),
@@ -385,7 +387,7 @@ class Recorder:
         return tuple(numbers[n] if isinstance(n, str) else n for n in dataset.shape)
 
     def create(self, location: str) -> None:
-        """Create every dataset that can have rows; store mesh, laminate and locations.
+        """Create every dataset that can have rows, and store mesh, laminate and locations.
 
         The location of tape8's strains is ``"nodes"`` or ``"gauss"``.
         """
@@ -418,7 +420,7 @@ class Recorder:
             self._sink.attributes("tape8", {"location": location})
 
     def _constants(self) -> dict[str, Array]:
-        """Datasets that do not change during the run."""
+        """Yield the datasets that do not change during the run."""
         model = self._model
         mesh, laminates = model.plate.mesh, model.plate.laminates
         found: dict[str, Array] = {
@@ -460,7 +462,7 @@ class Recorder:
         return found
 
     def row(self, group: str, step: int, time: float, columns: Mapping[str, Any]) -> None:
-        """Store a row of a group: a value or an array per dataset."""
+        """Store a row of a group: a value or an array for each dataset."""
         rows = {name: np.asarray(value)[None] for name, value in columns.items()}
         self.rows(group, [step], [time], rows)
 
@@ -470,23 +472,23 @@ class Recorder:
         self._buffers[group].put({**own, **columns})
 
     def strains(self, steps: Steps, times: Times, fields: Floats) -> None:
-        """Store rows of tape8: strains of the displacements at `times`, (rows, numnp, 5)."""
+        """Store rows of tape8: strains from the displacements at `times`, (rows, numnp, 5)."""
         strains = self._model.strains.evaluate(fields)
         self.rows("tape8", steps, times, dict(zip(STRAINS, strains, strict=True)))
         self.stretching(steps, times, fields)
 
     def stretching(self, steps: Steps, times: Times, fields: Floats) -> None:
-        """Store rows about the midplane of a nonlinear plate, of displacements at `times`."""
+        """Store rows about the midplane of a nonlinear plate, from displacements at `times`."""
         if self._model.stretching is not None:
             for step, time, field in zip(steps, times, fields, strict=True):
                 self.row(MEMBRANE, step, time, self._model.stretching.evaluate(field)._asdict())
 
     def _parts(self) -> dict[str, StepRecorder | RowBuffer]:
-        """What has rows that are not stored yet, by its path in a checkpoint."""
+        """Return the recorders with rows that are not stored yet, by their path in a checkpoint."""
         return {"steps": self.steps, **{f"rows/{name}": b for name, b in self._buffers.items()}}
 
     def state(self) -> dict[str, Any]:
-        """Rows that are not stored yet, for :meth:`restore`."""
+        """Return the rows that are not stored yet, for :meth:`restore`."""
         return {
             f"{path}/{name}": value
             for path, part in self._parts().items()
@@ -511,7 +513,7 @@ class Recorder:
                 self._sink.attributes(f"failure/{name}", {LOAD_FACTOR: factor})
 
     def finish(self) -> None:
-        """Store the remaining rows and trim each dataset to its rows."""
+        """Store the remaining rows, and trim each dataset to its rows."""
         self.steps.flush()
         for buffer in self._buffers.values():
             buffer.flush()

@@ -1,4 +1,4 @@
-"""Carries out a run: header, macro program, footer."""
+"""Execution of a run: header, macro program, footer."""
 
 from __future__ import annotations
 
@@ -42,13 +42,11 @@ def simulate(
 
 
 def run_program(simulation: Simulation) -> Result:
-    """Carry out a program, from its beginning or from the restored state; return its result.
+    """Run a program from its start or from the restored state, and return its result.
 
-    The result reads from the sink, as long as that is open.
-
-    Raises DivergenceError, with the likely cause, if the motion grows without bound or the energy
-    balance exceeds its limit.  Raises SingularStiffnessError if a static solution is
-    requested and the plate is not held.
+    The result reads from the sink while the sink is open. Raises DivergenceError, with the likely
+    cause, if the motion grows without bound or the energy balance exceeds its limit. Raises
+    SingularStiffnessError if a static solution is requested and the plate is not held.
     """
     problem, state = simulation.problem, simulation.state
     if not state.position:
@@ -98,7 +96,7 @@ def _write_header(simulation: Simulation) -> None:
 
 
 def _own_parts(options: RunOptions) -> dict[str, str]:
-    """Names of the parts by users that replace those of the deck."""
+    """Return the names of the user's parts that replace parts of the deck."""
     parts = {}
     if options.law is not None:
         parts["law"] = law_name(options.law)
@@ -108,7 +106,7 @@ def _own_parts(options: RunOptions) -> dict[str, str]:
 
 
 def _write_cure(simulation: Simulation) -> None:
-    """Store the changes of CURE, and the exposures of its residual stresses."""
+    """Store the changes of CURE and the exposures of its residual stresses."""
     model, deck = simulation.model, simulation.problem.deck
     if model.cure is None or model.failure is None:
         return
@@ -127,19 +125,19 @@ def _write_cure(simulation: Simulation) -> None:
 
 
 def _evaluate_at_rest(simulation: Simulation) -> None:
-    """Let FAIL find the exposures of the plate before anything moves."""
+    """Evaluate the exposures of the plate with FAIL before anything moves."""
     if simulation.model.is_stressed_at_rest:
         rest = np.zeros((1, *simulation.problem.mesh.equations.shape))
         STORING["FAIL"](simulation, [0], [0.0], rest)
 
 
 def _units(deck: Deck) -> dict[str, str]:
-    """Attributes that name the units; empty without UNIT."""
+    """Return the attributes that name the units; empty without UNIT."""
     return {f"unit_{name}": unit for name, unit in unit_names(deck).items()}
 
 
 def _write_footer(simulation: Simulation) -> Result:
-    """Store what the end of the run has decided, and reasons to doubt the result."""
+    """Store what is decided at the end of the run, and reasons to doubt the result."""
     sink = simulation.sink
     history = _history_attributes(simulation)
     if history:
@@ -160,7 +158,7 @@ def _write_footer(simulation: Simulation) -> Result:
 
 
 def _history_attributes(simulation: Simulation) -> dict[str, Any]:
-    """Attributes of the history after the last step; empty without impact steps."""
+    """Return the attributes of the history after the last step; empty without impact steps."""
     impact, system = simulation.state.impact, simulation.model.impact
     if impact is None or system is None or not impact.plate.step:
         return {}
@@ -174,7 +172,7 @@ def _history_attributes(simulation: Simulation) -> dict[str, Any]:
 
 
 def _undoubted(simulation: Simulation, datasets: ReadOnce, history: dict[str, Any]) -> Result:
-    """The result before it is judged, with what its metrics need."""
+    """Return the result before it is judged, with what its metrics need."""
     problem = simulation.problem
     groups: dict[str, dict[str, Any]] = {
         "": _units(problem.deck),
@@ -188,7 +186,7 @@ def _undoubted(simulation: Simulation, datasets: ReadOnce, history: dict[str, An
 
 
 def _threshold_attributes(threshold: Threshold, crossing: float, result: Result) -> dict[str, Any]:
-    """Attributes of the delamination threshold, first reached at the time `crossing`."""
+    """Return the attributes of the delamination threshold, first reached at time `crossing`."""
     return {
         "force": threshold.force,
         "d_star": threshold.rigidity,

@@ -10,14 +10,17 @@ import numpy as np
 
 
 def _names(value: object) -> tuple[str, ...]:
-    """Names of the fields of a dataclass or named tuple."""
+    """Return the names of the fields of a dataclass or named tuple."""
     if dataclasses.is_dataclass(value):
         return tuple(f.name for f in dataclasses.fields(value) if f.init)
     return getattr(value, "_fields", ())
 
 
 def saved_values(value: object, path: str, seen: set[int] | None = None) -> dict[str, Any]:
-    """Values and arrays of a dataclass and its members, by path; shared members only once."""
+    """Return values and arrays of a dataclass and its members, by path.
+
+    Shared members occur once.
+    """
     names = _names(value)
     seen = set() if seen is None else seen
     if not names:
@@ -30,10 +33,7 @@ def saved_values(value: object, path: str, seen: set[int] | None = None) -> dict
 
 
 def restore(value: Any, path: str, stored: Mapping[str, Any], seen: set[int] | None = None) -> Any:
-    """Set a dataclass to the state that :func:`saved_values` returned for another of the same type.
-
-    Returns the value; dataclasses and arrays are changed in place where they can be.
-    """
+    """Restore a dataclass to the state that :func:`saved_values` returned for one of its type."""
     names = _names(value)
     seen = set() if seen is None else seen
     if not names:
@@ -57,7 +57,7 @@ def restore(value: Any, path: str, stored: Mapping[str, Any], seen: set[int] | N
 
 
 def _tuples(value: Any) -> Any:
-    """A value with tuples for its lists."""
+    """Return a value with its lists turned into tuples."""
     return tuple(map(_tuples, value)) if isinstance(value, list) else value
 
 

@@ -1,4 +1,4 @@
-"""One run of a problem: its model, state, outputs and observers."""
+"""Simulation of a problem: its model, state, outputs and observers."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Observer = Callable[["Simulation"], object]
 
 @dataclass
 class Simulation:
-    """A run; building it writes nothing."""
+    """Simulation of a problem. Building it writes nothing."""
 
     problem: Problem
     sink: Sink  # receives the result
@@ -71,7 +71,7 @@ class Simulation:
 
     @cached_property
     def tangent(self) -> Tangent:
-        """The factorised stiffness about the field of the last TANG."""
+        """Factorised stiffness about the displacement of the last TANG."""
         return Tangent(self.model.plate, self.state.linearised)
 
     def linearise(self, field: Floats) -> None:
@@ -80,7 +80,7 @@ class Simulation:
         self.__dict__.pop("tangent", None)
 
     def load_factor(self, clock: float) -> float:
-        """Load factor of PROP at a time of the clock."""
+        """Return the load factor of PROP at a time of the clock."""
         state = self.state
         if state.table is None:
             return state.constant_factor
@@ -88,7 +88,7 @@ class Simulation:
         return self._program.table_factor(table, clock, state.constant_factor)
 
     def force_factor(self, clock: float | None = None) -> float:
-        """Factor of FORC's values at a time of the clock, by default now."""
+        """Return the factor of FORC's values at a time of the clock, by default the present time."""
         state = self.state
         factor = self.load_factor(state.clock if clock is None else clock)
         contact = None
@@ -98,7 +98,7 @@ class Simulation:
         return self._program.force_factor(factor, contact)
 
     def displacement_field(self) -> Floats:
-        """Displacement of every dof of every node, (numnp, 5)."""
+        """Return the displacement of every dof of every node, (numnp, 5)."""
         return self.model.motion.field(self.state.plate, self.force_factor())
 
     def observe(self) -> None:
@@ -108,7 +108,7 @@ class Simulation:
                 observer(self)
 
     def save(self) -> dict[str, Any]:
-        """Values that JSON can hold and arrays, for :meth:`restore`."""
+        """Return values that JSON can hold, and arrays, for :meth:`restore`."""
         self.state.position = self.interpreter.position
         if self.model.impact is not None:
             self.state.first_dt = self.model.impact.first_dt
@@ -118,8 +118,7 @@ class Simulation:
     def restore(self, stored: dict[str, Any]) -> None:
         """Continue from the saved state of another simulation of the same problem.
 
-        Raises KeyError if something is missing.  Raises ValueError if an array has another shape or
-        type.
+        Raises KeyError if something is missing, ValueError if an array has another shape or type.
         """
         restore(self.state, "state", stored)
         if self.model.impact is not None:

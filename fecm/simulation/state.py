@@ -1,4 +1,4 @@
-"""State of a run, the monitor of its energies and forces, and why a run diverges."""
+"""State of a run, the monitor of its energies and forces, and causes of divergence."""
 
 from __future__ import annotations
 
@@ -27,7 +27,10 @@ if TYPE_CHECKING:
 def cause_of_divergence(
     problem: Problem, model: ImpactModel, dt: float, law: Law | None = None
 ) -> str:
-    """Explain a divergence, as far as the time step does; `law` is a user's instead of EXPE's."""
+    """Explain a divergence as far as the time step causes it.
+
+    `law` is the name of the user's law that replaces EXPE.
+    """
     plate = model.motion.plate
     try:
         critical = critical_time_step(plate)
@@ -60,7 +63,7 @@ TOLERANCE = 1.0e-9  # relative change of the displacement below which CONV leave
 
 @dataclass
 class Monitor:
-    """Energy balance and largest contact force of the steps so far."""
+    """Monitor of the energy balance and the largest contact force of the steps so far."""
 
     # Largest and last work of the nodal forces, and its largest change in a step (force*length).
     largest_work: float = 0.0
@@ -74,12 +77,12 @@ class Monitor:
     def add(
         self, block: Columns, initial: float, limit: float | None, threshold: Threshold | None
     ) -> None:
-        """Add a block of steps; `initial` is the energy before the first.
+        """Add a block of steps; `initial` is the energy before the first step.
 
-        The error is relative to the energy supplied up to the end of the block: in its first steps
-        a load has done almost no work.  The work of one step is not counted as an error: the work
-        belongs to the step, the energies to its end.  Raises DivergenceError if the energy is not
-        finite, or the error exceeds the limit, if there is one.
+        The error is relative to the energy supplied up to the end of the block, as a load has done
+        almost no work in its first steps. The work of one step is not counted as an error: the work
+        belongs to the step, the energies to its end. Raises DivergenceError if the energy is not
+        finite, or if the error exceeds its limit.
         """
         lost = ~np.isfinite(block["held_energy"])
         if lost.any():
