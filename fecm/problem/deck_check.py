@@ -8,7 +8,7 @@ from fecm._table import Table, html_table
 from fecm.deck.findings import Finding, Severity
 from fecm.listing.slips import Mode, active_slips
 from fecm.problem.loading import AnyDeck, LoadedDeck, load_deck
-from fecm.problem.summary import ProblemSummary, deck_summary
+from fecm.problem.summary import ProblemSummary, deck_summary, summary_table
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class DeckCheck:
         """Table of the findings and of each problem, for notebooks."""
         rows = tuple((f"{item.severity} {item.code}", item.message) for item in self.findings)
         findings = Table(rows, title=repr(self)[1:-1])
-        return html_table(findings, *(problem.table() for problem in self.problems))
+        return html_table(findings, *map(summary_table, self.problems))
 
     def __repr__(self) -> str:
         counts = {"error": len(self.errors), "warning": len(self.warnings)}

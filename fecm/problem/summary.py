@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Annotated
 
 import numpy as np
@@ -176,112 +177,118 @@ class ProblemSummary:
 
     def lines(self) -> list[str]:
         """Return the lines of text that ``fecm check`` prints."""
-        table = self.table()
+        table = summary_table(self)
         return [table.title, *(f"  {line}" for line in text_lines(table, LABEL_WIDTH))]
 
-    def table(self) -> Table:
-        """Return a table with a row for each quantity."""
-        rows: list[Row] = [
-            (name, str(getattr(self, name)))
-            for name in ("nodes", "elements", "equations", "layers")
-        ]
-        if self.laminate:
-            rows.append(("laminate", f"{self.laminate}, under the load"))
-        rows += self._stiffness_rows()
-        rows += self._plate_rows()
-        rows += self._impact_rows()
-        rows += self._program_rows()
-        return Table(tuple(rows), title=self.title or "(no title)")
 
-    def _quantity(self, value: float, dimension: str) -> str:
-        """Format a value with its unit."""
-        return f"{value:.{DIGITS}g} {unit_of(dimension, self.units)}".rstrip()
+def summary_table(summary: ProblemSummary) -> Table:
+    """Return a table with a row for each quantity."""
+    rows: list[Row] = [
+        (name, str(getattr(summary, name))) for name in ("nodes", "elements", "equations", "layers")
+    ]
+    if summary.laminate:
+        rows.append(("laminate", f"{summary.laminate}, under the load"))
+    rows += _stiffness_rows(summary)
+    rows += _plate_rows(summary)
+    rows += _impact_rows(summary)
+    rows += _program_rows(summary)
+    return Table(tuple(rows), title=summary.title or "(no title)")
 
-    def _stiffness_rows(self) -> Iterator[Row]:
-        """Stiffness matrices of the laminate under the load, and its shear factor."""
-        largest_a, largest_d, largest_shear = (
-            float(np.abs(matrix).max()) for matrix in (self.A, self.D, self.shear)
-        )
-        largest_b = math.sqrt(largest_a * largest_d)  # the bound on entries of B
-        for label, matrix, dimension, size in (
-            ("A", self.A, "force/length", largest_a),
-            ("B", self.B, "force", largest_b),
-            ("D", self.D, "force*length", largest_d),
-            ("shear xz, yz", self.shear, "force/length", largest_shear),
-        ):
-            yield from _matrix_rows(label, matrix, unit_of(dimension, self.units), size)
-        if self.leaves_out_equilibrium:
-            yield ("shear factor", f"1; {self._effect_of_equilibrium()}")
 
-    def _plate_rows(self) -> Iterator[Row]:
-        """Kinematics, preload, curvature, cure and delamination threshold."""
-        quantity = self._quantity
-        if self.nonlinear:
-            share = f"{self.free_in_plane} of {self.nodes} nodes"
-            yield ("kinematics", f"von Kármán plate, u and v free at {share}")
-        elif self.energy is not None:
-            yield ("kinematics", "linear plate")
-        if any(self.preload):
-            named = zip(("N0x", "N0y", "N0xy"), self.preload, strict=True)
-            forces = (f"{name} {quantity(force, 'force/length')}" for name, force in named)
-            yield ("preload", ", ".join(forces))
-        if any(self.curvature):
-            named = zip(("Rx", "Ry", "Rxy"), self.curvature, strict=True)
-            radii = [f"{name} {quantity(1.0 / k, 'length')}" for name, k in named if k]
-            rise = f"rise {quantity(self.rise, 'length')}"
-            yield ("curved panel", ", ".join([*radii, rise]))
-        if self.cure is not None:
-            yield ("cure", f"{self.cure:+g} K")
-        if self.threshold is not None:
-            yield ("delamination", f"from {quantity(self.threshold, 'force')}")
+def _quantity(summary: ProblemSummary, value: float, dimension: str) -> str:
+    """Format a value with its unit."""
+    return f"{value:.{DIGITS}g} {unit_of(dimension, summary.units)}".rstrip()
 
-    def _impact_rows(self) -> Iterator[Row]:
-        """Masses, velocity and energy."""
 
-        def mass_text(mass: float) -> str:
-            in_si = mass_in_si(mass, self.units)
-            return self._quantity(mass, MASS) + (f" ({in_si})" if in_si else "")
+def _stiffness_rows(summary: ProblemSummary) -> Iterator[Row]:
+    """Stiffness matrices of the laminate under the load, and its shear factor."""
+    largest_a, largest_d, largest_shear = (
+        float(np.abs(matrix).max()) for matrix in (summary.A, summary.D, summary.shear)
+    )
+    largest_b = math.sqrt(largest_a * largest_d)  # the bound on entries of B
+    for label, matrix, dimension, size in (
+        ("A", summary.A, "force/length", largest_a),
+        ("B", summary.B, "force", largest_b),
+        ("D", summary.D, "force*length", largest_d),
+        ("shear xz, yz", summary.shear, "force/length", largest_shear),
+    ):
+        yield from _matrix_rows(label, matrix, unit_of(dimension, summary.units), size)
+    if summary.leaves_out_equilibrium:
+        yield ("shear factor", f"1; {_effect_of_equilibrium(summary)}")
 
-        yield ("plate mass", mass_text(self.plate_mass))
-        yield ("projectile mass", mass_text(self.projectile_mass))
-        if self.velocity is not None and self.energy is not None:
-            energy = readable_quantity(self.energy, unit_of("force*length", self.units), DIGITS)
-            velocity = self._quantity(self.velocity, "length/time")
-            yield ("impact", f"{velocity}, {energy}")
 
-    def _program_rows(self) -> Iterator[Row]:
-        """Time steps, resolution of the mesh, and size of the result."""
-        critical = self.critical_time_step
-        yield ("critical time step", self._quantity(critical, "time"))
-        if self.buckling_factor is not None:
-            from fecm.mechanics.solutions import FAR  # 0.3 ms, for PREL only
+def _plate_rows(summary: ProblemSummary) -> Iterator[Row]:
+    """Kinematics, preload, curvature, cure and delamination threshold."""
+    quantity = partial(_quantity, summary)
+    if summary.nonlinear:
+        share = f"{summary.free_in_plane} of {summary.nodes} nodes"
+        yield ("kinematics", f"von Kármán plate, u and v free at {share}")
+    elif summary.energy is not None:
+        yield ("kinematics", "linear plate")
+    if any(summary.preload):
+        named = zip(("N0x", "N0y", "N0xy"), summary.preload, strict=True)
+        forces = (f"{name} {quantity(force, 'force/length')}" for name, force in named)
+        yield ("preload", ", ".join(forces))
+    if any(summary.curvature):
+        named = zip(("Rx", "Ry", "Rxy"), summary.curvature, strict=True)
+        radii = [f"{name} {quantity(1.0 / k, 'length')}" for name, k in named if k]
+        rise = f"rise {quantity(summary.rise, 'length')}"
+        yield ("curved panel", ", ".join([*radii, rise]))
+    if summary.cure is not None:
+        yield ("cure", f"{summary.cure:+g} K")
+    if summary.threshold is not None:
+        yield ("delamination", f"from {quantity(summary.threshold, 'force')}")
 
-            far = math.isinf(self.buckling_factor)
-            times = f"more than {FAR:g}" if far else f"{self.buckling_factor:.{DIGITS}g}"
-            count = self.elements_per_buckle
-            bound = "at most " if count is not None and count < FEWEST_ELEMENTS else ""
-            yield ("buckling load", f"{bound}{times} times the preload")
-        for dt in dict.fromkeys(self.time_steps):
-            step = dt or SAFE * critical
-            share = step / critical
-            longer = ""
-            if share < ROOM:
-                default = taken_time_step(critical)
-                longer = f"; DT 0 takes {default:.3g}: {default / step:.1f} times fewer steps"
-            yield ("DT", f"{self._quantity(step, 'time')} ({share:.0%} of it{longer})")
-        if self.elements_per_wave is not None:
-            error = "" if self.mesh_error is None else f" ({said_error(self.mesh_error)})"
-            yield ("elements per wave", f"{self.elements_per_wave:.1f}{error}")
-        yield ("impact steps", str(self.steps))
-        yield ("output", format_bytes(self.output_bytes))
 
-    def _effect_of_equilibrium(self) -> str:
-        """Say how much SHEA EQUI would change."""
-        if self.equilibrium_change is not None:
-            return f"SHEA EQUI changes the static deflection by {self.equilibrium_change:+.1%}"
-        if self.elements > MOST_SOLVED:
-            return f"the change by SHEA EQUI is computed up to {MOST_SOLVED} elements"
-        return "the plate is not held: no static deflection to compare with SHEA EQUI"
+def _impact_rows(summary: ProblemSummary) -> Iterator[Row]:
+    """Masses, velocity and energy."""
+
+    def mass_text(mass: float) -> str:
+        in_si = mass_in_si(mass, summary.units)
+        return _quantity(summary, mass, MASS) + (f" ({in_si})" if in_si else "")
+
+    yield ("plate mass", mass_text(summary.plate_mass))
+    yield ("projectile mass", mass_text(summary.projectile_mass))
+    if summary.velocity is not None and summary.energy is not None:
+        energy = readable_quantity(summary.energy, unit_of("force*length", summary.units), DIGITS)
+        velocity = _quantity(summary, summary.velocity, "length/time")
+        yield ("impact", f"{velocity}, {energy}")
+
+
+def _program_rows(summary: ProblemSummary) -> Iterator[Row]:
+    """Time steps, resolution of the mesh, and size of the result."""
+    critical = summary.critical_time_step
+    yield ("critical time step", _quantity(summary, critical, "time"))
+    if summary.buckling_factor is not None:
+        from fecm.mechanics.solutions import FAR  # 0.3 ms, for PREL only
+
+        far = math.isinf(summary.buckling_factor)
+        times = f"more than {FAR:g}" if far else f"{summary.buckling_factor:.{DIGITS}g}"
+        count = summary.elements_per_buckle
+        bound = "at most " if count is not None and count < FEWEST_ELEMENTS else ""
+        yield ("buckling load", f"{bound}{times} times the preload")
+    for dt in dict.fromkeys(summary.time_steps):
+        step = dt or SAFE * critical
+        share = step / critical
+        longer = ""
+        if share < ROOM:
+            default = taken_time_step(critical)
+            longer = f"; DT 0 takes {default:.3g}: {default / step:.1f} times fewer steps"
+        yield ("DT", f"{_quantity(summary, step, 'time')} ({share:.0%} of it{longer})")
+    if summary.elements_per_wave is not None:
+        error = "" if summary.mesh_error is None else f" ({said_error(summary.mesh_error)})"
+        yield ("elements per wave", f"{summary.elements_per_wave:.1f}{error}")
+    yield ("impact steps", str(summary.steps))
+    yield ("output", format_bytes(summary.output_bytes))
+
+
+def _effect_of_equilibrium(summary: ProblemSummary) -> str:
+    """Say how much SHEA EQUI would change."""
+    if summary.equilibrium_change is not None:
+        return f"SHEA EQUI changes the static deflection by {summary.equilibrium_change:+.1%}"
+    if summary.elements > MOST_SOLVED:
+        return f"the change by SHEA EQUI is computed up to {MOST_SOLVED} elements"
+    return "the plate is not held: no static deflection to compare with SHEA EQUI"
 
 
 def deck_summary(problem: Problem) -> ProblemSummary:

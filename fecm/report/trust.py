@@ -77,7 +77,10 @@ ENDS = {
 
 
 def deck_problem(result: Result) -> tuple[Problem | None, list[str]]:
-    """Return the problem of a result's deck, None if it can't be read, and the warnings about it."""
+    """Return the problem of a result's deck and the warnings about it.
+
+    The problem is None if the deck can't be read.
+    """
     try:
         loaded = load_deck(result.deck, result.mode)  # the text of a file could be another's path
     except (ResultFileError, ValueError):

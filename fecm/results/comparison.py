@@ -1,4 +1,4 @@
-"""A measured force beside that of a result."""
+"""Comparison of a measured force with the force of a result."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Source = str | Path | tuple[Any, Any]
 
 @dataclass(frozen=True)
 class Measurement:
-    """A measured force in the deck's units."""
+    """Measured force in the deck's units."""
 
     name: str
     column: str  # what it is compared with: ``"force"`` or ``"transducer"``
@@ -33,14 +33,14 @@ class Measurement:
 
     @property
     def quantity(self) -> str:
-        """The column in words."""
+        """Name of the column in words."""
         return "contact force" if self.column == "force" else self.column
 
     def corrected(self, delay: float, offset: float) -> Measurement:
-        """The measurement without a delay of its times and an offset of its force.
+        """Return the measurement without a delay of its times and an offset of its force.
 
-        They have the signs of ``fecm identify``: `delay` is the measured time at which the
-        projectile touches the plate, `offset` the measured force without a contact.  Raises
+        The signs are those of ``fecm identify``: `delay` is the measured time at which the
+        projectile touches the plate, `offset` is the measured force without a contact. Raises
         StudyError if one is not finite.
 
         >>> late = Measurement("m", "force", np.array([1.0, 2.0]), np.array([5.0, 6.0]))
@@ -54,9 +54,9 @@ class Measurement:
 
 @dataclass(frozen=True)
 class Comparison:
-    """A result's force, interpolated at measured times, against the measured force.
+    """Force of a result, interpolated at measured times, against the measured force.
 
-    ``str()`` says it in one line.
+    ``str()`` summarises it in one line.
 
     Attributes
     ----------
@@ -101,7 +101,7 @@ class Comparison:
 
 
 def _against(name: str, own: float, measured: float, unit: str) -> str:
-    """Two values and their relative difference in words."""
+    """Format two values and their relative difference."""
     text = f"{name} {own:.4g} against {measured:.4g} {unit}".rstrip()
     return f"{text} ({own / measured - 1.0:+.1%})" if measured else text
 
@@ -112,13 +112,14 @@ def measurement_of(
     columns: Sequence[str] = (),
     stated: Sequence[str] = (),
 ) -> Measurement:
-    """Measured force of a file (time and force, or time and transducer), or of two arrays.
+    """Read a measured force from a file, or from two arrays of time and force.
 
-    `units` are the names of the deck's, which may be empty; a file that names its units is
-    converted to them.  `columns` has the names or the numbers (from 1) of the columns of time and
-    force, `stated` the units of the measurement, for one that names none.  Raises StudyError if the
-    file is invalid, or a unit unknown, or if times and forces are not finite numbers, equally many,
-    at increasing times.  Raises OSError if the file can't be read.
+    A file has time and force, or time and transducer. `units` has the names of the deck's units,
+    which may be empty. A file that names its units is converted to them. `columns` has the names or
+    the numbers (from 1) of the columns of time and force. `stated` has the units of a measurement
+    that names none. Raises StudyError if the file is invalid, a unit is unknown, the times do not
+    increase, or times and forces are not finite numbers of equal count. Raises OSError if the file
+    can't be read.
     """
     for what, pair in (("columns", columns), ("units", stated)):
         if isinstance(pair, str) or len(pair) not in (0, 2) or not all(map(_is_text, pair)):
@@ -160,7 +161,7 @@ def _from_file(
 
 
 def _doubt_trigger(stored: Stored, measured: Measurement, clock: Floats) -> None:
-    """Warn if the measured force rises much earlier or later than that of the result."""
+    """Warn if the measured force rises much earlier or later than the force of the result."""
     own = np.append(0.0, stored[f"history/{measured.column}"])
     if own.max() <= 0.0 or measured.force.max() <= 0.0:
         return
@@ -176,9 +177,9 @@ def _doubt_trigger(stored: Stored, measured: Measurement, clock: Floats) -> None
 
 
 def compare_force(stored: Stored, measured: Measurement) -> Comparison:
-    """Compare a result's force with a measured one, at the measured times of the run.
+    """Compare the force of a result with a measured force, at the measured times of the run.
 
-    Raises StudyError if the result has no impact, or fewer than two times are in both.
+    Raises StudyError if the result has no impact, or if fewer than two times are in both.
     """
     if "history/force" not in stored:
         raise StudyError("the result has no history to compare with: no impact step was taken")

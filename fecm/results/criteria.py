@@ -1,4 +1,4 @@
-"""Failure criteria, modes and the plies or interfaces that they belong to, in words."""
+"""Names of failure criteria and modes, and of the plies or interfaces where they occur."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ OWN_CRITERIA = "own_criteria"  # attribute of failure: names of users' criteria 
 
 
 def criteria_of(failure: Mapping[str, Any]) -> tuple[str, ...]:
-    """Names of the criteria of a result, from the attributes of its group ``failure``."""
+    """Return the criteria of a result, from the attributes of its group ``failure``."""
     own = failure.get(OWN_CRITERIA, ())
     return (*ALL_CRITERIA, *(map(str, own) if isinstance(own, list | tuple) else ()))
 
 
 def spelt(criterion: str) -> str:
-    """Name of a criterion in words."""
+    """Return the name of a criterion in words."""
     return criterion.replace("_", " ")
 
 
 def where(criterion: str, ply: int, materials: Sequence[str] = ()) -> str:
-    """A ply, or of the interlaminar criterion an interface, in words.
+    """Name a ply, or an interface for the interlaminar criterion.
 
     Examples
     --------
@@ -45,7 +45,7 @@ def where(criterion: str, ply: int, materials: Sequence[str] = ()) -> str:
 
 
 def plies_in_words(criterion: str, ply: int, materials: Sequence[str] = ()) -> str:
-    """The ply, or the plies of the interface, in words."""
+    """Name the ply, or the plies of the interface."""
     numbers = [ply, ply + 1] if criterion == INTERLAMINAR else [ply]
     names = [f" ({name})" for name in materials] or [""] * len(numbers)
     texts = [f"{number}{name}" for number, name in zip(numbers, names, strict=True)]
@@ -53,9 +53,10 @@ def plies_in_words(criterion: str, ply: int, materials: Sequence[str] = ()) -> s
 
 
 def materials_at(deck: Deck, laminate: int, criterion: str, ply: int) -> tuple[str, ...]:
-    """Names of the materials of a ply, or of the plies of an interface, of a numbered laminate.
+    """Name the materials of a ply, or of the plies of an interface, in a numbered laminate.
 
-    Empty if all plies of the deck have the same material, or the laminate has no such ply.
+    The text is empty if all plies of the deck have the same material, or if the laminate has no
+    such ply.
     """
     layers = deck.layers.get(laminate, ())
     count = 2 if criterion == INTERLAMINAR else 1
@@ -70,7 +71,10 @@ def materials_at(deck: Deck, laminate: int, criterion: str, ply: int) -> tuple[s
 
 
 def mode_at(deck: Deck, laminate: int, criterion: str, ply: int, mode: str) -> str:
-    """Name of a mode in a ply of a numbered laminate: :data:`YIELD` in an isotropic material."""
+    """Return the name of a mode in a ply of a numbered laminate.
+
+    Isotropic materials have the mode :data:`YIELD`.
+    """
     layer = next(iter(deck.layers.get(laminate, ())[ply - 1 : ply]), None)
     if criterion in CRITERIA and layer is not None and is_isotropic(deck, layer.material):
         return YIELD
@@ -78,14 +82,14 @@ def mode_at(deck: Deck, laminate: int, criterion: str, ply: int, mode: str) -> s
 
 
 def exposed(deck: Deck, laminate: int, one: PlyExposure) -> str:
-    """Mode, criterion and ply of an exposure in a numbered laminate, in words."""
+    """Return mode, criterion and ply of an exposure in a numbered laminate."""
     mode = mode_at(deck, laminate, one.criterion, one.ply, one.mode)
     materials = materials_at(deck, laminate, one.criterion, one.ply)
     return f"{mode}, {spelt(one.criterion)}, {where(one.criterion, one.ply, materials)}"
 
 
 def is_isotropic(deck: Deck, material: int) -> bool:
-    """Whether a material has the same constants and strengths in all directions."""
+    """Return whether a material has the same constants and strengths in all directions."""
     if (ply := deck.plies.get(material)) is None or ply.e1 != ply.e2:
         return False
     shear = ply.e1 / (2.0 * (1.0 + ply.nu12))

@@ -1,15 +1,13 @@
-"""Compares the datasets of two results.
+"""Comparison of two results, dataset by dataset.
 
-Two numbers are equal if |a - b| <= atol + rtol*scale.  The scale is the largest finite absolute
+Two numbers are equal if |a - b| <= atol + rtol*scale. The scale is the largest finite absolute
 value of the complete dataset in both results, so that a zero crossing of a history is judged by the
-size of the history.  Datasets that may hold nothing but rounding errors have another scale
-(`SCALE_NAMES` of :mod:`fecm.results.diff`).  Integers (steps, node and equation numbers)
-and texts must be equal.  NaN equals NaN, and an infinity the same infinity; either differs from
-anything else at any tolerance.
-
+size of the history. Datasets that may hold nothing but rounding errors have another scale
+(`SCALE_NAMES`). Integers (steps, node and equation numbers) and texts must be equal. NaN equals
+NaN, and an infinity equals the same infinity; either differs from anything else at any tolerance.
 Numbers of tapes are by default equal if they differ by at most one unit of the last printed digit.
 
-Datasets are compared in blocks of rows: memory does not grow with the results.
+Datasets are compared in blocks of rows, so that memory does not grow with the results.
 """
 
 from __future__ import annotations
@@ -45,7 +43,7 @@ CURVATURES = ("kappa_x", "kappa_y", "kappa_xy")
 
 
 class DifferenceScale(StrEnum):
-    """A scale of differences other than the largest value of the dataset, in words."""
+    """Scale of differences, other than the largest value of the dataset."""
 
     ENERGY = "the energy put in"
     COUPLING = "sqrt(max A * max D)"
@@ -69,7 +67,7 @@ Source = FileContents | TapeText
 
 
 class Pair(NamedTuple):
-    """A dataset that both sources have."""
+    """Dataset that both sources have."""
 
     path: str
     sources: tuple[Source, Source]  # A and B
@@ -87,7 +85,7 @@ class Pair(NamedTuple):
         return a.replace("object", TEXT), b.replace("object", TEXT)
 
     def blocks(self) -> Iterator[tuple[int, Array, Array]]:
-        """Yield number of the first row, rows of A and rows of B."""
+        """Yield the number of the first row, rows of A and rows of B."""
         a, b = self.sources
         for start, stop in row_blocks(self.shapes[0]):
             yield start, a.rows(self.path, start, stop), b.rows(self.path, start, stop)
@@ -126,13 +124,13 @@ def _compare_texts(found: DatasetDifference, pair: Pair) -> None:
 
 
 def _scaled_name(path: str) -> str:
-    """Name of a dataset in `SCALE_NAMES`: that of a numbered laminate without its number."""
+    """Return the name of a dataset in `SCALE_NAMES`, without the number of its laminate."""
     group, name = path.partition("/")[0], path.rpartition("/")[2]
     return f"{group}/{name}" if group == "laminate" else path
 
 
 def _own_scale(pair: Pair) -> float:
-    """Scale of the differences of a dataset that is not its maximum; 0 if there is none."""
+    """Return the scale of a dataset in `SCALE_NAMES`, or 0."""
     match SCALE_NAMES.get(_scaled_name(pair.path)):
         case None:
             return 0.0
@@ -157,7 +155,7 @@ def _own_scale(pair: Pair) -> float:
 
 
 def _largest(pair: Pair, path: str, above: float = -np.inf) -> float:
-    """Largest finite absolute value of a dataset in both sources, of the numbers above a limit."""
+    """Return the largest finite absolute value above a limit of a dataset in both sources."""
     size = 0.0
     for source in pair.sources:
         if path in source.shapes and source.dtypes[path].kind != "O":
@@ -169,25 +167,25 @@ def _largest(pair: Pair, path: str, above: float = -np.inf) -> float:
 
 
 def _largest_of(pair: Pair, names: Sequence[str]) -> float:
-    """Largest value of some of the resultants and strains that STRE stores."""
+    """Return the largest value of the given resultants and strains of STRE."""
     return max(_largest(pair, f"stresses/{name}") for name in names)
 
 
 def _inverse_thickness(pair: Pair) -> float:
-    """sqrt(A/D), which is of the order of 1/h; 0 if it is not known."""
+    """Return sqrt(A/D), which is of the order of 1/h; 0 if it is not known."""
     bending = _largest_laminate(pair, "D") or np.inf
     return float((_largest_laminate(pair, "A") / bending) ** 0.5)
 
 
 def _largest_laminate(pair: Pair, name: str) -> float:
-    """Largest value of a stiffness matrix of the laminates."""
+    """Return the largest value of a stiffness matrix of the laminates."""
     paths = {path for source in pair.sources for path in source.shapes}
     own = [p for p in paths if p.startswith("laminate/") and p.endswith(f"/{name}")]
     return max((_largest(pair, path) for path in own), default=0.0)
 
 
 def _initial_energy(pair: Pair) -> float:
-    """Largest initial energy of both files; 0 if it is not known."""
+    """Return the largest initial energy of both files; 0 if it is not known."""
     files = (source for source in pair.sources if isinstance(source, FileContents))
     initial = (file.groups.get("energy", {}).get("initial") for file in files)
     known = (abs(e) for e in initial if isinstance(e, int | float) and np.isfinite(e))
@@ -195,7 +193,10 @@ def _initial_energy(pair: Pair) -> float:
 
 
 def _measure(found: DatasetDifference, pair: Pair) -> bool:
-    """Find maximum, largest difference and its place; return whether it is infinite."""
+    """Find the maximum and the largest difference with its place.
+
+    Returns whether the difference is infinite.
+    """
     place: tuple[int, ...] = ()
     infinite = False
     for start, left, right in pair.blocks():
@@ -235,7 +236,7 @@ def _count(found: DatasetDifference, pair: Pair, *, to_last_digit: bool) -> None
 
 
 def _differences(left: Array, right: Array) -> tuple[Array, Array]:
-    """|a - b| where both are finite, else 0; and a mask of other unequal numbers."""
+    """Return |a - b| where both are finite, else 0; and a mask of other unequal numbers."""
     if left.dtype.kind in "biu" and right.dtype.kind in "biu":
         apart = np.abs(left.astype(float) - right.astype(float))
         unequal = left != right
@@ -250,7 +251,7 @@ def _differences(left: Array, right: Array) -> tuple[Array, Array]:
 
 
 def _clock(pair: Pair) -> tuple[Source, str] | None:
-    """Source and group whose step and time belong to the rows of a dataset."""
+    """Return the source and the group whose step and time belong to the rows of a dataset."""
     group = pair.path.rpartition("/")[0]
     for source in pair.sources:
         rows = source.shapes[pair.path][:1]
@@ -261,7 +262,7 @@ def _clock(pair: Pair) -> tuple[Source, str] | None:
 
 
 def _place(pair: Pair, index: tuple[int, ...]) -> Position:
-    """Position of a number, or of a row if only its index is given."""
+    """Return the position of a number, or of a row if only its index is given."""
     path, source = pair.path, pair.sources[0]
     if isinstance(source, TapeText) and source.lines and path == W:
         names = ("line", "column")
@@ -281,7 +282,7 @@ def _place(pair: Pair, index: tuple[int, ...]) -> Position:
 
 
 def _axes(pair: Pair, index: tuple[int, ...], *, has_clock: bool) -> dict[str, int | str]:
-    """Indices of a place, from 1, by the names of the axes other than time."""
+    """Return the indices of a place, from 1, by the names of the axes other than time."""
     path, sizes = pair.path, pair.shapes[0]
     axes: dict[str, int | str] = {}
     if not has_clock and path.startswith("tape"):
@@ -320,10 +321,10 @@ class IncomparableError(FecmError, ValueError):
 
 @runtime_checkable
 class Savable(Protocol):
-    """The result of a run, a sweep or a location."""
+    """Result of a run, a sweep or a location."""
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write it as a file."""
+        """Write the result as a file."""
 
 
 Compared = str | Path | Savable
@@ -439,7 +440,7 @@ def assert_same(
     exclude: str | Sequence[str] = (),
     tol: Mapping[str, Tolerance] | None = None,
 ) -> None:
-    """Require in a test that a result is that of a trusted file.
+    """Require in a test that a result equals a trusted file.
 
     Parameters
     ----------
@@ -481,7 +482,7 @@ def assert_same(
 
 
 def _source(one: Compared, stack: contextlib.ExitStack) -> Source:
-    """Contents of a file, of a folder of tapes, or of a result, which may be in memory."""
+    """Return the contents of a file, a folder of tapes, or a result, which may be in memory."""
     if isinstance(one, Result) and isinstance(one._arrays, FileContents):
         return one._arrays
     if not isinstance(one, str | Path | Savable):
@@ -498,19 +499,19 @@ def _source(one: Compared, stack: contextlib.ExitStack) -> Source:
 
 
 def _name(one: Compared) -> str:
-    """Path of a result; ``<memory>`` if it has none."""
+    """Return the path of a result, or ``<memory>``."""
     if isinstance(one, Result) and isinstance(one._arrays, FileContents):
         return str(one._arrays.path)
     return str(one) if isinstance(one, str | Path) else "<memory>"
 
 
 def _names(given: str | Sequence[str]) -> Sequence[str]:
-    """Names of datasets, of which there may be one."""
+    """Return names of datasets as a tuple."""
     return (given,) if isinstance(given, str) else given
 
 
 def _own_tolerance(name: str, given: Tolerance) -> tuple[float, ...]:
-    """Relative tolerance, or relative and absolute tolerance."""
+    """Return the relative and the absolute tolerance of a dataset."""
     values = tuple(given) if isinstance(given, Sequence) else (given,)
     valid = all(isinstance(v, Real) and 0.0 <= v < math.inf for v in values)
     if not valid or len(values) not in (1, 2):
@@ -520,7 +521,7 @@ def _own_tolerance(name: str, given: Tolerance) -> tuple[float, ...]:
 
 
 def _fitted(source: Source, other: Source) -> Source:
-    """Divide tape3 into rows of as many nodes as the other source has, if that is a file."""
+    """Divide tape3 into rows of as many nodes as the other source has, if the other is a file."""
     shape = other.shapes.get(W, ())
     if isinstance(source, TapeText) and other.form != TAPES and len(shape) == 2:
         return source.fitted(shape[1])
@@ -528,7 +529,10 @@ def _fitted(source: Source, other: Source) -> Source:
 
 
 def _chosen(names: set[str], patterns: Sequence[str], known: Collection[str] = ()) -> set[str]:
-    """Names that match patterns or lie in groups that do; each must match one, or a known name."""
+    """Return the names that match patterns, or lie in groups that match.
+
+    Each pattern must match one, or a known name.
+    """
     chosen: set[str] = set()
     for asked in patterns:
         plain = asked.strip("/")
@@ -541,7 +545,7 @@ def _chosen(names: set[str], patterns: Sequence[str], known: Collection[str] = (
 
 
 def _listed(a: Source, b: Source) -> list[Listed]:
-    """Attributes, and first lines of texts, that differ between two files; tapes have none."""
+    """Return attributes, and first lines of texts, that differ between two files."""
     if isinstance(a, TapeText) or isinstance(b, TapeText):
         return []
     left, right = _attributes(a), _attributes(b)
@@ -562,7 +566,7 @@ def _listed(a: Source, b: Source) -> list[Listed]:
 
 
 def _attributes(source: FileContents) -> dict[str, Any]:
-    """All attributes by name: ``title``, ``energy:initial``, ``tape3/w:unit``."""
+    """Return all attributes by name: ``title``, ``energy:initial``, ``tape3/w:unit``."""
     named = source.groups | {path: source.attributes_of(path) for path in source}
     return source.attributes | {
         f"{path}:{name}": value

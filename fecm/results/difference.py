@@ -1,4 +1,4 @@
-"""What two results differ in: as objects, as lines of text and as values for JSON."""
+"""Differences of two results, as objects, as text and as values for JSON."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ TEXT = "text"  # the type of a dataset of texts
 
 
 class PositionJson(TypedDict):
-    """A position in JSON; its other indices follow under the names of their axes."""
+    """Position in JSON; its other indices follow under the names of their axes."""
 
     index: list[int]
     step: int | None
@@ -22,7 +22,7 @@ class PositionJson(TypedDict):
 
 
 class DatasetDifferenceJson(TypedDict):
-    """A dataset of both results in JSON."""
+    """Dataset of both results in JSON."""
 
     name: str
     same: bool
@@ -62,7 +62,7 @@ class DifferenceJson(TypedDict):
 
 
 class ListedJson(TypedDict):
-    """An attribute or a text that differs, in JSON."""
+    """Attribute or text that differs, in JSON."""
 
     name: str
     a: object
@@ -103,13 +103,13 @@ class Position:
         return ", ".join(words)
 
     def to_dict(self) -> PositionJson:
-        """Plain values, for JSON."""
+        """Return plain values, for JSON."""
         return {"index": list(self.index), "step": self.step, "time": self.time, **self.axes}  # type: ignore[typeddict-item]
 
 
 @dataclass
 class DatasetDifference:
-    """One dataset that both results have.
+    """Dataset that both results have, and how it differs.
 
     Attributes
     ----------
@@ -175,7 +175,7 @@ class DatasetDifference:
         return math.inf if self.largest_difference else 0.0
 
     def __str__(self) -> str:
-        """Shapes and types that differ, largest difference, number of differences, first one."""
+        """Return unlike shapes and types, the largest difference, and the number of differences."""
         parts: list[str] = []
         if self.shapes[0] != self.shapes[1]:
             left, right = ("x".join(map(str, shape)) or "single" for shape in self.shapes)
@@ -193,7 +193,7 @@ class DatasetDifference:
         return "; ".join(parts)
 
     def _largest_in_words(self, at: Position, values: tuple[object, object]) -> str:
-        """The largest difference and its place."""
+        """Format the largest difference and its place."""
         quote = "`" if self.holds_texts else ""
         left, right = (f"{quote}{value}{quote}" for value in shown_apart(*values))
         text = f"{left} against {right}{_at(at)}"
@@ -203,7 +203,7 @@ class DatasetDifference:
         return f"largest {self.largest_difference:.3g} ({share}), {text}"
 
     def to_dict(self) -> DatasetDifferenceJson:
-        """Plain values, for JSON."""
+        """Return plain values, for JSON."""
         numbers = self.comparable and not self.holds_texts
         finite = numbers and math.isfinite(self.largest_difference)
         values = self.values or (None, None)
@@ -228,13 +228,13 @@ class DatasetDifference:
 
 
 def _at(place: Position) -> str:
-    """A place in words, with a leading blank."""
+    """Format a place, with a leading blank."""
     words = str(place)
     return f" at {words}" if words else ""
 
 
 class Listed(NamedTuple):
-    """An attribute or a text that differs, which is not judged.
+    """Attribute or text that differs. It is listed, not judged.
 
     Attributes
     ----------
@@ -330,7 +330,7 @@ class Difference:
         return f"<fecm difference of {self.a} and {self.b}: {self.verdict}>"
 
     def _repr_html_(self) -> str:
-        """Table of the datasets that differ and of what is listed, for notebooks."""
+        """Return a table of the datasets that differ and the listed items, for notebooks."""
         rows: list[Row] = [
             (dataset.name, str(dataset)) for dataset in self.datasets if not dataset.same
         ]
@@ -340,7 +340,7 @@ class Difference:
         return html_table(Table(tuple(rows), title=repr(self)[1:-1]))
 
     def lines(self, *, same: bool = True) -> list[str]:
-        """Return one line per dataset, what is listed, and the verdict.
+        """Return one line per dataset, the listed items, and the verdict.
 
         Parameters
         ----------
@@ -362,7 +362,7 @@ class Difference:
         return [*lines, *(f"listed     {item}" for item in self.listed), self.verdict]
 
     def to_dict(self, *, same: bool = True) -> DifferenceJson:
-        """Plain values: what ``fecm diff --format json`` prints.
+        """Return plain values, as ``fecm diff --format json`` prints them.
 
         Parameters
         ----------

@@ -111,19 +111,19 @@ class Deflection(NamedTuple):
 
     @property
     def reach(self) -> Floats:
-        """Largest displacement that the energy in the plate can still cause.
+        """Return the largest displacement that the energy in the plate can still cause.
 
-        A plate that its supports hold and that has the energy E deflects by at most sqrt(2 C E),
-        C being its static flexibility.
+        A plate that is held by its supports and has the energy E deflects by at most sqrt(2 C E),
+        where C is its static flexibility.
         """
         return np.sqrt(2.0 * RESERVE * self.compliance * np.maximum(self.energy, 0.0))
 
 
 def ends(last: LastContact, plate: Deflection, *, is_held: bool = True) -> Texts:
-    """State of every case at its end, of :class:`End`.
+    """Return the state of every case at its end, as :class:`End`.
 
-    A plate that its supports do not hold may follow the projectile anywhere, so that only a
-    projectile that leaves clearly ends the contact.
+    A plate that is not held may follow the projectile anywhere. Only a projectile that clearly
+    leaves it ends the contact.
 
     Examples
     --------
@@ -148,37 +148,40 @@ def ends(last: LastContact, plate: Deflection, *, is_held: bool = True) -> Texts
 
 
 def time_to_decide(last: LastContact, plate: Deflection) -> Floats:
-    """Time until the plate can't reach the projectile any more; of cases that may touch again."""
+    """Return the time until the plate can't reach the projectile any more.
+
+    It is for cases that may touch again.
+    """
     return np.maximum(last.position + plate.reach, 0.0) / last.leaving
 
 
 def over(end: Texts) -> Bools:
-    """Cases whose contact is over."""
+    """Return a mask of the cases whose contact is over."""
     return np.asarray(end == End.OVER)
 
 
 def peak_known(end: Texts) -> Bools:
-    """Cases whose largest force so far is the peak force."""
+    """Return a mask of the cases whose largest force so far is the peak force."""
     return np.isin(end, (End.OVER, End.PASSED))
 
 
 def decided(largest: Floats, last: Floats, end: Texts) -> Floats:
-    """Largest values of a quantity, NaN where the end has not decided them.
+    """Return the largest values of a quantity, NaN where the end has not decided them.
 
-    While the projectile leaves, the largest value is the peak of a quantity that has fallen.  Waves
-    that go on after the contact may exceed strains and exposures: a run notes a largest value that
-    comes near its end.
+    While the projectile leaves, the largest value is the peak of a quantity that has fallen. Waves
+    that continue after the contact may exceed strains and exposures: a run notes a largest value
+    near its end.
     """
     fallen = peak_known(end) & (last < largest)
     return np.where(over(end) | fallen, largest, np.nan)
 
 
 def settled_deflection(end: Texts, plate: Deflection, *, is_held: bool = True) -> Floats:
-    """Largest deflection under the load, NaN where the plate can still exceed it.
+    """Return the largest deflection under the load, NaN where the plate can still exceed it.
 
-    The plate vibrates on after the contact.  Of 300 random plates without damping, two thirds of
-    those that had the energy to exceed their largest deflection later did so.  The displacement of
-    a plate that its supports do not hold only says that it moves.
+    The plate continues to vibrate after the contact. Of 300 random plates without damping, two
+    thirds of those that had the energy to exceed their largest deflection later did so. The
+    displacement of a plate that is not held by its supports only says that the plate moves.
     """
     is_bounded = plate.reach <= RINGING * plate.largest
     return np.where(over(end) & (is_bounded | (not is_held)), plate.largest, np.nan)

@@ -1,16 +1,13 @@
 """Results for other programs: CSV, VTKHDF, and objects of pandas, xarray and PyVista.
 
-CSV: datasets of a result as tables in long form, for spreadsheets and data frames.
+CSV has datasets of a result as tables in long form, for spreadsheets and data frames. Key columns
+come first (step and time, then node, element or point, from 1), then values. Units follow the names
+in the header. Numbers are written by Python's repr and can be read back exactly.
 
-Key columns come first (step and time, then node, element or point, from 1), then values.  Units
-follow the names in the header, as tables of measured data have them.  Numbers are written by
-Python's repr and can be read back exactly.
-
-VTKHDF: a result as one file of time steps for ParaView and VTK.
-
-VTKHDF File Format, version 2.2, type UnstructuredGrid, temporal: the arrays of all time steps are
-concatenated, with the offset of each step.  The mesh is stored once, with all offsets 0.  Point
-n - 1 is node n, cell n - 1 element n.
+VTKHDF has a result as one file of time steps for ParaView and VTK (VTKHDF File Format, version 2.2,
+type UnstructuredGrid, temporal). The arrays of all time steps are concatenated, with the offset of
+each step. The mesh is stored once, with all offsets 0. Point n - 1 is node n, cell n - 1 is element
+n.
 """
 
 from __future__ import annotations
@@ -78,10 +75,11 @@ BLOCK = 100_000  # lines per block
 def dataset_csv_lines(
     result: Stored, name: str = HISTORY, note: Callable[[str], None] = lambda text: None
 ) -> Iterator[str]:
-    """Lines of one dataset such as ``tape3/w``, or of all datasets of a group such as ``history``.
+    """Return the lines of one dataset such as ``tape3/w``, or of a group such as ``history``.
 
-    The first is the header.  `note` receives a sentence about values that are not final.  Raises
-    ExportError if there is no such dataset or group, or the group's datasets differ in shape.
+    The first line is the header. `note` receives a sentence about values that are not final. Raises
+    ExportError if there is no such dataset or group, or if the datasets of the group differ in
+    shape.
     """
     plain = name.strip("/")
     members = _members(result, plain)
@@ -129,7 +127,7 @@ def dataset_csv_lines(
 
 
 def _members(result: Stored, name: str) -> list[str]:
-    """Paths of a dataset, or of a group's datasets in the schema's order."""
+    """Return the path of a dataset, or the paths of a group's datasets in the schema's order."""
     if name in result:
         return [name]
     if members := [path for path in result if path.startswith(f"{name}/")]:
@@ -142,14 +140,14 @@ def _members(result: Stored, name: str) -> list[str]:
 
 
 def _headings(result: Stored, paths: Sequence[str]) -> tuple[str, ...]:
-    """Names of datasets within their groups, with units."""
+    """Return the names of datasets within their groups, with units."""
     return tuple(column_name(path.rpartition("/")[2], result.unit(path)) for path in paths)
 
 
 def _components(names: Sequence[str], unit: str) -> tuple[str, ...]:
-    """Names of the components of a dataset, with units.
+    """Return the names of the components of a dataset, with units.
 
-    `unit` is that of all, or says which has which: ``mm (u, v, w), 1 (theta_x, theta_y)``.
+    `unit` applies to all components, or lists them: ``mm (u, v, w), 1 (theta_x, theta_y)``.
     """
     shared = OF_COMPONENTS.findall(unit)
     own = {name: one for one, members in shared for name in members.split(", ") if one != "1"}
@@ -157,14 +155,14 @@ def _components(names: Sequence[str], unit: str) -> tuple[str, ...]:
 
 
 def _in_rows(path: str) -> bool:
-    """Whether the rows of a dataset in a group with step and time are instants."""
+    """Return whether the rows of a dataset in a group with step and time are instants."""
     return path not in schema.DATASETS or schema.DATASETS[path].shape[0] == "rows"
 
 
 def _rows(
     arrays: Sequence[Array], clock: Sequence[Array], keys: Sequence[Sequence[int]]
 ) -> Iterator[tuple[float, ...]]:
-    """Rows of arrays with the axes (instants, keys, columns); instants only with a clock."""
+    """Yield rows of arrays with the axes (instants, keys, columns), instants only with a clock."""
     if not clock:
         arrays = [array[None] for array in arrays]
     numbers = list(itertools.product(*keys))
@@ -211,7 +209,7 @@ def write_vtkhdf(
 
 
 def _write_mesh(root: h5py.Group, result: Stored, times: Array) -> None:
-    """The mesh, once, and the times at which it has fields."""
+    """Write the mesh once, and the times at which it has fields."""
     connectivity, offsets, types = vtk_cells(result["mesh/elements"])
     points = vtk_points(result)
     root["Points"] = points
@@ -238,7 +236,7 @@ def _field(
     *,
     constant: bool = False,
 ) -> Any:
-    """Create a field with an array of `shape` per step, concatenated, or with a single one."""
+    """Create a field with an array of `shape` per step, concatenated, or with a single array."""
     data = root.require_group(f"{at}Data")
     count = 1 if constant else steps
     dataset = data.create_dataset(name, (count * shape[0], *shape[1:]), "f8")
@@ -251,7 +249,7 @@ def _field(
 
 
 def _write_fields(root: h5py.Group, steps: int, of: Fields) -> None:
-    """Point or cell data, one step after the other; once if they are constant."""
+    """Write point or cell data, step after step, or once if they are constant."""
     made = [
         (_field(root, of.at, name, steps, shape, constant=of.constant), shape[0])
         for name, shape in of.shapes.items()
@@ -262,7 +260,7 @@ def _write_fields(root: h5py.Group, steps: int, of: Fields) -> None:
 
 
 def _write_contact(root: h5py.Group, result: Stored, steps: Ints) -> None:
-    """Field data: contact at each step; zero before the first step."""
+    """Write the contact at each step as field data; zero before the first step."""
     if "history/step" not in result:
         return
     at = np.searchsorted(result["history/step"], steps)
@@ -273,7 +271,7 @@ def _write_contact(root: h5py.Group, result: Stored, steps: Ints) -> None:
 
 
 def _write_exposures(root: h5py.Group, result: Stored, steps: Ints) -> None:
-    """Field data: largest exposure so far of each criterion; zero before the first evaluation."""
+    """Write the largest exposure so far by criterion as field data; zero before the first."""
     if any(f"exposures/{name}" not in result for name in ("step", "exposure")):
         return
     evaluations = np.searchsorted(result["exposures/step"], steps, side="right")
@@ -286,7 +284,7 @@ def _write_exposures(root: h5py.Group, result: Stored, steps: Ints) -> None:
 
 
 def dataframe(stored: Stored) -> pandas.DataFrame:
-    """The history as a pandas DataFrame; see :meth:`fecm.Result.to_dataframe`."""
+    """Return the history as a pandas DataFrame; see :meth:`fecm.Result.to_dataframe`."""
     try:
         import pandas  # optional
     except ImportError:
@@ -305,7 +303,7 @@ def dataframe(stored: Stored) -> pandas.DataFrame:
 
 
 def datatree(stored: Stored) -> xarray.DataTree:
-    """The result as a tree of labelled arrays; see :meth:`fecm.Result.to_xarray`."""
+    """Return the result as a tree of labelled arrays; see :meth:`fecm.Result.to_xarray`."""
     try:
         import xarray  # optional
     except ImportError:
@@ -336,7 +334,7 @@ def datatree(stored: Stored) -> xarray.DataTree:
 
 
 def _axis_names(dataset: Dataset) -> list[str]:
-    """Names of the axes: those of the file's scales, else that of the dataset with a number."""
+    """Return the names of the axes: scales of the file, or else the dataset with a number."""
     names = {"rows": "time", **{size: name for size, (name, _) in SCALES.items()}}
     return [
         names.get(str(size), f"{dataset.name}_{axis}") for axis, size in enumerate(dataset.shape)
@@ -344,7 +342,7 @@ def _axis_names(dataset: Dataset) -> list[str]:
 
 
 def pyvista_grid(stored: Stored, time: float | None) -> pyvista.UnstructuredGrid:
-    """The plate with its displacements at a time; see :meth:`fecm.Result.to_pyvista`."""
+    """Return the plate with its displacements at a time; see :meth:`fecm.Result.to_pyvista`."""
     try:
         import pyvista  # optional
     except ImportError:
@@ -369,14 +367,17 @@ def pyvista_grid(stored: Stored, time: float | None) -> pyvista.UnstructuredGrid
 
 
 class ExportFormat(StrEnum):
-    """A format of other programs."""
+    """Format of another program."""
 
     VTKHDF = "vtkhdf"
     CSV = "csv"
 
 
 def format_of(path: Path, to: str | None) -> ExportFormat:
-    """Format of this name, or of the file's suffix; raises ExportError if there is none."""
+    """Return the format of this name, or of the file's suffix.
+
+    Raises ExportError if there is no such format.
+    """
     name = path.suffix.lower().removeprefix(".") if to is None else to
     try:
         return ExportFormat(name)
@@ -396,7 +397,7 @@ def export_result(
     *,
     overwrite: bool,
 ) -> None:
-    """Write a result, of csv one dataset or group; see :meth:`fecm.Result.export`.
+    """Write a result; as CSV, one of its datasets or groups; see :meth:`fecm.Result.export`.
 
     `note` receives a sentence about what is exported incompletely, or is not final.
     """

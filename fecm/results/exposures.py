@@ -1,4 +1,4 @@
-"""Exposures of FAIL: the largest, how often they were evaluated, and the first failure."""
+"""Exposures of FAIL: largest values, number of evaluations, and first failure."""
 
 from __future__ import annotations
 
@@ -84,7 +84,7 @@ class FailureVerdict(StrEnum):
 
 
 def failure_verdict(largest: Sequence[LargestExposure]) -> FailureVerdict:
-    """Whether any of the largest exposures reaches 1 on every finer mesh, on none, or on some."""
+    """Judge whether any of the largest exposures reaches 1 on every finer mesh, none, or some."""
     if any(one.exposure >= 1.0 and not one.is_open for one in largest):
         return FailureVerdict.REACHED
     return (
@@ -93,7 +93,7 @@ def failure_verdict(largest: Sequence[LargestExposure]) -> FailureVerdict:
 
 
 def mesh_band(exposure: float, criterion: str, coarseness: float) -> tuple[float, float]:
-    """Lowest and highest exposure that finer meshes may give.
+    """Return the lowest and the highest exposure that finer meshes may give.
 
     Parameters
     ----------
@@ -118,9 +118,9 @@ def mesh_band(exposure: float, criterion: str, coarseness: float) -> tuple[float
 
 
 def band_of_largest(largest: Sequence[LargestExposure]) -> tuple[float, float]:
-    """Lowest and highest value of the largest exposure of all that finer meshes may give.
+    """Return the lowest and the highest value that finer meshes may give the largest exposure.
 
-    NaN where it is not known.
+    Both are NaN where they are not known.
     """
     bands = [one.band for one in largest if one.band is not None]
     if not bands or len(bands) < len(largest):
@@ -130,10 +130,10 @@ def band_of_largest(largest: Sequence[LargestExposure]) -> tuple[float, float]:
 
 
 def largest_exposures(stored: Stored) -> list[LargestExposure]:
-    """Largest exposure of each criterion, outside the load and on the circle around it.
+    """Return the largest exposure of each criterion, outside the load and on its circle.
 
-    Ties go to the lowest element, point and ply.  Empty without FAIL.  Raises ResultFileError if
-    the result names no such mode.
+    Ties go to the lowest element, point and ply. The list is empty without FAIL. Raises
+    ResultFileError if the result names no such mode.
     """
     if "failure/x" not in stored:
         return []
@@ -147,7 +147,7 @@ def largest_exposures(stored: Stored) -> list[LargestExposure]:
 
 
 def _outside(stored: Stored, criterion: str) -> LargestExposure | None:
-    """Largest exposure of a criterion at points outside the load; None if there is none."""
+    """Return the largest exposure of a criterion at points outside the load, if there are any."""
     exposure = stored[f"failure/{criterion}/exposure"]
     outside = np.where(near_load(stored, criterion), -1.0, exposure)
     if not outside.size or not (outside >= 0.0).any():
@@ -173,7 +173,7 @@ def _outside(stored: Stored, criterion: str) -> LargestExposure | None:
 
 
 def _on_circle(stored: Stored, criterion: str, number: int) -> LargestExposure | None:
-    """Largest exposure of a criterion on the circle around the load; None if there is none."""
+    """Return the largest exposure of a criterion on the circle around the load, if it has one."""
     path = "failure/circle"
     if f"{path}/exposure" not in stored:
         return None
@@ -197,7 +197,7 @@ def _largest(
     time: float,
     mirrors: int,
 ) -> LargestExposure:
-    """The exposure with the name of its mode and what CURE adds."""
+    """Return an exposure with the name of its mode and the contribution of CURE."""
     modes = stored.attributes_of("failure").get("modes", ())
     if not 0 <= code < len(modes):
         raise ResultFileError(f"failure/{criterion}/mode has the mode {code}, which has no name")
@@ -226,7 +226,7 @@ def _largest(
 def of_material(
     stored: Stored, criterion: str, ply: int, place: tuple[float, float], mode: str
 ) -> tuple[str, tuple[str, ...]]:
-    """Name of a mode in a ply at a place, and the materials of the ply or of the interface.
+    """Return the name of a mode in a ply, and the materials of the ply or the interface.
 
     The mode remains as it is, without materials, if the result's deck does not have the ply.
     """
@@ -241,7 +241,7 @@ def of_material(
 
 
 def _laminate_at(stored: Stored, place: tuple[float, float]) -> int:
-    """Number of the laminate of the element whose points are nearest to a place."""
+    """Return the number of the laminate of the element whose points are nearest to a place."""
     if "mesh/laminate" not in stored:
         return MATERIAL
     x, y = stored["failure/x"], stored["failure/y"]
@@ -250,12 +250,12 @@ def _laminate_at(stored: Stored, place: tuple[float, float]) -> int:
 
 
 def _number(value: object) -> float | None:
-    """An attribute that is a number; None if there is none."""
+    """Return an attribute if it is a number, else None."""
     return float(value) if isinstance(value, int | float) else None
 
 
 def near_load(stored: Stored, criterion: str) -> Array:
-    """Mask of the exposures of a criterion under the load, of a shape that fits theirs."""
+    """Return a mask of the exposures of a criterion under the load, in a shape that fits them."""
     if criterion == INTERLAMINAR and "failure/centre_under_load" in stored:
         return np.asarray(stored["failure/centre_under_load"] != 0)[:, None]
     under = stored["failure/under_load"] != 0
@@ -273,7 +273,7 @@ def count_evaluations(stored: Stored) -> int:
 
 
 def evaluations_in_contact(stored: Stored) -> int | None:
-    """Number of :func:`count_evaluations` in the file; None without FAIL and in older results."""
+    """Return the stored :func:`count_evaluations`; None without FAIL and in older files."""
     count = stored.attributes_of("failure").get("evaluations_in_contact")
     return int(count) if isinstance(count, int | np.integer) else None
 
@@ -283,11 +283,11 @@ NEEDED = tuple(f"exposures/{name}" for name in ("time", "exposure", "mode", "ply
 
 @dataclass(frozen=True)
 class FirstFailure:
-    """First exposure of a criterion at a level, 1 for failure, outside the load.
+    """First time at which a criterion reaches an exposure outside the load: 1 for failure.
 
-    FAIL evaluates every N-th pass, so that the time lies between two evaluations.  It is
-    interpolated linearly between them, force and energy are those of this time.  Mode, ply and
-    place are those of the largest exposure at the later evaluation.
+    FAIL evaluates every N-th pass, so that the time lies between two evaluations. Time, force and
+    energy are interpolated linearly between them. Mode, ply and place belong to the largest
+    exposure at the later evaluation.
 
     Attributes
     ----------
@@ -329,9 +329,9 @@ class FirstFailure:
 
 
 def first_failures(stored: Stored, level: float = 1.0) -> list[FirstFailure]:
-    """First time at which each criterion reaches an exposure, the earliest first.
+    """Find the first time at which each criterion reaches an exposure, the earliest first.
 
-    Empty without FAIL.  Criteria that stay below the level are not in the list.
+    The list is empty without FAIL. Criteria that stay below the level are not in it.
     """
     if any(path not in stored for path in NEEDED):
         return []
@@ -373,9 +373,9 @@ def first_failures(stored: Stored, level: float = 1.0) -> list[FirstFailure]:
 
 
 def threshold_energy(stored: Stored) -> float:
-    """Work of the contact force when it first reaches the delamination threshold (force*length).
+    """Return the work of the contact force when it first reaches the delamination threshold.
 
-    NaN if it does not.
+    It is NaN if the force does not reach the threshold.
     """
     time = float(stored.threshold.get("time", math.nan)) if stored.threshold else math.nan
     if not math.isfinite(time):
@@ -414,7 +414,7 @@ class ExposureHistoryJson(TypedDict):
 
 
 class CureJson(TypedDict, total=False):
-    """What a run with FAIL and CURE says of residual stresses, in JSON."""
+    """Residual stresses of a run with FAIL and CURE, in JSON."""
 
     at_rest: Annotated[
         dict[str, float], "Largest exposure of the residual stresses alone, by criterion."
@@ -426,7 +426,7 @@ class CureJson(TypedDict, total=False):
 
 
 class FailureJson(CureJson):
-    """What a run with FAIL says of it, in JSON."""
+    """Failure of a run with FAIL, in JSON."""
 
     evaluations_in_contact: Annotated[int | None, "Null in results of older versions."]
     largest: Annotated[dict[str, float], "Largest exposure outside the load, by criterion."]
@@ -437,10 +437,10 @@ class FailureJson(CureJson):
 
 
 def failure_metrics(stored: Stored) -> FailureJson:
-    """Evaluations, largest exposures and first failures of a run with FAIL, as plain values.
+    """Return evaluations, largest exposures and first failures of a run with FAIL.
 
-    ``history`` has the largest exposures so far at every evaluation.  With CURE also the exposures
-    at rest and the load factors.
+    ``history`` has the largest exposures so far at every evaluation. Runs with CURE also have the
+    exposures at rest and the load factors.
     """
     times: list[float] = []
     so_far: dict[str, list[float]] = {}
@@ -459,7 +459,7 @@ def failure_metrics(stored: Stored) -> FailureJson:
 
 
 def _of_cure(stored: Stored) -> CureJson:
-    """Attributes of the criteria that runs with CURE have, by criterion."""
+    """Return the attributes of the criteria of a run with CURE, by criterion."""
     criteria = criteria_of(stored.attributes_of("failure"))
     known = {name: stored.attributes_of(f"failure/{name}") for name in criteria}
     found = {

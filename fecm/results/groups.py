@@ -1,4 +1,4 @@
-"""Groups of a result, their datasets as attributes, and errors about what is missing."""
+"""Groups of a result, their datasets as attributes, and errors about missing datasets."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class ExportError(FecmError, ValueError):
 
 
 class GroupInfo(NamedTuple):
-    """What is known of a group before any run."""
+    """Description of a group before any run."""
 
     description: str
     macro: str = ""  # that stores it; empty if every run does, or a segment asks for it
@@ -64,7 +64,7 @@ STORED_BY = {name: info.macro for name, info in GROUPS.items() if info.macro}
 
 
 def not_stored(asked: str, paths: Collection[str]) -> str:
-    """Message about a path that is no dataset of a result: what is, or what stores it."""
+    """Return the message about a missing dataset: similar names, or the macro that stores it."""
     if members := sorted(path for path in paths if path.startswith(f"{asked}/")):
         return f"{asked} is a group, not a dataset; its datasets are {', '.join(members)}"
     group = asked.partition("/")[0]
@@ -74,7 +74,7 @@ def not_stored(asked: str, paths: Collection[str]) -> str:
 
 
 def suggestion(asked: str, paths: Iterable[str]) -> str:
-    """End of a message about a missing dataset or group: similar names, or the groups."""
+    """Return the end of a message about a missing name: similar names, or the groups."""
     import difflib  # 1 ms, only after a mistake
 
     known = sorted({name for path in paths for name in (path, path.rpartition("/")[0])} - {""})
@@ -88,7 +88,7 @@ def suggestion(asked: str, paths: Iterable[str]) -> str:
 
 
 def remedy(path: str) -> str:
-    """End of a message about a missing dataset: what stores it; empty if no macro does."""
+    """Return the end of a message about a missing dataset: the macro that stores it, if any."""
     macro = STORED_BY.get(path.partition("/")[0])
     return f"; add {macro} to the deck's program and run it again" if macro else ""
 
@@ -97,30 +97,30 @@ Attributes = Mapping[str, Any]  # of a group: what HDF5 may hold
 
 
 class GroupSource(Protocol):
-    """The result that a group belongs to."""
+    """Result that a group belongs to."""
 
     @property
     def units(self) -> dict[str, str]:
         """Names of the units."""
 
     def unit(self, name: str) -> str:
-        """Unit of a dataset."""
+        """Return the unit of a dataset."""
 
     def attributes_of(self, group: str) -> dict[str, Any]:
-        """Attributes of a group."""
+        """Return the attributes of a group."""
 
     def __iter__(self) -> Iterator[str]:
-        """Paths of all datasets."""
+        """Iterate over the paths of all datasets."""
 
     def __contains__(self, name: str) -> bool:
-        """Whether there is a dataset of this path."""
+        """Return whether there is a dataset of this path."""
 
     def __getitem__(self, name: str) -> Array:
-        """A dataset by its path."""
+        """Return a dataset by its path."""
 
 
 class ResultGroup:
-    """The datasets of one group: ``result.tape3.w`` is ``result.tape3["w"]``.
+    """Datasets of one group: ``result.tape3.w`` is ``result.tape3["w"]``.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ class ResultGroup:
         return self._source.units
 
     def unit(self, name: str) -> str:
-        """Unit of a dataset; empty for a pure number, or if the deck names no units.
+        """Return the unit of a dataset; empty for a pure number, or if the deck names no units.
 
         Raises
         ------
@@ -155,7 +155,7 @@ class ResultGroup:
         return self._source.unit(f"{self._name}/{name}")
 
     def __getitem__(self, name: str) -> Array:
-        """A dataset by its name in the group."""
+        """Return a dataset by its name in the group."""
         return self._source[f"{self._name}/{name}"]
 
     def __contains__(self, name: str) -> bool:
@@ -166,7 +166,7 @@ class ResultGroup:
         return iter(self.keys())
 
     def keys(self) -> list[str]:
-        """Names of the datasets in the group, and in groups inside it."""
+        """Return the names of the datasets in the group, and in groups inside it."""
         head = f"{self._name}/"
         return [p.removeprefix(head) for p in self._source if p.startswith(head)]
 
@@ -185,7 +185,7 @@ class ResultGroup:
         return [*super().__dir__(), *{name.partition("/")[0] for name in self}]
 
     def _shapes(self) -> dict[str, str]:
-        """Shapes of the datasets by their names."""
+        """Return the shapes of the datasets by name."""
         return {name: str(self[name].shape) for name in self}
 
     def __repr__(self) -> str:
@@ -193,5 +193,5 @@ class ResultGroup:
         return f"<{self._name}: {shapes}>"
 
     def _repr_html_(self) -> str:
-        """Table of the datasets, for notebooks."""
+        """Return a table of the datasets, for notebooks."""
         return html_table(Table(tuple(self._shapes().items()), title=self._name))

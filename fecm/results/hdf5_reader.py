@@ -1,9 +1,8 @@
-"""Reads and checks result files of runs, sweeps and locations: untrusted HDF5.
+"""Reader of result files of runs, sweeps and locations: untrusted HDF5.
 
-:func:`read` lists the contents of a file; numbers are read on demand.  Links, virtual datasets and
+:func:`read` lists the contents of a file; numbers are read on demand. Links, virtual datasets and
 external storage, through which HDF5 would read other files, are refused before any dataset is read.
-Any error of the library on a damaged file becomes a
-:class:`~fecm.results.schema.ResultFileError`.
+Any error of the library on a damaged file becomes a :class:`~fecm.results.schema.ResultFileError`.
 """
 
 from __future__ import annotations
@@ -70,7 +69,7 @@ class FileContents(Mapping[str, Array]):
 
     @contextlib.contextmanager
     def held(self) -> Iterator[None]:
-        """Keep the file open for many reads; each of them opens it otherwise."""
+        """Keep the file open for many reads; otherwise each read opens it."""
         with _troubles(self.path):
             self._held = h5py.File(self._source)
         try:
@@ -81,7 +80,7 @@ class FileContents(Mapping[str, Array]):
 
     @contextlib.contextmanager
     def _file(self) -> Iterator[h5py.File]:
-        """The open file; its errors become those of this module."""
+        """Yield the open file; its errors become errors of this module."""
         held = self._held and contextlib.nullcontext(self._held)
         with _troubles(self.path), held or h5py.File(self._source) as file:
             yield file
@@ -148,10 +147,10 @@ def _troubles(path: Path) -> Iterator[None]:
 
 
 def read(source: str | Path | AnyFile, *forms: str) -> FileContents:
-    """List the contents of a result file of one of these formats; by default that of a run.
+    """List the contents of a result file of one of these formats; by default the format of a run.
 
-    A file that is open is read into memory.  Raises ResultFileError if it is not an HDF5 file, or
-    not a result of these forms.  Raises OSError if it can't be opened.
+    A file that is already open is read into memory. Raises ResultFileError if it is not an HDF5
+    file, or not a result of these formats. Raises OSError if it can't be opened.
     """
     if isinstance(source, str | Path):
         path, in_memory = Path(source), None
@@ -190,7 +189,7 @@ def read(source: str | Path | AnyFile, *forms: str) -> FileContents:
 
 
 def _open_file(file: AnyFile) -> tuple[Path, io.BytesIO]:
-    """Name and bytes of an open file; OptionsError if it is none, or is open as text."""
+    """Return name and bytes of an open file; OptionsError if it is not a file, or open as text."""
     if not hasattr(file, "read"):
         raise OptionsError(f"a result file is a path or an open file, not {file!r}")
     name = getattr(file, "name", None)
@@ -216,7 +215,7 @@ def _check_links(path: Path, file: h5py.File) -> None:
 def _list(contents: FileContents, file_size: int, name: str, item: Any) -> None:
     """Add a group or dataset of a file to its contents.
 
-    `item` is HDF5's own handle: opening all as h5py's objects would take twice as long.
+    `item` is HDF5's own handle: opening all items as objects of h5py takes twice as long.
     """
     path = contents.path
     if isinstance(item, h5py.h5g.GroupID):
@@ -254,7 +253,7 @@ def _list(contents: FileContents, file_size: int, name: str, item: Any) -> None:
 
 
 def _attributes(item: h5py.HLObject) -> dict[str, Any]:
-    """Attributes as Python values, without those that tie an axis to its scale."""
+    """Return attributes as Python values, without those that tie an axis to its scale."""
     values: dict[str, Any] = {}
     for name in item.attrs:
         if name in OF_SCALES:
@@ -267,7 +266,7 @@ def _attributes(item: h5py.HLObject) -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    """Convert to numbers, texts and lists of them; anything else to the name of its type."""
+    """Convert to numbers, texts and lists of them; any other type to its name."""
     if isinstance(value, np.ndarray | np.generic):
         value = value.tolist()
     if isinstance(value, list | tuple):
@@ -278,13 +277,13 @@ def _plain(value: Any) -> Any:
 
 
 def _text(value: str | bytes) -> str:
-    """Text with undecodable bytes replaced, so that it can be printed."""
+    """Return a text with undecodable bytes replaced, so that it can be printed."""
     raw = value.encode("utf-8", "surrogateescape") if isinstance(value, str) else value
     return raw.decode("utf-8", "replace")
 
 
 class Misfit(NamedTuple):
-    """A dataset whose shape or type is not that of the schema."""
+    """Dataset whose shape or type differs from the schema."""
 
     path: str
     message: str
@@ -297,9 +296,9 @@ KINDS = {"f": "f", "i": "iu", schema.NUMBERS: "fiu", schema.TEXTS: "O", schema.A
 def first_misfit(
     contents: FileContents, paths: Iterable[str] | None = None, **sizes: int
 ) -> Misfit | None:
-    """The first dataset, by default of all, whose shape or type is not that of the schema.
+    """Return the first dataset whose shape or type differs from the schema, or None.
 
-    None if there is none.  `sizes` are those of axes that are known beforehand.
+    By default all datasets are checked. `sizes` has the lengths of axes that are known beforehand.
     """
     form, failure = Form(contents.form), contents.groups.get("failure", {})
     known_sizes: dict[str | int, tuple[int, str]] = {
@@ -340,10 +339,7 @@ COMPLETE = ("threshold",)  # groups that have all of these attributes
 
 
 def attribute_error(groups: Mapping[str, Mapping[str, Any]]) -> str:
-    """Message about the first attribute of a wrong type or missing; empty if there is none.
-
-    Attributes are by group and name.
-    """
+    """Return a message about the first attribute that is missing or of a wrong type, or ""."""
     criteria = criteria_of(groups.get("failure", {}))
     numbers = NUMBERS | {f"failure/{name}": (AT_REST, LOAD_FACTOR) for name in criteria}
     for table, fits, what in ((numbers, _is_number, "a number"), (TEXTS, _is_texts, "texts")):

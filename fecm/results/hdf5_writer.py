@@ -1,4 +1,4 @@
-"""Writes result files: HDF5, renamed to their final name when complete."""
+"""Writer of result files: HDF5, renamed to their final name when complete."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PROPERTIES.set_obj_track_times(False)
 
 
 class FileSink:
-    """Writes a result of a form into an open HDF5 file."""
+    """Writer of a result of a form into an open HDF5 file."""
 
     def __init__(self, file: h5py.File, guarded: _Guarded, form: Form = Form.RUN) -> None:
         self._file = file
@@ -83,7 +83,7 @@ class FileSink:
         self._create(dataset, shape)
 
     def known(self, path: str, rank: int) -> Dataset:
-        """Dataset of the schema; ValueError if it has none of this path."""
+        """Return the dataset of the schema; ValueError if the schema has none of this path."""
         return schema.required_dataset(path, rank, self._form)
 
     def _create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
@@ -105,8 +105,8 @@ class FileSink:
     def label_axes(self) -> None:
         """Attach dimension scales (of the HDF5 specification) to the axes of datasets, for xarray.
 
-        The scale of rows is the group's time; those of nodes, elements, points and dofs belong to
-        the file, because a netCDF reader looks for dimensions in a group and its parents.  It needs
+        The scale of rows is the group's time. Scales of nodes, elements, points and dofs belong to
+        the file, because a netCDF reader looks for dimensions in a group and its parents. It needs
         all axes of a dataset labelled, or none.
         """
         kept = [
@@ -125,7 +125,7 @@ class FileSink:
                 h5py.h5ds.attach_scale(made.id, scale.id, axis)
 
     def _scale(self, size: Any, length: int) -> h5py.Dataset:
-        """Scale of an axis, created on first use."""
+        """Return the scale of an axis, created on first use."""
         name, description = schema.SCALES[size]
         if name not in self._scales:
             if texts := self.axis_names.get(size):
@@ -152,7 +152,7 @@ class FileSink:
     def store(self, path: str, values: Array, dimension: str = "") -> None:
         """Store a whole dataset of the schema, numbers or texts; see :meth:`known`.
 
-        A dimension takes the place of that of the schema.
+        `dimension` replaces the dimension of the schema.
         """
         known = self.known(path, values.ndim)
         if known.dtype == schema.TEXTS or values.dtype.kind in "US":
@@ -175,7 +175,7 @@ class FileSink:
             raise self._guarded.error
 
     def trim(self, path: str, rows: int) -> None:
-        """Truncate a dataset to its first rows; delete it, or an empty group, without any."""
+        """Truncate a dataset to its first rows; delete it, or an empty group, without rows."""
         old = self.arrays.pop(path)
         group = old.parent
         attributes = dict(old.attrs)
@@ -205,7 +205,7 @@ class FileSink:
 
 @cache
 def _type_of(dtype: str) -> h5py.h5t.TypeID:
-    """Type of the file for NumPy's name of a type."""
+    """Return the HDF5 type for NumPy's name of a type."""
     return h5py.h5t.py_create(np.dtype(dtype), logical=True)
 
 
@@ -222,7 +222,7 @@ def result_writing(
 ) -> Iterator[FileSink]:
     """Open a result of a form for writing; it gets its final name only on success.
 
-    Raises ResultWriteError if the file can't be written; an existing file is then untouched.
+    Raises ResultWriteError if the file can't be written; an existing file then stays unchanged.
     """
     with new_hdf5(path, overwrite=overwrite) as (file, guarded):
         sink = FileSink(file, guarded, form)
@@ -260,9 +260,9 @@ def new_hdf5(path: Path, *, overwrite: bool = True) -> Iterator[tuple[h5py.File,
 
 
 class _Guarded(io.FileIO):
-    """A file that stores the first write error instead of raising it.
+    """File that stores the first write error instead of raising it.
 
-    After a failed write HDF5 can neither continue nor close the file, and crashes at exit.  It
+    After a failed write HDF5 can neither continue nor close the file, and crashes at exit. It
     therefore sees no error; the sink checks for one.
     """
 

@@ -22,7 +22,7 @@ from fecm.results.end import (
 
 
 class Quantity(NamedTuple):
-    """A column of numbers."""
+    """Description of a column of numbers."""
 
     description: str
     dimension: str = ""  # physical dimension; may be empty
@@ -110,7 +110,7 @@ VERDICTS = (STATUS, VALIDITY)
 
 
 def described(name: str) -> str:
-    """Description of a column of a sweep."""
+    """Return the description of a column of a sweep."""
     if name.startswith(GAGE):
         return f"largest absolute strain of gage {name.removeprefix(GAGE)}"
     return COLUMNS[name].description if name in COLUMNS else "measured by the caller"
@@ -136,7 +136,7 @@ class Projectiles(NamedTuple):
 
 
 class Metrics(NamedTuple):
-    """Metrics of cases, and what their ends have decided."""
+    """Metrics of cases, and which of them the ends have decided."""
 
     columns: dict[str, Floats]  # (cases,) each; NaN where the end of the case has not decided them
     end: Texts  # (cases,): state of the contact at the end, :class:`~fecm.results.end.End`
@@ -162,13 +162,12 @@ def impact_metrics(
 ) -> Metrics:
     """Summarise many cases from their contact forces.
 
-    Contact forces are (steps, cases), times of the steps (steps,).  Returns the names of
-    :data:`SUMMARY`, with a delamination threshold (force, or (cases,)) also those of
-    :data:`THRESHOLD`.  `plate` is the motion of the plate under the load, `mobility` (1/mass) the
-    mobility of its rigid motion; see :class:`~fecm.results.validity.Judge`.
-
-    Values that the end of a case has not decided are NaN: if it ends in contact everything except
-    the peaks, and the peaks too unless the projectile leaves and they have passed.
+    Contact forces are (steps, cases), times of the steps (steps,). Returns the names of
+    :data:`SUMMARY`; with a delamination threshold (force, or (cases,)) also the names of
+    :data:`THRESHOLD`. `plate` is the motion of the plate under the load, `mobility` (1/mass) the
+    mobility of its rigid motion; see :class:`~fecm.results.validity.Judge`. Values that the end of
+    a case has not decided are NaN. If a case ends in contact, this is every value except the peaks,
+    and the peaks too unless the projectile leaves and they have passed.
     """
     limit = None if threshold is None else np.broadcast_to(threshold, force.shape[1])
     found = _from_forces(force, times, limit)
@@ -218,9 +217,9 @@ def impact_metrics(
 
 
 def _present_contact(force: Floats, last: Floats) -> tuple[Floats, Floats]:
-    """Force before the last step, and largest force of the contact at the end, (cases,) each.
+    """Return the force before the last step, and the largest force of the last contact.
 
-    Both are 0 where the case does not end in contact.
+    Both are (cases,), and 0 where the case does not end in contact.
     """
     before, peak = np.zeros_like(last), np.zeros_like(last)
     for case in np.flatnonzero(last > 0.0):
@@ -235,7 +234,7 @@ def _present_contact(force: Floats, last: Floats) -> tuple[Floats, Floats]:
 def _position(
     force: Floats, times: Floats, mass: Floats, velocity: Floats, chosen: Bools
 ) -> Floats:
-    """Displacement of the projectiles at the end, (cases,), NaN where it is not chosen."""
+    """Return the displacement of the projectiles at the end, (cases,), NaN where not chosen."""
     position = np.full(len(chosen), np.nan)
     dt = np.diff(times, prepend=0.0)
     lever = 0.5 * (dt + np.append(dt[1:], 0.0)) * (times[-1] - times)
@@ -246,7 +245,7 @@ def _position(
 
 
 class _OfForces(NamedTuple):
-    """What the contact forces of cases tell alone, (cases,) each."""
+    """Quantities that follow from the contact forces of cases alone, (cases,) each."""
 
     impulse: Floats
     reached: Floats  # largest force
@@ -263,7 +262,7 @@ class _OfForces(NamedTuple):
 
 
 def _from_forces(force: Floats, times: Floats, threshold: Floats | None) -> _OfForces:
-    """Evaluate contact forces (steps, cases), so many cases at a time as stay in the cache."""
+    """Evaluate contact forces (steps, cases), as many cases at a time as fit in the cache."""
     dt = np.diff(times, prepend=0.0)
     product = np.empty((min(PART, force.shape[1]), len(times)))
     parts = [
@@ -282,7 +281,10 @@ def _from_forces(force: Floats, times: Floats, threshold: Floats | None) -> _OfF
 
 
 def _durations(dt: Floats, chosen: Bools, product: Floats) -> Floats:
-    """Durations (cases,) of the chosen steps, (cases, steps); `product` is memory of that shape."""
+    """Return durations (cases,) of the chosen steps, (cases, steps).
+
+    `product` is memory of that shape.
+    """
     np.copyto(product, chosen)
     product *= dt
     return np.asarray(product.sum(axis=1))
@@ -291,7 +293,7 @@ def _durations(dt: Floats, chosen: Bools, product: Floats) -> Floats:
 def _of_part(
     force: Floats, times: Floats, dt: Floats, threshold: Floats | None, product: Floats
 ) -> _OfForces:
-    """Evaluate contact forces (cases, steps); `product` is memory for as many numbers."""
+    """Evaluate contact forces (cases, steps); `product` is memory of that shape."""
     cases = len(force)
     product = product[:cases]
     touching = force > 0.0

@@ -1,4 +1,4 @@
-"""The ways from a result, of a run or of a sweep, to its pictures and its report."""
+"""Pictures and report of a result of a run or a sweep, drawn by upper rooms."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ TYPES = {3: 5, 4: 9, 8: 23, 9: 28}
 
 
 def vtk_points(stored: Stored) -> Floats:
-    """Places x, y and z of the nodes at rest, (numnp, 3); z is 0 on a flat plate."""
+    """Return the places x, y and z of the nodes at rest, (numnp, 3); z is 0 on a flat plate."""
     coordinates = stored["mesh/coordinates"][:, :2]
     points = np.zeros((len(coordinates), 3))
     points[:, : coordinates.shape[1]] = coordinates
@@ -36,7 +36,7 @@ def vtk_points(stored: Stored) -> Floats:
 
 
 def vtk_cells(elements: Array) -> tuple[Ints, Ints, Ints]:
-    """Connectivity, offsets and types; elements that VTK lacks are reduced to corners."""
+    """Return connectivity, offsets and types; elements that VTK lacks are reduced to corners."""
     count = np.cumprod(elements > 0, axis=1).sum(axis=1)  # nodes before the first absent one
     whole = (count == (elements > 0).sum(axis=1)) & np.isin(count, list(TYPES))
     used = np.where(whole, count, np.minimum(count, CORNERS))
@@ -51,7 +51,7 @@ NODAL_POINTS = (4, 9)
 
 
 class At(StrEnum):
-    """What a field belongs to, as VTKHDF names it."""
+    """Location of a field, as VTKHDF names it."""
 
     POINTS = "Point"
     CELLS = "Cell"
@@ -68,9 +68,9 @@ class Fields(NamedTuple):
 
 
 def plate_fields(stored: Stored, rows: Ints, note: Note = lambda text: None) -> Iterator[Fields]:
-    """Fields at the time steps of some rows of tape3.
+    """Return the fields at the time steps of some rows of tape3.
 
-    `note` receives a sentence about fields that were not stored at all of these steps.  Raises
+    `note` receives a sentence about fields that were not stored at all of these steps. Raises
     ExportError if elements that do not exist have ply stresses.
     """
     steps = stored["tape3/step"][rows]
@@ -83,13 +83,13 @@ def plate_fields(stored: Stored, rows: Ints, note: Note = lambda text: None) -> 
 
 
 def _constant(values: Mapping[str, Array]) -> Fields:
-    """Values of the cells that do not depend on time."""
+    """Return values of the cells that do not depend on time."""
     shapes = {name: one.shape for name, one in values.items()}
     return Fields(At.CELLS, shapes, lambda number: list(values.values()), constant=True)
 
 
 def _displacements(stored: Array, rows: Ints) -> Fields:
-    """At the points: displacement (u, v, w), w alone, rotations (theta_x, theta_y)."""
+    """Return displacement (u, v, w), w, and rotations (theta_x, theta_y) at the points."""
     _, numnp, ndf = stored.shape
     shapes = {"displacement": (numnp, 3), "w": (numnp,), "rotation": (numnp, ndf - 3)}
     if ndf == 3:
@@ -103,7 +103,7 @@ def _displacements(stored: Array, rows: Ints) -> Fields:
 
 
 def _strains(stored: Stored, steps: Ints, note: Note) -> Iterator[Fields]:
-    """Curvatures and transverse shear strains: at the points if stored there, else cell means."""
+    """Return curvatures and transverse shear strains, at the points or as means of the cells."""
     if "tape8/step" not in stored:
         note("the result has no strains (tape8), which the macro RODP stores")
         return
@@ -139,7 +139,7 @@ def _strains(stored: Stored, steps: Ints, note: Note) -> Iterator[Fields]:
 def _rows_of(
     stored: Stored, group: str, steps: Ints, what: str, note: Note
 ) -> tuple[Ints, NDArray[np.bool_]]:
-    """Rows of a group at the time steps, and which of these have one."""
+    """Return the rows of a group at the time steps, and a mask of the steps that have one."""
     own = stored[f"{group}/step"]
     at = np.minimum(np.searchsorted(own, steps), len(own) - 1)
     shared = own[at] == steps
@@ -152,7 +152,7 @@ def _rows_of(
 
 
 def _ply_stresses(stored: Stored, steps: Ints, note: Note) -> Iterator[Fields]:
-    """In the cells: of each component the value of largest magnitude, and the ply that has it."""
+    """Return the ply stress of largest magnitude in each cell, by component, and its ply."""
     if "plies/step" not in stored:
         return
     at, shared = _rows_of(stored, "plies", steps, "ply stresses", note)
@@ -182,7 +182,7 @@ def _ply_stresses(stored: Stored, steps: Ints, note: Note) -> Iterator[Fields]:
 
 
 def _exposures(stored: Stored, note: Note) -> Iterator[Fields]:
-    """In the cells: the largest exposure of each criterion over the run, and its ply.
+    """Return the largest exposure of each criterion in the cells over the run, and its ply.
 
     Points under the load are left out; a cell without others is NaN.
     """
@@ -204,9 +204,10 @@ def _exposures(stored: Stored, note: Note) -> Iterator[Fields]:
 
 
 def _largest(row: Array) -> Array:
-    """Value of largest magnitude in (..., plies, levels) of every element, and its ply, (2, n).
+    """Return the value of largest magnitude of every element, and its ply, (2, n).
 
-    NaN, of plies that only other laminates have, is left out unless an element has nothing else.
+    Values are (..., plies, levels). NaN, of plies that only other laminates have, is left out
+    unless an element has nothing else.
     """
     values = np.moveaxis(row, -2, 1)
     flat = values.reshape(len(values), -1)

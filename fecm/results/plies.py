@@ -29,10 +29,10 @@ class PlyResults:
     """Stresses and strains of plies, in the deck's units.
 
     In-plane values are in the axes of the ply, at the points of each element and both faces of each
-    ply, (rows, elements, points, plies, 2).  Interlaminar stresses are in the axes of the plate,
+    ply, (rows, elements, points, plies, 2). Interlaminar stresses are in the axes of the plate,
     from equilibrium, at the centre of each element and three levels of each ply, (rows, elements,
-    plies, 3).  sigma_z is not computed.  Of a plate of several laminates, `z` and `angles` begin
-    with the elements, (elements, plies, ...); they and the stresses are NaN at plies that an
+    plies, 3). sigma_z is not computed. For a plate of several laminates, the first axis of `z` and
+    `angles` is the element, (elements, plies, ...). They and the stresses are NaN at plies that an
     element lacks.
 
     Attributes
@@ -79,7 +79,7 @@ class PlyResults:
 
 
 class PlyGroup(PlyRows):
-    """The datasets of ``plies``; called, the stresses and strains of some plies."""
+    """Datasets of ``plies``. Calling the group returns stresses and strains of plies."""
 
     def __init__(self, stored: Stored) -> None:
         super().__init__("plies", stored)
@@ -90,7 +90,7 @@ class PlyGroup(PlyRows):
         time: float | Sequence[float] | None = None,
         elements: int | Sequence[int] | None = None,
     ) -> PlyResults:
-        """Stresses and strains ply by ply.
+        """Return stresses and strains ply by ply.
 
         Parameters
         ----------
@@ -156,7 +156,7 @@ class PlyGroup(PlyRows):
 
 
 def _members(numbers: Array, asked: Array) -> Indices:
-    """Positions of the elements asked for among those with ply stresses."""
+    """Return the positions of the requested elements among those with ply stresses."""
     place = {int(number): position for position, number in enumerate(numbers)}
     for number in asked:
         if int(number) not in place:
@@ -171,7 +171,7 @@ Layup = tuple[Layer, ...]
 
 
 def _fits(deck: Deck, z: Floats) -> bool:
-    """Whether a deck has the laminates of stored z, and the materials of their layers."""
+    """Return whether a deck has the laminates of stored z, and the materials of their layers."""
     layups = deck.layers.values()
     several = (len(layups),) if len(layups) > 1 else ()
     known = deck.plies
@@ -181,7 +181,7 @@ def _fits(deck: Deck, z: Floats) -> bool:
 
 
 def _positions(stored: Stored, deck: Deck, numbers: Array) -> Indices:
-    """Positions among the deck's laminates of those of some elements."""
+    """Return the positions of the elements' laminates among the deck's laminates."""
     own = list(deck.layers)
     found = stored["mesh/laminate"][numbers - 1]
     if not np.isin(found, own).all():
@@ -190,7 +190,10 @@ def _positions(stored: Stored, deck: Deck, numbers: Array) -> Indices:
 
 
 def cure_stress_of(stored: Stored, element: int) -> Floats | None:
-    """Residual stresses of the plies of an element, (plies, 2, 3); None without CURE."""
+    """Return the residual stresses of the plies of an element, (plies, 2, 3).
+
+    Returns None without CURE.
+    """
     if CURE_STRESS not in stored:
         return None
     values = stored[CURE_STRESS]
@@ -201,7 +204,7 @@ def cure_stress_of(stored: Stored, element: int) -> Floats | None:
 
 
 def _layups(stored: Stored, deck: Deck, numbers: Array) -> Layup | list[Layup]:
-    """Layers of the plate, or of each element where there are several laminates."""
+    """Return the layers of the plate, or of each element where there are several laminates."""
     first, *others = layups = list(deck.layers.values())
     if not others:
         return first
@@ -209,7 +212,7 @@ def _layups(stored: Stored, deck: Deck, numbers: Array) -> Layup | list[Layup]:
 
 
 def _of_layers(layups: Layup | list[Layup], count: int, value: Callable[[Layer], float]) -> Floats:
-    """Values of the layers, (plies,), or of each element, (elements, plies), NaN where none is."""
+    """Return a value of each layer, (plies,), or of each element, NaN where it has no layer."""
     if isinstance(layups, tuple):
         return np.array([value(layer) for layer in layups])
     found = np.full((len(layups), count), np.nan)
@@ -230,7 +233,7 @@ class _Constants(NamedTuple):
 def _constants(
     deck: Deck, layups: Layup | list[Layup], count: int, variant: PlateVariant
 ) -> _Constants:
-    """Constants of the plies."""
+    """Return the constants of the plies."""
     plies = {number: variant.ply(ply) for number, ply in deck.plies.items()}
     if len(plies) == 1:
         (ply,) = plies.values()
@@ -246,7 +249,7 @@ def _constants(
 
 
 def _strains(stresses: Mapping[str, Floats], ply: _Constants) -> dict[str, Floats]:
-    """Strains of plies by their compliance."""
+    """Return the strains of plies by their compliance."""
     one, two, shear = (stresses[name] for name in IN_PLANE)
     return {
         "eps_1": (one - ply.nu12 * two) / ply.e1,
@@ -256,10 +259,10 @@ def _strains(stresses: Mapping[str, Floats], ply: _Constants) -> dict[str, Float
 
 
 def points_of(stored: Stored, numbers: Array, count: int, at_nodes: bool) -> Floats:
-    """Places of the points of the elements with the numbers (m,): (m, count, 2).
+    """Return the places of the points of the elements with the numbers (m,): (m, count, 2).
 
-    Of each element these are `count` nodes or Gauss points.  Raises ResultFileError if there is no
-    such element or no rule of so many points.
+    Points are `count` nodes or Gauss points of each element. Raises ResultFileError if there is no
+    such element, or no rule with this number of points.
     """
     order = math.isqrt(count)
     if order**2 != count or not 1 <= order <= HIGHEST_ORDER:
@@ -272,7 +275,7 @@ def points_of(stored: Stored, numbers: Array, count: int, at_nodes: bool) -> Flo
 
 
 def places(elements: Array, coordinates: Floats, rule: Quadrature) -> Floats:
-    """Places of the points of a rule in elements: (elements, points, 2), length."""
+    """Return the places of the points of a rule in elements: (elements, points, 2), length."""
     found = np.empty((len(elements), len(rule.xi), 2))
     for family in element_blocks(elements, coordinates):
         N = local_shape_functions(family, rule)[0]
@@ -281,7 +284,10 @@ def places(elements: Array, coordinates: Floats, rule: Quadrature) -> Floats:
 
 
 def rows_at(stored: Floats, times: Sequence[float] | Floats, what: str) -> Indices:
-    """Rows nearest to the given times.  Raises NotStoredError if a time is outside of the rows."""
+    """Return the rows nearest to the given times.
+
+    Raises NotStoredError if a time is outside of the rows.
+    """
     spacing = float(np.diff(stored).max()) if len(stored) > 1 else float(stored[0])
     for time in times:
         if not stored[0] - spacing <= time <= stored[-1] + spacing:

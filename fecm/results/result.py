@@ -1,4 +1,4 @@
-"""A result in Python: arrays by name, from a run or from a file."""
+"""Result in Python: arrays by name, from a run or from a file."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class Result(Stored, schema.ContactRows):
 
     @property
     def first_failures(self) -> list[FirstFailure]:
-        """When each criterion of FAIL first reaches an exposure of 1, the earliest first.
+        """Times at which each criterion of FAIL first reaches an exposure of 1, the earliest first.
 
         Empty without FAIL, or if all exposures stay below 1.
         """
@@ -117,9 +117,9 @@ class Result(Stored, schema.ContactRows):
         return metrics_of(self)
 
     def to_dataframe(self) -> pandas.DataFrame:
-        """The history as a pandas DataFrame: one row per step, indexed by time.
+        """Return the history as a pandas DataFrame: one row per step, indexed by time.
 
-        ``attrs["units"]`` has the units of the columns and of the time, if the deck names its own.
+        ``attrs["units"]`` has the units of the columns and the time, if the deck names its units.
 
         Raises
         ------
@@ -133,10 +133,10 @@ class Result(Stored, schema.ContactRows):
         return dataframe(self)
 
     def to_xarray(self) -> xarray.DataTree:
-        """The result as a tree of labelled arrays; needs xarray.
+        """Return the result as a tree of labelled arrays; needs xarray.
 
-        Dimensions have the names of the file's scales (``time``, ``node``, ``element``, ...); x and
-        y of the nodes are coordinates; ``units`` are the deck's, as pint-xarray reads them.
+        Dimensions have the names of the file's scales (``time``, ``node``, ``element``, ...). x and
+        y of the nodes are coordinates. ``units`` are the deck's units, as pint-xarray reads them.
 
         Examples
         --------
@@ -148,11 +148,11 @@ class Result(Stored, schema.ContactRows):
         return datatree(self)
 
     def to_pyvista(self, time: float | None = None) -> pyvista.UnstructuredGrid:
-        """The plate and its fields at a time, as point and cell data; needs PyVista.
+        """Return the plate and its fields at a time, as point and cell data; needs PyVista.
 
         The fields are those of ``fecm export --to vtkhdf`` (docs/results.md): displacements,
-        strains, ply stresses, and the largest exposures of the run.  Strains and ply stresses that
-        were not stored at the step of the displacements are absent.  The field data are ``time``
+        strains, ply stresses, and the largest exposures of the run. Strains and ply stresses that
+        were not stored at the step of the displacements are absent. The field data are ``time``
         and, if there are reasons to doubt the result or its fields, ``notes``.
 
         Parameters
@@ -401,7 +401,7 @@ class Result(Stored, schema.ContactRows):
         return "\n".join(run_text(self))
 
     def _repr_html_(self) -> str:
-        """Table of the summary and the notes, for notebooks."""
+        """Return a table of the summary and the notes, for notebooks."""
         from fecm.results.summary import run_table  # 4 ms at start
 
         notes = tuple(("note", note) for note in self.notes)
@@ -435,7 +435,7 @@ def load(path: str | Path | AnyFile) -> Result:
 
 
 def result_of(contents: FileContents, model: Deck | None = None) -> Result:
-    """Build a run's result from the contents of its file, and the deck's model where it is known.
+    """Build the result of a run from the contents of its file.
 
     Raises ResultFileError if a dataset has the wrong shape or type, or an attribute the wrong type.
     """

@@ -23,13 +23,13 @@ from fecm.results.stored import Stored
 
 
 def end_of(stored: Stored) -> End | None:
-    """State of the contact at the end of the run; None without impact steps."""
+    """Return the state of the contact at the end of the run; None without impact steps."""
     found = _summarised(stored)
     return None if found is None else End(found.end.item())
 
 
 def metrics_of(stored: Stored) -> dict[str, float]:
-    """Impact metrics by their names; NaN where they are not known, empty without impact steps."""
+    """Return the impact metrics by name: NaN where not known, empty without impact steps."""
     if (found := _summarised(stored)) is None:
         return {}
     columns = found.columns | {"max_deflection": found.deflection}
@@ -38,7 +38,7 @@ def metrics_of(stored: Stored) -> dict[str, float]:
 
 
 def _summarised(stored: Stored) -> Metrics | None:
-    """Metrics of the run as of a single case; None without impact steps."""
+    """Return the metrics of the run as a single case; None without impact steps."""
     if "history/force" not in stored or not len(stored["history/force"]):
         return None
     force, time, indentation = (
@@ -65,9 +65,9 @@ def _summarised(stored: Stored) -> Metrics | None:
 
 
 def steps_to_decide(stored: Stored) -> int | None:
-    """Steps after which the plate of a run can't reach the projectile any more.
+    """Return the number of steps after which the plate can't reach the projectile any more.
 
-    None if no number of steps is known to decide it.
+    Returns None if no number of steps is known to decide it.
     """
     summarised = _summarised(stored)
     if summarised is None or not summarised.is_held:
@@ -78,14 +78,14 @@ def steps_to_decide(stored: Stored) -> int | None:
 
 
 def deflection_of(stored: Stored) -> Deflection:
-    """Motion of the plate under the load in a run with impact steps."""
+    """Return the motion of the plate under the load in a run with impact steps."""
     energy = stored["energy/plate_kinetic"] + stored["energy/plate_strain"]
     initial = _number(stored.attributes_of("energy").get("initial"))
     return Deflection.of(stored["history/plate_w"], stored["history/time"], energy, initial)
 
 
 def _impact_velocity(stored: Stored) -> float:
-    """Impact velocity of the deck; NaN if the deck can't be read or has none."""
+    """Return the impact velocity of the deck; NaN if the deck can't be read or has none."""
     with contextlib.suppress(ResultFileError):
         if (card := stored.deck.last(Impact)) is not None and card.velocity:
             return card.velocity
@@ -93,5 +93,5 @@ def _impact_velocity(stored: Stored) -> float:
 
 
 def _number(value: object) -> float:
-    """A number of a file's attribute; NaN for anything else."""
+    """Return an attribute of a file if it is a number, else NaN."""
     return float(value) if isinstance(value, int | float) else math.nan

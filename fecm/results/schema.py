@@ -1,14 +1,14 @@
 """Schema of result files: groups, and type, shape, description and dimension of every dataset.
 
-:data:`FILES` has what each :class:`Form` of file holds: of a run, a sweep, or a location.  What is
+:data:`FILES` describes each :class:`Form` of file: a run, a sweep, or a location. A dataset that is
 not in it can't be written.
 
 Shapes of a run use the sizes of a run: ``rows`` of the group, ``numnp``, ``ndm``, ``ndf``,
-``numel``, ``nen``, ``npt`` and ``nps`` (points per element in tape8 and stresses), ``gages``;
-of ply stresses ``members`` (elements), ``npp`` (points per element), ``layers`` and :data:`FIXED`.
-The annotations of a group serve type checkers, editors and :data:`DATASETS`.  Those of a sweep use
-``cases``, ``steps``, ``combinations`` (of varied values), ``laws`` (random values), ``limits`` and
-``trials`` (of the reduced model).
+``numel``, ``nen``, ``npt`` and ``nps`` (points per element in tape8 and stresses), ``gages``.
+Shapes of ply stresses use ``members`` (elements), ``npp`` (points per element), ``layers`` and
+:data:`FIXED`. The annotations of a group serve type checkers, editors and :data:`DATASETS`. Shapes
+of a sweep use ``cases``, ``steps``, ``combinations`` (of varied values), ``laws`` (random values),
+``limits`` and ``trials`` (of the reduced model).
 """
 
 from collections.abc import Iterator, Mapping
@@ -40,7 +40,7 @@ FORMAT_VERSION = 1
 
 
 class Form(StrEnum):
-    """What a file holds: its attribute ``format``."""
+    """Content of a file: its attribute ``format``."""
 
     RUN = "fecm"
     SWEEP = "fecm-sweep"
@@ -48,7 +48,7 @@ class Form(StrEnum):
 
 
 class Kinematics(StrEnum):
-    """Strains of the plate: the attribute :data:`KINEMATICS` of nonlinear ones."""
+    """Strains of the plate: the attribute :data:`KINEMATICS` of nonlinear plates."""
 
     LINEAR = "linear"
     VON_KARMAN = "von Karman"
@@ -58,7 +58,7 @@ KINEMATICS = "kinematics"
 
 
 def heading(form: Form, title: str) -> dict[str, Any]:
-    """Attributes that every file has."""
+    """Return the attributes that every file has."""
     return {
         "format": form.value,
         "format_version": FORMAT_VERSION,
@@ -74,7 +74,7 @@ TEXTS = "texts"
 
 @dataclass(frozen=True)
 class Dataset:
-    """One dataset of a result."""
+    """Dataset of a result."""
 
     path: str  # group and name; ``*`` stands for any name
     shape: tuple[str | int, ...]  # sizes by name, or numbers
@@ -94,7 +94,7 @@ class Dataset:
         return self.path.rpartition("/")[2]
 
     def with_outer(self) -> "Dataset":
-        """The dataset of a result that has the outer axis."""
+        """Return the dataset of a result that has the outer axis."""
         return replace(self, shape=(self.outer, *self.shape))
 
 
@@ -412,7 +412,7 @@ BY_LAMINATE = ("plies/z", "plies/material", CURE_STRESS)
 
 
 def _datasets(group: str, kind: type[ResultGroup], sizes_of_all: str = "") -> Iterator[Dataset]:
-    """Datasets of a group, of these sizes unless they have their own."""
+    """Return the datasets of a group, with these sizes unless they have their own."""
     for base in reversed(kind.__mro__):
         for name, column in getattr(base, "__annotations__", {}).items():
             path = f"{group}/{name}"
@@ -439,7 +439,7 @@ _NAMED_DATASETS = {
 
 
 def criterion_datasets(name: str) -> list[Dataset]:
-    """Datasets of a user's criterion of the plies."""
+    """Return the datasets of a user's criterion of the plies."""
     return [
         replace(dataset, path=pattern.replace("*", name))
         for pattern, dataset in _NAMED_DATASETS.items()
@@ -516,7 +516,7 @@ LOCATION_DATASETS = _by_path(
 
 
 class FileSchema(NamedTuple):
-    """What a form of file holds beside its attributes."""
+    """Groups and datasets of a form of file."""
 
     deck: str  # description of the text ``deck``
     groups: Mapping[str, str]  # descriptions by path
@@ -558,7 +558,7 @@ FILES = {
 
 
 def dataset_of(path: str, rank: int, form: Form = Form.RUN) -> Dataset | None:
-    """Dataset of a path, with so many axes; None if it is not in the schema of the form."""
+    """Return the dataset of a path with this number of axes; None if the schema lacks it."""
     datasets, parts = FILES[form].datasets, path.split("/")
     known = datasets.get(path)
     if known is None and len(parts) > 1:
@@ -570,17 +570,17 @@ def dataset_of(path: str, rank: int, form: Form = Form.RUN) -> Dataset | None:
 
 
 def required_dataset(path: str, rank: int, form: Form = Form.RUN) -> Dataset:
-    """Dataset of a path that is written; ValueError if it is not in the schema of the form."""
+    """Return the dataset of a path that is written; ValueError if the schema lacks it."""
     if (dataset := dataset_of(path, rank, form)) is None:
         raise ValueError(f"{path} is not in the schema of {form}")
     return dataset
 
 
 def _named(dataset: Dataset, path: str) -> Dataset:
-    """The dataset of a name in the place of ``*``.
+    """Return the dataset of a name in the place of ``*``.
 
-    Its description has the name, or that of the quantity of this name: ``{text}``, or ``{label}``,
-    which is the name if the quantity is not one of fecm.
+    Its description has the name (``{label}``), or the description of the quantity of this name
+    (``{text}``).
     """
     name = path.split("/")[1]
     quantity = COLUMNS.get(name)

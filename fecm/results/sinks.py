@@ -1,7 +1,7 @@
 """Sinks: destinations of a run's rows.
 
-Every dataset is created once with its full shape; then its rows are written in order.  The memory
-sink keeps arrays, the file sink (:mod:`fecm.results.hdf5_writer`) writes them at once.
+Every dataset is created once with its full shape. Then its rows are written in order. The memory
+sink keeps arrays; the file sink (:mod:`fecm.results.hdf5_writer`) writes them at once.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class Operation(StrEnum):
-    """An operation on a result file, which a checkpoint repeats."""
+    """Operation on a result file, which a checkpoint repeats."""
 
     ATTRIBUTES = "attributes"
     CREATE = "create"
@@ -30,7 +30,7 @@ class Operation(StrEnum):
 
 
 class MemorySink:
-    """Keeps a result in arrays."""
+    """Sink that keeps a result in arrays."""
 
     def __init__(self) -> None:
         self.arrays: dict[str, Array] = {}
@@ -43,16 +43,19 @@ class MemorySink:
         self.groups.setdefault(group, {}).update(values)
 
     def create(self, dataset: Dataset, shape: tuple[int, ...]) -> None:
-        """Create a dataset; ValueError if it is not in the schema."""
+        """Create a dataset.
+
+        Raises ValueError if the dataset is not in the schema.
+        """
         required_dataset(dataset.path, len(shape))
         self.arrays[dataset.path] = np.zeros(shape, dtype=dataset.dtype)
 
     def write(self, path: str, start: int, rows: Array) -> None:
-        """Store rows of a dataset, beginning at row `start`."""
+        """Store rows of a dataset, from row `start`."""
         self.arrays[path][start : start + len(rows)] = rows
 
     def trim(self, path: str, rows: int) -> None:
-        """Truncate a dataset to its first rows; delete it if there are none."""
+        """Truncate a dataset to its first rows; delete a dataset without rows."""
         kept = self.arrays.pop(path)[:rows].copy()
         if rows:
             self.arrays[path] = kept
@@ -68,7 +71,7 @@ Sink: TypeAlias = "MemorySink | FileSink"
 class ReadOnce(Mapping[str, Array]):
     """Datasets of a sink by path, for the result of a run that is about to end.
 
-    Each is read when it is needed first, and kept; rows of it are not.
+    Each dataset is read when it is needed first, and kept; rows of it are not.
     """
 
     def __init__(self, sink: Sink) -> None:
@@ -81,7 +84,7 @@ class ReadOnce(Mapping[str, Array]):
         return self._read[path]
 
     def rows(self, path: str, start: int, stop: int) -> Array:
-        """Rows `start` to `stop` of a dataset."""
+        """Return rows `start` to `stop` of a dataset."""
         return np.asarray(self._read.get(path, self._datasets[path])[start:stop])
 
     def __contains__(self, path: object) -> bool:
@@ -95,9 +98,9 @@ class ReadOnce(Mapping[str, Array]):
 
 
 class RowBuffer:
-    """Collects the rows of one group and writes them to a sink in blocks.
+    """Buffer of the rows of one group, which writes them to a sink in blocks.
 
-    Its members are datasets with their full shapes, rows first; `stored` counts the rows written.
+    Its members are datasets with their full shapes, rows first. `stored` counts the rows written.
     """
 
     BYTES = 1_000_000  # of a block at most
@@ -113,7 +116,7 @@ class RowBuffer:
         self.stored = 0
 
     def state(self) -> dict[str, Any]:
-        """Rows not yet written, and the number of written ones."""
+        """Return the rows not yet written, and the number of written ones."""
         held = {name: block[: self._filled].copy() for name, block in self._blocks.items()}
         return {"stored": self.stored, **held}
 
@@ -125,7 +128,7 @@ class RowBuffer:
             block[: self._filled] = state[name]
 
     def put(self, columns: Mapping[str, Array]) -> None:
-        """Add rows, the first axis of an array for every dataset."""
+        """Add rows: for every dataset an array whose first axis is the row."""
         count = len(next(iter(columns.values())))
         if self._filled + count > self._room:
             self.flush()

@@ -1,4 +1,4 @@
-"""What a run has stored: datasets by path, attributes of groups, and the deck.
+"""Stored data of a run: datasets by path, attributes of groups, and the deck.
 
 :class:`~fecm.results.result.Result` adds to it what can be computed from them.
 """
@@ -24,7 +24,10 @@ BLOCK = 4_000_000  # bytes
 
 
 def row_blocks(shape: tuple[int, ...]) -> Iterator[tuple[int, int]]:
-    """First and last + 1 row of the blocks in which a dataset is read; a number is one row."""
+    """Yield the first and the last + 1 row of the blocks in which a dataset is read.
+
+    A single number is one row.
+    """
     rows = shape[0] if shape else 1
     step = max(1, BLOCK // (8 * max(1, math.prod(shape[1:]))))
     for start in range(0, rows, step):
@@ -49,7 +52,7 @@ class Stored:
 
     @property
     def deck(self) -> Deck:
-        """The deck that was run.
+        """Deck of the run.
 
         Raises
         ------
@@ -94,13 +97,13 @@ class Stored:
         return self._texts("notes")
 
     def _texts(self, name: str) -> tuple[str, ...]:
-        """An attribute that is a list of texts; empty if it is not there."""
+        """Return an attribute that is a list of texts, or an empty tuple."""
         texts = self.attributes.get(name)
         return tuple(map(str, texts)) if isinstance(texts, list | tuple) else ()
 
     @property
     def validity(self) -> str:
-        """``"ok"``, or the reasons to doubt the result, in the words that sweeps have.
+        """``"ok"``, or the reasons to doubt the result, in the words of sweeps.
 
         Empty in files of earlier versions and without impact steps.
         """
@@ -116,7 +119,8 @@ class Stored:
         """Delamination threshold of DELA; empty without it.
 
         `force` of `number` delaminations, `d_star`, `time` of the first crossing, `margin` of the
-        peak, and `band`: forces of one in each of the `interfaces` of unlike plies, and of one.
+        peak, and `band`: the force of one delamination in each of the `interfaces` of unlike plies,
+        and of one.
         """
         return self._groups.get("threshold", {})
 
@@ -126,7 +130,9 @@ class Stored:
         return declared_units(self.attributes)
 
     def unit(self, name: str) -> str:
-        """Unit of a dataset or a metric; empty for a pure number, or if the deck names no units.
+        """Return the unit of a dataset or a metric.
+
+        It is empty for a pure number, or if the deck names no units.
 
         Parameters
         ----------
@@ -152,33 +158,36 @@ class Stored:
         return "" if known is None else unit_of(known.dimension, self.units)
 
     def attributes_of(self, group: str) -> dict[str, Any]:
-        """Attributes of a group; empty without the group."""
+        """Return the attributes of a group; empty without the group."""
         return dict(self._groups.get(group, {}))
 
     def rows(self, path: str, start: int, stop: int) -> Array:
-        """Rows of a dataset; those of a file are not kept in memory."""
+        """Read rows of a dataset. Rows of a file are not kept in memory."""
         read = getattr(self._arrays, "rows", None)
         if read is None:
             return read_only(self._arrays[path.strip("/")][start:stop])
         return read_only(read(path, start, stop))
 
     def _path(self, name: str) -> str:
-        """Path of a dataset, or of a column of the history by its name alone."""
+        """Return the path of a dataset, or of a column of the history by its name alone."""
         path = name.strip("/")
         column = f"history/{path}"
         return column if path not in self._arrays and column in self._arrays else path
 
     def _stored(self, name: str) -> str:
-        """Path of a dataset that is there.  Raises NotStoredError if it is not."""
+        """Return the path of a stored dataset.
+
+        Raises NotStoredError if it is not stored.
+        """
         path = self._path(name)
         if path not in self._arrays:
             raise NotStoredError(not_stored(path, self._arrays))
         return path
 
     def __getitem__(self, name: str) -> Array:
-        """A dataset by its path; a column of the history also by its name alone.
+        """Return a dataset by its path; a column of the history also by its name alone.
 
-        The array is read-only: a change of it would be a change of the result.
+        The array is read-only, as changing it would change the result.
         """
         return read_only(self._arrays[self._stored(name)])
 
@@ -190,13 +199,13 @@ class Stored:
         return iter(self._arrays)
 
     def keys(self) -> list[str]:
-        """Paths of all datasets."""
+        """Return the paths of all datasets."""
         return list(self)
 
 
 @functools.lru_cache(maxsize=8)
 def deck_in(text: str, *, blanks_are_zeros: bool = False) -> Deck:
-    """The deck in the text of a result, parsed once, however often it is needed.
+    """Return the deck in the text of a result, parsed once.
 
     Raises ResultFileError if it can't be read.
     """

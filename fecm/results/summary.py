@@ -1,4 +1,4 @@
-"""Summary of a run in a few lines, and the contents of a result file for `fecm info`."""
+"""Summary of a run, and the contents of a result file for `fecm info`."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
 
 
 class DatasetJson(TypedDict):
-    """A dataset of a result file in JSON."""
+    """Dataset of a result file in JSON."""
 
     name: str
     shape: Sequence[int]
@@ -51,7 +51,7 @@ class DatasetJson(TypedDict):
 
 
 class GroupJson(TypedDict):
-    """A group of a result file in JSON."""
+    """Group of a result file in JSON."""
 
     name: str
     description: str
@@ -67,7 +67,7 @@ class MetricsJson(TypedDict, total=False):
 
 
 class RunJson(TypedDict):
-    """What is said of a run in JSON."""
+    """Summary of a run in JSON."""
 
     steps: int
     time: Annotated[Annotated[list[float], (2,)] | None, "First and last; null without steps."]
@@ -84,13 +84,13 @@ class RunJson(TypedDict):
 
 
 def describe_groups(contents: FileContents) -> list[GroupJson]:
-    """Describe the groups and datasets of a result file, of a run or of a sweep.
+    """Describe the groups and datasets of a result file of a run or a sweep.
 
-    Of each group ``name`` (empty for the file itself), ``description``, ``rows`` (stored instants,
-    or None), ``attributes`` and ``datasets``; of each dataset ``name`` (its path), ``shape``,
+    Each group has ``name`` (empty for the file itself), ``description``, ``rows`` (stored instants,
+    or None), ``attributes`` and ``datasets``. Each dataset has ``name`` (its path), ``shape``,
     ``dtype`` (``"text"`` for texts), ``description``, ``dimension``, ``unit``, ``min`` and ``max``
     of the finite numbers (None without any), ``not_finite`` and, for texts, the number of
-    ``different`` ones.
+    ``different`` texts.
     """
     members: dict[str, list[DatasetJson]] = {name: [] for name in contents.groups}
     for path in _sorted(contents, DATASETS):
@@ -113,13 +113,13 @@ def describe_groups(contents: FileContents) -> list[GroupJson]:
 
 
 def _sorted(names: Iterable[str], known: Iterable[str]) -> list[str]:
-    """Known names in their order, then others by name."""
+    """Return known names in their order, then other names sorted."""
     order = {name: number for number, name in enumerate(known)}
     return sorted(names, key=lambda name: (order.get(name, len(order)), name))
 
 
 def _describe(contents: FileContents, path: str) -> DatasetJson:
-    """Shape, type, attributes and range of one dataset."""
+    """Return shape, type, attributes and range of one dataset."""
     attributes, texts = contents.attributes_of(path), contents.lists.get(path)
     minimum, maximum, not_finite = (None, None, 0) if texts is not None else _range(contents, path)
     return {
@@ -137,7 +137,7 @@ def _describe(contents: FileContents, path: str) -> DatasetJson:
 
 
 def _range(contents: FileContents, path: str) -> tuple[float | None, float | None, int]:
-    """Minimum and maximum of the finite numbers, and number of others, by blocks of rows."""
+    """Return minimum and maximum of the finite numbers, and the count of others."""
     minimum, maximum, not_finite = math.inf, -math.inf, 0
     for start, stop in row_blocks(contents.shapes[path]):
         block = contents.rows(path, start, stop)
@@ -162,7 +162,7 @@ UNDECIDED = {
 
 
 def _search(what: str, until: str) -> Row:
-    """Row of the command that finds the impact energy at which something is reached."""
+    """Return the row with the command that finds the impact energy of an event."""
     command = f"fecm sweep DECK --find velocity --until {until}"
     return ("", f"{command} finds the impact energy of {what}")
 
@@ -217,14 +217,17 @@ def _run_rows(result: Stored) -> list[Row]:
 
 
 def radii_of(result: Stored) -> dict[str, float]:
-    """Finite radii of a curved panel by ``x``, ``y`` and ``xy``, length; empty if it is flat."""
+    """Return the finite radii of a curved panel by ``x``, ``y`` and ``xy``, length.
+
+    The result is empty for a flat panel.
+    """
     given = result.attributes_of("mesh")
     radii = {axis: given.get(f"radius_{axis}") for axis in ("x", "y", "xy")}
     return {axis: float(one) for axis, one in radii.items() if isinstance(one, int | float)}
 
 
 def _curved(result: Stored) -> list[Row]:
-    """Line of the radii and the rise of a curved panel."""
+    """Return the row of the radii and the rise of a curved panel."""
     if "mesh/z" not in result:
         return []
     named = [
@@ -236,7 +239,7 @@ def _curved(result: Stored) -> list[Row]:
 
 
 def _preload(result: Stored) -> list[Row]:
-    """Line of the initial membrane force of PREL."""
+    """Return the row of the initial membrane force of PREL."""
     given = result.attributes_of("laminate")
     forces = {f"N_{name}": given.get(f"N0_{name}") for name in ("x", "y", "xy")}
     named = [
@@ -248,10 +251,10 @@ def _preload(result: Stored) -> list[Row]:
 
 
 def _membrane(result: Stored) -> str:
-    """Share of the membrane in the strain energy of a nonlinear plate; empty if it is not known.
+    """Return the share of the membrane in the strain energy of a nonlinear plate.
 
-    It is that of the stored row nearest to the peak force; without contact that of the largest
-    energy.  The energy of the preload does not count.
+    The stored row nearest to the peak force counts; without contact, the row of the largest energy.
+    The energy of the preload does not count. The text is empty if the share is not known.
     """
     needed = [f"membrane/{name}" for name in ("time", "energy", "strain_energy")]
     if not all(path in result and result[path].size for path in needed):
@@ -272,7 +275,7 @@ def _membrane(result: Stored) -> str:
 
 
 def _delaminations(result: Stored) -> str:
-    """How many delaminations the threshold assumes, and the forces for other numbers of them."""
+    """Say how many delaminations the threshold assumes, and the forces for other numbers."""
     known = result.threshold
     band, number, interfaces = (
         np.asarray(known.get(name, "")) for name in ("band", "number", "interfaces")
@@ -289,7 +292,7 @@ def _delaminations(result: Stored) -> str:
 
 
 def _exposures(result: Stored) -> list[Row]:
-    """Lines about the largest exposures and the first failure."""
+    """Return rows about the largest exposures and the first failure."""
     largest, first = largest_exposures(result), _first_failures(result)
     reached = {one.criterion: one.force for one in first if not math.isnan(one.force)}
     lines: list[Row] = []
@@ -315,7 +318,7 @@ def _exposures(result: Stored) -> list[Row]:
 
 
 def _first_failures(result: Stored) -> list[FirstFailure]:
-    """When each criterion first reaches an exposure of 1; empty without FAIL."""
+    """Return the first time at which each criterion reaches 1; empty without FAIL."""
     if "exposures/exposure" not in result:
         return []
     from fecm.results.exposures import first_failures  # 1 ms, for FAIL only
@@ -324,7 +327,7 @@ def _first_failures(result: Stored) -> list[FirstFailure]:
 
 
 def _first_failure(result: Stored, first: FirstFailure) -> str:
-    """The first failure: mode, place, time, and force and energy of an impact."""
+    """Format the first failure: mode, place, time, and force and energy of an impact."""
     quantity = partial(_quantity, result)
     texts = [
         f"{first.mode} ({spelt(first.criterion)})",
@@ -339,7 +342,7 @@ def _first_failure(result: Stored, first: FirstFailure) -> str:
 
 
 def _exposure(result: Stored, largest: LargestExposure) -> str:
-    """Say where and when the exposure of a criterion is largest."""
+    """Format the largest exposure of a criterion with its place and time."""
     least = "at least " if end_of(result) in UNDECIDED else ""
     return (
         f"{least}{largest.exposure:.4g}: {largest.mode}, "
@@ -349,7 +352,7 @@ def _exposure(result: Stored, largest: LargestExposure) -> str:
 
 
 def _mirrors(largest: LargestExposure) -> str:
-    """How many other points have the same exposure."""
+    """Say how many other points have the same exposure."""
     count = largest.mirrors
     return f", and {count} point{'s' if count > 1 else ''} that mirror{'s' * (count == 1)} it" * (
         count > 0
@@ -357,7 +360,7 @@ def _mirrors(largest: LargestExposure) -> str:
 
 
 def _band(largest: LargestExposure) -> str:
-    """The exposures that finer meshes may give."""
+    """Format the exposures that finer meshes may give."""
     if largest.band is None:
         return ""
     low, high = largest.band
@@ -366,7 +369,7 @@ def _band(largest: LargestExposure) -> str:
 
 
 def _at_rest(largest: LargestExposure) -> str:
-    """What residual stresses contribute: with them the exposure is not proportional to the load."""
+    """Format the exposure of residual stresses, which makes exposure and load not proportional."""
     if largest.at_rest is None:
         return ""
     said = f"; at rest {largest.at_rest:.3g}"
@@ -376,7 +379,7 @@ def _at_rest(largest: LargestExposure) -> str:
 
 
 def _delamination(result: Stored) -> str:
-    """The threshold of delamination, and whether it is reached."""
+    """Format the threshold of delamination, and whether it is reached."""
     known = result.threshold
     force, crossing = _quantity(result, float(known["force"]), "force"), float(known["time"])
     if math.isfinite(crossing):
@@ -392,7 +395,7 @@ def _quantity(result: Stored, value: float, dimension: str, digits: int = DIGITS
 
 
 def _impact(result: Stored) -> list[Row]:
-    """Lines about forces, contacts, indentation and energy of an impact."""
+    """Return rows about forces, contacts, indentation and energy of an impact."""
     lines = [("peak force", _peak_force(result))]
     if intervals := _intervals(result):
         indentation, w = result["history/indentation"], result["history/plate_w"]
@@ -407,7 +410,7 @@ def _impact(result: Stored) -> list[Row]:
 
 
 def _peak_force(result: Stored) -> str:
-    """Peak force, its time and step, and what is doubtful about it."""
+    """Format the peak force, its time and step, and its doubts."""
     force, time = result["history/force"], result["history/time"]
     peak = int(np.argmax(force))
     text = "0: there was no contact"
@@ -422,7 +425,7 @@ def _peak_force(result: Stored) -> str:
 
 
 def later_contact(result: Stored) -> str:
-    """The number of the contact of the peak force, and the first contact's peak, if it is later."""
+    """Name the contact of the peak force, and the first contact's peak, if it is later."""
     metrics = metrics_of(result)
     if not metrics["peak_contact"] > 1:
         return ""
@@ -436,14 +439,14 @@ def _at_least(result: Stored) -> str:
 
 
 def _intervals(result: Stored) -> list[tuple[float, float]]:
-    """First and last time of every contact."""
+    """Return the first and the last time of every contact."""
     force, time = result["history/force"], result["history/time"]
     edges = np.flatnonzero(np.diff(np.concatenate(([0], force > 0.0, [0])).astype(int)))
     return list(zip(time[edges[::2]], time[edges[1::2] - 1], strict=True))
 
 
 def _contacts(result: Stored, intervals: list[tuple[float, float]]) -> str:
-    """Times of the contacts."""
+    """Format the times of the contacts."""
     texts = [
         f"{significant(begin)} to {_quantity(result, end, 'time')}"
         for begin, end in intervals[:LISTED]
@@ -458,14 +461,14 @@ def _contacts(result: Stored, intervals: list[tuple[float, float]]) -> str:
 
 
 def _largest(result: Stored, lengths: Floats, where: str = "") -> str:
-    """Largest of the lengths of every step, and its time."""
+    """Format the largest of the lengths of every step, and its time."""
     time = result["history/time"][lengths.argmax()]
     value = _quantity(result, lengths.max(), "length")
     return f"{value}{where} at time {_quantity(result, time, 'time')}"
 
 
 def _left(result: Stored) -> str:
-    """Permanent indentation."""
+    """Format the permanent indentation."""
     if end_of(result) is not End.OVER:
         return "open"
     permanent = float(result.attributes_of("history")["permanent_indentation"])
@@ -474,7 +477,7 @@ def _left(result: Stored) -> str:
 
 
 def _rebound(result: Stored) -> str:
-    """What the projectile has left of its velocity and its energy."""
+    """Format the velocity and the energy that the projectile has left."""
     metrics = metrics_of(result)
     return (
         f"{_quantity(result, metrics['rebound_velocity'], 'length/time')}, "
@@ -485,7 +488,7 @@ def _rebound(result: Stored) -> str:
 
 
 def _energy_balance(result: Stored) -> str:
-    """Largest error of the energy balance, of the initial energy."""
+    """Format the largest error of the energy balance, relative to the initial energy."""
     initial = float(result.attributes_of("energy")["initial"])
     worst = float(np.abs(result["energy/balance_error"]).max())
     share = f"{worst / initial:.2g} of the initial" if initial else f"{worst:.3g}, initially"
@@ -493,7 +496,7 @@ def _energy_balance(result: Stored) -> str:
 
 
 def elastic_doubt(result: Stored, peak: float) -> str:
-    """Why a peak force is that of an elastic plate only; empty if it may be real."""
+    """Say why a peak force is only an elastic prediction; empty if it may be real."""
     beyond = []
     if result.threshold and peak > CROSSED * (force := float(result.threshold["force"])):
         beyond.append(f"delamination is expected from {_quantity(result, force, 'force')}")
@@ -503,14 +506,14 @@ def elastic_doubt(result: Stored, peak: float) -> str:
 
 
 def run_text(result: Stored) -> list[str]:
-    """Title, summary and notes: what ``fecm run`` prints."""
+    """Return title, summary and notes, as ``fecm run`` prints them."""
     notes = label_lines(("note", note) for note in result.notes)
     lines = [*(_missing(result) or run_summary(result)), *notes]
     return [result.title or "(no title)", *(f"  {line}" for line in lines)]
 
 
 def about_run(result: Stored) -> RunJson:
-    """Steps, first and last time, metrics and summary of a run."""
+    """Return steps, first and last time, metrics and summary of a run."""
     steps = len(result["history/time"]) if "history/time" in result else 0
     missing = _missing(result)
     return {
@@ -526,7 +529,7 @@ def about_run(result: Stored) -> RunJson:
 
 
 def _metrics(result: Stored) -> MetricsJson:
-    """Impact metrics, and those of FAIL under ``failure``."""
+    """Return the impact metrics, and the metrics of FAIL under ``failure``."""
     if "failure/x" not in result:
         return cast("MetricsJson", metrics_of(result))
     from fecm.results.exposures import failure_metrics  # 1 ms, for FAIL only
@@ -536,7 +539,7 @@ def _metrics(result: Stored) -> MetricsJson:
 
 
 def _missing(result: Stored) -> list[str]:
-    """Reason why an incomplete file has no summary; empty if it has one."""
+    """Return the reason why an incomplete file has no summary; empty if it has one."""
     needed = ("history/time", "history/indentation", "history/plate_w", "energy/balance_error")
     if "history/force" in result:
         if not len(result["history/force"]) or any(name not in result for name in needed):

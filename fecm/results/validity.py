@@ -1,7 +1,7 @@
-"""The judge of results: where the model no longer holds, and the reasons to doubt a case.
+"""Judge of results: limits of the model, and reasons to doubt a case.
 
-Runs, cases of sweeps, searches, estimates and pictures all ask this module.  Its functions take
-many cases at once: arrays (cases,).
+Runs, cases of sweeps, searches, estimates and pictures all ask this module. Its functions take many
+cases at once: arrays (cases,).
 """
 
 from __future__ import annotations
@@ -70,11 +70,11 @@ ERRORS = {
 
 
 def in_plane_of(codes: Array, coordinates: Array | None = None) -> InPlane:
-    """Support of the edges in the plane, from the restraint codes of all nodes, (numnp, 5).
+    """Return the support of the edges in the plane, from the restraint codes of all nodes.
 
-    Nodes at which w is restrained are the supports; a plate without any is free.  With the
-    coordinates of the nodes, (numnp, 2), a plate whose supports are all inside its outline lies on
-    a window.
+    The codes are (numnp, 5). Nodes at which w is restrained are the supports; a plate without
+    supports is free. With the coordinates of the nodes, (numnp, 2), a plate whose supports are all
+    inside its outline lies on a window.
     """
     held = codes != 0
     supports = held[held[:, 2]]
@@ -94,12 +94,12 @@ def in_plane_of(codes: Array, coordinates: Array | None = None) -> InPlane:
 
 
 def unsafe(*, curved: bool) -> str:
-    """What a plate that is too soft means for thresholds; of a curved panel, that it may not be."""
+    """Explain how a too-soft plate affects thresholds. A curved panel may not be too soft."""
     return f"{UNSAFE}; {CURVED}" if curved else UNSAFE
 
 
 def softness(ratio: float, in_plane: InPlane, *, preloaded: bool = False) -> str:
-    """Error of a linear plate at a deflection over its thickness, in words.
+    """Format the error of a linear plate at a deflection over its thickness.
 
     Examples
     --------
@@ -135,7 +135,7 @@ SEPARATOR = "; "  # between the reasons of a case
 
 
 class Reason(StrEnum):
-    """A reason to doubt a case."""
+    """Reason to doubt a case."""
 
     OPEN = "peak not reached"
     AGAIN = "may touch again"
@@ -172,19 +172,19 @@ MEANING: dict[str, str] = {
 
 
 def joined(reasons: Sequence[str]) -> str:
-    """Validity of a case with some reasons."""
+    """Return the validity of a case with some reasons."""
     return SEPARATOR.join(reasons) or VALID
 
 
 def reasons_of(validity: str) -> list[str]:
-    """Reasons in the validity of a case; empty for a valid or a failed one."""
+    """Return the reasons in the validity of a case; empty for a valid or a failed case."""
     return [] if validity in ("", VALID, FAILED) else validity.split(SEPARATOR)
 
 
 def counted(validity: Texts) -> Iterator[tuple[Reason, Bools]]:
-    """Reasons among cases, in the order of :class:`Reason`, with the cases that have them.
+    """Count the cases with each reason, in the order of :class:`Reason`.
 
-    Reasons of other versions, whose number is not bounded, count together.
+    Reasons of other versions, whose number is not bounded, are counted together.
     """
     known = set(Reason)
     texts = validity.tolist()
@@ -199,7 +199,7 @@ def counted(validity: Texts) -> Iterator[tuple[Reason, Bools]]:
 
 @dataclass(frozen=True)
 class Extent:
-    """What cases have reached: (cases,) each, lower bounds where the end has not decided them."""
+    """Largest values of cases, (cases,) each. They are lower bounds where the end is undecided."""
 
     end: Texts
     peak: Floats
@@ -226,26 +226,26 @@ class Judge(NamedTuple):
 
     @property
     def indented(self) -> float:
-        """Thickness that the indentation is compared with: the struck face's, or the plate's.
+        """Thickness that the indentation is compared with: the struck face or the plate.
 
         A core under the first ply leaves no face to compare with.
         """
         return self.struck or self.thickness
 
     def softness(self, ratio: float) -> str:
-        """Error of the linear plate at a deflection over its thickness, in words."""
+        """Format the error of the linear plate at a deflection over its thickness."""
         return softness(ratio, self.in_plane, preloaded=self.preloaded)
 
     @property
     def limit(self) -> float:
-        """Deflection up to which the plate is taken as linear, over its thickness.
+        """Deflection over the thickness up to which the plate is taken as linear.
 
-        Infinite if the plate is not taken as linear.
+        It is infinite if the plate is not taken as linear.
         """
         return math.inf if self.nonlinear else LIMITS[self.in_plane]
 
     def validity(self, extent: Extent) -> Texts:
-        """``"ok"``, or the reasons to doubt each case, in words."""
+        """Return ``"ok"``, or the reasons to doubt each case."""
         h = self.thickness
         with np.errstate(invalid="ignore"):
             masks = {

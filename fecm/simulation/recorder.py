@@ -298,7 +298,10 @@ def _padded(parts: Sequence[Floats]) -> Floats:
 def exposures_of(
     monitor: FailureMonitor, found: FailureEnvelope, places: PlyPoints
 ) -> dict[str, Array]:
-    """Return the datasets of the largest exposures by criterion, exposures of plies as (states,)."""
+    """Return the datasets of the largest exposures by criterion.
+
+    Exposures of plies are (states,).
+    """
     arrays, plies = {}, monitor.every_state(found)
     for part in ("exposure", "time", "mode"):
         for name, values in zip(monitor.criteria, getattr(plies, part), strict=True):

@@ -88,7 +88,7 @@ class Simulation:
         return self._program.table_factor(table, clock, state.constant_factor)
 
     def force_factor(self, clock: float | None = None) -> float:
-        """Return the factor of FORC's values at a time of the clock, by default the present time."""
+        """Return the factor of FORC's values at a time of the clock, by default the present."""
         state = self.state
         factor = self.load_factor(state.clock if clock is None else clock)
         contact = None

@@ -106,7 +106,7 @@ class Estimate:
             "models": [{"model": name, **asdict(one)} for name, one in self.models.items()],
         }
 
-    def tables(self) -> tuple[Table, Table]:
+    def _tables(self) -> tuple[Table, Table]:
         """Return what the models share, and the models with the run."""
         free = " (the plate is free: no static model)" if math.isnan(self.stiffness) else ""
         shared: list[Row] = [
@@ -120,14 +120,14 @@ class Estimate:
         return Table(tuple(shared), title=self.title or "(no title)"), Table(models, header)
 
     def __str__(self) -> str:
-        shared, models = self.tables()
+        shared, models = self._tables()
         lines = [*text_lines(shared, LABEL_WIDTH), *text_lines(models)]
         return "\n".join([shared.title, *(f"  {line}" for line in lines)])
 
     def _repr_html_(self) -> str:
         """Tables of the estimate and its notes, for notebooks."""
         notes = (Table(tuple(("note", note) for note in self.notes)),) if self.notes else ()
-        return html_table(*self.tables(), *notes)
+        return html_table(*self._tables(), *notes)
 
     def _row(self, name: str, model: ModelEstimate) -> Row:
         """Return the row of a model."""
