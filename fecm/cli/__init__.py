@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 
 class LazyCommand(NamedTuple):
-    """A command that is imported when it is called."""
+    """Command that is imported when it is called."""
 
     module: str  # in which it has its name
     summary: str  # its line in ``fecm --help``
@@ -84,10 +84,10 @@ COMMANDS = {name: one for commands in GROUPED.values() for name, one in commands
 
 
 class LazyGroup(click.Group):
-    """A group that imports the command that is called, and no other."""
+    """Group that imports only the command that is called."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
-        """Names of the commands, sorted."""
+        """Return the names of the commands, sorted."""
         return sorted(COMMANDS)
 
     def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
@@ -100,7 +100,7 @@ class LazyGroup(click.Group):
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """Find a command; of an unknown one, name the most similar."""
+        """Find a command; for an unknown one, suggest the most similar name."""
         name = args[0]
         if not (name in COMMANDS or name.startswith("-") or ctx.resilient_parsing):
             ctx.fail(f"there is no command {name!r}{did_you_mean(name, COMMANDS)}")
@@ -203,7 +203,7 @@ def _report(error: Exception) -> int:
 
 
 def _message(error: Exception) -> str:
-    """One line about an error of the package, of a file or of the system."""
+    """Format an error of the package, of a file or of the system in one line."""
     if isinstance(error, OSError) and error.strerror:
         name = error.filename2 or error.filename  # the target of a rename
         named = name and not isinstance(name, int)

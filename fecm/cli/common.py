@@ -1,4 +1,4 @@
-"""What all commands have in common: exit statuses, messages, progress and text files."""
+"""Common parts of all commands: exit statuses, messages, progress and text files."""
 
 from __future__ import annotations
 
@@ -64,20 +64,20 @@ def note(*texts: object) -> None:
 
 
 def with_options(text: str) -> str:
-    """Name the options of a command in a message that names the arguments of a call."""
+    """Replace names of arguments in a message by the options of a command."""
     text = re.sub(r"\bthe same call (?=resumes|with \w+=True\b)", "the same command ", text)
     return re.sub(rf"`({NAMED_IN_MESSAGES})`|\b(force|overwrite|resume)=True\b", _named, text)
 
 
 def _named(argument: re.Match[str]) -> str:
-    """Name of an argument of a call as an option of a command."""
+    """Return the option of a command for an argument of a call."""
     return f"--{argument[1] or argument[2]}"
 
 
 class TerminalWatch(Watch):
-    """Shows the progress and the notes of a job on standard error; a signal stops the job.
+    """Watch that shows progress and notes of a job on standard error; a signal stops the job.
 
-    `advance` takes the number of new steps.  Notes wait until :meth:`close` if a bar is shown.
+    `advance` takes the number of new steps. Notes wait until :meth:`close` if a bar is shown.
     """
 
     def __init__(self, advance: Callable[[int], object]) -> None:
@@ -97,12 +97,12 @@ class TerminalWatch(Watch):
             self.close()
 
     def close(self) -> None:
-        """Print the notes that wait."""
+        """Print the waiting notes."""
         note(*self._notes)
         self._notes.clear()
 
     def stops(self) -> bool:
-        """Whether a signal came; the bar shows that the job goes on."""
+        """Return whether a signal came; the bar shows that the job continues."""
         self._advance(0)
         return bool(signals.received)
 
@@ -131,8 +131,8 @@ def progress(
 ) -> Iterator[Callable[[int], object]]:
     """Show a progress bar on standard error; yield the function that advances it.
 
-    The bar ends with a remark, and is left out for a single step without one.  If standard error is
-    no terminal, a line a minute takes its place.
+    The bar ends with a remark. A single step without a remark has no bar. If standard error is not
+    a terminal, a line a minute replaces the bar.
     """
     if length < 2 and remark is None:
         yield lambda steps: None
@@ -186,7 +186,7 @@ def every_minute(line: Callable[[int], str]) -> Iterator[None]:
 
 
 def write_text(path: Path, text: str, *, overwrite: bool) -> None:
-    """Write a complete text file, or print it, on a terminal with control characters escaped."""
+    """Write a complete text file, or print it; a terminal gets control characters escaped."""
     if path != DASH:
         with open_for_writing(path, overwrite=overwrite) as file:
             file.write(text)

@@ -55,10 +55,11 @@ def load_valid(
     force: bool = True,
     warnings: bool = True,
 ) -> list[Problem]:
-    """Problems of a deck, whose findings go to standard error; without `warnings` only errors.
+    """Return the problems of a deck; its findings go to standard error.
 
-    Errors that `--force` permits are permitted if `force`.  Raises RefusedError, whose message ends
-    with `otherwise`, if the deck has other errors.
+    Without `warnings` only errors are printed. With `force`, errors that `--force` permits are
+    permitted. Raises RefusedError, whose message ends with `otherwise`, if the deck has other
+    errors.
     """
     loaded = load_deck(deck, mode)
     errors = loaded.errors(force)
@@ -81,7 +82,7 @@ def refusing_errors(otherwise: str = "") -> Iterator[None]:
 
 
 def load_single(deck: Path, command: str) -> Problem:
-    """The problem of a deck, for a command that takes one; raises as :func:`load_valid`."""
+    """Return the only problem of a deck; raises as :func:`load_valid`."""
     problems = load_valid(deck)
     if len(problems) != 1:
         raise RefusedError(f"{deck} has {len(problems)} problems; {command} takes one")
@@ -93,7 +94,7 @@ DECKS = click.argument("decks", nargs=-1, required=True, metavar="DECK...", type
 
 
 def _input(deck: Path) -> Path | BinaryIO:
-    """What to read: a file, or standard input for ``-``."""
+    """Return a file to read, or standard input for ``-``."""
     if deck != DASH:
         return deck
     piped: BinaryIO = getattr(sys.stdin, "buffer", None) or io.BytesIO()
@@ -101,7 +102,10 @@ def _input(deck: Path) -> Path | BinaryIO:
 
 
 def _failures(decks: Sequence[Path], work: Callable[[Path], None]) -> list[Exception]:
-    """Do the work on every deck; return the errors, whose worst exit status is the command's."""
+    """Apply a function to every deck, and return the errors.
+
+    The worst exit status of the errors is the status of the command.
+    """
     failed: list[Exception] = []
     for deck in dict.fromkeys(decks):
         try:
@@ -163,7 +167,7 @@ def check_command(
 
 
 def _print(prepared: LoadedDeck, form: Format, *, brief: bool, passes: bool) -> None:
-    """Print findings and, if there are no errors, a summary, or one line of a deck that passes."""
+    """Print findings and, if there are no errors, a summary or one line."""
     if form is Format.JSON:
         for values in check_loaded(prepared).to_dicts():
             echo_json(values)
@@ -220,7 +224,7 @@ HOME = "https://fecm.readthedocs.io"
 
 
 def _sarif(checked: Mapping[Path, Sequence[Finding]], failures: Sequence[str]) -> dict[str, Any]:
-    """SARIF 2.1.0: findings by deck, and messages about decks that could not be read."""
+    """Return SARIF 2.1.0: findings by deck, and messages about decks that could not be read."""
     # 0.3 ms, for the text of the reader's rules, which only SARIF shows.
     from fecm.problem.findings_page import RULES
 
@@ -259,7 +263,7 @@ def _sarif(checked: Mapping[Path, Sequence[Finding]], failures: Sequence[str]) -
 
 
 def _text(finding: Finding) -> str:
-    """Message and hint in sentences; a hint has a full stop unless it is a question."""
+    """Return message and hint as sentences; a hint gets a full stop unless it is a question."""
     if not finding.hint:
         return finding.message
     stop = "" if finding.hint.endswith((".", "?")) else "."
@@ -267,7 +271,7 @@ def _text(finding: Finding) -> str:
 
 
 def _location(deck: Path, finding: Finding) -> dict[str, Any]:
-    """File and region; without a place the region is the first line."""
+    """Return file and region; without a place the region is the first line."""
     uri = deck.as_uri() if deck.is_absolute() else quote(os.fsencode(deck.as_posix()))
     region: dict[str, Any] = {"startLine": 1}
     if place := finding.place:

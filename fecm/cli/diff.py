@@ -30,7 +30,7 @@ from fecm.results.diff import diff as compare
 
 
 class Tolerances(NamedTuple):
-    """Tolerances, patterns that are left out, and patterns with tolerances of their own."""
+    """Tolerances, patterns that are left out, and patterns with their own tolerances."""
 
     rtol: float | None = None
     atol: float | None = None
@@ -54,7 +54,7 @@ class DiffOptions:
     form: Format
 
     def tolerances(self) -> Tolerances:
-        """Tolerances of the options, and of the file where they give none."""
+        """Return the tolerances of the options, or of the file where the options give none."""
         file = self.file or Tolerances()
         return Tolerances(
             rtol=file.rtol if self.rtol is None else self.rtol,
@@ -65,7 +65,7 @@ class DiffOptions:
 
 
 def _tolerance(name: str, values: object) -> tuple[float, ...]:
-    """Relative tolerance, or relative and absolute tolerance."""
+    """Parse a relative tolerance, or a relative and an absolute tolerance."""
     parts: list[Any] = values if isinstance(values, list) else [values]
     try:
         numbers = tuple(float("" if isinstance(part, bool) else part) for part in parts)
@@ -78,13 +78,13 @@ def _tolerance(name: str, values: object) -> tuple[float, ...]:
 
 
 def _own(text: str) -> tuple[str, tuple[float, ...]]:
-    """Pattern and tolerances of ``PATTERN=RTOL[,ATOL]``."""
+    """Parse pattern and tolerances of ``PATTERN=RTOL[,ATOL]``."""
     pattern, values = assignment(text)
     return pattern, _tolerance(pattern, values.split(","))
 
 
 def _tolerances(text: str) -> Tolerances:
-    """Contents of a tolerance file."""
+    """Parse the contents of a tolerance file."""
     given = parsed_toml(text)
     if unknown := given.keys() - {"rtol", "atol", "exclude", "tol"}:
         raise ValueError(f"{min(unknown)} is unknown; the keys are rtol, atol, exclude and tol")
@@ -194,7 +194,7 @@ def diff_command(options: DiffOptions) -> None:
 
 
 def _by_pattern(own: Iterable[tuple[str, tuple[float, ...]]]) -> dict[str, tuple[float, ...]]:
-    """Tolerances by pattern, in the order in which each was given last."""
+    """Return the tolerances by pattern, in the order in which each was given last."""
     latest: dict[str, tuple[float, ...]] = {}
     for pattern, values in own:
         latest.pop(pattern, None)

@@ -24,9 +24,9 @@ from fecm.sweeps.estimate import estimate_problem
 def estimate_command(deck: Path, form: Format) -> None:
     """Estimate the impact of DECK by quick models, and compare them with the run.
 
-    The infinite plate is for small masses, the static plate for large ones, that of a deck with
-    NONL linear and nonlinear; a model out of its range is marked.  With a DELA segment, velocity
-    and energy are those at which the peak force reaches the delamination threshold.  The models
+    The infinite plate is for small masses. The static plate is for large masses; a deck with NONL
+    has it linear and nonlinear. A model out of its range is marked. With a DELA segment, velocity
+    and energy are the values at which the peak force reaches the delamination threshold. The models
     without a mesh neglect DAMP, and the infinite plate neglects PREL.
     """
     found = estimate_problem(load_single(deck, "estimate"))

@@ -30,7 +30,7 @@ from fecm.cli.options import FILE_PATH, Parsed, typical
 )
 @click.option("--overwrite", is_flag=True, help="Replace an existing FILE.")
 def example_command(name: str | None, output: Path | None, overwrite: bool) -> None:
-    """List the example decks and tables; with NAME, write that one."""
+    """List the example decks and tables, or write the one with NAME."""
     if name is None:
         if output or overwrite:
             raise click.UsageError("give the NAME of an example")

@@ -86,8 +86,8 @@ def export_command(
 ) -> None:
     """Write RESULT, of a run or of a sweep, in the format of another program.
 
-    vtkhdf is one file with one time step per row that DISP stored; csv is a table with a header
-    line.  A sweep has the table cases, with one row per case, and the table history if its forces
+    vtkhdf is one file with one time step per row that DISP stored. csv is a table with a header
+    line. A sweep has the table cases, with one row per case, and the table history if its forces
     are stored.
     """
     if target == "vtkhdf" and dataset is not None:

@@ -1,4 +1,4 @@
-"""``fecm indent``: indentation tests, and the law that follows from them."""
+"""``fecm indent``: indentation tests, and the contact law that follows from them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ PARAMETERS = ("acr", "columns", "units")  # of fits, which messages name
 
 @click.group("indent", cls=HelpGroup)
 def indent_command() -> None:
-    """Indentation tests and the law of contact (the report's chapter 3)."""
+    """Fit, evaluate and list contact laws (the report's chapter 3)."""
 
 
 @dataclass(frozen=True)
@@ -135,7 +135,7 @@ def fit_command(options: FitOptions) -> None:
 
 
 def _law(deck: Path) -> tuple[Deck, Indentation]:
-    """First problem of a deck that has an EXPE segment, and the segment."""
+    """Return the first problem of a deck that has an EXPE segment, and the segment."""
     reader = Reader(load_text(deck)[0])
     problems = [problem.deck for problem in reader.problems() if problem.deck is not None]
     laws = [(one, law) for one in problems if (law := one.last(Indentation)) is not None]
@@ -268,7 +268,7 @@ def _rigidities(options: CurveOptions) -> None:
 def _permanent(
     problem: Deck, card: Indentation, options: CurveOptions
 ) -> tuple[LinearPermanent, YangSunPermanent]:
-    """Permanent indentations of 3-8 and 3-7: of the options, the deck, or the report."""
+    """Return the permanent indentations of 3-8 and 3-7: of the options, the deck, or the report."""
     own = build_constants(card)
     line, alpha_cr = options.line, options.alpha_cr
     if line is None and isinstance(own, LinearPermanent):
@@ -295,14 +295,14 @@ def _report_length(deck: Deck, value: float, name: str, flag: str) -> float:
 
 @dataclass(frozen=True)
 class SphereOptions:
-    """An indenter."""
+    """Options of an indenter."""
 
     radius: float
     e_s: float  # Young's modulus
     nu_s: float  # Poisson's ratio
 
     def coefficient(self, modulus: float) -> float:
-        """Contact coefficient k (equation 3-2) of a solid with a modulus."""
+        """Return the contact coefficient k (equation 3-2) of a solid with a modulus."""
         try:
             return hertz_coefficient(self.radius, self.e_s, self.nu_s, modulus)
         except ValueError as error:
@@ -311,7 +311,7 @@ class SphereOptions:
 
 @dataclass(frozen=True)
 class CardOptions:
-    """Parameters of an EXPE card besides its coefficient."""
+    """Parameters of an EXPE card other than its coefficient."""
 
     alpha_p: float
     s_p: float

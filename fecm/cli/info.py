@@ -88,7 +88,7 @@ def info_command(result: Path, form: Format) -> None:
 
 
 class FileJson(TypedDict):
-    """What is said of every file in JSON."""
+    """File of a run, a sweep or a location in JSON."""
 
     file: str
     size: int
@@ -102,13 +102,13 @@ class FileJson(TypedDict):
 
 
 class TextJson(TypedDict):
-    """A text of a file in JSON."""
+    """Text of a file in JSON."""
 
     lines: int
 
 
 class RunFileJson(FileJson, RunJson):
-    """The file of a run in JSON."""
+    """File of a run in JSON."""
 
     format: Literal[Form.RUN]
     mode: str | None
@@ -116,7 +116,7 @@ class RunFileJson(FileJson, RunJson):
 
 
 class SweepFileJson(FileJson):
-    """The file of a sweep in JSON."""
+    """File of a sweep in JSON."""
 
     format: Literal[Form.SWEEP]
     summary: list[str]
@@ -125,14 +125,14 @@ class SweepFileJson(FileJson):
 
 
 class LocationFileJson(FileJson):
-    """The file of a location in JSON."""
+    """File of a location in JSON."""
 
     format: Literal[Form.LOCATION]
     summary: list[str]
 
 
 def _about(contents: FileContents) -> dict[str, Any]:
-    """What is shown, under the keys of the JSON output."""
+    """Return what is shown, under the keys of the JSON output."""
     if contents.form == Form.SWEEP:
         extent: dict[str, Any] = _about_sweep(contents)
     elif contents.form == Form.LOCATION:
@@ -162,7 +162,7 @@ def _about(contents: FileContents) -> dict[str, Any]:
 
 
 def _about_sweep(contents: FileContents) -> dict[str, Any]:
-    """Number of cases, and the summary."""
+    """Return the number of cases, and the summary."""
     # 48 ms, which the result of a run does not need.
     from fecm.sweeps.result import sweep_of
     from fecm.sweeps.summary import sweep_summary, tables
@@ -174,7 +174,7 @@ def _about_sweep(contents: FileContents) -> dict[str, Any]:
 
 
 def _page(about: Mapping[str, Any]) -> list[str]:
-    """Lines of the text output."""
+    """Return the lines of the text output."""
     rows = [("file", f"{about['file']}, {about['size']} bytes")]
     if about["format"] == Form.SWEEP:
         extent = [("cases", f"{about['cases']}, {about['failed'] or 'none'} failed")]
@@ -212,7 +212,7 @@ def _page(about: Mapping[str, Any]) -> list[str]:
 
 
 def _group(group: Mapping[str, Any]) -> list[str]:
-    """A group, with one line for each of its datasets."""
+    """Return a heading of a group, and one line for each of its datasets."""
     head = printable(group["name"]) or "/"
     if group["description"]:
         head += f": {printable(group['description'])}"
@@ -224,7 +224,7 @@ def _group(group: Mapping[str, Any]) -> list[str]:
 
 
 def _cells(dataset: Mapping[str, Any]) -> tuple[str, ...]:
-    """Name, shape, type, dimension and unit, range."""
+    """Return name, shape, type, dimension and unit, and range."""
     name = dataset["name"].rpartition("/")[2]
     dimension = dataset["dimension"] + (f" ({dataset['unit']})" if dataset["unit"] else "")
     if dataset["different"] is not None:

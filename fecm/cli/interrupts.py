@@ -16,17 +16,18 @@ SIGNALLED = tuple(128 + number for number in SIGNALS)  # exit status after each 
 
 
 class Signals:
-    """Ends the program at SIGINT, SIGTERM and SIGHUP.
+    """Handler that ends the program at SIGINT, SIGTERM and SIGHUP.
 
-    A run looks for a signal between two macros and ends in good order; an exception that a handler
-    raised in the middle of it could be lost in a finaliser.  A second signal ends it at once.
+    A run looks for a signal between two macros and ends in good order. An exception that a handler
+    raised in the middle of a run could be lost in a finaliser. A second signal ends the program at
+    once.
     """
 
     received = 0  # number of the signal that came
     _deferred = _installed = False
 
     def install(self) -> None:
-        """Handle the signals from now on; a SIGHUP that nohup has switched off stays so."""
+        """Handle the signals from now on; a SIGHUP that nohup has switched off stays off."""
         with contextlib.suppress(ValueError):  # only the main thread may do so
             for number in SIGNALS:
                 ignored = signal.getsignal(number) == signal.SIG_IGN
@@ -36,7 +37,7 @@ class Signals:
             sys.unraisablehook = self._unraisable
 
     def restore(self) -> None:
-        """Let the signals end this process at once, as is right where another one clears up."""
+        """Let the signals end this process at once, as another process cleans up."""
         for number in SIGNALS if self._installed else ():
             if signal.getsignal(number) != signal.SIG_IGN:
                 signal.signal(number, signal.SIG_DFL)
@@ -53,7 +54,7 @@ class Signals:
             self.heed()
 
     def _unraisable(self, lost: Any) -> None:
-        """End the program if a finaliser or a callback has swallowed what a handler raised."""
+        """End the program if a finaliser or a callback has swallowed the exception of a handler."""
         if not (self.received and issubclass(lost.exc_type, KeyboardInterrupt | SystemExit)):
             sys.__unraisablehook__(lost)
             return

@@ -1,12 +1,12 @@
-"""Commands that read result files do so in a child process under limits.
+"""Isolation of commands that read result files: a child process under limits.
 
-HDF5 can crash on a damaged file or never return from it, which no exception handler catches.  The
-program forks; the child runs the command under the kernel's limits of memory and processor time,
-and the parent ends as the child does.  A child that a signal ended becomes one line.  Waiting takes
+HDF5 can crash on a damaged file or never return from it, which no exception handler catches. The
+program forks. The child runs the command under the kernel's limits of memory and processor time,
+and the parent ends as the child does. A child that a signal ended becomes one line. Waiting takes
 no processor time and has no limit.
 
-Only Linux: on macOS, libraries that NumPy has loaded may fail after a fork, and Windows has none.
-There the command reads the files in its own process.
+Only Linux has this. On macOS, libraries that NumPy has loaded may fail after a fork, and Windows
+has no fork. There the command reads the files in its own process.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ enabled = False  # `main` turns it on for a process of its own
 
 
 def limits_for(sizes: list[int], free: int | None) -> tuple[int, float]:
-    """Memory (bytes) and processor time (s) of a command that reads files of these sizes.
+    """Return memory (bytes) and processor time (s) of a command that reads files of these sizes.
 
     `free` is the free memory, if known.
     """
@@ -60,7 +60,7 @@ def limits_for(sizes: list[int], free: int | None) -> tuple[int, float]:
 def reads(*names: str) -> Callable[[Command], Command]:
     """Run a command in a child process.
 
-    The parameters of these names are the files to read: a path, or a tuple of paths.
+    `names` are the parameters with the files to read: a path, or a tuple of paths.
     """
 
     def decorate(function: Command) -> Command:
@@ -95,14 +95,14 @@ def reads(*names: str) -> Callable[[Command], Command]:
 
 
 def _size(path: Path) -> int:
-    """Bytes of a file or of a folder's files; 0 if it can't be read, which is reported later."""
+    """Return the bytes of a file or of a folder's files; 0 if they can't be read."""
     with contextlib.suppress(OSError):
         return sum(file.stat().st_size for file in (path.iterdir() if path.is_dir() else [path]))
     return 0
 
 
 def _confine(memory: int, seconds: float) -> None:
-    """Put limits on this process, and take the noise of libraries from standard error."""
+    """Limit this process, and silence the messages of libraries on standard error."""
     import ctypes
     import resource  # not on Windows
 
@@ -120,7 +120,10 @@ def _confine(memory: int, seconds: float) -> None:
 
 
 def _wait(child: int, label: str, seconds: float, folders: Iterable[Path]) -> NoReturn:
-    """Wait for a child and end as it does; a signal leaves no partial files in these folders."""
+    """Wait for a child and end as it does.
+
+    After a signal, the partial files in these folders are removed.
+    """
     status = -1
     try:
         status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])

@@ -1,4 +1,4 @@
-"""Options that describe a laminate, of ``fecm new`` and ``fecm waves``."""
+"""Options that describe a laminate, for ``fecm new`` and ``fecm waves``."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ CORE = "K"  # letter of a core that has no other
 
 @dataclass(frozen=True)
 class LaminateOptions:
-    """Layup and plies; values by the letter of a material, empty for plies without one."""
+    """Layup and plies; values by the letter of a material, empty for plies without a letter."""
 
     layup: Sequence[LayupPly] | None
     ply_thickness: dict[str, float] | None
@@ -47,7 +47,7 @@ class LaminateOptions:
     units: str | None  # system to which a named ply is converted
 
     def one_ply(self) -> Ply | NamedPly:
-        """The ply of one of the two options, of a layup without letters."""
+        """Return the ply of one of the two options, for a layup without letters."""
         if self.ply is not None and self.named is None:
             return Ply(*self.ply)
         if self.ply is not None or self.named is None:
@@ -56,7 +56,7 @@ class LaminateOptions:
 
     @property
     def named(self) -> NamedPly | None:
-        """The named ply of a layup without letters."""
+        """Named ply of a layup without letters."""
         return (self.material or {}).get("")
 
     @property
@@ -76,17 +76,17 @@ class LaminateOptions:
         return [ply.angle for ply in plies]
 
     def constants(self) -> Ply:
-        """Constants of the ply; of a named one in the units."""
+        """Return the constants of the ply; a named ply is converted to the units."""
         chosen = self.one_ply()
         return chosen if isinstance(chosen, Ply) else chosen.converted(self.units or chosen.system)
 
     def authored(
         self, plies: Mapping[str, Ply], cores: Sequence[tuple[str, float]]
     ) -> AuthoredLaminate:
-        """Laminate of one or several materials.
+        """Return a laminate of one or several materials.
 
-        `plies` are constants by name, `cores` names and thicknesses: of a letter, or of a material
-        that has the letter :data:`CORE`.
+        `plies` has constants by name. `cores` has names and thicknesses of a letter, or of a
+        material that has the letter :data:`CORE`.
         """
         materials: dict[str, Ply | NamedPly] = {**(self.material or {}), **plies}
         if self.ply is not None or not materials:
@@ -109,7 +109,7 @@ class LaminateOptions:
 
 
 def as_options(message: str, options: Collection[str]) -> str:
-    """A message with the options in place of the parameters that it quotes."""
+    """Return a message with options in place of the parameters that it quotes."""
     names = "|".join(options)
     name = {"edges": "edge"}
     return re.sub(f"`({names})`", lambda m: "--" + name.get(m[1], m[1]).replace("_", "-"), message)
@@ -118,7 +118,7 @@ def as_options(message: str, options: Collection[str]) -> str:
 def laminate_options(
     *, required: bool, thickness_required: bool = False
 ) -> Callable[[Decorated], Decorated]:
-    """Add the options of a laminate, whose object is the parameter `laminate`."""
+    """Add the options of a laminate, which the command receives as `laminate`."""
     own = "" if thickness_required else "  [default: that of a named ply]"
     return stack_options(
         option(
@@ -170,13 +170,13 @@ def laminate_options(
 
 
 def _lettered(text: str) -> tuple[str, str]:
-    """Letter and value of ``C=VALUE``; the letter is empty without one."""
+    """Return letter and value of ``C=VALUE``; the letter is empty without one."""
     match = re.fullmatch(rf"\s*({LETTER})\s*=\s*(.*)", text)
     return (match[1], match[2]) if match else ("", text)
 
 
 def _thickness(text: str) -> tuple[str, float]:
-    """Read a thickness, perhaps with a letter."""
+    """Parse a thickness, perhaps with a letter."""
     letter, value = _lettered(text)
     return letter, float(POSITIVE.convert(value, None, None))
 
@@ -184,14 +184,14 @@ def _thickness(text: str) -> tuple[str, float]:
 def _by_letter(
     context: click.Context, parameter: click.Parameter, given: Iterable[tuple[str, float]]
 ) -> dict[str, float] | None:
-    """Callback of values by letter; None if there are none."""
+    """Collect the values by letter; None without values."""
     return unique(given, context, parameter) or None
 
 
 def unique(
     given: Iterable[tuple[str, T]], context: click.Context, parameter: click.Parameter
 ) -> dict[str, T]:
-    """Values by name, none of which is given twice."""
+    """Return values by name; each name may occur once."""
     found: dict[str, T] = {}
     for name, value in given:
         if name in found:
@@ -204,7 +204,7 @@ def unique(
 def _named(
     context: click.Context, parameter: click.Parameter, names: Sequence[str]
 ) -> dict[str, NamedPly] | None:
-    """Callback of --material: the plies of names, by letter; None if there are none."""
+    """Collect the plies of --material by letter; None without plies."""
     plies: dict[str, NamedPly] = MATERIALS | context.meta[_META]
     given = [("", name) if name in plies else _lettered(name) for name in names]
     found = {

@@ -134,7 +134,7 @@ class NewOptions:
     failure: int | None
 
     def plate(self, given: Collection[str]) -> Plate:
-        """Mesh and supports; `given` are the options on the command line."""
+        """Return mesh and supports; `given` are the options on the command line."""
         if self.fixture:
             return self._plate_on_fixture(self.fixture, given)
         if isinstance(self.mesh, Path):
@@ -154,7 +154,7 @@ class NewOptions:
         )
 
     def _plate_on_fixture(self, fixture: str, given: Collection[str]) -> Plate:
-        """Plate on a fixture, which has its own size and supports."""
+        """Return a plate on a fixture, which has its own size and supports."""
         for name in FIXED:
             if name in given:
                 raise ObjectError(f"`fixture` has its own plate and supports; leave out `{name}`")
@@ -411,7 +411,10 @@ def new_command(options: NewOptions) -> None:
 
 
 def _author(options: NewOptions, given: Collection[str]) -> Authored:
-    """Deck of the options of ``fecm new``; `given` are those on the command line."""
+    """Return the deck of the options of ``fecm new``.
+
+    `given` has the options on the command line.
+    """
     plate = options.plate(given)
     prescribed = plate.fixture is not None and plate.fixture.test is not None
     law, contact = options.law, options.contact
@@ -455,7 +458,7 @@ def _author(options: NewOptions, given: Collection[str]) -> Authored:
 
 
 def _rows_of_plies(given: tuple[int, ...] | None) -> RowsOfPlies | None:
-    """Steps between rows of ply stresses, and perhaps the number of elements."""
+    """Return the steps between rows of ply stresses, and perhaps the number of elements."""
     if given is None:
         return None
     steps, *elements = given
@@ -463,7 +466,7 @@ def _rows_of_plies(given: tuple[int, ...] | None) -> RowsOfPlies | None:
 
 
 def _additions(deck: Deck) -> list[str]:
-    """Say what a deck has, unasked, besides the cards of the report's program."""
+    """List what a deck has by default besides the cards of the report's program."""
     parts: list[str] = []
     options: list[str] = []
     if (patch := deck.last(Patch)) is not None:

@@ -1,4 +1,4 @@
-"""Texts of the options of ``fecm new``; ValueError says what is wrong with one."""
+"""Parsers of the options of ``fecm new``. ValueError says what is wrong."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PROJECTILES: dict[str, tuple[str, Callable[..., Rod | RigidMass]]] = {
 
 
 def projectile(text: str) -> Rod | RigidMass:
-    """Read a rigid mass or a cylindrical rod."""
+    """Parse a rigid mass or a cylindrical rod."""
     kind, _, values = text.partition(":")
     if kind not in PROJECTILES:
         raise ValueError(f"{text!r} is not mass:M or rod:LENGTH,DIAMETER,E,DENSITY")
@@ -36,7 +36,7 @@ def projectile(text: str) -> Rod | RigidMass:
 
 
 def contact(text: str) -> NamedContact | Sphere:
-    """Named contact, or a sphere whose k is estimated."""
+    """Parse a named contact, or a sphere whose k is estimated."""
     word, _, values = text.partition(":")
     if word == "estimate":
         return Sphere(*(list_of(ESTIMATE, POSITIVE, [1, 3])(values) if values else ()))
@@ -46,7 +46,7 @@ def contact(text: str) -> NamedContact | Sphere:
 
 
 def mesh_of_text(text: str) -> tuple[int, int] | Path:
-    """Numbers of elements, or the file of a mesh."""
+    """Parse numbers of elements, or the file of a mesh."""
     if re.fullmatch(r"[\s\d.+-]+[xX×][\s\d.+-]+", text):
         counts = list_of("14x10", click.IntRange(1, MOST), [2], "[xX×]")(text)
         return counts[0], counts[1]
@@ -57,7 +57,7 @@ def mesh_of_text(text: str) -> tuple[int, int] | Path:
 
 
 def ply_of(text: str) -> tuple[str, Ply]:
-    """Name and constants of a material."""
+    """Parse name and constants of a material."""
     name, equals, values = text.partition("=")
     if not (name and equals):
         raise ValueError(f"{text!r} is not NAME=RHO,NU12,E1,E2,G12,G13,G23")
@@ -65,7 +65,7 @@ def ply_of(text: str) -> tuple[str, Ply]:
 
 
 def core(text: str) -> tuple[str, float]:
-    """Name and thickness of a core."""
+    """Parse name and thickness of a core."""
     name, _, thickness = text.rpartition(":")
     if not name:
         raise ValueError(f"{text!r} is not NAME:T, as in Divinycell-H60:10")
@@ -73,7 +73,7 @@ def core(text: str) -> tuple[str, float]:
 
 
 def zone(text: str) -> Zone:
-    """Rectangle or group of a zone, and its layup."""
+    """Parse the rectangle or group of a zone, and its layup."""
     place, _, layup = text.rpartition(":")
     if not place:
         raise ValueError(f"{text!r} is not X0,Y0,X1,Y1:LAYUP or GROUP:LAYUP")
@@ -84,7 +84,7 @@ def zone(text: str) -> Zone:
 
 
 def shear_factor(text: str) -> float | str:
-    """Read a factor, or the word for the stiffness from equilibrium."""
+    """Parse a factor, or the word for the stiffness from equilibrium."""
     try:
         return text if text == EQUI else float(text)
     except ValueError:

@@ -40,10 +40,10 @@ def stack_options(*options: Callable[[Decorated], Decorated]) -> Callable[[Decor
 
 
 def collected(kind: type, name: str = "options") -> Callable[[Decorated], Decorated]:
-    """Pass options of a command to its function as one object, an instance of a dataclass.
+    """Pass options of a command to its function as an instance of a dataclass.
 
-    The fields of the dataclass have the names of the options and arguments.  The object is the
-    parameter `name`; values that are no fields stay parameters.
+    The fields of the dataclass have the names of the options and arguments. The object is the
+    parameter `name`. Values that are not fields stay parameters.
     """
     own = [field.name for field in fields(kind)]
 
@@ -59,7 +59,7 @@ def collected(kind: type, name: str = "options") -> Callable[[Decorated], Decora
 
 
 def job_options(job: Any, **settings: Mapping[str, Any]) -> Callable[[Decorated], Decorated]:
-    """Options of a job (see :mod:`fecm._options`), in one mapping, the parameter `options`.
+    """Add the options of a job (see :mod:`fecm._options`) as one mapping, the parameter `options`.
 
     `settings` of click, such as the type, complete or replace those of some options.
     """
@@ -79,7 +79,7 @@ def job_options(job: Any, **settings: Mapping[str, Any]) -> Callable[[Decorated]
 
 
 def _click_option(name: str, about: Option, default: Any, settings: Mapping[str, Any]) -> Any:
-    """Option of click for an option of a job."""
+    """Return the option of click for an option of a job."""
     flags = [about.flag or f"--{name.replace('_', '-')}"]
     if about.flag == "-o":
         flags.append("--output")
@@ -100,7 +100,7 @@ def _click_option(name: str, about: Option, default: Any, settings: Mapping[str,
 
 
 def groups_of(job: Any, own: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
-    """Options of a job by the headings of the help page, before those of the command itself."""
+    """Return the options of a job by headings of the help page, before the command's own groups."""
     groups: dict[str, list[str]] = {title: [] for title in own}
     for name, (about, _) in declared_options(job).items():
         if about.group:
@@ -109,7 +109,7 @@ def groups_of(job: Any, own: Mapping[str, Sequence[str]]) -> dict[str, list[str]
 
 
 class NamedFile(click.Path):
-    """Path of a file or folder, which is no standard stream."""
+    """Path of a file or folder; standard streams are refused."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Refuse -, and convert any other path."""
@@ -128,12 +128,12 @@ WITH_UNIT = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?\s*[a-zA-Zµμ/]*[
 
 
 class Finite(click.FloatRange):
-    """A float in a range; never infinite, never NaN."""
+    """Finite float in a range."""
 
     name = "number"
 
     def convert(self, value: Any, param: Any, ctx: Any) -> float:
-        """Read a number."""
+        """Parse a number."""
         if isinstance(value, str) and WITH_UNIT.fullmatch(value.strip()):  # 5.5kg
             message = f"{value!r} has a unit; give the number alone, in the deck's units"
             self.fail(message, param, ctx)
@@ -143,7 +143,7 @@ class Finite(click.FloatRange):
         return number
 
     def _describe_range(self) -> str:
-        """Range on help pages; empty without bounds."""
+        """Format a range for help pages; empty without bounds."""
         return "" if self.min is None and self.max is None else super()._describe_range()
 
 
@@ -152,10 +152,10 @@ NOT_NEGATIVE = Finite(min=0.0)
 
 
 class Parsed(click.ParamType):  # type: ignore[type-arg]
-    """Result of a function of the text, whose ValueError is the message of the option.
+    """Result of a parser of the text. Its ValueError is the message of the option.
 
-    The form, as in ``X,Y``, is for help pages, the values for the shell's completion: of the whole
-    text, or of the part after the last comma of a list.
+    The form, as in ``X,Y``, is for help pages. The values are for the shell's completion of the
+    whole text, or of the part after the last comma of a list.
     """
 
     name = "text"
@@ -166,11 +166,11 @@ class Parsed(click.ParamType):  # type: ignore[type-arg]
         self._function, self._form, self._values = function, form, values
 
     def get_metavar(self, *_: Any, **__: Any) -> str:
-        """Form of the value."""
+        """Return the form of the value."""
         return self._form
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """Read the text."""
+        """Parse the text."""
         try:
             return self._function(value)
         except ValueError as error:
@@ -191,10 +191,10 @@ class Parsed(click.ParamType):  # type: ignore[type-arg]
 
 
 class OneOf(click.Choice):  # type: ignore[type-arg]
-    """One of many names; the message about another one says which is similar."""
+    """One of many names. The message about another name suggests a similar one."""
 
     def convert(self, value: Any, param: Any, ctx: Any) -> Any:
-        """Read the name."""
+        """Look up the name."""
         if hint := value not in self.choices and did_you_mean(value, map(str, self.choices)):
             self.fail(f"there is no {value!r}{hint}", param, ctx)
         return super().convert(value, param, ctx)
@@ -209,19 +209,19 @@ LAW_OPTION = click.option(
 
 
 class Member(click.Choice):  # type: ignore[type-arg]
-    """A member of an enumeration of texts, given by its value."""
+    """Member of an enumeration of texts, given by its value."""
 
     def __init__(self, members: Sequence[StrEnum]) -> None:
         super().__init__([member.value for member in members])
         self._members = members
 
     def convert(self, value: Any, param: Any, ctx: Any) -> StrEnum:
-        """Read the value."""
+        """Look up the value."""
         return self._members[self.choices.index(super().convert(value, param, ctx))]
 
 
 def list_of(form: str, item: Any, counts: Sequence[int] = (), separator: str = ",") -> Parsed:
-    """Type of a tuple of values of a type, in any number but 0 or in one of the `counts`.
+    """Return the type of a non-empty tuple of values, with one of the `counts` if given.
 
     The separator is a regular expression.
     """
@@ -241,7 +241,7 @@ def list_of(form: str, item: Any, counts: Sequence[int] = (), separator: str = "
 
 
 def file_of(parse: Callable[[str], Any]) -> Parsed:
-    """Type of a file's path whose value is what a function makes of the text in the file."""
+    """Return the type of a file's path whose value is the parsed text of the file."""
 
     def read(path: str) -> Any:
         try:
@@ -258,7 +258,7 @@ SYSTEM = Parsed(system_named, "SYSTEM", NAMES)
 
 
 def assignment(text: str) -> tuple[str, str]:
-    """Read a name and a value with an equals sign between them."""
+    """Parse a name and a value with an equals sign between them."""
     name, _, value = (part.strip() for part in text.partition("="))
     if not name or not value:
         raise ValueError(f"{text!r} is not of the form NAME=VALUE")
@@ -266,7 +266,7 @@ def assignment(text: str) -> tuple[str, str]:
 
 
 class Format(StrEnum):
-    """Form of a command's output."""
+    """Output format of a command."""
 
     TEXT = "text"
     JSON = "json"
@@ -283,7 +283,7 @@ MODE_OPTION = click.option(
 
 
 def format_option(*formats: Format, about: str) -> Callable[[Decorated], Decorated]:
-    """``--format``, whose value is the parameter `form`."""
+    """Return the option ``--format``, whose value is the parameter `form`."""
     return click.option(
         "--format",
         "form",
@@ -314,12 +314,12 @@ UNITS_OPTION = click.option(
 
 
 def typical(*calls: str) -> str:
-    """End of a help page: typical calls of a command, most of them with the example files."""
+    """Return the end of a help page: typical calls, most of them with the example files."""
     return "\n".join(["\b", "Typical calls:", *(f"  {call}" for call in calls)])
 
 
 class HelpGroup(click.Group):
-    """A group that lists the whole first sentence of each of its commands."""
+    """Group that lists the whole first sentence of each of its commands."""
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands."""
@@ -329,10 +329,10 @@ class HelpGroup(click.Group):
 
 
 class GroupedCommand(click.Command):
-    """A command whose help page has its options in groups.
+    """Command whose help page has its options in groups.
 
-    Groups are titles with the names of parameters, in the order of the page; what is in no group
-    comes last.
+    Groups are titles with the names of parameters, in the order of the page. Options without a
+    group come last.
     """
 
     def __init__(

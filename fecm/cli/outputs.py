@@ -56,7 +56,7 @@ def outputs(source: str = "", *, table: bool = True) -> Callable[[Decorated], De
 
 
 class OutputPaths:
-    """Files of a table, ``-`` for standard output, and its picture, checked before all else."""
+    """Files of a table, ``-`` for standard output, and its picture, checked first."""
 
     def __init__(
         self, table: Path, picture: Path | None, overwrite: bool, *sources: Path | None
@@ -70,7 +70,10 @@ class OutputPaths:
         check_outputs(files, overwrite, [source for source in sources if source])
 
     def draw(self, place: str, *data: Any) -> None:
-        """Write the picture that a function of :mod:`fecm.plot`, ``module:name``, makes of data."""
+        """Write the picture that a function of :mod:`fecm.plot` draws from data.
+
+        The function is named ``module:name``.
+        """
         if self.picture is not None:
             save_picture(imported(place)(*data), self.picture, overwrite=self._overwrite)
             note(f"drew {self.picture}")
@@ -78,10 +81,10 @@ class OutputPaths:
     def write(
         self, columns: Mapping[str, str], units: dict[str, str], rows: Iterable[Iterable[object]]
     ) -> None:
-        """Write the table as CSV, the units after the names in the header.
+        """Write the table as CSV, with units after the names in the header.
 
-        `columns` has the dimension of each column, empty for pure numbers and texts; `units` are
-        the names of the units of length, force and time, empty if they are not known.
+        `columns` has the dimension of each column, empty for pure numbers and texts. `units` has
+        the names of the units of length, force and time, and is empty if they are not known.
         """
         header = [
             column_name(name, unit_of(dimension, units)) for name, dimension in columns.items()

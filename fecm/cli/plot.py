@@ -45,7 +45,7 @@ _KIND_HELP = "; ".join(f"{name}: {kind.summary}" for name, kind in KINDS.items()
 
 
 def _by_name(_: Any, __: Any, pairs: tuple[tuple[str, str], ...]) -> dict[str, str]:
-    """Values by name."""
+    """Return values by name."""
     values = dict(pairs)
     if len(values) < len(pairs):
         raise click.BadParameter("a name is given twice")
@@ -54,7 +54,7 @@ def _by_name(_: Any, __: Any, pairs: tuple[tuple[str, str], ...]) -> dict[str, s
 
 @dataclass(frozen=True)
 class PlotOptions:
-    """Options of kinds of pictures, with the names that their functions give them."""
+    """Options of kinds of pictures, under the names of their functions."""
 
     at: tuple[tuple[float, float], ...]
     gages: tuple[float, ...] | None
@@ -74,7 +74,7 @@ class PlotOptions:
     level: tuple[float, ...] | None
 
     def given(self) -> dict[str, Any]:
-        """Those that are given, by name."""
+        """Return the options that are given, by name."""
         return {name: value for name, value in vars(self).items() if value}
 
 
@@ -227,7 +227,7 @@ def plot_command(
 
 
 def _usual(first: Result | SweepResult | Location) -> PictureKind:
-    """Kind of picture that is drawn unless others are asked for."""
+    """Return the kind of picture that is drawn by default."""
     if isinstance(first, Result):
         return PictureKind.FORCE
     # 46 ms, which results of runs do not need.
@@ -239,7 +239,7 @@ def _usual(first: Result | SweepResult | Location) -> PictureKind:
 
 
 def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path]:
-    """Path of each picture, by kind."""
+    """Return the path of each picture, by kind."""
     is_folder = output is None or output.is_dir() or not (output.exists() or output.suffix)
     if output is not None and not is_folder:
         if len(kinds) > 1:
@@ -251,7 +251,7 @@ def _paths(first: Path, kinds: list[str], output: Path | None) -> dict[str, Path
 
 
 def named(paths: tuple[Path, ...]) -> dict[str, Path]:
-    """Paths of results by their shortest distinct names."""
+    """Return paths of results by their shortest distinct names."""
     names = [printable(path.stem) for path in paths]
     if len(set(names)) < len(names):
         names = [printable(str(path)) for path in paths]
@@ -261,7 +261,7 @@ def named(paths: tuple[Path, ...]) -> dict[str, Path]:
 
 
 def run_or_sweep(contents: FileContents) -> Result | SweepResult:
-    """The result of a run, or of a sweep without its forces."""
+    """Return the result of a run, or of a sweep without its forces."""
     if contents.form == Form.RUN:
         return result_of(contents)
     # 46 ms, which results of runs do not need.
@@ -271,7 +271,7 @@ def run_or_sweep(contents: FileContents) -> Result | SweepResult:
 
 
 def _loaded(contents: FileContents) -> Result | SweepResult | Location:
-    """The result of a run or a sweep, or a located impact."""
+    """Return the result of a run or a sweep, or a location."""
     if contents.form != Form.LOCATION:
         return run_or_sweep(contents)
     # 12 ms, which other results do not need.
@@ -285,7 +285,10 @@ def _draw(
     kinds: list[str],
     options: Mapping[str, Any],
 ) -> tuple[dict[str, Picture], dict[str, LackingError]]:
-    """Draw all pictures before writing any; the pictures, and why others are not drawn, by kind."""
+    """Draw all pictures before writing any.
+
+    Returns the pictures, and by kind the reasons why others are not drawn.
+    """
     pictures, lacking = {}, {}
     with progress("fecm", len(kinds)) as advance, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")

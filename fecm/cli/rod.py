@@ -51,10 +51,10 @@ FILTER_HELP = (
 
 
 class _PulseGroup(HelpGroup):
-    """A group whose default command is ``pulse``."""
+    """Group whose default command is ``pulse``."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        """Insert the default command's name if there is none."""
+        """Insert the default command's name if the call names no command."""
         if args and args[0] not in self.commands and args[0] not in ("-h", "--help"):
             args = ["pulse", *args]
         return super().parse_args(ctx, args)
@@ -62,7 +62,7 @@ class _PulseGroup(HelpGroup):
 
 @click.group("rod", cls=_PulseGroup)
 def rod_command() -> None:
-    """The projectile's rod by itself: response to a pulse, filters, calibration.
+    """Compute with the rod alone: response to a pulse, filters, calibration.
 
     `fecm rod [DECK] --pulse ...` is short for `fecm rod pulse [DECK] --pulse ...`.
     """
@@ -70,7 +70,7 @@ def rod_command() -> None:
 
 @dataclass(frozen=True)
 class Shape:
-    """A uniform rod, and the system of its units."""
+    """Uniform rod, and the system of its units."""
 
     length: float | None
     modulus: float | None
@@ -80,7 +80,7 @@ class Shape:
     units: str | None
 
     def given(self) -> list[str]:
-        """Names of the options that are given."""
+        """Return the names of the options that are given."""
         return [name for name, value in vars(self).items() if value is not None]
 
 
@@ -198,7 +198,7 @@ def pulse(options: PulseOptions) -> None:
 
 
 def _uniform(shape: Shape) -> Struck:
-    """The rod of the options."""
+    """Return the rod of the options."""
     length, modulus, density, diameter = shape.length, shape.modulus, shape.density, shape.diameter
     if length is None or modulus is None or density is None or diameter is None:
         needed = ("length", "modulus", "density", "diameter")
@@ -209,7 +209,7 @@ def _uniform(shape: Shape) -> Struck:
 
 
 def _of_deck(options: PulseOptions) -> Struck:
-    """The rod of the first problem of a deck."""
+    """Return the rod of the first problem of a deck."""
     deck, given = options.deck, options.shape.given()
     assert deck is not None
     if given:

@@ -51,7 +51,7 @@ GROUPS: dict[str, list[str]] = {
 
 
 class ProblemRunJson(RunJson):
-    """The run of a problem in JSON."""
+    """Run of a problem in JSON."""
 
     title: str
     result: str
@@ -116,7 +116,7 @@ def run_command(
 
 
 def _run_and_print(job: ProblemRun, form: Format) -> list[tuple[str, float]]:
-    """Run a problem and print what came out; return its largest exposures with their names."""
+    """Run a problem and print its summary; return its largest exposures with their names."""
     path, title = job.path, job.problem.deck.title
     with (
         signals.deferred(),
@@ -146,7 +146,7 @@ def _run_and_print(job: ProblemRun, form: Format) -> list[tuple[str, float]]:
 
 @contextlib.contextmanager
 def _messages(path: Path | None) -> Iterator[None]:
-    """Say in the errors of a run that its result was not written."""
+    """Add to the errors of a run that its result was not written."""
     end = f"; {path} was not written"
     try:
         yield

@@ -1,8 +1,8 @@
 """Standard streams whose errors do not disturb a command.
 
-Nothing that happens to standard error disturbs a command.  Standard output raises its first error,
-remembers it, and drops what follows: the command's exit status then says that something was not
-printed.  Characters that an encoding lacks are escaped.
+Errors of standard error are ignored. Standard output raises its first error, remembers it, and
+drops what follows: the command's exit status then says that something was not printed. Characters
+that an encoding lacks are escaped.
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ from typing import TextIO
 
 
 class _Guarded(io.FileIO):
-    """A stream that remembers its first error of writing and drops what follows."""
+    """Stream that remembers its first error of writing and drops what follows."""
 
     error: OSError | None = None
 
@@ -24,7 +24,7 @@ class _Guarded(io.FileIO):
         self._raises = raises
 
     def write(self, data: object) -> int:
-        """Write bytes; return their number."""
+        """Write bytes, and return their number."""
         view = memoryview(data)  # type: ignore[arg-type]
         if self.error is None:
             try:
@@ -40,7 +40,7 @@ _guarded: list[_Guarded] = []  # the standard output, once it is guarded
 
 
 def guard_streams() -> None:
-    """Guard the standard streams of this process; streams that a caller has put there stay."""
+    """Guard the standard streams of this process; replaced streams stay as they are."""
     # In order, as each takes the lowest free number.  No other file may get such a number, or what
     # is printed would go there.  A write to what is open for reading fails.
     for number, flags in enumerate((os.O_RDONLY, os.O_RDONLY, os.O_WRONLY)):
@@ -56,12 +56,12 @@ def guard_streams() -> None:
 
 
 def standard_error(number: int, like: TextIO | None) -> TextIO:
-    """A guarded text stream to an open file, in the encoding of another stream."""
+    """Return a guarded text stream to an open file, in the encoding of another stream."""
     return _text(_Guarded(number, raises=False), like, line_buffering=True)
 
 
 def _is_own(stream: TextIO | None, number: int) -> bool:
-    """Whether a stream is the process's own, or was closed before the process began."""
+    """Return whether a stream is the process's own, or was closed before the process began."""
     if stream is None:
         return True
     try:
@@ -79,7 +79,7 @@ def _text(raw: _Guarded, like: TextIO | None, *, line_buffering: bool = False) -
 
 
 def output_error() -> OSError | None:
-    """Print what is still buffered; the first error of standard output, if there was one."""
+    """Print what is still buffered, and return the first error of standard output, if any."""
     with contextlib.suppress(OSError, ValueError):
         sys.stdout.flush()
     return _guarded[0].error if _guarded else None

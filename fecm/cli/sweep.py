@@ -55,7 +55,7 @@ GROUPS: dict[str, list[str]] = {
 
 
 def _texts(form: str) -> dict[str, Any]:
-    """Settings of an option of several texts of a form, which the sweep reads."""
+    """Return the settings of an option that takes several texts, which the sweep parses."""
     return {"type": Parsed(str, form, NAMED), "multiple": True}
 
 
@@ -180,7 +180,7 @@ def _print(result: SweepResult, job: Sweep) -> None:
 
 
 class _EndingWatch(TerminalWatch):
-    """Lets a signal end the program at once; notes wait for the end of the run."""
+    """Watch that lets a signal end the program at once; notes wait for the end of the run."""
 
     def stops(self) -> bool:
         """End the program if a signal came."""

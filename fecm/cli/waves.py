@@ -37,7 +37,7 @@ MOST = 1_000_000  # rows of a table; more are certainly a typo
 
 
 def _wavelengths(text: str) -> tuple[float, ...]:
-    """Read FROM:TO:N, wavelengths at equal distances."""
+    """Parse FROM:TO:N, wavelengths at equal distances."""
     parts = text.split(":")
     try:
         first, last, count = float(parts[0]), float(parts[1]), int(parts[2])
@@ -54,12 +54,12 @@ def _wavelengths(text: str) -> tuple[float, ...]:
 
 
 def _joined(_: Any, __: Any, lists: tuple[tuple[Any, ...], ...]) -> tuple[Any, ...]:
-    """Callback of a repeated option of lists: join them, without repeated values."""
+    """Join the values of a repeated option of lists, each value once."""
     return tuple(dict.fromkeys(chain(*lists)))
 
 
 class _ListCommand(click.Command):
-    """A command whose repeated options also take several values: ``--time 2e-6 4e-6``."""
+    """Command whose repeated options also take several values: ``--time 2e-6 4e-6``."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Put the option before every further number that follows one of these options."""
@@ -81,7 +81,7 @@ class _ListCommand(click.Command):
 
 
 def _is_number(text: str) -> bool:
-    """Whether a text is a number, or several with commas between them."""
+    """Return whether a text is a number, or several with commas between them."""
     try:
         list(map(float, text.split(",")))
     except ValueError:
@@ -91,14 +91,14 @@ def _is_number(text: str) -> bool:
 
 @dataclass(frozen=True)
 class LaminateSource:
-    """Where a laminate comes from: a deck, or options."""
+    """Source of a laminate: a deck, or options."""
 
     deck: Path | None
     laminate: LaminateOptions
     shear_factor: float
 
     def waves(self) -> Waves:
-        """Waves in the laminate."""
+        """Return the waves in the laminate."""
         if self.deck is not None:
             found = self._of_deck(self.deck)
         elif self.laminate.layup is None:
@@ -114,7 +114,7 @@ class LaminateSource:
         return found
 
     def _of_deck(self, deck: Path) -> Waves:
-        """Waves in the laminate of a deck's first problem."""
+        """Return the waves in the laminate of a deck's first problem."""
         for name, value in vars(self.laminate).items():
             if value is not None:
                 given = name.replace("_", "-")
@@ -153,14 +153,14 @@ STEP = option(
 
 
 def _normals(step: float) -> list[float]:
-    """Angles from 0 to 360 degrees."""
+    """Return angles from 0 to 360 degrees."""
     count = math.floor(360.0 / step * (1.0 + 1e-12))
     return [n * step for n in range(count)] + [min(360.0, count * step)]
 
 
 @click.group("waves", cls=HelpGroup)
 def waves_command() -> None:
-    """Waves in the laminate of a DECK, or of a layup: the report's chapter 2, for any laminate."""
+    """Compute waves in the laminate of a DECK, or of a layup (the report's chapter 2)."""
 
 
 @waves_command.command(
@@ -196,7 +196,7 @@ def dispersion_command(
     source: LaminateSource,
     targets: OutputPaths,
 ) -> None:
-    """Phase velocity and frequency of all modes against wavelength (figures 2.4, 2.5)."""
+    """Write phase velocity and frequency of all modes by wavelength (figures 2.4, 2.5)."""
     _bound(5 * len(angles) * len(wavelengths))
     waves = source.waves()
     curves = [waves.dispersion(angle, wavelengths) for angle in angles]
@@ -232,7 +232,7 @@ def dispersion_command(
 @STEP
 @_SHARED
 def speeds(step: float, source: LaminateSource, targets: OutputPaths) -> None:
-    """Normal velocities of the five wave fronts (figures 2.7, 2.8)."""
+    """Write the normal velocities of the five wave fronts (figures 2.7, 2.8)."""
     _bound(360.0 / step)
     waves = source.waves()
     fronts = waves.fronts(_normals(step))
@@ -274,7 +274,7 @@ def fronts(
     source: LaminateSource,
     targets: OutputPaths,
 ) -> None:
-    """Front positions and rays (figures 2.9 to 2.12); cusps go to standard error."""
+    """Write front positions and rays (figures 2.9 to 2.12); cusps go to standard error."""
     _bound(5 * len(times) * 360.0 / step)
     waves = source.waves()
     start = waves.thickness if radius is None else radius

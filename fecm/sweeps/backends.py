@@ -1,7 +1,7 @@
-"""Back ends of a sweep: what computes impacts on one plate.
+"""Back ends of a sweep, which compute impacts on one plate.
 
 A linear plate is stepped once under a unit force, and every impact follows by convolution with its
-response.  A nonlinear plate is run in full for each impact, or reduced to some bending modes.
+response. A nonlinear plate is run in full for each impact, or reduced to some bending modes.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ def backend_of(
     modes: int | None = None,
     history: bool = True,
 ) -> Backend:
-    """Return what computes impacts on the plate of a problem, in bending modes if they are given.
+    """Return the back end for the plate of a problem, in bending modes if `modes` is given.
 
     Forces are kept with `history`.
     """
@@ -61,7 +61,7 @@ def backend_of(
 
 @dataclass
 class ImpulseResponse:
-    """A linear plate: stepped once under a unit force; every impact by convolution."""
+    """Back end for a linear plate, stepped once under a unit force; impacts by convolution."""
 
     problem: Problem
     measures: Sequence[Measure] = ()
@@ -91,7 +91,7 @@ class ImpulseResponse:
         )
 
     def lengthened(self, factor: int) -> ImpulseResponse:
-        """Return the back end of a run so many times as long."""
+        """Return the back end of a run `factor` times as long."""
         if factor == 1:
             return self
         if factor not in self._longer:
@@ -102,7 +102,7 @@ class ImpulseResponse:
 
 @dataclass
 class BendingModes:
-    """A nonlinear plate in some bending modes; impacts are advanced together."""
+    """Back end for a nonlinear plate in some bending modes; impacts are advanced together."""
 
     problem: Problem
     measures: Sequence[Measure]
@@ -117,7 +117,7 @@ class BendingModes:
         return reduced(self.problem, self.modes)
 
     def outcomes(self, impacts: Impacts, *, judged: bool = True) -> Outcome:
-        """Compute impacts; those with the same halvings of the time step together."""
+        """Compute impacts, together if their time steps are halved as often."""
         parts = []
         for times, rows in by_halvings(self.plate, impacts).items():
             plate, some = self.plate.halved(times), impacts.select(rows)
@@ -129,13 +129,13 @@ class BendingModes:
         return merge(parts)
 
     def lengthened(self, factor: int) -> BendingModes:
-        """Return the back end of a run so many times as long."""
+        """Return the back end of a run `factor` times as long."""
         return replace(self, problem=lengthened(self.problem, factor)) if factor != 1 else self
 
 
 @dataclass
 class FullRuns:
-    """Any plate: one full run for each impact."""
+    """Back end for any plate: one full run for each impact."""
 
     problem: Problem
     measures: Sequence[Measure] = ()
@@ -160,7 +160,7 @@ class FullRuns:
         )
 
     def lengthened(self, factor: int) -> FullRuns:
-        """Return the back end of a run so many times as long."""
+        """Return the back end of a run `factor` times as long."""
         return replace(self, problem=lengthened(self.problem, factor)) if factor != 1 else self
 
 
@@ -201,7 +201,7 @@ def _plate_response(checked: Problem, *, gages: bool) -> PlateResponse:
 
 
 class _ByKind(NamedTuple):
-    """Impacts with those of the same projectile next to one another."""
+    """Impacts sorted by the kind of their projectile."""
 
     numbers: list[int]
     hits: Hits
@@ -234,7 +234,7 @@ def _outcome_together(
     *,
     history: bool,
 ) -> Outcome:
-    """Compute impacts on a plate; if judged, those with doubtful energies in full."""
+    """Compute impacts on a plate; if judged, impacts with doubtful energies in full."""
     steps, dt = plate.steps, plate.dt
     require_memory(ADVANCED_BYTES * steps * len(given), f"{len(given)} cases of {steps} steps")
     with np.errstate(all="ignore"):

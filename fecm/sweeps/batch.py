@@ -1,4 +1,4 @@
-"""Computes the tasks of a sweep: cases of one plate, or single cases."""
+"""Computation of the tasks of a sweep: cases of one plate, or single cases."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from fecm.sweeps.search import LONGER, Sought, search
 
 
 def run_task(task: Task) -> Outcome:
-    """Compute the cases of a task; a case that can't be computed becomes a row with the reason."""
+    """Compute the cases of a task; the status of a failed case is the reason."""
     settings = task.settings
     cases = list(zip(task.numbers, task.cases, strict=True))
     if settings.shares_motion and len(cases) > 1:
@@ -79,14 +79,14 @@ def _plate(
     modes: int | None,
     history: bool,
 ) -> tuple[Problem, Backend]:
-    """The problem of a plate, given by values of names, and what computes impacts on it."""
+    """Return the problem of a plate, given by values of names, and its back end."""
     case: Case = dict(of_plate)
     problem = with_clock(apply_case(deck, case), clock, case)
     return problem, backend_of(problem, measures, modes=modes, history=history)
 
 
 def _outcome(settings: Settings, problem: Problem, backend: Backend, impacts: Impacts) -> Outcome:
-    """Compute impacts on a plate, or search their velocities."""
+    """Compute impacts on a plate, or find their velocities."""
     if settings.search is None:
         outcome = backend.outcomes(impacts)
         return _lengthened(outcome, backend, impacts, settings) if backend.lengthens else outcome
@@ -97,7 +97,7 @@ def _outcome(settings: Settings, problem: Problem, backend: Backend, impacts: Im
 
 
 def _levels(settings: Settings, problem: Problem, impacts: Impacts) -> Floats:
-    """Peak forces that a search reaches, (rows,)."""
+    """Return the peak forces that a search must reach, (rows,)."""
     assert settings.search is not None
     level = settings.search.level
     if level != THRESHOLD:
@@ -125,7 +125,7 @@ def _lengthened(
 
 
 def _from_quick_models(problem: Problem, impacts: Impacts, levels: Floats) -> Impacts:
-    """Impacts of a nonlinear plate at the velocities of the quick models."""
+    """Return impacts on a nonlinear plate at the velocities that the quick models estimate."""
     from fecm.studies.estimate import velocity_at  # 0.1 s, which most sweeps don't need
 
     rows = np.arange(len(impacts))
@@ -137,7 +137,7 @@ def _from_quick_models(problem: Problem, impacts: Impacts, levels: Floats) -> Im
 
 
 def _in_full(settings: Settings, number: int, case: Case) -> Outcome:
-    """Compute a case on a plate of its own by full runs."""
+    """Compute a case on its own plate by full runs."""
     sought = settings.search
     try:
         problem = problem_of_case(settings, case)

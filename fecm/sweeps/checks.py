@@ -1,4 +1,4 @@
-"""Checks before a sweep: values that look like a mistake, and the memory that it needs."""
+"""Checks before a sweep: values that look like mistakes, and memory."""
 
 from __future__ import annotations
 
@@ -34,8 +34,8 @@ FEW = 4  # plies below which a laminate as thin as two of them is possible
 def doubtful_values(checked: Problem, cases: Sequence[Case]) -> list[str]:
     """Say which values of a deck's cases look like a mistake, such as another unit.
 
-    The rules are those of a deck's values.  They are limits, so that only the smallest and the
-    largest value of every name are judged, each alone in the deck.
+    The rules are the rules for a deck's values. They are limits. It is enough to check the smallest
+    and the largest value of each name, one name at a time.
     """
     notes = list(_notes_of_places(checked, cases))
     known = {(finding.code, finding.message) for finding in _findings(checked)}
@@ -92,7 +92,7 @@ def _notes_of_places(checked: Problem, cases: Sequence[Case]) -> Iterator[str]:
 
 
 def _place_of(checked: Problem, case: Case) -> tuple[float, float] | None:
-    """Impact point of a case; None if the case does not move it."""
+    """Return the impact point of a case, or None if the case does not move it."""
     if "at" in case:
         return pair_of_text("at", str(case["at"]))
     if "impact_node" in case:
@@ -105,7 +105,7 @@ def _place_of(checked: Problem, case: Case) -> tuple[float, float] | None:
 
 
 def _thickness_notes(deck: model.Deck, name: str, least: float) -> Iterator[str]:
-    """What may be misunderstood about a thickness."""
+    """Yield notes about a thickness that may be misunderstood."""
     if name not in (THICKNESS, "laminate_thickness"):
         return
     if name == THICKNESS:
@@ -123,7 +123,10 @@ def _thickness_notes(deck: model.Deck, name: str, least: float) -> Iterator[str]
 
 
 def _of_value(checked: Problem, name: str, value: float) -> list[Finding]:
-    """Warnings about the deck with one value; none where it is invalid, as its cases say."""
+    """Return warnings about the deck with one value.
+
+    An invalid value has none, as its cases fail with the reason.
+    """
     try:
         deck = apply_case(checked.deck, {name: value})
     except CasesError:
@@ -167,30 +170,30 @@ LONGER = frozenset(("duration", "dt"))  # values on which the number of steps de
 
 
 def _steps(case: Case) -> float:
-    """Measure of the steps of a case, compared with other cases of the same names."""
+    """Return a measure of the steps of a case, to compare cases of the same names."""
     duration, dt = (float(case.get(name, 1.0)) for name in ("duration", "dt"))
     return duration / dt if dt > 0.0 else 0.0
 
 
 class SweepMemory(NamedTuple):
-    """Parts of the memory of a sweep; bytes of a process depend on whether they are exact."""
+    """Parts of the memory of a sweep, in bytes."""
 
     stored: int  # bytes of the histories
     at_once: int  # cases on this machine
     of_process: Callable[[bool], int]
 
     def needed(self, exact: bool = True) -> int:
-        """Bytes at once; an exact number takes longer."""
+        """Return the bytes needed at once. An exact number takes longer."""
         return self.stored + (self.at_once * self.of_process(exact) if self.at_once else 0)
 
 
 def sweep_memory(
     checked: Problem, made: Plan, workers: int, *, streamed: bool = False
 ) -> SweepMemory:
-    """Memory of a sweep.
+    """Return the memory of a sweep.
 
-    `workers` are those on this machine; 0 if a cluster runs the cases.  If histories are
-    `streamed` to files, only those of one task are held.
+    `workers` is the number of workers on this machine, 0 if a cluster runs the cases. If histories
+    are `streamed` to files, only the histories of one task are held.
     """
     settings = made.settings
     if REFINE in made.cases[-1]:
@@ -218,7 +221,7 @@ def sweep_memory(
 
 
 def _held_together(checked: Problem, made: Plan, steps: int) -> int:
-    """Most runs whose forces are held at once."""
+    """Return the largest number of runs whose forces are held at once."""
     together, settings = runs_together(checked, made), made.settings
     by_kernels = LIBRARY is not None and settings.law is None and settings.modes is None
     if settings.history or not by_kernels:

@@ -1,7 +1,7 @@
 """Refinement studies: cases on finer meshes; order, limit and error band of every quantity.
 
-P. J. Roache, Verification and Validation in Computational Science and Engineering, 1998, chapter 5;
-the error band is his grid convergence index (J. Fluids Engineering 116, 1994, 405-413).
+P. J. Roache, Verification and Validation in Computational Science and Engineering, 1998, chapter 5.
+The error band is his grid convergence index (J. Fluids Engineering 116, 1994, 405-413).
 """
 
 from __future__ import annotations
@@ -56,7 +56,9 @@ def convergence(
     nodes: int,
     patch_ratio: float = 0.0,
 ) -> dict[str, Convergence]:
-    """Order, limit and error band of every quantity of a refined sweep; empty for other sweeps.
+    """Return order, limit and error band of every quantity of a refined sweep.
+
+    Other sweeps have none.
 
     Parameters
     ----------
@@ -81,7 +83,7 @@ def convergence(
 
 
 def _limit(values: Floats, highest: float) -> Convergence:
-    """Order, limit and band of two or three values, of meshes twice as fine as the last."""
+    """Return order, limit and band of two or three values; each mesh halves the elements."""
     *earlier, before, last = values.tolist()
     change = last - before
     if not np.isfinite(values).all():
@@ -111,7 +113,7 @@ def _limit(values: Floats, highest: float) -> Convergence:
 def convergence_lines(
     cases: Mapping[str, Column], summary: Mapping[str, Column], found: Mapping[str, Convergence]
 ) -> list[str]:
-    """Lines with the values of every case, and order, limit and band of every quantity."""
+    """Return lines of the values of every case, and of order, limit and band of every quantity."""
     if not found:
         return []
     rows = [[n, *(f"{v:.6g}" for v in cases[n].tolist()), "", "", "", ""] for n in cases]
@@ -131,10 +133,10 @@ FACTORS = "1,2,4,8"
 
 
 def refined_cases(checked: Problem, factors: Sequence[int]) -> list[Case]:
-    """Return the cases of a refinement study; the factors are 1, 2, 4, 8 or a part of it.
+    """Return the cases of a refinement study; the factors are 1, 2, 4, 8 or some of them.
 
-    DT is that of the deck over the factor.  If it is 0, it is the largest with which no case
-    exceeds 0.9 of its critical time step.  Raises CasesError if factors or deck are unsuitable.
+    DT is the DT of the deck over the factor. If it is 0, DT is the largest step with which no case
+    exceeds 0.9 of its critical time step. Raises CasesError if factors or deck are unsuitable.
     """
     given = ",".join(map(str, factors))
     if len(factors) < 2 or given not in FACTORS:

@@ -24,14 +24,14 @@ LONGEST = 80  # characters of the text of an object
 
 
 class HasQuantiles(Protocol):
-    """A distribution that gives its quantiles, such as a frozen one of :mod:`scipy.stats`."""
+    """Distribution with a quantile function ``ppf``, as frozen ones of :mod:`scipy.stats`."""
 
     def ppf(self, probabilities: Any, /) -> Any:
         """Return the values (n,) at which the distribution function is `probabilities` (n,)."""
 
 
 class HasInverse(Protocol):
-    """A distribution that gives its quantiles as the new ones of :mod:`scipy.stats` do."""
+    """Distribution with a quantile function ``icdf``, as the new ones of :mod:`scipy.stats`."""
 
     def icdf(self, probabilities: Any, /) -> Any:
         """Return the values (n,) at which the distribution function is `probabilities` (n,)."""
@@ -41,7 +41,7 @@ OwnDistribution = HasQuantiles | HasInverse
 
 
 class Distribution(NamedTuple):
-    """A distribution with the parameters of its text."""
+    """Distribution with the parameters of its text."""
 
     parameters: str
     rule: str  # what must hold for the parameters
@@ -50,14 +50,14 @@ class Distribution(NamedTuple):
 
 
 def standard_normal(probability: Floats) -> Floats:
-    """Quantiles of the standard normal distribution."""
+    """Return quantiles of the standard normal distribution."""
     from scipy.special import ndtri  # takes 0.1 s to import
 
     return np.asarray(ndtri(probability))
 
 
 def standard_normal_probability(values: Floats | float) -> Floats:
-    """Values of the distribution function of the standard normal distribution."""
+    """Return values of the distribution function of the standard normal distribution."""
     from scipy.special import ndtr  # takes 0.1 s to import
 
     return np.asarray(ndtr(values))
@@ -76,7 +76,7 @@ def _truncated(probability: Floats, mean: float, deviation: float, a: float, b: 
 
 
 def _has_part(mean: float, deviation: float, a: float, b: float) -> bool:
-    """Whether a normal law can be truncated to what is between two ends."""
+    """Return whether a normal law can be truncated to the range between two ends."""
     if not (deviation > 0.0 and a < b):
         return False
     ends = (np.array([a, b]) - mean) / deviation
@@ -149,7 +149,7 @@ class ValueDistribution(NamedTuple):
         return f"{self.kind}:{','.join(f'{value:.12g}' for value in self.parameters)}"
 
     def values(self, unit: Floats) -> Floats:
-        """Values at which the distribution function takes these values, between 0 and 1."""
+        """Return the values at which the distribution function has these probabilities."""
         with np.errstate(over="ignore"):
             values = LAWS[self.kind].quantile(unit, *self.parameters)
         if not np.isfinite(values).all():
@@ -157,7 +157,7 @@ class ValueDistribution(NamedTuple):
         return values
 
     def doubt(self) -> str:
-        """What is doubtful about the parameters; empty if nothing is."""
+        """Return a doubt about the parameters, or an empty text."""
         last = self.parameters[-1]
         if self.kind == LOGNORMAL and last >= DOUBTFUL_SIGMA:
             return _of_logarithm(self)
@@ -170,7 +170,7 @@ class ValueDistribution(NamedTuple):
 
 @dataclass(frozen=True)
 class CustomDistribution:
-    """Distribution of a value that is an object of the caller."""
+    """Distribution of a value, given by an object of the caller."""
 
     text: str  # that describes it
     source: OwnDistribution | None = field(default=None, compare=False)  # None if it was read
@@ -183,7 +183,7 @@ class CustomDistribution:
         return CustomDistribution, (self.text,)
 
     def values(self, unit: Floats) -> Floats:
-        """Values at which the distribution function takes these values, between 0 and 1."""
+        """Return the values at which the distribution function has these probabilities."""
         if self.source is None:
             raise CasesError(f"a stored result has the draws of {self}, not the law")
         name = _quantile_method(self.source)
@@ -200,12 +200,12 @@ class CustomDistribution:
         return values.reshape(unit.shape)
 
     def doubt(self) -> str:
-        """What is doubtful: nothing is known."""
+        """Return an empty text: nothing is known about the object."""
         return ""
 
 
 def _quantile_method(law: object) -> str | None:
-    """Name of the method that gives the quantiles of a distribution; None without one."""
+    """Return the name of the method that gives the quantiles of a distribution, or None."""
     names = ("ppf", "icdf")
     return next((name for name in names if callable(getattr(law, name, None))), None)
 
@@ -213,9 +213,10 @@ def _quantile_method(law: object) -> str | None:
 def distribution_of(
     name: str, given: str | OwnDistribution, *, free: bool = False
 ) -> ValueDistribution | CustomDistribution:
-    """The law of a name (any with `free`): a text, or an object with a method ``ppf`` or ``icdf``.
+    """Return the law of a name from a text, or from an object with ``ppf`` or ``icdf``.
 
-    Raises CasesError if it is neither, if it has no parameters yet, or if one is invalid.
+    `free` allows any name. Raises CasesError if the law is neither a text nor such an object, lacks
+    its parameters, or has an invalid one.
     """
     if isinstance(given, str):
         return parse_law(name, given, free=free)
@@ -233,7 +234,7 @@ def distribution_of(
 
 
 def _text_of(law: OwnDistribution) -> str:
-    """An object in words: of a frozen distribution its name and parameters, or else the repr."""
+    """Describe an object: name and parameters of a frozen distribution, or else the repr."""
     text = type(law).__name__ if type(law).__repr__ is object.__repr__ else str(law)
     if isinstance(name := getattr(getattr(law, "dist", None), "name", None), str):
         named = [f"{key}={value}" for key, value in getattr(law, "kwds", {}).items()]
@@ -242,7 +243,10 @@ def _text_of(law: OwnDistribution) -> str:
 
 
 def parse_law(name: str, text: str, *, free: bool = False) -> ValueDistribution:
-    """Read ``LAW:PARAMETERS`` of a name (any with `free`); CasesError if one of them is invalid."""
+    """Parse ``LAW:PARAMETERS`` of a name. `free` allows any name.
+
+    Raises CasesError if the law or a parameter is invalid.
+    """
     _check_random(name, free=free)
     kind, _, given = (part.strip() for part in str(text).partition(":"))
     if kind not in LAWS:
@@ -274,7 +278,7 @@ def _check_random(name: str, *, free: bool) -> None:
 
 
 def _of_logarithm(law: ValueDistribution) -> str:
-    """Say that SIGMA of a lognormal law is that of the logarithm, and what it would be of an SD."""
+    """Say that SIGMA of a lognormal law belongs to the logarithm, and give its value for an SD."""
     median, sigma = law.parameters
     # The variance is m^2 s (s - 1) with the median m and s = exp(SIGMA^2).
     meant = math.sqrt(math.log(0.5 + 0.5 * math.hypot(1.0, 2.0 * sigma / median)))
@@ -283,7 +287,10 @@ def _of_logarithm(law: ValueDistribution) -> str:
 
 
 def parse_random(text: str) -> tuple[str, ValueDistribution]:
-    """Read ``NAME=LAW:PARAMETERS``; CasesError if the text has another form, or is invalid."""
+    """Parse ``NAME=LAW:PARAMETERS``.
+
+    Raises CasesError if the text has another form, or is invalid.
+    """
     name, equals, law = (part.strip() for part in text.partition("="))
     if not equals:
         raise CasesError(f"`{text}`: write NAME=LAW, such as k=lognormal:1.9e6,0.15")

@@ -1,4 +1,4 @@
-"""An impact by quick models and by the run itself, side by side."""
+"""Estimate of an impact by quick models, beside the run itself."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ COLUMNS = {
 
 @dataclass(frozen=True)
 class ModelEstimate:
-    """An impact by one model, or by the run itself.
+    """Impact by one model, or by the run itself.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class ModelEstimate:
 
 @dataclass(frozen=True)
 class Estimate:
-    """Quick estimates of an impact beside its run; printed, it is the page of `fecm estimate`.
+    """Quick estimates of an impact beside its run; ``str()`` is the page of `fecm estimate`.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ class Estimate:
     units: dict[str, str]
 
     def to_dict(self) -> dict[str, object]:
-        """Plain values, as `fecm estimate --format json` prints them."""
+        """Return plain values, as `fecm estimate --format json` prints them."""
         stretching = self.remarks.get("stretching")
         about = {"nonlinear": stretching} if stretching else {}
         return {
@@ -107,7 +107,7 @@ class Estimate:
         }
 
     def _tables(self) -> tuple[Table, Table]:
-        """Return what the models share, and the models with the run."""
+        """Return a table of what the models share, and a table of the models and the run."""
         free = " (the plate is free: no static model)" if math.isnan(self.stiffness) else ""
         shared: list[Row] = [
             ("class", f"M/M_plate = {self.mass_ratio:.4g}, {self.response}"),
@@ -125,7 +125,7 @@ class Estimate:
         return "\n".join([shared.title, *(f"  {line}" for line in lines)])
 
     def _repr_html_(self) -> str:
-        """Tables of the estimate and its notes, for notebooks."""
+        """Return tables of the estimate and its notes, for notebooks."""
         notes = (Table(tuple(("note", note) for note in self.notes)),) if self.notes else ()
         return html_table(*self._tables(), *notes)
 
@@ -139,17 +139,17 @@ class Estimate:
         return tuple(cells)
 
     def _text(self, value: float, dimension: str, missing: str = "-") -> str:
-        """A value with its unit."""
+        """Format a value with its unit."""
         return missing if math.isnan(value) else quantity(value, unit_of(dimension, self.units))
 
 
 def estimate(deck: str | Path | Deck) -> Estimate:
     """Estimate an impact by quick models, and compare them with its run.
 
-    The infinite plate is for small masses, the static plate for large ones, that of a deck with
-    NONL linear and nonlinear.  With a DELA segment, velocity and energy are those at which the peak
-    force reaches the delamination threshold.  The models without a mesh neglect DAMP, and the
-    infinite plate neglects PREL.  The notes of the result are :class:`FecmWarning`.
+    The infinite plate is for small masses. The static plate is for large masses; decks with NONL
+    have it linear and nonlinear. With a DELA segment, velocity and energy are the values at which
+    the peak force reaches the delamination threshold. The models without a mesh neglect DAMP, and
+    the infinite plate neglects PREL. The notes of the result are :class:`FecmWarning`.
 
     Parameters
     ----------
@@ -225,7 +225,7 @@ def estimate_problem(problem: Problem) -> Estimate:
 
 
 def _rows(quick: QuickEstimate) -> dict[str, ModelEstimate]:
-    """Rows of the quick models."""
+    """Return the quick models by name."""
     return {
         one.name: ModelEstimate(
             one.impact.peak,
@@ -240,7 +240,7 @@ def _rows(quick: QuickEstimate) -> dict[str, ModelEstimate]:
 
 
 def _run_itself(problem: Problem, mass: float) -> tuple[ModelEstimate, list[str], list[str]]:
-    """Row of the run itself, by the kernel of sweeps, its deflections, and what is open in it."""
+    """Return the run itself, notes about its deflections, and notes about what is open in it."""
     own = carry_out_plan(problem, plan(problem, [{}]))
     swept, doubts = {"the run": own}, []
     threshold = velocity = math.nan
@@ -264,7 +264,7 @@ def _run_itself(problem: Problem, mass: float) -> tuple[ModelEstimate, list[str]
 
 
 def _bent_statically(quick: QuickEstimate, judge: Judge) -> list[str]:
-    """Notes about deflections of the static model."""
+    """Return notes about deflections of the static model."""
     static = quick.models[-1]
     return [
         *_bent("the static plate", static.impact.peak / quick.stiffness, judge),
@@ -273,7 +273,7 @@ def _bent_statically(quick: QuickEstimate, judge: Judge) -> list[str]:
 
 
 def _bent(where: str, deflection: float, judge: Judge) -> list[str]:
-    """Note about a deflection beyond the linear plate; a free plate has none (NaN)."""
+    """Return a note about a deflection beyond the linear plate. A free plate has none (NaN)."""
     ratio = deflection / judge.thickness
     if not ratio > judge.limit:
         return []

@@ -1,4 +1,4 @@
-"""Which options of a sweep exclude each other, and which need another one."""
+"""Options of a sweep that exclude each other, or need another one."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ SEVERAL = "several workers"
 
 
 class Exclusion(NamedTuple):
-    """An option, others that can't be given with it, and why."""
+    """Option, the options that it excludes, and the reason."""
 
     option: str
     others: tuple[str, ...]
@@ -30,7 +30,7 @@ class Exclusion(NamedTuple):
 
 
 class Need(NamedTuple):
-    """Options that need another one, and why."""
+    """Options that need another one, and the reason."""
 
     options: tuple[str, ...]
     needed: str
@@ -64,7 +64,7 @@ NEEDS = (
 
 
 def check_options(job: Sweep) -> None:
-    """Raise CasesError if options exclude each other, or one lacks another or has another type."""
+    """Raise CasesError if options exclude each other, lack another one, or have the wrong type."""
     _check_types(job)
     given = _given(job)
     for option, others, reason in EXCLUSIONS:
@@ -81,7 +81,7 @@ def check_options(job: Sweep) -> None:
 
 
 def exclusions_table() -> list[str]:
-    """Rows of the table of the docs."""
+    """Return the rows of the table in the docs."""
     lines = ["| option | not with | because |", "|---|---|---|"]
     lines += [f"| {_quoted(o)} | {', '.join(map(_quoted, b))} | {r} |" for o, b, r in EXCLUSIONS]
     lines += ["", "| option | needs | because |", "|---|---|---|"]
@@ -92,7 +92,7 @@ def exclusions_table() -> list[str]:
 
 
 def _given(job: Sweep) -> set[str]:
-    """Names of what is given."""
+    """Return the names of the options that are given."""
     names = {"deck"} if job.deck is not None else set()
     for name, (_, default) in declared_options(job).items():
         value = getattr(job, name)

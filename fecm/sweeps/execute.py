@@ -1,6 +1,6 @@
-"""Carries out the tasks of a sweep: here, in worker processes, on a Dask cluster or an executor.
+"""Execution of the tasks of a sweep: here, in worker processes, on a Dask cluster or an executor.
 
-Tasks are independent, and their outcomes do not depend on where they run.  Each outcome is reported
+Tasks are independent, and their outcomes do not depend on where they run. Each outcome is reported
 as soon as it is available, so that an interrupted sweep loses only the tasks in progress.
 """
 
@@ -65,7 +65,7 @@ def attempt(task: Task) -> Outcome:
 
 
 def _begin(started: Event, parent: int) -> None:
-    """Say that this worker process has started, and end it soon after its parent process."""
+    """Report that this worker process has started, and end it soon after its parent process."""
     started.set()
 
     def watch() -> None:
@@ -79,7 +79,10 @@ def _begin(started: Event, parent: int) -> None:
 def _run_on(
     executor: futures.Executor, tasks: Iterable[Task], idle: Idle
 ) -> Iterator[tuple[Task, futures.Future[Outcome]]]:
-    """Yield tasks and futures as an executor finishes them; SchedulerError if it takes no tasks."""
+    """Yield tasks and futures as an executor finishes them.
+
+    Raises SchedulerError if the executor takes no tasks.
+    """
     running: dict[futures.Future[Outcome], Task] = {}
     try:
         for task in tasks:
@@ -108,9 +111,9 @@ def here(tasks: Sequence[Task], done: Done, idle: Idle) -> None:
 def here_first(
     tasks: Sequence[Task], most_workers: Callable[[], int], done: Done, idle: Idle
 ) -> None:
-    """Run tasks in this process, but on workers those that take longer than workers to start.
+    """Run tasks in this process; use workers if the tasks take longer than workers to start.
 
-    `most_workers` gives the largest number of workers.
+    `most_workers` returns the largest number of workers.
     """
     begin = time.monotonic()
     for count, task in enumerate(tasks):
@@ -125,7 +128,7 @@ def here_first(
 
 
 def _can_be_sent(task: Task) -> bool:
-    """Whether another process can get a task, whose contact law may be any object."""
+    """Return whether another process can get a task, whose contact law may be any object."""
     try:
         pickle.dumps(task)
     except Exception:  # pickle raises several types
@@ -134,9 +137,9 @@ def _can_be_sent(task: Task) -> bool:
 
 
 def start_resource_tracker() -> None:
-    """Start the process with which multiprocessing cleans up, such that SIGHUP does not end it.
+    """Start the process with which multiprocessing cleans up, shielded from SIGHUP.
 
-    A closing terminal sends SIGHUP to all processes.  Without its first tracker, multiprocessing
+    A closing terminal sends SIGHUP to all processes. Without its first tracker, multiprocessing
     starts another one, which prints a traceback for each semaphore that it does not know.
     """
     if not hasattr(signal, "SIGHUP"):  # Windows, which has no tracker
@@ -151,8 +154,8 @@ def start_resource_tracker() -> None:
 def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> None:
     """Run tasks in worker processes; rerun the tasks of a worker that died.
 
-    Raises SchedulerError if no worker starts.  Each worker imports the script that is running: one
-    that calls this function whenever it is imported can't have workers.
+    Raises SchedulerError if no worker starts. Each worker imports the running script. A script that
+    calls this function whenever it is imported can't have workers.
     """
     left = {task.number: task for task in tasks}
     deaths = 0
@@ -196,7 +199,10 @@ def _check_address(address: str) -> None:
 
 
 def _client(scheduler: Any) -> Any:
-    """Context of a scheduler's client, which it closes unless that is the caller's own."""
+    """Return the context of a scheduler's client.
+
+    The context closes the client unless it is the caller's client.
+    """
     if hasattr(scheduler, "get_executor"):
         return nullcontext(scheduler)
     address = getattr(scheduler, "scheduler_address", scheduler)
@@ -228,7 +234,7 @@ def on_dask(tasks: Sequence[Task], scheduler: Any, done: Done, idle: Idle) -> No
 
 
 def on_executor(tasks: Sequence[Task], executor: futures.Executor, done: Done, idle: Idle) -> None:
-    """Run tasks on any executor; those that it loses become failed cases."""
+    """Run tasks on any executor; tasks that it loses become failed cases."""
     for task, future in _run_on(executor, tasks, idle):
         try:
             outcome = future.result()
@@ -238,7 +244,10 @@ def on_executor(tasks: Sequence[Task], executor: futures.Executor, done: Done, i
 
 
 def address_in(file: Path) -> str:
-    """Address in a file of ``dask scheduler --scheduler-file``; SchedulerError if it has none."""
+    """Return the address in a file of ``dask scheduler --scheduler-file``.
+
+    Raises SchedulerError if the file has no address.
+    """
     try:
         return str(json.loads(read_input(file, MOST_ADDRESS))["address"])
     except (ValueError, KeyError, TypeError):
@@ -247,7 +256,7 @@ def address_in(file: Path) -> str:
 
 
 class Means(NamedTuple):
-    """Where the tasks of a sweep are computed; in this process by default.
+    """Place where the tasks of a sweep are computed, by default this process.
 
     Attributes
     ----------
@@ -270,7 +279,7 @@ class Means(NamedTuple):
 
     @property
     def here(self) -> int:
-        """Tasks that are computed at once on this machine."""
+        """Number of tasks that are computed at once on this machine."""
         if self.scheduler is not None:
             return 0
         return self.workers or 1 if self.executor is None else _workers_of(self.executor)
@@ -280,7 +289,7 @@ HERE = Means()
 
 
 def _workers_of(executor: futures.Executor) -> int:
-    """Workers of an executor on this machine; 0 if it does not say."""
+    """Return the number of workers of an executor on this machine; 0 if it is not known."""
     return int(getattr(executor, "_max_workers", 0))
 
 
@@ -296,8 +305,8 @@ def carry_out_plan(
 ) -> SweepResult:
     """Compute the tasks of a plan.
 
-    Tasks that `parts` has stored are not computed again.  `done` is called with each task and its
-    outcome, including tasks finished earlier.  Without `keeps_forces` the result has no forces,
+    Tasks that `parts` has stored are not computed again. `done` is called with each task and its
+    outcome, including tasks finished earlier. Without `keeps_forces` the result has no forces,
     which `parts` has.
 
     Raises
@@ -345,7 +354,7 @@ def _by_model(
     run: Callable[[Sequence[Task], Done], list[tuple[Task, Outcome]]],
     watch: Watch,
 ) -> tuple[ReducedModel, list[Task]]:
-    """Compare the reduced model with full runs; tasks of the cases, by the model or in full.
+    """Compare the reduced model with full runs, and return the tasks by the model or in full.
 
     Raises CasesError if the model holds for no case.
     """
@@ -373,7 +382,7 @@ def _outcomes(
     whole: Sequence[Task],
     done: Done,
 ) -> list[tuple[Task, Outcome]]:
-    """Compute tasks, or take their stored outcomes."""
+    """Compute tasks, or read their stored outcomes."""
     outcomes: list[tuple[Task, Outcome]] = []
     left: list[Task] = []
 
@@ -408,7 +417,7 @@ def _outcomes(
 
 
 def _most_workers(problem: Problem, made: Plan, *, streamed: bool) -> int:
-    """Worker processes for which processors and memory are free."""
+    """Return the number of worker processes for which processors and memory are free."""
     for count in range(free_processors(), 1, -1):
         with suppress(NotEnoughMemoryError):
             check_sweep_memory(problem, made, count, streamed=streamed)

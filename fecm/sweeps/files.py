@@ -1,4 +1,4 @@
-"""Writes results of sweeps: HDF5 files, those of random sweeps included, and CSV tables."""
+"""Writer of results of sweeps: HDF5 files, including random sweeps, and CSV tables."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ OWN = "own"  # instead of the name of a law: that of an object, of which the fil
 
 
 def stored(random: RandomResult) -> Iterator[tuple[str, Column]]:
-    """Paths and values of the datasets of a random sweep."""
+    """Yield paths and values of the datasets of a random sweep."""
     for name, made in random.statistics.items():
         moments = np.stack([made.draws, made.mean, made.standard_deviation], axis=-1)
         yield f"statistics/{name}", np.concatenate([moments, made.quantiles], axis=-1)
@@ -54,7 +54,7 @@ def stored(random: RandomResult) -> Iterator[tuple[str, Column]]:
 
 
 def random_attributes(random: RandomResult) -> dict[str, dict[str, Any]]:
-    """Attributes of the groups of the file."""
+    """Return the attributes of the groups of the file."""
     design = random.design
     about = {name: getattr(design, name) for name in ("kind", "samples", "seed", "sensitivity")}
     made: dict[str, dict[str, Any]] = {
@@ -77,7 +77,10 @@ def random_attributes(random: RandomResult) -> dict[str, dict[str, Any]]:
 def random_of(
     contents: FileContents, cases: Columns, quantities: Iterable[str], count: int
 ) -> RandomResult | None:
-    """Results of a random sweep, None if it is none; ResultFileError if they are incomplete."""
+    """Read the results of a random sweep; None for other sweeps.
+
+    Raises ResultFileError if the results are incomplete.
+    """
     if "design" not in contents.groups:
         return None
     try:
@@ -123,7 +126,7 @@ def _design(contents: FileContents) -> Design:
 
 
 def _numbers(contents: FileContents, path: str, shape: tuple[int, ...]) -> Floats:
-    """Numbers of a shape; ValueError if they are others."""
+    """Return the numbers of a dataset; ValueError if it has another shape or type."""
     values = contents[path]
     if values.shape != shape or values.dtype.kind != "f":
         raise ValueError(path)
@@ -166,8 +169,8 @@ def save_sweep(
 ) -> None:
     """Write the result of a sweep.
 
-    `forces` are those that the result does not hold, of some cases after the other.  Raises
-    ResultWriteError if the file cannot be written; an existing file is then unchanged.
+    `forces` yields the forces that the result does not hold, for some cases at a time. Raises
+    ResultWriteError if the file can't be written; an existing file then stays unchanged.
     """
     from fecm.results.hdf5_writer import result_writing  # h5py takes 60 ms to import
 
@@ -243,7 +246,7 @@ def _case_rows(sweep: StoredSweep) -> Iterator[Iterable[Any]]:
 
 
 def _headings(sweep: StoredSweep, names: Iterable[str]) -> list[str]:
-    """Names of columns, with units."""
+    """Return the names of columns, with units."""
     return [column_name(name, sweep.unit(name)) for name in names]
 
 

@@ -79,10 +79,10 @@ def judge_cases(
     indentation: Floats,
     of_rows: Collection[str] = (),
 ) -> None:
-    """Add the validity of cases, and the columns of what was measured, with its open values.
+    """Add the validity of cases, and the measured columns with their open values.
 
-    `peaks` has the strains of gages and the exposures, `indentation` (cases,) is the largest.
-    `of_rows` has the reasons that the stored rows of a full run gave.
+    `peaks` has the strains of gages and the exposures, `indentation` (cases,) the largest values.
+    `of_rows` has the reasons from the stored rows of a full run.
     """
     rules, end, plate = checked.judge, metrics.end, metrics.plate
     known = {name: decided(peak.largest, peak.last, end) for name, peak in peaks.items()}
@@ -107,7 +107,7 @@ def judge_cases(
 
 
 def peaks_of(measures: Sequence[Measure], result: Result) -> dict[str, CasePeaks]:
-    """Peaks of the columns of a run that are measured on request."""
+    """Return the peaks of the columns of a run that are measured on request."""
     peaks: dict[str, CasePeaks] = {}
     if Measure.GAGES in measures and "gages/number" in result:
         strains = np.abs(result["gages/strain"]).T
@@ -125,7 +125,10 @@ NEVER = 1e9  # steps between two rows of RODP
 
 
 def problem_of_case(settings: Settings, case: Case) -> Problem:
-    """The checked deck of a case with its time step; CasesError if the case cannot be run."""
+    """Return the checked problem of a case with its time step.
+
+    Raises CasesError if the case can't be run.
+    """
     if settings.build is None:
         return with_clock(apply_case(settings.deck, case), settings.clock, case)
     (checked,) = built(settings.build, case).problems
@@ -135,7 +138,10 @@ def problem_of_case(settings: Settings, case: Case) -> Problem:
 
 
 def built(build: BuildFunction, case: Case) -> LoadedDeck:
-    """Build and check the deck of a case; CasesError if it cannot be built, or has an error."""
+    """Build and check the deck of a case.
+
+    Raises CasesError if it can't be built, or has an error.
+    """
     try:
         deck = build(dict(case))
         if not isinstance(deck, Deck):
@@ -151,7 +157,7 @@ def built(build: BuildFunction, case: Case) -> LoadedDeck:
 
 
 def with_hit(outcome: Outcome, checked: Problem, case: Case) -> Outcome:
-    """Add the place that is hit, of cases that give one."""
+    """Add the impact position to the cases that define one."""
     if "at" in case and checked.load_place is not None:
         for name, value in zip(HIT, checked.load_place, strict=True):
             outcome.columns[name] = np.where(outcome.fine, value, np.nan)
@@ -167,9 +173,9 @@ def run_case_in_full(
     *,
     law: Law | None = None,
 ) -> Outcome:
-    """Run one case in full, without storing fields unless it is measured.
+    """Run one case in full, without storing fields unless a function measures them.
 
-    `names` are those of its values, which the columns of `measure` may not have.
+    `names` has the names of its values, which the columns of `measure` may not have.
     """
     sink, program = MemorySink(), checked if measure else without_output(checked, measures)
     try:
@@ -225,7 +231,7 @@ def in_one_motion(
 
 
 def _criteria(simulation: Simulation, checked: Problem) -> Criteria:
-    """Failure criteria of plies with the residual stresses and strengths of another case."""
+    """Return failure criteria of plies with the residual stresses and strengths of another case."""
     monitor, residuals = simulation.model.failure, checked.residuals
     assert monitor is not None
     made = monitor.with_residual(
@@ -241,7 +247,7 @@ def _criteria(simulation: Simulation, checked: Problem) -> Criteria:
 def _outcome(
     number: int, checked: Problem, measures: Sequence[Measure], result: Result, dt: float
 ) -> Outcome:
-    """Columns of a case from its result."""
+    """Return the outcome of a case from its result."""
     force, depth, times = (result[f"history/{n}"] for n in ("force", "indentation", "time"))
     about = result.attributes_of("history")
     permanent = np.array([about.get("permanent_indentation", 0.0)])
@@ -289,7 +295,7 @@ def _outcome(
 def _measured(
     measure: MeasureFunction, result: Result, names: Collection[str]
 ) -> dict[str, Floats]:
-    """Columns that the caller computes from the result of a case."""
+    """Return the columns that the caller computes from the result of a case."""
     try:
         found = measure(result)
         if not isinstance(found, Mapping):
@@ -309,12 +315,15 @@ def _measured(
 
 
 def stores_rows(checked: Problem, measures: Sequence[Measure] = ()) -> bool:
-    """Whether full runs keep the rows of RODP: cases that share no response of a linear plate."""
+    """Return whether full runs keep the rows of RODP.
+
+    They do if the cases share no response of a linear plate.
+    """
     return checked.plate.nonlinear or Measure.FAILURE in measures
 
 
 def without_output(checked: Problem, measures: Sequence[Measure] = ()) -> Problem:
-    """Return a problem whose program stores no fields, except for what is measured.
+    """Return a problem whose program stores no fields, except those that are measured.
 
     The rows of RODP stay where the run judges slope and strain by them.
     """
@@ -333,5 +342,5 @@ def without_output(checked: Problem, measures: Sequence[Measure] = ()) -> Proble
 
 
 def told(error: Exception) -> str:
-    """Type and text of an exception in one line."""
+    """Format type and text of an exception in one line."""
     return f"{type(error).__name__}: {' '.join(str(error).split())}"

@@ -80,13 +80,12 @@ Named = str | Sequence[str]  # one text of the form NAME=..., or several
 @documented
 @dataclass(eq=False, repr=False)
 class Sweep:
-    """A deck with many cases, ready to be computed.
+    """Deck with many cases, ready to be computed.
 
     Cases that differ only in the projectile, its velocity or the contact law share one run of the
-    plate; of a nonlinear plate (NONL) each case is one full run, and each search about five.
-
-    Deck, cases, options and output files are checked at once.  :attr:`price` says what the sweep
-    takes, :attr:`doubts` has what looks like a mistake, and :meth:`execute` carries it out.
+    plate. On a nonlinear plate (NONL) each case is one full run, and each search about five. Deck,
+    cases, options and output files are checked at once. :attr:`price` says what the sweep takes,
+    :attr:`doubts` lists what looks like a mistake, and :meth:`execute` computes it.
 
     Parameters
     ----------
@@ -297,7 +296,7 @@ class Sweep:
         check_draws(self.plan)
 
     def _cases(self, loaded: LoadedDeck | None) -> tuple[list[Case], Design | None]:
-        """Cases, and the design of random ones."""
+        """Return the cases, and the design of random cases."""
         free = self.build is not None
         system = None if loaded is None else system_of(loaded.problems[0].deck)
         if isinstance(self.cases, str | Path):
@@ -395,12 +394,15 @@ class Sweep:
 
     @property
     def _streams(self) -> bool:
-        """Whether outcomes can be stored and taken again: not those of functions of the caller."""
+        """Whether outcomes can be stored and read again; functions of the caller forbid it."""
         is_own = self.law is not None and not isinstance(self.law, str)
         return self.path is not None and not (self.build or callable(self.measure) or is_own)
 
     def expectation(self) -> list[str]:
-        """Say how many runs of the plate the cases take, and of a nonlinear plate how long."""
+        """Say how many runs of the plate the cases take.
+
+        On a nonlinear plate, say how long they take, too.
+        """
         made, texts = self.plan, []
         if made.design is not None:
             shared = shares_plate(self.problem) and not made.settings.in_full
@@ -419,9 +421,9 @@ class Sweep:
 
     @cached_property
     def price(self) -> Price:
-        """What the sweep takes; the time is measured by its first cases.
+        """What the sweep takes. The time is estimated from its first cases.
 
-        Steps are those of the plate: cases that share a plate take its steps once.
+        Steps are steps of the plate: cases that share a plate take its steps once.
         """
         problem, made = self.problem, self.plan
         steps, seconds = seconds_of(problem, made)
@@ -474,7 +476,7 @@ class Sweep:
     def compute(self, watch: Watch, *, keeps_forces: bool = True) -> SweepResult:
         """Compute the cases that are not stored and write the result; see :meth:`execute`.
 
-        Without `keeps_forces`, the forces of `history` are in the file alone.
+        Without `keeps_forces`, the forces of `history` are only in the file.
         """
         streams = self._streams and not keeps_forces
         check_sweep_memory(self.problem, self.plan, self._means.here, streamed=streams)
@@ -493,7 +495,7 @@ class Sweep:
     def _computed(
         self, parts: PartialResults | None, watch: Watch, *, keeps_forces: bool
     ) -> SweepResult:
-        """Compute the cases; partial results of a sweep that can't be carried out are deleted."""
+        """Compute the cases; delete the partial results of a sweep that can't be computed."""
         done = _same_names() if callable(self.measure) else lambda task, outcome: None
         try:
             return carry_out_plan(
@@ -525,7 +527,7 @@ class Sweep:
             parts.clear()
 
     def full_runs(self) -> dict[int, ProblemRun]:
-        """Runs of the cases of `full`, with all rows that their deck stores, by their numbers.
+        """Return the runs of the cases of `full`, with all rows that their deck stores, by number.
 
         Raises CasesError if the deck of a case has errors.
         """
@@ -542,7 +544,7 @@ class Sweep:
         return f"<fecm sweep of {self._loaded.source}: {len(self.all_cases)} cases>"
 
     def _repr_html_(self) -> str:
-        """Names, output and price, for notebooks."""
+        """Return a table of names, output and price, for notebooks."""
         names = ", ".join(self.all_cases[0])
         rows: list[Row] = [("title", self.title), ("names", names), ("price", str(self.price))]
         rows += [("result", str(self.path))] * (self.path is not None)
@@ -551,7 +553,10 @@ class Sweep:
 
 
 def checked_problem(deck: AnyDeck) -> Problem:
-    """Checked problem of a deck; DeckError if it has errors, CasesError if several problems."""
+    """Return the checked problem of a deck.
+
+    Raises DeckError if the deck has errors, CasesError if it has several problems.
+    """
     return _loaded(deck).problems[0]
 
 
@@ -564,7 +569,7 @@ def _loaded(deck: AnyDeck) -> LoadedDeck:
 
 
 def _first_built(build: BuildFunction | None, cases: Sequence[Case]) -> LoadedDeck:
-    """The first deck that can be built: it has the units, and tells the memory of a case."""
+    """Return the first deck that can be built, which gives the units and the memory of a case."""
     assert build is not None  # as the options are checked
     first = ""
     for case in cases:
@@ -591,7 +596,10 @@ def check_draws(planned: Plan) -> None:
 
 
 def reduced_mode_count(model: str | None, modes: int | None) -> int | None:
-    """Bending modes of a model; None of full runs.  CasesError if there is no such model."""
+    """Return the number of bending modes of a model; None for full runs.
+
+    Raises CasesError if there is no such model.
+    """
     if model is None:
         return None
     if model != REDUCED:
@@ -602,7 +610,7 @@ def reduced_mode_count(model: str | None, modes: int | None) -> int | None:
 def _measures(
     measure: MeasureFunction | str | Sequence[str] | None,
 ) -> tuple[MeasureFunction | None, Sequence[str]]:
-    """The function or the names that were given as measure."""
+    """Return the function or the names that were given as `measure`."""
     if callable(measure):
         return measure, ()
     if measure is None:
@@ -614,7 +622,7 @@ def _measures(
 
 
 def _texts(given: object) -> list[str]:
-    """Texts of the form NAME=..., of which one or several are given; empty for anything else."""
+    """Return one or several texts of the form NAME=...; an empty list for anything else."""
     if isinstance(given, str):
         return [given]
     if isinstance(given, list | tuple) and all(isinstance(one, str) for one in given):
@@ -623,7 +631,7 @@ def _texts(given: object) -> list[str]:
 
 
 def _by_name(option: str, given: Any, form: str) -> dict[str, Any]:
-    """Values by name, from a mapping or texts of a form."""
+    """Return values by name, from a mapping or from texts of a form."""
     if isinstance(given, Mapping):
         return dict(given)
     pairs = [text.partition("=")[::2] for text in _texts(given)]
@@ -636,7 +644,7 @@ def _by_name(option: str, given: Any, form: str) -> dict[str, Any]:
 
 
 def _limits(exceed: Any) -> tuple[Limit, ...]:
-    """Limits of quantities, from texts or from values by name."""
+    """Return limits of quantities, from texts or from values by name."""
     if texts := _texts(exceed):
         return tuple(map(parse_exceed, texts))
     if not isinstance(exceed or {}, Mapping):
@@ -668,9 +676,9 @@ def _same_names() -> Done:
 def sweep(job: Sweep) -> SweepResult:
     """Run a deck many times with varied values.
 
-    The parameters and their errors are those of :class:`Sweep`, the errors of the computation
-    those of :meth:`Sweep.execute`.  The warnings about the deck and the numbers of failed and
-    doubtful cases (:attr:`SweepResult.notes`) are :class:`FecmWarning`.
+    :class:`Sweep` has the parameters and their errors. :meth:`Sweep.execute` has the errors of the
+    computation. The warnings about the deck and the numbers of failed and doubtful cases
+    (:attr:`SweepResult.notes`) are :class:`FecmWarning`.
 
     Parameters
     ----------

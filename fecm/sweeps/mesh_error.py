@@ -1,4 +1,4 @@
-"""The mesh error of a peak force and of exposures, by a second run with bisected elements."""
+"""Mesh error of a peak force and of exposures, from a second run with bisected elements."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ from fecm.sweeps.plan import Measure
 
 @dataclass(frozen=True)
 class MeshErrorEstimate:
-    """Peak force and exposures on a mesh and on one with bisected elements around the load.
+    """Peak force and exposures on a mesh, and on one with bisected elements around the load.
 
     Attributes
     ----------
@@ -130,8 +130,8 @@ def mesh_error(
 def bisected(problem: Problem) -> Problem:
     """Bisect the elements around the load of a problem.
 
-    Its DT is kept, or shortened to that which DT 0 takes on the new mesh.  Raises RefineError if
-    nothing hits the plate, or its elements cannot be bisected.
+    DT is kept, or shortened to the step that DT 0 takes on the new mesh. Raises RefineError if the
+    deck has no impact, or its elements can't be bisected.
     """
     near = problem.distances <= max(_distance(problem), problem.distances.min())
     deck = refined_deck(problem.deck, problem.mesh, near)
@@ -144,7 +144,7 @@ def bisected(problem: Problem) -> Problem:
 
 
 def _distance(problem: Problem) -> float:
-    """Distance from the load within which elements are bisected: a bending wave."""
+    """Return the distance from the load within which elements are bisected: a bending wave."""
     found = resolution(problem) if problem.has_impact else None
     if found is None:
         raise RefineError("nothing hits the plate: there is no peak force whose mesh error to find")
@@ -154,10 +154,10 @@ def _distance(problem: Problem) -> float:
 def compare_peaks(
     problem: Problem, fine: Problem, options: RunOptions, advance: Callable[[int], object]
 ) -> MeshErrorEstimate:
-    """Run a problem and its :func:`bisected` one, and compare peak forces and exposures.
+    """Run a problem and its :func:`bisected` problem, and compare peak forces and exposures.
 
-    `advance` is called with numbers of steps that were taken.  Raises DivergenceError if a motion
-    grows without bound.  Raises NotEnoughMemoryError if a run needs more memory than is free.
+    `advance` is called with the number of new steps. Raises DivergenceError if a motion grows
+    without bound, NotEnoughMemoryError if a run needs more memory than is free.
     """
     coarse, refined = (_run(one, options, advance) for one in (problem, fine))
     return MeshErrorEstimate(
@@ -173,7 +173,7 @@ def compare_peaks(
 
 
 def _exposures(stored: Stored) -> dict[str, float]:
-    """Largest exposure by criterion."""
+    """Return the largest exposure by criterion."""
     return {one.criterion: one.exposure for one in largest_exposures(stored)}
 
 

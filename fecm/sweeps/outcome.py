@@ -1,4 +1,4 @@
-"""Outcomes of cases: their columns, and the contact forces of every step; what computes them."""
+"""Outcomes of cases: columns and contact forces; and the protocol of back ends."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ Forces = tuple[Sequence[int], Floats | None]  # of cases, with contact forces (c
 
 
 class Status(StrEnum):
-    """Status of a case that was run; that of another one is the reason of its failure."""
+    """Status of a case that was run. A failed case has the reason instead."""
 
     OK = "ok"
     STILL = "still in contact"  # at the end
@@ -38,7 +38,7 @@ class About(StrEnum):
 
 
 def was_run(status: Column) -> Bools:
-    """Cases that were run, by their status."""
+    """Return a mask of the cases that were run, by their status."""
     return np.isin(status, tuple(Status))
 
 
@@ -60,7 +60,7 @@ class Outcome:
 
     @property
     def fine(self) -> Bools:
-        """Cases that were run."""
+        """Mask of the cases that were run."""
         return was_run(self.columns[About.STATUS])
 
     @property
@@ -76,7 +76,7 @@ class Outcome:
 
     @classmethod
     def failed(cls, reasons: Mapping[int, str]) -> Outcome:
-        """Return the outcome of cases that could not be run, from the reasons by their numbers."""
+        """Return the outcome of failed cases, from their reasons by number."""
         count = len(reasons)
         about: dict[About, Column] = {
             About.STATUS: np.array(list(reasons.values()), dtype=np.str_),
@@ -98,13 +98,13 @@ class Backend(Protocol):
 
     @property
     def lengthens(self) -> bool:
-        """Whether a longer run takes little time, so that open values are decided by it."""
+        """Whether a longer run takes little time, so that it decides open values."""
 
     def outcomes(self, impacts: Impacts, *, judged: bool = True) -> Outcome:
-        """Compute impacts; if judged, those with doubtful energies in full."""
+        """Compute impacts; if judged, impacts with doubtful energies in full."""
 
     def lengthened(self, factor: int) -> Backend:
-        """Return the back end of a run so many times as long."""
+        """Return the back end of a run `factor` times as long."""
 
 
 def outcome_of(
@@ -119,7 +119,8 @@ def outcome_of(
 ) -> Outcome:
     """Return the outcome of cases that were run with one time step, before they are judged.
 
-    `last` (cases,) are the contact forces after the last step, `force` (cases, steps) all.
+    `last` (cases,) are the contact forces after the last step, `force` (cases, steps) the forces of
+    all.
     """
     cases = len(numbers)
     about: dict[About, Column] = {
@@ -134,7 +135,7 @@ def outcome_of(
 
 
 def merge(parts: Sequence[Outcome], *, history: bool = True) -> Outcome:
-    """Merge outcomes, ordered by the numbers of the cases; their forces only with `history`."""
+    """Merge outcomes, ordered by the numbers of the cases, with their forces if `history`."""
     given = [number for part in parts for number in part.numbers]
     order, numbers = np.argsort(given), sorted(given)
     columns: dict[str, Column] = {}

@@ -1,8 +1,8 @@
 """Partial results of a sweep, in a folder beside its result.
 
-There is one file per task, renamed into place when complete.  It has the fingerprint of its sweep
-and, at its end, a checksum that reveals damage.  Only regular files are read; the folder must not
-be a link.
+There is one file per task, renamed into place when complete. It has the fingerprint of its sweep
+and, at its end, a checksum that reveals damage. Only regular files are read; the folder must not be
+a link.
 """
 
 from __future__ import annotations
@@ -42,20 +42,23 @@ class DamagedPartError(FecmError, ValueError):
 
 
 def parts_of(result: Path) -> Path:
-    """Folder of the partial results of a sweep."""
+    """Return the folder of the partial results of a sweep."""
     return result.with_name(f".{result.name}.parts")
 
 
 def exclusive_result(result: Path) -> AbstractContextManager[None]:
-    """Keep other processes from this result; raises OutputError if one computes it."""
+    """Keep other processes from this result.
+
+    Raises OutputError if another process computes it.
+    """
     return held(parts_of(result), f"{result} is being computed by another process")
 
 
 class PartialResults:
-    """Outcomes of finished tasks of the sweep with a fingerprint, for its result file.
+    """Outcomes of the finished tasks of a sweep with a fingerprint.
 
-    `restart` deletes the outcomes of another sweep, for which OtherSweepError is raised otherwise;
-    without `resume` those of this sweep are deleted too.
+    `restart` deletes the outcomes of another sweep, for which OtherSweepError is raised otherwise.
+    Without `resume` the outcomes of this sweep are deleted too.
     """
 
     def __init__(
@@ -85,7 +88,7 @@ class PartialResults:
         return self.folder / f"task-{task.number:06d}.npz"
 
     def get(self, task: Task) -> Outcome | None:
-        """Outcome of a finished task, None if there is none.
+        """Return the outcome of a finished task; None if the task is not finished.
 
         Raises DamagedPartError if its file is damaged, or was not written by this sweep.
         """
@@ -130,7 +133,7 @@ class PartialResults:
             file.write(hashlib.sha256(data).digest())
 
     def forces(self) -> Iterator[Forces]:
-        """Read the contact forces of one task after the other; None if all its cases failed."""
+        """Read the contact forces of each task; None if all its cases failed."""
         for task in self.tasks:
             outcome = self.get(task)
             yield task.numbers, None if outcome is None else outcome.force
@@ -141,7 +144,7 @@ class PartialResults:
 
 
 def _fingerprint_in(mark: Path) -> str:
-    """Fingerprint of the sweep whose outcomes a folder holds; empty if it can't be read."""
+    """Return the fingerprint of the sweep whose outcomes a folder holds; empty if unreadable."""
     try:
         with open_ordinary(mark) as file:
             return str(json.loads(file.read(MOST_MARK))["fingerprint"])
@@ -150,7 +153,7 @@ def _fingerprint_in(mark: Path) -> str:
 
 
 def _unpacked(data: bytes) -> dict[str, Array]:
-    """Arrays of an .npz file."""
+    """Return the arrays of an .npz file."""
     with np.load(io.BytesIO(data), allow_pickle=False) as stored:
         if any(member.compress_type != ZIP_STORED for member in stored.zip.infolist()):
             raise ValueError("it is compressed")
@@ -158,7 +161,7 @@ def _unpacked(data: bytes) -> dict[str, Array]:
 
 
 def _is_sound(outcome: Outcome) -> bool:
-    """Whether the columns of an outcome are those of a sweep, and of the right shapes and types."""
+    """Return whether the columns of an outcome have the names, shapes and types of a sweep."""
     columns, force, count = outcome.columns, outcome.force, len(outcome.numbers)
     if not columns.keys() >= {*KINDS, *SUMMARY}:
         return False
@@ -186,6 +189,6 @@ def _remove(path: Path) -> None:
 
 
 def _remove_folder(path: Path) -> None:
-    """Remove a folder that has the name of a file, for which no file can replace it."""
+    """Remove a folder that has the name of a file, as no file can replace it."""
     if path.is_dir() and not path.is_symlink():
         shutil.rmtree(path)

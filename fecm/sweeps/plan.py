@@ -1,9 +1,8 @@
 """Plan of a sweep: its cases, and the tasks that compute them.
 
-A study (grid, cases, random, refine) gives cases. A plan has them and what they have in common,
-:class:`Settings`. :func:`tasks` splits it; :func:`fecm.sweeps.batch.run_task` computes the outcome
-of a task, and :func:`fecm.sweeps.result.sweep_result` makes the result of the plan from all
-outcomes.
+A study (grid, cases, random, refine) gives cases. A plan has the cases and their common
+:class:`Settings`. :func:`tasks` splits it. :func:`fecm.sweeps.batch.run_task` computes the outcome
+of a task. :func:`fecm.sweeps.result.sweep_result` makes the result of the plan from all outcomes.
 """
 
 from __future__ import annotations
@@ -90,7 +89,7 @@ class Settings:
 
     @property
     def in_full(self) -> bool:
-        """Whether every case is run in full, whatever its plate is."""
+        """Whether every case is run in full on any plate."""
         return (
             self.build is not None or self.measure is not None or Measure.FAILURE in self.measures
         )
@@ -106,7 +105,7 @@ class Plan:
     limits: tuple[Limit, ...] = ()  # whose probability of exceedance is asked for
 
     def fingerprint(self) -> str:
-        """Hash that identifies the outcomes of this sweep."""
+        """Return the hash that identifies the outcomes of this sweep."""
         own = self.settings
         parts = [__version__, own.deck.to_text(), self.cases, own.history, own.search]
         law = () if own.law is None else (law_name(own.law),)
@@ -138,12 +137,12 @@ def plan(
     modes: int | None = None,
     law: Law | None = None,
 ) -> Plan:
-    """Create the plan of a sweep; `extra` are names of :class:`Measure`, `until` is sought.
+    """Create the plan of a sweep.
 
-    With `modes` the cases are those of the reduced model.  `law` is a user's contact law instead of
-    the deck's.  Raises CasesError if the deck has no
-    impact, names exclude each other, the deck lacks what is searched or measured, or the reduced
-    model does not give it.
+    `extra` has names of :class:`Measure`, `until` the searched quantity. With `modes` the cases are
+    computed by the reduced model. `law` is a user's contact law that replaces the deck's law.
+    Raises CasesError if the deck has no impact, names exclude each other, the deck lacks what is
+    searched or measured, or the reduced model does not give it.
     """
     deck, search = checked.deck, search_of(until)
     if search is not None and search.quantity is Sought.EXPOSURE:
@@ -194,7 +193,10 @@ def check_law(law: Law, names: Collection[str], modes: int | None = None) -> Non
 
 
 def _measures(names: Sequence[str], deck: Deck) -> tuple[Measure, ...]:
-    """What is measured; CasesError if a name is unknown, or the deck lacks what it needs."""
+    """Return what is measured.
+
+    Raises CasesError if a name is unknown, or the deck lacks what it needs.
+    """
     if unknown := sorted({*names} - {*MEASURES}):
         raise CasesError(f"measure has {unknown[0]!r}; the names are {', '.join(MEASURES)}")
     if Measure.GAGES in names and not deck.has(Gages):
@@ -224,7 +226,7 @@ def _check_limits(
 
 
 def _check_reduced(checked: Problem, names: Collection[str], settings: Settings) -> None:
-    """Raise CasesError if the reduced model is not for a deck, or does not give what is asked."""
+    """Raise CasesError if the reduced model does not suit a deck, or lacks a quantity."""
     modes = settings.modes
     if not (isinstance(modes, int) and 1 <= modes <= MOST_MODES):
         raise CasesError(f"the reduced model takes 1 to {MOST_MODES} bending modes, not {modes!r}")
@@ -247,12 +249,12 @@ def _check_reduced(checked: Problem, names: Collection[str], settings: Settings)
 
 
 def shares_plate(checked: Problem) -> bool:
-    """Whether cases of a linear plate share a response: see :func:`_only_impacts`."""
+    """Return whether cases of a linear plate share a response: see :func:`_only_impacts`."""
     return not checked.deck.has(Nonlinear) and _only_impacts(checked)
 
 
 def _only_impacts(checked: Problem) -> bool:
-    """Whether a program has only impact steps of one size, and the plate no other loads."""
+    """Return whether a program has only impact steps of one size, and the plate no other loads."""
     words = [macro.word for macro in flat(checked.program)]
     sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
     if "RODP" not in words or len(sizes) != 1 or words.index("DT") > words.index("RODP"):
@@ -261,7 +263,7 @@ def _only_impacts(checked: Problem) -> bool:
 
 
 def runs_together(checked: Problem, made: Plan) -> int:
-    """Most runs advanced together."""
+    """Return the largest number of runs that are advanced together."""
     if made.settings.modes is not None:
         return min(MOST_REDUCED, len(made.cases))
     if made.settings.in_full or not shares_plate(checked):
@@ -270,14 +272,14 @@ def runs_together(checked: Problem, made: Plan) -> int:
 
 
 def _runs_of_case(made: Plan) -> int:
-    """Runs of a case that are advanced together: those of the first round of a search."""
+    """Return the number of runs of a case in the first round of a search."""
     return 1 if made.settings.search is None else FIRST_VELOCITIES
 
 
 def tasks(checked: Problem, made: Plan, cases: Sequence[int] | None = None) -> list[Task]:
     """Split a plan, or some of its cases, into tasks.
 
-    These are cases that share a plate, full runs that share a motion, or single ones.
+    A task has cases that share a plate, full runs that share a motion, or a single case.
     """
     together = max(1, runs_together(checked, made) // _runs_of_case(made))
     common = plate_values

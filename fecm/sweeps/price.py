@@ -1,4 +1,4 @@
-"""What a sweep takes: full runs, and their time on this machine."""
+"""Price of a sweep: full runs, and their time on this machine."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ UNITS = ((3600.0, "h"), (60.0, "min"), (1.0, "s"))
 def expected(problem: Problem, made: Plan, workers: int | None) -> str:
     """Say how many full runs the cases of a plan take, and about how long.
 
-    The time is that of `workers` on this machine; 0 if a cluster runs the cases, None if their
-    number depends on the time.
+    The time is for `workers` on this machine. `workers` is 0 if a cluster runs the cases, and None
+    if their number depends on the time.
     """
     count = len(made.cases)
     cases = f"{count} case{'' if count == 1 else 's'}"
@@ -56,10 +56,10 @@ def expected(problem: Problem, made: Plan, workers: int | None) -> str:
 
 
 def seconds_of(problem: Problem, made: Plan) -> tuple[int, float]:
-    """Steps of the plate that a sweep takes, and their seconds in one process.
+    """Return the steps of the plate that a sweep takes, and their seconds in one process.
 
-    The first case of a shared plate is computed, and then some more: their response stays in
-    memory for the sweep.  The seconds are NaN if they are not known.
+    The first case of a shared plate is computed, and then some more: their response stays in memory
+    for the sweep. The seconds are NaN if they are not known.
     """
     settings = made.settings
     if settings.build is not None:
@@ -84,21 +84,21 @@ def _seconds_of_task(task: Task) -> float:
 
 
 def output_bytes(problem: Problem, made: Plan) -> int:
-    """Size of the file of a sweep, about."""
+    """Estimate the size of the file of a sweep."""
     columns = len(SUMMARY) + len(made.cases[0])
     steps = problem.work.steps if made.settings.history else 0
     return FILE + 8 * len(made.cases) * (columns + steps)
 
 
 def _full_cases(problem: Problem, made: Plan) -> Sequence[Case]:
-    """Cases of which each takes a full run: one for all that share a motion."""
+    """Return the cases that each take a full run: one for all that share a motion."""
     if not made.settings.shares_motion:
         return made.cases
     return tuple(task.cases[0] for task in tasks(problem, made))
 
 
 def _of_full_runs(problem: Problem, made: Plan, chosen: Sequence[Case]) -> tuple[int, float]:
-    """Steps and seconds of the full runs of cases; NaN if a run of a few steps fails."""
+    """Return steps and seconds of the full runs of cases; NaN if a run of a few steps fails."""
     each = 1 if made.settings.search is None else USUAL
     duration = duration_of(problem)
     steps = sum(_full_steps(case, duration, problem.work.steps) for case in chosen)
@@ -110,7 +110,7 @@ def _of_full_runs(problem: Problem, made: Plan, chosen: Sequence[Case]) -> tuple
 
 
 def _costs(problem: Problem, made: Plan) -> tuple[float, float]:
-    """Seconds of a run before its steps, and of a step."""
+    """Return the seconds of a run before its steps, and of a step."""
     first, few = _seconds(problem, made, FEW)
     second, more = first, few
     wanted = FEW
@@ -125,7 +125,7 @@ def _costs(problem: Problem, made: Plan) -> tuple[float, float]:
 
 
 def _seconds(problem: Problem, made: Plan, steps: int) -> tuple[float, int]:
-    """Seconds of a run of about so many steps, and their number."""
+    """Return the seconds of a run of about `steps` steps, and the number of its steps."""
     short = lengthened(problem, min(1.0, steps / problem.work.steps))
     begin = time.perf_counter()
     run_case_in_full(0, short, made.settings.measures, law=made.settings.law)
@@ -133,12 +133,12 @@ def _seconds(problem: Problem, made: Plan, steps: int) -> tuple[float, int]:
 
 
 def _full_steps(case: Case, duration: float, steps: int) -> float:
-    """Steps of a case, counted by the elements of the deck, whose duration and steps are given."""
+    """Return the steps of a case, counted from the duration and the elements of the deck."""
     dt = float(case.get("dt", 0.0)) or duration / steps
     return float(case.get(REFINE, 1)) ** 2 * float(case.get("duration", duration)) / dt
 
 
 def _rounded(seconds: float) -> str:
-    """A duration with two digits."""
+    """Format a duration with two digits."""
     size, unit = next(((s, u) for s, u in UNITS if seconds >= 2.0 * s), UNITS[-1])
     return f"{float(f'{seconds / size:.2g}'):g} {unit}"

@@ -1,8 +1,8 @@
 """Random sweeps: designs of the samples, and correlations of the values.
 
-The values of each name keep their law.  Their normal scores, the values of the standard normal law
-at the same probabilities, have a joint normal distribution with the given correlations; those of a
-normal law are the values themselves, but for mean and scale.
+The values of each name keep their law. Their normal scores are the values of the standard normal
+law at the same probabilities. The scores have a joint normal distribution with the given
+correlations. The scores of a normal law are its values, up to mean and scale.
 """
 
 from __future__ import annotations
@@ -32,7 +32,10 @@ ROUNDING = 1e-9  # of a matrix that is symmetric, or has a diagonal of 1
 
 
 def parse_correlation(text: str) -> tuple[Pair, float]:
-    """Read ``NAME,NAME=RHO``; CasesError if the text has another form."""
+    """Parse ``NAME,NAME=RHO``.
+
+    Raises CasesError if the text has another form.
+    """
     names, equals, value = text.partition("=")
     pair = tuple(name.strip() for name in names.split(","))
     if not equals or len(pair) != 2:
@@ -41,10 +44,10 @@ def parse_correlation(text: str) -> tuple[Pair, float]:
 
 
 def correlation_of(names: Sequence[str], given: object) -> Correlation:
-    """Correlation matrix in the order of `names`; CasesError if it is none.
+    """Return the correlation matrix in the order of `names`.
 
-    Given are correlations by pairs of names, or the whole matrix: in the order of the names, or
-    with names as a DataFrame has them.
+    Correlations are given by pairs of names, or as the whole matrix: in the order of the names, or
+    with names as a DataFrame has them. Raises CasesError if the matrix is not a correlation matrix.
     """
     matrix = _of_pairs(names, given) if isinstance(given, Mapping) else _of_table(names, given)
     diagonal = matrix.diagonal()
@@ -59,7 +62,7 @@ def correlation_of(names: Sequence[str], given: object) -> Correlation:
 
 
 def _of_pairs(names: Sequence[str], given: Mapping[Any, Any]) -> Floats:
-    """Matrix of correlations by pairs of names; others are 0."""
+    """Return the matrix of correlations by pairs of names; missing pairs are 0."""
     matrix = np.eye(len(names))
     seen: set[frozenset[str]] = set()
     for pair, value in given.items():
@@ -81,7 +84,7 @@ def _of_pairs(names: Sequence[str], given: Mapping[Any, Any]) -> Floats:
 
 
 def _of_table(names: Sequence[str], given: Any) -> Floats:
-    """Matrix from an array, or from a table whose rows and columns have names."""
+    """Return the matrix from an array, or from a table whose rows and columns have names."""
     size = len(names)
     try:
         if hasattr(given, "columns"):
@@ -98,7 +101,7 @@ def _of_table(names: Sequence[str], given: Any) -> Floats:
 
 
 def pairs_of(names: Sequence[str], correlation: Correlation) -> dict[Pair, float]:
-    """Correlations by pairs of names, each pair once."""
+    """Return the correlations by pairs of names, each pair once."""
     places = itertools.combinations(range(len(correlation)), 2)
     return {(names[row], names[column]): correlation[row][column] for row, column in places}
 
@@ -106,8 +109,8 @@ def pairs_of(names: Sequence[str], correlation: Correlation) -> dict[Pair, float
 def correlated(unit: Floats, correlation: Correlation, *, stratified: bool) -> Floats:
     """Correlate independent uniform values (n, d).
 
-    Of a Latin hypercube (`stratified`) the values of each column are kept and put into the order of
-    the correlated ones, so that each of n intervals has one still (M. Stein, Technometrics 29,
+    A Latin hypercube (`stratified`) keeps the values of each column. They are put into the order of
+    the correlated values, so that each of n intervals still has one (M. Stein, Technometrics 29,
     1987, 143).
     """
     factor = np.linalg.cholesky(np.array(correlation))
@@ -174,7 +177,7 @@ def design_of(
 
 
 def doubt(design: Design) -> str:
-    """What is doubtful about a design; empty if nothing is."""
+    """Return a doubt about a design, or an empty text."""
     texts = [f"{name}: {text}" for name, law in design.laws.items() if (text := law.doubt())]
     if design.kind == "sobol" and design.samples & (design.samples - 1):
         why = "no power of 2, which a Sobol' design needs to be balanced"
@@ -203,7 +206,8 @@ def matrix(design: Design) -> Floats:
     """Return the random values of a design, (rows, names).
 
     With `sensitivity` the rows are the matrices A and B, the halves of the columns of one design,
-    and for each name A with the column of B (Saltelli et al., 2010).  CasesError if one overflows.
+    and for each name A with the column of B (Saltelli et al., 2010). Raises CasesError if a value
+    overflows.
     """
     count, halves = len(design.laws), 2 if design.sensitivity else 1
     unit = unit_samples(design.kind, design.samples, count * halves, design.seed)
@@ -223,7 +227,10 @@ def matrix(design: Design) -> Floats:
 
 
 def random_cases(design: Design, varied: Sequence[Case]) -> list[Case]:
-    """Cases of a design for each of some varied values; CasesError if there are too many."""
+    """Return the cases of a design for each combination of varied values.
+
+    Raises CasesError if there are too many.
+    """
     for name in design.laws:
         if name in varied[0]:
             raise CasesError(f"{name} is both varied and random")

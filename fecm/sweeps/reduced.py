@@ -1,6 +1,6 @@
 """Cases of a nonlinear plate in a few modes (the model ``reduced``), and full runs beside them.
 
-The theory is that of :mod:`~fecm.mechanics.reduced_plate`.
+:mod:`~fecm.mechanics.reduced_plate` has the theory.
 """
 
 from __future__ import annotations
@@ -74,7 +74,7 @@ class ReducedImpacts:
         return {}
 
     def halved(self, times: int) -> ReducedImpacts:
-        """The same with a time step that is halved so many times."""
+        """Return these impacts with a time step that is halved `count` times."""
         return replace(self, dt=self.dt / 2**times, steps=self.steps * 2**times)
 
     def impacts(self, hits: Hits) -> ComputedImpacts:
@@ -121,7 +121,10 @@ class ReducedImpacts:
 
 
 def reduced(checked: Problem, modes: int) -> ReducedImpacts:
-    """Reduce the plate of a problem to bending modes; CasesError if that is not possible."""
+    """Reduce the plate of a problem to bending modes.
+
+    Raises CasesError if that is not possible.
+    """
     assert checked.contact is not None  # the program has impact steps
     try:
         plate = reduced_plate(checked.plate, checked.contact, modes, checked.damping)
@@ -133,7 +136,7 @@ def reduced(checked: Problem, modes: int) -> ReducedImpacts:
 
 
 def by_halvings(made: ReducedImpacts, impacts: Impacts) -> Mapping[int, Indices]:
-    """Rows of impacts by how often their time step is halved, so that it resolves the contact."""
+    """Group rows of impacts by the halvings of the time step that resolve their contact."""
     groups: dict[int, list[int]] = {}
     for row in range(len(impacts)):
         step = largest_time_step(made.plate, impacts.cards(row))
@@ -144,10 +147,10 @@ def by_halvings(made: ReducedImpacts, impacts: Impacts) -> Mapping[int, Indices]
 
 
 def largest_time_step(plate: ReducedPlate, strike: Strike) -> float:
-    """Largest time step that resolves the contact of a strike; infinite at velocity 0.
+    """Return the largest time step that resolves the contact; infinite at velocity 0.
 
     The contact is at most as stiff as at the force that all of the energy would give, in loading or
-    unloading, and in series with the modes left out.
+    unloading, and in series with the omitted modes.
     """
     law, energy = strike.law, strike.energy
     force = (2.5 * energy * law.k ** (2.0 / 3.0)) ** 0.6  # of (2/5) F^(5/3)/k^(2/3)
@@ -174,7 +177,7 @@ TRIAL_COLUMNS = tuple(d.name for d in SWEEP_DATASETS.values() if d.group == GROU
 
 @dataclass(frozen=True)
 class ReducedModel:
-    """The reduced model of a sweep, beside full runs of some of its cases.
+    """Reduced model of a sweep, beside full runs of some of its cases.
 
     Attributes
     ----------
@@ -194,7 +197,7 @@ class ReducedModel:
     in_full: int = 0
 
     def difference(self, name: str) -> Column:
-        """Difference of the model from the full runs, relative to these, (n,)."""
+        """Return the relative difference of the model from the full runs, (n,)."""
         full = self.columns[f"full_{name}"]
         return np.asarray((self.columns[name] - full) / full)
 
@@ -203,7 +206,7 @@ class ReducedModel:
         return f"{self.modes} mode{'' if self.modes == 1 else 's'}"
 
     def rows(self) -> Iterator[Row]:
-        """What the summary of the sweep says of the model."""
+        """Yield the rows about the model for the summary of the sweep."""
         yield ("reduced model", f"{self._modes} of bending; difference from full runs:")
         rows = zip(
             self.columns["case"], self.difference("peak_force"), self.difference(RATIO), strict=True
@@ -226,14 +229,14 @@ class ReducedModel:
 
     @property
     def note(self) -> str:
-        """Which cases are run in full, and why."""
+        """Sentence about the cases that are run in full, and the reason."""
         cases = "the case" if self.in_full == 1 else f"the {self.in_full} cases"
         more = "" if self.modes >= MOST_MODES else "; with more modes they may be fewer"
         return f"{self._misfit}: {cases} of the largest energies are run in full{more}"
 
     @property
     def _misfit(self) -> str:
-        """The largest difference of a peak force."""
+        """Largest difference of a peak force."""
         peaks = self.difference("peak_force")
         worst = int(np.abs(peaks).argmax())
         return (
@@ -243,7 +246,7 @@ class ReducedModel:
 
 
 def trials(made: Plan, cases: Sequence[int], first: int) -> list[Task]:
-    """Tasks of some cases, each in full and by the model; case n has number `first` + 2 n."""
+    """Return tasks of cases, in full and by the model; case n has number `first` + 2 n."""
     both = (replace(made.settings, modes=None), made.settings)
     return [
         Task(own, first + 2 * case + place, (case,), (made.cases[case],))
@@ -253,7 +256,10 @@ def trials(made: Plan, cases: Sequence[int], first: int) -> list[Task]:
 
 
 def by_energy(made: Plan) -> list[int]:
-    """Cases with an energy, the smallest first; CasesError if none has one."""
+    """Return the cases with an energy, the smallest first.
+
+    Raises CasesError if no case has an energy.
+    """
     energies: list[tuple[float, int]] = []
     for number, case in enumerate(made.cases):
         with suppress(CasesError):  # the case will fail
@@ -273,7 +279,7 @@ class Trials:
         self._models: list[Outcome] = []
 
     def failing(self, cases: Iterable[int]) -> set[int]:
-        """Run cases that have not been run yet; those of all for which the model does not hold."""
+        """Run cases that have not been run, and return those for which the model fails."""
         before = {number for outcome in self._fulls for number in outcome.numbers}
         new = [case for case in dict.fromkeys(cases) if case not in before]
         for task, outcome in self._run(trials(self._made, new, self._first)) if new else ():
@@ -284,16 +290,19 @@ class Trials:
         return {number for number, one in zip(full.numbers, holds, strict=True) if not one}
 
     def compared(self, modes: int) -> ReducedModel:
-        """The model beside the full runs; CasesError if all failed."""
+        """Compare the model with the full runs.
+
+        Raises CasesError if all failed.
+        """
         return compared(modes, self._fulls, self._models)
 
 
 def count_held(ordered: Sequence[int], failing: Callable[[Iterable[int]], set[int]]) -> int:
-    """Count the cases, ordered by energy, for which the model holds; others are run in full.
+    """Count the cases, ordered by energy, for which the model holds; the others are run in full.
 
-    The model fits worst where the plate bends most.  So the case of the largest energy goes first.
-    If it fails, and that of the smallest holds, bisection finds the last that holds.  A case of the
-    middle is tried too.
+    The model fits worst where the plate bends most. The case of the largest energy is therefore
+    tried first. If it fails and the case of the smallest energy holds, bisection finds the last
+    case that holds. A case in the middle is tried too.
     """
     held = len(ordered)
     if failing(ordered[-1:]):
@@ -314,7 +323,10 @@ def count_held(ordered: Sequence[int], failing: Callable[[Iterable[int]], set[in
 
 
 def compared(modes: int, fulls: Sequence[Outcome], models: Sequence[Outcome]) -> ReducedModel:
-    """Compare outcomes of the trials; CasesError if all failed."""
+    """Compare outcomes of the trials.
+
+    Raises CasesError if all failed.
+    """
     full, model = merge(fulls, history=False), merge(models, history=False)
     fine = np.flatnonzero(full.fine & model.fine)
     if not len(fine):
@@ -335,13 +347,16 @@ def compared(modes: int, fulls: Sequence[Outcome], models: Sequence[Outcome]) ->
 
 
 def reduced_attributes(model: ReducedModel) -> dict[str, Any]:
-    """Attributes of the group in the file."""
+    """Return the attributes of the group in the file."""
     in_full = {"in_full": model.in_full} if model.in_full else {}
     return {"modes": model.modes, **in_full}
 
 
 def reduced_of(contents: FileContents) -> ReducedModel | None:
-    """The reduced model of a sweep's file, None without one; ResultFileError if incomplete."""
+    """Return the reduced model of a sweep's file, None without one.
+
+    Raises ResultFileError if it is incomplete.
+    """
     if GROUP not in contents.groups:
         return None
     try:

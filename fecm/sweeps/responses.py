@@ -1,15 +1,12 @@
 """Responses of the plate and of a rod to a unit force, and their convolution with forces.
 
-Convolution of responses with forces that depend on the sums so far.
+The plate is linear and the projectile acts on one dof. The displacement of this dof is exactly the
+sum of its impulse responses: w_n = sum over m < n of g_(n-m) F_m. A rod is linear too: the
+acceleration of its tip is such a sum of the forces on the tip. The forces depend on the sums so
+far.
 
-The sums are evaluated in blocks: a matrix product adds the contributions of earlier blocks, and
-those of steps within the block are added one by one.
-
-Responses to a unit force in the first step, and their convolution with force histories.
-
-The plate is linear and the projectile acts on one dof, so that the displacement of this dof is
-exactly the sum of its impulse responses: w_n = sum over m < n of g_(n-m) F_m.  A rod is linear too:
-the acceleration of its tip is such a sum of the forces on the tip.
+The sums are evaluated in blocks. A matrix product adds the contributions of earlier blocks, and
+contributions of steps within the block are added one by one.
 """
 
 from __future__ import annotations
@@ -126,10 +123,10 @@ NO_FORCE = HystereticLaw(LinearPermanent(0.0, 0.0, 0.0, 1.0))
 def plate_response(
     motion: PlateMotion, load: Load, dt: float, steps: int, gages: DofSums | None = None
 ) -> tuple[Floats, Floats]:
-    """Displacement under a load and strains of gages per force after 1 to `steps` steps.
+    """Return displacement under a load and strains of gages per force after 1 to `steps` steps.
 
-    The first is taken under a unit force.  The plate has no nodal loads.  Returns arrays (steps,)
-    and (gages, steps).
+    The first step is taken under a unit force. The plate has no nodal loads. Returns arrays
+    (steps,) and (gages, steps).
     """
     # A projectile that never touches the plate.
     system = ImpactSystem(motion, RigidMass(1.0), NO_FORCE, ImpactConditions(load, 0.0))
@@ -149,7 +146,10 @@ def plate_response(
 
 
 def tip_response(step: RodIntegrator, steps: int) -> Floats:
-    """Acceleration per force of a tip after 1 to `steps` steps, the first under a unit force."""
+    """Return the acceleration per force of a tip after 1 to `steps` steps.
+
+    The first step is taken under a unit force.
+    """
     state, response = RodState(np.zeros((3, step.n))), np.empty(steps)
     for number in range(steps):
         state = step.advance(state, float(number == 0))
@@ -158,7 +158,7 @@ def tip_response(step: RodIntegrator, steps: int) -> Floats:
 
 
 def largest_sums(response: Floats, force: Floats) -> tuple[Floats, Floats]:
-    """Largest and last absolute value (cases,) of the sums of a response and forces.
+    """Return the largest and the last absolute value (cases,) of the sums of a response and forces.
 
     `response` is (steps,), `force` (steps, cases).
     """
@@ -172,7 +172,7 @@ def largest_sums(response: Floats, force: Floats) -> tuple[Floats, Floats]:
 
 
 def _product(a: Floats, b: Floats) -> Floats:
-    """Matrix product in pieces small enough for BLAS to use one thread."""
+    """Multiply matrices in pieces small enough for BLAS to use one thread."""
     columns = max(1, SMALL // a.size)
     return np.hstack([a @ b[:, i : i + columns] for i in range(0, b.shape[1], columns)])
 
@@ -196,10 +196,10 @@ class TipState(NamedTuple):
 
 
 class TipSteps:
-    """Steps of size `dt` of the projectiles of hits that compute only the motion of the tips.
+    """Steps of size `dt` of the projectiles of impacts, for the motion of the tips only.
 
-    The stiffness and mass of a case are those of its kind times its scale.  `count` is the number
-    of steps.
+    The stiffness and mass of a case are those of its kind times its scale. `count` is the number of
+    steps.
     """
 
     def __init__(self, hits: Hits, dt: float, count: int) -> None:
@@ -219,10 +219,10 @@ class TipSteps:
         self.sums: Floats = np.zeros(len(hits.kind))  # over the contact forces before the next step
 
     def motions(self, kind: int, force: Floats) -> Iterator[Floats]:
-        """Motion of complete projectiles of a kind after every block of steps and after the last.
+        """Yield the motion of complete projectiles of a kind, after blocks of steps and at the end.
 
-        `force` (steps, cases) are the contact forces of all kinds; yields (3 n, own cases) as in
-        :class:`~fecm.mechanics.projectile.RodState`.
+        `force` (steps, cases) are the contact forces of all kinds; yields (3 n, cases of the kind)
+        as in :class:`~fecm.mechanics.projectile.RodState`.
         """
         step, cases = self._steps[kind], np.flatnonzero(self.hits.kind == kind)
         before = np.zeros((1, len(cases)))
@@ -355,15 +355,14 @@ class DeflectionRecord:
 
 
 def balance_errors(force: Floats, work: Work, tips: TipSteps) -> Floats:
-    """Estimate the error of the energy balance of cases relative to the initial energy, (cases,).
+    """Estimate the relative error of the energy balance of cases, (cases,).
 
-    The energy of the projectile and the work done on plate and indentation must add up to the
-    initial energy, after every block of steps and after the last.  Central differences conserve
-    1/2 v(-)' M v(+) + 1/2 u' K u, with velocities half a step before and after: the work done on
-    the plate.  The energy that a run reports is larger by dt^2/8 a' M a, of which only the part of
-    the impact node is known here.
-
-    The error is 0 if the initial energy is 0, and not finite if the motion is not finite.
+    The energy of the projectile and the work on plate and indentation must add up to the initial
+    energy, after every block of steps and at the end. Central differences conserve 1/2 v(-)' M v(+)
+    + 1/2 u' K u, with velocities half a step before and after: the work on the plate. The energy
+    that a run reports is larger by dt^2/8 a' M a, of which only the part of the impact node is
+    known here. The error is 0 if the initial energy is 0, and not finite if the motion is not
+    finite.
     """
     hits, worst = tips.hits, np.zeros(force.shape[1])
     for number, rod in enumerate(hits.rods):

@@ -77,7 +77,7 @@ class SweepResult(StoredSweep):
         return f"<fecm sweep {self.title!r} over {', '.join(self.cases)}: {sweep_verdict(self)}>"
 
     def _repr_html_(self) -> str:
-        """Table of the summary, for notebooks."""
+        """Return a table of the summary, for notebooks."""
         return html_table(Table(tuple(sweep_rows(self)), title=repr(self)[1:-1]))
 
     @property
@@ -134,8 +134,8 @@ class SweepResult(StoredSweep):
         """Return values and results as labelled arrays (requires xarray).
 
         A full grid has one dimension per name of its values, which are the coordinates: numbers in
-        ascending order, texts in the order of the cases.  Other cases have the dimension ``case``.
-        The last dimension of ``force`` is ``step``.  ``units`` are those of the deck.
+        ascending order, texts in the order of the cases. Other cases have the dimension ``case``.
+        The last dimension of ``force`` is ``step``. ``units`` are the deck's units.
 
         Raises
         ------
@@ -303,7 +303,10 @@ class SweepResult(StoredSweep):
 
 
 def _grid(cases: Mapping[str, Column], count: int) -> tuple[dict[str, Column], NDArray[np.intp]]:
-    """Values of each name of a full grid and its cases in their order; no values if it is none."""
+    """Return the values of each name of a full grid, and its cases in their order.
+
+    Other cases have no values.
+    """
     levels: dict[str, Column] = {}
     places: list[NDArray[np.intp]] = []
     for name, values in cases.items():
@@ -343,7 +346,7 @@ def sweep_result(plan: Plan, outcome: Outcome, reduced: ReducedModel | None = No
 
 
 def _summary_names(plan: Plan, outcome: Outcome) -> list[str]:
-    """Names of the results of every case, whether or not one of them has a value."""
+    """Return the names of the results of every case, whether or not a case has a value."""
     columns = outcome.columns
     names = [*SUMMARY]
     if plan.settings.deck.last(Delamination) is not None or not columns.keys().isdisjoint(
@@ -379,8 +382,8 @@ def load_sweep(path: str | Path | AnyFile) -> SweepResult:
 def sweep_of(contents: FileContents, *, history: bool = True) -> SweepResult:
     """Create the result of a sweep from the contents of its file.
 
-    Without `history` the forces, which may be large, are not read.  Raises ResultFileError if data
-    are missing, or their number of cases differs.
+    Without `history` the forces, which may be large, are not read. Raises ResultFileError if data
+    are missing, or if their numbers of cases differ.
     """
     from fecm.results.hdf5_reader import first_misfit  # h5py takes 60 ms to import
 
@@ -417,7 +420,7 @@ def sweep_of(contents: FileContents, *, history: bool = True) -> SweepResult:
 
 
 def _group(contents: FileContents, group: str) -> dict[str, Column]:
-    """The datasets of a group by their names, numbers before texts."""
+    """Return the datasets of a group by name, numbers before texts."""
     names = sorted(contents, key=lambda name: name in contents.lists)
     members = [name for name in names if name.startswith(group) and name.count("/") == 1]
     return {name.removeprefix(group): contents[name] for name in members}

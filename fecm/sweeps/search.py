@@ -1,4 +1,4 @@
-"""Searches for the velocity at which a quantity of a case reaches a value."""
+"""Searches for the impact velocity at which a quantity of a case reaches a level."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Sought(StrEnum):
 
 
 class Search(NamedTuple):
-    """A search for the velocity at which a quantity reaches a level."""
+    """Search for the impact velocity at which a quantity reaches a level."""
 
     quantity: Sought
     level: float | str  # a number, or of the peak force :data:`~fecm.authoring.case.THRESHOLD`
@@ -55,7 +55,10 @@ class Search(NamedTuple):
 
 
 def parse_until(text: str) -> Until:
-    """Read ``peak_force=VALUE`` or ``exposure=NUMBER``; CasesError if it is neither."""
+    """Parse ``peak_force=VALUE`` or ``exposure=NUMBER``.
+
+    Raises CasesError if the text is neither.
+    """
     name, _, value = (part.strip() for part in text.partition("="))
     if name not in tuple(Sought) or not value:
         forms = f"peak_force=NUMBER or peak_force={THRESHOLD}, or exposure=NUMBER"
@@ -64,7 +67,10 @@ def parse_until(text: str) -> Until:
 
 
 def search_of(until: Until | None) -> Search | None:
-    """The search for a value, alone that of a peak force, or for that of one named quantity."""
+    """Return the search for a level.
+
+    The searched quantity is the peak force, or one named quantity.
+    """
     if until is None:
         return None
     if not isinstance(until, Mapping):
@@ -77,11 +83,11 @@ def search_of(until: Until | None) -> Search | None:
 
 
 def search(backend: Backend, impacts: Impacts, quantity: Sought, levels: Floats) -> Outcome:
-    """Compute impacts at the velocities at which a quantity of each reaches its level, (rows,).
+    """Find the impact velocities at which a quantity of each impact reaches its level, (rows,).
 
     A back end that computes many impacts together gets rounds of velocities from 1/100 to 100 times
-    those of the impacts, of which the lowest counts; another one gets one velocity after the other,
-    from those of the impacts on.  Where the value is open, runs are repeated, longer.
+    those of the impacts; the lowest counts. Another back end gets one velocity after the other,
+    starting at the velocities of the impacts. Where the value is open, longer runs decide it.
     """
     if backend.computes_together:
         return _search_together(backend, impacts, levels)
@@ -90,7 +96,7 @@ def search(backend: Backend, impacts: Impacts, quantity: Sought, levels: Floats)
 
 
 def _search_together(backend: Backend, impacts: Impacts, forces: Floats) -> Outcome:
-    """Search the velocities of peak forces; those that are open in longer runs."""
+    """Find the velocities for peak forces; longer runs decide open values."""
     left, parts = np.arange(len(impacts)), []
     for factor in LONGER:
         longer, still_open = backend.lengthened(factor), []
@@ -111,13 +117,13 @@ def _search_together(backend: Backend, impacts: Impacts, forces: Floats) -> Outc
 
 
 def _with_velocities(outcome: Outcome, impacts: Impacts) -> Outcome:
-    """Add the velocities that were found, and their energies: those of the impacts."""
+    """Add the velocities of the impacts, and their energies."""
     outcome.columns |= {"found_velocity": impacts.velocity, "found_energy": impacts.energy}
     return outcome
 
 
 def _searched(backend: Backend, impacts: Impacts, forces: Floats) -> tuple[Outcome, Bools]:
-    """Search velocities: outcome of the impacts that are decided, and which are open."""
+    """Find velocities. Returns the outcome of the decided impacts, and a mask of the open ones."""
 
     def tried(pairs: list[tuple[int, float]]) -> Outcome:
         rows, velocities = np.array([row for row, _ in pairs]), np.array([v for _, v in pairs])
@@ -149,7 +155,10 @@ def _searched(backend: Backend, impacts: Impacts, forces: Floats) -> tuple[Outco
 
 
 def _decided(outcome: Outcome, force: Floats, known: Bools) -> list[Outcome]:
-    """Outcomes of the cases whose peak is known; those whose peak is not the force have failed."""
+    """Return the outcome of the cases whose peak is known.
+
+    Cases fail if their peak is not the required force.
+    """
     reached, velocity = outcome.columns[About.REACHED], outcome.columns["found_velocity"]
     right = outcome.fine & known & (np.abs(reached - force) <= ROUGH * force)
     reasons = {}
@@ -169,9 +178,9 @@ def lowest_velocities(
 ) -> dict[int, float | str]:
     """Find the lowest velocity of each case at which the contact force reaches its value.
 
-    The range from 1/100 to 100 times the start is searched, by rounds of velocities.  Later rounds
-    gather around the interpolated velocity of the bracket, whose upper end is the result.  `peaks`
-    returns the largest forces of pairs of case and velocity; NaN where unknown.  A text is the
+    The range from 1/100 to 100 times the start is searched, by rounds of velocities. Later rounds
+    gather around the interpolated velocity of the bracket, whose upper end is the result. `peaks`
+    returns the largest forces of pairs of case and velocity; NaN where unknown. A text is the
     reason why a case has no velocity.
     """
     found: dict[int, float | str] = dict.fromkeys(starts, "")
@@ -216,7 +225,7 @@ NAMES = {Sought.PEAK_FORCE: "peak force", Sought.EXPOSURE: "exposure"}
 def _search_row(
     backend: Backend, impacts: Impacts, row: int, quantity: Sought, level: float
 ) -> Outcome:
-    """Search the velocity of one impact; the reason is its status if no velocity is found."""
+    """Find the velocity of one impact; without one, its status is the reason."""
     number = impacts.numbers[row]
     try:
         return _search_in_turn(backend, impacts, row, quantity, level)
@@ -227,7 +236,10 @@ def _search_row(
 def _search_in_turn(
     backend: Backend, impacts: Impacts, row: int, quantity: Sought, level: float
 ) -> Outcome:
-    """Search the velocity of one impact; CasesError with the reason if no velocity is found."""
+    """Find the velocity of one impact.
+
+    Raises CasesError with the reason if there is none.
+    """
     outcomes: dict[float, Outcome] = {}
     factors = list(LONGER)  # those that are left
     largest = largest_exposure if quantity is Sought.EXPOSURE else peak_force
@@ -267,8 +279,8 @@ def _add_band(
 ) -> None:
     """Add the energies at which finer meshes may reach the level, from the band of the exposure.
 
-    Near the velocity that was found the exposure is a power of the velocity, by the nearest other
-    trial; without one it is proportional to it.
+    Near the velocity the exposure is a power of the velocity, which the nearest other trial gives.
+    Without another trial the exposure is taken as proportional to the velocity.
     """
     columns = outcome.columns
     if not columns.keys() >= {*BAND}:
@@ -286,12 +298,15 @@ def _add_band(
 
 
 def peak_force(outcome: Outcome) -> float:
-    """Peak force of a run, NaN if it is open."""
+    """Return the peak force of a run, NaN if it is open."""
     return float(outcome.columns[Sought.PEAK_FORCE][0])
 
 
 def largest_exposure(outcome: Outcome) -> float:
-    """Largest exposure of a run, NaN if it is open; CasesError if the run has none to rely on."""
+    """Return the largest exposure of a run, NaN if it is open.
+
+    Raises CasesError if the run has no reliable exposure.
+    """
     values = [float(outcome.columns[name][0]) for name in EXPOSURES if name in outcome.columns]
     if values and np.isnan(values).any():
         return math.nan
@@ -306,10 +321,10 @@ def velocity_at_level(
 ) -> float:
     """Find a velocity at which a value is at the level, or slightly above it.
 
-    The value exceeds the level by at most :data:`LEVEL_EXCESS`, relative to the level.
-
-    Secants in the logarithms, as the value is almost a power of the velocity; a bracket guards
-    them once it is known.  Raises CasesError if there is none within 1/100 to 100 times the start.
+    The value exceeds the level by at most :data:`LEVEL_EXCESS`, relative to the level. Secants are
+    taken in the logarithms, as the value is almost a power of the velocity. A bracket guards them
+    once it is known. Raises CasesError if there is no such velocity within 1/100 to 100 times the
+    start.
     """
     least, most = math.log(start / RANGE), math.log(start * RANGE)
     low, high = -math.inf, math.inf  # bracket

@@ -78,11 +78,11 @@ def statistics(values: Floats) -> Statistics:
 def indices(values: Floats, seed: int) -> Indices:
     """Estimate the first-order and total Sobol' indices of quantities.
 
-    `values` (m, d + 2, n) are those of the rows of A, B, and A with column i of B.  The indices are
-    those of Saltelli et al., Computer Physics Communications 181 (2010) 259, table 2 (b) and (f);
-    NaN of a quantity that is constant or lacks values.  The variance is that over A and B together.
-    The values are taken relative to their mean there, which does not change the expected values.
-    The intervals are percentiles of bootstraps over the rows of the matrices.
+    `values` (m, d + 2, n) belong to the rows of A, B, and A with column i of B. The estimators are
+    table 2 (b) and (f) of Saltelli et al., Computer Physics Communications 181 (2010) 259. Indices
+    of a quantity that is constant or lacks values are NaN. The variance is taken over A and B
+    together. The values are taken relative to their mean there, which does not change the expected
+    values. The intervals are percentiles of bootstraps over the rows of the matrices.
     """
     m, rows, n = values.shape
     d = rows - 2
@@ -98,7 +98,7 @@ def indices(values: Floats, seed: int) -> Indices:
     columns[~varies] = np.nan
 
     def ratios(means: Floats) -> Floats:
-        """First-order and total indices (..., m, 2 d) from means (..., m, 2 + 2 d)."""
+        """Return first-order and total indices (..., m, 2 d) from means (..., m, 2 + 2 d)."""
         variance = means[..., 1] - means[..., 0] ** 2
         variance = np.where(variance > 0.0, variance, np.nan)  # else there are no indices
         return np.asarray(means[..., 2:] / variance[..., None])
@@ -122,11 +122,11 @@ def indices(values: Floats, seed: int) -> Indices:
 def exceedance_bounds(
     hits: Counts, count: Counts, lacking: Counts
 ) -> tuple[Floats, Floats, Floats]:
-    """Probability of exceeding a limit, and the ends of an interval that holds for all draws.
+    """Return the probability of exceeding a limit, and the ends of an interval for all draws.
 
-    `hits` of `count` draws exceed the limit, and it is not known whether `lacking` more do.  The
-    probability is NaN if there are any: the draws that are open are not a random choice.  The
-    interval is Wilson's from its lower end, if none of them does, to its upper end, if all do.
+    `hits` of `count` draws exceed the limit. It is not known whether `lacking` more do. If there
+    are any, the probability is NaN, as the open draws are not a random choice. The interval extends
+    from Wilson's lower end if none of them exceeds the limit to Wilson's upper end if all do.
     """
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.where(lacking > 0, np.nan, hits / count)
@@ -136,7 +136,10 @@ def exceedance_bounds(
 
 
 def wilson(hits: Counts, count: Counts) -> tuple[Floats, Floats]:
-    """Ends of Wilson's 95 % interval of a probability (E. B. Wilson, JASA 22, 1927, 209)."""
+    """Return the ends of Wilson's 95 % interval of a probability.
+
+    E. B. Wilson, JASA 22, 1927, 209.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
         share = hits / count
         middle = share + Z**2 / (2.0 * count)
@@ -182,7 +185,7 @@ class Exceedance(NamedTuple):
 class RandomResult:
     """Results of a random sweep.
 
-    With varied values, arrays have one more axis, the first: the combinations of these values.
+    With varied values, the first axis of the arrays is the combination of these values.
 
     Attributes
     ----------
@@ -219,7 +222,7 @@ class RandomResult:
                 values.flags.writeable = False
 
     def label(self, combination: int) -> str:
-        """Varied values of a combination, in words."""
+        """Format the varied values of a combination."""
         return ", ".join(f"{n} {values[combination]}" for n, values in self.combinations.items())
 
 
@@ -248,7 +251,7 @@ def evaluate(
 
 
 def _sensitivity(design: Design, columns: Columns) -> dict[str, Indices]:
-    """Indices of all quantities."""
+    """Return the indices of all quantities."""
     table = np.array(list(columns.values()))
     flat = table.reshape(-1, len(design.laws) + 2, design.samples)
     parts = [
@@ -258,7 +261,7 @@ def _sensitivity(design: Design, columns: Columns) -> dict[str, Indices]:
 
 
 def _notes(design: Design, columns: Columns, fine: Bools) -> Iterator[str]:
-    """What is doubtful about the results."""
+    """Return doubts about the results."""
     failed = int((~fine).sum())
     if failed > MANY_FAILED * len(fine):
         text = "of the draws failed, and the statistics are those of the others"
@@ -271,14 +274,14 @@ def _notes(design: Design, columns: Columns, fine: Bools) -> Iterator[str]:
 
 
 def open_cases(summary: Columns) -> Bools:
-    """Cases that were run and ended before their contact was over, so that values are open."""
+    """Return a mask of the cases that ended before their contact was over, with open values."""
     validity = summary.get(VALIDITY, summary["status"])
     open_peaks = [np.char.find(validity, reason) >= 0 for reason in (Reason.OPEN, Reason.AGAIN)]
     return np.asarray((summary["status"] == Status.STILL) | np.any(open_peaks, axis=0))
 
 
 def exceedances(draws: Columns, is_open: Bools, limits: Sequence[Limit]) -> Exceedance:
-    """Probabilities that quantities (..., draws) exceed limits."""
+    """Return the probabilities that quantities (..., draws) exceed limits."""
     thresholds = draws.get(THRESHOLD_FORCE, np.full(1, np.nan))
     known = thresholds[np.isfinite(thresholds)]
     common = known[0] if len(known) and not np.ptp(known) else np.nan
@@ -289,7 +292,7 @@ def exceedances(draws: Columns, is_open: Bools, limits: Sequence[Limit]) -> Exce
     combinations = next(iter(draws.values())).shape[:-1]
 
     def counted(which: Sequence[Bools]) -> Counts:
-        """Draws of every combination and limit."""
+        """Return the numbers of draws of every combination and limit."""
         sums = np.array([one.sum(axis=-1) for one in which], dtype=np.int64)
         return sums.reshape(len(limits), *combinations).T
 

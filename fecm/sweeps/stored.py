@@ -1,6 +1,6 @@
-"""What a sweep has stored: values and results of every case by name, and the deck.
+"""Stored data of a sweep: values and results of every case by name, and the deck.
 
-:class:`~fecm.sweeps.result.SweepResult` adds to it what can be made of them.
+:class:`~fecm.sweeps.result.SweepResult` adds to it what can be computed from them.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ class StoredSweep:
         return len(self.dt)
 
     def __getitem__(self, name: str) -> Column:
-        """Values or results of every case, by name."""
+        """Return values or results of every case, by name."""
         for columns in (self.cases, self.summary):
             if name in columns:
                 return columns[name]
@@ -76,17 +76,17 @@ class StoredSweep:
         return iter(self.cases | self.summary)
 
     def keys(self) -> list[str]:
-        """Names of values and results."""
+        """Return the names of values and results."""
         return list(self)
 
     def _lacks(self, name: str) -> NotStoredError:
-        """The error about an unknown name."""
+        """Return the error about an unknown name."""
         others = did_you_mean(name, self) or f"; there are {', '.join(self)}"
         return NotStoredError(f"there is no {name} in this sweep{others}")
 
     @property
     def deck(self) -> Deck:
-        """The deck that was varied; of decks of your own that of the first case that has one.
+        """Deck that was varied; with decks of the caller, the deck of the first case that has one.
 
         Raises
         ------
@@ -107,7 +107,7 @@ class StoredSweep:
 
     @property
     def validity(self) -> Column:
-        """``"ok"``, reasons to doubt a case, or ``"failed"``; of earlier files empty texts."""
+        """``"ok"``, reasons to doubt a case, or ``"failed"``; empty texts in earlier files."""
         return self.summary.get(VALIDITY, np.full(len(self), ""))
 
     @property
@@ -136,7 +136,7 @@ class StoredSweep:
         return 0.0
 
     def unit(self, name: str) -> str:
-        """Unit of a column; empty for texts and pure numbers, or if the deck names no units.
+        """Return the unit of a column; empty for texts and pure numbers, or without named units.
 
         Parameters
         ----------
@@ -153,6 +153,6 @@ class StoredSweep:
         return self._unit(name)
 
     def _unit(self, name: str) -> str:
-        """Unit of any name; empty if it is unknown."""
+        """Return the unit of any name; empty if it is unknown."""
         dimension = COLUMNS[name].dimension if name in COLUMNS else dimension_of(name)
         return unit_of(OWN_DIMENSIONS.get(name, dimension), self.units)

@@ -1,4 +1,4 @@
-"""Summary of a sweep in lines: its cases, what they are worth, and random results."""
+"""Summary of a sweep: its cases, their validity, and random results."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def sweep_summary(result: StoredSweep) -> list[str]:
 
 
 def sweep_rows(result: StoredSweep) -> list[Row]:
-    """Summarise a sweep: number of cases, smallest and largest peak or velocity, failures."""
+    """Summarise a sweep: number of cases, extreme peaks or velocities, failures."""
     fine = result.completed
     failed = Counter(result["status"][~fine].tolist())
     rows: list[Row] = [("cases", f"{len(result)}")]
@@ -63,7 +63,7 @@ def sweep_rows(result: StoredSweep) -> list[Row]:
 
 
 def _extremes(result: StoredSweep) -> Iterator[Row]:
-    """The cases with the smallest and the largest peak, or velocity found."""
+    """Yield the cases with the smallest and the largest peak, or velocity that was searched."""
     what, names = "peak", ["peak_force"]
     if "found_velocity" in result.summary:
         what, names = "found", ["found_velocity", "found_energy"]
@@ -79,7 +79,7 @@ def _extremes(result: StoredSweep) -> Iterator[Row]:
 
 
 def _found_band(result: StoredSweep, case: int) -> str:
-    """The energies that finer meshes may find for a case."""
+    """Format the energies that finer meshes may give a case."""
     if not all(name in result.summary for name in FOUND_BAND):
         return ""
     low, high = (float(result[name][case]) for name in FOUND_BAND)
@@ -90,7 +90,7 @@ def _found_band(result: StoredSweep, case: int) -> str:
 
 
 def _moved(result: StoredSweep) -> Iterator[Row]:
-    """How far the places that were hit are from those given."""
+    """Yield how far impact positions were moved to nodes."""
     if "at" not in result.cases or "hit_x" not in result.summary:
         return
     asked = np.array([pair_of_text("at", text) for text in result.cases["at"].tolist()]).T
@@ -101,7 +101,7 @@ def _moved(result: StoredSweep) -> Iterator[Row]:
 
 
 def _shown(result: StoredSweep, name: str, case: int) -> str:
-    """Value of a case with six digits, or as many as tell it from those that are not random."""
+    """Format a value of a case with six digits, or enough to distinguish it from fixed values."""
     values = result.cases[name]
     if values.dtype.kind != "f":
         return str(values[case])
@@ -121,14 +121,14 @@ def sweep_verdict(result: StoredSweep) -> str:
 
 
 def reasons(status: Column) -> str:
-    """The most common reason of failure, and the number of others."""
+    """Return the most common reason of failure, and the number of other reasons."""
     (first, _), *others = Counter(status.tolist()).most_common()
     more = f", and {len(others)} other reason{'s' * (len(others) > 1)}" if others else ""
     return f"{first}{more}"
 
 
 def doubtful_counts(result: StoredSweep) -> list[tuple[int, str]]:
-    """Numbers of cases with doubtful results and of failures, which are last."""
+    """Count the cases by doubt; failures come last."""
     fine, steps = result.completed, result.unsettled_steps
     unconverged = np.zeros_like(fine) if steps is None else fine & (steps > 0)
     cases = {
@@ -141,7 +141,7 @@ def doubtful_counts(result: StoredSweep) -> list[tuple[int, str]]:
 
 
 def _doubts(result: StoredSweep) -> dict[str, Bools]:
-    """Cases beyond the range of the model, by what they are."""
+    """Count the cases beyond the range of the model, by kind."""
     found = {}
     for reason, some in counted(result.validity):
         what = MEANING[reason]
@@ -154,7 +154,7 @@ def _doubts(result: StoredSweep) -> dict[str, Bools]:
 
 
 def remarks(result: StoredSweep) -> Iterator[str]:
-    """What open values and cases beyond the linear plate mean, and what helps."""
+    """Explain open values and cases beyond the linear plate, and name remedies."""
     is_open = result.completed & ~result.contact_over
     if is_open.any():
         duration = 2.0 * float((result.dt * result.steps)[is_open].max())
@@ -192,7 +192,7 @@ def _decided_by_mesh(result: StoredSweep) -> int:
 
 
 def _in_plane(result: StoredSweep) -> InPlane:
-    """Support of the plate in its plane; unknown where the deck can't be read or meshed."""
+    """Return the in-plane support of the plate; unknown where the deck can't be read or meshed."""
     try:
         mesh = generate(result.deck)
     except (ResultFileError, ValueError, LookupError):  # of a damaged file
@@ -202,7 +202,7 @@ def _in_plane(result: StoredSweep) -> InPlane:
 
 
 def _has(result: StoredSweep, kind: type[Segment]) -> bool:
-    """Whether the deck has a segment of one kind."""
+    """Return whether the deck has a segment of one kind."""
     try:
         return result.deck.has(kind)
     except ResultFileError:  # of a damaged file
@@ -223,7 +223,7 @@ MAIN = (
 
 
 def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
-    """Lines of the most important quantities: statistics, indices and probabilities."""
+    """Return lines about the main quantities: statistics, indices and probabilities."""
     design, found = random.design, random.exceedance
     lines = [f"design            {design.kind}, {design.samples} samples, seed {design.seed}"]
     lines += [
@@ -265,7 +265,7 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
 
 
 def chance(p: float, low: float, high: float, is_open: int, lacking: int) -> str:
-    """A probability, its interval and the number of draws without a value, in words."""
+    """Format a probability, its interval and the number of draws without a value."""
     text = (
         f"{'open' if np.isnan(p) else significant(p)} ({significant(low)} to {significant(high)})"
     )
