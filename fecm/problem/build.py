@@ -1,4 +1,4 @@
-"""Build the model of a run from a checked problem and its options."""
+"""Model of a run, built from a checked problem and its options."""
 
 from __future__ import annotations
 
@@ -54,7 +54,10 @@ WORTH_SHARING = 100_000  # number of equations above which threads save more tha
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Options of a run, by default the report's.  Raises OptionsError if a value is not valid."""
+    """Options of a run; the defaults are those of the report.
+
+    Raises OptionsError if a value is not valid.
+    """
 
     # Slips of the printed program that are on: see :func:`~fecm.listing.slips.active_slips`.
     slips: frozenset[str] = frozenset()
@@ -128,13 +131,13 @@ class ImpactModel(NamedTuple):
 
     @property
     def is_stressed_at_rest(self) -> bool:
-        """Whether FAIL has exposures to find before anything moves."""
+        """Whether FAIL has exposures before anything moves."""
         has_residual = self.failure is not None and self.failure.has_residual
         return self.failure is not None and (has_residual or self.plate.is_preloaded)
 
 
 def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactModel:
-    """Build the model of a checked problem, with its own plate unless the options change that."""
+    """Build the model of a checked problem, with the problem's plate unless options change it."""
     chosen = options or RunOptions()
     deck, variant = problem.deck, variant_of(chosen.slips)
     own = chosen.projectile or build_projectile(deck, variant.impact)
@@ -192,9 +195,10 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
 
 
 def _share_of_contact_force(problem: Problem) -> tuple[MeshArrays, float]:
-    """The mesh, and the share of the contact force that acts on it: the nodal force of ROD's dof.
+    """Return the mesh, and the share of the contact force that acts on it.
 
-    A FORC card may have replaced the unit force of this dof, or added to it.
+    The share is the nodal force of ROD's dof. A FORC card may have replaced the unit force of this
+    dof, or added to it.
     """
     card = problem.deck.require(model.Impact)
     hit = card.node - 1, card.dof - 1
@@ -207,7 +211,7 @@ def _share_of_contact_force(problem: Problem) -> tuple[MeshArrays, float]:
 def _plates(
     problem: Problem, mesh: MeshArrays, variant: PlateVariant
 ) -> tuple[PlateModel, PlateModel]:
-    """The plate, and the plate with only the dofs free that the program moves."""
+    """Return the plate, and the plate with only the dofs free that the program moves."""
     if mesh is problem.mesh and variant == REPORT_PLATE:
         return problem.plate, problem.moving_plate
     plate = build_plate(problem.deck, mesh, variant)
@@ -219,7 +223,7 @@ def _plates(
 def _motion(
     problem: Problem, mobile: PlateModel, chosen: RunOptions
 ) -> tuple[PlateMotion, Workers]:
-    """Motion of the plate, and the threads that share its work."""
+    """Return the motion of the plate, and the threads that share its work."""
     reduced = None
     if moves_only(problem.program) and chosen.solver != CSR:
         reduced = symmetry_reduction(mobile, problem.contact)
@@ -231,7 +235,10 @@ def _motion(
 def _conditions(
     problem: Problem, load: Load, share: float, variant: ImpactVariant
 ) -> ImpactConditions:
-    """Conditions of an impact; `share` is that of the contact force which acts on the plate."""
+    """Return the conditions of an impact.
+
+    `share` is the share of the contact force that acts on the plate.
+    """
     return ImpactConditions(
         load=load,
         velocity=problem.deck.require(model.Impact).velocity,
@@ -250,7 +257,7 @@ def _stresses(
     criteria: Sequence[OwnCriterion],
     under_load: Bools | None,
 ) -> tuple[PlyStresses | None, FailureMonitor | None]:
-    """Ply stresses of PLYS, and the failure criteria of FAIL; None where there is no such macro."""
+    """Return the ply stresses of PLYS and the failure criteria of FAIL; None without the macro."""
     words = {macro.word: macro for macro in flat(problem.program)}
     points = problem.rules[2]
     initial = plate.preload_strain if plate.is_preloaded else None
@@ -311,7 +318,7 @@ def _stresses(
 
 
 def _gages(problem: Problem, mesh: MeshArrays, plate: PlateModel) -> GageArray | None:
-    """The strain gages; None without a GAGE segment."""
+    """Return the strain gages; None without a GAGE segment."""
     if (cards := problem.deck.last(model.Gages)) is None:
         return None
     return gages(
@@ -324,7 +331,7 @@ def _gages(problem: Problem, mesh: MeshArrays, plate: PlateModel) -> GageArray |
 
 
 def _stretching(problem: Problem, plate: PlateModel) -> Stretching | None:
-    """What evaluates the stretching of a nonlinear plate where it is stored."""
+    """Return what evaluates the stretching of a nonlinear plate where it is stored."""
     work = problem.work
     rows = work.contact_rows if problem.has_impact else work.passes["DISP"]
     if not (plate.nonlinear and rows):

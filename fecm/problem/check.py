@@ -1,8 +1,8 @@
 """Checks of a deck: which rules apply, and in which order.
 
 A stage is entered only if the stages before it found nothing that would mislead it, so that one
-mistake gives one finding.  For the same reason nothing is said about missing data of a segment that
-has an unreadable card.
+mistake gives one finding. For the same reason nothing is reported about missing data of a segment
+with an unreadable card.
 """
 
 from __future__ import annotations
@@ -62,7 +62,10 @@ ELEMENT_ERRORS = ("E303", "E304", "E305")  # after which the numbers of elements
 def check_problem(
     problem: ParsedProblem, findings: Findings, *, uses_l2: bool = True
 ) -> Problem | None:
-    """Check a problem; None without a control card.  Its L2 counts if the run `uses_l2`."""
+    """Check a problem; return None without a control card.
+
+    Its L2 counts if the run `uses_l2`.
+    """
     deck, unsound = problem.deck, problem.unsound
     if deck is None:
         return None
@@ -109,7 +112,7 @@ def _element_errors(findings: Findings) -> int:
 def _check_shapes(checked: Problem, findings: Findings, *, uses_l2: bool) -> None:
     """Check Jacobians, lumped masses and zero-energy modes where the orders are valid.
 
-    Nothing is wrong with an L2 that is not used; assumed strains need none.
+    An L2 that is not used is not checked. Assumed strains need no L2.
     """
     material = checked.deck.last(model.Material)
     if material is None or laminate.unknown_stress_points(material):
@@ -120,7 +123,7 @@ def _check_shapes(checked: Problem, findings: Findings, *, uses_l2: bool) -> Non
 
 
 def _check_each_segment(checked: Problem, findings: Findings, unsound: set[str]) -> None:
-    """Check each segment as far as that needs no sound mesh."""
+    """Check each segment as far as this needs no sound mesh."""
     if checked.deck.has(model.Impact):
         check_impact(checked, findings)
     check_segments(checked.deck, findings)
@@ -142,7 +145,7 @@ def check_impact(checked: Problem, findings: Findings) -> None:
 
 
 def check_segments(deck: model.Deck, findings: Findings) -> None:
-    """Check the segments of a deck that can be judged alone."""
+    """Check the segments of a deck that can be judged individually."""
     for kind in ALONE:
         if (segment := deck.last(kind)) is not None:
             check_segment(segment, findings)
@@ -241,13 +244,13 @@ def _check_time_step(checked: Problem, findings: Findings) -> None:
 
 
 def check_program(checked: Problem, findings: Findings) -> None:
-    """Check the length of a program, and that its loops reach the steps to be stored."""
+    """Check the length of a program, and that its loops reach the steps that are stored."""
     if apply(program.OF_LENGTH, findings, checked):
         apply(program.OF_OUTPUT, findings, checked)
 
 
 def check_values(checked: Problem, findings: Findings) -> None:
-    """Warn of the valid values of a sound problem that look like a mistake."""
+    """Warn about valid values of a sound problem that look like mistakes."""
     apply((*laminate.VALUES, *zones.VALUES, *damage.OF_LAYERS), findings, checked)
     apply(units.VALUES, findings, checked)
     apply(preload.VALUES, findings, checked)

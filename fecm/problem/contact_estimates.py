@@ -24,16 +24,19 @@ CLAMPED = 1.0 / (64.0 * 0.0056)
 
 
 def wave_impedance(laminate: LaminateSection) -> float:
-    """Force over velocity of a point of an infinite plate, 8 (m D*)^(1/2) (force*time/length)."""
+    """Return force over velocity at a point of an infinite plate, 8 (m D*)^(1/2).
+
+    The result is force*time/length.
+    """
     return 8.0 * math.sqrt(laminate.mass * effective_rigidity(laminate))
 
 
 def expected_peak(deck: model.Deck, plate: PlateModel) -> float:
-    """Estimate the peak force, high rather than low.
+    """Estimate the peak force; the estimate is high rather than low.
 
-    The minimum of the Hertz contact on a rigid target, k^(2/5) (5 m v^2/4)^(3/5), and of the
-    response of the plate: the bending wave for a light projectile, the stiffness of a clamped plate
-    for a heavy one.
+    It is the smaller of two values: the Hertz contact on a rigid target, k^(2/5) (5 m v^2/4)^(3/5),
+    and the response of the plate, by the bending wave for a light projectile and the stiffness of a
+    clamped plate for a heavy one.
     """
     impact, law = deck.require(model.Impact), deck.require(model.Indentation)
     mass, v = build_projectile(deck).total_mass, np.abs(np.float64(impact.velocity))
@@ -44,7 +47,7 @@ def expected_peak(deck: model.Deck, plate: PlateModel) -> float:
 
 
 def contact_stiffness(deck: model.Deck, plate: PlateModel) -> float:
-    """Larger tangent stiffness of loading (3-1) and unloading (3-3) at the expected peak."""
+    """Return the larger tangent stiffness of loading (3-1) and unloading (3-3) at the peak."""
     law = build_constants(deck.require(model.Indentation))
     with np.errstate(all="ignore"):  # infinite where the unloading curve is a vertical line
         force = np.float64(expected_peak(deck, plate))
@@ -55,7 +58,7 @@ def contact_stiffness(deck: model.Deck, plate: PlateModel) -> float:
 
 
 class ContactStep(NamedTuple):
-    """Limit of the time step from the contact."""
+    """Limit of the time step due to the contact."""
 
     stiffness: float  # tangent stiffness of the contact, force/length
     mass: float  # the smaller of the plate's mass at the impact dof and the projectile's at its tip
@@ -65,11 +68,12 @@ class ContactStep(NamedTuple):
 def contact_step(
     deck: model.Deck, plate: PlateModel, contact: Floats | None, dt: float, bound: float
 ) -> ContactStep | None:
-    """Largest time step at which plate and contact are stable together; None without impact.
+    """Return the largest stable time step of plate and contact together; None without impact.
 
-    `contact` is the distribution of a unit contact force over the dofs, (numnp, 5), or None;
-    `bound` is a lower bound of the plate's critical time step, `dt` the deck's, 0 for 0.9 of the
-    critical one.  The limit is computed only where the bound does not show that this is stable.
+    `contact` is the distribution of a unit contact force over the dofs, (numnp, 5), or None.
+    `bound` is a lower bound of the plate's critical time step. `dt` is the deck's time step, 0 for
+    0.9 of the critical one. The limit is computed only where the bound does not show that `dt` is
+    stable.
     """
     if contact is None:
         return None

@@ -1,4 +1,4 @@
-"""Check a deck without running it."""
+"""Check of a deck without a run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from fecm.problem.summary import ProblemSummary, deck_summary, summary_table
 
 @dataclass(frozen=True)
 class DeckCheck:
-    """What is known of a deck before it runs; ``str()`` is what ``fecm check`` prints.
+    """Findings and summaries of a deck before it runs; ``str()`` is what ``fecm check`` prints.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class DeckCheck:
         return tuple(finding for finding in self.findings if finding.severity is severity)
 
     def to_dicts(self) -> list[dict[str, object]]:
-        """Findings and problems as plain values: the lines of ``fecm check --format json``."""
+        """Return the lines of ``fecm check --format json``: findings and problems."""
         found = [{**finding.to_dict(self.source)} for finding in self.findings]
         head = {"kind": "summary", "file": self.source}
         return [*found, *({**head, **problem.to_dict()} for problem in self.problems)]
@@ -58,7 +58,7 @@ class DeckCheck:
         return "\n".join([*texts, *(line for one in self.problems for line in one.lines())])
 
     def _repr_html_(self) -> str:
-        """Table of the findings and of each problem, for notebooks."""
+        """Return tables of the findings and of each problem, for notebooks."""
         rows = tuple((f"{item.severity} {item.code}", item.message) for item in self.findings)
         findings = Table(rows, title=repr(self)[1:-1])
         return html_table(findings, *map(summary_table, self.problems))
@@ -70,7 +70,7 @@ class DeckCheck:
 
 
 def check_loaded(loaded: LoadedDeck) -> DeckCheck:
-    """Summarise the problems of a deck that was loaded, if it has no errors."""
+    """Summarise the problems of a loaded deck, if it has no errors."""
     problems = () if loaded.errors() else loaded.problems
     return DeckCheck(loaded.source, tuple(loaded.findings), tuple(map(deck_summary, problems)))
 

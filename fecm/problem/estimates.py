@@ -1,7 +1,7 @@
 """Estimates before a run: waves that the mesh resolves, and the impact on the static plate.
 
-The kinetic energy of the projectile is stored in the plate and in the indentation.  Nothing here
-knows waves: a light projectile bends the plate less.
+The static plate assumes that plate and indentation store the kinetic energy of the projectile. It
+neglects waves: a light projectile bends the plate less.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ class Resolution(NamedTuple):
 def resolution(problem: Problem) -> Resolution | None:
     """Compare the elements at the impact node with the bending waves of the impact.
 
-    None without an approach, or where a number overflows.
+    Returns None without an approach, or where a number overflows.
     """
     deck, mesh = problem.deck, problem.mesh
     impact, law = deck.require(model.Impact), deck.require(model.Indentation)
@@ -82,12 +82,13 @@ def resolution(problem: Problem) -> Resolution | None:
 def estimated_mesh_error(elements: float, slenderness: float, shear: int) -> float:
     """Estimate the relative mesh error of the peak force, within a factor of about two.
 
-    Fitted to the peaks of 14 meshes of 8- or 9-node elements with L2 = 3, and compared with 18
-    with L2 = 2, each against a mesh of 15 to 30 elements per wave: AS/3501 plates of
-    100 x 100 x 1, 2 and 4 mm, and the report's plate.
+    The formula was fitted to the peaks of 14 meshes of 8- or 9-node elements with L2 = 3, and
+    compared with 18 meshes with L2 = 2, each against a mesh of 15 to 30 elements per wave: AS/3501
+    plates of 100 x 100 x 1, 2 and 4 mm, and the report's plate.
 
-    `elements` are those per bending wave of the contact's duration, `slenderness` is the side of an
-    element over the thickness (under L2 = 3 a slender element locks), `shear` the order L2.
+    `elements` is the number of elements per bending wave of the contact's duration. `slenderness`
+    is the side of an element over the thickness (under L2 = 3 a slender element locks). `shear` is
+    the order L2.
     """
     if shear < FULL:
         return 0.045 * ENOUGH_PER_WAVE / elements
@@ -95,7 +96,7 @@ def estimated_mesh_error(elements: float, slenderness: float, shear: int) -> flo
 
 
 def said_error(error: float) -> str:
-    """Text of an estimated mesh error of the peak force."""
+    """Format an estimated mesh error of the peak force."""
     if error > MOST_ERROR:
         return f"mesh error of the peak above {MOST_ERROR:.0%}"
     return f"mesh error of the peak about {error:.1%}"
@@ -120,9 +121,9 @@ class NoCurveError(FecmError, ValueError):
 def static_deflection(problem: Problem) -> float:
     """Estimate the largest deflection of the linear plate under the impact, length.
 
-    It is the deflection of the static plate, or that of an infinite plate where this is smaller: an
-    infinite plate moves by I/(8 sqrt(m D*)) under an impulse I, here at most twice the momentum of
-    the projectile.  NaN for a plate that its supports do not hold.
+    It is the smaller of the deflections of the static plate and of an infinite plate. An infinite
+    plate moves by I/(8 sqrt(m D*)) under an impulse I, here at most twice the momentum of the
+    projectile. It is NaN for a plate that its supports do not hold.
 
     Parameters
     ----------
@@ -144,9 +145,9 @@ def static_deflection(problem: Problem) -> float:
 
 
 def nonlinear_curve(problem: Problem, energy: float, force: float) -> StaticCurve:
-    """Static curve of a nonlinear plate up to an energy, and up to a force unless it is NaN.
+    """Return the static curve of a nonlinear plate up to an energy, and a force unless it is NaN.
 
-    Raises NoCurveError if the plate has none.
+    Raises NoCurveError if the plate has no such curve.
     """
     contact = problem.contact
     assert contact is not None  # the program has impact steps
@@ -172,9 +173,9 @@ def nonlinear_curve(problem: Problem, energy: float, force: float) -> StaticCurv
 
 
 def contact_duration(problem: Problem) -> float:
-    """Simulated time that is longer than the contact of the projectile with the static plate.
+    """Return a simulated time that is longer than the contact with the static plate.
 
-    A nonlinear plate has its static curve where there is one, and is taken as linear otherwise.
+    A nonlinear plate has its static curve if there is one, and is taken as linear otherwise.
     """
     contact = problem.contact
     assert contact is not None
@@ -201,7 +202,7 @@ def _velocity(problem: Problem) -> float:
 
 
 def _coefficient(problem: Problem) -> float:
-    """Contact coefficient k, force/length^1.5."""
+    """Return the contact coefficient k, force/length^1.5."""
     return problem.deck.require(Indentation).k
 
 

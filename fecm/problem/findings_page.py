@@ -1,6 +1,6 @@
-"""All rules, and the page ``docs/findings.md`` that is made of them.
+"""All rules, and the page ``docs/findings.md`` that is generated from them.
 
-Write the page anew by ``python -m fecm.problem.findings_page docs/findings.md``.
+``python -m fecm.problem.findings_page docs/findings.md`` generates the page.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ TABLE = ["| code | finding | remedy |", "|---|---|---|"]
 
 
 def all_rules() -> list[Rule]:
-    """Every rule, by number, and by severity where two share a number."""
+    """Return every rule by number, and by severity where two rules share a number."""
     return sorted(RULES.values(), key=lambda rule: (rule.code[1:], "EWN".index(rule.code[0])))
 
 
 def findings_page() -> str:
-    """Text of the page in Markdown: a table for each subject."""
+    """Return the page as Markdown: a table for each subject."""
     lines = [HEAD]
     for subject in Subject:
         lines += [f"## {subject}", "", *TABLE]

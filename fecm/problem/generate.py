@@ -1,4 +1,4 @@
-"""Generate nodes, elements, restraints and loads of the mesh from a deck's cards."""
+"""Generation of nodes, elements, restraints and loads of the mesh from a deck's cards."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ GENERATED = 10_000  # and besides
 
 
 class _Budget:
-    """Limit of the generated nodes: the cost would grow with the product of cards and nodes."""
+    """Limit of the generated nodes, as the cost grows with the product of cards and nodes."""
 
     def __init__(self, nodes: int, findings: Findings) -> None:
         self._limit = self._left = GENERATED_PER_NODE * nodes + GENERATED
@@ -56,9 +56,9 @@ def generate(
 ) -> MeshArrays:
     """Generate nodes, elements, restraints and forces as the listing's GENVEC and PMESH do.
 
-    The mesh is complete if there were no findings.  With `unit_force` the force of ROD's dof is set
-    to 1 at ROD's place among the segments, so that it replaces an earlier FORC's value and a later
-    FORC's replaces it.
+    The mesh is complete if there were no findings. With `unit_force` the force of ROD's dof is set
+    to 1 at ROD's place among the segments. It replaces the value of an earlier FORC, and a later
+    FORC replaces it.
     """
     noted = Findings() if findings is None else findings
     control = deck.control
@@ -95,7 +95,10 @@ def restraint_codes(
 
 
 def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floats:
-    """Diameters of a rod's elements, generated like coordinates; NaN for those without a card."""
+    """Return the diameters of a rod's elements, generated like coordinates.
+
+    Elements without a card have NaN.
+    """
     noted = Findings() if findings is None else findings
     values = np.full((segment.elements, 1), np.nan)
     known: list[NodeValues] = []
@@ -117,7 +120,7 @@ _R = TypeVar("_R", NodeValues, NodeCodes, ElementNodes)
 
 
 class _Cards(NamedTuple):
-    """Cards of nodes or elements as arrays, and their records, which know the places."""
+    """Cards of nodes or elements as arrays, and their records, which know their positions."""
 
     numbers: Indices  # of the nodes or elements
     increments: Indices
@@ -125,12 +128,12 @@ class _Cards(NamedTuple):
     records: Sequence[Record]
 
     def place(self, card: int, field: str) -> CardPlace | None:
-        """Place of a field of a card."""
+        """Return the position of a field of a card."""
         return self.records[card].place(field)
 
 
 def _cards(records: Sequence[_R], number: str, values: str) -> _Cards:
-    """Arrays of records; `number` and `values` are the names of their attributes."""
+    """Return arrays of records; `number` and `values` are the names of their attributes."""
     kind = "f8" if values == "values" else "i4"
     if isinstance(records, Table):
         table = np.frombuffer(records.values).reshape(-1, records.width)
@@ -148,7 +151,7 @@ def _cards(records: Sequence[_R], number: str, values: str) -> _Cards:
 def _existing(
     records: Sequence[_R], number: str, values: str, count: int, code: str, findings: Findings
 ) -> _Cards:
-    """Cards whose node or element exists; the others are reported together."""
+    """Return the cards whose node or element exists; report the others together."""
     cards = _cards(records, number, values)
     inside = (cards.numbers >= 1) & (cards.numbers <= count)
     if inside.all():
@@ -163,7 +166,7 @@ def _existing(
 
 
 def _rows(first: int, last: int, increment: int) -> Indices:
-    """Rows of the nodes from one card up to the next, without that of the next."""
+    """Return the rows of the nodes from one card up to, and without, the next."""
     step = abs(increment) if last >= first else -abs(increment)
     return np.arange(first - 1, last - 1, step)
 
@@ -222,7 +225,7 @@ def _carry(codes: Ints, records: Sequence[NodeCodes], findings: Findings, budget
 
 
 def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -> None:
-    """Set elements; those between two cards add the earlier card's increment (PMESH)."""
+    """Set elements; elements between two cards add the earlier card's increment (PMESH)."""
     if not records:
         return
     cards = _existing(records, "element", "nodes", len(elements), "E303", findings)
@@ -244,7 +247,7 @@ def _step(elements: Ints, records: Sequence[ElementNodes], findings: Findings) -
 
 
 def _fill(elements: Ints, cards: _Cards, card: int, end: int) -> None:
-    """Generate the elements between a card's own and number `end`."""
+    """Generate the elements from a card's number up to `end`."""
     number, increment = int(cards.numbers[card]), int(cards.increments[card])
     nodes = cards.values[card].astype(np.int64)
     steps = np.arange(1, end - number)[:, None] * (increment or 1)
@@ -256,7 +259,7 @@ def _fill(elements: Ints, cards: _Cards, card: int, end: int) -> None:
 
 
 def place_of_element(deck: Deck, number: int) -> CardPlace | None:
-    """Place of the card that defines or generates an element."""
+    """Return the position of the card that defines or generates an element."""
     if (segment := deck.last(Elements)) is None:
         return None
     cards = bisect.bisect_right(segment.records, number, key=lambda record: record.element)

@@ -1,4 +1,4 @@
-"""Reads decks and checks them."""
+"""Loading of decks: reading and checking."""
 
 from __future__ import annotations
 
@@ -19,14 +19,17 @@ from fecm.problem.rules.time_step import UNSTABLE
 
 
 class LoadedDeck(NamedTuple):
-    """A file that was read and checked."""
+    """File that was read and checked."""
 
     source: str  # its name
     problems: list[Problem]  # the problems that could be read
     findings: list[Finding]  # all findings, in the deck's order
 
     def errors(self, force: bool = False) -> list[Finding]:
-        """Findings that make the deck unusable; with `force`, without unstable motions."""
+        """Return the findings that make the deck unusable.
+
+        With `force`, unstable motions are permitted.
+        """
         allowed = (UNSTABLE, HOURGLASS) if force else ()
         return [f for f in self.findings if f.severity == "error" and f.code not in allowed]
 
@@ -50,7 +53,7 @@ def load_deck(deck: AnyDeck, mode: str = REPORT) -> LoadedDeck:
     """Read and check a deck without running it.
 
     In listing mode blanks inside numbers are zeros, and decks that the printed program can't
-    compute are errors.  Raises OSError if the file can't be read.
+    compute are errors. Raises OSError if the file can't be read.
     """
     if isinstance(deck, LoadedDeck):
         return deck
@@ -75,7 +78,7 @@ def load_deck(deck: AnyDeck, mode: str = REPORT) -> LoadedDeck:
 def load_one(deck: AnyDeck, mode: str = REPORT) -> Problem:
     """Load a deck with exactly one problem.
 
-    Raises DeckError if the deck has errors, OptionsError if it has several problems, or none.
+    Raises DeckError if the deck has errors, OptionsError if it has several problems or none.
     """
     loaded = load_deck(deck, mode)
     loaded.refuse_errors()
@@ -84,10 +87,10 @@ def load_one(deck: AnyDeck, mode: str = REPORT) -> Problem:
 
 
 def sole_problem(deck: AnyDeck, *, warns: bool = True) -> Problem:
-    """Checked problem of a deck that has one; with `warns`, warnings about it are FecmWarnings.
+    """Return the checked problem of a deck with one problem.
 
-    Raises DeckError if the deck has errors, apart from unstable motions.  Raises OptionsError if
-    the deck does not have exactly one problem.
+    With `warns`, warnings about it are FecmWarnings. Raises DeckError if the deck has errors, apart
+    from unstable motions. Raises OptionsError if the deck does not have exactly one problem.
     """
     loaded = load_deck(deck)
     loaded.refuse_errors(force=True)

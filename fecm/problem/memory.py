@@ -1,9 +1,9 @@
 """Estimate of the memory of a run, before the run.
 
 The large parts are the element matrices, the assembled stiffness and its factors if a macro or the
-solver needs them, the nodal vectors and, without an output file, the result.
-The estimate is between 0.7 times and twice what was measured on meshes of 400 to 40 000 nodes; the
-memory of interpreter and libraries is not counted.
+solver needs them, the nodal vectors and, without an output file, the result. The estimate is
+between 0.7 and 2 times the memory that was measured on meshes of 400 to 40 000 nodes. The memory of
+interpreter and libraries is not counted.
 """
 
 from __future__ import annotations
@@ -45,9 +45,9 @@ STATIC = {"TANG", "EIGE"}
 def needed_bytes(
     checked: Problem, *, solver: str = AUTO, in_memory: bool = False, exact: bool = True
 ) -> int:
-    """Estimate of the memory of a run, whose result may be kept in memory.
+    """Estimate the memory of a run, whose result may be kept in memory.
 
-    An `exact` one counts congruent elements once, instead of taking all elements as different.
+    An `exact` estimate counts congruent elements once, instead of taking all elements as different.
     """
     words = {macro.word for macro in flat(checked.program)}
     output, model, control = checked.output_bytes, checked.plate, checked.deck.control
@@ -93,7 +93,7 @@ def check_run_memory(checked: Problem, *, solver: str = AUTO, in_memory: bool = 
 
 
 def _product(model: PlateModel, *, compiled: bool, exact: bool) -> int:
-    """Element matrices of the product K u, and the vectors that it gathers and sums."""
+    """Return the bytes of the element matrices of K u, and of the vectors around it."""
     points = max(len(rule.xi) for rule in (model.rules.bending, model.rules.shear))
     total = 0
     for family in model.families:
@@ -113,7 +113,7 @@ def _product(model: PlateModel, *, compiled: bool, exact: bool) -> int:
 
 
 def _gages(checked: Problem, count: int) -> int:
-    """Weights of gages, and their strains: as the kernels write them, turned, and gathered."""
+    """Return the bytes of weights of gages, and of their strains in two orders."""
     steps = checked.work.steps
     together = min(steps, TOGETHER.interval(checked.moving_plate.neq))
     strains = 8 * (2 * together + GATHERED + min(steps, GATHERED))
@@ -121,7 +121,7 @@ def _gages(checked: Problem, count: int) -> int:
 
 
 def _fields(checked: Problem) -> int:
-    """Displacement fields that one call of the kernels stores, and what is made of them."""
+    """Return the bytes of fields that one call of the kernels stores, with derived arrays."""
     plate, work, control = checked.plate, checked.work, checked.deck.control
     field, n = plate.mesh.equations.size, checked.moving_plate.neq
     stored = max(work.contact_rows, *(work.passes[word] for word in ("DISP", "PLYS", "FAIL")))
@@ -135,7 +135,7 @@ def _fields(checked: Problem) -> int:
 
 
 def reduction_bytes(model: PlateModel, modes: int) -> int:
-    """Memory of the reduction of a plate to some bending modes."""
+    """Return the bytes of the reduction of a plate to some bending modes."""
     n, in_plane = model.neq, int(np.count_nonzero(model.mesh.equations[:, :2]))
     vectors = min(n, VECTORS_PER_MODE * modes + MORE_VECTORS)
     factors = _factors(model, {"TANG"})
@@ -148,7 +148,7 @@ def reduction_bytes(model: PlateModel, modes: int) -> int:
 
 
 def _buckling(model: PlateModel) -> int:
-    """Matrices for the buckling load, and the factors with a copy of them, of w and rotations."""
+    """Return the bytes of the matrices for the buckling load, and of the factors with copies."""
     if model.is_curved:
         n, share, coupled = model.neq, 1.0, 25 / 13
     else:
@@ -157,7 +157,10 @@ def _buckling(model: PlateModel) -> int:
 
 
 def _factors(model: PlateModel, words: set[str]) -> int:
-    """Factors of the stiffness: n log n in a plane mesh ordered well, n^1.5 ordered by columns."""
+    """Return the bytes of the factors of the stiffness.
+
+    They grow with n log n in a plane mesh ordered well, with n^1.5 if ordered by columns.
+    """
     n = model.neq
     total = FACTORS * n * math.log2(max(2, n)) if "TANG" in words else 0.0
     total += SHIFTED * n**1.5 if "EIGE" in words else 0.0

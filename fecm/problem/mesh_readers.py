@@ -1,14 +1,12 @@
 """Readers of mesh files: physical groups of Gmsh 4.1, bulk data of Nastran.
 
-Physical groups of the curves and surfaces in a file of Gmsh 4.1.
+Gmsh: physical groups of curves and surfaces. meshio knows all named groups of an entity, but only
+the first of the groups without a name.
 
-meshio knows all groups of an entity that have names, and of those without a name the first alone.
-
-Nodes and elements of the bulk data of Nastran: CQUAD4, CQUADR, CTRIA3, CTRIAR, CQUAD8, CTRIA6.
-
-Coordinates are converted from the systems of CP and GRDSET to the basic one.  INCLUDE is followed.
-What a plate of fecm does not have, such as offsets, angles of elements and stiffeners, is refused.
-Bars without a property, as Gmsh writes lines, are groups of nodes named by its number.
+Nastran: nodes and the elements CQUAD4, CQUADR, CTRIA3, CTRIAR, CQUAD8, CTRIA6. Coordinates are
+converted from the systems of CP and GRDSET to the basic system. INCLUDE is followed. What a plate
+of fecm does not have, such as offsets, angles of elements and stiffeners, is refused. Bars without
+a property, as Gmsh writes lines, are groups of nodes named by the number of the property.
 """
 
 from __future__ import annotations
@@ -35,9 +33,9 @@ Take = Callable[[str, int], list[int]]  # numbers of a kind, `i` or `N` or `d`
 
 
 def physical_groups(text: bytes) -> dict[tuple[int, int], list[int]]:
-    """Numbers of the physical groups of an entity, by its dimension and number.
+    """Return the physical groups of an entity, by its dimension and number.
 
-    Empty for a file that is not of Gmsh 4.1 or is damaged.
+    The result is empty for a file that is not of Gmsh 4.1 or is damaged.
     """
     head, section = _HEAD.match(text), _SECTION.search(text)
     if head is None or section is None:
@@ -52,7 +50,7 @@ def physical_groups(text: bytes) -> dict[tuple[int, int], list[int]]:
 
 
 def _entities(take: Take) -> Iterator[tuple[tuple[int, int], list[int]]]:
-    """Dimension and number of points, curves and surfaces, and their groups."""
+    """Yield dimension and number of points, curves and surfaces, and their groups."""
     counts = take("N", 4)
     for dimension, doubles in _DOUBLES.items():
         for _ in range(counts[dimension]):
@@ -109,22 +107,22 @@ class NastranError(ValueError):
 
 
 class NastranCard(NamedTuple):
-    """A card with its continuations."""
+    """Card with its continuations."""
 
     place: str  # file and line
     fields: list[str]  # without the keyword
 
     def error(self, keyword: str, what: str) -> NastranError:
-        """Error that names the card."""
+        """Return an error that names the card."""
         number = f" {self.fields[0]}" if self.fields and self.fields[0] else ""
         return NastranError(f"{self.place}: {keyword}{number} {what}")
 
     def text(self, place: int) -> str:
-        """Field after the keyword, from 0; empty beyond the last."""
+        """Return a field after the keyword, from 0; empty beyond the last field."""
         return self.fields[place] if place < len(self.fields) else ""
 
     def real(self, keyword: str, place: int) -> float:
-        """Number in a field; 0 in a blank one."""
+        """Return the number in a field; 0 for a blank field."""
         text = self.text(place)
         match = _NUMBER.fullmatch(text) if text else None
         value = float(f"{match[1]}e{match[2] or 0}") if match else 0.0
@@ -133,7 +131,7 @@ class NastranCard(NamedTuple):
         return value
 
     def whole(self, keyword: str, place: int, default: int | None = None) -> int:
-        """Whole number in a field; the default in a blank one."""
+        """Return the whole number in a field; the default for a blank field."""
         text = self.text(place)
         if not text and default is not None:
             return default
@@ -144,7 +142,7 @@ class NastranCard(NamedTuple):
 
 
 class NastranElement(NamedTuple):
-    """Places of the fields of an element, from the first node, 2, on."""
+    """Positions of the fields of an element. The first node is field 2."""
 
     nodes: int
     angle: int  # THETA or MCID
@@ -170,14 +168,14 @@ NOT_OF_PLATE = f"is not part of a plate: leave it out; the elements are {', '.jo
 
 
 class System(NamedTuple):
-    """Coordinate system in the basic one."""
+    """Coordinate system in basic coordinates."""
 
     kind: str  # R, C or S
     origin: Floats
     axes: Floats  # its x, y and z in rows
 
     def basic(self, place: Floats) -> Floats:
-        """Basic coordinates of a place; angles are in degrees."""
+        """Return the basic coordinates of a place; angles are in degrees."""
         a, b, c = place.tolist()
         turn, rise = np.radians(b), np.radians(c)
         if self.kind == "C":
@@ -192,7 +190,7 @@ BASIC = System("R", np.zeros(3), np.eye(3))
 
 
 class Bulk(NamedTuple):
-    """Points (n, 3) in the basic system; cells (m, k) and groups have their rows, from 0."""
+    """Points (n, 3) in the basic system; cells (m, k) and groups refer to their rows, from 0."""
 
     points: Floats
     cells: NDArray[np.int_]
@@ -200,7 +198,7 @@ class Bulk(NamedTuple):
 
 
 def read_nastran(path: Path) -> Bulk:
-    """Points, cells and groups of a file.
+    """Read points, cells and groups of a file.
 
     Raises NastranError with the place and the remedy.
     """
@@ -211,7 +209,7 @@ def read_nastran(path: Path) -> Bulk:
 
 
 class _Reader:
-    """What is used of the cards."""
+    """Collector of the cards that are used."""
 
     def __init__(self) -> None:
         self._grids: dict[int, NastranCard] = {}
@@ -225,7 +223,7 @@ class _Reader:
         self._open: list[int] = []  # systems that are being resolved
 
     def add(self, keyword: str, card: NastranCard) -> None:
-        """Take a card."""
+        """Add a card."""
         if keyword.startswith("=") or "=" in card.fields:
             raise card.error(keyword, "repeats the card before it by `=`; write the card in full")
         if keyword == "GRID":
@@ -249,7 +247,7 @@ class _Reader:
             raise card.error(keyword, NOT_OF_PLATE)
 
     def mesh(self, path: Path) -> Bulk:
-        """Points, cells and groups."""
+        """Return points, cells and groups."""
         if not self._elements:
             known = ", ".join(ELEMENTS)
             raise NastranError(f"{path} has no elements of a plate, which are {known}")
@@ -273,14 +271,14 @@ class _Reader:
         return Bulk(points, np.array(cells), groups)
 
     def _node(self, keyword: str, card: NastranCard, place: int) -> int:
-        """Number of a node that a GRID card gives."""
+        """Return the number of the node that a GRID card defines."""
         node = card.whole(keyword, place)
         if node not in self._grids:
             raise card.error(keyword, f"has the node {node}, which no GRID card gives")
         return node
 
     def _nodes(self, keyword: str, card: NastranCard) -> list[int]:
-        """Nodes of an element that has nothing else."""
+        """Return the nodes of an element, which must have no other data."""
         kind = ELEMENTS[keyword]
         nodes = [self._node(keyword, card, 2 + n) for n in range(kind.nodes)]
         if kind.offset is not None and card.real(keyword, kind.offset):
@@ -315,7 +313,7 @@ class _Reader:
         )
 
     def _place(self, number: int) -> Floats:
-        """Basic coordinates of a node."""
+        """Return the basic coordinates of a node."""
         if number not in self._places:
             card = self._grids[number]
             own = np.array([card.real("GRID", n) for n in (2, 3, 4)])
@@ -324,7 +322,7 @@ class _Reader:
         return self._places[number]
 
     def _system(self, number: int, keyword: str, user: NastranCard) -> System:
-        """System of a number, which a card uses."""
+        """Return the system with a number, which a card uses."""
         if number in self._found:
             return self._found[number]
         if number not in self._systems:
@@ -354,7 +352,7 @@ class _Reader:
 
 
 def _cards(path: Path) -> Iterator[tuple[str, NastranCard]]:
-    """Keywords and cards of the bulk data."""
+    """Yield the cards of the bulk data."""
     keyword, card, expected = "", NastranCard("", []), ""
     for place, line in _lines(path, 0):
         fields, name, here, follows = _fields(line)
@@ -387,7 +385,7 @@ def _is_used(keyword: str) -> bool:
 
 
 def _fields(line: str) -> tuple[list[str], str, str, str]:
-    """Fields of a line, its first field, and the marks of its continuations."""
+    """Return the fields of a line, its first field, and the marks of its continuations."""
     if "," in line:
         name, *fields = (field.strip() for field in line.split(","))
         width = 4 if "*" in name else 8
@@ -401,7 +399,7 @@ def _fields(line: str) -> tuple[list[str], str, str, str]:
 
 
 def _lines(path: Path, depth: int) -> Iterator[tuple[str, str]]:
-    """Places and texts of the lines of bulk data, with those of other files."""
+    """Yield places and texts of the lines of bulk data, including other files."""
     text = read_input(path).decode("latin-1")
     lines = re.split("\r\n|\r|\n", text)
     starts = [number for number, line in enumerate(lines) if _BULK.match(line)]

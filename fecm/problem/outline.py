@@ -1,4 +1,4 @@
-"""Outline of a plate: sides of its elements, holes, supports, and the distance between supports."""
+"""Outline of a plate: sides of its elements, holes, supports, and distance between supports."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ SUPPORTED = 300
 
 
 class Span(NamedTuple):
-    """Length to compare the thickness with."""
+    """Length that the thickness is compared with."""
 
     length: float
     name: str  # what it is, in messages
 
 
 def unsupported(mesh: MeshArrays, load: tuple[float, float] | None) -> Span:
-    """Distance between supports that counts for bending.
+    """Return the distance between supports that counts for bending.
 
-    Diameter of the largest circle around a node that has no node with restrained w in it and
-    reaches the load, if there is one: the shorter distance between two supported sides, the
-    diameter of a round window, twice the length of a cantilever.  Without supports the shorter
-    side of the plate.
+    It is the diameter of the largest circle around a node that contains no node with restrained w
+    and, if there is a load, reaches it: the shorter distance between two supported sides, the
+    diameter of a round window, or twice the length of a cantilever. Without supports it is the
+    shorter side of the plate.
     """
     places, held = mesh.coordinates[mesh.used], mesh.codes[mesh.used, W] != 0
     free, supports = places[~held], places[held]
@@ -72,7 +72,7 @@ class PlateSides(NamedTuple):
 
 
 def element_sides(mesh: MeshArrays) -> PlateSides:
-    """Sides of the elements of a mesh."""
+    """Return the sides of the elements of a mesh."""
     corners, rows, held = [], [], []
     # Node 0 stands for an absent one, which does not decide.
     holds = np.concatenate([[True], mesh.codes[:, W] != 0])
@@ -102,9 +102,9 @@ def holes(mesh: MeshArrays) -> int:
 
 
 def outside_supports(mesh: MeshArrays) -> Bools:
-    """Which elements lie outside the supports, as the rim of a plate on a window does.
+    """Return a mask of the elements outside the supports, such as the rim of a plate on a window.
 
-    Lines of supports divide a plate into parts.  A part lies outside if no support holds its
+    Lines of supports divide a plate into parts. A part lies outside if no support holds its
     outline, and supports hold all of another part's border.
     """
     outside = np.zeros(len(mesh.elements), dtype=bool)
@@ -129,7 +129,7 @@ def outside_supports(mesh: MeshArrays) -> Bools:
 
 
 def _neighbours(sides: PlateSides, passable: Bools) -> tuple[Indices, Indices]:
-    """Rows of the two elements at every shared side that is passable."""
+    """Return the rows of the two elements at every shared side that is passable."""
     shared = np.flatnonzero(passable & ~sides.is_outline)
     shared = shared[np.argsort(sides.numbers[shared], kind="stable")]
     same = sides.numbers[shared[1:]] == sides.numbers[shared[:-1]]
@@ -137,7 +137,7 @@ def _neighbours(sides: PlateSides, passable: Bools) -> tuple[Indices, Indices]:
 
 
 def _parts(count: int, first: Indices, second: Indices) -> tuple[int, Indices]:
-    """Number of connected parts of a graph, and the part of each of its vertices."""
+    """Return the number of connected parts of a graph, and the part of each vertex."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 

@@ -1,4 +1,4 @@
-"""Parts of a run that its deck determines, with the parameters of its variant."""
+"""Parts of a run that follow from its deck, with the parameters of its variant."""
 
 from __future__ import annotations
 
@@ -42,10 +42,11 @@ THETA_X = 3
 
 
 def rules(material: model.Material) -> tuple[Quadrature, Quadrature, Quadrature]:
-    """Quadrature of a MATE card: bending (L1), transverse shear (L2), stored strains (K).
+    """Return the quadrature of a MATE card.
 
-    L1 and L2 outside 1 to 4 count as the nearest of these, as in the listing.  Raises ValueError if
-    K is 0 or beyond 4.
+    These are the rules of bending (L1), transverse shear (L2) and stored strains (K). L1 and L2
+    outside 1 to 4 count as the nearest of these, as in the listing. Raises ValueError if K is 0 or
+    beyond 4.
     """
     card = material.integration
     bending, shear = (min(HIGHEST_ORDER, max(1, n)) for n in (card.bending, card.shear))
@@ -74,7 +75,7 @@ def build_plate(deck: Deck, mesh: MeshArrays, variant: PlateVariant = REPORT_PLA
 
 
 def build_projectile(deck: Deck, variant: ImpactVariant = REPORT_IMPACT) -> DeckProjectile:
-    """Build the projectile of a deck; without a PROJ segment the report's rod."""
+    """Build the projectile of a deck; without a PROJ segment, the report's rod."""
     if (card := deck.last(model.Projectile)) is None:
         return report_rod(variant.rod_density)
     if not card.elements:
@@ -83,7 +84,7 @@ def build_projectile(deck: Deck, variant: ImpactVariant = REPORT_IMPACT) -> Deck
 
 
 def projectile_segment(rod: DeckProjectile, transducer: int = 0) -> model.Projectile:
-    """PROJ segment of a projectile."""
+    """Return the PROJ segment of a projectile."""
     if isinstance(rod, RigidMass):
         return model.Projectile(0, 0, rod.total_mass)
     cards = [RodDiameter(n, 0, diameter) for n, diameter in enumerate(rod.diameters, start=1)]
@@ -117,7 +118,7 @@ def build_station(
 ) -> Transducer:
     """Build the transducer: PROJ's node, or the rod's middle.
 
-    PROJ's is not that of a projectile of a user.
+    A user's projectile does not have PROJ's node.
     """
     if not isinstance(projectile, Rod):
         return Transducer(0, variant.station_sign)
@@ -135,7 +136,7 @@ def build_law(
 
 
 def laminate_numbers(deck: Deck) -> Indices:
-    """Number from 0 of the laminate of every element, (numel,), in the order of LAMS."""
+    """Return the number from 0 of the laminate of every element, (numel,), in the order of LAMS."""
     order = {number: n for n, number in enumerate(deck.layers)}
     numbers = np.zeros(deck.control.numel, dtype=np.intp)
     for zone in deck.require(model.Zones).records:
@@ -155,7 +156,7 @@ def _laminate_of(
 
 
 def laminates_of_deck(deck: Deck, variant: PlateVariant = REPORT_PLATE) -> list[LaminateSection]:
-    """Laminates of a deck with its shear correction factor, that of MATE first.
+    """Return the laminates of a deck with its shear correction factor, MATE's first.
 
     Raises LookupError without a MATE segment.
     """
@@ -174,7 +175,7 @@ def laminates_of_deck(deck: Deck, variant: PlateVariant = REPORT_PLATE) -> list[
 def residuals_of_deck(
     deck: Deck, laminates: Sequence[LaminateSection]
 ) -> tuple[Residual, ...] | None:
-    """Residual stresses of the plies of each laminate of a deck; None without a CURE segment."""
+    """Return the residual stresses of the plies of each laminate; None without CURE."""
     if (cure := deck.last(model.Cure)) is None:
         return None
     from fecm.mechanics.ply_stresses import residual_stresses  # 0.3 ms, for CURE only
@@ -187,16 +188,16 @@ def residuals_of_deck(
 
 
 def strengths_of_deck(deck: Deck) -> list[list[model.Allowables | None]]:
-    """Strengths of the plies of each laminate; None where ALLO does not give them."""
+    """Return the strengths of the plies of each laminate; None where ALLO lacks them."""
     card = deck.require(model.Allowables)
     layups = deck.layers.values()
     return [[card.of(layer.material) for layer in layers] for layers in layups]
 
 
 def materials_of_deck(deck: Deck) -> Ints | None:
-    """Numbers of the materials of the plies of each laminate, (laminates, plies), 0 where none is.
+    """Return the material numbers of the plies of each laminate, (laminates, plies).
 
-    None if the deck has one material.
+    Missing plies have 0. Returns None if the deck has one material.
     """
     layups = list(deck.layers.values())
     if not deck.has(model.Materials):
@@ -208,12 +209,12 @@ def materials_of_deck(deck: Deck) -> Ints | None:
 
 
 def has_assumed_shear(deck: Deck) -> bool:
-    """Whether the transverse shear strains of a deck are assumed (``SHEA MITC``)."""
+    """Return whether the transverse shear strains of a deck are assumed (``SHEA MITC``)."""
     return (deck.last(model.Shear) or model.Shear()).assumed
 
 
 def is_coupled(deck: Deck) -> bool:
-    """Whether B of one of a deck's laminates is not 0; False where the segments are invalid."""
+    """Return whether B of one of a deck's laminates is not 0; False for invalid segments."""
     material = deck.last(model.Material)
     if material is None:
         return False
@@ -221,13 +222,13 @@ def is_coupled(deck: Deck) -> bool:
 
 
 def is_curved(deck: Deck) -> bool:
-    """Whether a deck is that of a curved panel (``CURV``)."""
+    """Return whether a deck has a curved panel (``CURV``)."""
     card = deck.last(model.Curvature)
     return card is not None and any(card.curvatures)
 
 
 def moves_in_plane(deck: Deck) -> bool:
-    """Whether u and v of a deck's plate are not zero: coupled, curved or nonlinear."""
+    """Return whether u and v of a deck's plate are not zero: coupled, curved or nonlinear."""
     return deck.has(model.Nonlinear) or is_curved(deck) or is_coupled(deck)
 
 
@@ -235,7 +236,7 @@ def moves_in_plane(deck: Deck) -> bool:
 def _are_coupled(
     material: model.Material, materials: model.Materials | None, laminates: model.Laminates | None
 ) -> bool:
-    """Whether B of one of the laminates is not 0."""
+    """Return whether B of one of the laminates is not 0."""
     plies = {MATERIAL: material.ply} | {
         one.number: one.ply for one in (materials.plies if materials else ())
     }

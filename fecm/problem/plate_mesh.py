@@ -1,4 +1,4 @@
-"""Meshes of mesh generators: elements and groups of nodes of a file or of arrays."""
+"""Meshes of mesh generators: elements and groups of nodes from a file or arrays."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ NAMED = 8  # most elements named in a message
 
 
 class MeshError(FecmError, ValueError):
-    """A mesh cannot be used for a plate."""
+    """A mesh can't be used for a plate."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -113,7 +113,7 @@ class PlateMesh:
         return self.points.min(axis=0).tolist(), self.points.max(axis=0).tolist()
 
     def nearest(self, x: float, y: float) -> tuple[int, float, float]:
-        """Number and place of the node nearest to a point."""
+        """Return number and place of the node nearest to a point."""
         row = int(np.hypot(*(self.points - (x, y)).T).argmin())
         return row + 1, *self.points[row].tolist()
 
@@ -122,13 +122,13 @@ class PlateMesh:
         return Control(self.nodes, self.elements, layers=1, ndm=2, ndf=5, nen=self.most_nodes)
 
     def coordinates(self) -> Coordinates:
-        """COOR cards, one per node."""
+        """Return COOR cards, one per node."""
         numbers = np.arange(1, self.nodes + 1)
         cards = np.column_stack((numbers, np.zeros(self.nodes), self.points))
         return Coordinates.of(self._control, cards)
 
     def element_cards(self) -> Elements:
-        """ELEM cards, one per element."""
+        """Return ELEM cards, one per element."""
         numbers = np.arange(1, self.elements + 1)
         cards = np.column_stack((numbers, self.cells + 1, np.zeros(self.elements)))
         return Elements.of(self._control, cards)
@@ -136,11 +136,10 @@ class PlateMesh:
     def supported(
         self, everywhere: Sequence[int], supports: Mapping[str, str], *, in_plane: str = "held"
     ) -> Boundary | None:
-        """BOUN cards of the supports of groups; None where nothing is restrained.
+        """Return BOUN cards of the supports of groups; None where nothing is restrained.
 
-        The support of the boundary leaves out the other groups.  `in_plane` is what the supports do
-        to u and v; raises MeshError if that depends on the direction of a side that is along
-        neither x nor y.
+        The support of the boundary leaves out the other groups. `in_plane` is the support of u and
+        v. Raises MeshError if it depends on the direction of a side that is along neither x nor y.
         """
         codes = np.tile(np.array(everywhere), (self.nodes, 1))
         for name, support in supports.items():
@@ -189,7 +188,10 @@ class PlateMesh:
         return np.unique(sides[number[counts[of_joined] == 1]])
 
     def supports(self, wanted: Mapping[str, str]) -> dict[str, str]:
-        """Supports of groups; those named after a support have it.  Raises MeshError."""
+        """Return the supports of groups; a group named after a support has it.
+
+        Raises MeshError if a group does not exist.
+        """
         for name, support in wanted.items():
             if name not in self.groups and name != BOUNDARY:
                 known = ", ".join(sorted({*self.groups, BOUNDARY}))
@@ -200,7 +202,7 @@ class PlateMesh:
 
 
 class MeshLike(Protocol):
-    """What is used of a `meshio.Mesh`."""
+    """Attributes of a `meshio.Mesh` that are used."""
 
     points: Any
     cells: Any
@@ -213,14 +215,14 @@ class MeshLike(Protocol):
 
 @runtime_checkable
 class GridLike(Protocol):
-    """What is used of a data set of PyVista."""
+    """Attributes of a data set of PyVista that are used."""
 
     def cast_to_unstructured_grid(self) -> Any:
         """Convert the data set to a grid with points, cells and types of cells."""
 
 
 def read_mesh(path: str | Path) -> PlateMesh:
-    """Read a mesh: the bulk data of Nastran, or with meshio Gmsh's `.msh` or what else it reads.
+    """Read a mesh: bulk data of Nastran, or with meshio Gmsh's `.msh` and other formats.
 
     Raises MeshError if the file is not the mesh of a plane plate, ImportError without meshio.
     """
@@ -274,7 +276,7 @@ def _check_whole(path: Path, text: bytes) -> None:
 
 
 def _check_abaqus(path: Path, text: bytes) -> None:
-    """Refuse what meshio leaves out of an input of Abaqus, or reads in another way."""
+    """Refuse what meshio omits from an input of Abaqus, or reads in another way."""
     for card, remedy in ABAQUS_ONCE.items():
         if len(lines := _lines_with(text, rb"\*%b\s*(,|$)" % card.encode())) > 1:
             raise MeshError(f"{path}:{lines[1]}: a second *{card}; {remedy}")
@@ -295,7 +297,7 @@ def _check_abaqus(path: Path, text: bytes) -> None:
 
 
 def _why_unreadable(path: Path, text: bytes, error: BaseException, printed: str) -> str:
-    """What meshio can't read, where it is, and what helps."""
+    """Say what meshio can't read, where it is, and what helps."""
     why = " ".join(str(error).split()) if isinstance(error, Exception) else ""
     if found := re.search(r"Element type not available: (\S+)", printed):
         kind = found[1]
@@ -325,13 +327,16 @@ def _why_unreadable(path: Path, text: bytes, error: BaseException, printed: str)
 
 
 def _lines_with(text: bytes, pattern: bytes) -> list[int]:
-    """Numbers of the lines that begin with a pattern."""
+    """Return the numbers of the lines that start with a pattern."""
     begins = re.compile(pattern, re.IGNORECASE)
     return [n for n, line in enumerate(text.splitlines(), start=1) if begins.match(line)]
 
 
 def from_pyvista(grid: GridLike) -> PlateMesh:
-    """Plate of a data set of PyVista, whose groups are numbers in the cell data `gmsh:physical`."""
+    """Return the plate of a data set of PyVista.
+
+    Groups are numbers in the cell data `gmsh:physical`.
+    """
     made = grid.cast_to_unstructured_grid()
     blocks: list[Any] = []
     physical: list[Any] = []
@@ -355,7 +360,7 @@ def from_pyvista(grid: GridLike) -> PlateMesh:
 
 
 def from_meshio(read: MeshLike, where: str = "") -> PlateMesh:
-    """Plate of a `meshio.Mesh`; see :func:`plate_mesh`."""
+    """Return the plate of a `meshio.Mesh`; see :func:`plate_mesh`."""
     if not all(hasattr(read, name) for name in MeshLike.__annotations__):
         raise MeshError(
             f"{read!r} is not a file, a meshio.Mesh, a grid of PyVista, or points and cells"
@@ -400,12 +405,12 @@ def from_meshio(read: MeshLike, where: str = "") -> PlateMesh:
 
 
 def _is_group(value: Any) -> bool:
-    """Whether field data are the number and dimension of a group; MED files have other data."""
+    """Return whether field data are the number and dimension of a group; MED files have others."""
     return len(value) == 2 and all(isinstance(one, int | np.integer) for one in value)
 
 
 def _joined(groups: Mapping[str, list[Any]]) -> dict[str, Integers]:
-    """Numbers of each group that has any."""
+    """Return the numbers of each group that is not empty."""
     flat = {name: np.concatenate([np.ravel(p) for p in parts]) for name, parts in groups.items()}
     return {name: np.unique(numbers) for name, numbers in flat.items() if len(numbers)}
 
@@ -417,15 +422,15 @@ def plate_mesh(
     where: str = "",
     surfaces: Mapping[str, ArrayLike] | None = None,
 ) -> PlateMesh:
-    """Elements of a plate from points and cells.
+    """Return the elements of a plate from points and cells.
 
-    Cells are turned counter-clockwise and nodes without a cell dropped.  Three quadrilaterals of 4
+    Cells are turned counter-clockwise and nodes without a cell dropped. Three quadrilaterals of 4
     nodes replace a triangle; a quadrilateral of 8 nodes gets its centre as the ninth.
 
-    The points, (n, 2) or (n, 3), are in a plane z = const.  Cells, (m, k), and groups have points
-    from 0; a cell has corners, mid-sides (the first between corners 1 and 2), centre.  Surfaces
-    have cells from 0.  `where` begins messages.  Raises MeshError if they are not the mesh of a
-    plane plate.
+    The points, (n, 2) or (n, 3), are in a plane z = const. Cells, (m, k), and groups have points
+    from 0; a cell has corners, mid-sides (the first between corners 1 and 2), centre. Surfaces have
+    cells from 0. `where` starts the messages. Raises MeshError if they are not the mesh of a plane
+    plate.
     """
     try:
         places, nodes = np.array(points, float), np.array(cells)
@@ -466,7 +471,7 @@ def plate_mesh(
 
 
 def _turned(places: Floats, nodes: Integers, size: float, where: str) -> Integers:
-    """The cells counter-clockwise; those without an area, or given twice, are refused."""
+    """Return the cells counter-clockwise; cells without an area, or given twice, are refused."""
     count = CORNERS[nodes.shape[1]]
     x, y = np.moveaxis(places[nodes[:, :count]], 2, 0)
     area = (x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)).sum(axis=1) / 2.0
@@ -503,7 +508,7 @@ def _check_joints(places: Floats, nodes: Integers, where: str) -> None:
 
 
 def _with_middles(nodes: Integers, group: Integers) -> Integers:
-    """A group of nodes with the middles of its sides, if it has corners alone."""
+    """Add the middles of its sides to a group of nodes that has only corners."""
     corners = CORNERS[nodes.shape[1]]
     middles = nodes[:, corners : 2 * corners]
     if not middles.shape[1] or np.isin(middles, group).any():
@@ -517,7 +522,10 @@ def _with_middles(nodes: Integers, group: Integers) -> Integers:
 def _quadrilaterals(
     places: Floats, nodes: Integers, groups: dict[str, Integers]
 ) -> tuple[Floats, Integers, int]:
-    """Points, cells of 4 or 9 nodes, and the number of new mid-sides after the old points."""
+    """Return points, cells of 4 or 9 nodes, and the number of new mid-sides.
+
+    New mid-sides follow the old points.
+    """
     count, new = nodes.shape[1], 0
     if count in (4, 9):
         return places, nodes, new
@@ -544,7 +552,7 @@ def _quadrilaterals(
 
 
 def _sides(cells: Integers) -> tuple[Integers, Integers, Integers]:
-    """Nodes of the sides, (n, 2) or (n, 3), the elements' sides, and how many share each."""
+    """Return the nodes of the sides, (n, 2) or (n, 3), the elements' sides, and their shares."""
     corners = min(cells.shape[1], 4)
     parts = [cells[:, :corners], np.roll(cells[:, :corners], -1, axis=1), cells[:, 4:8]]
     sides = np.stack(parts[: 2 if cells.shape[1] == corners else 3], axis=2)
@@ -554,7 +562,7 @@ def _sides(cells: Integers) -> tuple[Integers, Integers, Integers]:
 
 
 def _inside(sides: Integers, counts: Integers, group: Integers) -> Bools:
-    """Which sides lie in a group of nodes; on the boundary only, if all of its nodes do."""
+    """Return which sides lie in a group of nodes; on the boundary only, if all its nodes do."""
     edge = counts == 1
     within = np.asarray(np.isin(sides, group).all(axis=1))
     return within & edge if np.isin(group, sides[edge]).all() else within

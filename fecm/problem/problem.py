@@ -1,4 +1,4 @@
-"""A deck with its mesh and program: what the checks and the run ask for."""
+"""Problem: a deck with its mesh and program, for the checks and the run."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 
 
 class Threshold(NamedTuple):
-    """Force at which delaminations grow, and what it is computed from."""
+    """Force at which delaminations grow, and the values it is computed from."""
 
     force: float
     rigidity: float  # effective rigidity D*, force*length
@@ -65,14 +65,14 @@ class ContactPatch(NamedTuple):
 
 @dataclass(frozen=True)
 class Problem:
-    """A checked problem; each part is built once, when it is first needed."""
+    """Checked problem; each part is built once, when it is first needed."""
 
     deck: Deck
     mesh: MeshArrays
     program: Body  # the macro program with nested loops
 
     def __getstate__(self) -> dict[str, object]:
-        """The deck, mesh and program: a copy in another process builds its own parts."""
+        """Return the deck, mesh and program: a copy in another process builds its own parts."""
         return {"deck": self.deck, "mesh": self.mesh, "program": self.program}
 
     @cached_property
@@ -82,7 +82,10 @@ class Problem:
 
     @cached_property
     def families(self) -> list[ElementBlock]:
-        """Elements with the same nodes present; ValueError if one lacks a corner."""
+        """Elements with the same nodes present.
+
+        Raises ValueError if an element lacks a corner.
+        """
         return element_blocks(self.mesh.elements, self.mesh.coordinates)
 
     @cached_property
@@ -123,7 +126,7 @@ class Problem:
 
     @cached_property
     def laminate_number(self) -> int:
-        """Number from 0 of the laminate under the load; that of element 1 without a load."""
+        """Number from 0 of the laminate under the load, or of element 1 without a load."""
         place = self.load_place
         return self._laminate_number_at(place) if place else self._laminate_numbers[0]
 
@@ -134,7 +137,10 @@ class Problem:
         return [0] * self.deck.control.numel if numbers is None else numbers.tolist()
 
     def _laminate_number_at(self, place: tuple[float, float]) -> int:
-        """Number from 0 of the laminate at a place: of the first element that contains it."""
+        """Return the number from 0 of the laminate at a place.
+
+        The first element that contains the place counts.
+        """
         if self.plate.laminate_numbers is None:
             return 0
         rows = [
@@ -177,10 +183,10 @@ class Problem:
 
     @cached_property
     def elements_per_buckle(self) -> float:
-        """Least number of elements along a half wave of the buckled panel; infinite if it is flat.
+        """Least number of elements along a half wave of the buckled panel; infinite if flat.
 
-        The half wave of a cylinder under axial compression is pi (D R^2/(E h))^(1/4), or 1.73
-        (R h)^(1/2) of an isotropic one (Timoshenko and Gere, Theory of Elastic Stability, 11.1).
+        The half wave of a cylinder under axial compression is pi (D R^2/(E h))^(1/4), or 1.73 (R
+        h)^(1/2) of an isotropic one (Timoshenko and Gere, Theory of Elastic Stability, 11.1).
         """
         largest = max(map(abs, self.plate.curvature))
         if not largest:
@@ -246,7 +252,7 @@ class Problem:
         return self.laminate.thickness / 2.0 + (0.0 if self.patch is None else self.patch.radius)
 
     def under_load(self, x: Floats, y: Floats) -> Bools:
-        """Whether plate theory does not hold at points: under the load, at corners of supports.
+        """Return whether plate theory fails at points: under the load, and at corners of supports.
 
         A support along a line pulls with a single force where the line turns inside the plate, and
         the moments beside it grow without bound on finer meshes.
@@ -274,7 +280,7 @@ class Problem:
         return inner_corners(self.families, self.mesh.coordinates, self.mesh.equations[:, W] == 0)
 
     def coarseness(self, elements: Indices) -> float:
-        """Longest side of some elements over the reach of the load."""
+        """Return the longest side of some elements over the reach of the load."""
         return float(self._longest_sides[elements].max(initial=0.0)) / self.reach_of_load
 
     @cached_property
@@ -293,10 +299,10 @@ class Problem:
 
     @cached_property
     def factors_to_circle(self) -> Floats:
-        """Distance from the load over the reach of the load, of elements next to it, (numel,).
+        """Distance from the load over the reach of the load, for elements next to it, (numel,).
 
-        Of elements whose centre is farther away than the reach, by at most their longest side; 0 of
-        the others.
+        These are elements whose centre is farther away than the reach by at most their longest
+        side. Other elements have 0.
         """
         reach, distances = self.reach_of_load, self.distances
         is_next = (distances >= reach) & (distances <= reach + self._longest_sides)
@@ -317,9 +323,9 @@ class Problem:
 
     @cached_property
     def threshold(self) -> Threshold | None:
-        """Delamination threshold; None without a DELA segment, and of a sandwich.
+        """Delamination threshold; None without a DELA segment, and for a sandwich.
 
-        The threshold is that of a solid laminate: the faces of a sandwich delaminate, or leave the
+        The threshold holds for a solid laminate: the faces of a sandwich delaminate, or leave the
         core, at a small part of it.
         """
         card = self.deck.last(model.Delamination)
@@ -344,16 +350,17 @@ class Problem:
 
     @property
     def worst_at_rest(self) -> PlyExposure | None:
-        """Largest exposure before anything moves; None without stresses then, or strengths."""
+        """Largest exposure before anything moves; None without strengths, or stresses at rest."""
         worst = self.worst_under()
         return None if worst is None else worst[0]
 
     def worst_under(
         self, *, preload: bool = True, cure: bool = True
     ) -> tuple[PlyExposure, int] | None:
-        """Largest exposure under the preload, the residual stresses or both, and its laminate.
+        """Return the largest exposure under the preload and residual stresses, and its laminate.
 
-        None without strengths or without these stresses.  The laminate is its number on the card.
+        Returns None without strengths or without these stresses. The laminate is its number on the
+        card.
         """
         residuals = self.residuals if cure else None
         preload = preload and self.plate.is_preloaded
@@ -377,7 +384,7 @@ class Problem:
 
     @cached_property
     def judge(self) -> Judge:
-        """What the validity of an impact on the plate depends on."""
+        """Judge of the validity of an impact on the plate."""
         mobility = 0.0
         if self.contact is not None:
             mobility = self.moving_plate.rigid_mobility(self.contact[:, W])

@@ -1,7 +1,7 @@
-"""Bisect elements of a mesh.
+"""Bisection of the elements of a mesh.
 
-A side that is bisected takes the opposite side of its elements with it, so that the mesh stays
-conforming: bisecting near a point cuts strips of elements through the whole plate.
+A bisected side takes the opposite side of its elements with it, so that the mesh stays conforming:
+bisecting near a point cuts strips of elements through the whole plate.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ _ALONG = (0, 1, 0, 1)
 
 
 class RefineError(FecmError, ValueError):
-    """A mesh cannot be bisected."""
+    """A mesh can't be bisected."""
 
 
 def refined_deck(deck: Deck, mesh: MeshArrays, marked: Bools | None = None) -> Deck:
-    """Bisect elements of a deck with a mesh in both directions: all, or those marked, (numel,).
+    """Bisect the elements of a deck with a mesh in both directions: all, or those marked, (numel,).
 
-    Old nodes keep their numbers.  A new node is restrained where all nodes of its side, or of its
-    element, are; nodal forces stay where they are.  Raises RefineError if an element is not a
+    Old nodes keep their numbers. A new node is restrained where all nodes of its side, or of its
+    element, are; nodal forces stay where they are. Raises RefineError if an element is not a
     quadrilateral with four or nine nodes.
     """
     nodes = _Nodes(mesh)
@@ -61,7 +61,7 @@ def refined_deck(deck: Deck, mesh: MeshArrays, marked: Bools | None = None) -> D
 
 
 def _split_sides(mesh: MeshArrays, marked: Bools) -> Bools:
-    """Whether each element is bisected along xi and along eta, (numel, 2)."""
+    """Return whether each element is bisected along xi and along eta, (numel, 2)."""
     ends = np.sort(mesh.elements[:, _SIDES], axis=2)
     _, side = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
     side = side.reshape(-1, 4)
@@ -87,7 +87,7 @@ class _Nodes:
         self.forces = list(mesh.forces)
 
     def number(self, row: int, own: Ints, place: tuple[float, ...], shares: Floats) -> int:
-        """Number of the node at a place of an old element; a new one where there is none yet."""
+        """Return the number of the node at a place of an old element; a new one where it is new."""
         old = np.flatnonzero(np.abs(shares - 1.0) < 1e-9)
         if len(old):
             return int(own[old[0]])
@@ -111,7 +111,7 @@ class _Nodes:
 
 
 def _node_cards(values: Floats | Bools) -> Floats:
-    """Cards of the nodes from 1 on, without increments."""
+    """Return the cards of the nodes from 1 on, without increments."""
     count = len(values)
     return np.column_stack((np.arange(1, count + 1), np.zeros(count), values))
 
@@ -119,7 +119,7 @@ def _node_cards(values: Floats | Bools) -> Floats:
 def _rebuilt(
     deck: Deck, mesh: MeshArrays, nodes: _Nodes, elements: list[tuple[int, list[int]]]
 ) -> Deck:
-    """The deck with other nodes and elements, each on a card of its own."""
+    """Return the deck with other nodes and elements, each on its own card."""
     control = replace(deck.control, numnp=len(nodes.coordinates), numel=len(elements))
     children = np.zeros((len(elements), mesh.elements.shape[1]))
     for row, (_, child) in zip(children, elements, strict=True):

@@ -37,7 +37,7 @@ ROUNDING = 1e-12  # of entries of a matrix, relative to their size
 
 
 def leaves_out_equilibrium(problem: Problem) -> bool:
-    """Whether the deck of an impact has assumed shear strains and the factor 1 without EQUI."""
+    """Return whether an impact has assumed shear strains and the factor 1 without EQUI."""
     card = problem.deck.last(Shear)
     plain = card is not None and card.assumed and not card.equilibrium and card.factor == 1.0
     return plain and problem.contact is not None
@@ -65,7 +65,7 @@ def equilibrium_change(problem: Problem) -> float | None:
 
 
 def larger_steps(problem: Problem) -> list[str]:
-    """Line of a run about the time step of DT 0 where that of the deck is far smaller."""
+    """Return the line about DT 0 if the deck's time step is far smaller."""
     largest = max((m.value for m in flat(problem.program) if m.word == "DT"), default=0.0)
     if not problem.work.steps or not 0.0 < largest < ROOM * problem.safe_time_step:
         return []
@@ -77,7 +77,7 @@ def larger_steps(problem: Problem) -> list[str]:
 
 @dataclass(frozen=True)
 class ProblemSummary:
-    """A problem without errors in numbers, in the deck's units.
+    """Numbers of a problem without errors, in the deck's units.
 
     Attributes
     ----------
@@ -171,7 +171,7 @@ class ProblemSummary:
     threshold: FiniteFloat | None
 
     def to_dict(self) -> dict[str, object]:
-        """Plain values, for JSON."""
+        """Return plain values, for JSON."""
         values = vars(self).items()
         return {name: v.tolist() if isinstance(v, np.ndarray) else v for name, v in values}
 
@@ -201,7 +201,7 @@ def _quantity(summary: ProblemSummary, value: float, dimension: str) -> str:
 
 
 def _stiffness_rows(summary: ProblemSummary) -> Iterator[Row]:
-    """Stiffness matrices of the laminate under the load, and its shear factor."""
+    """Yield rows of the stiffness matrices under the load, and of the shear factor."""
     largest_a, largest_d, largest_shear = (
         float(np.abs(matrix).max()) for matrix in (summary.A, summary.D, summary.shear)
     )
@@ -218,7 +218,7 @@ def _stiffness_rows(summary: ProblemSummary) -> Iterator[Row]:
 
 
 def _plate_rows(summary: ProblemSummary) -> Iterator[Row]:
-    """Kinematics, preload, curvature, cure and delamination threshold."""
+    """Yield rows about kinematics, preload, curvature, cure and delamination threshold."""
     quantity = partial(_quantity, summary)
     if summary.nonlinear:
         share = f"{summary.free_in_plane} of {summary.nodes} nodes"
@@ -241,7 +241,7 @@ def _plate_rows(summary: ProblemSummary) -> Iterator[Row]:
 
 
 def _impact_rows(summary: ProblemSummary) -> Iterator[Row]:
-    """Masses, velocity and energy."""
+    """Yield rows about masses, velocity and energy."""
 
     def mass_text(mass: float) -> str:
         in_si = mass_in_si(mass, summary.units)
@@ -256,7 +256,7 @@ def _impact_rows(summary: ProblemSummary) -> Iterator[Row]:
 
 
 def _program_rows(summary: ProblemSummary) -> Iterator[Row]:
-    """Time steps, resolution of the mesh, and size of the result."""
+    """Yield rows about time steps, resolution of the mesh, and size of the result."""
     critical = summary.critical_time_step
     yield ("critical time step", _quantity(summary, critical, "time"))
     if summary.buckling_factor is not None:
@@ -339,12 +339,12 @@ def deck_summary(problem: Problem) -> ProblemSummary:
 
 
 def _rise(plate: PlateModel) -> float:
-    """Difference of the largest and the least height of a curved panel, length."""
+    """Return the height of a curved panel, length."""
     return float(np.ptp(midplane_height(plate.mesh.coordinates[plate.mesh.used], plate.curvature)))
 
 
 def _matrix_rows(label: str, matrix: Floats, unit: str, size: float) -> Iterator[Row]:
-    """Rows of a matrix.  Entries that are rounding errors beside `size` are shown as 0."""
+    """Yield the rows of a matrix. Rounding errors beside `size` are shown as 0."""
     shown = np.where(np.abs(matrix) < ROUNDING * size, 0.0, matrix)
     first, *others = (" ".join(f"{value:12.5g}" for value in row) for row in shown)
     yield (label, f"{first}  {unit}".rstrip())

@@ -1,6 +1,5 @@
-"""Rules of a problem, by subject: a function for each code, which yields what is wrong.
+"""Rules of a problem, by subject: a function for each code, which yields its findings.
 
-A rule takes the :class:`~fecm.problem.problem.Problem` and asks it for what it needs, or a segment
-alone where that suffices.  Each module ends with the order in which its rules are applied by
-``fecm/problem/check.py``.
+A rule takes the :class:`~fecm.problem.problem.Problem`, or only a segment where that suffices. Each
+module ends with the order in which ``fecm/problem/check.py`` applies its rules.
 """

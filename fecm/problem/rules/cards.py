@@ -27,12 +27,12 @@ def ranges(numbers: Sequence[int] | NDArray[np.int_]) -> str:
 
 
 def describe_nodes(rows: NDArray[np.intp]) -> str:
-    """Beginning of a sentence about the nodes in some rows: ``Nodes 3, 7-9 are``."""
+    """Return the start of a sentence about the nodes in some rows: ``Nodes 3, 7-9 are``."""
     return f"Node {rows[0] + 1} is" if len(rows) == 1 else f"Nodes {ranges(rows + 1)} are"
 
 
 def describe_elements(rows: NDArray[np.intp]) -> str:
-    """Number and list of the elements in some rows: ``3 elements (1, 4-5)``."""
+    """Return number and list of the elements in some rows: ``3 elements (1, 4-5)``."""
     count = len(rows)
     return f"{count} element{'' if count == 1 else 's'} ({ranges(rows + 1)})"
 

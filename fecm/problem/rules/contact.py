@@ -46,7 +46,10 @@ def invalid_parameter(law: model.Indentation) -> Reports:
 def limits_of(
     word: str, k: float | Floats, alpha_p: float | Floats, s_p: float | Floats, q: float | Floats
 ) -> list[tuple[bool | Bools, str]]:
-    """Whether each value of an EXPE card is valid, and what it must be; of numbers or arrays."""
+    """Return whether each value of an EXPE card is valid, and what it must be.
+
+    The values are numbers or arrays.
+    """
     if word == model.Indentation.ACR:
         return [
             (k > 0.0, "positive"),
@@ -115,7 +118,10 @@ def exchanged_constants(problem: Problem) -> Reports:
 
 
 def sphere_radius(deck: model.Deck) -> float:
-    """Radius of a rigid sphere with the k of a deck, equation 3-2 with E2 for E_t, length."""
+    """Return the radius of a rigid sphere with the k of a deck, length.
+
+    Equation 3-2 with E2 for E_t.
+    """
     k, e2 = deck.require(model.Indentation).k, deck.require(model.Material).ply.e2
     with np.errstate(all="ignore"):
         return float((0.75 * np.float64(k) / e2) ** 2)

@@ -177,7 +177,7 @@ def expansion_per_fahrenheit(problem: Problem) -> Reports:
 
 
 def _expansions_of_fibrous_plies(problem: Problem) -> list[model.Expansion]:
-    """Coefficients of expansion of the plies with parallel fibres."""
+    """Yield the coefficients of expansion of the plies with parallel fibres."""
     card, plies = problem.deck.last(model.Cure), problem.deck.plies
     given = () if card is None else card.expansions
     return [
@@ -188,7 +188,7 @@ def _expansions_of_fibrous_plies(problem: Problem) -> list[model.Expansion]:
 
 
 def _largest_curvature(curvature: Floats) -> float:
-    """Largest principal curvature in size of kappa_x, kappa_y and the twist kappa_xy."""
+    """Return the largest principal curvature in size of kappa_x, kappa_y and kappa_xy."""
     x, y, xy = curvature
     return float(abs(x + y) / 2.0 + np.hypot((x - y) / 2.0, xy / 2.0))
 

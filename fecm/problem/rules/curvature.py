@@ -48,7 +48,7 @@ def elements_without_curvature(problem: Problem) -> Reports:
 
 
 def _slope(problem: Problem) -> float:
-    """Largest slope of the midplane along x or y, from the centre of the panel."""
+    """Return the largest slope of the midplane along x or y, from the centre of the panel."""
     x, y, xy = _card(problem).curvatures
     places = problem.mesh.coordinates[problem.mesh.used]
     middle = (places.min(axis=0) + places.max(axis=0)) / 2.0

@@ -152,7 +152,7 @@ def strengths_in_another_unit(problem: Problem) -> Reports:
 
 
 def _strengths(problem: Problem) -> list[tuple[model.Allowables, model.Ply]]:
-    """Strengths and constants of the materials that have both."""
+    """Yield the strengths and constants of the materials that have both."""
     card, plies = problem.deck.last(model.Allowables), problem.deck.plies
     given = () if card is None else (card, *card.others)
     return [(one, plies[one.material]) for one in given if one.material in plies]
@@ -218,7 +218,7 @@ def _strengths_in_another_order(card: model.Allowables, ply: model.Ply) -> Repor
 
 
 def _faults(strengths: Sequence[float], ply: model.Ply) -> dict[str, str]:
-    """What is wrong with XT, XC, YT, YC of a ply with fibres in one direction, by the field."""
+    """Yield faults of XT, XC, YT, YC of a ply with fibres in one direction, by field."""
     xt, xc, yt, yc = strengths
     faults = {}
     has_boron = ply.e1 > BORON_ANISOTROPY * ply.e2 and ply.g12 < BORON_SHEAR * ply.e2

@@ -66,14 +66,14 @@ Layers = model.Material | model.NumberedLaminate
 
 
 def _plies_of(segment: Plies) -> list[model.Ply]:
-    """Materials of a segment."""
+    """Return the materials of a segment."""
     if isinstance(segment, model.Material):
         return [segment.ply]
     return [one.ply for one in segment.plies]
 
 
 def _invalid_constants(ply: model.Ply) -> list[tuple[str, float]]:
-    """Name and value of a ply's constants that must be positive and are not."""
+    """Yield name and value of a ply's constants that must be positive and are not."""
     named = zip((field.name for field in ply.fields), map(float, ply.row()), strict=True)
     return [(name, value) for name, value in named if value <= 0.0 and name != POISSONS_RATIO]
 
@@ -285,12 +285,12 @@ def angles_in_radians(problem: Problem) -> Reports:
 
 
 def _all_layers(problem: Problem) -> list[model.Layer]:
-    """Layers of all laminates."""
+    """Return the layers of all laminates."""
     return [layer for layers in problem.deck.layers.values() for layer in layers]
 
 
 def are_like_radians(angles: Sequence[float]) -> bool:
-    """Whether all angles are small multiples of 5 degrees in radians."""
+    """Return whether all angles are small multiples of 5 degrees in radians."""
     sizes = np.abs(angles)
     multiples = np.degrees(sizes) / 5.0
     off = np.abs(multiples - np.rint(multiples))
@@ -302,13 +302,13 @@ def _is_too_thin(problem: Problem) -> bool:
 
 
 def _thickest(problem: Problem) -> float:
-    """Thickness of the plate, the largest of several."""
+    """Return the thickness of the plate, the largest of several laminates."""
     laminates = problem.plate.laminates
     return max(laminates[number].thickness for number in problem.used_laminates)
 
 
 def _thick_plate(problem: Problem) -> tuple[float, str]:
-    """Thickness over the distance between supports, and the beginning of a sentence about it."""
+    """Return thickness over distance between supports, and the start of a sentence about it."""
     thickness = _thickest(problem)
     span = problem.span
     share = thickness / span.length

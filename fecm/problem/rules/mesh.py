@@ -61,17 +61,20 @@ def _report(problem: Problem, wrong: Bools, what: str, hint: str = "") -> Report
 
 
 def _corner_missing(problem: Problem, count: int) -> Bools:
-    """Whether one of the first `count` nodes is missing, (numel,)."""
+    """Return a mask of the elements that lack one of the first `count` nodes, (numel,)."""
     return np.asarray((problem.mesh.elements[:, :count] == 0).any(axis=1))
 
 
 def _is_pointed(problem: Problem) -> Bools:
-    """Whether elements end with their third node: those after it make a quadrilateral, (numel,)."""
+    """Return a mask of the elements whose list ends with the third node, (numel,).
+
+    The later nodes make a quadrilateral.
+    """
     return np.asarray(~(problem.mesh.elements[:, CORNERS:] != 0).any(axis=1))
 
 
 def _is_empty(problem: Problem) -> Bools:
-    """Whether elements have no nodes, (numel,)."""
+    """Return a mask of the elements without nodes, (numel,)."""
     return np.asarray(~(problem.mesh.elements != 0).any(axis=1))
 
 
@@ -124,7 +127,7 @@ def repeated_node(problem: Problem) -> Reports:
 
 
 def _hint_of_feap(problem: Problem) -> str:
-    """Hint for ELEM cards that have a material number before their nodes; empty for others."""
+    """Return a hint for ELEM cards that have a material number before their nodes, or ""."""
     records = problem.deck.require(model.Elements).records
     if len({record.nodes[0] for record in records}) > 1 or records[0].nodes[0] != 1:
         return ""

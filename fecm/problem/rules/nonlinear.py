@@ -74,7 +74,7 @@ def elements_without_membrane(problem: Problem) -> Reports:
 
 
 def not_nine_nodes(problem: Problem) -> Bools:
-    """Whether each element is another one than a quadrilateral with 9 nodes, (numel,)."""
+    """Return a mask of the elements that are not quadrilaterals with 9 nodes, (numel,)."""
     wrong = np.zeros(len(problem.mesh.elements), dtype=bool)
     for family in problem.families:
         nine = family.shape is QUADRILATERAL and family.nodes.shape[1] == QUADRILATERAL.nodes
@@ -133,7 +133,7 @@ def open_symmetry(problem: Problem) -> Reports:
 
 
 def _open_lines(problem: Problem, axis: int) -> Iterator[tuple[float, int]]:
-    """Place and number of nodes of edges across an axis with only the symmetry of bending."""
+    """Yield place and number of nodes of edges across an axis with only symmetry of bending."""
     mesh = problem.mesh
     free = mesh.codes == 0
     turned = ~free[:, THETA_X + axis] & free[:, W] & free[:, axis]
@@ -146,7 +146,7 @@ def _open_lines(problem: Problem, axis: int) -> Iterator[tuple[float, int]]:
 
 
 def _on_edges_across(problem: Problem, axis: int) -> Bools:
-    """Whether nodes are on an element's side that no other has and that is normal to an axis."""
+    """Return which nodes are on an unshared side of an element that is normal to an axis."""
     mesh = problem.mesh
     # Corners and middle of each side of 9-node elements.
     sides = np.stack([mesh.elements[:, [n, (n + 1) % 4, 4 + n]] for n in range(4)], axis=1)

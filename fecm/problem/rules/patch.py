@@ -96,7 +96,7 @@ def patch_off_the_plate(problem: Problem) -> Reports:
 
 
 def _held(problem: Problem, patch: ContactPatch) -> str:
-    """Name a node or a side under a patch whose w is restrained; empty if there is none."""
+    """Name a node or a side under a patch whose w is restrained; empty without one."""
     mesh = problem.mesh
     held = mesh.codes[:, W] != 0
     centre = np.array([patch.x, patch.y])
@@ -152,7 +152,7 @@ def unresolved_patch(problem: Problem) -> Reports:
 
 
 def _longest_side(mesh: MeshArrays, rows: Indices | Bools) -> float:
-    """Longest side of the elements in some rows."""
+    """Return the longest side of the elements in some rows."""
     return float(longest_sides(mesh.elements[rows], mesh.coordinates).max(initial=0.0))
 
 
@@ -206,7 +206,7 @@ def patch_away_from_node(problem: Problem) -> Reports:
 
 
 def _large_patch(problem: Problem) -> str:
-    """What is said of a patch far larger than thickness and contact; empty for another."""
+    """Describe a patch far larger than thickness and contact; empty for other patches."""
     card, thickness = problem.deck.last(model.Patch), problem.laminate.thickness
     if card is None or card.radius is None or card.radius <= LARGE * thickness:
         return ""
@@ -223,7 +223,7 @@ def _large_patch(problem: Problem) -> str:
 
 
 def _judges_stresses(problem: Problem) -> bool:
-    """Whether stresses under the load are stored or judged."""
+    """Return whether stresses under the load are stored or judged."""
     return any(macro.word in ("FAIL", "PLYS") for macro in flat(problem.program))
 
 

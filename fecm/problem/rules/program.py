@@ -146,12 +146,12 @@ def large_result(problem: Problem) -> Reports:
 
 
 def _movers(problem: Problem) -> set[str]:
-    """Words of the program that move the plate."""
+    """Return the words of the program that move the plate."""
     return MOVE & {macro.word for macro in problem.deck.macros}
 
 
 def _unused_segment(problem: Problem) -> model.Segment | None:
-    """First segment of an impact in a deck whose program has no RODP."""
+    """Return the first segment of an impact in a deck whose program has no RODP."""
     if "RODP" in _movers(problem):
         return None
     found = (problem.deck.last(kind) for kind in OF_AN_IMPACT)
@@ -159,7 +159,7 @@ def _unused_segment(problem: Problem) -> model.Segment | None:
 
 
 def _storing_at_rest(problem: Problem) -> Macro | None:
-    """First macro of a program in which nothing moves the plate that stores or steps."""
+    """Return the first macro that stores or steps in a program that moves nothing."""
     movers = _movers(problem)
     if not movers <= {"EXCD"} or problem.mesh.forces.any():
         return None

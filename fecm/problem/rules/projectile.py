@@ -222,7 +222,7 @@ def _takes_the_reports_rod(problem: Problem) -> bool:
 
 
 def _has_the_reports_units(names: dict[str, str]) -> bool:
-    """Whether units are those of the report's rod; True where they are unknown."""
+    """Return whether units fit the report's rod; True where they are unknown."""
     return not names or [in_si(name, names) for name in names] == REPORT_UNITS
 
 

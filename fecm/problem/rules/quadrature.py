@@ -44,7 +44,7 @@ def strains_at_nodes_of_triangles(problem: Problem) -> Reports:
 
 
 def _has_singular_points(problem: Problem, family: ElementBlock) -> bool:
-    """Whether strains are stored where a triangle's Jacobian is zero."""
+    """Return whether strains are stored where a triangle's Jacobian is zero."""
     points = problem.deck.require(model.Material).integration.points
     return family.shape is TRIANGLE and points < -1
 
@@ -111,7 +111,7 @@ TRIANGLES = ShearOrders("triangles", free=1, held=1)
 
 
 def _orders(family: ElementBlock) -> ShearOrders:
-    """Least shear orders of elements."""
+    """Return the least shear orders of elements."""
     if family.shape is TRIANGLE:
         return TRIANGLES
     if family.shape is CUBIC:
@@ -124,19 +124,19 @@ def _orders(family: ElementBlock) -> ShearOrders:
 
 
 def _shear_order(problem: Problem) -> int:
-    """The order L2 that is used."""
+    """Return the order L2 that is used."""
     return math.isqrt(len(problem.rules[1].xi))
 
 
 def _is_supported(problem: Problem) -> bool:
-    """Whether w is held somewhere."""
+    """Return whether w is held somewhere."""
     return bool((problem.mesh.equations[:, W] == 0).any())
 
 
 def _checkerboards(problem: Problem) -> Iterator[str]:
-    """Beginnings of sentences about 9-node elements that a force on single nodes excites.
+    """Yield starts of sentences about 9-node elements that a force on single nodes excites.
 
-    An impact's force does, that of FORC only in a free plate.
+    The force of an impact excites them; FORC does so only in a free plate.
     """
     words = {macro.word for macro in problem.deck.macros}
     few = 0 < np.count_nonzero(problem.mesh.forces[:, W]) <= FEW_LOADED
@@ -150,7 +150,7 @@ def _checkerboards(problem: Problem) -> Iterator[str]:
 
 
 def _only_supports_resist(problem: Problem) -> bool:
-    """Whether only supports resist the checkerboard of 9-node elements."""
+    """Return whether only supports resist the checkerboard of 9-node elements."""
     return NINE_NODES.held <= _shear_order(problem) < NINE_NODES.free
 
 

@@ -23,18 +23,18 @@ UNSTABLE = "E508"
 
 
 def deck_time_steps(problem: Problem) -> list[Macro]:
-    """The DT cards of a program."""
+    """Return the DT cards of a program."""
     return [macro for macro in problem.deck.macros if macro.word == "DT"]
 
 
 def takes_steps(problem: Problem) -> bool:
-    """Whether a program takes time steps of a given length."""
+    """Return whether a program takes time steps of a given length."""
     words = {macro.word for macro in problem.deck.macros}
     return "DT" in words and not STEPS.isdisjoint(words)
 
 
 def known_safe_step(problem: Problem) -> float | None:
-    """Lower bound of the critical time step; None where E417 says that there is none."""
+    """Return a lower bound of the critical time step; None where E417 reports its absence."""
     try:
         return problem.safe_time_step
     except UnsoundPlateError:
@@ -42,7 +42,7 @@ def known_safe_step(problem: Problem) -> float | None:
 
 
 def _needs_critical_step(problem: Problem) -> bool:
-    """Whether the bound does not show that every DT is stable."""
+    """Return whether the bound does not show that every DT is stable."""
     safe, values = problem.safe_time_step, [macro.value for macro in deck_time_steps(problem)]
     return min(values) == 0.0 or max(values) >= safe
 
@@ -183,7 +183,7 @@ def badly_resolved_damping(problem: Problem) -> Reports:
 
 
 def _loss_within_program(problem: Problem) -> tuple[float, float]:
-    """Damping times duration, and the duration of the program."""
+    """Return damping times duration, and the duration of the program."""
     dt = max((macro.value for macro in deck_time_steps(problem)), default=0.0)
     duration = problem.work.steps * (dt or problem.safe_time_step)
     return problem.damping * duration, duration

@@ -33,7 +33,7 @@ def unknown_material(number: int, known: set[int], place: CardPlace | None) -> R
 
 
 def material_numbers(deck: model.Deck) -> set[int]:
-    """Numbers of the materials."""
+    """Return the numbers of the materials."""
     return {MATERIAL, *(one.number for one in _materials(deck))}
 
 
@@ -57,7 +57,7 @@ def number_taken(deck: model.Deck) -> Reports:
 
 
 def _in_layers(deck: model.Deck) -> Iterator[model.Layer]:
-    """Layers of all laminates, with or without a zone."""
+    """Return the layers of all laminates, with or without a zone."""
     material = deck.last(model.Material)
     yield from () if material is None else material.layers
     for laminate in _laminates(deck):
@@ -127,13 +127,13 @@ def unused(problem: Problem) -> Reports:
 
 
 def _used(problem: Problem) -> list[tuple[int, LaminateSection]]:
-    """Numbers and laminates of the elements."""
+    """Return the materials and laminates of the elements."""
     numbers, laminates = list(problem.deck.layers), problem.plate.laminates
     return [(numbers[n], laminates[n]) for n in problem.used_laminates]
 
 
 def _place(deck: model.Deck, number: int) -> CardPlace | None:
-    """Place of the cards of a laminate."""
+    """Return the position of the cards of a laminate."""
     own = (one for one in _laminates(deck) if one.number == number)
     if (found := next(own, None)) is not None:
         return found.head.place()
