@@ -1,4 +1,4 @@
-"""A case of a sweep: its values by name, the check of its deck, and limits of quantities."""
+"""Case of a sweep: its values by name, the check of its deck, and limits of quantities."""
 
 from __future__ import annotations
 
@@ -31,7 +31,10 @@ class CasesError(FecmError, ValueError):
 
 
 def number_of_text(name: str, text: str) -> float:
-    """Finite number of a text; CasesError if it is none."""
+    """Return the finite number of a text.
+
+    Raises CasesError if the text is not a finite number.
+    """
     with suppress(ValueError):
         if math.isfinite(value := float(text)):
             return value
@@ -39,7 +42,10 @@ def number_of_text(name: str, text: str) -> float:
 
 
 def pair_of_text(name: str, text: str) -> tuple[float, float]:
-    """Two numbers of a text, as in ``(3,2)`` or ``6x4``; raises CasesError if it has none."""
+    """Return the two numbers of a text such as ``(3,2)`` or ``6x4``.
+
+    Raises CasesError if the text has no two numbers.
+    """
     form, separators = PAIRS[name]
     parts = re.split(separators, text.strip().removeprefix("(").removesuffix(")").strip())
     if len(parts) != 2:
@@ -48,13 +54,13 @@ def pair_of_text(name: str, text: str) -> tuple[float, float]:
 
 
 def normal_pair(name: str, text: str) -> str:
-    """The text of two numbers in its usual form."""
+    """Return the text of two numbers in its usual form."""
     form, _ = PAIRS[name]
     return form.format(*(repr(value).removesuffix(".0") for value in pair_of_text(name, text)))
 
 
 def check_count(count: int, cases: str = "") -> None:
-    """Raise CasesError if there are no cases or too many; `cases` says which."""
+    """Raise CasesError if there are no cases or too many; `cases` names them."""
     if not count:
         raise CasesError("a sweep needs at least one case")
     if count > MOST_CASES:
@@ -62,7 +68,10 @@ def check_count(count: int, cases: str = "") -> None:
 
 
 def check_deck(deck: Deck) -> Problem:
-    """Check a complete deck.  Raises CasesError if it has an error; the first is the message."""
+    """Check a complete deck.
+
+    Raises CasesError with the first error of the deck.
+    """
     findings = Findings()
     checked = check_problem(ParsedProblem(deck), findings)
     raise_first(findings)
@@ -71,7 +80,7 @@ def check_deck(deck: Deck) -> Problem:
 
 
 def raise_first(findings: Findings) -> None:
-    """Raise the first error as that of a case."""
+    """Raise the first error as the error of a case."""
     if findings.errors:
         first = findings.errors[0]
         remedy = " Vary dt=auto, or take DT 0." if first.code == UNSTABLE else ""
@@ -86,14 +95,17 @@ NO_THRESHOLD = (
 
 
 class Limit(NamedTuple):
-    """A quantity whose probability of exceedance is asked for, and its limit."""
+    """Quantity whose probability of exceedance is requested, and its limit."""
 
     quantity: str
     value: float | str  # a number or :data:`THRESHOLD`
 
 
 def parse_exceed(text: str) -> Limit:
-    """Read ``QUANTITY=NUMBER`` or ``peak_force=threshold``; CasesError if it is neither."""
+    """Parse ``QUANTITY=NUMBER`` or ``peak_force=threshold``.
+
+    Raises CasesError if the text is neither.
+    """
     name, _, value = (part.strip() for part in text.partition("="))
     if not name or not value or (value == THRESHOLD and name != PEAK_FORCE):
         raise CasesError(f"`{text}`: write QUANTITY=NUMBER or {PEAK_FORCE}={THRESHOLD}")
@@ -101,7 +113,7 @@ def parse_exceed(text: str) -> Limit:
 
 
 def check_limits(limits: Sequence[Limit], known: Sequence[str], *, threshold: bool) -> None:
-    """Raise CasesError if a quantity is not among the known ones, or the deck has no threshold."""
+    """Raise CasesError if a quantity is unknown, or the deck has no threshold."""
     for limit in limits:
         if limit.quantity not in known:
             names = ", ".join(known)

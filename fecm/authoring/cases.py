@@ -29,9 +29,10 @@ from fecm.authoring.values import (
 
 
 def read_cases(path: Path, system: str | None = None) -> list[Case]:
-    """Read a CSV table, a header of names and one row per case; CasesError states a line.
+    """Read a CSV table: a header of names and one row per case.
 
-    Values with a unit, theirs or that of the header, are converted to a system of units.
+    Values with a unit, their own or the unit of the header, are converted to a system of units.
+    Raises CasesError with the line of an error.
     """
     try:
         table = read_table(path, MOST_CASES + 1)
@@ -79,7 +80,10 @@ class CaseTable(Protocol):
 
 
 def _rows(table: CaseTable) -> list[dict[Any, Any]]:
-    """The rows of a table as mappings; CasesError if a name is repeated."""
+    """Return the rows of a table as mappings.
+
+    Raises CasesError if a name is repeated.
+    """
     names = list(table.columns)
     for name in names:
         if names.count(name) > 1:
@@ -97,9 +101,9 @@ def checked(
 ) -> list[Case]:
     """Validate cases given as mappings, which must all have the same names, or as a table.
 
-    With `free`, the names are any but those of results, and a value is a number or a text;
-    otherwise texts with a unit are converted to a system of units.  Raises
-    CasesError if a case is invalid; the message states the source, or else the case's number.
+    With `free`, any name is allowed except those of results, and a value is a number or a text.
+    Otherwise texts with a unit are converted to a system of units. Raises CasesError if a case is
+    invalid; the message states the source, or else the case's number.
     """
     check_name, read = (
         (check_free, free_value_of) if free else (check_known, partial(value_of, system=system))
@@ -128,9 +132,10 @@ def checked(
 
 
 def parse_vary(text: str, system: str | None = None) -> tuple[str, list[Value]]:
-    """Read ``NAME=FROM:TO:N`` (N values with both ends) or ``NAME=a,b,c``; else CasesError.
+    """Parse ``NAME=FROM:TO:N`` (N values with both ends) or ``NAME=a,b,c``.
 
-    Values with a unit, as in ``energy=5J:30J:6``, are converted to a system of units.
+    Values with a unit, as in ``energy=5J:30J:6``, are converted to a system of units. Raises
+    CasesError if the text has another form.
     """
     name, equals, text_of_values = (part.strip() for part in text.partition("="))
     check_known(name, text)
@@ -158,7 +163,10 @@ def parse_vary(text: str, system: str | None = None) -> tuple[str, list[Value]]:
 
 
 def _points(numbers: Sequence[str]) -> list[str]:
-    """One point from two numbers; CasesError, with the brackets to write, if there are more."""
+    """Return one point from two numbers.
+
+    Raises CasesError, with the brackets to write, if there are more.
+    """
     if len(numbers) == 2:
         return [",".join(numbers)]
     pairs = [f"({','.join(numbers[n : n + 2])})" for n in range(0, len(numbers) - 1, 2)]
@@ -167,7 +175,10 @@ def _points(numbers: Sequence[str]) -> list[str]:
 
 
 def grid_cases(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
-    """Every combination of the values, the last name fastest; CasesError if there are too many."""
+    """Return every combination of the values, the last name fastest.
+
+    Raises CasesError if there are too many.
+    """
     names = [name for name, _ in varied]
     for name in names:
         if names.count(name) > 1:
@@ -181,10 +192,9 @@ def grid_cases(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
 def combined(
     vary: Mapping[str, Iterable[Any]], *, free: bool = False, system: str | None = None
 ) -> list[Case]:
-    """Return every combination of lists of values, given by name; with `free` both are any.
+    """Return every combination of lists of values, given by name.
 
-    Texts with a unit are converted to a system of units.
-
+    With `free` names and values are any. Texts with a unit are converted to a system of units.
     Raises CasesError if a name is unknown, a value is invalid, or values are not in a list.
     """
     if not isinstance(vary, Mapping):

@@ -31,7 +31,7 @@ NONLINEAR = "nonlinear"
 
 
 class Values(TypedDict, total=False):
-    """What :meth:`fecm.Deck.with_` changes: values by their names in sweeps, and whole objects."""
+    """Changes by :meth:`fecm.Deck.with_`: values by their names in sweeps, and whole objects."""
 
     plate: Plate
     laminate: Laminate
@@ -116,7 +116,7 @@ def with_values(deck: Deck, values: Mapping[str, Any]) -> Deck:
 
 
 def _converted(deck: Deck, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Values in the units of the deck, where a text has a unit, as in ``10J``."""
+    """Return values in the units of the deck, where a text has a unit, as in ``10J``."""
     system = system_of(deck)
     return {
         name: in_units(name, value, dimension_of(name), system)
@@ -127,7 +127,7 @@ def _converted(deck: Deck, values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _with_kinematics(deck: Deck, *, nonlinear: object) -> Deck:
-    """The deck without NONL, or as it is if it has NONL and is to keep it."""
+    """Return the deck without NONL if it should be linear."""
     if not isinstance(nonlinear, bool):
         raise CasesError(f"with_: nonlinear is {nonlinear!r}, not True or False")
     if nonlinear and not deck.has(Nonlinear):
@@ -142,7 +142,7 @@ def _with_kinematics(deck: Deck, *, nonlinear: object) -> Deck:
 
 
 def _on_the_clock(deck: Deck, made: Deck, case: Case) -> Deck:
-    """The new deck with the time step of its plate, if that of the old one follows from its own."""
+    """Return the new deck with the time step of its plate, if the old step follows a rule."""
     with suppress(CasesError):  # a run states what is wrong with either deck
         if (clock := clock_of(check_deck(deck))) is not None:
             return with_clock(made, clock, case).deck
@@ -167,10 +167,10 @@ def with_program(
 
 
 def with_cards(deck: Deck, cards: str) -> Deck:
-    """The deck with the macro program of cards: those between MACR and END.
+    """Return the deck with the macro program of cards: those between MACR and END.
 
-    The cards of PROP's load tables may follow after END; otherwise the deck's own stay.  Raises
-    DeckError if the cards are no macro program.
+    The cards of PROP's load tables may follow after END; otherwise the deck's own stay. Raises
+    DeckError if the cards are not a macro program.
     """
     lines = [TITLE, deck.control.to_card(), END, MACROS, *cards.rstrip("\n").split("\n")]
     if END not in map(str.strip, lines[4:]):

@@ -48,7 +48,7 @@ class Sphere:
         return f"Contact.estimate({given})"
 
     def law(self, plies: DeckPlies, layers: Sequence[Layer]) -> tuple[Indentation, str]:
-        """Law of contact with layers, and comment lines which say how k was computed."""
+        """Return the contact law on layers, and comment lines that say how k was computed."""
         if self.radius is None:
             raise ObjectError("the `contact` estimate needs the sphere's radius")
         if self.modulus is None and plies.system is None:
@@ -82,7 +82,7 @@ class Sphere:
 
 
 def doubts_of_sphere(sphere: Sphere, system: str | None, test: DropWeight | None) -> list[str]:
-    """Doubt a modulus in another unit, and a diameter in the place of a standard's radius."""
+    """Yield doubts about a modulus in another unit, and a diameter in place of a radius."""
     doubts: list[str] = []
     names = units_of(system) if system else {}
     own, modulus = in_si(MODULUS, names), sphere.modulus
@@ -105,9 +105,9 @@ def doubts_of_sphere(sphere: Sphere, system: str | None, test: DropWeight | None
 def doubts_of_soft_tip(
     sphere: Sphere, radius: float, k: float, energy: float, modulus: float
 ) -> list[str]:
-    """Doubt the radius of the patch of a sphere that is softer than the plies across their fibres.
+    """Yield a doubt about the patch of a sphere softer than the plies across their fibres.
 
-    The contact circle of a sphere is (R alpha)^(1/2); the indentation alpha is at most that of a
+    The contact circle of a sphere is (R alpha)^(1/2). The indentation alpha is at most the one of a
     rigid plate, whose energy is (2/5) k alpha^(5/2).
     """
     if sphere.radius is None or sphere.modulus is None or sphere.modulus > SOFT_TIP * modulus:
@@ -154,7 +154,7 @@ class Contact(Indentation):
 
     @staticmethod
     def named(name: str) -> NamedContact:
-        """Published law, which `fecm indent contacts` lists; converted to the deck's units.
+        """Return a published law, which `fecm indent contacts` lists, in the deck's units.
 
         Raises
         ------
@@ -169,7 +169,7 @@ class Contact(Indentation):
     def estimate(
         radius: float | None = None, modulus: float | None = None, poisson: float | None = None
     ) -> Sphere:
-        """Elastic law of a sphere on the laminate, as `fecm indent estimate` has it.
+        """Return the elastic law of a sphere on the laminate, as `fecm indent estimate` has it.
 
         Parameters
         ----------
@@ -190,9 +190,9 @@ class Contact(Indentation):
 
 
 def parse_patch(text: str) -> Patch | None:
-    """Contact patch of ``disc``, ``hertz``, ``disc:RADIUS`` or ``hertz:RADIUS``.
+    """Parse a contact patch ``disc``, ``hertz``, ``disc:RADIUS`` or ``hertz:RADIUS``.
 
-    ``none`` is a point force, None.  Raises ValueError if the text is none of these.
+    ``none`` is a point force, None. Raises ValueError for any other text.
     """
     shape, colon, given = text.partition(":")
     if text == "none":
@@ -212,7 +212,7 @@ AnyContact = Indentation | NamedContact | Sphere | str
 def indentation_law(
     contact: AnyContact | None, plies: DeckPlies, layers: Sequence[Layer]
 ) -> tuple[Indentation, str]:
-    """Indentation law in the units of the deck, and comment lines about one that is estimated."""
+    """Return the contact law in the units of the deck, and comment lines about an estimated law."""
     match contact:
         case str():
             return indentation_law(Contact.named(contact), plies, layers)

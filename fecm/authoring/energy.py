@@ -1,4 +1,4 @@
-"""The energy of a new deck's projectile."""
+"""Energy of a new deck's projectile."""
 
 from __future__ import annotations
 
@@ -18,20 +18,20 @@ ENERGY_UNITS = {1.0: "J", 1e-3: "mJ"}
 
 
 def energy_of(deck: model.Deck) -> float:
-    """Kinetic energy of the projectile."""
+    """Return the kinetic energy of the projectile."""
     velocity, mass = deck.require(model.Impact).velocity, build_projectile(deck).total_mass
     return 0.5 * mass * velocity**2
 
 
 def said_energy(deck: model.Deck, plies: DeckPlies) -> str:
-    """Kinetic energy of the projectile, in joule where the units are known."""
+    """Format the kinetic energy of the projectile, in joule where the units are known."""
     energy = energy_of(deck)
     joule = in_si("force*length", units_of(plies.system) if plies.system else {})
     return f"{energy * joule:.4g} J" if joule else f"{energy:.4g}"
 
 
 def energy_note(deck: model.Deck, plies: DeckPlies, *, per_thickness: bool) -> str:
-    """Say energy and velocity of the projectile."""
+    """Format energy and velocity of the projectile."""
     energy, velocity = energy_of(deck), deck.require(model.Impact).velocity
     names = units_of(plies.system) if plies.system else {}
     said = said_energy(deck, plies)
@@ -45,7 +45,7 @@ def energy_note(deck: model.Deck, plies: DeckPlies, *, per_thickness: bool) -> s
 def doubts_of_energy(
     deck: model.Deck, fixture: Fixture | None, plies: DeckPlies, *, is_bare: bool
 ) -> list[str]:
-    """Doubt an energy that is far below a standard's, or a bare number that is small for one.
+    """Yield doubts about an energy far below a standard's, or a small bare number.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def doubts_of_energy(
 
 
 def with_energy(deck: model.Deck, energy: float) -> model.Deck:
-    """The deck with a velocity for an energy, in as many digits as its card has."""
+    """Return the deck with the velocity of an energy, in as many digits as its card has."""
     mass = build_projectile(deck).total_mass
     velocity = math.sqrt(2.0 * energy / mass) if mass > 0.0 else math.inf
     if not 0.0 < velocity < math.inf:

@@ -1,4 +1,4 @@
-"""The deck of an impact from plate, laminate, projectile and contact, with its title."""
+"""Deck of an impact from plate, laminate, projectile and contact, with its title."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ LONGEST_LAYUP = 60  # characters; a longer one is replaced by the number of plie
 
 
 def default_title(plate: Plate, laminate: Laminate, deck: model.Deck, plies: DeckPlies) -> str:
-    """Title such as ``D7136 [45/0/-45/90]3s IM7/8552, 10 J``."""
+    """Return a title such as ``D7136 [45/0/-45/90]3s IM7/8552, 10 J``."""
     names = dict.fromkeys(named.name for _, named in plies.named)
     words = (_plate(plate), _layup(laminate), " + ".join(names))
     return f"{' '.join(filter(None, words))}, {said_energy(deck, plies)}"
@@ -76,7 +76,7 @@ def _plate(plate: Plate) -> str:
 
 
 def _layup(laminate: Laminate) -> str:
-    """The layup as the literature writes it, ``[45/0/-45/90]3s``."""
+    """Return the layup as the literature writes it, ``[45/0/-45/90]3s``."""
     plies = [f"{ply.angle:g}{ply.name if len(ply.name) == 1 else ''}" for ply in laminate.plies]
     count, symmetric = len(plies), ""
     if count % 2 == 0 and plies == plies[::-1]:
@@ -94,7 +94,7 @@ GagePlace = tuple[float, float, float, float]  # x, y, z and degrees
 
 @dataclass(frozen=True)
 class ImpactParameters:
-    """What hits the plate, how fast and where."""
+    """Projectile, its velocity and its position."""
 
     projectile: AnyProjectile | None = None
     contact: AnyContact | None = None
@@ -104,7 +104,7 @@ class ImpactParameters:
 
 
 class Request(NamedTuple):
-    """What :func:`impact` and ``fecm new`` are asked for; see there."""
+    """Arguments of :func:`impact` and options of ``fecm new``; see there."""
 
     plate: Plate
     laminate: Laminate
@@ -124,11 +124,11 @@ class Request(NamedTuple):
 
     @property
     def test(self) -> DropWeight | None:
-        """What a standard prescribes."""
+        """Test that a standard prescribes."""
         return self.plate.fixture.test if self.plate.fixture else None
 
     def check(self) -> None:
-        """Raise ObjectError if an argument is no object of fecm, or a text none of the choices."""
+        """Raise ObjectError if an argument is not an object of fecm, or a text is invalid."""
         strike, numerics = self.strike, self.numerics
         check_kind("plate", self.plate, Plate)
         check_kind("laminate", self.laminate, Laminate)
@@ -154,7 +154,7 @@ class Motion(NamedTuple):
 
 
 class Authored(NamedTuple):
-    """A new deck, not yet checked."""
+    """New deck, not yet checked."""
 
     deck: model.Deck
     comments: str  # comment lines for the deck's head
@@ -194,11 +194,11 @@ def impact(
     title: str | None = None,
     zones: Sequence[tuple[str | Sequence[float], Layup | Laminate]] = (),
 ) -> model.Deck:
-    """Deck of an impact, as `fecm new` writes it.
+    """Return the deck of an impact, as `fecm new` writes it.
 
     A flat linear plate whose laminate is not coupled has its in-plane dofs restrained, as the
-    report's does; any other has them free inside, and restrained on its supports as `in_plane`
-    says.
+    report's plate. Any other plate has them free inside, and restrained on its supports as
+    `in_plane` says.
 
     Parameters
     ----------
@@ -333,7 +333,7 @@ def impact(
 
 
 def author(asked: Request) -> Authored:
-    """Make the deck of a request without checking it."""
+    """Build the deck of a request without checking it."""
     asked.check()
     units = system_asked(asked.units)
     notes: list[str] = []
@@ -431,7 +431,7 @@ def author(asked: Request) -> Authored:
 def _formed(
     asked: Request, plain: model.Deck, mesh: AnyMesh, plies: DeckPlies, *, nonlinear: bool
 ) -> Formed:
-    """The deck with its supports, and with NONL for a nonlinear plate."""
+    """Return the deck with its supports, and with NONL for a nonlinear plate."""
     notes: list[str] = []
     membrane = MembraneSupport.of(
         curved=plain.has(model.Curvature), stretches=nonlinear or plies.is_coupled
@@ -450,12 +450,12 @@ def _formed(
 
 
 def is_sandwich(plies: DeckPlies, layers: Sequence[model.Layer]) -> bool:
-    """Whether a layer is so soft in shear that it is the core of a sandwich."""
+    """Return whether a layer is so soft in shear that it is the core of a sandwich."""
     return any(are_cores([plies.of(layer).ply for layer in layers]))
 
 
 def doubts_of_core(plies: DeckPlies, layers: Sequence[model.Layer]) -> list[str]:
-    """Doubt an estimated k of a sandwich."""
+    """Yield a doubt about an estimated k of a sandwich."""
     if not is_sandwich(plies, layers):
         return []
     return [
@@ -465,7 +465,7 @@ def doubts_of_core(plies: DeckPlies, layers: Sequence[model.Layer]) -> list[str]
 
 
 def _doubts_of_duration(duration: float | None, dt: float, system: str | None) -> list[str]:
-    """Doubt a simulated time of very many steps."""
+    """Yield a doubt about a simulated time of very many steps."""
     if duration is None or duration / dt <= MOST_STEPS:
         return []
     unit = units_of(system)["time"] if system else ""
@@ -477,14 +477,14 @@ def _doubts_of_duration(duration: float | None, dt: float, system: str | None) -
 
 
 def _check_choice(name: str, value: str | None, choices: Sequence[str | None]) -> None:
-    """Refuse a text that is none of the choices."""
+    """Refuse a text that is not one of the choices."""
     if value not in choices:
         known = ", ".join(choice for choice in choices if choice is not None)
         raise ObjectError(f"`{name}` is {value!r}, none of {known}")
 
 
 def _motion(asked: Request, plies: DeckPlies) -> Motion:
-    """Velocity, energy and duration in the units of the deck."""
+    """Return velocity, energy and duration in the units of the deck."""
     strike, numerics, system = asked.strike, asked.numerics, plies.system
     motion = Motion(
         in_units("velocity", strike.velocity, "length/time", system),
@@ -504,7 +504,7 @@ def _motion(asked: Request, plies: DeckPlies) -> Motion:
 def _prescribed(
     test: DropWeight, strike: ImpactParameters, motion: Motion, thickness: float
 ) -> tuple[ImpactParameters, Motion]:
-    """What a standard has in place of what is not given."""
+    """Return the values that a standard prescribes for missing arguments."""
     if motion.velocity is None and motion.energy is None:
         motion = motion._replace(energy=test.energy * thickness)
     contact = strike.contact
@@ -515,7 +515,7 @@ def _prescribed(
 
 
 def _doubt_of_thickness(name: str, test: DropWeight, thickness: float) -> str:
-    """What a standard says about a laminate whose thickness is outside its range."""
+    """Return a doubt about a laminate whose thickness is outside a standard's range."""
     limits = f"{test.thinnest:g} to {test.thickest:g} mm"
     return f"{name} is for laminates of {limits}; this one has {thickness:.4g} mm"
 
@@ -536,21 +536,21 @@ def _check_complete(
 
 
 def _units(asked: Request, plies: DeckPlies) -> model.Units | None:
-    """UNIT segment; the report's decks have none."""
+    """Return the UNIT segment; the report's decks have none."""
     if plies.system is None or (plies.system == SYSTEM and asked.units is None):
         return None
     return model.Units(*units_of(plies.system).values())
 
 
 def _projectile(projectile: AnyProjectile | None) -> model.Projectile | None:
-    """Segment of a projectile."""
+    """Return the segment of a projectile."""
     if isinstance(projectile, Rod | RigidMass):
         return projectile_segment(projectile)
     return projectile
 
 
 def _preload(asked: Request, plies: DeckPlies) -> model.Preload | None:
-    """PREL segment of a membrane force, if there is one."""
+    """Return the PREL segment of a membrane force, if there is one."""
     if asked.preload is None:
         return None
     given = list(asked.preload) if isinstance(asked.preload, Iterable) else []
@@ -562,7 +562,7 @@ def _preload(asked: Request, plies: DeckPlies) -> model.Preload | None:
 
 
 def _gages(places: Iterable[GagePlace]) -> model.Gages | None:
-    """GAGE segment of strain gages, if there are any."""
+    """Return the GAGE segment of strain gages, if there are any."""
     try:
         gages = tuple(Gage(n, *map(float, place)) for n, place in enumerate(places, start=1))
     except (TypeError, ValueError):

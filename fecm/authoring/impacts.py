@@ -1,7 +1,7 @@
 """Impacts on one plate as columns: velocity, contact law, projectile and toughness of many cases.
 
-A card, a projectile and a strike for every case would take longer than its impact.  The rules of
-the cards check the values as arrays; an invalid case has its message from the rule of its card.
+A card, a projectile and a strike for every case would take longer than its impact. The rules of the
+cards check the values as arrays. An invalid case gets its message from the rule of its card.
 """
 
 from __future__ import annotations
@@ -88,9 +88,9 @@ class Impacts:
 def impacts_of(
     checked: Problem, numbers: Sequence[int], cases: Sequence[Case], own_law: Law | None = None
 ) -> tuple[Impacts | None, dict[int, str]]:
-    """Impacts of cases on the plate of a problem, and why other cases have none, by their numbers.
+    """Return the impacts of cases on the plate of a problem, and the faults of invalid cases.
 
-    The impacts are None if no case has one.
+    The impacts are None if no case has one. The faults are texts by the number of the case.
     """
     as_columns = _from_values(checked, numbers, cases, own_law)
     valid = set() if as_columns is None else set(as_columns.numbers)
@@ -113,7 +113,7 @@ def impacts_of(
 
 
 def impacts_from_cards(strikes: Mapping[int, Strike], own_law: Law | None = None) -> Impacts:
-    """Impacts that are given as cards, by the numbers of their cases."""
+    """Return impacts that are given as cards, by the numbers of their cases."""
     rows = list(strikes.values())
     units = [UNIT if isinstance(one.projectile, RigidMass) else one.projectile for one in rows]
     kinds = {unit: place for place, unit in enumerate(dict.fromkeys(units))}
@@ -135,7 +135,7 @@ def impacts_from_cards(strikes: Mapping[int, Strike], own_law: Law | None = None
 def _from_values(
     checked: Problem, numbers: Sequence[int], cases: Sequence[Case], own_law: Law | None
 ) -> Impacts | None:
-    """Impacts of the cases whose values are valid; None if columns can't hold the values."""
+    """Return the impacts of the cases with valid values; None if columns can't hold the values."""
     own = strike_of(checked.deck)
     names = cases[0].keys() - plate_values(cases[0]).keys()
     if own.impact is None or own.indentation is None or not _fits_columns(own, names):
@@ -160,7 +160,10 @@ def _from_values(
 
 
 def _fits_columns(own: Strike, names: Collection[str]) -> bool:
-    """Whether columns can hold values of these names: a rod of another mass is another kind."""
+    """Return whether columns can hold values of these names.
+
+    A rod of another mass is another kind.
+    """
     rigid = isinstance(own.projectile, RigidMass)
     return AS_COLUMNS.issuperset(names) and (rigid or not {*MASSES}.intersection(names))
 
@@ -168,7 +171,10 @@ def _fits_columns(own: Strike, names: Collection[str]) -> bool:
 def _columns(
     own: Strike, law: model.Indentation, values: Mapping[str, Floats], count: int
 ) -> tuple[Impacts, Bools]:
-    """Columns of cases with values by name, the others of their deck; and which are valid."""
+    """Return columns of cases with values by name, and a mask of the valid cases.
+
+    Missing values are the deck's.
+    """
     projectile, rigid = own.projectile, isinstance(own.projectile, RigidMass)
     total = next((values[name] for name in MASSES if name in values), projectile.total_mass)
     mass = np.array(np.broadcast_to(total, count))
@@ -204,5 +210,5 @@ def _columns(
 
 
 def _toughness(one: Strike) -> float:
-    """Toughness of a strike; NaN without a DELA segment."""
+    """Return the toughness of a strike; NaN without a DELA segment."""
     return math.nan if one.delamination is None else one.delamination.toughness

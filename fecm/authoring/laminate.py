@@ -1,4 +1,4 @@
-"""Layups and their materials, their units, strengths, toughness and expansions."""
+"""Layups and their materials, with units, strengths, toughness and expansions."""
 
 from __future__ import annotations
 
@@ -72,10 +72,10 @@ class LaminatePly(NamedTuple):
 class Laminate:
     """Layup of a plate, and its stiffness.
 
-    The x-axis is that of the plate, and angles are counter-clockwise from it.  z runs from the
-    struck face, z = -h/2, to the other.  The matrices have the order xx, yy, xy, with the
-    engineering shear strain.  All numbers are in the units of the first named ply's source, which
-    ``fecm.materials()`` has, or else in those of the constants in `ply`.
+    The x-axis is the x-axis of the plate, and angles are counter-clockwise from it. z runs from the
+    struck face, z = -h/2, to the other. The matrices have the order xx, yy, xy, with the
+    engineering shear strain. All numbers are in the units of the first named ply's source, which
+    ``fecm.materials()`` has, or else in the units of the constants in `ply`.
 
     Attributes
     ----------
@@ -151,9 +151,10 @@ class Laminate:
 
     @property
     def thickness(self) -> float:
-        """Total thickness, length; ValueError without the thickness of a ply.
+        """Total thickness, length.
 
-        The own thickness of a named ply is in the units of its source.
+        Raises ValueError if the thickness of a ply is missing. The own thickness of a named ply is
+        in the units of its source.
         """
         named = [one for ply in self.plies if isinstance(one := self._bound(ply), NamedPly)]
         system = named[0].system if named else None
@@ -161,7 +162,10 @@ class Laminate:
 
     @property
     def A(self) -> Floats:
-        """Extensional stiffness, (3, 3), force/length; ValueError if the laminate is incomplete."""
+        """Extensional stiffness, (3, 3), force/length.
+
+        Raises ValueError if the laminate is incomplete.
+        """
         return self._stiffness.A
 
     @property
@@ -198,7 +202,7 @@ class Laminate:
         return hash(self.plies)  # a layup may be a list, and materials a dictionary
 
     def _repr_html_(self) -> str:
-        """Table of plies, stiffness and engineering constants, for notebooks."""
+        """Return a table of plies, stiffness and engineering constants, for notebooks."""
         angles = "/".join(f"{ply.angle:g} {ply.name}".rstrip() for ply in self.plies)
         rows: list[Row] = [("angles", shorten(angles, 200))]
         try:
@@ -208,17 +212,17 @@ class Laminate:
         return html_table(Table(tuple(rows), title=repr(self)))
 
     def _bound(self, ply: LaminatePly) -> Ply | NamedPly | None:
-        """Material of a ply; None if it has none."""
+        """Return the material of a ply, or None."""
         given = self.material(ply.name)
         return None if given is None else _known(given)
 
     def _own(self, ply: LaminatePly, system: str | None) -> float:
-        """Thickness that the name of a ply gives."""
+        """Return the thickness that the name of a ply gives."""
         bound = self._bound(ply)
         return _own_thickness(bound if isinstance(bound, NamedPly) else None, system)
 
     def material(self, name: str) -> object:
-        """What is given as the material of a name."""
+        """Return the argument that is the material of a name."""
         given = self.ply if isinstance(self.ply, Mapping) else {"": self.ply}
         if name in given:
             return given[name]
@@ -229,7 +233,7 @@ class Laminate:
         raise ObjectError(f"`layup` has {said}; the materials given are {known}")
 
     def thickness_of(self, ply: LaminatePly) -> float | None:
-        """Thickness of a ply, where the laminate has it; it is positive."""
+        """Return the thickness of a ply, positive, where the laminate has it."""
         given = self.ply_thickness
         common = given.get(ply.name) if isinstance(given, Mapping) else given
         thickness = common if ply.thickness is None else ply.thickness
@@ -247,14 +251,14 @@ def _ply_of(entry: Entry) -> LaminatePly:
 
 
 def _total(thicknesses: Sequence[float]) -> float:
-    """Thickness of a laminate, in the digits of a card."""
+    """Return the thickness of a laminate, in the digits of a card."""
     if len(set(thicknesses)) == 1:
         return float(f"{len(thicknesses) * thicknesses[0]:.9g}")
     return float(f"{math.fsum(thicknesses):.9g}")
 
 
 class Bound(NamedTuple):
-    """A material in the units of a deck."""
+    """Material in the units of a deck."""
 
     ply: Ply
     named: NamedPly | None  # from which the constants are, if they have a name
@@ -266,7 +270,7 @@ class Bound(NamedTuple):
 
 
 class DeckPlies(NamedTuple):
-    """Laminates in the units of a deck: that of the plate, and those of its zones."""
+    """Laminates in the units of a deck: the laminate of the plate, and those of its zones."""
 
     layups: tuple[tuple[Layer, ...], ...]
     materials: tuple[Bound, ...]  # number 1 is the first
@@ -284,7 +288,7 @@ class DeckPlies(NamedTuple):
 
     @property
     def said(self) -> str:
-        """Words about the thickest laminate."""
+        """Description of the thickest laminate."""
         layers = max(self.layups, key=lambda one: _total([layer.thickness for layer in one]))
         sizes = {f"{layer.thickness:g}" for layer in layers}
         each = f" of `ply_thickness` {sizes.pop()}" if len(sizes) == 1 else ""
@@ -309,11 +313,11 @@ class DeckPlies(NamedTuple):
         )
 
     def of(self, layer: Layer) -> Bound:
-        """Material of a layer."""
+        """Return the material of a layer."""
         return self.materials[layer.material - MATERIAL]
 
     def segments(self) -> list[Segment]:
-        """MATE, and MATS and LAMS where there are several materials and laminates."""
+        """Return MATE, and MATS and LAMS where there are several materials and laminates."""
         (first, *others), (own, *zones) = self.materials, self.layups
         integration = Integration(ORDER, ORDER, NODAL_POINTS, self.thickness)
         made: list[Segment] = [Material(integration, first.ply, own)]
@@ -331,11 +335,10 @@ class DeckPlies(NamedTuple):
 def deck_plies(
     laminate: Laminate, zones: Sequence[Laminate], units: str | None, notes: list[str]
 ) -> tuple[DeckPlies, list[int]]:
-    """Laminates of a plate, by default in the units of the first named ply, and those of its zones.
+    """Return the laminates of a plate and of its zones.
 
-    Equal laminates have one number.
-
-    Notes the thickness of a ply that its name gives.
+    By default they are in the units of the first named ply. Equal laminates have one number. The
+    thickness of a ply that comes from its name is noted.
     """
     laminates = (laminate, *zones)
     owners = {ply.name: one for one in reversed(laminates) for ply in reversed(one.plies)}
@@ -374,7 +377,7 @@ def deck_plies(
 def stiffness_of_laminate(
     laminate: Laminate, units: str | None, notes: list[str]
 ) -> tuple[Stiffness, dict[str, str]]:
-    """Stiffness and inertia of a laminate by itself, checked as in a deck, and names of its units.
+    """Return stiffness and inertia of a laminate, checked as in a deck, and names of its units.
 
     Raises ObjectError if the laminate is incomplete or impossible.
     """
@@ -391,7 +394,7 @@ def stiffness_of_laminate(
 
 
 def _stiffness_rows(stiffness: Stiffness, names: dict[str, str]) -> list[tuple[str, str]]:
-    """Rows of a table: thickness, matrices without rounding errors, and engineering constants."""
+    """Return rows of thickness, matrices without rounding errors, and engineering constants."""
 
     def text(values: Iterable[float], dimension: str) -> str:
         numbers = ", ".join(f"{value:.5g}" for value in values)
@@ -416,7 +419,7 @@ def _stiffness_rows(stiffness: Stiffness, names: dict[str, str]) -> list[tuple[s
 
 
 def system_asked(units: str | None) -> str | None:
-    """Name of the system of units that is asked for."""
+    """Return the name of the requested system of units."""
     if units is None:
         return None
     if not isinstance(units, str):
@@ -428,7 +431,7 @@ def system_asked(units: str | None) -> str | None:
 
 
 def _known(ply: object) -> Ply | NamedPly:
-    """A ply; the named one of a name."""
+    """Return a ply, or the named ply of a name."""
     if isinstance(ply, Ply):
         check_numbers(**{one.name: getattr(ply, one.name) for one in fields(Ply)[1:]})
         return ply
@@ -443,7 +446,7 @@ def _known(ply: object) -> Ply | NamedPly:
 
 
 def _own_thickness(named: NamedPly | None, system: str | None) -> float:
-    """Thickness of a named ply."""
+    """Return the thickness of a named ply."""
     own = None if named is None or system is None else named.value("thickness", system)
     if own is None:
         unknown = f": that of {named.name} is not known" if named else ""
@@ -452,13 +455,13 @@ def _own_thickness(named: NamedPly | None, system: str | None) -> float:
 
 
 def _note_of_thickness(own: float, named: NamedPly, system: str | None) -> str:
-    """Say the thickness that the name of a ply gives."""
+    """Note the thickness that the name of a ply gives."""
     unit = units_of(system or named.system)["length"]
     return f"the plies are {own:g} {unit} thick, as {named.name} is listed"
 
 
 def check_thickness(plies: DeckPlies) -> None:
-    """Raise ObjectError if plies are thinner than any, and say in which unit they seem to be."""
+    """Raise ObjectError if plies are impossibly thin, and name the unit they seem to be in."""
     names = units_of(plies.system) if plies.system else {}
     unit = in_si("length", names)
     thinnest = min(layer.thickness for layers in plies.layups for layer in layers)
@@ -471,12 +474,12 @@ def check_thickness(plies: DeckPlies) -> None:
 
 
 def toughness(giic: float | None) -> list[Segment]:
-    """DELA segment of a given toughness."""
+    """Return the DELA segment of a given toughness."""
     return [] if giic is None else [Delamination(toughness=giic)]
 
 
 def strengths_of(plies: DeckPlies) -> Allowables:
-    """ALLO segment of named plies, of which one at least has strengths."""
+    """Return the ALLO segment of named plies, if one of them has strengths."""
     found, lacking = _strengths(plies)
     if not found:
         why = "; ".join(f"{name} has {lacks}" for name, lacks in lacking.items())
@@ -485,7 +488,7 @@ def strengths_of(plies: DeckPlies) -> Allowables:
 
 
 def _strengths(plies: DeckPlies) -> tuple[list[Allowables], dict[str, str]]:
-    """Strengths of named plies, and what the others lack, by name."""
+    """Return the strengths of named plies, and what the others lack, by name."""
     found: list[Allowables] = []
     lacking: dict[str, str] = {}
     for number, named in plies.named:
@@ -501,20 +504,20 @@ def _strengths(plies: DeckPlies) -> tuple[list[Allowables], dict[str, str]]:
 
 
 def toughness_of(plies: DeckPlies) -> float:
-    """Least toughness G_IIc of named plies."""
+    """Return the least toughness G_IIc of named plies."""
     if found := _toughnesses(plies):
         return min(found)
     raise ObjectError("no named ply with GIIc")
 
 
 def _toughnesses(plies: DeckPlies) -> list[float]:
-    """Toughness G_IIc of the named plies that have it."""
+    """Return the toughness G_IIc of the named plies that have it."""
     known = [named.delamination(plies.system) for _, named in plies.named if plies.system]
     return [one.toughness for one in known if one]
 
 
 def damages(plies: DeckPlies, giic: float | None, notes: list[str]) -> list[Segment]:
-    """Strengths and least toughness of named plies; notes what they do not have."""
+    """Return strengths and least toughness of named plies; missing ones are noted."""
     if plies.system is None or not plies.named:
         raise ObjectError("`damage` needs a named ply with strengths or toughness")
     strengths, without = _strengths(plies)
@@ -538,12 +541,12 @@ def damages(plies: DeckPlies, giic: float | None, notes: list[str]) -> list[Segm
 
 
 def _expanding() -> list[str]:
-    """Names of the plies that have expansions."""
+    """Return the names of the plies that have expansions."""
     return [name for name, ply in MATERIALS.items() if ply.expansion is not None]
 
 
 def cure_segment(plies: DeckPlies, cure: float | str | None) -> Cure | None:
-    """CURE segment of named plies for a change of temperature, or for ``"177:20"``."""
+    """Return the CURE segment of named plies for a change of temperature, or ``"177:20"``."""
     if cure is None:
         return None
     expansions: list[Expansion] = []
@@ -561,7 +564,7 @@ def cure_segment(plies: DeckPlies, cure: float | str | None) -> Cure | None:
 
 
 def _cooling(cure: float | str, plies: Sequence[NamedPly]) -> float:
-    """Temperature of use minus stress-free temperature, K; by default that of the plies."""
+    """Return temperature of use minus stress-free temperature, K, by default of the plies."""
     before, colon, after = str(cure).rpartition(":")
     if colon and not before.strip():
         before = str(_stress_free(cure, plies))
@@ -578,7 +581,7 @@ def _cooling(cure: float | str, plies: Sequence[NamedPly]) -> float:
 
 
 def _stress_free(cure: float | str, plies: Sequence[NamedPly]) -> float:
-    """Stress-free temperature of the plies that have one."""
+    """Return the stress-free temperature of the plies that have one."""
     known = {ply.values.get("stress_free_temperature") for ply in plies} - {None}
     if len(known) != 1:
         names = " and ".join(ply.name for ply in plies)

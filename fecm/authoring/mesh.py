@@ -1,4 +1,4 @@
-"""Mesh of a plate, the node that is hit, and the supports."""
+"""Mesh of a plate, the impact node, and the supports."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ AnyMesh = ElementGrid | PlateMesh
 
 
 class Placed(NamedTuple):
-    """Mesh, node that is hit, and patch."""
+    """Mesh, impact node, and patch."""
 
     mesh: AnyMesh
     node: int
@@ -48,7 +48,7 @@ def placed(
     patch: Patch | None,
     doubts: list[str],
 ) -> Placed:
-    """Mesh, node that is hit, and patch; adds what was changed in them to `doubts`."""
+    """Return mesh, impact node, and patch; changes in them are added to `doubts`."""
     place = None if at is None else number_pair("at", at)
     mesh = plate.imported or plate_grid(plate, place, None if patch is None else patch.radius)
     low, high = mesh.extent
@@ -80,7 +80,7 @@ def placed(
 
 
 def _doubts_of_refinement(plate: Plate, mesh: AnyMesh, patch: Patch | None) -> list[str]:
-    """Whether a rectangle has other numbers of elements than were given."""
+    """Doubt a rectangle with other numbers of elements than were given."""
     if not isinstance(mesh, ElementGrid) or plate.mesh is None or plate.fixture is not None:
         return []
     if patch is None or patch.radius is None:
@@ -96,7 +96,7 @@ def _doubts_of_refinement(plate: Plate, mesh: AnyMesh, patch: Patch | None) -> l
 
 
 def plate_grid(plate: Plate, at: tuple[float, float] | None, radius: float | None) -> ElementGrid:
-    """Grid of a rectangular plate, refined to the radius of a patch.
+    """Return the grid of a rectangular plate, refined to the radius of a patch.
 
     With a fixture, size and mesh are those of its window.
     """
@@ -122,7 +122,7 @@ def plate_grid(plate: Plate, at: tuple[float, float] | None, radius: float | Non
 def _sections(
     length: float, count: int, centre: float, grading: float, radius: float | None
 ) -> list[GridSection]:
-    """Elements in one direction."""
+    """Return the elements in one direction."""
     if grading > 1.0:
         made = grids.graded(length, count, centre, grading)
     else:
@@ -145,7 +145,7 @@ class Supported(NamedTuple):
 
 
 class MembraneSupport(Enum):
-    """Why u and v of a plate move."""
+    """Reason why u and v of a plate move."""
 
     AT_REST = auto()  # they are zero
     STRETCHES = auto()  # with B or large deflections
@@ -153,14 +153,14 @@ class MembraneSupport(Enum):
 
     @classmethod
     def of(cls, *, curved: bool, stretches: bool) -> Self:
-        """The kind of a plate."""
+        """Return the kind of a plate."""
         if curved:
             return cls.CURVED
         return cls.STRETCHES if stretches else cls.AT_REST
 
 
 def curvature_of(radius_x: float | None, radius_y: float | None) -> Curvature | None:
-    """CURV segment of a shallow panel; None without a radius."""
+    """Return the CURV segment of a shallow panel; None without a radius."""
     radii = {"radius_x": radius_x, "radius_y": radius_y}
     for name, radius in radii.items():
         if radius is not None and not (is_finite(radius) and radius):
@@ -180,7 +180,7 @@ def supported(
     notes: list[str],
     membrane: MembraneSupport,
 ) -> Supported:
-    """Supports of a plate; u and v are held everywhere where they are zero."""
+    """Return the supports of a plate; u and v are held everywhere where they are zero."""
     if membrane is MembraneSupport.AT_REST:
         if in_plane is not None:
             notes.append(
@@ -204,7 +204,7 @@ def supported(
 
 
 def _note_of_curved(plate: Plate, in_plane: InPlane) -> str:
-    """What the supports of a curved panel hold in its plane, which decides its stiffness."""
+    """Say what the supports of a curved panel hold in its plane, which decides its stiffness."""
     kinds: dict[str, str] = {"window": in_plane} if plate.fixture else {}
     for support in sorted(set(plate.supports.values()) - {"free"}):
         kinds[support] = held_in_plane(support, in_plane)

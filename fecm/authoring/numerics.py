@@ -37,7 +37,7 @@ FULL: Quadrature = "full"
 
 
 class Numerics(NamedTuple):
-    """How an impact is computed."""
+    """Numerical options of an impact."""
 
     patch: str | Patch | None = AUTO
     shear: Quadrature = MITC
@@ -51,13 +51,13 @@ class Numerics(NamedTuple):
     damage: bool = False  # whether the deck is to show damage
 
     def contact_patch(self, *, prescribed: bool) -> Patch | None:
-        """Contact patch; `prescribed` says whether a standard has the default one."""
+        """Return the contact patch; `prescribed` says whether a standard has the default."""
         if self.patch == AUTO:
             return Patch(HERTZ) if prescribed else Patch()
         return parse_patch(self.patch) if isinstance(self.patch, str) else self.patch
 
     def shear_segment(self) -> Shear | None:
-        """SHEA segment; None for the report's shear stiffness and quadrature."""
+        """Return the SHEA segment; None for the report's shear stiffness and quadrature."""
         factor, assumed = self.shear_factor, self.shear == MITC
         if factor is None:
             factor = EQUI if assumed else 1.0
@@ -69,7 +69,7 @@ class Numerics(NamedTuple):
         return Shear(factor, assumed=assumed) if assumed or factor != 1.0 else None
 
     def time_step(self, deck: Deck) -> float:
-        """Time step, by default 0.9 of the critical one."""
+        """Return the time step, by default 0.9 of the critical one."""
         if self.dt is not None:
             return self.dt
         mesh = generate(deck)
@@ -85,7 +85,7 @@ class Numerics(NamedTuple):
     def program(
         self, deck: Deck, dt: float, duration: float, elements: int | None = None
     ) -> tuple[Macro, ...]:
-        """Macro program of an impact; unless asked otherwise with ply stresses of `elements`."""
+        """Return the macro program of an impact, by default with ply stresses of `elements`."""
         steps = max(1, math.ceil(duration / dt - 1e-9))
         rows = float(self.every if self.every is not None else max(1, steps // ROWS))
         words = {"LMAS": 0.0, "DT": dt, "LOOP": float(steps), "TIME": 0.0}
@@ -98,7 +98,7 @@ class Numerics(NamedTuple):
         return with_outputs(macros, failure=failure, plies=plies)
 
     def with_program(self, deck: Deck, dt: float, duration: float | None) -> Deck:
-        """The deck with its program; without a duration, it is longer than the contact.
+        """Return the deck with its program; without a duration, it is longer than the contact.
 
         With `damage` and strengths the program also stores ply stresses around the load.
         """
@@ -115,7 +115,10 @@ class Numerics(NamedTuple):
 
 
 def elements_around_load(problem: Problem) -> int:
-    """Number of elements about the load in which the plies are most stressed, and those beside."""
+    """Return the number of elements around the load in which the plies are most stressed.
+
+    The elements next to them count.
+    """
     near = int((problem.distances < AROUND_LOAD * problem.reach_of_load).sum())
     return min(max(near, FEWEST_ELEMENTS), problem.deck.control.numel)
 
@@ -141,7 +144,7 @@ BRIEF = (
 
 
 class Formed(NamedTuple):
-    """A deck with its supports, without a program."""
+    """Deck with its supports, without a program."""
 
     deck: model.Deck
     comment: str  # comment lines about a window
@@ -149,7 +152,10 @@ class Formed(NamedTuple):
 
 
 def kinematics_of(kinematics: Kinematics | None, nonlinear: bool | None) -> Kinematics:
-    """Kinematics of both names; ObjectError if they contradict each other."""
+    """Return the kinematics of both options.
+
+    Raises ObjectError if they contradict each other.
+    """
     if nonlinear is None:
         return kinematics or AUTO_KINEMATICS
     named = VON_KARMAN if nonlinear else LINEAR
@@ -159,9 +165,9 @@ def kinematics_of(kinematics: Kinematics | None, nonlinear: bool | None) -> Kine
 
 
 def with_kinematics(asked: Kinematics, form: Callable[[bool], Formed]) -> Formed:
-    """The deck of the kinematics that are asked for, or that the static deflection needs.
+    """Return the deck of the requested kinematics, or of those that the static deflection needs.
 
-    `form` forms the deck of a nonlinear plate, or of a linear one.
+    `form` builds the deck of a nonlinear plate, or of a linear one.
     """
     if asked == VON_KARMAN:
         formed = form(True)
@@ -202,7 +208,7 @@ def _noted(formed: Formed, note: str) -> Formed:
 
 
 def _deflection(deck: model.Deck) -> float:
-    """Static estimate of the largest deflection over the thickness; 0 of a deck with errors."""
+    """Estimate the largest static deflection over the thickness; 0 for a deck with errors."""
     loaded = load_deck(replace(deck, macros=BRIEF))
     if loaded.errors():  # the deck is refused later
         return 0.0

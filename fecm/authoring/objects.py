@@ -1,4 +1,4 @@
-"""Put a plate, a laminate, a projectile or a contact as objects into a deck."""
+"""Replacement of plate, laminate, projectile or contact of a deck by objects."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ class Objects(NamedTuple):
     contact: AnyContact | None = None
 
     def check(self) -> None:
-        """Raise ObjectError if one is no object of fecm."""
+        """Raise ObjectError if a part is not an object of fecm."""
         if self.plate is not None:
             check_kind("plate", self.plate, Plate)
         if self.laminate is not None:
@@ -52,27 +52,27 @@ class Objects(NamedTuple):
             check_kind("contact", self.contact, AnyContact)
 
     def with_plate(self, deck: model.Deck, at: tuple[float, float] | None) -> model.Deck:
-        """The deck with the laminate and the plate, which is struck at a point."""
+        """Return the deck with the laminate and the plate, struck at a point."""
         if self.laminate is not None:
             deck = with_laminate(deck, self.laminate)
         return deck if self.plate is None else with_plate(deck, self.plate, at)
 
     def with_strike(self, deck: model.Deck) -> model.Deck:
-        """The deck with the projectile and the contact."""
+        """Return the deck with the projectile and the contact."""
         if self.projectile is not None:
             deck = with_projectile(deck, self.projectile)
         return deck if self.contact is None else with_contact(deck, self.contact)
 
 
 def with_projectile(deck: model.Deck, projectile: AnyProjectile) -> model.Deck:
-    """The deck with another projectile; a rod keeps the node of the transducer."""
+    """Return the deck with another projectile; a rod keeps the node of the transducer."""
     if isinstance(projectile, Rod | RigidMass):
         return strike_of(deck).with_projectile(projectile).deck()
     return swapped(deck, deck.last(model.Projectile), projectile)
 
 
 def with_contact(deck: model.Deck, contact: AnyContact) -> model.Deck:
-    """The deck with another indentation law, which may be estimated from its laminate."""
+    """Return the deck with another contact law, which may be estimated from its laminate."""
     plies = plies_of_deck(deck)
     elastic = isinstance(contact, Sphere) and contact.modulus is not None
     if plies.system is None and not elastic and not isinstance(contact, model.Indentation):
@@ -85,7 +85,7 @@ def with_contact(deck: model.Deck, contact: AnyContact) -> model.Deck:
 
 
 def with_laminate(deck: model.Deck, laminate: Laminate) -> model.Deck:
-    """The deck with another laminate; the new plies' strengths go in the place of those it has."""
+    """Return the deck with another laminate; strengths of the new plies replace existing ones."""
     _refuse(deck, "laminate", model.Laminates, model.Zones)
     system = system_of(deck)
     plies, _ = deck_plies(laminate, (), system, [])
@@ -104,7 +104,7 @@ def with_laminate(deck: model.Deck, laminate: Laminate) -> model.Deck:
 
 
 def _with_properties(deck: model.Deck, plies: DeckPlies) -> model.Deck:
-    """The deck with strengths, toughness and expansions of other plies, where it has any."""
+    """Return the deck with strengths, toughness and expansions of other plies, where it has any."""
     segments: list[model.Segment] = []
     try:
         for segment in deck.segments:
@@ -128,7 +128,7 @@ def _with_properties(deck: model.Deck, plies: DeckPlies) -> model.Deck:
 
 
 def with_plate(deck: model.Deck, plate: Plate, at: tuple[float, float] | None) -> model.Deck:
-    """The deck with another mesh and its supports, struck at a point, by default in its middle."""
+    """Return the deck with another mesh and its supports, by default struck in its middle."""
     _refuse(deck, "plate", model.Forces, model.Zones)
     test = plate.fixture.test if plate.fixture else None
     if test is not None and system_of(deck) != STANDARD:
@@ -163,7 +163,7 @@ def with_plate(deck: model.Deck, plate: Plate, at: tuple[float, float] | None) -
 
 
 def _refuse(deck: model.Deck, name: str, *kinds: type[model.Segment]) -> None:
-    """Raise ObjectError if the deck has segments that refer to what is replaced."""
+    """Raise ObjectError if the deck has segments that refer to the replaced part."""
     if there := [kind.keyword for kind in kinds if deck.has(kind)]:
         raise ObjectError(
             f"`{name}` can't replace that of a deck with {' and '.join(there)}, which would no "
@@ -172,7 +172,7 @@ def _refuse(deck: model.Deck, name: str, *kinds: type[model.Segment]) -> None:
 
 
 def plies_of_deck(deck: model.Deck) -> DeckPlies:
-    """Laminates and materials of a deck; constants that are those of a named ply have its name."""
+    """Return the laminates and materials of a deck; constants of a named ply have its name."""
     system, plies = system_of(deck), deck.plies
     first = plies[MATERIAL]
     numbers = range(MATERIAL, max(plies) + 1)

@@ -27,41 +27,44 @@ EXAMPLES = {
 
 
 class ObjectError(FecmError, ValueError):
-    """Objects that make no deck; messages quote the names of parameters in backquotes."""
+    """Objects do not give a deck; messages quote the names of parameters in backquotes."""
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Whether a parameter is a number; True and False are not."""
+    """Return whether a parameter is a number; True and False are not."""
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
 def is_finite(value: object) -> TypeGuard[float]:
-    """Whether a parameter is a finite number."""
+    """Return whether a parameter is a finite number."""
     return is_number(value) and math.isfinite(value)
 
 
 def check_numbers(**values: object) -> None:
-    """Refuse parameters that are not numbers; None is not given."""
+    """Refuse parameters that are not numbers; None is a missing parameter."""
     for name, value in values.items():
         if value is not None and not is_number(value):
             raise ObjectError(f"`{name}` is {value!r}; it must be a number")
 
 
 def check_positive(**values: float | None) -> None:
-    """Refuse parameters that are not positive numbers; None is not given."""
+    """Refuse parameters that are not positive numbers; None is a missing parameter."""
     for name, value in values.items():
         if value is not None and not (is_finite(value) and value > 0.0):
             raise ObjectError(f"`{name}` is {value!r}; it must be a positive number")
 
 
 def check_kind(name: str, value: object, kind: type | UnionType) -> None:
-    """Refuse a parameter that is no object of fecm."""
+    """Refuse a parameter that is not an object of fecm."""
     if not isinstance(value, kind):
         raise ObjectError(f"`{name}` is {value!r}, not a {name} of fecm")
 
 
 def text_of(value: object) -> object:
-    """Text of a quantity of pint, unyt or astropy, as in ``3.0 m/s``; any other value as it is."""
+    """Return the text of a quantity of pint, unyt or astropy, such as ``3.0 m/s``.
+
+    Any other value stays as it is.
+    """
     number = getattr(value, "magnitude", getattr(value, "value", None))
     unit = getattr(value, "units", getattr(value, "unit", None))
     if number is None or unit is None:
@@ -74,10 +77,10 @@ def text_of(value: object) -> object:
 
 
 def in_units(name: str, value: object, dimension: str, system: str | None) -> float | None:
-    """A parameter in a system of units; one that is a number or None stays as it is.
+    """Return a parameter in a system of units; a number or None stays as it is.
 
-    Raises ObjectError if a text, as in ``10J`` or ``3m/s``, or a quantity is no number with a unit
-    of the dimension, the system is not known, or the value is none of these.
+    Raises ObjectError if a text, as in ``10J`` or ``3m/s``, or a quantity is not a number with a
+    unit of the dimension, the system is not known, or the value has another type.
     """
     value = text_of(value)
     if value is None or is_number(value):
@@ -100,7 +103,7 @@ def in_units(name: str, value: object, dimension: str, system: str | None) -> fl
 
 
 def number_pair(name: str, value: Sequence[float]) -> tuple[float, float]:
-    """Two numbers of a parameter."""
+    """Return the two numbers of a parameter."""
     try:
         x, y = map(float, value)
     except (TypeError, ValueError):

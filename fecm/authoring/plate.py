@@ -1,4 +1,4 @@
-"""A plate: its mesh, its supports, and the fixtures of drop-weight tests."""
+"""Plate: its mesh, its supports, and the fixtures of drop-weight tests."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ CUSTOM = "window:LXxLY,WXxWY"
 
 
 class DropWeight(NamedTuple):
-    """What a test standard prescribes besides its fixture, in mm, N, s and t."""
+    """Values that a test standard prescribes besides its fixture, in mm, N, s and t."""
 
     mass: float  # of the rigid projectile
     radius: float
@@ -31,7 +31,7 @@ class DropWeight(NamedTuple):
     least_energy: float = 100.0  # per thickness, below which a unit is probably mistaken, force
 
     def allows(self, thickness: float) -> bool:
-        """Whether a laminate's thickness is in the range of the standard."""
+        """Return whether a laminate's thickness is in the range of the standard."""
         return self.thinnest <= round(thickness, 9) <= self.thickest
 
 
@@ -61,7 +61,7 @@ FIXTURES = {"D7136": Fixture("D7136", (150.0, 100.0), (125.0, 75.0), D7136)}
 
 
 def parse_fixture(text: str) -> Fixture:
-    """Fixture of a name, or of ``window:LXxLY,WXxWY``, smaller than the plate."""
+    """Return the fixture of a name, or of ``window:LXxLY,WXxWY``, smaller than the plate."""
     if text in FIXTURES:
         return FIXTURES[text]
     number = r"\s*(\d+\.?\d*|\.\d+)\s*"
@@ -87,7 +87,7 @@ Support = Literal["free", "simple", "pinned", "clamped"]
 class Plate:
     """Mesh and supports of a plate.
 
-    :meth:`rectangle`, :meth:`on_fixture` and :meth:`from_mesh` make one.
+    :meth:`rectangle`, :meth:`on_fixture` and :meth:`from_mesh` create one.
 
     Attributes
     ----------
@@ -119,7 +119,7 @@ class Plate:
         return hash((supports, self.size, self.mesh, self.grading, self.columns, self.rows))
 
     def _repr_html_(self) -> str:
-        """Table of what the plate is made of, for notebooks."""
+        """Return a table of the parts of the plate, for notebooks."""
         values = ((one.name, getattr(self, one.name)) for one in fields(self) if one.repr)
         return html_table(
             Table(tuple((name, str(value)) for name, value in values if value), title="Plate")
@@ -137,7 +137,7 @@ class Plate:
         columns: str = "",
         rows: str = "",
     ) -> Self:
-        """Rectangle of elements with nine nodes, one corner at the origin.
+        """Return a rectangle of elements with nine nodes, one corner at the origin.
 
         Parameters
         ----------
@@ -196,7 +196,9 @@ class Plate:
     def on_fixture(
         cls, name: str, mesh: tuple[int, int] | None = None, *, grading: float | None = None
     ) -> Self:
-        """Plate on the edges of a window; with a standard's name its test gives defaults.
+        """Return a plate on the edges of a window.
+
+        The name of a standard gives the defaults of its test.
 
         Parameters
         ----------
@@ -225,11 +227,11 @@ class Plate:
         *,
         groups: Mapping[str, ArrayLike] | None = None,
     ) -> Self:
-        """Plate with the elements of a mesh generator.
+        """Return a plate with the elements of a mesh generator.
 
-        All elements are triangles of 3 or 6 nodes, or all quadrilaterals of 4, 8 or 9.  They are
-        turned counter-clockwise, and nodes without an element dropped.  A triangle becomes three
-        quadrilaterals of 4 nodes; one of 8 nodes gets its centre.
+        All elements are triangles of 3 or 6 nodes, or all are quadrilaterals of 4, 8 or 9. They are
+        turned counter-clockwise, and nodes without an element dropped. A triangle becomes three
+        quadrilaterals of 4 nodes; an element of 8 nodes gets its centre.
 
         Parameters
         ----------

@@ -1,7 +1,7 @@
-"""Setters of the values that change the plate of a deck, its mesh or where it is struck.
+"""Setters of the values that change the plate of a deck, its mesh or its impact position.
 
-Each takes a deck and a value and returns the deck with the value; CasesError says why a value is
-invalid for the deck.
+Each setter takes a deck and a value and returns the deck with the value. CasesError says why a
+value is invalid for the deck.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ def swapped(deck: model.Deck, old: model.Segment | None, new: model.Segment) -> 
 def set_layup(deck: model.Deck, value: Value) -> model.Deck:
     """Change the angles and their number; all plies keep the thickness of the deck.
 
-    As many angles as the deck has layers leave each its own material and thickness.
+    If there are as many angles as layers, each layer keeps its own material and thickness.
     """
     try:
         angles = parse_layup(str(value))
@@ -64,7 +64,7 @@ def set_layup(deck: model.Deck, value: Value) -> model.Deck:
 
 
 def set_layer_materials(deck: model.Deck, value: Value) -> model.Deck:
-    """Change the numbers of the materials of the layers, which are written as a layup's angles."""
+    """Change the materials of the layers; numbers are written as the angles of a layup."""
     old = deck.require(model.Material)
     try:
         numbers = parse_layup(str(value), math.inf)
@@ -85,7 +85,7 @@ def set_layer_materials(deck: model.Deck, value: Value) -> model.Deck:
 
 
 def _each(layers: Sequence[Layer], name: str, values: Sequence[float]) -> tuple[Layer, ...]:
-    """Layers with another value of a field for each."""
+    """Return the layers with another value of a field for each."""
     pairs = zip(layers, values, strict=True)
     changed: list[tuple[Layer, dict[str, Any]]] = [(layer, {name: v}) for layer, v in pairs]
     return tuple(replace(layer, **fields, source=None) for layer, fields in changed)
@@ -118,7 +118,7 @@ def add_angle(deck: model.Deck, value: Value) -> model.Deck:
 
 
 def ply_property(name: str) -> PlateSetter:
-    """Setter of a property of the ply."""
+    """Return the setter of a property of the ply."""
 
     def changed(deck: model.Deck, value: Value) -> model.Deck:
         old = deck.require(model.Material)
@@ -129,7 +129,7 @@ def ply_property(name: str) -> PlateSetter:
 
 
 def preload_force(name: str) -> PlateSetter:
-    """Setter of a force of the preload; a deck without one gets it."""
+    """Return the setter of a force of the preload, which is added to a deck without one."""
 
     def changed(deck: model.Deck, value: Value) -> model.Deck:
         old = deck.last(model.Preload)
@@ -141,7 +141,10 @@ def preload_force(name: str) -> PlateSetter:
 
 
 def curvature_radius(name: str) -> PlateSetter:
-    """Setter of a radius of a curved panel; 0 is flat.  A deck without radii gets them."""
+    """Return the setter of a radius of a curved panel; 0 is flat.
+
+    A deck without radii gets them.
+    """
 
     def changed(deck: model.Deck, value: Value) -> model.Deck:
         old = deck.last(model.Curvature)
@@ -178,7 +181,10 @@ def strength(name: str) -> PlateSetter:
 
 
 def _common_thickness(name: str, deck: model.Deck) -> float:
-    """Thickness of every ply; CasesError if they differ."""
+    """Return the thickness of every ply.
+
+    Raises CasesError if the thicknesses differ.
+    """
     first, *others = (layer.thickness for layer in deck.require(model.Material).layers)
     if any(thickness != first for thickness in others):
         raise CasesError(f"{name}: the plies of the deck differ in thickness")
@@ -202,7 +208,7 @@ def set_impact_node(deck: model.Deck, value: Value) -> model.Deck:
 
 
 def patch_field(field: str) -> PlateSetter:
-    """Setter of a field of the patch; a deck without one gets a disc."""
+    """Return the setter of a field of the patch; a deck without a patch gets a disc."""
 
     def changed(deck: model.Deck, value: Value) -> model.Deck:
         old = deck.last(model.Patch)
@@ -291,7 +297,7 @@ def refine(deck: model.Deck, value: Value) -> model.Deck:
 
 
 def check_free_in_plane(deck: model.Deck) -> None:
-    """Raise CasesError if a curved panel can't stretch: its supports decide how stiff it is."""
+    """Raise CasesError if a curved panel can't stretch, as its supports decide its stiffness."""
     if _holds_the_plane(deck):
         raise CasesError(
             "the deck holds u and v at every node, which clamps the membrane of a curved panel: "
@@ -300,13 +306,13 @@ def check_free_in_plane(deck: model.Deck) -> None:
 
 
 def _holds_the_plane(deck: model.Deck) -> bool:
-    """Whether a deck restrains u and v at every node."""
+    """Return whether a deck restrains u and v at every node."""
     boundaries = tuple(deck.all(model.Boundary))
     return holds_the_plane(restraint_codes(boundaries, deck.control.numnp, deck.control.ndf))
 
 
 def free_in_plane(deck: model.Deck) -> model.Deck:
-    """Restrain u and v only where w is, if the deck restrains them at every node."""
+    """Restrain u and v only where w is restrained, if the deck restrains them at every node."""
     if not _holds_the_plane(deck):
         return deck
 

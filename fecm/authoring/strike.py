@@ -1,7 +1,7 @@
-"""What strikes the plate in a case: ROD, EXPE, the projectile, and DELA, which judges the force.
+"""Strike of a case: ROD, EXPE, the projectile, and DELA, which judges the force.
 
-The values of a case that change nothing else need no deck of their own: cases of one plate differ
-in their strikes.
+Values that only change the strike need no deck of their own: cases of one plate differ in their
+strikes.
 """
 
 from __future__ import annotations
@@ -56,18 +56,18 @@ class Strike(NamedTuple):
         return 0.5 * self.projectile.total_mass * self.velocity**2
 
     def with_velocity(self, velocity: float) -> Strike:
-        """The strike at another velocity."""
+        """Return the strike at another velocity."""
         impact = _required(self.impact, model.Impact)
         return self._replace(impact=replace(impact, velocity=velocity, source=None))
 
     def with_constant(self, name: str, value: float) -> Strike:
-        """The strike with another constant of EXPE."""
+        """Return the strike with another constant of EXPE."""
         old = _required(self.indentation, model.Indentation)
         changed: dict[str, Any] = {name: value}  # mypy compares each with every field
         return self._replace(indentation=replace(old, **changed, source=None))
 
     def with_projectile(self, projectile: DeckProjectile) -> Strike:
-        """The strike of another projectile; a rod keeps the transducer of the deck."""
+        """Return the strike of another projectile; a rod keeps the transducer of the deck."""
         transducer = 0
         if self.card is not None and isinstance(projectile, Rod):
             transducer = self.card.transducer
@@ -75,7 +75,7 @@ class Strike(NamedTuple):
         return self._replace(card=card, projectile=projectile)
 
     def deck(self) -> model.Deck:
-        """The deck of the plate with this strike."""
+        """Return the deck of the plate with this strike."""
         deck = self.plate
         for kind, segment in (
             (model.Impact, self.impact),
@@ -104,7 +104,7 @@ StrikeSetter = Callable[[Strike, Value], Strike]
 
 
 def strike_of(deck: model.Deck) -> Strike:
-    """The strike of a deck itself."""
+    """Return the strike of a deck."""
     return Strike(
         plate=deck,
         impact=deck.last(model.Impact),
@@ -130,7 +130,7 @@ def set_velocity(strike: Strike, value: Value) -> Strike:
 
 
 def set_energy(strike: Strike, value: Value) -> Strike:
-    """Change the velocity to that which gives the projectile an energy."""
+    """Change the velocity to give the projectile an energy."""
     mass, energy = strike.projectile.total_mass, float(value)
     if not (mass > 0.0 and energy >= 0.0):
         raise CasesError(f"no velocity gives the energy {energy:g} to the mass {mass:g}")
@@ -138,12 +138,12 @@ def set_energy(strike: Strike, value: Value) -> Strike:
 
 
 def constant(name: str) -> StrikeSetter:
-    """Setter of a constant of EXPE."""
+    """Return the setter of a constant of EXPE."""
     return lambda strike, value: strike.with_constant(name, float(value))
 
 
 def set_radius(strike: Strike, value: Value) -> Strike:
-    """Change k to that of a steel sphere on the laminate of the deck."""
+    """Change k to the value of a steel sphere on the laminate of the deck."""
     unit = in_si(MODULUS, unit_names(strike.plate))
     if unit is None:
         hint = "add a UNIT segment, or vary k instead"
@@ -160,7 +160,7 @@ def set_radius(strike: Strike, value: Value) -> Strike:
 
 
 def struck_layers(deck: model.Deck) -> tuple[model.Layer, ...]:
-    """Layers under the load."""
+    """Return the layers under the load."""
     layups, number = list(deck.layers.values()), 0
     if len(layups) > 1:
         program = compile_program(deck.macros, Findings())
@@ -191,7 +191,7 @@ def set_mass(strike: Strike, value: Value) -> Strike:
 
 
 def rod_property(name: str, field: str) -> StrikeSetter:
-    """Setter of a field of the rod, which varies under a name."""
+    """Return the setter of a field of the rod, which varies under a name."""
 
     def changed(strike: Strike, value: Value) -> Strike:
         if isinstance(strike.projectile, RigidMass):

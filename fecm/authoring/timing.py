@@ -21,14 +21,14 @@ STORING = ("RODP", "DISP", "STRE", "PLYS")  # macros that store every N-th step 
 
 
 class Clock(NamedTuple):
-    """How the time step of a plate follows from its critical one."""
+    """Rule by which the time step of a plate follows from its critical step."""
 
     own: float  # time step of the deck
     rule: Callable[[float], float]
 
 
 def clock_of(checked: Problem) -> Clock | None:
-    """Rule of a deck, that of DT 0 or of ``fecm new``; None if its DT applies to every case."""
+    """Return the rule of a deck: DT 0 or ``fecm new``; None if its DT applies to every case."""
     sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
     if len(sizes) != 1:
         return None
@@ -55,13 +55,13 @@ def with_clock(deck: Deck, clock: Clock | None, case: Case) -> Problem:
 
 @lru_cache(maxsize=8)
 def stable_time_step(deck: Deck) -> float:
-    """Time step that DT 0 would mean in a deck."""
+    """Return the time step that DT 0 takes in a deck."""
     # DT 0 is below the critical time step of any plate.
     return taken_time_step(check_deck(with_time_step(deck, 0.0)).critical_time_step)
 
 
 def duration_of(checked: Problem) -> float:
-    """Simulated time of a problem."""
+    """Return the simulated time of a problem."""
     taken = taken_time_step(checked.critical_time_step)
     return _length(checked.deck.macros, taken).duration
 
@@ -78,11 +78,10 @@ def with_time_step(
 ) -> Deck:
     """Change every DT of a deck, and the loops so that the duration is kept, or is another.
 
-    `taken` is the time step that DT 0 means in the deck; 0 if no DT is 0.  If the new one is None,
-    every DT is kept; if it is not positive, only the DT cards change.  Macros that store rows keep
-    approximately their number of rows.
-
-    Raises CasesError if whole numbers of passes miss the duration by a step and by 1 %.
+    `taken` is the time step that DT 0 takes in the deck; 0 if no DT is 0. If the new step is None,
+    every DT is kept; if it is not positive, only the DT cards change. Macros that store rows keep
+    approximately their number of rows. Raises CasesError if whole numbers of passes miss the
+    duration by a step and by 1 %.
     """
     before = _length(deck.macros, taken).duration
     share = 1.0 if duration is None or not before else duration / before
@@ -105,7 +104,7 @@ def with_time_step(
 
 
 class _Visit(NamedTuple):
-    """A macro on the way through a program."""
+    """Macro on the way through a program."""
 
     macro: Macro
     place: int
@@ -129,7 +128,7 @@ def _visits(cards: Sequence[Macro], taken: float) -> Iterator[_Visit]:
 
 
 def _changed(visit: _Visit, dt: float | None, ratios: dict[int, float]) -> Macro:
-    """A macro of a program with another time step, and with other passes of its loops."""
+    """Return a macro of a program with another time step, and with other passes of its loops."""
     macro = visit.macro
     if macro.word == "DT" and dt is not None:
         return replace(macro, value=dt, source=None)

@@ -1,4 +1,4 @@
-"""The values that can vary: one row each, from which checks, help and docs/sweeps.md follow."""
+"""Values that can vary: one row each, which determines checks, help and docs/sweeps.md."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class ValueKind(Enum):
 
 
 class Changes(IntEnum):
-    """What a value changes, in the order in which the values of a case are applied.
+    """Part that a value changes, in the order in which the values of a case are applied.
 
     Values of failure and of a strike share a run of the plate; each other value needs its own.
     """
@@ -196,7 +196,7 @@ RESERVED = ("case", "step", "steps", "force", "unsettled_steps", *VERDICTS, *COL
 
 
 def names_of(*changes: Changes) -> tuple[str, ...]:
-    """Names of the values that change something."""
+    """Return the names of the values that change something."""
     return tuple(name for name, variable in VARIABLES.items() if variable.changes in changes)
 
 
@@ -208,24 +208,24 @@ OF_PLATE = frozenset((*PLATE_NAMES, REFINE))  # which need another response of t
 
 
 def plate_values(case: Case) -> Case:
-    """The values of a case that need another response of the plate."""
+    """Return the values of a case that need another response of the plate."""
     if OF_PLATE.isdisjoint(case):  # most cases, of which there may be many
         return {}
     return {name: value for name, value in case.items() if name in OF_PLATE}
 
 
 def motion_values(case: Case) -> Case:
-    """The values of a case that change its motion."""
+    """Return the values of a case that change its motion."""
     return {name: value for name, value in case.items() if name not in FAILURE_NAMES}
 
 
 def kind_of(name: str) -> ValueKind:
-    """Kind of a value."""
+    """Return the kind of a value."""
     return VARIABLES[name].kind
 
 
 def dimension_of(name: str) -> str:
-    """Dimension of a value; empty if its name is none of the table."""
+    """Return the dimension of a value; empty if the table lacks its name."""
     return VARIABLES[name].dimension if name in VARIABLES else ""
 
 
@@ -237,30 +237,30 @@ def check_names(names: Collection[str]) -> None:
 
 
 def check_known(name: str, where: str, known: Collection[str] = NAMES) -> None:
-    """Raise CasesError if a name is none of those known, by default those of the table."""
+    """Raise CasesError if a name is unknown, by default if the table lacks it."""
     if name not in known:
         others = did_you_mean(str(name), known) or f"; the names are {', '.join(known)}"
         raise CasesError(f"{where}: `{name}` cannot be varied{others}")
 
 
 def check_free(name: object, where: str) -> None:
-    """Raise CasesError if a name that the caller chose can't be that of a column."""
+    """Raise CasesError if a name that the caller chose can't be the name of a column."""
     if fault := name_fault(name):
         raise CasesError(f"{where}: {fault}")
 
 
 def name_fault(name: object) -> str:
-    """Why a name can't be that of a column; empty if it can."""
+    """Return why a name can't be the name of a column; empty if it can."""
     if not (isinstance(name, str) and name.isidentifier()):
         return f"`{name}` is not a name such as width"
     return f"`{name}` is a name of the results; choose another" if name in RESERVED else ""
 
 
 def without_unit(name: str, text: str, system: str | None) -> str:
-    """A number in a system of units, from a text that may have a unit, as in ``10J``.
+    """Return a number in a system of units, from a text that may have a unit, as in ``10J``.
 
-    Other texts stay as they are.  Raises CasesError if the unit is not one of the name's dimension,
-    or the system, which is the deck's, is unknown.
+    Other texts stay as they are. Raises CasesError if the unit does not belong to the name's
+    dimension, or the system, which is the deck's, is unknown.
     """
     match = re.fullmatch(rf"\s*{NUMBER}\s*(\S.*)?", text)
     if match is None or match[1] is None:
@@ -283,9 +283,10 @@ def without_unit(name: str, text: str, system: str | None) -> str:
 
 
 def parse_value(name: str, text: str, system: str | None = None) -> Value:
-    """Read the value of a name; CasesError if it is invalid.
+    """Parse the value of a name.
 
-    A value with a unit is converted to a system of units.
+    A value with a unit is converted to a system of units. Raises CasesError if the value is
+    invalid.
     """
     if name in PAIRS:
         return normal_pair(name, text)
@@ -303,9 +304,10 @@ def parse_value(name: str, text: str, system: str | None = None) -> Value:
 
 
 def value_of(name: str, given: object, where: str, system: str | None = None) -> Value:
-    """The value of a name that a caller of Python has given; CasesError if it is invalid.
+    """Return the value of a name that a caller of Python has given.
 
-    A text with a unit, or a quantity, is converted to a system of units.
+    A text with a unit, or a quantity, is converted to a system of units. Raises CasesError if the
+    value is invalid.
     """
     given = text_of(given)
     if isinstance(given, np.generic):
@@ -329,7 +331,7 @@ def value_of(name: str, given: object, where: str, system: str | None = None) ->
 
 
 def free_value_of(name: str, given: object, where: str) -> Value:
-    """The value of a name that the caller chose: a finite number or a text."""
+    """Return the value of a name that the caller chose: a finite number or a text."""
     if isinstance(given, np.generic):
         given = given.item()
     if isinstance(given, str) or (isinstance(given, float | int) and math.isfinite(given)):

@@ -1,4 +1,4 @@
-"""Values of a case applied to a deck, or to what strikes its plate."""
+"""Application of the values of a case to a deck, or to the strike on its plate."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ def apply_case(deck: Deck, case: Case, objects: Objects | None = None) -> Deck:
 
 
 def strike_of_case(plate: Deck, case: Case) -> Strike:
-    """Return the strike of a plate with the values of a case; those of the plate don't count."""
+    """Return the strike of a plate with the values of a case; values of the plate are ignored."""
     made = strike_of(plate)
     for name, setter in _STRIKE_SETTERS.items():
         if name in case:

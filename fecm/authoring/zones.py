@@ -1,4 +1,4 @@
-"""Zones of a plate that have a laminate of their own."""
+"""Zones of a plate that have their own laminate."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class ElementLaminates(NamedTuple):
 
 
 def laminates_of(laminate: Laminate, zones: Sequence[Zone]) -> list[Laminate]:
-    """Laminates of the zones; a layup has the materials of the plate's laminate."""
+    """Return the laminates of the zones; a layup has the materials of the plate's laminate."""
     try:
         own = [layup for _, layup in zones]
     except (TypeError, ValueError):
@@ -45,9 +45,10 @@ def laminates_of(laminate: Laminate, zones: Sequence[Zone]) -> list[Laminate]:
 def placed_zones(
     zones: Sequence[Zone], laminates: Sequence[int], mesh: AnyMesh, node: int, doubts: list[str]
 ) -> ElementLaminates:
-    """Elements of zones, the later ones over the earlier; `laminates` are the numbers of theirs.
+    """Return the elements of zones, later zones over earlier ones.
 
-    A rectangle has the elements whose centres lie in it; one whose edge cuts elements is doubted.
+    `laminates` are the numbers of their laminates. A rectangle has the elements whose centres lie
+    in it; a rectangle whose edge cuts elements is doubted.
     """
     if not zones:
         return ElementLaminates(MATERIAL, None)
@@ -63,7 +64,7 @@ def placed_zones(
 
 
 def _group(mesh: AnyMesh, name: str) -> Indices:
-    """Elements of a group of surfaces."""
+    """Return the elements of a group of surfaces."""
     surfaces = mesh.surfaces if isinstance(mesh, PlateMesh) else {}
     if name not in surfaces:
         known = f"its groups of elements are {', '.join(sorted(surfaces))}"
@@ -75,7 +76,7 @@ def _group(mesh: AnyMesh, name: str) -> Indices:
 
 
 def _rectangle(mesh: MeshArrays, place: Sequence[float], doubts: list[str]) -> Bools:
-    """Which elements have their centres in a rectangle."""
+    """Return the elements that have their centres in a rectangle."""
     try:
         x0, y0, x1, y1 = map(float, place)
     except (TypeError, ValueError):
@@ -103,7 +104,7 @@ def _rectangle(mesh: MeshArrays, place: Sequence[float], doubts: list[str]) -> B
 
 
 def _runs(numbers: Indices) -> tuple[model.Zone, ...]:
-    """Cards of consecutive elements of one laminate; those of the plate's need none."""
+    """Yield cards of consecutive elements of one laminate; the plate's laminate needs none."""
     starts = np.flatnonzero(np.diff(numbers, prepend=MATERIAL - 1))
     ends = [*starts[1:].tolist(), len(numbers)]
     runs = zip(starts.tolist(), ends, strict=True)

@@ -1,7 +1,7 @@
 """Cards: one line of a deck cut into fields, its numbers as Fortran writes them, and typed records.
 
-Columns are counted from 1 and both ends of a field belong to it.  A card with a comma is read as
-values separated by commas, in the same order; everything from ``!`` on is a comment.
+Columns are counted from 1 and both ends of a field belong to it. A card with a comma is read as
+values separated by commas, in the same order. Everything from ``!`` on is a comment.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ _REAL = re.compile(
 
 
 def capitals(word: str) -> str:
-    """A word without the blanks around it, in capitals.
+    """Return a word in capitals, without the blanks around it.
 
     Letters beyond ASCII stay as they are: the capitals of some are two letters, and the word would
     outgrow its field.
@@ -44,9 +44,8 @@ def parse_integer(text: str) -> int | None:
 def parse_real(text: str) -> float | None:
     """Read an F field without blanks; None if it is not a number.
 
-    Understands every Fortran form: ``45.``, ``.2E-6``, ``1.5D+3``, ``1.5-3``.  A number beyond the
-    range of double precision is infinite.  The caller limits the length to :data:`LONGEST`
-    characters.
+    All Fortran forms are read: ``45.``, ``.2E-6``, ``1.5D+3``, ``1.5-3``. A number beyond the range
+    of double precision is infinite. The caller limits the length to :data:`LONGEST` characters.
     """
     if (match := _REAL.fullmatch(text)) is None:
         return None
@@ -57,8 +56,8 @@ def parse_real(text: str) -> float | None:
 def format_real(value: float, width: int) -> str | None:
     """Write a finite number into `width` columns so that reading it gives the same number again.
 
-    The most readable form that fits, not padded; None if none fits.  Only fields of ten columns or
-    more get an exponent without its letter: 2.5E-7 as ``25-8`` is hard to read.
+    Returns the most readable form that fits, without padding, or None if none fits. Only fields of
+    ten columns or more get an exponent without its letter: 2.5E-7 as ``25-8`` is hard to read.
     """
     numeral = repr(value)
     mantissa, has_exponent, _ = numeral.partition("e")
@@ -73,7 +72,7 @@ def format_real(value: float, width: int) -> str | None:
 
 @lru_cache(4096)
 def _formatted(numeral: str, width: int) -> str | None:
-    """Write the number of a numeral of Python into `width` columns; decks repeat their numbers."""
+    """Write a number, given as a numeral of Python, into `width` columns (cached)."""
     for letter in ("E", "") if width >= WITHOUT_LETTER else ("E",):
         forms = list(_forms(numeral, letter))
         for room in (width - 1, width):  # with a blank between two numbers if it fits
@@ -84,7 +83,7 @@ def _formatted(numeral: str, width: int) -> str | None:
 
 
 def _forms(numeral: str, letter: str) -> Iterator[str]:
-    """Forms of a number, the most readable first, with `letter` before an exponent."""
+    """Return the forms of a number, the most readable first, with `letter` before an exponent."""
     from decimal import Decimal  # 0.8 ms, and only what writes decks needs it
 
     number = Decimal(numeral).normalize()
@@ -114,7 +113,7 @@ BLANK = ""  # value of a blank field that has a default
 
 
 class FieldKind(StrEnum):
-    """What a field holds, by the letter of its Fortran format."""
+    """Content of a field, by the letter of its Fortran format."""
 
     INTEGER = "I"
     REAL = "F"
@@ -122,9 +121,9 @@ class FieldKind(StrEnum):
 
 
 class Field(NamedTuple):
-    """A field of a card: name, kind, columns, and a label for rulers.
+    """Field of a card: name, kind, columns, and a label for rulers.
 
-    A blank number is 0; with `has_default` it is read as :data:`BLANK` and the record has its
+    A blank number is 0. With `has_default` a blank is read as :data:`BLANK` and the record has its
     default.
     """
 
@@ -148,8 +147,8 @@ Fields = tuple[Field, ...]
 def layout(*descriptors: str) -> Fields:
     """Lay out fields from column 1.
 
-    Each is ``"I5 node"``, ``"A4 word"``, ``"X1"`` for a column that is skipped, or with a label for
-    rulers ``"F10 x-coordinate|x"``; ``"F10? radius"`` where a blank is not 0.
+    Each field is ``"I5 node"``, ``"A4 word"``, ``"X1"`` for a skipped column, with a label for
+    rulers ``"F10 x-coordinate|x"``, or ``"F10? radius"`` where a blank is not 0.
     """
     fields: list[Field] = []
     column = 1
@@ -185,7 +184,7 @@ class Card:
 
     @property
     def is_keyword(self) -> bool:
-        """Whether the card begins with a letter, which no card of numbers does."""
+        """Whether the card starts with a letter, as no card of numbers does."""
         return self.data[:1].isalpha()
 
     @property
@@ -200,19 +199,19 @@ class Card:
 
     @property
     def is_free(self) -> bool:
-        """Whether the values are separated by commas instead of standing in columns."""
+        """Whether commas separate the values, instead of columns."""
         return "," in self.data
 
     @property
     def place(self) -> CardPlace:
-        """Place of the entire card."""
+        """Position of the entire card."""
         return CardPlace(self.line, 1, max(1, len(self.data)), self.text)
 
     def cut(self, fields: Fields) -> list[tuple[int, str]]:
-        """First column and text of every field, in fixed or in free format.
+        """Return first column and text of every field, in fixed or in free format.
 
-        Free format gives the values without the blanks around them, as many as the card has, and
-        as a last piece all that follows the fields.
+        Free format gives the values without the blanks around them, as many as the card has, and as
+        a last piece everything after the fields.
         """
         data = self.data
         if not self.is_free:
@@ -233,7 +232,7 @@ class CardSource(NamedTuple):
     fields: Fields = ()
 
     def place(self, name: str = "") -> CardPlace:
-        """Place of the field `name`, or of the entire card without a name."""
+        """Return the position of the field `name`, or of the entire card without a name."""
         for field, (first, text) in zip(self.fields, self.card.cut(self.fields), strict=False):
             if field.name == name:
                 last = first + max(1, len(text)) - 1
@@ -243,7 +242,7 @@ class CardSource(NamedTuple):
 
 
 def write_card(fields: Fields, values: Sequence[Value]) -> str:
-    """Write values as a card; in free format where one does not fit its columns.
+    """Write values as a card, in free format if a value does not fit its columns.
 
     Raises ValueError if a number is not finite.
     """
@@ -267,7 +266,7 @@ def in_free_format(values: Sequence[Value]) -> str:
 
 
 def _free(value: Value) -> str:
-    """A value's text in free format; NumPy's numbers as Python's."""
+    """Return a value's text in free format; NumPy's numbers as Python's."""
     if not isinstance(value, float):
         return str(value)
     if not math.isfinite(value):
@@ -301,7 +300,7 @@ class Record:
         return cls(**given, source=source)
 
     def row(self) -> list[Value]:
-        """Values in the card's order; a blank for an attribute that is None."""
+        """Return the values in the card's order; a blank for an attribute that is None."""
         row: list[Value] = []
         for attribute in dataclasses.fields(self)[1:]:  # the first is the source
             value = getattr(self, attribute.name)
@@ -312,7 +311,7 @@ class Record:
         return row
 
     def to_card(self, fields: Fields | None = None) -> str:
-        """Text of the card; `fields` where they depend on the control card."""
+        """Return the text of the card; `fields` where they depend on the control card."""
         written = fields or self.fields
         values = self.row()[: len(written)]
         least = len(written) - self.optional
@@ -321,7 +320,7 @@ class Record:
         return write_card(written[: len(values)], values)
 
     def place(self, name: str = "") -> CardPlace | None:
-        """Place of the field `name` in the deck, or of the entire card without a name."""
+        """Return the position of the field `name` in the deck; without a name, of the card."""
         return self.source.place(name) if self.source else None
 
 

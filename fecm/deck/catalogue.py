@@ -1,7 +1,7 @@
 """Named plies, and named contacts: measured constants of EXPE for an indenter on a laminate.
 
 The report gives k for two indenters and two groups of specimens (Table 3.1), alpha_p and s_p for
-all of them (section 3.2.2 and the input listing), and q for each indenter.
+all specimens (section 3.2.2 and the input listing), and q for each indenter.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ STEEL_POISSON = 0.3
 
 
 def system_of(deck: Deck) -> str | None:
-    """System of units of a deck; None if it names none, or others."""
+    """Return the system of units of a deck; None if it names none, or unknown units."""
     try:
         return system_named("-".join(unit_names(deck).values()))
     except UnitsError:
@@ -112,7 +112,7 @@ class NamedPly(NamedTuple):
         return self.values.get("nu23", NU23)
 
     def value(self, key: str, system: str) -> float | None:
-        """A constant of `values` in a system of units; None if it is not known.
+        """Return a constant of `values` in a system of units; None if it is not known.
 
         Examples
         --------
@@ -125,14 +125,14 @@ class NamedPly(NamedTuple):
         return convert(value, dimension, self.system, system)
 
     def constants(self, system: str) -> dict[str, float]:
-        """Constants that are known, and G13 and G23, in a system of units."""
+        """Return the known constants, and G13 and G23, in a system of units."""
         ply = self.converted(system)
         known = {key: self.value(key, system) for key in self.values}
         found = {"G13": ply.g13, "G23": ply.g23, **known}
         return {key: value for key, value in found.items() if value is not None}
 
     def to_dict(self, system: str) -> dict[str, object]:
-        """Name, units, all constants by :data:`KEYS`, and source; None where it is not known."""
+        """Return name, units, all constants by :data:`KEYS`, and source; None where not known."""
         constants = self.constants(system)
         return {
             "name": self.name,
@@ -143,9 +143,9 @@ class NamedPly(NamedTuple):
         }
 
     def converted(self, system: str) -> Ply:
-        """Elastic constants in a system of units; unchanged in their own.
+        """Return elastic constants in a system of units; unchanged in their own.
 
-        G13 is G12 and G23 is E2/(2 (1 + nu23)) where they are not known.
+        Where they are not known, G13 is G12 and G23 is E2/(2 (1 + nu23)).
         """
         density, nu12, e1, e2, g12 = (self.value(key, system) or 0.0 for key in ELASTIC)
         g13 = self.value("G13", system) or g12
@@ -153,7 +153,10 @@ class NamedPly(NamedTuple):
         return Ply(density, nu12, e1, e2, g12, g13, g23)
 
     def allowables(self, system: str) -> Allowables | None:
-        """Strengths in a system of units; None if one of :data:`STRENGTHS` is not known."""
+        """Return the strengths in a system of units; None if one is not known.
+
+        :data:`STRENGTHS` has their names.
+        """
         xt, xc, yt, yc, s12 = (self.value(key, system) for key in STRENGTHS)
         if xt is None or xc is None or yt is None or yc is None or s12 is None:
             return None
@@ -174,17 +177,17 @@ class NamedPly(NamedTuple):
         return Expansion(alpha1=alpha1, alpha2=alpha2)
 
     def delamination(self, system: str) -> Delamination | None:
-        """Toughness G_IIc in a system of units; None if it is not known."""
+        """Return the toughness G_IIc in a system of units; None if it is not known."""
         toughness = self.value("GIIc", system)
         return None if toughness is None else Delamination(toughness=toughness)
 
 
 def read_plies(text: str) -> dict[str, NamedPly]:
-    """Plies of a TOML file, by name.
+    """Read the plies of a TOML file, by name.
 
-    Each table is a ply: numbers by :data:`KEYS`, and the texts `source` and `assumed`.  `units`, of
-    the file or of a ply, is a system of units; mm-N-s if it is missing.  Raises ValueError
-    if a name, value or unit cannot be meant, or the file is not TOML.
+    Each table is a ply: numbers by :data:`KEYS`, and the texts `source` and `assumed`. `units`, of
+    the file or of a ply, is a system of units, by default mm-N-s. Raises ValueError if a name,
+    value or unit is implausible, or the file is not TOML.
     """
     try:
         tables = parsed_toml(text)
@@ -206,7 +209,7 @@ def read_plies(text: str) -> dict[str, NamedPly]:
 
 
 def _other_form(text: str) -> str:
-    """What a text is that is not TOML; empty if it looks like TOML with a mistake."""
+    """Name the format of a text that is not TOML; empty if it looks like TOML with a mistake."""
     import json  # 2 ms, only after a mistake
 
     begin = text.lstrip()[:1]
@@ -266,7 +269,7 @@ def _ply(name: str, table: Mapping[str, object]) -> NamedPly:
 
 
 def _constant(name: str, key: str, value: object) -> float:
-    """A number of a ply's table, or a ValueError if it is implausible."""
+    """Return a number of a ply's table; ValueError if it is implausible."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"[{name}] {key}: {value!r} is not a number")
     if not math.isfinite(value) or (KEYS[key] and value <= 0.0):
@@ -287,25 +290,28 @@ MATERIALS = read_plies(_text("materials.toml"))
 
 
 def named_ply(ply: Ply, system: str | None) -> NamedPly | None:
-    """The named ply that has these constants in a system of units; None if there is none."""
+    """Return the named ply with these constants in a system of units, or None."""
     return None if system is None else _by_constants(system).get(ply)
 
 
 @cache
 def _by_constants(system: str) -> dict[Ply, NamedPly]:
-    """Named plies by their constants; the first one of equals."""
+    """Return named plies by their constants; the first of equal plies."""
     return {named.converted(system): named for named in reversed(MATERIALS.values())}
 
 
 def material_names(deck: Deck) -> dict[int, str]:
-    """Names of the materials of a deck, by number: those of named plies with the same constants."""
+    """Return the names of the materials of a deck, by number.
+
+    A material has the name of the named ply with the same constants.
+    """
     system = system_of(deck)
     named = {number: named_ply(ply, system) for number, ply in deck.plies.items()}
     return {n: f"material {n}" if one is None else one.name for n, one in named.items()}
 
 
 def materials(file: str | Path | None = None) -> dict[str, NamedPly]:
-    """Named plies with their sources, as `fecm materials` lists them.
+    """Return the named plies with their sources, as `fecm materials` lists them.
 
     Parameters
     ----------
@@ -360,7 +366,7 @@ class NamedContact(NamedTuple):
     source: str
 
     def converted(self, system: str) -> Indentation:
-        """Constants in a system of units."""
+        """Return the constants in a system of units."""
         k = convert(self.law.k, COEFFICIENT, SYSTEM, system)
         return replace(self.law, k=k, alpha_p=convert(self.law.alpha_p, "length", SYSTEM, system))
 
@@ -372,7 +378,7 @@ CONTACTS = {
 
 
 def contacts() -> dict[str, NamedContact]:
-    """Named contact laws with their sources, as `fecm indent contacts` lists them.
+    """Return the named contact laws with their sources, as `fecm indent contacts` lists them.
 
     Returns
     -------

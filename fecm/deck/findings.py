@@ -29,7 +29,7 @@ class Severity(StrEnum):
 
 
 class FindingJson(TypedDict):
-    """A finding in JSON."""
+    """Finding in JSON."""
 
     kind: Literal["finding"]
     severity: Annotated[str, Severity]
@@ -79,11 +79,11 @@ class Finding(NamedTuple):
 
     @property
     def severity(self) -> Severity:
-        """What the first letter of the code says."""
+        """Severity that the first letter of the code means."""
         return SEVERITIES[self.code[0]]
 
     def to_dict(self, source: str) -> FindingJson:
-        """The finding as plain values, for JSON; `source` is the name of the deck's file."""
+        """Return the finding as plain values, for JSON; `source` is the name of the deck's file."""
         place = self.place
         return {
             "kind": "finding",
@@ -102,7 +102,7 @@ class Finding(NamedTuple):
     def render(self, source: str) -> str:
         """Format the finding as text, with the card and a caret under the field.
 
-        A note is one line, without its card.  The text opens with `source`, the name of the file.
+        A note is one line, without its card. The text starts with `source`, the name of the file.
         """
         head = f"{self.severity}[{self.code}]: {self.message}"
         place = self.place
@@ -116,7 +116,7 @@ class Finding(NamedTuple):
 
 
 def _marked_card(place: CardPlace) -> list[str]:
-    """The card with its line number, and a caret under the field."""
+    """Return the card with its line number, and a caret under the field."""
     card = place.text.rstrip()
     begin, last = 0, place.last
     if len(card) > WIDEST:  # the part around the place
@@ -130,7 +130,7 @@ def _marked_card(place: CardPlace) -> list[str]:
 
 
 def _shortened(text: str) -> str:
-    """A long text without its middle."""
+    """Return a long text without its middle."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
 
 
@@ -144,7 +144,7 @@ class Findings:
         self.closed: bool = False  # whether no more findings are kept, so that reading can stop
 
     def add(self, code: str, message: str, place: CardPlace | None = None, hint: str = "") -> None:
-        """Add a finding; after :data:`MOST` errors report that there are more, and close."""
+        """Add a finding. After :data:`MOST` errors, report that there are more, and close."""
         is_error = code.startswith("E")
         self.counts[code] += 1
         self.error_count += is_error

@@ -1,6 +1,6 @@
-"""A deck rewritten with aligned columns and a ruler above each kind of card.
+"""Formatter of decks: aligned columns and a ruler above each kind of card.
 
-Comments and blank cards stay where they are; the model does not change.  Rulers begin with ``!:``
+Comments and blank cards stay where they are; the model does not change. Rulers start with ``!:``
 and are replaced each time.
 """
 
@@ -20,9 +20,9 @@ RULER = "!:"  # first letters of a comment that shows where the fields are
 
 
 def format_deck(text: str, source: str = "<text>") -> str:
-    """Align a deck's columns; `source` is its name in messages.  Raises DeckError.
+    """Align a deck's columns; `source` is its name in messages.
 
-    A byte order mark stays, and line ends are those of the first line.
+    A byte order mark stays, and line ends follow the first line. Raises DeckError.
     """
     reader = Reader(text, keeps_values=True)
     reader.problems()
@@ -57,13 +57,13 @@ def format_deck(text: str, source: str = "<text>") -> str:
 
 
 def _keyword(card: Card) -> str:
-    """Text of a card without fields: of a known keyword alone, its four letters in capitals."""
+    """Return the text of a card without fields; a known keyword gets capitals."""
     is_known = card.is_keyword and (card.keyword in SEGMENTS or card.keyword == STOP)
     return card.keyword if is_known and len(card.words) == 1 else card.data
 
 
 def ruler(fields: Fields) -> str:
-    """A comment with the fields' names over their columns."""
+    """Return a comment with the fields' names over their columns."""
     line = RULER
     for field in fields:
         room = field.last - len(line)
@@ -72,7 +72,7 @@ def ruler(fields: Fields) -> str:
 
 
 def _aligned(card: Card, fields: Fields, values: Sequence[Value]) -> str:
-    """A card's values in their columns, without the zeros that it left blank at its end."""
+    """Return a card's values in their columns, without trailing zeros that it left blank."""
     texts = [text for _, text in card.cut(fields)][: len(fields)]
     count = max([n for n, text in enumerate(texts, start=1) if text.strip()], default=0)
     kept: list[Value] = list(values[:count])

@@ -35,7 +35,7 @@ class EdgeCodes(NamedTuple):
     along_y: tuple[int, ...]
 
     def of(self, edge: str) -> tuple[int, ...]:
-        """Codes of one of the :data:`EDGES`."""
+        """Return the codes of one of the :data:`EDGES`."""
         return self.along_y if edge in ("left", "right") else self.along_x
 
 
@@ -54,9 +54,9 @@ EDGES = ("left", "right", "bottom", "top")
 
 
 def held_in_plane(support: str, in_plane: str) -> str:
-    """What a support does to u and v, a key of :data:`IN_PLANE`.
+    """Return what a support does to u and v, a key of :data:`IN_PLANE`.
 
-    ``"pinned"`` holds both, and so does ``"clamped"`` where others hold the tangential one.
+    ``"pinned"`` holds both. So does ``"clamped"`` where other supports hold the tangential one.
     """
     holds_both = support == "pinned" or (support == "clamped" and in_plane == "tangential")
     return "held" if holds_both else in_plane
@@ -71,12 +71,15 @@ class GridSection(NamedTuple):
 
 
 def uniform_section(length: float, elements: int) -> list[GridSection]:
-    """One section of equal elements."""
+    """Return one section of equal elements."""
     return [GridSection(0.0, length, elements)]
 
 
 def listed_sections(text: str) -> list[GridSection]:
-    """Sections from a list of counts and sizes, ``3*0.5,8*0.375,3*0.5``, or a ValueError."""
+    """Parse a list of counts and sizes, ``3*0.5,8*0.375,3*0.5``, into sections.
+
+    Raises ValueError if the text is not such a list.
+    """
     sections: list[GridSection] = []
     start = 0.0
     for part in text.split(","):
@@ -91,9 +94,10 @@ def listed_sections(text: str) -> list[GridSection]:
 
 
 def graded(length: float, elements: int, centre: float, ratio: float) -> list[GridSection]:
-    """Elements that shrink towards `centre`, a corner of elements, each side in a geometric series.
+    """Return elements that shrink towards `centre`, geometrically on each side.
 
-    `ratio` is that of the largest to the smallest element of a side.
+    `centre` is a corner of elements. `ratio` is the ratio of the largest to the smallest element of
+    a side.
     """
     if not 0.0 < centre < length or elements < 2:
         side = _series(length, elements, ratio)
@@ -101,7 +105,7 @@ def graded(length: float, elements: int, centre: float, ratio: float) -> list[Gr
     else:
 
         def unlike(n: int) -> float:
-            """Difference of the smallest elements of both sides, n of them on the left."""
+            """Return the difference of the smallest elements of both sides, n on the left."""
             right = _series(length - centre, elements - n, ratio)
             return abs(math.log(_series(centre, n, ratio)[0] / right[0]))
 
@@ -113,7 +117,7 @@ def graded(length: float, elements: int, centre: float, ratio: float) -> list[Gr
 
 
 def longest_at(sections: Sequence[GridSection], place: float) -> float:
-    """Length of the longest element at a place; 0 beside the sections."""
+    """Return the length of the longest element at a place; 0 beside the sections."""
     here = (s for s in sections if s.start <= place <= s.end)
     return max(((s.end - s.start) / s.elements for s in here), default=0.0)
 
@@ -121,10 +125,10 @@ def longest_at(sections: Sequence[GridSection], place: float) -> float:
 def refined_sections(
     length: float, elements: int, centre: float, ratio: float, side: float
 ) -> list[GridSection]:
-    """Graded elements that are at most `side` long at `centre`.
+    """Return graded elements that are at most `side` long at `centre`.
 
-    There are `elements` of them or as many more as that takes; the ratio of the largest to the
-    smallest is at least that of `elements` equal ones to `side`.
+    There are `elements` of them, or as many more as needed. The ratio of the largest to the
+    smallest is at least the ratio of `elements` equal ones to `side`.
     """
     ratio = max(ratio, length / elements / side)
     # Geometric series that end at equal ones take R ln R/(R - 1) < 1 + ln R times as many.
@@ -137,7 +141,7 @@ def refined_sections(
 
 
 def framed(inner: Sequence[GridSection], length: float) -> list[GridSection]:
-    """Elements of a centred window, with lines of nodes at its edges, and like ones beside it."""
+    """Return elements of a centred window, with lines of nodes at its edges, and beside it."""
     start = (length - inner[-1].end) / 2.0
     ends = [round_to(start + section.end, length) for section in inner]
     starts = [round_to(start, length), *ends]
@@ -148,19 +152,19 @@ def framed(inner: Sequence[GridSection], length: float) -> list[GridSection]:
 
 
 def _series(length: float, count: int, ratio: float) -> list[float]:
-    """Sizes that grow geometrically by `ratio` over all, and add up to `length`."""
+    """Return sizes that grow geometrically by `ratio` in all, and add up to `length`."""
     growth = ratio ** (1.0 / (count - 1)) if count > 1 else 1.0
     sizes = [growth**n for n in range(count)]
     return [length * size / sum(sizes) for size in sizes]
 
 
 def round_to(value: float, scale: float) -> float:
-    """A coordinate with :data:`DIGITS` digits of the plate's size."""
+    """Return a coordinate with :data:`DIGITS` digits of the plate's size."""
     return round(value, DIGITS - math.floor(math.log10(scale)))
 
 
 def grid_lines(sections: Sequence[GridSection]) -> list[float]:
-    """Coordinates of the lines of nodes: two per element, and the last."""
+    """Return the coordinates of the lines of nodes: two per element, and the last."""
     found: list[float] = []
     for section in sections:
         count = 2 * section.elements
@@ -204,14 +208,14 @@ class ElementGrid:
         return (0.0, 0.0), (self.columns[-1].end, self.rows[-1].end)
 
     def nearest(self, x: float, y: float) -> tuple[int, float, float]:
-        """Number and place of the node nearest to a point."""
+        """Return number and place of the node nearest to a point."""
         xs, ys = grid_lines(self.columns), grid_lines(self.rows)
         i = min(range(len(xs)), key=lambda k: abs(xs[k] - x))
         j = min(range(len(ys)), key=lambda k: abs(ys[k] - y))
         return 1 + i + j * self.across, xs[i], ys[j]
 
     def coordinates(self) -> Coordinates:
-        """COOR cards: one for the beginning of every section in every line of nodes."""
+        """Return COOR cards: one for the start of every section in every line of nodes."""
         records: list[NodeValues] = []
         for line, y in enumerate(grid_lines(self.rows)):
             node = 1 + line * self.across
@@ -223,7 +227,7 @@ class ElementGrid:
         return Coordinates(tuple(records))
 
     def element_cards(self) -> Elements:
-        """ELEM cards: the first element of every row."""
+        """Return ELEM cards: the first element of every row."""
         a = self.across
         records: list[ElementNodes] = []
         for row in range(self.up // 2):
@@ -242,7 +246,7 @@ class ElementGrid:
         *,
         in_plane: str = "held",
     ) -> Boundary | None:
-        """BOUN cards of the supports of the edges; w is held along the edges of a window.
+        """Return BOUN cards of the supports of the edges; w is held along the edges of a window.
 
         `in_plane`, a key of :data:`IN_PLANE`, is what these supports do to u and v.
         """
@@ -262,11 +266,11 @@ class ElementGrid:
         *,
         in_plane: str = "held",
     ) -> Boundary | None:
-        """BOUN cards; None where nothing is restrained.
+        """Return BOUN cards; None where nothing is restrained.
 
-        Codes are those of every node, and of the nodes of each of the :data:`EDGES`; w, and u and v
-        by `in_plane`, are held along the edges of a window in the middle of the plate, given by its
-        sides.
+        The codes are given for every node, and for the nodes of each of the :data:`EDGES`. Along
+        the edges of a window in the middle of the plate, given by its sides, w is held, and u and v
+        by `in_plane`.
         """
         codes = np.tile(np.array(everywhere), (self.up, self.across, 1))
         parts = {"left": codes[:, 0], "right": codes[:, -1], "bottom": codes[0], "top": codes[-1]}
@@ -285,7 +289,7 @@ class ElementGrid:
 
 
 def _nearest_lines(sections: Sequence[GridSection], side: float) -> tuple[int, int]:
-    """Numbers of the lines of nodes nearest to both ends of a side in the middle."""
+    """Return the lines of nodes nearest to both ends of a side in the middle."""
     places = np.array(grid_lines(sections))
     ends = ((sections[-1].end + distance) / 2.0 for distance in (-side, side))
     first, last = (int(np.abs(places - end).argmin()) for end in ends)
@@ -293,7 +297,7 @@ def _nearest_lines(sections: Sequence[GridSection], side: float) -> tuple[int, i
 
 
 def boundary_cards(codes: NDArray[np.int_]) -> Boundary | None:
-    """BOUN cards of restraint codes (numnp, ndf), runs of equal ones generated."""
+    """Return BOUN cards of restraint codes (numnp, ndf); runs of equal codes are generated."""
     starts = [0, *(np.flatnonzero((np.diff(codes, axis=0) != 0).any(axis=1)) + 1).tolist()]
     records: list[NodeCodes] = []
     for start, end in pairwise([*starts, len(codes)]):

@@ -68,19 +68,19 @@ class Indentation(Segment, keyword="EXPE"):
         return law and replace(law, word=word)
 
     def values(self) -> tuple[float, float, float, float]:
-        """Values in the card's order."""
+        """Return the values in the card's order."""
         return self.k, self.alpha_p, self.s_p, self.q
 
     def names(self) -> list[str]:
-        """Names of the values."""
+        """Return the names of the values."""
         return [field.name for field in self.fields_of[self.word]]
 
     def text(self) -> str:
-        """Text of the keyword card and of the card of data."""
+        """Return the text of the keyword card and of the card of data."""
         return f"{f'EXPE {self.word}'.rstrip()}\n{self.to_card()}"
 
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
+        """Return the text of the segment's cards."""
         yield from self.text().split("\n")
 
 
@@ -127,7 +127,7 @@ class Projectile(Segment, keyword="PROJ"):
         return replace(projectile, diameters=cards.until_blank(head, RodDiameter))
 
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
+        """Return the text of the segment's cards."""
         yield from super().cards(control)
         if self.elements:
             for record in self.diameters:
@@ -160,7 +160,7 @@ class Patch(Segment, keyword="PATC"):
 
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self | None:
-        """Read the card, which begins with a word, but not with that of another segment."""
+        """Read the card, which starts with a word other than the keyword of another segment."""
         card = cards.peek()
         if card is not None and not cards.begins_segment(card):
             cards.take()

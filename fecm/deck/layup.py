@@ -59,10 +59,10 @@ class LayupPly(NamedTuple):
 
 
 def parse_layup(text: str, largest: float = LARGEST_ANGLE) -> list[float]:
-    """Angles of the plies of a layup such as ``"[0_2/(±45)2/90]s"``, from the struck face on.
+    """Return the angles of a layup such as ``"[0_2/(±45)2/90]s"``, from the struck face down.
 
-    None is beyond plus or minus `largest`.  Raises LayupError, whose message shows where, if the
-    text is not a layup or has materials.
+    No angle is beyond plus or minus `largest`. Raises LayupError, whose message shows where, if the
+    text is not a layup or names materials.
     """
     plies = parse_plies(text, largest)
     if named := next((ply.name for ply in plies if ply.name), ""):
@@ -73,10 +73,10 @@ def parse_layup(text: str, largest: float = LARGEST_ANGLE) -> list[float]:
 
 
 def parse_plies(text: str, largest: float = LARGEST_ANGLE) -> list[LayupPly]:
-    """Plies of a layup such as ``"[0C/90G]s"``, with the letters of their materials.
+    """Return the plies of a layup such as ``"[0C/90G]s"``, with the letters of their materials.
 
-    No angle is beyond plus or minus `largest`.  Raises LayupError, whose message shows where, if
-    the text is not a layup.
+    No angle is beyond plus or minus `largest`. Raises LayupError, whose message shows where, if the
+    text is not a layup.
     """
     plain = _plain(text)
     compact = _AFTER_SIGN.sub("", _INSIDE.sub("", plain))
@@ -97,7 +97,7 @@ def parse_plies(text: str, largest: float = LARGEST_ANGLE) -> list[LayupPly]:
 
 
 def _plain(text: str) -> str:
-    """A layup with single blanks and the characters of the grammar."""
+    """Return a layup with single blanks and the characters of the grammar."""
     plain = " ".join(text.split()).translate(_CHARACTERS)
     for written, mark in _PAIRS:
         plain = plain.replace(written, mark)
@@ -105,7 +105,7 @@ def _plain(text: str) -> str:
 
 
 def _readings(plain: str, compact: str, largest: float) -> list[str]:
-    """What a layup may mean whose separators are not clear, separated by ``/``."""
+    """Return the readings of a layup whose separators are ambiguous, separated by ``/``."""
     # Blanks after a comma show that it separates.
     commas = [_DECIMAL_COMMA.sub(".", compact)] if ", " not in plain else []
     found: list[str] = []
@@ -128,7 +128,7 @@ def _unclear(text: str, what: str, readings: Sequence[str]) -> LayupError:
 
 
 def _parse(compact: str, largest: float) -> list[LayupPly]:
-    """Plies of a layup without blanks."""
+    """Return the plies of a layup without blanks."""
     if not compact.startswith("["):
         compact = f"[{compact}]" if compact[-1:] not in "])" or "[" not in compact else compact
     plies, end = _group(compact, 0, largest)
@@ -171,7 +171,7 @@ def _angle(written: str, text: str, position: int, largest: float) -> float:
 
 
 def _group(text: str, start: int, largest: float, depth: int = 1) -> tuple[list[LayupPly], int]:
-    """Plies of the group that begins at `start`, and where it ends."""
+    """Return the plies of the group that starts at `start`, and where it ends."""
     if depth > NESTING:
         raise LayupError(f"the layup `{_quoted(text)}` has groups nested deeper than {NESTING}")
     if text[start : start + 1] not in ("[", "("):
@@ -211,7 +211,7 @@ def _group(text: str, start: int, largest: float, depth: int = 1) -> tuple[list[
 
 
 def _times(digits: str, plies: int, text: str, position: int) -> int:
-    """Number of repeats, limited to :data:`MOST_PLIES` plies."""
+    """Return the number of repeats, limited to :data:`MOST_PLIES` plies."""
     if len(digits) > 5 or int(digits) * plies > MOST_PLIES or int(digits) < 1:
         where = f"{_quoted(digits)} times at `{text[position : position + 10]}`"
         possible = f"1 to {MOST_PLIES} plies are possible"
@@ -220,7 +220,7 @@ def _times(digits: str, plies: int, text: str, position: int) -> int:
 
 
 def layup_text(angles: Sequence[float]) -> str:
-    """Shortest usual notation of a laminate's angles, which :func:`parse_layup` reads back.
+    """Return the shortest usual notation of angles, which :func:`parse_layup` reads back.
 
     Examples
     --------

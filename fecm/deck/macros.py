@@ -1,7 +1,7 @@
-"""The macro program: cards, words, loops, order of execution, and what it stores how often.
+"""Macro program: cards, words, loops, order of execution, and the rows that it stores.
 
-A pass is the number of times that the innermost loop has been entered at its head, from 1; outside
-any loop it is 1.  LOOP 0 runs once.
+A pass is the number of times that the innermost loop has been entered at its head, from 1. Outside
+any loop it is 1. LOOP 0 runs once.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ EXACT = 2**53  # floats represent every integer below this number
 
 
 def without_points(values: Sequence[Value]) -> list[Value]:
-    """Values of a card, whole floats as integers, which are written without a point."""
+    """Return the values of a card, whole floats as integers, which have no decimal point."""
     return [
         int(v) if isinstance(v, float) and v.is_integer() and abs(v) < EXACT else v for v in values
     ]
@@ -32,7 +32,7 @@ def without_points(values: Sequence[Value]) -> list[Value]:
 
 @dataclass(frozen=True)
 class Macro(Record):
-    """A macro card: (A4,1X,A4,1X,2F5.0)."""
+    """Macro card: (A4,1X,A4,1X,2F5.0)."""
 
     word: str  # name, in capitals
     option: str = ""  # second word, in capitals; often blank
@@ -49,7 +49,7 @@ class Macro(Record):
     optional: ClassVar[int] = 3
 
     def row(self) -> list[Value]:
-        """Values in the card's order; integers have no point."""
+        """Return the values in the card's order; integers have no decimal point."""
         return without_points(super().row())
 
 
@@ -76,7 +76,10 @@ class LoadTable(Record):
 
 
 def load_factor(table: LoadTable, clock: float) -> float:
-    """A1 + A2 t + A3 sin(A4 t + A5)^L between t_min and t_max, 0 outside; L below 1 counts as 1."""
+    """Return A1 + A2 t + A3 sin(A4 t + A5)^L between t_min and t_max, 0 outside.
+
+    L below 1 counts as 1.
+    """
     if not table.begin <= clock <= table.end:
         return 0.0
     a1, a2, a3, a4, a5 = table.constants
@@ -84,7 +87,7 @@ def load_factor(table: LoadTable, clock: float) -> float:
 
 
 class MacroNumber(Enum):
-    """What the number of a macro is."""
+    """Meaning of the number of a macro."""
 
     COUNT = auto()  # an integer, at least 0
     EVERY = auto()  # the same, 0 or blank counting as 1
@@ -93,7 +96,7 @@ class MacroNumber(Enum):
 
 
 class Word(NamedTuple):
-    """A word of the macro language."""
+    """Word of the macro language."""
 
     name: str  # up to four letters
     meaning: str  # its effect, in one sentence
@@ -165,7 +168,7 @@ STEPS = {"RODP", "EXCD"}  # words that take a time step
 
 @dataclass(frozen=True)
 class Loop:
-    """A loop: its LOOP card, number of passes and body."""
+    """Loop: its LOOP card, number of passes and body."""
 
     macro: Macro
     count: int
@@ -176,17 +179,17 @@ Body = tuple[Macro | Loop, ...]
 
 
 def every(macro: Macro) -> int:
-    """N of a macro that acts at every N-th step or pass; 1 if blank."""
+    """Return N of a macro that acts at every N-th step or pass; 1 if blank."""
     return max(1, int(macro.value))
 
 
 def macro_number(macro: Macro) -> float:
-    """Meaning of a macro's number: its N if it has one, otherwise the number on the card."""
+    """Return the meaning of a macro's number: its N if it has one, or the number on the card."""
     return every(macro) if WORDS[macro.word].value is MacroNumber.EVERY else macro.value
 
 
 class _OpenLoop(NamedTuple):
-    """A LOOP whose NEXT was not read yet."""
+    """LOOP whose NEXT was not read yet."""
 
     head: Macro
     outer: list[Macro | Loop]  # macros of the loop around it, up to this one
@@ -237,7 +240,7 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
 
 
 def _check_needs(word: Word, macro: Macro, done: set[str], findings: Findings) -> None:
-    """Report the words that must come before and did not, each once, and note this one."""
+    """Report each word that must come before and did not, once, and record this word."""
     for choices in word.needs:
         if not done.intersection(choices):
             names = " or ".join(choices)
@@ -258,7 +261,7 @@ def _closest(macro: Macro, findings: Findings) -> Word | None:
 
 
 def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
-    """Report the first field that a word does not use and that is not blank."""
+    """Report the first field that a word does not use although it is not blank."""
     if macro.option:
         is_number = word.value and not macro.value and parse_real(macro.option) is not None
         hint = f"the number is in columns 11-15 or after a comma: {word.name},{macro.option}"
@@ -306,17 +309,17 @@ def _warn_of_stopped_clock(body: Body, findings: Findings) -> None:
 
 
 def flat(body: Body) -> Iterator[Macro]:
-    """Every macro once, in the order of the cards, without LOOP and NEXT."""
+    """Return every macro once, in the order of the cards, without LOOP and NEXT."""
     return (macro for macro, *_ in _executed(body) if macro.word != "LOOP")
 
 
 def hits(body: Body) -> bool:
-    """Whether a program takes impact steps."""
+    """Return whether a program takes impact steps."""
     return any(macro.word == "RODP" for macro in flat(body))
 
 
 def moves_only(body: Body) -> bool:
-    """Whether a program moves the plate from rest and has no static solution."""
+    """Return whether a program moves the plate from rest and has no static solution."""
     return all(macro.word not in ("TANG", "FORM", "SOLV") for macro in flat(body))
 
 
@@ -332,8 +335,8 @@ class WorkEstimate(NamedTuple):
 def estimate_work(body: Body) -> WorkEstimate:
     """Count the work of a program without executing its loops.
 
-    Exact, except that `contact_rows` is an upper bound where RODP cards differ in their number or
-    are mixed with EXCD.
+    The counts are exact, except that `contact_rows` is an upper bound where RODP cards differ in
+    their number or are mixed with EXCD.
     """
     macros, passes, steps = 0, Counter[str](), Counter[int]()  # steps by RODP's number, 0 for EXCD
     for macro, count, outer in _executed(body):
@@ -354,7 +357,7 @@ def estimate_work(body: Body) -> WorkEstimate:
 
 
 def _executed(body: Body, count: int = 1, outer: int = 1) -> Iterator[tuple[Macro, int, int]]:
-    """Each macro, the passes of its loop, and how often that loop is carried out.
+    """Yield each macro, the passes of its loop, and how often that loop is executed.
 
     LOOP comes after its body, where NEXT is.
     """
@@ -379,24 +382,24 @@ RowsOfPlies = Rows | tuple[int, int]
 
 
 class RowsError(FecmError, ValueError):
-    """A program can't store what it is asked for."""
+    """A program can't store the requested rows."""
 
 
 class _Output(NamedTuple):
-    """A macro that stores rows."""
+    """Macro that stores rows."""
 
     word: str
     rows: Rows
     nearest: int | None = None  # elements nearest to the load
 
     def changed(self, old: Macro) -> Macro:
-        """A macro of the program with the new numbers."""
+        """Return a macro of the program with the new numbers."""
         value = old.value if self.rows is True else float(self.rows)
         second = old.second if self.nearest is None else float(self.nearest)
         return replace(old, value=value, second=second, source=None)
 
     def macro(self, passes: int, step: int) -> Macro:
-        """A new macro for a loop of some passes, where RODP stores every `step` steps."""
+        """Return a new macro for a loop of `passes`, where RODP stores every `step` steps."""
         default = max(1, passes // PLY_ROWS) if self.word == PLIES else min(step, passes)
         value = default if self.rows is True else self.rows
         return Macro(self.word, value=float(value), second=float(self.nearest or 0))
@@ -409,14 +412,13 @@ def with_outputs(
     plies: RowsOfPlies | None = None,
     failure: Rows | None = None,
 ) -> tuple[Macro, ...]:
-    """Macros that store other rows; what is None stays as it is.
+    """Return the macros with other stored rows; None keeps them as they are.
 
-    `every` is the number of RODP and DISP, `plies` that of PLYS and `failure` that of FAIL.  A
-    macro that the program lacks is put at the end of each loop that takes steps, or at the end of a
-    program without such a loop.  True stores failure with the rows of RODP, and about
-    :data:`PLY_ROWS` rows of ply stresses; a macro that is there keeps its number.
-
-    Raises RowsError if a number is not positive and whole.
+    `every` is the number of RODP and DISP, `plies` the number of PLYS and `failure` the number of
+    FAIL. A missing macro is added at the end of each loop that takes steps, or at the end of a
+    program without such a loop. True stores failure with the rows of RODP, and about
+    :data:`PLY_ROWS` rows of ply stresses; an existing macro keeps its number. Raises RowsError if a
+    number is not positive and whole.
     """
     made = list(macros)
     if every is not None:
@@ -448,7 +450,7 @@ def _rows(name: str, value: object) -> Rows:
 
 
 def _count(name: str, value: object) -> int:
-    """A number of steps or elements."""
+    """Return a number of steps or elements."""
     if isinstance(value, Integral) and not isinstance(value, bool) and (count := int(value)) > 0:
         return count
     raise RowsError(f"`{name}` is {value!r}, not a whole number above 0")

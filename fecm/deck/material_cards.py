@@ -92,7 +92,7 @@ class Layer(Record):
     plain: ClassVar[Fields] = fields[:-1]
 
     def to_card(self, fields: Fields | None = None) -> str:
-        """Text of the card; the material of MATE is not written."""
+        """Return the text of the card; the material of MATE is not written."""
         written = self.plain if self.material == MATERIAL else self.fields
         return super().to_card(fields or written)
 
@@ -119,14 +119,14 @@ class Material(Segment, keyword="MATE"):
         return cls(integration, ply, layers, source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
+        """Return the text of the segment's cards."""
         yield self.keyword
         for record in (self.integration, self.ply, *self.layers):
             yield record.to_card()
 
 
 def read_layers(head: Card, cards: CardStream, count: int, said: str) -> tuple[Layer, ...] | None:
-    """Layer cards, as many as `said`; None if one is missing or unreadable."""
+    """Read layer cards; None if one of the `said` cards is missing or unreadable."""
     taken: list[Card] = []
     while len(taken) < count and (card := cards.take_data()) is not None and not card.is_blank:
         taken.append(card)
@@ -173,11 +173,14 @@ class Shear(Segment, keyword="SHEA"):
         return found and replace(found, assumed=assumed, equilibrium=equilibrium)
 
     def words(self) -> list[str]:
-        """Words of the keyword card."""
+        """Return the words of the keyword card."""
         return list(compress(self.WORDS, (self.assumed, self.equilibrium)))
 
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards; the factor's is missing where a word is and it is 1."""
+        """Return the text of the segment's cards.
+
+        The card of the factor is left out if a word is given and the factor is 1.
+        """
         words = self.words()
         yield " ".join([self.keyword, *words])
         if not words or self.factor != 1.0:
@@ -255,13 +258,13 @@ class Allowables(Segment, keyword="ALLO"):
         return cls.from_row([*values[:count], *of_constants, *values[count:]], source)
 
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
+        """Return the text of the segment's cards."""
         yield self.keyword
         for one in (self, *self.others):
             yield from one._pair()
 
     def _pair(self) -> Iterator[str]:
-        """Text of the cards of this material."""
+        """Return the text of the cards of this material."""
         count = len(self.fields)
         values = self.row()
         is_plain = self.material == MATERIAL
@@ -270,7 +273,7 @@ class Allowables(Segment, keyword="ALLO"):
         yield write_card(self.constants, values[count : count + len(self.constants)])
 
     def of(self, material: int) -> Allowables | None:
-        """Strengths of a material; None if they are not given."""
+        """Return the strengths of a material; None if they are not given."""
         return next((one for one in (self, *self.others) if one.material == material), None)
 
 
@@ -303,7 +306,7 @@ class Nonlinear(Segment, keyword="NONL"):
         return cls(source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's card."""
+        """Return the text of the segment's card."""
         yield self.keyword
 
 
@@ -366,7 +369,7 @@ class Expansion(Record):
 
 @dataclass(frozen=True)
 class Cure(Segment, keyword="CURE"):
-    """CURE: (2F10.0) and expansions; what has happened since the plies were free of stress.
+    """CURE: (2F10.0) and expansions; changes since the plies were free of stress.
 
     It is not in the report's program.
     """
@@ -387,18 +390,18 @@ class Cure(Segment, keyword="CURE"):
         return changes and replace(changes, expansions=cards.until_blank(head, Expansion))
 
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
+        """Return the text of the segment's cards."""
         yield from super().cards(control)
         for record in self.expansions:
             yield record.to_card()
         yield ""
 
     def strains(self, material: int) -> tuple[float, float]:
-        """Free strains of a material along and across its fibres."""
+        """Return the free strains of a material along and across its fibres."""
         free = self.expansion(material) or Expansion()
         along = free.alpha1 * self.delta_t + free.beta1 * self.delta_c
         return along, free.alpha2 * self.delta_t + free.beta2 * self.delta_c
 
     def expansion(self, material: int) -> Expansion | None:
-        """Expansion of a material; None if it has none."""
+        """Return the expansion of a material; None if it has none."""
         return next((one for one in self.expansions if one.material == material), None)

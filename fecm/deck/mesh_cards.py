@@ -53,7 +53,7 @@ class Coordinates(NumberedSegment[NodeValues], keyword="COOR", record=NodeValues
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
-        """Fields of a card."""
+        """Return the fields of a card."""
         return layout(*NODE, *(f"F10 {axis}-coordinate|{axis}" for axis in AXES[: control.ndm]))
 
 
@@ -63,13 +63,13 @@ class Elements(NumberedSegment[ElementNodes], keyword="ELEM", record=ElementNode
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
-        """Fields of a card."""
+        """Return the fields of a card."""
         nodes = (f"I5 node {i}|n{i}" for i in range(1, control.nen + 1))
         return layout("I5 element|elm", *nodes, "I5 increment|incr")
 
     @classmethod
     def is_last(cls, record: Record, control: Control) -> bool:
-        """Whether a card is that of the last element, which no blank one must follow."""
+        """Return whether a card is the last element's, which needs no blank card after it."""
         return isinstance(record, ElementNodes) and record.element >= control.numel
 
 
@@ -79,7 +79,7 @@ class Boundary(NumberedSegment[NodeCodes], keyword="BOUN", record=NodeCodes):
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
-        """Fields of a card."""
+        """Return the fields of a card."""
         return layout(*NODE, *(f"I5 code {i}|c{i}" for i in range(1, control.ndf + 1)))
 
 
@@ -89,5 +89,5 @@ class Forces(NumberedSegment[NodeValues], keyword="FORC", record=NodeValues):
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
-        """Fields of a card."""
+        """Return the fields of a card."""
         return layout(*NODE, *(f"F10 value {i}" for i in range(1, control.ndf + 1)))

@@ -1,7 +1,7 @@
-"""The model of a deck: plain typed objects without mechanics.
+"""Model of a deck: plain typed objects without mechanics.
 
 A :class:`Deck` is one problem of a file: its control card, its segments in the deck's order, its
-macro program.  It keeps the values of the cards; :mod:`fecm.problem.generate` generates the nodes
+macro program. It keeps the values of the cards; :mod:`fecm.problem.generate` generates the nodes
 and elements between them.
 """
 
@@ -134,27 +134,27 @@ class Deck(Record):
         return f"<fecm deck {self.title!r}, {sizes}, {len(self.macros)} macros>"
 
     def _repr_html_(self) -> str:
-        """Table of segments and macros, for notebooks."""
+        """Return a table of segments and macros, for notebooks."""
         segments = " ".join(segment.keyword for segment in self.segments)
         macros = " ".join(macro.word for macro in self.macros)
         rows = (("segments", shorten(segments, 200)), ("macros", shorten(macros, 200)))
         return html_table(Table(rows, title=repr(self)[1:-1]))
 
     def has(self, kind: type[Segment]) -> bool:
-        """Whether the deck has a segment of one kind."""
+        """Return whether the deck has a segment of one kind."""
         return any(isinstance(segment, kind) for segment in self.segments)
 
     def all(self, kind: type[_S]) -> list[_S]:
-        """Every segment of one kind, in the deck's order."""
+        """Return every segment of one kind, in the deck's order."""
         return [segment for segment in self.segments if isinstance(segment, kind)]
 
     def last(self, kind: type[_S]) -> _S | None:
-        """The last segment of one kind, which is the effective one; None if there is none."""
+        """Return the last segment of one kind, which is the effective one; None without one."""
         found = self.all(kind)
         return found[-1] if found else None
 
     def require(self, kind: type[_S]) -> _S:
-        """The effective segment of one kind.
+        """Return the effective segment of one kind.
 
         Raises
         ------
@@ -167,7 +167,7 @@ class Deck(Record):
 
     @property
     def plies(self) -> dict[int, Ply]:
-        """Constants of the materials by number: 1 is MATE's, the others those of MATS.
+        """Constants of the materials by number: 1 is MATE's, the others are those of MATS.
 
         Raises LookupError without a MATE segment.
         """
@@ -177,9 +177,9 @@ class Deck(Record):
 
     @property
     def layers(self) -> dict[int, tuple[Layer, ...]]:
-        """Layers of the laminates by number: 1 is MATE's, the others those of LAMS.
+        """Layers of the laminates by number: 1 is MATE's, the others are those of LAMS.
 
-        Without ZONE all elements have the first.  Raises LookupError without a MATE segment.
+        Without ZONE all elements have the first. Raises LookupError without a MATE segment.
         """
         layers = {MATERIAL: self.require(Material).layers}
         card = self.last(Laminates)
@@ -231,7 +231,7 @@ class Deck(Record):
         plies: int | bool | tuple[int, int] | None = None,
         failure: int | bool | None = None,
     ) -> Deck:
-        r"""Deck with another macro program, or one that stores other rows.
+        r"""Return the deck with another macro program, or one that stores other rows.
 
         Parameters
         ----------

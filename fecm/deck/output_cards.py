@@ -68,7 +68,7 @@ class Units(Segment, keyword="UNIT"):
         return None
 
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
+        """Return the text of the segment's cards."""
         yield self.keyword
         yield f"{self.length} {self.force} {self.time}"
 
@@ -83,11 +83,11 @@ class PrintOption(Segment, keyword="PRIN"):
 
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self:
-        """Read the keyword card, which is all there is."""
+        """Read the keyword card, the only card of the segment."""
         return cls(head.keyword == cls.keyword, source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's card."""
+        """Return the text of the segment's card."""
         yield self.keyword if self.on else self.OFF
 
 

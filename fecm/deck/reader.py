@@ -1,4 +1,4 @@
-"""The card reader: a deck's text in, its models and all errors out, not just the first."""
+"""Card reader: reads the text of a deck into its models, and reports all errors."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ INLINE = "<text>"  # name of a deck that is given as text, or in a stream withou
 
 
 def load_text(path_or_text: str | Path | AnyFile) -> tuple[str, str]:
-    """Text and name of a deck, see :func:`fecm.read_deck`.
+    """Return text and name of a deck, see :func:`fecm.read_deck`.
 
-    Raises OptionsError if it is no path, text or open file.
+    Raises OptionsError if it is neither a path, a text nor an open file.
     """
     if isinstance(path_or_text, str) and ("\n" in path_or_text or not path_or_text.strip()):
         return path_or_text, INLINE
@@ -49,7 +49,7 @@ def load_text(path_or_text: str | Path | AnyFile) -> tuple[str, str]:
 
 
 def _text(file: AnyFile, path: str) -> str:
-    """Text of a deck, which may be an endless pipe; see :func:`decoded`."""
+    """Return the text of a deck, which may be an endless pipe; see :func:`decoded`."""
     free = available_memory()
     most = LARGEST_FILE if free is None else min(LARGEST_FILE, free // BYTES_A_BYTE)
     begin = _read(file, FIRST)
@@ -65,7 +65,7 @@ def _text(file: AnyFile, path: str) -> str:
 
 
 def _read(file: AnyFile, size: int) -> bytes:
-    """Bytes of a file that is open as bytes or as text."""
+    """Read the bytes of a file that is open as bytes or as text."""
     data = file.read(size)
     return data.encode("utf-8", "surrogateescape") if isinstance(data, str) else data
 
@@ -81,7 +81,7 @@ MOST_MACRO_CARDS = 100_000
 
 
 class OtherFile(NamedTuple):
-    """A file of another program."""
+    """File of another program."""
 
     lines: str  # pattern of one of its first lines, or of two
     what: str
@@ -121,7 +121,7 @@ OTHER_FILES = (
 
 @dataclass
 class ParsedProblem:
-    """The readable part of a problem."""
+    """Readable part of a problem."""
 
     deck: Deck | None  # the model; None where the control card could not be read
     # Keywords of segments with unreadable cards, from which no conclusion can be drawn.
@@ -214,7 +214,7 @@ class Reader:
         return control if control is not None and self._is_possible(control) else None
 
     def _is_possible(self, control: Control) -> bool:
-        """Whether the values of a control card can be meant; others are reported."""
+        """Return whether the values of a control card are possible; report the others."""
         if control.nen == 0:
             named = zip(Control.fields, control.row(), strict=True)
             missing = [field.name for field, value in named if not value]
@@ -384,7 +384,7 @@ class Reader:
 
 
 def _other_file(lines: Sequence[str]) -> OtherFile | None:
-    """The other program whose file begins with these lines; None if there is none."""
+    """Return the other program whose files start with these lines, or None."""
     text = "\n".join(line.lstrip() for line in lines[:FIRST_LINES])
     if re.search(rf"^{TITLE}", text, re.MULTILINE):
         return None

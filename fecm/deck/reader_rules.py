@@ -1,7 +1,7 @@
-"""Rules of what is found while cards are read: the frame of the file, numbers, counts, macros.
+"""Rules of reading cards: the frame of the file, numbers, counts, macros.
 
-The reader, the cards and the grammar of the macros report these codes; nothing imports this module
-but what shows their text.
+The reader, the cards and the grammar of the macros report these codes. Only the modules that show
+their text import this one.
 """
 
 from __future__ import annotations

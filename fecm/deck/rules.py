@@ -1,10 +1,9 @@
-"""Rules: what each code of a finding means, beside the function that finds it.
+"""Rules: the meaning of each code of a finding, beside the function that finds it.
 
-Most rules are functions, decorated with :func:`rule`, that look at a segment or a problem and yield
-a :class:`Report` for each fault; the docstring is the text of the rule.  What is found while cards
-are read has no such function; ``reader_rules.py`` declares those codes.
-
-The page ``docs/findings.md`` is made of the declarations, see ``fecm/problem/findings_page.py``.
+Most rules are functions, decorated with :func:`rule`, that check a segment or a problem and yield a
+:class:`Report` for each fault. The docstring is the text of the rule. Faults in cards that are
+being read have no such function; ``reader_rules.py`` declares their codes.
+``fecm/problem/findings_page.py`` generates the page ``docs/findings.md`` from the declarations.
 """
 
 from __future__ import annotations
@@ -44,7 +43,7 @@ class Rule(NamedTuple):
 
 
 class Report(NamedTuple):
-    """A fault found by a rule: the finding without its code."""
+    """Fault found by a rule: the finding without its code."""
 
     message: str
     place: CardPlace | None = None
@@ -56,14 +55,17 @@ RULES: dict[str, Rule] = {}  # rules of the modules that are imported, by code
 
 
 def declare(code: str, subject: Subject, summary: str, *, remedy: str, cause: str = "") -> None:
-    """Declare the text of a code; raises ValueError if the code is taken."""
+    """Declare the text of a code.
+
+    Raises ValueError if the code is taken.
+    """
     if code in RULES:
         raise ValueError(f"the code {code} is taken: {RULES[code].summary}")
     RULES[code] = Rule(code, subject, summary, remedy, cause)
 
 
 def reports(code: str) -> Callable[[Callable[P, Reports]], Callable[P, list[Finding]]]:
-    """Give what a function reports a code that is declared elsewhere."""
+    """Give the reports of a function a code that is declared elsewhere."""
 
     def decorate(function: Callable[P, Reports]) -> Callable[P, list[Finding]]:
         def find(*args: P.args, **kwargs: P.kwargs) -> list[Finding]:
@@ -78,10 +80,10 @@ def reports(code: str) -> Callable[[Callable[P, Reports]], Callable[P, list[Find
 def rule(
     code: str, subject: Subject
 ) -> Callable[[Callable[P, Reports]], Callable[P, list[Finding]]]:
-    """Declare a code by the docstring of a function, and give it to what the function reports.
+    """Declare a code by the docstring of a function, and give it to the function's reports.
 
-    The first paragraph of the docstring is the summary, the last one begins with "Remedy:", and
-    those between them are the cause.
+    The first paragraph of the docstring is the summary. The last one starts with "Remedy:". The
+    paragraphs between them are the cause.
     """
 
     def decorate(function: Callable[P, Reports]) -> Callable[P, list[Finding]]:
@@ -115,7 +117,7 @@ def apply_first(
     *args: P.args,
     **kwargs: P.kwargs,
 ) -> None:
-    """Apply rules up to the first that finds something; the others would say the same again."""
+    """Apply rules up to the first with a finding; the others would repeat it."""
     for one in rules:
         if found := one(*args, **kwargs):
             findings.extend(found)

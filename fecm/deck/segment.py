@@ -21,7 +21,7 @@ _R = TypeVar("_R", bound=Record)
 
 
 class CardStream:
-    """Cards in the order of the file, without the lines that are comments.
+    """Cards in the order of the file, without comment lines.
 
     Parameters
     ----------
@@ -67,22 +67,22 @@ class CardStream:
         return Card(*self._cards[-1]) if self._cards else None
 
     def text_since(self, position: int) -> list[str]:
-        """Lines of the cards taken since a position."""
+        """Return the lines of the cards taken since a position."""
         return [line.rstrip() for _, line in self._cards[position : self.position]]
 
     def begins_segment(self, card: Card) -> bool:
-        """Whether a card is the keyword card of a segment, or ends the segments."""
+        """Return whether a card is the keyword card of a segment, or ends the segments."""
         return card.keyword in self._keywords
 
     def take(self) -> Card | None:
-        """The next card; None at the end of the file or when findings are closed."""
+        """Return the next card; None at the end of the file or when findings are closed."""
         if self.at_end or self.findings.closed:
             return None
         self.position += 1
         return Card(*self._cards[self.position - 1])
 
     def take_filled(self) -> Card | None:
-        """The next card that is not blank, or None as in :meth:`take`."""
+        """Return the next card that is not blank, or None as in :meth:`take`."""
         while not self.at_end and not self._cards[self.position][1].strip():
             self.position += 1
         while (card := self.take()) is not None and card.is_blank:
@@ -90,17 +90,17 @@ class CardStream:
         return card
 
     def give_back(self) -> None:
-        """Return the last card to the stream."""
+        """Put the last card back into the stream."""
         self.position -= 1
 
     def peek(self) -> Card | None:
-        """The next card as :meth:`take` gives it, which stays in the stream."""
+        """Return the next card as in :meth:`take`; the card stays in the stream."""
         if (card := self.take()) is not None:
             self.give_back()
         return card
 
     def take_data(self) -> Card | None:
-        """The next card; None where that is a keyword card, which stays, or as in :meth:`take`."""
+        """Return the next card; None for a keyword card, which stays, or as in :meth:`take`."""
         card = self.take()
         if card is None or not card.is_keyword:
             return card
@@ -113,7 +113,7 @@ class CardStream:
             pass
 
     def row(self, card: Card, fields: Fields) -> tuple[list[Value], CardSource] | None:
-        """Values of a card and their source; None after an error, which is reported."""
+        """Return the values of a card and their source; None after an error, which is reported."""
         values = read_values(card, fields, self.findings, blanks_are_zeros=self._blanks_are_zeros)
         if values is None:
             return None
@@ -122,12 +122,12 @@ class CardStream:
         return values, CardSource(card, fields)
 
     def record(self, card: Card, kind: type[_R], fields: Fields | None = None) -> _R | None:
-        """Record of a card; None after an error, which is reported."""
+        """Return the record of a card; None after an error, which is reported."""
         row = self.row(card, fields or kind.fields)
         return None if row is None else kind.from_row(*row)
 
     def single(self, head: Card, kind: type[_R], fields: Fields | None = None) -> _R | None:
-        """Record of a segment's mandatory card; None if it is missing or unreadable."""
+        """Return the record of a segment's mandatory card; None if it is missing or unreadable."""
         card = self.take_data()
         if card is None and head.keyword not in self.unsound:
             message = f"A card of {head.keyword} is missing."
@@ -139,7 +139,7 @@ class CardStream:
         return record
 
     def until_blank(self, head: Card, kind: type[_R]) -> tuple[_R, ...]:
-        """Records of a segment's cards up to a blank card."""
+        """Return the records of a segment's cards up to a blank card."""
         found: list[_R] = []
         while (card := self.take_data()) is not None and not card.is_blank:
             if (record := self.record(card, kind)) is None:
@@ -152,7 +152,7 @@ class CardStream:
     def table(
         self, head: Card, kind: type[_R], fields: Fields, is_last: Callable[[_R], bool]
     ) -> Table[_R]:
-        """Records of cards of numbers up to a blank card, or up to one that is the last."""
+        """Return the records of cards of numbers up to a blank card, or up to a last one."""
         reader = TableReader(fields)
         self._take_table(reader)
         while (card := self.take_data()) is not None and not card.is_blank:
@@ -176,7 +176,7 @@ class CardStream:
             self.read.update(reader.last_rows(count))
 
     def end(self, head: Card, card: Card | None) -> None:
-        """Report that no blank card ends a segment, if `card`, which should be one, is None."""
+        """Report that no blank card ends a segment if `card`, which should be blank, is None."""
         if card is None:
             following = self.peek()
             message = f"The {head.keyword} cards are not ended by a blank card."
@@ -186,7 +186,7 @@ class CardStream:
 
 @dataclass(frozen=True)
 class Segment(Record):
-    """A keyword card and the data that follow it: by default one card, the segment's own values."""
+    """Keyword card and the data that follow it: by default one card, the segment's own values."""
 
     keyword: ClassVar[str]
     # Whether its card of data begins with a letter, as a keyword card does.
@@ -202,16 +202,16 @@ class Segment(Record):
         return cards.single(head, cls)
 
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
+        """Return the text of the segment's cards."""
         yield self.keyword
         yield self.to_card()
 
 
 @dataclass(frozen=True)
 class NumberedSegment(Segment, Generic[_R]):
-    """A segment of any number of cards, ended by a blank one.
+    """Segment of any number of cards, ended by a blank one.
 
-    The records are a tuple, or what compares and hashes like one.
+    The records are a tuple, or a sequence that compares and hashes like one.
     """
 
     records: Sequence[_R]
@@ -223,23 +223,23 @@ class NumberedSegment(Segment, Generic[_R]):
 
     @classmethod
     def of(cls, control: Control, cards: NDArray[Any]) -> Self:
-        """Segment with the values of its cards, (cards, fields)."""
+        """Return the segment with the values of its cards, (cards, fields)."""
         kind = cast("type[_R]", cls.record)
         return cls(Table(kind, cls.card_fields(control), array("d", cards.astype(float).tobytes())))
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
-        """Fields of a card."""
+        """Return the fields of a card."""
         return cls.record.fields
 
     @classmethod
     def is_last(cls, record: Record, control: Control) -> bool:
-        """Whether a card ends the segment, so that no blank one must follow."""
+        """Return whether a card ends the segment, so that no blank one must follow."""
         return False
 
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self | None:
-        """Read the cards up to a blank one; unreadable ones are reported and left out."""
+        """Read the cards up to a blank one; unreadable cards are reported and left out."""
         control = cards.control
         fields = cls.card_fields(control)
         found = cards.table(head, cls.record, fields, lambda r: cls.is_last(r, control))
@@ -247,7 +247,7 @@ class NumberedSegment(Segment, Generic[_R]):
         return cls(cast("Table[_R]", found), source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
+        """Return the text of the segment's cards."""
         fields = self.card_fields(control)
         yield self.keyword
         if isinstance(self.records, Table) and self.records.fields == fields:

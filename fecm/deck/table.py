@@ -1,7 +1,7 @@
 """Cards of numbers by the thousand: read and written in blocks, and kept in one array.
 
-A line is read here only if :func:`fecm.deck.values.read_values` would take the same numbers from it
-and report nothing.  Every other line is left to that function.
+A line is read here only if :func:`fecm.deck.values.read_values` would read the same numbers from it
+and report nothing. Every other line is left to that function.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ _REAL = r"[+-]?(?:[0-9]{1,20}(?:\.[0-9]{0,30})?|\.[0-9]{1,30})(?:[Ee][+-]?[0-9]{
 
 
 class Table(Sequence[_R]):
-    """Records of cards of numbers, in one array; a record is made when it is asked for.
+    """Records of cards of numbers, in one array; a record is created when it is accessed.
 
-    It compares, hashes and prints as the tuple of its records does.
+    The table compares, hashes and prints as the tuple of its records.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ class Table(Sequence[_R]):
         return len(self.fields)
 
     def rows(self) -> Iterator[list[float]]:
-        """Values of each card, integers as such."""
+        """Yield the values of each card, integers as such."""
         return _rows(self.fields, self.values)
 
     def __len__(self) -> int:
@@ -116,7 +116,7 @@ def _rows(fields: Fields, values: array[float]) -> Iterator[list[float]]:
 
 
 class TableReader:
-    """Takes the values of the lines that hold nothing but the numbers of some fields."""
+    """Reader of lines that hold nothing but the numbers of some fields."""
 
     def __init__(self, fields: Fields) -> None:
         self.fields = fields
@@ -134,7 +134,7 @@ class TableReader:
         return _with_commas(self.fields).fullmatch
 
     def take(self, lines: Sequence[Line], begin: int) -> int:
-        """Take lines from `begin` on up to one that it can't read; return how many."""
+        """Read lines from `begin` on up to one that it can't read; return their number."""
         values = self.values
         end = begin
         for end in range(begin, len(lines)):
@@ -154,12 +154,12 @@ class TableReader:
         return end - begin
 
     def add(self, line: Line, row: Sequence[float]) -> None:
-        """Add a line that was read otherwise."""
+        """Add a line that was read elsewhere."""
         self.values.extend(row)
         self.lines.append(line)
 
     def last_rows(self, count: int) -> Iterator[tuple[int, tuple[Fields, Sequence[Value]]]]:
-        """Line number, fields and values of the last lines."""
+        """Yield line number, fields and values of the last lines."""
         begin = len(self.values) - count * len(self.fields)
         rows = _rows(self.fields, self.values[begin:])
         lines = self.lines[len(self.lines) - count :]
@@ -173,10 +173,10 @@ class TableReader:
 
 @cache
 def _in_columns(fields: Fields) -> re.Pattern[str]:
-    """Pattern of a line in columns.
+    """Return the pattern of a line in columns.
 
-    A number ends with its field, so that one that touches the number before it fills its field.
-    What the pattern takes for a number need not be one; `float` decides.
+    A number ends with its field, so that a number that touches the one before it fills its field. A
+    match need not be a number; `float` decides.
     """
     rest = ""
     for before, field in reversed(list(pairwise(fields))):
@@ -188,7 +188,7 @@ def _in_columns(fields: Fields) -> re.Pattern[str]:
 
 @cache
 def _with_commas(fields: Fields) -> re.Pattern[str]:
-    """Pattern of a line with commas."""
+    """Return the pattern of a line with commas."""
     numbers = [_INTEGER if field.kind is FieldKind.INTEGER else _REAL for field in fields]
     rest = ""
     for number in reversed(numbers[1:]):
@@ -197,7 +197,7 @@ def _with_commas(fields: Fields) -> re.Pattern[str]:
 
 
 def _number(field: Field) -> str:
-    """Pattern of a field whose last column is not blank."""
+    """Return the pattern of a field whose last column is not blank."""
     width = field.width
     if field.kind is FieldKind.INTEGER:
         return f"[ 0-9+-]{{{width - 1}}}[0-9]"

@@ -1,7 +1,7 @@
 """Systems of units by names such as ``mm-N-s``, and names of units for output and axes.
 
 Numbers are never converted, except that text and pictures show masses in g and energies in J where
-the deck's own units of them are powers of ten of these.
+the deck's own units are powers of ten of these.
 """
 
 from __future__ import annotations
@@ -55,48 +55,48 @@ NAMED = {
 
 
 def unit_names(deck: Deck) -> dict[str, str]:
-    """Names of the units of length, force and time; empty where the deck gives none.
+    """Return the names of the units of length, force and time; empty if the deck gives none.
 
-    Known units in capitals or small letters, such as MM, have their usual names.
+    Known units in capitals or small letters, such as MM, get their usual names.
     """
     units = deck.last(Units)
     return {} if units is None else {n: _usual(n, getattr(units, n)) for n in Units.NAMES}
 
 
 def _usual(dimension: str, name: str) -> str:
-    """Usual name of a unit; the name itself if it is not clear without its capitals."""
+    """Return the usual name of a unit; the name itself if it is ambiguous without its capitals."""
     alike = [known for known in KNOWN[dimension] if known.casefold() == name.casefold()]
     return alike[0] if len(alike) == 1 and name not in KNOWN[dimension] else name
 
 
 def declared_units(attributes: Mapping[str, Any]) -> dict[str, str]:
-    """Names of the units of length, force and time in the attributes of a result; empty without."""
+    """Return the names of the units of length, force and time in the attributes of a result."""
     names = {name: str(attributes.get(f"unit_{name}", "")) for name in Units.NAMES}
     return names if all(names.values()) else {}
 
 
 def unit_of(dimension: str, names: dict[str, str]) -> str:
-    """Unit of a dimension: ``lbf/in`` of ``force/length``; empty without names or dimension."""
+    """Return the unit of a dimension: ``lbf/in`` of ``force/length``; empty without names."""
     if not names or not dimension:
         return ""
     return re.sub(r"length|force|time", lambda match: names[match[0]], dimension)
 
 
 def column_name(name: str, unit: str) -> str:
-    """Heading of a column: ``force (N)``, or the name alone where it has no unit."""
+    """Return the heading of a column: ``force (N)``, or the name alone without a unit."""
     return f"{name} ({printable(short_name(unit))})" if unit else name
 
 
 def short_name(unit: str) -> str:
-    """Name of a unit: t of the mass N*s^2/mm; others as they are."""
+    """Return the short name of a unit: t for the mass N*s^2/mm; other units as they are."""
     return with_prefix(unit, 0) if PREFIXED.get(unit, ("",))[0] == "g" else unit
 
 
 def in_si(dimension: str, names: dict[str, str]) -> float | None:
-    """One unit of a physical dimension, such as ``force*time^2/length^4``, in m, N and s.
+    """Return the size in m, N and s of one unit of a dimension such as ``force*time^2/length^4``.
 
-    The dimension has at most one division.  None where the deck names no units, or one that is not
-    in :data:`KNOWN`.
+    The dimension has at most one division. Returns None where the deck names no units, or one that
+    is not in :data:`KNOWN`.
     """
     value = 1.0
     for sign, product in zip((1.0, -1.0), dimension.split("/"), strict=False):
@@ -109,7 +109,7 @@ def in_si(dimension: str, names: dict[str, str]) -> float | None:
 
 
 def unit_in_si(unit: str, dimension: str) -> float | None:
-    """A unit such as ``mm/s`` or ``J`` in m, N and s; None if it is not one of the dimension.
+    """Return the size in m, N and s of a unit such as ``mm/s`` or ``J``; None if it is not valid.
 
     The dimension is a product or a quotient of length, force and time, without powers.
     """
@@ -123,12 +123,12 @@ def unit_in_si(unit: str, dimension: str) -> float | None:
 
 
 def thousands(value: float) -> int:
-    """Power of 1000, as one of ten, that leaves 1 to 1000 of a positive value."""
+    """Return the power of ten, a multiple of 3, that leaves 1 to 1000 of a positive value."""
     return 3 * math.floor(math.log10(value) / 3.0)
 
 
 def with_prefix(unit: str, power: int) -> str:
-    """Name of 10^power of a unit, as kN of 10^3 N; empty if it has none."""
+    """Return the name of 10^power of a unit, as kN of 10^3 N; empty if it has none."""
     base, own = PREFIXED.get(unit, ("", 0))
     if not base or power + own not in PREFIXES:
         return ""
@@ -137,13 +137,16 @@ def with_prefix(unit: str, power: int) -> str:
 
 
 def quantity(value: float, unit: str, digits: int = DIGITS) -> str:
-    """A value with its unit: 20 g instead of 2e-05 N*s^2/mm, 1.5 J instead of 1500 N*mm."""
+    """Format a value with its unit: 20 g for 2e-05 N*s^2/mm, 1.5 J for 1500 N*mm."""
     power, name = readable(value, unit, digits)
     return f"{significant(value / 10.0**power, digits)} {name}".rstrip()
 
 
 def readable(value: float, unit: str, digits: int = DIGITS) -> tuple[int, str]:
-    """Power of ten, and its name, in which a mass or an energy has a few digits; else 0, `unit`."""
+    """Return power of ten and name of the unit in which a mass or an energy has few digits.
+
+    Other values have 0 and `unit`.
+    """
     base, _ = PREFIXED.get(unit, ("", 0))
     if base in ("g", "J") and 0.0 < abs(value) < math.inf:
         power = thousands(float(f"{abs(value):.{digits}g}"))
@@ -153,7 +156,7 @@ def readable(value: float, unit: str, digits: int = DIGITS) -> tuple[int, str]:
 
 
 def mass_in_si(mass: float, names: dict[str, str]) -> str:
-    """A mass in g, kg or t; empty if the deck's units are not known."""
+    """Format a mass in g, kg or t; empty if the deck's units are not known."""
     unit = in_si(MASS, names)
     return "" if unit is None else quantity(mass * unit, "N*s^2/m")
 
@@ -166,12 +169,12 @@ FORM = "length, force and time, as in mm-N-s, or length, time and mass, as in mm
 
 
 class UnitsError(FecmError, ValueError):
-    """A name is not that of a consistent system of units."""
+    """A name is not a consistent system of units."""
 
 
 @lru_cache
 def system_named(name: str) -> str:
-    """Name of a system as length, force and time, whose parts may be given in any order.
+    """Return the name of a system as length, force and time, given in any order.
 
     Raises
     ------
@@ -203,9 +206,9 @@ def system_named(name: str) -> str:
 
 
 def force_of(mass: str, length: str, time: str) -> str:
-    """Unit of force that accelerates a unit of mass by a unit of length over time squared.
+    """Return the unit of force that accelerates a unit of mass by length over time squared.
 
-    Empty if it has no name, or a unit is unknown.
+    It is empty if it has no name, or a unit is unknown.
     """
     if mass not in MASSES or length not in KNOWN["length"] or time not in KNOWN["time"]:
         return ""
@@ -215,12 +218,12 @@ def force_of(mass: str, length: str, time: str) -> str:
 
 
 def units_of(system: str) -> dict[str, str]:
-    """Names of the units of length, force and time of a system."""
+    """Return the names of the units of length, force and time of a system."""
     return dict(zip(Units.NAMES, system_named(system).split("-"), strict=True))
 
 
 def convert(value: float, dimension: str, system: str, other: str) -> float:
-    """A value in another system of units, with as many digits as the field of a card has."""
+    """Return a value in another system of units, with the digits of a card's field."""
     before, after = in_si(dimension, units_of(system)), in_si(dimension, units_of(other))
     if before is None or after is None:
         raise LookupError(f"no unit of {dimension}")

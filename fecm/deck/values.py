@@ -1,4 +1,4 @@
-"""Values of a card, or the findings that say what is wrong with it and how it is written."""
+"""Values of a card, or findings that say what is wrong with a value and how to write it."""
 
 from __future__ import annotations
 
@@ -30,10 +30,10 @@ WORD = FieldKind.WORD
 def read_values(
     card: Card, fields: Fields, findings: Findings, *, blanks_are_zeros: bool = False
 ) -> list[Value] | None:
-    """Read the values of a card, one a field; None after an error, which is reported.
+    """Read the values of a card, one per field; None after an error, which is reported.
 
-    With `blanks_are_zeros` a blank inside a number is read as the zero that it was on the report's
-    machine, with a warning; otherwise it is an error where it would change the value.
+    With `blanks_are_zeros` a blank inside a number is read as zero, as on the report's machine,
+    with a warning. Otherwise it is an error where it would change the value.
     """
     if "\t" in card.data:
         column = card.data.index("\t") + 1
@@ -68,7 +68,10 @@ def read_values(
 
 
 def _ends_with_its_fields(card: Card, fields: Fields, findings: Findings) -> bool:
-    """Whether a card has no more values than fields; more in fixed columns are only warned of."""
+    """Return whether a card has no more values than fields.
+
+    More values in fixed columns are a warning only.
+    """
     if card.is_free:
         pieces = card.cut(fields)[len(fields) :]
         surplus = pieces[0][1].lstrip(", ") if pieces else ""
@@ -89,7 +92,7 @@ def _ends_with_its_fields(card: Card, fields: Fields, findings: Findings) -> boo
 
 
 def _word(field: Field, text: str, source: CardSource, findings: Findings) -> str | None:
-    """A word of a field, or None after reporting that it is too long."""
+    """Return the word of a field, or None after reporting that it is too long."""
     word = text.rstrip()
     if len(word) <= field.width:
         return word
@@ -101,7 +104,7 @@ def _word(field: Field, text: str, source: CardSource, findings: Findings) -> st
 def _number(
     field: Field, text: str, source: CardSource, findings: Findings, *, blanks_are_zeros: bool
 ) -> Value | None:
-    """A field's number, :data:`BLANK` where a blank has a default, or None after an error."""
+    """Return a field's number, :data:`BLANK` for a blank with a default, or None after an error."""
     is_integer = field.kind is INTEGER
     parse = parse_integer if is_integer else parse_real
     written = text.strip()
@@ -182,7 +185,7 @@ class _Misplaced(NamedTuple):
 
 
 def _misplaced(card: Card, fields: Fields, *, cut_is_meant: bool) -> _Misplaced | None:
-    """The first text that crosses the end of its field; numbers may with `cut_is_meant`."""
+    """Return the first text that crosses the end of its field; numbers may with `cut_is_meant`."""
     data = card.data
     for field, following in pairwise(fields):
         gap = data[field.last : following.first - 1]
@@ -208,7 +211,7 @@ def _misplaced(card: Card, fields: Fields, *, cut_is_meant: bool) -> _Misplaced 
 
 
 def _misplaced_in_last(data: str, field: Field) -> _Misplaced | None:
-    """A number that crosses the end of the last field and is another without the part beyond."""
+    """Return a number that crosses the end of the last field and differs without its end."""
     if not _is_joined(data, field.last):
         return None
     first, last = _run_around(data, field.last)
@@ -236,18 +239,18 @@ def _report_misplaced(found: _Misplaced, card: Card, fields: Fields, findings: F
 
 
 def _is_joined(data: str, column: int) -> bool:
-    """Whether no blank parts a column from the next."""
+    """Return whether no blank separates a column from the next."""
     return len(data) > column and " " not in data[column - 1 : column + 1]
 
 
 def _run_around(data: str, column: int) -> tuple[int, int]:
-    """First and last column of the text without blanks around a column."""
+    """Return first and last column of the text without blanks around a column."""
     end = data.find(" ", column - 1)
     return data.rfind(" ", 0, column) + 2, len(data) if end < 0 else end
 
 
 def _hint_of_separators(card: Card, fields: Fields) -> str:
-    """Hint for a card with blanks between its values, or decimal commas; empty for another."""
+    """Return a hint for a card with blanks between values, or decimal commas; else ""."""
     if card.is_free:
         return _hint_of_points(card, fields)
     words = card.data.split()
@@ -263,7 +266,7 @@ def _hint_of_separators(card: Card, fields: Fields) -> str:
 
 
 def _hint_of_points(card: Card, fields: Fields) -> str:
-    """Hint for a card with commas, some of which are decimal points."""
+    """Return a hint for a card with commas, some of which are decimal points."""
     pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", card.data)
     words = pointed.replace(",", " ").split()
     pieces = [text for _, text in card.cut(fields)]
@@ -278,7 +281,7 @@ def _hint_of_points(card: Card, fields: Fields) -> str:
 
 
 def _hint_of_length(card: Card, fields: Fields, length: int, width: int) -> str:
-    """Hint for a number that is longer than its field; empty for one that fits."""
+    """Return a hint for a number that is longer than its field; empty for one that fits."""
     if length <= width:
         return ""
     too_long = f"the number has {length} characters and its field {width} columns"

@@ -53,7 +53,7 @@ class Materials(Segment, keyword="MATS"):
         return cls(tuple(found), source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
+        """Return the text of the segment's cards."""
         yield self.keyword
         for one in self.plies:
             yield one.head.to_card()
@@ -119,7 +119,7 @@ class Laminates(Segment, keyword="LAMS"):
         return cls(tuple(found), source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
-        """Text of the segment's cards."""
+        """Return the text of the segment's cards."""
         yield self.keyword
         for one in self.laminates:
             yield one.head.to_card()
@@ -129,7 +129,7 @@ class Laminates(Segment, keyword="LAMS"):
 
 
 def _is_layer(card: Card) -> bool:
-    """Whether a card, which should begin a laminate, has a fibre angle and a thickness."""
+    """Return whether a card in place of a laminate's first has a fibre angle and a thickness."""
     texts = [text.strip() for _, text in card.cut(Layer.fields)]
     return len(texts) > 2 and bool(texts[2]) and not texts[1].isdigit()
 

@@ -44,10 +44,10 @@ def leaves_out_equilibrium(problem: Problem) -> bool:
 
 
 def equilibrium_change(problem: Problem) -> float | None:
-    """By how much the shear stiffness of SHEA EQUI changes the static deflection under the load.
+    """Return the relative change of the static deflection by SHEA EQUI.
 
-    The deck has the factor 1.  None for a plate that is not held, and one of more elements than
-    MOST_SOLVED: a static solution of many takes longer than all other checks.
+    The deck has the factor 1. Returns None for a plate that is not held, or with more elements than
+    MOST_SOLVED: its static solution would take longer than all other checks.
     """
     plate, contact = problem.moving_plate, problem.contact
     if contact is None or problem.deck.control.numel > MOST_SOLVED:

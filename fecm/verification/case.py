@@ -1,6 +1,6 @@
 """Verification cases: each computes a few values, its checks state the expected ones.
 
-Their rows are output as text, as values for JSON, and as Markdown.
+Their rows are written as text, as values for JSON, and as Markdown.
 """
 
 from __future__ import annotations
@@ -122,7 +122,7 @@ class Row(NamedTuple):
         return RowVerdict.FINE if self.within else RowVerdict.FAILED
 
     def to_dict(self) -> dict[str, object]:
-        """Plain values, for JSON; None for values that could not be computed."""
+        """Return plain values, for JSON; None for values that could not be computed."""
         check = self.check
         got, error = (value if math.isfinite(value) else None for value in (self.got, self.error))
         return {
@@ -173,7 +173,7 @@ def compute_rows(one: Case) -> list[Row]:
 
 
 def _number(value: Value, expected: float) -> float:
-    """Return what counts of a value; NaN if any part of it is NaN."""
+    """Return the number that a value is compared by; NaN if any part of it is NaN."""
     if isinstance(value, tuple):
         off = (value[0] - expected * value[1]).ravel()
         return expected + float(off[np.abs(off).argmax()])

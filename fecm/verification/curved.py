@@ -40,7 +40,7 @@ def refined_grid(side: float) -> ElementGrid:
 
 
 def middle_node(grid: ElementGrid) -> int:
-    """Number of the node in the middle."""
+    """Return the number of the node in the middle."""
     return grid.nearest(SIDES[0] / 2.0, SIDES[1] / 2.0)[0]
 
 
@@ -53,7 +53,7 @@ def pressed(curvature: Curvature, grid: ElementGrid) -> tuple[Result, float]:
 
 @case
 def _curved_panel() -> Sequence[Value]:
-    """Static deflections, forces and moments in the middle, and frequencies."""
+    """Compute static deflections, forces and moments in the middle, and frequencies."""
     coarse, fine = refined_grid(4.0), refined_grid(2.0)
     flatter = pressed(Curvature(radius_y=1000.0), coarse)[1]
     found, deflection = pressed(Curvature(radius_x=500.0), fine)
@@ -70,7 +70,7 @@ def _curved_panel() -> Sequence[Value]:
 
 @case
 def _curved_impact() -> Sequence[Value]:
-    """A mass of 20 g at 3 m/s until 200 us."""
+    """Compute the impact of a mass of 20 g at 3 m/s until 200 us."""
     grid, patch = refined_grid(4.0), model.Patch("DISC", 4.0)
     hit = (Projectile(0, 0, 2.0e-5), Impact(middle_node(grid), 3, 3000.0), decks.elastic(5.0e4))
     macros = decks.impact_program(1.6e-7, 1250)
@@ -80,7 +80,7 @@ def _curved_impact() -> Sequence[Value]:
 
 @case
 def _curved_strains() -> Sequence[Value]:
-    """One element of a twisted panel with NONL, held in a constant w."""
+    """Compute the strains of a twisted element with NONL, held in a constant w."""
     side, w = 10.0, 0.01
     grid = ElementGrid(uniform_section(side, 1), uniform_section(side, 1))
     held = np.zeros((grid.nodes, 5))

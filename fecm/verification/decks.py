@@ -60,13 +60,13 @@ def elastic(k: float) -> model.Indentation:
 
 
 def program(text: str) -> tuple[Macro, ...]:
-    """Macros of words, some with ``=`` and a value."""
+    """Return macros of words, some with ``=`` and a value."""
     parts = (word.partition("=") for word in text.split())
     return tuple(Macro(word, value=float(value or 0.0)) for word, _, value in parts)
 
 
 def impact_program(dt: float, steps: int) -> tuple[Macro, ...]:
-    """Macros of an impact that stores only the history."""
+    """Return the macros of an impact that stores only the history."""
     return program(f"LMAS DT={dt!r} LOOP={steps} TIME RODP={steps} NEXT")
 
 
@@ -75,13 +75,13 @@ STRESSES = program("TANG FORM SOLV STRE")
 
 
 def restraints(grid: ElementGrid, codes: str) -> model.Boundary | None:
-    """Restraints of codes such as `SUPPORTED`."""
+    """Return restraints of codes such as `SUPPORTED`."""
     every, *edges = ([int(code) for code in word] for word in codes.split())
     return grid.boundary(every, dict(zip(("left", "bottom", "right", "top"), edges, strict=True)))
 
 
 def held_but(dof: int, node: int = 1) -> model.Boundary:
-    """Hold the nodes of one element, but for a dof of one of them: a deck needs an equation."""
+    """Hold the nodes of an element, except a dof of one node, as a deck needs an equation."""
     freed = tuple(int(one != dof) for one in range(5))
     return model.Boundary(
         tuple(NodeCodes(n, 0, freed if n == node else (1,) * 5) for n in range(1, 10))
@@ -109,7 +109,7 @@ def run_of_deck(one: model.Deck, mode: Mode = "report") -> Result:
 
 
 def field_values(found: Result, group: str, names: str) -> list[Floats]:
-    """Fields of a group, by their names."""
+    """Return the fields of a group, by name."""
     return [found[f"{group}/{name}"] for name in names.split()]
 
 
@@ -121,7 +121,7 @@ def constant_strains(
     strain: Sequence[float] = (0.0, 0.0, 0.0),
     shear: Sequence[float] = (0.0, 0.0),
 ) -> Floats:
-    """Dofs (nodes, 5) of a field of constant midplane strains, curvatures and shear yz, xz."""
+    """Return dofs (nodes, 5) of constant midplane strains, curvatures and shear yz, xz."""
     (ex, ey, exy), (kx, ky, kxy), (gyz, gxz) = strain, curvature, shear
     w = -(kx * x**2 + ky * y**2 + kxy * x * y) / 2.0 + gxz * x + gyz * y
     u, v = ex * x + exy / 2.0 * y, ey * y + exy / 2.0 * x
@@ -135,7 +135,7 @@ def forces(field: Floats) -> model.Forces:
 
 
 def weights(coordinates: Sequence[float]) -> Floats:
-    """Simpson's weights of the lines of nodes: integrals of their shape functions."""
+    """Return Simpson's weights of the lines of nodes: integrals of their shape functions."""
     found = np.zeros(len(coordinates))
     for first in range(0, len(coordinates) - 1, 2):
         part = (coordinates[first + 2] - coordinates[first]) / 6.0

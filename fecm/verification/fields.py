@@ -84,9 +84,9 @@ def _resultants() -> Sequence[Value]:
 
 @case
 def _tape8() -> Sequence[Value]:
-    """Strains of a plate whose nodes are held in a field of constant strains, except one w.
+    """Compute strains of a plate whose nodes, except one w, are held in constant strains.
 
-    A very slow rigid mass hits this dof, in the middle of the first element, for one step: the
+    A very slow rigid mass hits this dof, in the middle of the first element, for one step. The
     other elements keep the field.
     """
     grid = ElementGrid(uniform_section(2.0, 2), uniform_section(2.0, 2))
@@ -145,7 +145,7 @@ CRITERIA = ("max_stress", "tsai_wu", "hashin", "puck")
 
 @case
 def _failure_states() -> Sequence[Value]:
-    """Exposures in the middle of an element, one of whose w is free."""
+    """Compute exposures in the middle of an element, one of whose w is free."""
     grid = ElementGrid(uniform_section(1.0, 1), uniform_section(1.0, 1))
     x, y = (v.ravel() - 0.5 for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     u, v, p, q = FIELD @ [x, y, x * x / 2.0, x * y, y * y / 2.0]
@@ -163,7 +163,7 @@ PRESSED = ((-180.0, 0.0), (-180.0, 60.0), (-150.0, -80.0))
 
 @case
 def _inclined_failure() -> Sequence[Value]:
-    """Puck's exposure in constant stresses of one element, by which mode C decides."""
+    """Compute Puck's exposure in constant stresses of an element, where mode C decides."""
     grid = ElementGrid(uniform_section(1.0, 1), uniform_section(1.0, 1))
     x, y = (v.ravel() - 0.5 for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     plate, macros = decks.material(CARBON, [0.0], 1.0), decks.program("TANG FORM SOLV FAIL")

@@ -31,7 +31,7 @@ V = 100.0  # of projectiles
 
 
 def largest_force(found: Result) -> list[float]:
-    """Largest force, and its time."""
+    """Return the largest force, and its time."""
     return [found.force.max(), found.time[found.force.argmax()]]
 
 
@@ -48,14 +48,17 @@ def _rigid_target() -> Sequence[Value]:
 
 @case
 def _end_of_contact() -> Sequence[Value]:
-    """A run that is cut at every phase of a half-sine contact."""
+    """Compute a run that is cut at every phase of a half-sine contact."""
     phase, one = np.linspace(0.0, np.pi, 20001)[1:-1], np.ones(19999)
     force = np.sin(phase)
     peak = np.maximum.accumulate(force)
     last = LastContact(force, np.append(0.0, force[:-1]), peak, peak, -np.cos(phase), 0.0 * one)
 
     def known(speed: float) -> float:
-        """Share of the contact that knows its peak, of a plate with a largest velocity."""
+        """Return the share of the contact that knows its peak.
+
+        The plate has a largest velocity.
+        """
         plate = Deflection(one, 0.0 * one, speed * one, one, one)
         return float(peak_known(ends(last, plate)).mean())
 
@@ -68,7 +71,7 @@ def _end_of_contact() -> Sequence[Value]:
 
 @case
 def _free_plate() -> Sequence[Value]:
-    """A plate so stiff that it moves as a rigid body, which DAMP slows down."""
+    """Compute a plate so stiff that it moves as a rigid body, which DAMP slows down."""
     grid = ElementGrid(uniform_section(1.0, 2), uniform_section(1.0, 2))
     plate, law = decks.material(decks.isotropic(1e9, 0.3, 2.5e-4), [0.0], 0.2), decks.elastic(1e5)
     made = decks.struck_plate(grid, plate, Projectile(0, 0, 2.0e-4), V, law, 3e-8, 10000)
@@ -79,7 +82,7 @@ def _free_plate() -> Sequence[Value]:
 
 @case
 def _infinite_plate() -> Sequence[Value]:
-    """A thin plate of 12 x 12 in, stiff in shear; no reflection returns within 200 us."""
+    """Compute a thin plate of 12 x 12 in, stiff in shear; no reflection returns within 200 us."""
     grid = ElementGrid(uniform_section(12.0, 48), uniform_section(12.0, 48))
     plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4, 13.0), [0.0], 0.1)
     mass, law = Projectile(0, 0, 2.0e-5), decks.elastic(5.0e4)
@@ -89,7 +92,7 @@ def _infinite_plate() -> Sequence[Value]:
 
 @case
 def _supported_plate() -> Sequence[Value]:
-    """A quarter of the plate, with a quarter of mass and contact coefficient."""
+    """Compute a quarter of the plate, with a quarter of mass and contact coefficient."""
     plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.03)
     hit = (Projectile(0, 0, 5.0e-6 / 4.0), Impact(1, 3, V), decks.elastic(1.0e5 / 4.0))
     macros = decks.impact_program(8e-8, 2500)
@@ -116,7 +119,7 @@ def _report_impact() -> Sequence[Value]:
 
 
 def _at(result: Result, name: str, time: float) -> float:
-    """Value of a history at the step nearest to a time."""
+    """Return the value of a history at the step nearest to a time."""
     values: Floats = result[f"history/{name}"]
     return float(values[int(np.abs(result.time - time).argmin())])
 

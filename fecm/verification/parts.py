@@ -1,4 +1,4 @@
-"""Parts of the program by themselves: laminates, K u, waves, rods, the indentation law (lb, in, s).
+"""Parts of the program: laminates, K u, waves, rods, the indentation law (lb, in, s).
 
 Layer 1 lies at z = -h/2.
 """
@@ -100,7 +100,7 @@ def report_laminate() -> LaminateSection:
 
 @case
 def _internal_force() -> Sequence[Value]:
-    """K u on a mesh without parallel sides, which elements compute from their strains."""
+    """Compute K u on a mesh without parallel sides, from the strains of the elements."""
     grid = ElementGrid(uniform_section(2.0, 3), uniform_section(2.0, 3))
     x, y = (v.ravel() for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     corners = enumerate(np.stack([x + 0.1 * x * y, y + 0.2 * x * y], axis=1).tolist(), start=1)

@@ -49,7 +49,7 @@ def _time_step() -> Sequence[Value]:
 
 @case
 def _static_bending() -> Sequence[Value]:
-    """Transverse shear is integrated by order 2, which does not lock, and by order 3."""
+    """Compute deflections with shear orders 2, which does not lock, and 3."""
 
     def w(thickness: float, factor: float = 1.0, shear_order: int = 2) -> Floats:
         ply = decks.isotropic(1.0, 0.3, 1.0, factor)
@@ -71,7 +71,7 @@ def _static_bending() -> Sequence[Value]:
 
 @case
 def _frequencies() -> Sequence[Value]:
-    """Frequencies of the symmetric modes, on a quarter of the plate, and of uniform shear."""
+    """Compute frequencies of symmetric modes, on a quarter of the plate, and of uniform shear."""
     plate = decks.material(decks.ONE, [0.0], 0.1, 2)
     macros = decks.program("LMAS EIGE=4 CMAS EIGE=4")
     found = decks.run_of_deck(decks.quarter_plate(ELEMENTS, plate, macros)).modes.angular_frequency
@@ -88,7 +88,7 @@ def _frequencies() -> Sequence[Value]:
 
 
 def two_layers(angles: Sequence[float], codes: str, mode: int, node: int) -> Sequence[Value]:
-    """Frequencies of the first and another mode; w in the middle and u at a node under a load."""
+    """Compute frequencies of two modes, and w in the middle and u at a node under a load."""
 
     def made(shear_order: int, load: float, macros: Sequence[Macro]) -> Result:
         card = decks.material(FIBRES, angles, THICKNESS / 2.0, shear_order)
@@ -115,7 +115,7 @@ COMPRESSION = model.Preload(-0.004, -0.004)
 
 @case
 def _preload() -> Sequence[Value]:
-    """Buckling loads of symmetric modes, then frequencies, deflection, forces and stresses."""
+    """Compute buckling loads of symmetric modes, frequencies, deflection, forces and stresses."""
     plate = decks.material(STIFF, CROSS, THICKNESS / len(CROSS))
 
     def made(preload: model.Preload, macros: str, load: float = 0.0) -> model.Deck:
@@ -246,7 +246,7 @@ def _sandwich_deck(ratio: float) -> model.Deck:
 
 @case
 def _unlike_densities() -> Sequence[Value]:
-    """The sandwich of thickness 1, whose core has a fifth of the faces' density."""
+    """Compute the sandwich of thickness 1, whose core has a fifth of the faces' density."""
     made = _sandwich_deck(1.0)
     found = build_plate(made, generate(made)).laminate
     return [found.mass, found.rotary_inertia]
@@ -289,7 +289,7 @@ def _failure() -> Sequence[Value]:
 
 
 def cure_of_named_ply(dt: float) -> model.Cure:
-    """Change of temperature of the named ply T300/5208."""
+    """Return the change of temperature of the named ply T300/5208."""
     expansion = MATERIALS["T300/5208"].expansion
     assert expansion is not None
     return model.Cure(dt, expansions=(expansion,))

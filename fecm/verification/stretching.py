@@ -36,13 +36,13 @@ VELOCITY = 2271.56334  # of the mass
 
 
 def middle_deflection(made: Deck) -> float:
-    """Deflection of node 1."""
+    """Return the deflection of node 1."""
     return float(decks.run_of_deck(made).tape3.w[-1, 0])
 
 
 @case
 def _stretching_plate() -> Sequence[Value]:
-    """Levy's clamped plate, of side, thickness and modulus 1, 1/100 and 1."""
+    """Compute Levy's clamped plate, of side, thickness and modulus 1, 1/100 and 1."""
     h = 0.01
     plate = decks.material(decks.isotropic(1.0, 0.1**0.5, 1.0, FACTOR), [0.0], h)
     codes = f"{QUARTER} {CLAMPED}"
@@ -53,7 +53,7 @@ def _stretching_plate() -> Sequence[Value]:
 def strip(
     end: str, pressure: float, others: Sequence[Segment] = STRETCHES, *, slant: float = 0.0
 ) -> Deck:
-    """Half a strip of [0_4/90_4] in cylindrical bending, from its middle to an end with codes.
+    """Build half a strip of [0_4/90_4] in cylindrical bending, from its middle to an end.
 
     The lines across the strip are slanted one way and the other, by a share of an element.
     """
@@ -89,7 +89,7 @@ def _cylindrical_bending() -> Sequence[Value]:
 
 
 def disc(rim: str, pressure: float) -> Deck:
-    """A quarter of a circular plate under a pressure, its elements those of a square, mapped."""
+    """Build a quarter of a circular plate under pressure; its elements are a mapped square."""
     radius = 100.0
     grid = ElementGrid(uniform_section(1.0, ELEMENTS), uniform_section(1.0, ELEMENTS))
     x, y = (at.ravel() for at in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
@@ -106,7 +106,7 @@ def disc(rim: str, pressure: float) -> Deck:
 
 
 def areas(made: Deck) -> Floats:
-    """Integrals of the nodes' shape functions, (numnp,)."""
+    """Return the integrals of the nodes' shape functions, (numnp,)."""
     plate = build_plate(made, generate(made))
     found = np.zeros(len(plate.mesh.coordinates))
     for family in plate.families:
@@ -123,7 +123,7 @@ def _stretching_disc() -> Sequence[Value]:
 
 @case
 def _stretching_impact() -> Sequence[Value]:
-    """A mass on the middle of a clamped square plate, until both peaks are over."""
+    """Compute a mass on the middle of a clamped square plate, until both peaks are over."""
     side, end = 100.0, 1.7e-3
     sections = graded(side, 8, side / 2.0, 2.0)
     grid = ElementGrid(sections, sections)
@@ -146,7 +146,7 @@ def _stretching_impact() -> Sequence[Value]:
 
 @case
 def _reduced_plate() -> Sequence[Value]:
-    """The first mode of a simply supported square plate with w = h in the middle."""
+    """Compute the first mode of a simply supported square plate with w = h in the middle."""
     codes = f"{QUARTER} 10101 01110"
     plate = decks.material(ALUMINIUM, [0.0], THICKNESS)
     side = 200.0 * THICKNESS

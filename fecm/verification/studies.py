@@ -1,4 +1,4 @@
-"""Studies by themselves: random values, refinement, identification, location."""
+"""Studies: random values, refinement, identification, location."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ from fecm.verification.case import Value, case
 
 @case
 def _random_values() -> Sequence[Value]:
-    """Ishigami's function, a lognormal value, and the share of 3 hits in 40 draws."""
+    """Compute Ishigami's function, a lognormal value, and the share of 3 hits in 40 draws."""
     law, samples = ValueDistribution("uniform", (-np.pi, np.pi)), 1024
     design = Design(dict.fromkeys("xyz", law), samples, 0, "sobol", sensitivity=True)
     x, y, z = matrix(design).T
@@ -67,7 +67,7 @@ def _refinement() -> Sequence[Value]:
 
 @case
 def _identification() -> Sequence[Value]:
-    """The force of Hertz's impact on a fixed target, given to a deck with other values."""
+    """Compute the force of Hertz's impact on a fixed target, fitted from other values."""
     k, mass, velocity = 1.0e6, 2.0e-4, 100.0
     deepest = (5.0 * mass * velocity**2 / (4.0 * k)) ** 0.4
     # t = a/v times the integral of dx/sqrt(1 - x^2.5), an incomplete beta function of x^2.5.
