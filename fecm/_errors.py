@@ -35,14 +35,14 @@ class StudyError(FecmError, ValueError):
     """A study can't be computed from these numbers, or their table is invalid."""
 
 
-def did_you_mean(name: str, known: Iterable[str]) -> str:
+def did_you_mean(name: str, known_names: Iterable[str]) -> str:
     """Return the end of a message about an unknown name: the most similar known name.
 
     It is empty if no name is similar. Upper and lower case are alike.
     """
     import difflib  # 1 ms, only after a mistake
 
-    folded = {one.casefold(): one for one in known}
+    folded = {name_known.casefold(): name_known for name_known in known_names}
     close = difflib.get_close_matches(name.casefold(), folded, n=1)
     return f"; did you mean {folded[close[0]]}?" if close else ""
 

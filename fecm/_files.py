@@ -60,14 +60,14 @@ def check_outputs(
     if Path("-") in (*paths, *own):
         raise OutputError("- is a standard stream, and this needs a file; give its name")
     read = {key for path in inputs for key in _keys(path)}
-    taken = {key for path in own for key in _keys(path)}
+    used = {key for path in own for key in _keys(path)}
     for path in paths:
         keys = _keys(path)
         if read & keys:
             raise OutputError(f"{path} is an input, which is not replaced; give another name")
-        if taken & keys:
+        if used & keys:
             raise OutputError(f"{path} is the name of two outputs; give them different names")
-        taken |= keys
+        used |= keys
     for path in own:
         _refuse_folder(path)
     for path in paths:
@@ -89,8 +89,8 @@ def _keys(path: Path) -> set[object]:
     """Return what all paths of a file share: its real path, and device and inode if it exists."""
     keys: set[object] = {os.path.realpath(path)}
     with contextlib.suppress(OSError):
-        found = path.stat()
-        keys.add((found.st_dev, found.st_ino))
+        status = path.stat()
+        keys.add((status.st_dev, status.st_ino))
     return keys
 
 
@@ -163,10 +163,10 @@ def beside(path: Path, *, overwrite: bool = True, follow: bool = True) -> Iterat
             yield partial
             _finish(file, partial, target, overwrite)
         finally:
-            left = file.closed or _is(file.fileno(), partial)
+            is_finished = file.closed or _is(file.fileno(), partial)
             if OPEN_FILES_STAY:
                 file.close()
-            if left:
+            if is_finished:
                 with contextlib.suppress(PermissionError):  # a writer that failed has it open
                     partial.unlink(missing_ok=True)
             with contextlib.suppress(OSError):

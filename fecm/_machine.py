@@ -27,8 +27,8 @@ def available_memory() -> int | None:
     the machine is MemAvailable of proc(5) on Linux, and elsewhere the value of psutil, if it is
     installed.
     """
-    known = [count for count in (_of_machine(), *_of_groups()) if count is not None]
-    return max(0, min(known)) if known else None
+    counts = [count for count in (_of_machine(), *_of_groups()) if count is not None]
+    return max(0, min(counts)) if counts else None
 
 
 def require_memory(count: int, what: str) -> None:
@@ -50,8 +50,8 @@ def check_available_memory(
 
 
 def _shortage(what: str, count: int, free: int) -> str:
-    needed, left = format_bytes(count), format_bytes(free)
-    return f"{what} takes about {needed} of memory, and {left} are free"
+    needed, remaining = format_bytes(count), format_bytes(free)
+    return f"{what} takes about {needed} of memory, and {remaining} are free"
 
 
 def _of_machine() -> int | None:
@@ -68,16 +68,16 @@ def _of_machine() -> int | None:
 
 def _of_groups() -> list[int]:
     """Yield the remaining bytes of the control groups of the process."""
-    left: list[int] = []
+    remaining: list[int] = []
     with suppress(OSError, ValueError, IndexError):
-        (own,) = [line[3:] for line in CGROUP.read_text().splitlines() if line.startswith("0::")]
-        folder = CGROUPS / own.strip("/")
+        (group,) = [line[3:] for line in CGROUP.read_text().splitlines() if line.startswith("0::")]
+        folder = CGROUPS / group.strip("/")
         while folder != CGROUPS.parent:
             with suppress(OSError, ValueError):
                 most = int((folder / "memory.max").read_text())  # "max" is not a number
-                left.append(most - int((folder / "memory.current").read_text()))
+                remaining.append(most - int((folder / "memory.current").read_text()))
             folder = folder.parent
-    return left
+    return remaining
 
 
 def format_bytes(count: float) -> str:

@@ -118,7 +118,9 @@ class MeasuredTable(NamedTuple):
 
     def has(self, name: str) -> bool:
         """Return whether a column has a name of a quantity."""
-        return any(same_name(word, one) for word in WORDS.get(name, (name,)) for one in self.names)
+        return any(
+            same_name(word, column) for word in WORDS.get(name, (name,)) for column in self.names
+        )
 
     def column(self, name: str, place: int, *, is_negated: bool = False) -> TableColumn:
         """Return the column of a number as a quantity."""
@@ -140,13 +142,13 @@ class MeasuredTable(NamedTuple):
         unit of `units` is taken, or else the first one in a known unit. Raises StudyError if a
         column is missing, or if two columns can't be told apart.
         """
-        found, given = [], columns or [""] * len(names)
-        wanted = [column.removeprefix("-") for column in given]
-        self._check_numbers(wanted)
+        columns_found, requested = [], columns or [""] * len(names)
+        names_given = [column.removeprefix("-") for column in requested]
+        self._check_numbers(names_given)
         remedy = f"`columns` of {' and '.join(names)} selects others by name or number"
         if columns is None:
             remedy = "rename it in the file"
-        for order, (name, column) in enumerate(zip(names, wanted, strict=True)):
+        for order, (name, column) in enumerate(zip(names, names_given, strict=True)):
             if column.isdecimal() and int(column) and column not in self.names:
                 place = int(column) - 1
             elif not self.head[1] and not column:
@@ -154,16 +156,16 @@ class MeasuredTable(NamedTuple):
             else:
                 unit = units.get(DIMENSIONS.get(name, ""), "")
                 place = self._place(name, column, unit, remedy)
-            found.append(self.column(name, place, is_negated=column != given[order]))
-        if not (self.head[1] or any(wanted)):
-            taken = ", ".join(f"column {n + 1} as {name}" for n, name in enumerate(names))
-            warn(f"{self.path} has no names of columns: {taken}")
-        return found
+            columns_found.append(self.column(name, place, is_negated=column != requested[order]))
+        if not (self.head[1] or any(names_given)):
+            choice = ", ".join(f"column {n + 1} as {name}" for n, name in enumerate(names))
+            warn(f"{self.path} has no names of columns: {choice}")
+        return columns_found
 
-    def _check_numbers(self, wanted: Sequence[str]) -> None:
+    def _check_numbers(self, requested: Sequence[str]) -> None:
         """Raise StudyError if columns are given by numbers that are names of other columns."""
-        numbered = all(column.isdecimal() for column in wanted)
-        names = [n for n in wanted if numbered and self.names[int(n) - 1 : int(n)] != [n]]
+        numbered = all(column.isdecimal() for column in requested)
+        names = [n for n in requested if numbered and self.names[int(n) - 1 : int(n)] != [n]]
         if names and (both := [n for n in names if n in self.names]):
             verb = "is a name" if len(both) == 1 else "are names"
             raise StudyError(
@@ -171,25 +173,25 @@ class MeasuredTable(NamedTuple):
                 "rename them in the file, or name one of the columns by a text"
             )
 
-    def _place(self, quantity: str, given: str, unit: str, remedy: str) -> int:
+    def _place(self, quantity: str, requested: str, unit: str, remedy: str) -> int:
         """Return the index of the column with a given name, or of the first name of a quantity."""
-        words = (given,) if given else WORDS.get(quantity, (quantity,))
+        words = (requested,) if requested else WORDS.get(quantity, (quantity,))
         word = next((word for word in words if any(same_name(word, n) for n in self.names)), "")
         places = [n for n, name in enumerate(self.names) if word and same_name(word, name)]
         if len(places) > 1:  # in several units
             exact = [n for n in places if self.head[1][n] == word != unit_free(word)]
-            own = {n: plain_unit(self.units[n]) for n in places}
+            units = {n: plain_unit(self.units[n]) for n in places}
             sizes = UNITS.get(DIMENSIONS.get(quantity, ""), {})
-            known = [n for n in places if own[n] and own[n] in sizes]
-            wanted = exact or [n for n in known if own[n] == plain_unit(unit)]
-            distinct = len({own[n] for n in known}) == len(known)
-            places = wanted if len(wanted) == 1 else known[: distinct and not wanted]
+            convertible = [n for n in places if units[n] and units[n] in sizes]
+            matching = exact or [n for n in convertible if units[n] == plain_unit(unit)]
+            distinct = len({units[n] for n in convertible}) == len(convertible)
+            places = matching if len(matching) == 1 else convertible[: distinct and not matching]
         if places:
             return places[0]
         listing = ", ".join(self.head[1])[:80] or "unnamed"
-        others = f" (or {', '.join(words[1:])})" if words[1:] else ""
+        alternatives = f" (or {', '.join(words[1:])})" if words[1:] else ""
         raise StudyError(
-            f"{self.path}: the columns are {listing}; one must be named {words[0]}{others}; "
+            f"{self.path}: the columns are {listing}; one must be named {words[0]}{alternatives}; "
             f"{remedy}"
         )
 
@@ -213,20 +215,22 @@ class MeasuredTable(NamedTuple):
         for column in columns:
             self.check_thousands(column.name, column.place)
         rows = [self.head, *self.rows] if self._head_is_row(columns) else self.rows
-        found = list(np.array([self._row(row, columns) for row in rows]).T)
+        numbers = list(np.array([self._row(row, columns) for row in rows]).T)
         if increasing:
-            named = {column.name: values for column, values in zip(columns, found, strict=True)}
+            named = {column.name: values for column, values in zip(columns, numbers, strict=True)}
             self._check_increase(named, increasing, [line for line, _ in rows])
         for n, column in enumerate(columns):
-            own, said = column.unit, stated[n] if stated else ""
+            unit, stated_unit = column.unit, stated[n] if stated else ""
             where, dimension = f"{self.path}: {column.name}", column.dimension
-            if own and said and factor(where, own, said, dimension) != 1.0:
-                raise StudyError(f"{where} is in {own}, and `units` says {said}")
+            if unit and stated_unit and factor(where, unit, stated_unit, dimension) != 1.0:
+                raise StudyError(f"{where} is in {unit}, and `units` says {stated_unit}")
             if units is not None and dimension:
-                found[n] *= factor(where, said or own, units.get(dimension, ""), dimension)
+                numbers[n] *= factor(
+                    where, stated_unit or unit, units.get(dimension, ""), dimension
+                )
             if column.is_negated:
-                found[n] = -found[n]
-        return found
+                numbers[n] = -numbers[n]
+        return numbers
 
     def check_thousands(self, name: str, place: int) -> None:
         """Raise StudyError if commas may be decimal marks or separators of thousands.
@@ -236,7 +240,7 @@ class MeasuredTable(NamedTuple):
         it, the first of which is not 0, and three digits behind it.
         """
         written = [(line, row[place]) for line, row in self.rows if place < len(row)]
-        marked = [one for one in written if _GROUPED.fullmatch(one[1])]
+        marked = [field for field in written if _GROUPED.fullmatch(field[1])]
         whole = [text for _, text in written if _WHOLE.fullmatch(text)]
         largest = max((abs(int(text)) for text in whole), default=0)
         if marked and len(marked) + len(whole) == len(written) and largest >= 100:
@@ -264,7 +268,9 @@ class MeasuredTable(NamedTuple):
 
         Different whole numbers from 1 are names of gages or channels.
         """
-        fields = [self.head[1][one.place] for one in columns if one.place < len(self.head[1])]
+        fields = [
+            self.head[1][column.place] for column in columns if column.place < len(self.head[1])
+        ]
         if len(fields) < len(columns) or any(_number(field) is None for field in fields):
             return False
         if len(set(fields)) < len(fields) or not all(f.isdecimal() and int(f) for f in fields):
@@ -281,8 +287,8 @@ class MeasuredTable(NamedTuple):
             return
         row = int(rises[increasing].argmin())
         before, after = columns[increasing][row : row + 2]
-        others = [n for n in columns if n != increasing and rises[n].all()]
-        swapped = f"; are {increasing} and {others[0]} swapped?" if others else ""
+        rising = [n for n in columns if n != increasing and rises[n].all()]
+        swapped = f"; are {increasing} and {rising[0]} swapped?" if rising else ""
         raise StudyError(
             f"{self.path}:{lines[row + 1]}: {increasing} must increase: {after:g} "
             f"follows {before:g}{swapped}"
@@ -302,10 +308,10 @@ class MeasuredTable(NamedTuple):
             field = fields[column.place] if column.place < len(fields) else ""
             value = _number(field)
             if value is None or not math.isfinite(value):
-                found = repr(field) if field else "empty"
+                shown = repr(field) if field else "empty"
                 hint = f"; {UNMARKED}" if _GROUPED.fullmatch(field) else ""
                 raise StudyError(
-                    f"{self.path}:{line}: {column.name} is {found}, not a finite number{hint}"
+                    f"{self.path}:{line}: {column.name} is {shown}, not a finite number{hint}"
                 )
             values.append(value)
         return values
@@ -360,9 +366,9 @@ def unit_in(name: str) -> str:
     return next((text for text in reversed(texts) if text.casefold() not in REMARKS), "")
 
 
-def same_name(one: str, other: str) -> bool:
+def same_name(name: str, other_name: str) -> bool:
     """Return whether two names denote the same column."""
-    return unit_free(one).casefold() == unit_free(other).casefold()
+    return unit_free(name).casefold() == unit_free(other_name).casefold()
 
 
 def unit_free(name: str) -> str:
@@ -494,10 +500,10 @@ def _is_numeric(row: Row) -> bool:
 def _is_of_units(row: Row) -> bool:
     """Return whether a row names units: all in brackets, or at least one known unit."""
     fields = [field for field in row[1] if field]
-    known = {unit.casefold() for sizes in UNITS.values() for unit in sizes}
+    known_units = {unit.casefold() for sizes in UNITS.values() for unit in sizes}
     if all(field[0] in "([" and field[-1] in ")]" for field in fields):
         return True
-    return any(plain_unit(field.strip("()[] ")).casefold() in known for field in fields)
+    return any(plain_unit(field.strip("()[] ")).casefold() in known_units for field in fields)
 
 
 def _has_number(row: Row) -> bool:

@@ -54,9 +54,9 @@ def option(
 def declared_options(job: Any) -> dict[str, tuple[Option, Any]]:
     """Return the options of a job by name, with their default values."""
     return {
-        one.name: (one.metadata["option"], one.default)
-        for one in fields(job)
-        if "option" in one.metadata
+        field.name: (field.metadata["option"], field.default)
+        for field in fields(job)
+        if "option" in field.metadata
     }
 
 
@@ -69,7 +69,7 @@ def documented(job: type[T]) -> type[T]:
 
 def _parameters(job: Any) -> str:
     lines = []
-    types = {one.name: one.type for one in fields(job)}
+    types = {field.name: field.type for field in fields(job)}
     for name, (about, _) in declared_options(job).items():
         text = textwrap.fill(" ".join(f"{about.help} {about.python}".split()), WIDTH - 8)
         lines += [f"{name} : {types[name]}", textwrap.indent(text, "    ")]

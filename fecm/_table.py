@@ -74,8 +74,8 @@ def html_table(*tables: Table) -> str:
 def _html(table: Table) -> str:
     from html import escape  # 1 ms, only in notebooks
 
-    def cells(row: Iterable[Cell], first: str, others: str) -> str:
-        tags = [first, *[others] * (len(table.header) or 2)]
+    def cells(row: Iterable[Cell], first: str, tag_of_others: str) -> str:
+        tags = [first, *[tag_of_others] * (len(table.header) or 2)]
         return "".join(
             f"<{tag} style='text-align:left'>{escape(_text(cell))}</{tag}>"
             for tag, cell in zip(tags, row, strict=False)

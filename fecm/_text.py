@@ -94,12 +94,12 @@ def short_text(value: object, width: int = 60, *, exact: bool = False) -> str:
     return text if len(text) <= width else text[: width - 1] + "…"
 
 
-def shown_apart(one: object, other: object, width: int = 60) -> tuple[str, str]:
+def shown_apart(first: object, second: object, width: int = 60) -> tuple[str, str]:
     """Format two different values in short lines that show where they differ."""
-    short = short_text(one, width), short_text(other, width)
+    short = short_text(first, width), short_text(second, width)
     if short[0] != short[1]:
         return short
-    whole = [short_text(value, sys.maxsize, exact=True) for value in (one, other)]
+    whole = [short_text(value, sys.maxsize, exact=True) for value in (first, second)]
     pairs = zip(*whole, strict=False)
     same = next((n for n, (a, b) in enumerate(pairs) if a != b), min(map(len, whole)))
     begin = max(0, same - width // 2)

@@ -130,12 +130,12 @@ def show_progress(clock: Callable[[], float] = monotonic) -> Progress:
         nonlocal begin, first
         if begin is None:
             begin, first = clock(), done
-        left = ""
+        remaining = ""
         if first < done < total:
             seconds = (clock() - begin) * (total - done) / (done - first)
-            left = f", {seconds:.0f} s left"
+            remaining = f", {seconds:.0f} s left"
         end = "\n" if done >= total else ""
-        sys.stderr.write(f"\r{f'fecm: {done} of {total}{left}':<{WIDTH}}{end}")
+        sys.stderr.write(f"\r{f'fecm: {done} of {total}{remaining}':<{WIDTH}}{end}")
         sys.stderr.flush()
 
     return show

@@ -112,11 +112,11 @@ def parse_exceed(text: str) -> Limit:
     return Limit(name, value if value == THRESHOLD else number_of_text(name, value))
 
 
-def check_limits(limits: Sequence[Limit], known: Sequence[str], *, threshold: bool) -> None:
+def check_limits(limits: Sequence[Limit], quantities: Sequence[str], *, threshold: bool) -> None:
     """Raise CasesError if a quantity is unknown, or the deck has no threshold."""
     for limit in limits:
-        if limit.quantity not in known:
-            names = ", ".join(known)
+        if limit.quantity not in quantities:
+            names = ", ".join(quantities)
             raise CasesError(f"there is no quantity `{limit.quantity}`; there are {names}")
         if limit.value == THRESHOLD and not threshold:
             raise CasesError(NO_THRESHOLD)

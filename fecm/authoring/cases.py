@@ -108,7 +108,7 @@ def checked(
     check_name, read = (
         (check_free, free_value_of) if free else (check_known, partial(value_of, system=system))
     )
-    made: list[Case] = []
+    checked_cases: list[Case] = []
     remedy = 'write a list of mappings such as [{"velocity": 50.0}]'
     if isinstance(cases, CaseTable):
         cases = _rows(cases)
@@ -120,15 +120,15 @@ def checked(
             raise CasesError(f"{where} is {case!r}, not a mapping of names to values; {remedy}")
         for name in case:
             check_name(name, where)
-        if made and case.keys() != made[0].keys():
+        if checked_cases and case.keys() != checked_cases[0].keys():
             raise CasesError(f"{where} has other names than case 0")
-        made.append({name: read(name, value, where) for name, value in case.items()})
-    if not made:
+        checked_cases.append({name: read(name, value, where) for name, value in case.items()})
+    if not checked_cases:
         raise CasesError("a sweep needs at least one case")
-    for name in made[0]:
-        if len({isinstance(case[name], str) for case in made}) > 1:
+    for name in checked_cases[0]:
+        if len({isinstance(case[name], str) for case in checked_cases}) > 1:
             raise CasesError(f"{name} has numbers and texts")
-    return made
+    return checked_cases
 
 
 def parse_vary(text: str, system: str | None = None) -> tuple[str, list[Value]]:
@@ -200,12 +200,14 @@ def combined(
     if not isinstance(vary, Mapping):
         raise CasesError(f'vary is {vary!r}; write a mapping such as {{"velocity": [50.0, 115.0]}}')
     lists: list[tuple[str, list[Value]]] = []
-    for name, given in vary.items():
+    for name, choices in vary.items():
         values: list[Any] | None = None
         with suppress(TypeError):
-            values = None if isinstance(given, str | bytes) else list(given)
+            values = None if isinstance(choices, str | bytes) else list(choices)
         if values is None:
-            raise CasesError(f'vary: {name} is one value; write a list: {{"{name}": [{given!r}]}}')
+            raise CasesError(
+                f'vary: {name} is one value; write a list: {{"{name}": [{choices!r}]}}'
+            )
         if not values:
             raise CasesError(f"vary: {name} has no values")
         cases = checked(({name: value} for value in values), "vary", free=free, system=system)

@@ -97,22 +97,22 @@ def with_values(deck: Deck, values: Mapping[str, Any]) -> Deck:
         check_known(name, "with_", (*OBJECTS, NONLINEAR, *NAMES))
     if NONLINEAR in values:
         deck = _with_kinematics(deck, nonlinear=values[NONLINEAR])
-    given = {name: value for name, value in values.items() if name in OBJECTS}
-    others = (*OBJECTS, NONLINEAR)
-    numbers = _converted(deck, {name: values[name] for name in values if name not in others})
+    objects_given = {name: value for name, value in values.items() if name in OBJECTS}
+    not_values = (*OBJECTS, NONLINEAR)
+    numbers = _converted(deck, {name: values[name] for name in values if name not in not_values})
     (case,) = checked([numbers], "with_")
     objects = None
-    if given:
+    if objects_given:
         from fecm.authoring.objects import Objects  # 30 ms, which other values need not
 
-        objects = Objects(**given)
+        objects = Objects(**objects_given)
         objects.check()
     try:
-        made = apply_case(deck, case, objects)
+        changed = apply_case(deck, case, objects)
     except LookupError as error:  # a value of a segment that the deck lacks
         raise CasesError(f"with_: {error}") from None
-    is_new = "plate" in given or "laminate" in given
-    return _on_the_clock(deck, made, case) if is_new and "dt" not in case else made
+    is_new = "plate" in objects_given or "laminate" in objects_given
+    return _on_the_clock(deck, changed, case) if is_new and "dt" not in case else changed
 
 
 def _converted(deck: Deck, values: Mapping[str, Any]) -> dict[str, Any]:
@@ -141,12 +141,12 @@ def _with_kinematics(deck: Deck, *, nonlinear: object) -> Deck:
     return replace(deck, segments=kept, text="")
 
 
-def _on_the_clock(deck: Deck, made: Deck, case: Case) -> Deck:
+def _on_the_clock(deck: Deck, changed: Deck, case: Case) -> Deck:
     """Return the new deck with the time step of its plate, if the old step follows a rule."""
     with suppress(CasesError):  # a run states what is wrong with either deck
         if (clock := clock_of(check_deck(deck))) is not None:
-            return with_clock(made, clock, case).deck
-    return made
+            return with_clock(changed, clock, case).deck
+    return changed
 
 
 def with_program(
@@ -176,9 +176,9 @@ def with_cards(deck: Deck, cards: str) -> Deck:
     if END not in map(str.strip, lines[4:]):
         lines += [END, *(table.to_card() for table in deck.tables)]
     reader = Reader("\n".join([*lines, STOP, ""]))
-    found = [problem.deck for problem in reader.problems() if problem.deck is not None]
-    for one in found:
-        compile_program(one.macros, reader.findings)
+    decks = [problem.deck for problem in reader.problems() if problem.deck is not None]
+    for read_deck in decks:
+        compile_program(read_deck.macros, reader.findings)
     if errors := reader.findings.errors:
         raise DeckError(errors, "<macros>")
-    return replace(deck, macros=found[0].macros, tables=found[0].tables)
+    return replace(deck, macros=decks[0].macros, tables=decks[0].tables)

@@ -44,8 +44,8 @@ class Sphere:
 
     def __repr__(self) -> str:
         values = ("radius", self.radius), ("modulus", self.modulus), ("poisson", self.poisson)
-        given = ", ".join(f"{name}={value!r}" for name, value in values if value is not None)
-        return f"Contact.estimate({given})"
+        shown = ", ".join(f"{name}={value!r}" for name, value in values if value is not None)
+        return f"Contact.estimate({shown})"
 
     def law(self, plies: DeckPlies, layers: Sequence[Layer]) -> tuple[Indentation, str]:
         """Return the contact law on layers, and comment lines that say how k was computed."""
@@ -63,16 +63,16 @@ class Sphere:
         materials = [plies.of(layer) for layer in layers]
         try:
             stiffness = effective_stiffness(
-                [one.ply for one in materials],
+                [material.ply for material in materials],
                 [layer.angle for layer in layers],
                 [layer.thickness for layer in layers],
-                [one.nu23 for one in materials],
+                [material.nu23 for material in materials],
             )
             effective = indentation_modulus(stiffness)
             k = float(f"{hertz_coefficient(self.radius, modulus, poisson, effective):.6g}")
         except (ValueError, ArithmeticError) as error:
             raise ObjectError(f"k cannot be estimated: {error}; give a law") from None
-        ratios = " and ".join(dict.fromkeys(f"{one.nu23:g}" for one in materials))
+        ratios = " and ".join(dict.fromkeys(f"{material.nu23:g}" for material in materials))
         return Indentation(k, 0.0, 0.0, ELASTIC_POWER), (
             "! k of EXPE is estimated by the laminate's indentation modulus "
             f"{effective:.5g}: a sphere of radius {self.radius:g},\n"
@@ -85,8 +85,8 @@ def doubts_of_sphere(sphere: Sphere, system: str | None, test: DropWeight | None
     """Yield doubts about a modulus in another unit, and a diameter in place of a radius."""
     doubts: list[str] = []
     names = units_of(system) if system else {}
-    own, modulus = in_si(MODULUS, names), sphere.modulus
-    if modulus is not None and own is not None and not SOFTEST <= modulus * own <= HARDEST:
+    size, modulus = in_si(MODULUS, names), sphere.modulus
+    if modulus is not None and size is not None and not SOFTEST <= modulus * size <= HARDEST:
         unit = likely_unit(modulus, MODULUS, STEEL_IN_SI)
         least, greatest = SOLID
         if unit and least <= modulus * USED[MODULUS][unit] <= greatest:
@@ -194,11 +194,11 @@ def parse_patch(text: str) -> Patch | None:
 
     ``none`` is a point force, None. Raises ValueError for any other text.
     """
-    shape, colon, given = text.partition(":")
+    shape, colon, radius_text = text.partition(":")
     if text == "none":
         return None
     try:
-        radius = float(given) if colon else None
+        radius = float(radius_text) if colon else None
         check_positive(radius=radius)
         return Patch(PATCHES[shape], radius)
     except (KeyError, ValueError):

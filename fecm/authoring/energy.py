@@ -34,12 +34,12 @@ def energy_note(deck: model.Deck, plies: DeckPlies, *, per_thickness: bool) -> s
     """Format energy and velocity of the projectile."""
     energy, velocity = energy_of(deck), deck.require(model.Impact).velocity
     names = units_of(plies.system) if plies.system else {}
-    said = said_energy(deck, plies)
+    text = said_energy(deck, plies)
     if per_thickness:
         share = energy / plies.thickness
-        said += f" ({share / 1e3:.3g} J per mm of thickness)"
+        text += f" ({share / 1e3:.3g} J per mm of thickness)"
     speed = f"{velocity:.4g} {unit_of('length/time', names)}".rstrip()
-    return f"energy {said}, {speed}"
+    return f"energy {text}, {speed}"
 
 
 def doubts_of_energy(

@@ -305,7 +305,7 @@ def impact(
     >>> deck.control.numel
     80
     """
-    made = author(
+    authored = author(
         Request(
             plate,
             laminate,
@@ -324,9 +324,9 @@ def impact(
             zones=tuple(zones),
         )
     )
-    for doubt in made.doubts:
+    for doubt in authored.doubts:
         warn(doubt)
-    loaded = load_deck(made.deck)
+    loaded = load_deck(authored.deck)
     if errors := loaded.errors():
         raise DeckError(errors, "<deck>")
     return replace(loaded.problems[0].deck, text="")
@@ -444,7 +444,7 @@ def _formed(
             segments.append(boundary)
     if nonlinear:  # before the preload and the laminate
         later = (model.Preload, model.Material)
-        place = next(n for n, one in enumerate(segments) if isinstance(one, later))
+        place = next(n for n, part in enumerate(segments) if isinstance(part, later))
         segments.insert(place, model.Nonlinear())
     return Formed(replace(plain, segments=tuple(segments)), comment, notes)
 
@@ -479,8 +479,8 @@ def _doubts_of_duration(duration: float | None, dt: float, system: str | None) -
 def _check_choice(name: str, value: str | None, choices: Sequence[str | None]) -> None:
     """Refuse a text that is not one of the choices."""
     if value not in choices:
-        known = ", ".join(choice for choice in choices if choice is not None)
-        raise ObjectError(f"`{name}` is {value!r}, none of {known}")
+        known_choices = ", ".join(choice for choice in choices if choice is not None)
+        raise ObjectError(f"`{name}` is {value!r}, none of {known_choices}")
 
 
 def _motion(asked: Request, plies: DeckPlies) -> Motion:
@@ -553,12 +553,12 @@ def _preload(asked: Request, plies: DeckPlies) -> model.Preload | None:
     """Return the PREL segment of a membrane force, if there is one."""
     if asked.preload is None:
         return None
-    given = list(asked.preload) if isinstance(asked.preload, Iterable) else []
-    forces = [in_units("preload", force, "force/length", plies.system) for force in given]
-    known = [force for force in forces if is_finite(force)]
-    if len(known) < len(given) or len(given) not in (2, 3):
+    forces_given = list(asked.preload) if isinstance(asked.preload, Iterable) else []
+    forces = [in_units("preload", force, "force/length", plies.system) for force in forces_given]
+    numbers = [force for force in forces if is_finite(force)]
+    if len(numbers) < len(forces_given) or len(forces_given) not in (2, 3):
         raise ObjectError(f"`preload` is {asked.preload!r}, not N0x, N0y and perhaps N0xy")
-    return model.Preload(*map(float, known))
+    return model.Preload(*map(float, numbers))
 
 
 def _gages(places: Iterable[GagePlace]) -> model.Gages | None:

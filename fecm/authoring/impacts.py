@@ -115,18 +115,18 @@ def impacts_of(
 def impacts_from_cards(strikes: Mapping[int, Strike], own_law: Law | None = None) -> Impacts:
     """Return impacts that are given as cards, by the numbers of their cases."""
     rows = list(strikes.values())
-    units = [UNIT if isinstance(one.projectile, RigidMass) else one.projectile for one in rows]
+    units = [UNIT if isinstance(row.projectile, RigidMass) else row.projectile for row in rows]
     kinds = {unit: place for place, unit in enumerate(dict.fromkeys(units))}
-    mass = np.array([one.projectile.total_mass for one in rows])
+    mass = np.array([row.projectile.total_mass for row in rows])
     return Impacts(
         numbers=list(strikes),
-        velocity=np.array([one.velocity for one in rows]),
-        constants=stack_parameters([one.law for one in rows]),
+        velocity=np.array([row.velocity for row in rows]),
+        constants=stack_parameters([row.law for row in rows]),
         kinds=list(kinds),
         kind=np.array([kinds[unit] for unit in units], dtype=np.intp),
         mass=mass,
         scale=np.where([unit is UNIT for unit in units], mass, 1.0),
-        toughness=np.array([_toughness(one) for one in rows]),
+        toughness=np.array([_toughness(row) for row in rows]),
         own_law=own_law,
         cards=rows.__getitem__,
     )
@@ -136,12 +136,12 @@ def _from_values(
     checked: Problem, numbers: Sequence[int], cases: Sequence[Case], own_law: Law | None
 ) -> Impacts | None:
     """Return the impacts of the cases with valid values; None if columns can't hold the values."""
-    own = strike_of(checked.deck)
+    strike = strike_of(checked.deck)
     names = cases[0].keys() - plate_values(cases[0]).keys()
-    if own.impact is None or own.indentation is None or not _fits_columns(own, names):
+    if strike.impact is None or strike.indentation is None or not _fits_columns(strike, names):
         return None
     values = {name: np.array([float(case[name]) for case in cases]) for name in names}
-    columns, valid = _columns(own, own.indentation, values, len(cases))
+    columns, valid = _columns(strike, strike.indentation, values, len(cases))
     rows = np.flatnonzero(valid)
     try:  # what does not depend on these values is the same for all
         for row in rows[:1].tolist():
@@ -159,56 +159,56 @@ def _from_values(
     return impacts.select(rows) if len(rows) else None
 
 
-def _fits_columns(own: Strike, names: Collection[str]) -> bool:
+def _fits_columns(strike: Strike, names: Collection[str]) -> bool:
     """Return whether columns can hold values of these names.
 
     A rod of another mass is another kind.
     """
-    rigid = isinstance(own.projectile, RigidMass)
+    rigid = isinstance(strike.projectile, RigidMass)
     return AS_COLUMNS.issuperset(names) and (rigid or not {*MASSES}.intersection(names))
 
 
 def _columns(
-    own: Strike, law: model.Indentation, values: Mapping[str, Floats], count: int
+    strike: Strike, law: model.Indentation, values: Mapping[str, Floats], count: int
 ) -> tuple[Impacts, Bools]:
     """Return columns of cases with values by name, and a mask of the valid cases.
 
     Missing values are the deck's.
     """
-    projectile, rigid = own.projectile, isinstance(own.projectile, RigidMass)
+    projectile, rigid = strike.projectile, isinstance(strike.projectile, RigidMass)
     total = next((values[name] for name in MASSES if name in values), projectile.total_mass)
     mass = np.array(np.broadcast_to(total, count))
     valid = mass > 0.0
-    velocity = np.array(np.broadcast_to(values.get("velocity", own.velocity), count))
+    velocity = np.array(np.broadcast_to(values.get("velocity", strike.velocity), count))
     with np.errstate(all="ignore"):
         if "energy" in values:
             valid &= values["energy"] >= 0.0
             velocity = np.sqrt(2.0 * values["energy"] / mass)
         valid &= velocity >= 0.0
-    given = [
+    stated = [
         np.array(np.broadcast_to(values.get(name, constant), count))
         for name, constant in zip(CONSTANTS, law.values(), strict=True)
     ]
-    for within, _ in limits_of(law.word, *given):
+    for within, _ in limits_of(law.word, *stated):
         valid &= within
-    toughness = np.array(np.broadcast_to(values.get("giic", _toughness(own)), count))
+    toughness = np.array(np.broadcast_to(values.get("giic", _toughness(strike)), count))
     if "giic" in values:
         valid &= toughness > 0.0
     columns = Impacts(
         numbers=[],
         velocity=velocity,
-        constants=constants_of(law.word, *given),
+        constants=constants_of(law.word, *stated),
         kinds=[UNIT if rigid else projectile],
         kind=np.zeros(count, dtype=np.intp),
         mass=mass,
         scale=mass if rigid else np.ones(count),
         toughness=toughness,
         own_law=None,
-        cards=lambda row: own,
+        cards=lambda row: strike,
     )
     return columns, valid
 
 
-def _toughness(one: Strike) -> float:
+def _toughness(strike: Strike) -> float:
     """Return the toughness of a strike; NaN without a DELA segment."""
-    return math.nan if one.delamination is None else one.delamination.toughness
+    return math.nan if strike.delamination is None else strike.delamination.toughness

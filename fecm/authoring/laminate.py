@@ -118,10 +118,10 @@ class Laminate:
     ply_thickness: float | Mapping[str, float] | None = None
 
     def __post_init__(self) -> None:
-        given = self.ply.values() if isinstance(self.ply, Mapping) else [self.ply]
-        for one in given:
-            if one is not None:  # a zone's laminate may have the plate's material
-                _known(one)
+        plies = self.ply.values() if isinstance(self.ply, Mapping) else [self.ply]
+        for constants in plies:
+            if constants is not None:  # a zone's laminate may have the plate's material
+                _known(constants)
         for ply in self.plies:
             self.material(ply.name)
             self.thickness_of(ply)
@@ -156,7 +156,7 @@ class Laminate:
         Raises ValueError if the thickness of a ply is missing. The own thickness of a named ply is
         in the units of its source.
         """
-        named = [one for ply in self.plies if isinstance(one := self._bound(ply), NamedPly)]
+        named = [bound for ply in self.plies if isinstance(bound := self._bound(ply), NamedPly)]
         system = named[0].system if named else None
         return _total([self.thickness_of(ply) or self._own(ply, system) for ply in self.plies])
 
@@ -213,8 +213,8 @@ class Laminate:
 
     def _bound(self, ply: LaminatePly) -> Ply | NamedPly | None:
         """Return the material of a ply, or None."""
-        given = self.material(ply.name)
-        return None if given is None else _known(given)
+        material = self.material(ply.name)
+        return None if material is None else _known(material)
 
     def _own(self, ply: LaminatePly, system: str | None) -> float:
         """Return the thickness that the name of a ply gives."""
@@ -223,19 +223,19 @@ class Laminate:
 
     def material(self, name: str) -> object:
         """Return the argument that is the material of a name."""
-        given = self.ply if isinstance(self.ply, Mapping) else {"": self.ply}
-        if name in given:
-            return given[name]
+        materials = self.ply if isinstance(self.ply, Mapping) else {"": self.ply}
+        if name in materials:
+            return materials[name]
         if name in MATERIALS:
             return name
-        known = ", ".join(filter(None, given)) or "only plies without a name"
-        said = f"the material {name!r}" if name else "a ply without a material"
-        raise ObjectError(f"`layup` has {said}; the materials given are {known}")
+        names = ", ".join(filter(None, materials)) or "only plies without a name"
+        what = f"the material {name!r}" if name else "a ply without a material"
+        raise ObjectError(f"`layup` has {what}; the materials given are {names}")
 
     def thickness_of(self, ply: LaminatePly) -> float | None:
         """Return the thickness of a ply, positive, where the laminate has it."""
-        given = self.ply_thickness
-        common = given.get(ply.name) if isinstance(given, Mapping) else given
+        stated = self.ply_thickness
+        common = stated.get(ply.name) if isinstance(stated, Mapping) else stated
         thickness = common if ply.thickness is None else ply.thickness
         check_positive(ply_thickness=thickness)
         return thickness
@@ -298,7 +298,7 @@ class DeckPlies(NamedTuple):
     def named(self) -> list[tuple[int, NamedPly]]:
         """Numbers of the materials that have names."""
         numbered = enumerate(self.materials, start=MATERIAL)
-        return [(number, one.named) for number, one in numbered if one.named]
+        return [(number, bound.named) for number, bound in numbered if bound.named]
 
     @property
     def is_coupled(self) -> bool:
@@ -318,18 +318,18 @@ class DeckPlies(NamedTuple):
 
     def segments(self) -> list[Segment]:
         """Return MATE, and MATS and LAMS where there are several materials and laminates."""
-        (first, *others), (own, *zones) = self.materials, self.layups
+        (first, *other_materials), (layup, *zones) = self.materials, self.layups
         integration = Integration(ORDER, ORDER, NODAL_POINTS, self.thickness)
-        made: list[Segment] = [Material(integration, first.ply, own)]
-        if others:
-            numbered = enumerate(others, start=MATERIAL + 1)
-            made.append(
+        segments: list[Segment] = [Material(integration, first.ply, layup)]
+        if other_materials:
+            numbered = enumerate(other_materials, start=MATERIAL + 1)
+            segments.append(
                 Materials(tuple(NumberedPly(MaterialNumber(n), b.ply) for n, b in numbered))
             )
         if zones:
             heads = [LaminateNumber(n, len(z)) for n, z in enumerate(zones, start=MATERIAL + 1)]
-            made.append(Laminates(tuple(map(NumberedLaminate, heads, zones))))
-        return made
+            segments.append(Laminates(tuple(map(NumberedLaminate, heads, zones))))
+        return segments
 
 
 def deck_plies(
@@ -341,36 +341,36 @@ def deck_plies(
     thickness of a ply that comes from its name is noted.
     """
     laminates = (laminate, *zones)
-    owners = {ply.name: one for one in reversed(laminates) for ply in reversed(one.plies)}
-    names = list(dict.fromkeys(ply.name for one in laminates for ply in one.plies))
-    known = {name: _known(owners[name].material(name)) for name in names}
-    named = {name: one for name, one in known.items() if isinstance(one, NamedPly)}
-    system = units or next((one.system for one in named.values()), None)
-    if named and len(named) < len(known) and units is None:
+    owners = {ply.name: item for item in reversed(laminates) for ply in reversed(item.plies)}
+    names = list(dict.fromkeys(ply.name for item in laminates for ply in item.plies))
+    plies_by_name = {name: _known(owners[name].material(name)) for name in names}
+    named = {name: item for name, item in plies_by_name.items() if isinstance(item, NamedPly)}
+    system = units or next((item.system for item in named.values()), None)
+    if named and len(named) < len(plies_by_name) and units is None:
         raise ObjectError("constants of a `ply` beside a named one need `units`, theirs")
     numbers = {name: number for number, name in enumerate(names, start=MATERIAL)}
     materials = [
-        Bound(one.converted(system or one.system), one)
-        if isinstance(one, NamedPly)
-        else Bound(one, None)
-        for one in known.values()
+        Bound(item.converted(system or item.system), item)
+        if isinstance(item, NamedPly)
+        else Bound(item, None)
+        for item in plies_by_name.values()
     ]
-    own: dict[str, float] = {}  # thickness of a material's plies where its name gives it
+    own_thickness: dict[str, float] = {}  # thickness of a material's plies where its name gives it
 
-    def layer(number: int, ply: LaminatePly, given: float | None) -> Layer:
-        if given is None:
-            if ply.name not in own:
-                own[ply.name] = _own_thickness(named.get(ply.name), system)
-                notes.append(_note_of_thickness(own[ply.name], named[ply.name], system))
-            given = own[ply.name]
-        return Layer(number, ply.angle, given, numbers[ply.name])
+    def layer(number: int, ply: LaminatePly, thickness: float | None) -> Layer:
+        if thickness is None:
+            if ply.name not in own_thickness:
+                own_thickness[ply.name] = _own_thickness(named.get(ply.name), system)
+                notes.append(_note_of_thickness(own_thickness[ply.name], named[ply.name], system))
+            thickness = own_thickness[ply.name]
+        return Layer(number, ply.angle, thickness, numbers[ply.name])
 
     layups = [
-        tuple(layer(n, ply, one.thickness_of(ply)) for n, ply in enumerate(one.plies, start=1))
-        for one in laminates
+        tuple(layer(n, ply, item.thickness_of(ply)) for n, ply in enumerate(item.plies, start=1))
+        for item in laminates
     ]
     different = list(dict.fromkeys(layups))
-    in_zones = [different.index(one) + MATERIAL for one in layups[1:]]
+    in_zones = [different.index(item) + MATERIAL for item in layups[1:]]
     return DeckPlies(tuple(different), tuple(materials), system), in_zones
 
 
@@ -433,31 +433,31 @@ def system_asked(units: str | None) -> str | None:
 def _known(ply: object) -> Ply | NamedPly:
     """Return a ply, or the named ply of a name."""
     if isinstance(ply, Ply):
-        check_numbers(**{one.name: getattr(ply, one.name) for one in fields(Ply)[1:]})
+        check_numbers(**{field.name: getattr(ply, field.name) for field in fields(Ply)[1:]})
         return ply
     if isinstance(ply, NamedPly):
         return ply
     if not isinstance(ply, str):
         raise ObjectError(f"`ply` is {ply!r}, not a name or a Ply")
     if ply not in MATERIALS:
-        others = did_you_mean(ply, MATERIALS) or f": {', '.join(MATERIALS)}"
-        raise ObjectError(f"{ply!r} is not a named ply{others}")
+        alternatives = did_you_mean(ply, MATERIALS) or f": {', '.join(MATERIALS)}"
+        raise ObjectError(f"{ply!r} is not a named ply{alternatives}")
     return MATERIALS[ply]
 
 
 def _own_thickness(named: NamedPly | None, system: str | None) -> float:
     """Return the thickness of a named ply."""
-    own = None if named is None or system is None else named.value("thickness", system)
-    if own is None:
+    thickness = None if named is None or system is None else named.value("thickness", system)
+    if thickness is None:
         unknown = f": that of {named.name} is not known" if named else ""
         raise ObjectError(f"`ply_thickness` is missing{unknown}")
-    return own
+    return thickness
 
 
-def _note_of_thickness(own: float, named: NamedPly, system: str | None) -> str:
+def _note_of_thickness(thickness: float, named: NamedPly, system: str | None) -> str:
     """Note the thickness that the name of a ply gives."""
     unit = units_of(system or named.system)["length"]
-    return f"the plies are {own:g} {unit} thick, as {named.name} is listed"
+    return f"the plies are {thickness:g} {unit} thick, as {named.name} is listed"
 
 
 def check_thickness(plies: DeckPlies) -> None:
@@ -467,9 +467,9 @@ def check_thickness(plies: DeckPlies) -> None:
     thinnest = min(layer.thickness for layers in plies.layups for layer in layers)
     if unit is not None and thinnest * unit < THINNEST:
         looks = looks_like(thinnest, "length", USUAL_THICKNESS, names)
-        said = f"; it {looks}" if looks else ""
+        remark = f"; it {looks}" if looks else ""
         raise ObjectError(
-            f"`ply_thickness` is {thinnest:g} {names['length']}, thinner than any ply{said}"
+            f"`ply_thickness` is {thinnest:g} {names['length']}, thinner than any ply{remark}"
         )
 
 
@@ -480,40 +480,40 @@ def toughness(giic: float | None) -> list[Segment]:
 
 def strengths_of(plies: DeckPlies) -> Allowables:
     """Return the ALLO segment of named plies, if one of them has strengths."""
-    found, lacking = _strengths(plies)
-    if not found:
+    strengths, lacking = _strengths(plies)
+    if not strengths:
         why = "; ".join(f"{name} has {lacks}" for name, lacks in lacking.items())
         raise ObjectError(f"`failure` needs a named ply with strengths{why and ': '}{why}")
-    return replace(found[0], others=tuple(found[1:]))
+    return replace(strengths[0], others=tuple(strengths[1:]))
 
 
 def _strengths(plies: DeckPlies) -> tuple[list[Allowables], dict[str, str]]:
     """Return the strengths of named plies, and what the others lack, by name."""
-    found: list[Allowables] = []
+    all_strengths: list[Allowables] = []
     lacking: dict[str, str] = {}
     for number, named in plies.named:
-        if plies.system and (own := named.allowables(plies.system)) is not None:
-            found.append(replace(own, material=number))
+        if plies.system and (strengths := named.allowables(plies.system)) is not None:
+            all_strengths.append(replace(strengths, material=number))
         else:
             lacks = " and ".join(key for key in catalogue.STRENGTHS if key not in named.values)
             lacking[named.name] = (
                 f"no {lacks}, so no failure exposures (ALLO, FAIL); a file of your own plies may "
                 "have them (fecm new --materials)"
             )
-    return found, lacking
+    return all_strengths, lacking
 
 
 def toughness_of(plies: DeckPlies) -> float:
     """Return the least toughness G_IIc of named plies."""
-    if found := _toughnesses(plies):
-        return min(found)
+    if toughnesses := _toughnesses(plies):
+        return min(toughnesses)
     raise ObjectError("no named ply with GIIc")
 
 
 def _toughnesses(plies: DeckPlies) -> list[float]:
     """Return the toughness G_IIc of the named plies that have it."""
-    known = [named.delamination(plies.system) for _, named in plies.named if plies.system]
-    return [one.toughness for one in known if one]
+    delaminations = [named.delamination(plies.system) for _, named in plies.named if plies.system]
+    return [delamination.toughness for delamination in delaminations if delamination]
 
 
 def damages(plies: DeckPlies, giic: float | None, notes: list[str]) -> list[Segment]:
@@ -532,12 +532,12 @@ def damages(plies: DeckPlies, giic: float | None, notes: list[str]) -> list[Segm
     if not strengths and not toughnesses:
         raise ObjectError(f"`damage`: {'; '.join(lacking)}")
     notes += lacking
-    made: list[Segment] = []
+    segments: list[Segment] = []
     if strengths:
-        made.append(replace(strengths[0], others=tuple(strengths[1:])))
+        segments.append(replace(strengths[0], others=tuple(strengths[1:])))
     if toughnesses:
-        made.append(Delamination(min(toughnesses)))
-    return made
+        segments.append(Delamination(min(toughnesses)))
+    return segments
 
 
 def _expanding() -> list[str]:
@@ -550,9 +550,11 @@ def cure_segment(plies: DeckPlies, cure: float | str | None) -> Cure | None:
     if cure is None:
         return None
     expansions: list[Expansion] = []
-    for number, one in enumerate(plies.materials, start=MATERIAL):
-        if one.named is None or (expansion := one.named.expansion) is None:
-            lacks = f"{one.named.name} has no" if one.named else "it needs a named ply with"
+    for number, material in enumerate(plies.materials, start=MATERIAL):
+        if material.named is None or (expansion := material.named.expansion) is None:
+            lacks = (
+                f"{material.named.name} has no" if material.named else "it needs a named ply with"
+            )
             raise ObjectError(
                 f"`cure`: {lacks} alpha1 and alpha2, which "
                 f"{', '.join(_expanding())} have; a file of your own plies may have them (fecm new "
@@ -582,11 +584,11 @@ def _cooling(cure: float | str, plies: Sequence[NamedPly]) -> float:
 
 def _stress_free(cure: float | str, plies: Sequence[NamedPly]) -> float:
     """Return the stress-free temperature of the plies that have one."""
-    known = {ply.values.get("stress_free_temperature") for ply in plies} - {None}
-    if len(known) != 1:
+    temperatures = {ply.values.get("stress_free_temperature") for ply in plies} - {None}
+    if len(temperatures) != 1:
         names = " and ".join(ply.name for ply in plies)
-        why = "not the same" if known else "not known"
+        why = "not the same" if temperatures else "not known"
         raise ObjectError(f"`cure` is {cure!r}: the stress-free temperature of {names} is {why}")
-    (own,) = known
-    assert own is not None
-    return own
+    (temperature,) = temperatures
+    assert temperature is not None
+    return temperature

@@ -124,11 +124,11 @@ def _sections(
 ) -> list[GridSection]:
     """Return the elements in one direction."""
     if grading > 1.0:
-        made = grids.graded(length, count, centre, grading)
+        sections = grids.graded(length, count, centre, grading)
     else:
-        made = grids.uniform_section(length, count)
-    if radius is None or grids.longest_at(made, centre) <= radius:
-        return made
+        sections = grids.uniform_section(length, count)
+    if radius is None or grids.longest_at(sections, centre) <= radius:
+        return sections
     if radius < LEAST_RADIUS * length:
         raise ObjectError(
             f"the mesh is not refined to a radius of {radius:g}, less than {LEAST_RADIUS:g} times "

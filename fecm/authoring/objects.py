@@ -91,16 +91,16 @@ def with_laminate(deck: model.Deck, laminate: Laminate) -> model.Deck:
     plies, _ = deck_plies(laminate, (), system, [])
     if system is None and plies.named:
         raise ObjectError("`laminate` has a named ply: the deck needs a UNIT segment to convert it")
-    material, *others = plies.segments()
+    material, *other_segments = plies.segments()
     assert isinstance(material, model.Material)
     old = deck.require(model.Material)
     integration = replace(old.integration, thickness=plies.thickness, source=None)
-    made = swapped(deck, old, replace(material, integration=integration))
-    kept = [segment for segment in made.segments if not isinstance(segment, model.Materials)]
+    changed = swapped(deck, old, replace(material, integration=integration))
+    kept = [segment for segment in changed.segments if not isinstance(segment, model.Materials)]
     control = replace(deck.control, layers=len(material.layers), source=None)
-    made = replace(made, control=control, segments=(*kept, *others))
-    constants = dict(enumerate((one.ply for one in plies.materials), start=MATERIAL))
-    return made if constants == deck.plies else _with_properties(made, plies)
+    changed = replace(changed, control=control, segments=(*kept, *other_segments))
+    constants = dict(enumerate((bound.ply for bound in plies.materials), start=MATERIAL))
+    return changed if constants == deck.plies else _with_properties(changed, plies)
 
 
 def _with_properties(deck: model.Deck, plies: DeckPlies) -> model.Deck:
@@ -150,16 +150,16 @@ def with_plate(deck: model.Deck, plate: Plate, at: tuple[float, float] | None) -
     )
     kept = tuple(segment for segment in deck.segments if not isinstance(segment, OF_MESH))
     supports = () if boundary is None else (boundary,)
-    made = replace(
+    changed = replace(
         deck,
         control=control,
         segments=(mesh.coordinates(), mesh.element_cards(), *supports, *kept),
     )
     if old is not None and patch is not None:
-        made = swapped(made, old, patch)
+        changed = swapped(changed, old, patch)
     if (strike := deck.last(model.Impact)) is not None:
-        made = swapped(made, strike, replace(strike, node=node, source=None))
-    return made
+        changed = swapped(changed, strike, replace(strike, node=node, source=None))
+    return changed
 
 
 def _refuse(deck: model.Deck, name: str, *kinds: type[model.Segment]) -> None:

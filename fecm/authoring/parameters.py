@@ -89,17 +89,17 @@ def in_units(name: str, value: object, dimension: str, system: str | None) -> fl
         raise ObjectError(f"`{name}` is {value!r}, not a number or a text")
     match = re.fullmatch(rf"\s*({NUMBER})\s*(\S.*)?", value)
     unit = match[2] if match else None
-    known = unit_in_si(unit, dimension) if unit else 1.0
-    if match is None or known is None or not math.isfinite(float(match[1])):
+    factor = unit_in_si(unit, dimension) if unit else 1.0
+    if match is None or factor is None or not math.isfinite(float(match[1])):
         raise ObjectError(
             f"`{name}` is {value!r}, not a number or one with a unit, as in {EXAMPLES[dimension]}"
         )
     if unit is None:
         return float(match[1])
-    own = in_si(dimension, units_of(system)) if system else None
-    if own is None:
+    size = in_si(dimension, units_of(system)) if system else None
+    if size is None:
         raise ObjectError(f"`{name}` is {value!r}: give `units`, the deck's")
-    return float(f"{float(match[1]) * known / own:.9g}")
+    return float(f"{float(match[1]) * factor / size:.9g}")
 
 
 def number_pair(name: str, value: Sequence[float]) -> tuple[float, float]:

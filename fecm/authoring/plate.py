@@ -120,7 +120,7 @@ class Plate:
 
     def _repr_html_(self) -> str:
         """Return a table of the parts of the plate, for notebooks."""
-        values = ((one.name, getattr(self, one.name)) for one in fields(self) if one.repr)
+        values = ((field.name, getattr(self, field.name)) for field in fields(self) if field.repr)
         return html_table(
             Table(tuple((name, str(value)) for name, value in values if value), title="Plate")
         )
@@ -263,16 +263,16 @@ class Plate:
         {'boundary': 'clamped'}
         """
         if isinstance(mesh, tuple):
-            found = plate_mesh.plate_mesh(mesh[0], mesh[1], groups or {})
+            plate = plate_mesh.plate_mesh(mesh[0], mesh[1], groups or {})
         elif groups is not None:
             raise ObjectError("`groups` are for arrays; a mesh has its own")
         elif isinstance(mesh, str | Path):
-            found = plate_mesh.read_mesh(mesh)
+            plate = plate_mesh.read_mesh(mesh)
         elif isinstance(mesh, GridLike):
-            found = plate_mesh.from_pyvista(mesh)
+            plate = plate_mesh.from_pyvista(mesh)
         else:
-            found = plate_mesh.from_meshio(mesh)
-        wanted = {BOUNDARY: support} if isinstance(support, str) else support or {}
-        if not isinstance(wanted, Mapping):
+            plate = plate_mesh.from_meshio(mesh)
+        supports = {BOUNDARY: support} if isinstance(support, str) else support or {}
+        if not isinstance(supports, Mapping):
             raise ObjectError(f"`support` is {support!r}, not a dictionary of groups")
-        return cls(found.supports(wanted), imported=found)
+        return cls(plate.supports(supports), imported=plate)

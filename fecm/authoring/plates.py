@@ -59,8 +59,8 @@ def set_layup(deck: model.Deck, value: Value) -> model.Deck:
     thickness = _common_thickness("layup", deck)
     number = old.layers[0].material
     layers = [Layer(n, angle, thickness, number) for n, angle in enumerate(angles, start=1)]
-    made = _with_layers(deck, layers, len(angles) * thickness)
-    return replace(made, control=replace(deck.control, layers=len(layers), source=None))
+    changed = _with_layers(deck, layers, len(angles) * thickness)
+    return replace(changed, control=replace(deck.control, layers=len(layers), source=None))
 
 
 def set_layer_materials(deck: model.Deck, value: Value) -> model.Deck:
@@ -70,9 +70,9 @@ def set_layer_materials(deck: model.Deck, value: Value) -> model.Deck:
         numbers = parse_layup(str(value), math.inf)
     except LayupError as error:
         raise CasesError(f"layer_materials: {error}") from None
-    known = sorted(deck.plies)
-    if unknown := [number for number in numbers if number not in known]:
-        listed = ", ".join(map(str, known))
+    known_numbers = sorted(deck.plies)
+    if unknown := [number for number in numbers if number not in known_numbers]:
+        listed = ", ".join(map(str, known_numbers))
         raise CasesError(
             f"layer_materials: the deck has no material {unknown[0]:g}; its materials are {listed}"
         )
@@ -174,8 +174,8 @@ def strength(name: str) -> PlateSetter:
         new = replace(ply, **fields, source=None)
         if ply is old:
             return swapped(deck, old, new)
-        others = tuple(new if one is ply else one for one in old.others)
-        return swapped(deck, old, replace(old, others=others, source=None))
+        other_cards = tuple(new if card is ply else card for card in old.others)
+        return swapped(deck, old, replace(old, others=other_cards, source=None))
 
     return changed
 
@@ -185,8 +185,8 @@ def _common_thickness(name: str, deck: model.Deck) -> float:
 
     Raises CasesError if the thicknesses differ.
     """
-    first, *others = (layer.thickness for layer in deck.require(model.Material).layers)
-    if any(thickness != first for thickness in others):
+    first, *other_thicknesses = (layer.thickness for layer in deck.require(model.Material).layers)
+    if any(thickness != first for thickness in other_thicknesses):
         raise CasesError(f"{name}: the plies of the deck differ in thickness")
     return first
 
@@ -275,15 +275,17 @@ def set_support(deck: model.Deck, value: Value) -> model.Deck:
     everywhere = (0, 0, 0, 0, 0) if moves_in_plane(deck) else (1, 1, 0, 0, 0)
     in_plane = "tangential" if is_curved(deck) else "held"
     try:
-        made = plate.supported(everywhere, {BOUNDARY: support}, in_plane=in_plane)
+        boundary = plate.supported(everywhere, {BOUNDARY: support}, in_plane=in_plane)
     except MeshError as error:
         raise CasesError(f"support {support}: {error}") from None
-    others = tuple(s for s in deck.segments if not isinstance(s, model.Boundary))
-    if made is not None and support in ("simple", "pinned") and mesh.elements.shape[1] == 4:
-        codes = restraint_codes([made], deck.control.numnp, deck.control.ndf) != 0
+    other_segments = tuple(s for s in deck.segments if not isinstance(s, model.Boundary))
+    if boundary is not None and support in ("simple", "pinned") and mesh.elements.shape[1] == 4:
+        codes = restraint_codes([boundary], deck.control.numnp, deck.control.ndf) != 0
         if (codes[:, 2] & ~codes[:, 3:].any(axis=1)).any():
             raise CasesError(f"support {support}: elements of four nodes need sides along x or y")
-    return replace(deck, segments=others if made is None else (*others, made))
+    return replace(
+        deck, segments=other_segments if boundary is None else (*other_segments, boundary)
+    )
 
 
 def refine(deck: model.Deck, value: Value) -> model.Deck:

@@ -34,8 +34,8 @@ def clock_of(checked: Problem) -> Clock | None:
         return None
     (dt,) = sizes
     rule = rounded_time_step if dt else taken_time_step
-    taken = rule(checked.critical_time_step)
-    return Clock(taken, rule) if dt in (0.0, taken) else None
+    time_step = rule(checked.critical_time_step)
+    return Clock(time_step, rule) if dt in (0.0, time_step) else None
 
 
 def with_clock(deck: Deck, clock: Clock | None, case: Case) -> Problem:
@@ -62,30 +62,30 @@ def stable_time_step(deck: Deck) -> float:
 
 def duration_of(checked: Problem) -> float:
     """Return the simulated time of a problem."""
-    taken = taken_time_step(checked.critical_time_step)
-    return _length(checked.deck.macros, taken).duration
+    default_step = taken_time_step(checked.critical_time_step)
+    return _length(checked.deck.macros, default_step).duration
 
 
 def lengthened(checked: Problem, factor: float) -> Problem:
     """Return a problem that runs `factor` times as long, with the same time step."""
-    deck, taken = checked.deck, taken_time_step(checked.critical_time_step)
-    macros = with_time_step(deck, None, taken, factor * duration_of(checked)).macros
+    deck, default_step = checked.deck, taken_time_step(checked.critical_time_step)
+    macros = with_time_step(deck, None, default_step, factor * duration_of(checked)).macros
     return replace(checked, program=compile_program(macros, Findings()))
 
 
 def with_time_step(
-    deck: Deck, dt: float | None, taken: float = 0.0, duration: float | None = None
+    deck: Deck, dt: float | None, default_step: float = 0.0, duration: float | None = None
 ) -> Deck:
-    """Change every DT of a deck, and the loops so that the duration is kept, or is another.
+    """Change every DT of a deck, and the loops so that the duration is kept, or changed.
 
-    `taken` is the time step that DT 0 takes in the deck; 0 if no DT is 0. If the new step is None,
-    every DT is kept; if it is not positive, only the DT cards change. Macros that store rows keep
-    approximately their number of rows. Raises CasesError if whole numbers of passes miss the
+    `default_step` is the time step that DT 0 takes in the deck; 0 if no DT is 0. If the new step is
+    None, every DT is kept; if it is not positive, only the DT cards change. Macros that store rows
+    keep approximately their number of rows. Raises CasesError if whole numbers of passes miss the
     duration by a step and by 1 %.
     """
-    before = _length(deck.macros, taken).duration
+    before = _length(deck.macros, default_step).duration
     share = 1.0 if duration is None or not before else duration / before
-    visits = list(_visits(deck.macros, taken))
+    visits = list(_visits(deck.macros, default_step))
     ratios: dict[int, float] = {}  # of the passes, by the place of a LOOP
     for visit in visits:
         if visit.loop is None or visit.macro.word not in STEPS:
@@ -94,10 +94,10 @@ def with_time_step(
             ratios[visit.loop] = share * (1.0 if dt is None else visit.dt / dt)
 
     macros = tuple(_changed(visit, dt, ratios) for visit in visits)
-    wanted, made = share * before, _length(macros, taken)
-    if ratios and abs(made.duration - wanted) > max(0.01 * wanted, made.largest_step):
+    target, length = share * before, _length(macros, default_step)
+    if ratios and abs(length.duration - target) > max(0.01 * target, length.largest_step):
         text = (
-            f"the loops of the deck give the duration {made.duration:.6g} instead of {wanted:.6g}"
+            f"the loops of the deck give the duration {length.duration:.6g} instead of {target:.6g}"
         )
         raise CasesError(f"{text}; take all steps in one loop")
     return replace(deck, macros=macros)
@@ -113,14 +113,14 @@ class _Visit(NamedTuple):
     dt: float  # time step
 
 
-def _visits(cards: Sequence[Macro], taken: float) -> Iterator[_Visit]:
+def _visits(cards: Sequence[Macro], default_step: float) -> Iterator[_Visit]:
     loops: list[tuple[int, float]] = []  # place and passes of the open ones
     dt = 0.0
     for place, macro in enumerate(cards):
         if macro.word == "NEXT" and loops:
             loops.pop()
         elif macro.word == "DT":
-            dt = macro.value or taken
+            dt = macro.value or default_step
         loop, passes = loops[-1] if loops else (None, 1.0)
         yield _Visit(macro, place, loop, passes, dt)
         if macro.word == "LOOP":
@@ -148,7 +148,7 @@ class _Length(NamedTuple):
     largest_step: float
 
 
-def _length(macros: Sequence[Macro], taken: float) -> _Length:
-    steps = [visit for visit in _visits(macros, taken) if visit.macro.word in STEPS]
+def _length(macros: Sequence[Macro], default_step: float) -> _Length:
+    steps = [visit for visit in _visits(macros, default_step) if visit.macro.word in STEPS]
     duration = sum(visit.passes * visit.dt for visit in steps)
     return _Length(duration, max((visit.dt for visit in steps), default=0.0))

@@ -232,15 +232,17 @@ def dimension_of(name: str) -> str:
 def check_names(names: Collection[str]) -> None:
     """Raise CasesError if names exclude each other."""
     for group in EXCLUDING:
-        if len(given := [name for name in group if name in names]) > 1:
-            raise CasesError(f"{given[0]} and {given[1]} exclude each other; vary one of them")
+        if len(present := [name for name in group if name in names]) > 1:
+            raise CasesError(f"{present[0]} and {present[1]} exclude each other; vary one of them")
 
 
-def check_known(name: str, where: str, known: Collection[str] = NAMES) -> None:
+def check_known(name: str, where: str, known_names: Collection[str] = NAMES) -> None:
     """Raise CasesError if a name is unknown, by default if the table lacks it."""
-    if name not in known:
-        others = did_you_mean(str(name), known) or f"; the names are {', '.join(known)}"
-        raise CasesError(f"{where}: `{name}` cannot be varied{others}")
+    if name not in known_names:
+        alternatives = (
+            did_you_mean(str(name), known_names) or f"; the names are {', '.join(known_names)}"
+        )
+        raise CasesError(f"{where}: `{name}` cannot be varied{alternatives}")
 
 
 def check_free(name: object, where: str) -> None:
@@ -303,37 +305,37 @@ def parse_value(name: str, text: str, system: str | None = None) -> Value:
     return int(value)
 
 
-def value_of(name: str, given: object, where: str, system: str | None = None) -> Value:
+def value_of(name: str, value: object, where: str, system: str | None = None) -> Value:
     """Return the value of a name that a caller of Python has given.
 
     A text with a unit, or a quantity, is converted to a system of units. Raises CasesError if the
     value is invalid.
     """
-    given = text_of(given)
-    if isinstance(given, np.generic):
-        given = given.item()
-    if isinstance(given, bool):
-        raise CasesError(f"{where}: {name} can't be {given}")
+    value = text_of(value)
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, bool):
+        raise CasesError(f"{where}: {name} can't be {value}")
     if (
         kind_of(name) is ValueKind.TEXT
-        and isinstance(given, Iterable)
-        and not isinstance(given, str)
+        and isinstance(value, Iterable)
+        and not isinstance(value, str)
     ):
         separator = {"at": ",", "size": "x"}.get(name, "/")
-        given = separator.join(map(str, given))
+        value = separator.join(map(str, value))
     try:
         # float() reports what is not a number
-        text = given if isinstance(given, str) else repr(float(given))  # type: ignore[arg-type]
+        text = value if isinstance(value, str) else repr(float(value))  # type: ignore[arg-type]
         return parse_value(name, text, system)
     except (TypeError, ValueError) as error:
-        text = str(error) if isinstance(error, CasesError) else f"{name} can't be {given!r}"
+        text = str(error) if isinstance(error, CasesError) else f"{name} can't be {value!r}"
         raise CasesError(f"{where}: {text}") from None
 
 
-def free_value_of(name: str, given: object, where: str) -> Value:
+def free_value_of(name: str, value: object, where: str) -> Value:
     """Return the value of a name that the caller chose: a finite number or a text."""
-    if isinstance(given, np.generic):
-        given = given.item()
-    if isinstance(given, str) or (isinstance(given, float | int) and math.isfinite(given)):
-        return given
-    raise CasesError(f"{where}: {name} is {given!r}, not a finite number or a text")
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, str) or (isinstance(value, float | int) and math.isfinite(value)):
+        return value
+    raise CasesError(f"{where}: {name} is {value!r}, not a finite number or a text")

@@ -58,43 +58,43 @@ def apply_case(deck: Deck, case: Case, objects: Objects | None = None) -> Deck:
     A deck without a patch gets a disc.  Raises CasesError if a value is invalid for this deck.
     """
     check_names(case)
-    made = deck
+    changed = deck
     if objects is not None:
         at = pair_of_text("at", str(case["at"])) if "at" in case else None
-        made = objects.with_plate(deck, at)
+        changed = objects.with_plate(deck, at)
         if objects.plate is not None:  # which is struck there already
             case = {name: value for name, value in case.items() if name != "at"}
     for name, setter in _PLATE_SETTERS.items():
         if name in case:
-            made = setter(made, case[name])
+            changed = setter(changed, case[name])
     if objects is not None:
-        made = objects.with_strike(made)
+        changed = objects.with_strike(changed)
     if not case.keys().isdisjoint(_STRIKE_SETTERS):
-        made = strike_of_case(made, case).deck()
-    if not is_coupled(deck) and is_coupled(made):
-        made = free_in_plane(made)
-    if is_curved(made) and not is_curved(deck):
-        check_free_in_plane(made)
-    return replace(_timed(deck, made, case), text="")
+        changed = strike_of_case(changed, case).deck()
+    if not is_coupled(deck) and is_coupled(changed):
+        changed = free_in_plane(changed)
+    if is_curved(changed) and not is_curved(deck):
+        check_free_in_plane(changed)
+    return replace(_timed(deck, changed, case), text="")
 
 
 def strike_of_case(plate: Deck, case: Case) -> Strike:
     """Return the strike of a plate with the values of a case; values of the plate are ignored."""
-    made = strike_of(plate)
+    strike = strike_of(plate)
     for name, setter in _STRIKE_SETTERS.items():
         if name in case:
-            made = setter(made, case[name])
-    return made
+            strike = setter(strike, case[name])
+    return strike
 
 
-def _timed(deck: Deck, made: Deck, case: Case) -> Deck:
+def _timed(deck: Deck, changed: Deck, case: Case) -> Deck:
     """Apply time step and duration to a deck with the other values of a case."""
     dt, duration = (float(case[n]) if n in case else None for n in ("dt", "duration"))
     if duration is not None and not duration > 0.0:
         raise CasesError(f"duration must be positive, not {duration:g}")
     if dt == 0.0:
-        dt = stable_time_step(made)
+        dt = stable_time_step(changed)
     if dt is None and duration is None:
-        return made
-    given = all(macro.value for macro in deck.macros if macro.word == "DT")
-    return with_time_step(made, dt, 0.0 if given else stable_time_step(deck), duration)
+        return changed
+    are_fixed = all(macro.value for macro in deck.macros if macro.word == "DT")
+    return with_time_step(changed, dt, 0.0 if are_fixed else stable_time_step(deck), duration)

@@ -36,10 +36,12 @@ class ElementLaminates(NamedTuple):
 def laminates_of(laminate: Laminate, zones: Sequence[Zone]) -> list[Laminate]:
     """Return the laminates of the zones; a layup has the materials of the plate's laminate."""
     try:
-        own = [layup for _, layup in zones]
+        layups = [layup for _, layup in zones]
     except (TypeError, ValueError):
         raise ObjectError(f"`zones` is {zones!r}, not pairs of a place and a layup") from None
-    return [one if isinstance(one, Laminate) else replace(laminate, layup=one) for one in own]
+    return [
+        item if isinstance(item, Laminate) else replace(laminate, layup=item) for item in layups
+    ]
 
 
 def placed_zones(
@@ -53,12 +55,18 @@ def placed_zones(
     if not zones:
         return ElementLaminates(MATERIAL, None)
     control = model.Control(mesh.nodes, mesh.elements, 1, 2, 5, mesh.most_nodes)
-    made = generate(model.Deck("", control, (mesh.coordinates(), mesh.element_cards()), ()))
+    mesh_of_plate = generate(
+        model.Deck("", control, (mesh.coordinates(), mesh.element_cards()), ())
+    )
     numbers = np.full(mesh.elements, MATERIAL)
     for (place, _), laminate in zip(zones, laminates, strict=True):
-        inside = _group(mesh, place) if isinstance(place, str) else _rectangle(made, place, doubts)
+        inside = (
+            _group(mesh, place)
+            if isinstance(place, str)
+            else _rectangle(mesh_of_plate, place, doubts)
+        )
         numbers[inside] = laminate
-    struck = int(numbers[(made.elements == node).any(axis=1)][0])
+    struck = int(numbers[(mesh_of_plate.elements == node).any(axis=1)][0])
     records = _runs(numbers)
     return ElementLaminates(struck, model.Zones(records) if records else None)
 
@@ -67,10 +75,10 @@ def _group(mesh: AnyMesh, name: str) -> Indices:
     """Return the elements of a group of surfaces."""
     surfaces = mesh.surfaces if isinstance(mesh, PlateMesh) else {}
     if name not in surfaces:
-        known = f"its groups of elements are {', '.join(sorted(surfaces))}"
+        existing = f"its groups of elements are {', '.join(sorted(surfaces))}"
         raise ObjectError(
             f"`zone` {name!r} is no rectangle x0,y0,x1,y1 and no group of the mesh; "
-            f"{known if surfaces else 'it has no groups of elements'}"
+            f"{existing if surfaces else 'it has no groups of elements'}"
         )
     return surfaces[name]
 
@@ -81,15 +89,15 @@ def _rectangle(mesh: MeshArrays, place: Sequence[float], doubts: list[str]) -> B
         x0, y0, x1, y1 = map(float, place)
     except (TypeError, ValueError):
         raise ObjectError(f"`zone` is at {place!r}, not x0, y0, x1 and y1 or a group") from None
-    said = f"`zone` {x0:g},{y0:g},{x1:g},{y1:g}"
+    zone = f"`zone` {x0:g},{y0:g},{x1:g},{y1:g}"
     if not (x0 < x1 and y0 < y1):
-        raise ObjectError(f"{said} is empty: x0 and y0 are its lower corner, x1 and y1 its upper")
+        raise ObjectError(f"{zone} is empty: x0 and y0 are its lower corner, x1 and y1 its upper")
     corners = mesh.coordinates[mesh.elements[:, :CORNERS] - 1]
     centres = corners.mean(axis=1)
     low, high = np.array([x0, y0]), np.array([x1, y1])
     inside = np.asarray(((centres >= low) & (centres <= high)).all(axis=1))
     if not inside.any():
-        raise ObjectError(f"{said} has no element whose centre lies in it")
+        raise ObjectError(f"{zone} has no element whose centre lies in it")
     least, most = corners.min(axis=1), corners.max(axis=1)
     slack = SAME * (most - least)
     within = ((least >= low - slack) & (most <= high + slack)).all(axis=1)
@@ -97,7 +105,7 @@ def _rectangle(mesh: MeshArrays, place: Sequence[float], doubts: list[str]) -> B
     if cut := int((~within & ~beside).sum()):
         reach = ", ".join(f"{n:.6g}" for n in (*least[inside].min(0), *most[inside].max(0)))
         doubts.append(
-            f"the edge of {said} cuts {cut} elements; those whose centres lie in it have its "
+            f"the edge of {zone} cuts {cut} elements; those whose centres lie in it have its "
             f"laminate, and it reaches over {reach}"
         )
     return inside

@@ -94,8 +94,8 @@ class LazyGroup(click.Group):
         """Import a command."""
         if (command := COMMANDS.get(cmd_name)) is None:
             return None
-        found: click.Command = getattr(import_module(command.module), f"{cmd_name}_command")
-        return found
+        loaded: click.Command = getattr(import_module(command.module), f"{cmd_name}_command")
+        return loaded
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
@@ -110,7 +110,7 @@ class LazyGroup(click.Group):
         """List the commands with their summaries."""
         for title, commands in GROUPED.items():
             with formatter.section(title):
-                formatter.write_dl([(name, one.summary) for name, one in commands.items()])
+                formatter.write_dl([(name, command.summary) for name, command in commands.items()])
 
     def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
         """Complete the name of a command or an option."""

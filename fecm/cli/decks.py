@@ -178,8 +178,8 @@ def _print(prepared: LoadedDeck, form: Format, *, brief: bool, passes: bool) -> 
             echo(finding.render(prepared.source))
         if passes:
             counts = Counter(finding.severity for finding in prepared.findings)
-            found = [f"{n} {word}{'s' * (n != 1)}" for word, n in counts.items()]
-            echo(f"{prepared.source}: {', '.join(found) or 'no findings'}")
+            counted = [f"{n} {word}{'s' * (n != 1)}" for word, n in counts.items()]
+            echo(f"{prepared.source}: {', '.join(counted) or 'no findings'}")
 
 
 def _compare_meshes(prepared: LoadedDeck, mode: str, form: Format) -> None:
@@ -193,29 +193,32 @@ def _compare_meshes(prepared: LoadedDeck, mode: str, form: Format) -> None:
         force, length = (unit_of(name, units) for name in ("force", "length"))
         fine = bisected(problem)
         with progress("fecm", problem.work.steps + fine.work.steps) as advance:
-            found = compare_peaks(problem, fine, RunOptions(active_slips(mode, ())), advance)
+            estimate = compare_peaks(problem, fine, RunOptions(active_slips(mode, ())), advance)
         if form is Format.JSON:
-            changes = {"change": found.change, "relative_change": found.relative_change}
+            changes = {"change": estimate.change, "relative_change": estimate.relative_change}
             head = {"kind": "mesh_error", "file": prepared.source}
-            echo_json({**head, **vars(found), **changes, "units": units})
+            echo_json({**head, **vars(estimate), **changes, "units": units})
             continue
-        share = found.relative_change
+        share = estimate.relative_change
         about = "no contact" if share is None else f"{share:+.2%}"
         coarse, refined = (
-            f"{peak:.5g} {force}".rstrip() for peak in (found.peak_force, found.refined_peak_force)
+            f"{peak:.5g} {force}".rstrip()
+            for peak in (estimate.peak_force, estimate.refined_peak_force)
         )
-        near = f"within {found.distance:.3g} {length}".rstrip()
-        change = f"{found.change:+.3g} {force}".rstrip()
-        label = "largest force so far" if found.undecided else "peak force"
-        echo(f"  {label:22}{coarse} on {found.elements} elements")
-        echo(f"    bisected            {refined} on {found.refined_elements}, {near} of the load")
+        near = f"within {estimate.distance:.3g} {length}".rstrip()
+        change = f"{estimate.change:+.3g} {force}".rstrip()
+        label = "largest force so far" if estimate.undecided else "peak force"
+        echo(f"  {label:22}{coarse} on {estimate.elements} elements")
+        echo(
+            f"    bisected            {refined} on {estimate.refined_elements}, {near} of the load"
+        )
         echo(f"    change              {change} ({about})")
-        for criterion, exposure in found.exposures.items():
-            finer = found.refined_exposures.get(criterion, math.nan)
+        for criterion, exposure in estimate.exposures.items():
+            finer = estimate.refined_exposures.get(criterion, math.nan)
             change = f" ({finer / exposure - 1.0:+.1%})" if exposure else ""
             values = f"{exposure:.4g}, bisected {finer:.4g}{change}"
             echo(f"  exposure            {spelt(criterion)} {values}")
-        if found.undecided:
+        if estimate.undecided:
             note("a run ends before its peak: these forces are lower bounds; take more steps")
 
 

@@ -72,8 +72,8 @@ def _tolerance(name: str, values: object) -> tuple[float, ...]:
     except (TypeError, ValueError, OverflowError):
         numbers = ()
     if len(numbers) not in (1, 2) or not all(0 <= number < math.inf for number in numbers):
-        given = ",".join(map(str, parts))
-        raise ValueError(f"{name}: `{given}` is not R or R,T with finite numbers from 0")
+        text = ",".join(map(str, parts))
+        raise ValueError(f"{name}: `{text}` is not R or R,T with finite numbers from 0")
     return numbers
 
 
@@ -85,19 +85,22 @@ def _own(text: str) -> tuple[str, tuple[float, ...]]:
 
 def _tolerances(text: str) -> Tolerances:
     """Parse the contents of a tolerance file."""
-    given = parsed_toml(text)
-    if unknown := given.keys() - {"rtol", "atol", "exclude", "tol"}:
+    tables = parsed_toml(text)
+    if unknown := tables.keys() - {"rtol", "atol", "exclude", "tol"}:
         raise ValueError(f"{min(unknown)} is unknown; the keys are rtol, atol, exclude and tol")
-    exclude, own = given.get("exclude", []), given.get("tol", {})
+    exclude, patterns = tables.get("exclude", []), tables.get("tol", {})
     if not isinstance(exclude, list) or not all(isinstance(name, str) for name in exclude):
         raise ValueError("exclude is not a list of texts")
-    if not isinstance(own, dict):
+    if not isinstance(patterns, dict):
         raise ValueError('tol is not a table; begin it with [tol], and give "NAME" = RTOL')
     rtol, atol = (
-        _tolerance(name, [given[name]])[0] if name in given else None for name in ("rtol", "atol")
+        _tolerance(name, [tables[name]])[0] if name in tables else None for name in ("rtol", "atol")
     )
     return Tolerances(
-        rtol, atol, tuple(exclude), tuple((name, _tolerance(name, own[name])) for name in own)
+        rtol,
+        atol,
+        tuple(exclude),
+        tuple((name, _tolerance(name, patterns[name])) for name in patterns),
     )
 
 
@@ -174,7 +177,7 @@ def diff_command(options: DiffOptions) -> None:
     Exit status: 0 equal, 1 different, 2 unusable file or call.
     """
     asked = options.tolerances()
-    found = compare(
+    difference = compare(
         options.a,
         options.b,
         asked.rtol,
@@ -184,19 +187,19 @@ def diff_command(options: DiffOptions) -> None:
         tol=_by_pattern(asked.own),
     )
     if options.form is Format.JSON:
-        echo_json(found.to_dict(same=not options.brief))
+        echo_json(difference.to_dict(same=not options.brief))
     elif options.brief:
-        click.echo("\n".join([*map(printable, found.different), found.verdict]))
+        click.echo("\n".join([*map(printable, difference.different), difference.verdict]))
     else:
-        click.echo("\n".join(found.lines()))
-    if not found.same:
+        click.echo("\n".join(difference.lines()))
+    if not difference.same:
         raise SystemExit(FAILED)
 
 
-def _by_pattern(own: Iterable[tuple[str, tuple[float, ...]]]) -> dict[str, tuple[float, ...]]:
+def _by_pattern(pairs: Iterable[tuple[str, tuple[float, ...]]]) -> dict[str, tuple[float, ...]]:
     """Return the tolerances by pattern, in the order in which each was given last."""
     latest: dict[str, tuple[float, ...]] = {}
-    for pattern, values in own:
+    for pattern, values in pairs:
         latest.pop(pattern, None)
         latest[pattern] = values
     return latest

@@ -29,9 +29,9 @@ def estimate_command(deck: Path, form: Format) -> None:
     and energy are the values at which the peak force reaches the delamination threshold. The models
     without a mesh neglect DAMP, and the infinite plate neglects PREL.
     """
-    found = estimate_problem(load_single(deck, "estimate"))
-    note(*found.notes)
+    estimate = estimate_problem(load_single(deck, "estimate"))
+    note(*estimate.notes)
     if form is Format.JSON:
-        echo_json(found.to_dict())
+        echo_json(estimate.to_dict())
     else:
-        echo(found)
+        echo(estimate)

@@ -34,8 +34,8 @@ def example_command(name: str | None, output: Path | None, overwrite: bool) -> N
     if name is None:
         if output or overwrite:
             raise click.UsageError("give the NAME of an example")
-        for known, content in examples.CONTENTS.items():
-            echo(f"{known:<22}{content}")
+        for example, content in examples.CONTENTS.items():
+            echo(f"{example:<22}{content}")
         return
     try:
         source = examples.path(name)

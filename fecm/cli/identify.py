@@ -120,23 +120,23 @@ def identify_command(options: IdentifyOptions) -> None:
     problem = load_single(options.deck, "identify")
     units = unit_names(problem.deck)
     measured = measurement_of(options.measured, units, options.columns or (), options.units or ())
-    found = _fit(problem.deck, measured, options)
-    targets.draw("histories:force_fit_picture", found, units)
+    fit = _fit(problem.deck, measured, options)
+    targets.draw("histories:force_fit_picture", fit, units)
     if output is not None:
-        write_lines([found.deck.to_text()], output, overwrite=overwrite)
+        write_lines([fit.deck.to_text()], output, overwrite=overwrite)
         note(f"wrote {output}")
     if options.page is not None:
         # 0.5 s with matplotlib, which other fits do not need.
         from fecm.report.report import write_report
 
-        write_report({measured.name: found}, options.page, overwrite=overwrite)
+        write_report({measured.name: fit}, options.page, overwrite=overwrite)
         note(f"wrote {options.page}")
-    note(*found.notes)
+    note(*fit.notes)
     if options.form is Format.JSON:
-        echo_json(found.to_dict())
+        echo_json(fit.to_dict())
     else:
-        echo(found)
-    if not found.accepted:
+        echo(fit)
+    if not fit.accepted:
         raise SystemExit(FAILED)
 
 

@@ -120,18 +120,18 @@ def fit_command(options: FitOptions) -> None:
     except StudyError as error:
         raise RefusedError(as_options(str(error), PARAMETERS)) from None
     try:
-        found = fit_law(read, q=options.q, acr=options.acr, turn=options.turn)
+        fit = fit_law(read, q=options.q, acr=options.acr, turn=options.turn)
     except StudyError as error:
         raise RefusedError(as_options(f"{test}: {error}", PARAMETERS)) from None
     names = {**read.units, "time": "s"} if read.units else {}
     options.targets.draw(
-        "studies:indentation_fit_picture", read.indentation, read.force, found.fit, names
+        "studies:indentation_fit_picture", read.indentation, read.force, fit.fit, names
     )
-    note(*(as_options(text, PARAMETERS) for text in found.notes))
+    note(*(as_options(text, PARAMETERS) for text in fit.notes))
     if options.form is Format.JSON:
-        click.echo(json.dumps({"file": str(test), **found.to_dict()}))
+        click.echo(json.dumps({"file": str(test), **fit.to_dict()}))
     else:
-        click.echo(found)
+        click.echo(fit)
 
 
 def _law(deck: Path) -> tuple[Deck, Indentation]:
@@ -269,17 +269,17 @@ def _permanent(
     problem: Deck, card: Indentation, options: CurveOptions
 ) -> tuple[LinearPermanent, YangSunPermanent]:
     """Return the permanent indentations of 3-8 and 3-7: of the options, the deck, or the report."""
-    own = build_constants(card)
+    constants = build_constants(card)
     line, alpha_cr = options.line, options.alpha_cr
-    if line is None and isinstance(own, LinearPermanent):
-        line = float(own.alpha_p), float(own.s_p)
+    if line is None and isinstance(constants, LinearPermanent):
+        line = float(constants.alpha_p), float(constants.s_p)
     elif line is None:
         line = _report_length(problem, catalogue.ALPHA_P, "alpha_p", "--line"), catalogue.S_P
-    if alpha_cr is None and isinstance(own, YangSunPermanent):
-        alpha_cr = float(own.alpha_cr)
+    if alpha_cr is None and isinstance(constants, YangSunPermanent):
+        alpha_cr = float(constants.alpha_cr)
     elif alpha_cr is None:
         alpha_cr = _report_length(problem, catalogue.ALPHA_CR, "alpha_cr", "--alpha-cr")
-    q = own.q if options.q is None else options.q
+    q = constants.q if options.q is None else options.q
     return LinearPermanent(card.k, *line, q), YangSunPermanent(card.k, alpha_cr)
 
 

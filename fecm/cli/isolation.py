@@ -69,8 +69,10 @@ def reads(*names: str) -> Callable[[Command], Command]:
             if not (enabled and sys.platform == "linux"):
                 function(**values)
                 return
-            given = (values[name] for name in names)
-            files = [f for value in given for f in (value if isinstance(value, tuple) else [value])]
+            inputs = (values[name] for name in names)
+            files = [
+                f for value in inputs for f in (value if isinstance(value, tuple) else [value])
+            ]
             memory, seconds = limits_for(list(map(_size, files)), available_memory())
             label = printable(" or ".join(map(str, dict.fromkeys(files))))
             sys.stdout.flush()

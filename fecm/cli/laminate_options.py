@@ -93,12 +93,14 @@ class LaminateOptions:
             materials[""] = self.one_ply()
         thicknesses = dict(self.ply_thickness or {})
         default = thicknesses.get("")
-        known = MATERIALS | click.get_current_context().meta[_META] | materials
+        plies_by_name = MATERIALS | click.get_current_context().meta[_META] | materials
         for name, thickness in cores:
             letter = name if re.fullmatch(LETTER, name) else CORE
             if letter != name and letter in materials:
                 raise click.UsageError(f"--core {name}: {CORE} is another material already")
-            materials[letter] = known[name] if name in known else _unknown(name, known)
+            materials[letter] = (
+                plies_by_name[name] if name in plies_by_name else _unknown(name, plies_by_name)
+            )
             thicknesses[letter] = thickness
         used = {ply.name for ply in self.layup or ()}
         if default is not None:
@@ -119,7 +121,7 @@ def laminate_options(
     *, required: bool, thickness_required: bool = False
 ) -> Callable[[Decorated], Decorated]:
     """Add the options of a laminate, which the command receives as `laminate`."""
-    own = "" if thickness_required else "  [default: that of a named ply]"
+    default = "" if thickness_required else "  [default: that of a named ply]"
     return stack_options(
         option(
             "--layup",
@@ -134,7 +136,7 @@ def laminate_options(
             multiple=True,
             callback=_by_letter,
             required=thickness_required,
-            help=f"Thickness of a ply, also of one material.{own}",
+            help=f"Thickness of a ply, also of one material.{default}",
         ),
         option(
             "--ply",
@@ -182,23 +184,23 @@ def _thickness(text: str) -> tuple[str, float]:
 
 
 def _by_letter(
-    context: click.Context, parameter: click.Parameter, given: Iterable[tuple[str, float]]
+    context: click.Context, parameter: click.Parameter, pairs: Iterable[tuple[str, float]]
 ) -> dict[str, float] | None:
     """Collect the values by letter; None without values."""
-    return unique(given, context, parameter) or None
+    return unique(pairs, context, parameter) or None
 
 
 def unique(
-    given: Iterable[tuple[str, T]], context: click.Context, parameter: click.Parameter
+    pairs: Iterable[tuple[str, T]], context: click.Context, parameter: click.Parameter
 ) -> dict[str, T]:
     """Return values by name; each name may occur once."""
-    found: dict[str, T] = {}
-    for name, value in given:
-        if name in found:
-            said = f"{name} is given twice" if name else "give it once, or with letters"
-            raise click.BadParameter(said, context, parameter)
-        found[name] = value
-    return found
+    by_name: dict[str, T] = {}
+    for name, value in pairs:
+        if name in by_name:
+            message = f"{name} is given twice" if name else "give it once, or with letters"
+            raise click.BadParameter(message, context, parameter)
+        by_name[name] = value
+    return by_name
 
 
 def _named(
@@ -206,12 +208,12 @@ def _named(
 ) -> dict[str, NamedPly] | None:
     """Collect the plies of --material by letter; None without plies."""
     plies: dict[str, NamedPly] = MATERIALS | context.meta[_META]
-    given = [("", name) if name in plies else _lettered(name) for name in names]
-    found = {
+    pairs = [("", name) if name in plies else _lettered(name) for name in names]
+    plies_by_letter = {
         letter: plies[name] if name in plies else _unknown(name, plies, context, parameter)
-        for letter, name in unique(given, context, parameter).items()
+        for letter, name in unique(pairs, context, parameter).items()
     }
-    return found or None
+    return plies_by_letter or None
 
 
 def _unknown(

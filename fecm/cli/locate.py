@@ -122,7 +122,7 @@ def locate_command(options: LocateOptions) -> None:
         options.output or DASH, options.picture, options.overwrite, options.deck, options.strains
     )
     problem = load_single(options.deck, "locate")
-    wanted = LocationSettings(
+    settings = LocationSettings(
         options.region,
         options.grid,
         options.basis,
@@ -133,16 +133,16 @@ def locate_command(options: LocateOptions) -> None:
         options.mesh_error,
     )
     with every_minute(lambda minutes: f"fecm: locating for {minutes} min"):
-        found = located(problem, options.strains, wanted)
-    targets.draw("location:location_picture", found)
+        location = located(problem, options.strains, settings)
+    targets.draw("location:location_picture", location)
     if options.output is not None:
         with signals.deferred():
-            found.save(options.output, overwrite=options.overwrite)
+            location.save(options.output, overwrite=options.overwrite)
         note(f"wrote {options.output}")
-    note(*found.notes)
+    note(*location.notes)
     if options.form is Format.JSON:
-        echo_json(found.to_dict())
+        echo_json(location.to_dict())
     else:
-        echo(found)
-    if not found.accepted:
+        echo(location)
+    if not location.accepted:
         raise SystemExit(FAILED)

@@ -133,16 +133,16 @@ class NewOptions:
     plies: tuple[int, ...] | None
     failure: int | None
 
-    def plate(self, given: Collection[str]) -> Plate:
-        """Return mesh and supports; `given` are the options on the command line."""
+    def plate(self, on_command_line: Collection[str]) -> Plate:
+        """Return mesh and supports; `on_command_line` are the options on the command line."""
         if self.fixture:
-            return self._plate_on_fixture(self.fixture, given)
+            return self._plate_on_fixture(self.fixture, on_command_line)
         if isinstance(self.mesh, Path):
             for name in RECTANGLE:
-                if name in given:
+                if name in on_command_line:
                     raise ObjectError(f"`mesh` is a file; leave out `{name}`")
-            wanted = {BOUNDARY: self.support} if "support" in given else {}
-            return Plate.from_mesh(self.mesh, wanted | dict(self.edges))
+            supports = {BOUNDARY: self.support} if "support" in on_command_line else {}
+            return Plate.from_mesh(self.mesh, supports | dict(self.edges))
         return Plate.rectangle(
             self.size,
             self.mesh,
@@ -153,14 +153,14 @@ class NewOptions:
             rows=self.rows,
         )
 
-    def _plate_on_fixture(self, fixture: str, given: Collection[str]) -> Plate:
+    def _plate_on_fixture(self, fixture: str, on_command_line: Collection[str]) -> Plate:
         """Return a plate on a fixture, which has its own size and supports."""
         for name in FIXED:
-            if name in given:
+            if name in on_command_line:
                 raise ObjectError(f"`fixture` has its own plate and supports; leave out `{name}`")
         if isinstance(self.mesh, Path):
             raise ObjectError("`fixture` has its own plate and supports; `mesh` is NXxNY")
-        grading = self.grading if "grading" in given else None
+        grading = self.grading if "grading" in on_command_line else None
         return Plate.on_fixture(fixture, self.mesh, grading=grading)
 
 
@@ -388,17 +388,19 @@ def new_command(options: NewOptions) -> None:
         check_outputs([output], overwrite)
     context = click.get_current_context()
     source = context.get_parameter_source
-    given = {name for name in context.params if source(name) is ParameterSource.COMMANDLINE}
+    on_command_line = {
+        name for name in context.params if source(name) is ParameterSource.COMMANDLINE
+    }
     try:
-        made = _author(options, given)
+        authored = _author(options, on_command_line)
     except (ObjectError, ImportError) as error:
         raise click.UsageError(as_options(str(error), context.params)) from None
-    notes = [as_options(text, context.params) for text in (*made.doubts, *made.notes)]
-    notes += _additions(made.deck)
-    text = made.comments + format_deck(made.deck.to_text())
+    notes = [as_options(text, context.params) for text in (*authored.doubts, *authored.notes)]
+    notes += _additions(authored.deck)
+    text = authored.comments + format_deck(authored.deck.to_text())
     prepared = load_deck(text)
     if errors := prepared.errors():
-        note(*(as_options(text, context.params) for text in made.doubts))
+        note(*(as_options(text, context.params) for text in authored.doubts))
         for finding in errors:
             echo(finding.render("the new deck"), err=True)
         raise RefusedError("these options do not give a valid deck; nothing was written")
@@ -410,12 +412,12 @@ def new_command(options: NewOptions) -> None:
         echo(output)
 
 
-def _author(options: NewOptions, given: Collection[str]) -> Authored:
+def _author(options: NewOptions, on_command_line: Collection[str]) -> Authored:
     """Return the deck of the options of ``fecm new``.
 
-    `given` has the options on the command line.
+    `on_command_line` has the options on the command line.
     """
-    plate = options.plate(given)
+    plate = options.plate(on_command_line)
     prescribed = plate.fixture is not None and plate.fixture.test is not None
     law, contact = options.law, options.contact
     if (law is None) == (contact is None) and (law is not None or not prescribed):
@@ -433,7 +435,7 @@ def _author(options: NewOptions, given: Collection[str]) -> Authored:
                 options.at,
             ),
             Numerics(
-                options.patch if "patch" in given else AUTO,
+                options.patch if "patch" in on_command_line else AUTO,
                 options.shear,
                 options.shear_factor,
                 options.duration,
@@ -457,11 +459,11 @@ def _author(options: NewOptions, given: Collection[str]) -> Authored:
     )
 
 
-def _rows_of_plies(given: tuple[int, ...] | None) -> RowsOfPlies | None:
+def _rows_of_plies(numbers: tuple[int, ...] | None) -> RowsOfPlies | None:
     """Return the steps between rows of ply stresses, and perhaps the number of elements."""
-    if given is None:
+    if numbers is None:
         return None
-    steps, *elements = given
+    steps, *elements = numbers
     return (steps, elements[0]) if elements else steps or False
 
 

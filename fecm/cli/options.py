@@ -45,12 +45,12 @@ def collected(kind: type, name: str = "options") -> Callable[[Decorated], Decora
     The fields of the dataclass have the names of the options and arguments. The object is the
     parameter `name`. Values that are not fields stay parameters.
     """
-    own = [field.name for field in fields(kind)]
+    names = [field.name for field in fields(kind)]
 
     def decorate(function: Decorated) -> Decorated:
         @functools.wraps(function)
         def command(**values: Any) -> None:
-            values[name] = kind(**{key: values.pop(key) for key in own})
+            values[name] = kind(**{key: values.pop(key) for key in names})
             function(**values)
 
         return command
@@ -63,7 +63,7 @@ def job_options(job: Any, **settings: Mapping[str, Any]) -> Callable[[Decorated]
 
     `settings` of click, such as the type, complete or replace those of some options.
     """
-    declared = {n: one for n, one in declared_options(job).items() if one[0].group}
+    declared = {n: field for n, field in declared_options(job).items() if field[0].group}
 
     def decorate(function: Decorated) -> Decorated:
         @functools.wraps(function)
@@ -83,29 +83,29 @@ def _click_option(name: str, about: Option, default: Any, settings: Mapping[str,
     flags = [about.flag or f"--{name.replace('_', '-')}"]
     if about.flag == "-o":
         flags.append("--output")
-    made: dict[str, Any] = {"help": about.help, "metavar": about.metavar}
+    attributes: dict[str, Any] = {"help": about.help, "metavar": about.metavar}
     if default is False:
-        made["is_flag"] = True
+        attributes["is_flag"] = True
     elif default == ():
-        made["multiple"] = True
+        attributes["multiple"] = True
     elif default is not None:
-        made |= {"default": default, "show_default": "default" not in settings}
+        attributes |= {"default": default, "show_default": "default" not in settings}
     if about.choices:
         is_long = len(about.choices) > MOST_CHOICES
-        made["type"] = OneOf(about.choices) if is_long else click.Choice(about.choices)
-    made |= settings
-    if made.get("multiple"):
-        made["help"] += "  May be repeated."
-    return click.option(*flags, name, **made)
+        attributes["type"] = OneOf(about.choices) if is_long else click.Choice(about.choices)
+    attributes |= settings
+    if attributes.get("multiple"):
+        attributes["help"] += "  May be repeated."
+    return click.option(*flags, name, **attributes)
 
 
-def groups_of(job: Any, own: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
+def groups_of(job: Any, own_groups: Mapping[str, Sequence[str]]) -> dict[str, list[str]]:
     """Return the options of a job by headings of the help page, before the command's own groups."""
-    groups: dict[str, list[str]] = {title: [] for title in own}
+    groups: dict[str, list[str]] = {title: [] for title in own_groups}
     for name, (about, _) in declared_options(job).items():
         if about.group:
             groups[about.group].append(name)
-    return {title: [*names, *own[title]] for title, names in groups.items()}
+    return {title: [*names, *own_groups[title]] for title, names in groups.items()}
 
 
 class NamedFile(click.Path):
@@ -323,7 +323,10 @@ class HelpGroup(click.Group):
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the commands."""
-        rows = [(name, one.get_short_help_str(limit=1000)) for name, one in self.commands.items()]
+        rows = [
+            (name, command.get_short_help_str(limit=1000))
+            for name, command in self.commands.items()
+        ]
         with formatter.section("Commands"):
             formatter.write_dl(sorted(rows))
 

@@ -293,13 +293,15 @@ def _draw(
     with progress("fecm", len(kinds)) as advance, warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         for kind in kinds:
-            own = {name: options[name] for name in options_of(kind) if name in options}
+            options_of_kind = {name: options[name] for name in options_of(kind) if name in options}
             try:
-                pictures[kind] = draw(kind, results, **own)
+                pictures[kind] = draw(kind, results, **options_of_kind)
             except LackingError as error:
                 lacking[kind] = error
             advance(1)
-    notes = [str(one.message) for one in caught if issubclass(one.category, FecmWarning)]
+    notes = [
+        str(warning.message) for warning in caught if issubclass(warning.category, FecmWarning)
+    ]
     notes += [text for picture in pictures.values() for text in picture.notes]
     note(*dict.fromkeys(notes))
     return pictures, lacking

@@ -47,9 +47,11 @@ def report_command(
     from fecm.report.report import digest, write_report
 
     paths = named(results)
-    found = {name: run_or_sweep(read(one, Form.RUN, Form.SWEEP)) for name, one in paths.items()}
-    digests = {name: digest(one) for name, one in paths.items()}
-    write_report(found, path, digests, overwrite=overwrite)
+    loaded = {
+        name: run_or_sweep(read(place, Form.RUN, Form.SWEEP)) for name, place in paths.items()
+    }
+    digests = {name: digest(place) for name, place in paths.items()}
+    write_report(loaded, path, digests, overwrite=overwrite)
     echo(path)
     if opens and click.launch(str(path)):
         raise RefusedError(f"{path} is written, but no browser could be started")

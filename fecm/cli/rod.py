@@ -179,7 +179,7 @@ def pulse(options: PulseOptions) -> None:
     Force is positive in compression.
     """
     struck = _uniform(options.shape) if options.deck is None else _of_deck(options)
-    found = simulate_rod_test(
+    test = simulate_rod_test(
         struck,
         pulse_test.pulse_of(options.pulse, struck.units),
         options.dt,
@@ -190,11 +190,11 @@ def pulse(options: PulseOptions) -> None:
         options.integrator,
     )
     targets = options.targets
-    targets.draw("studies:pulse_picture", found, found.filtered, found.units)
-    columns, rows = pulse_test.pulse_table(found, found.filtered)
-    targets.write(columns, found.units, rows)
+    targets.draw("studies:pulse_picture", test, test.filtered, test.units)
+    columns, rows = pulse_test.pulse_table(test, test.filtered)
+    targets.write(columns, test.units, rows)
     if targets.table != DASH:
-        click.echo(found)
+        click.echo(test)
 
 
 def _uniform(shape: Shape) -> Struck:
@@ -210,10 +210,10 @@ def _uniform(shape: Shape) -> Struck:
 
 def _of_deck(options: PulseOptions) -> Struck:
     """Return the rod of the first problem of a deck."""
-    deck, given = options.deck, options.shape.given()
+    deck, options_given = options.deck, options.shape.given()
     assert deck is not None
-    if given:
-        raise click.UsageError(f"--{given[0]} is for a rod without a deck; {deck} has one")
+    if options_given:
+        raise click.UsageError(f"--{options_given[0]} is for a rod without a deck; {deck} has one")
     problems = load_valid(deck)
     if not problems:
         raise RefusedError(f"{deck} contains no problem")
@@ -290,14 +290,14 @@ def calibrate_command(
     V_a gives c_F = (c_a / m) V_F / V_a.
     """
     measured = read_table(test)
-    found = measured.find(("time", "V_F", "V_a"), columns or ())
-    units = [column.unit for column in found]
+    columns_found = measured.find(("time", "V_F", "V_a"), columns or ())
+    units = [column.unit for column in columns_found]
     if bool(units[1]) != bool(units[2]):
         raise RefusedError(
             f"{test}: one of V_F and V_a is in {units[1] or units[2]}; name both units"
         )
     target = {"time": units[0], "voltage": units[2]}
-    time, v_f, v_a = measured.values(found, target, increasing="time")
+    time, v_f, v_a = measured.values(columns_found, target, increasing="time")
     try:
         fit = fit_sensitivity(v_f, v_a, mass, c_a, through_origin=through_origin)
     except StudyError as error:

@@ -31,27 +31,27 @@ def verify_command(cases: tuple[str, ...], listing: bool, markdown: bool, form: 
     """
     if markdown and (listing or form is Format.JSON):
         raise RefusedError("--markdown goes with neither --list nor --format json")
-    wanted = chosen(cases)
+    selected = chosen(cases)
     if listing and form is Format.JSON:
-        listed = [{"case": c.name, "title": c.title, "rows": len(c.checks)} for c in wanted]
+        listed = [{"case": c.name, "title": c.title, "rows": len(c.checks)} for c in selected]
         click.echo(json.dumps({"cases": listed}, ensure_ascii=False))
         return
     if listing:
-        width = max(len(one.name) for one in wanted)
-        for one in wanted:
-            click.echo(f"{one.name.ljust(width)}  {one.title}")
+        width = max(len(case.name) for case in selected)
+        for case in selected:
+            click.echo(f"{case.name.ljust(width)}  {case.title}")
         return
     # The same rows twice: for the output as they are computed, and for the verdict.
-    rows, kept = tee(chain.from_iterable(map(compute_rows, wanted)))
+    rows, kept = tee(chain.from_iterable(map(compute_rows, selected)))
     if markdown:
         click.echo(verification_page(rows), nl=False)
     elif form is Format.JSON:
-        found = list(rows)
-        values = [row.to_dict() for row in found]
-        told = {"ok": all(row.within for row in found), "rows": values}
-        click.echo(json.dumps(told, ensure_ascii=False, allow_nan=False))
+        rows_found = list(rows)
+        values = [row.to_dict() for row in rows_found]
+        document = {"ok": all(row.within for row in rows_found), "rows": values}
+        click.echo(json.dumps(document, ensure_ascii=False, allow_nan=False))
     else:
-        for line in table_lines(wanted, rows):  # the table grows while the rows are computed
+        for line in table_lines(selected, rows):  # the table grows while the rows are computed
             click.echo(line)
     fine = [row.within for row in kept]
     bad, count = fine.count(False), f"{len(fine)} row{'s' * (len(fine) != 1)}"

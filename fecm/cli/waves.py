@@ -64,7 +64,7 @@ class _ListCommand(click.Command):
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Put the option before every further number that follows one of these options."""
         options = [param for param in self.params if isinstance(param, click.Option)]
-        names = {name for one in options if one.multiple for name in one.opts}
+        names = {name for option in options if option.multiple for name in option.opts}
         end = args.index("--") if "--" in args else len(args)
         repeated: list[str] = []
         last, waits = "", False
@@ -100,25 +100,25 @@ class LaminateSource:
     def waves(self) -> Waves:
         """Return the waves in the laminate."""
         if self.deck is not None:
-            found = self._of_deck(self.deck)
+            result = self._of_deck(self.deck)
         elif self.laminate.layup is None:
             message = "give a DECK, or --layup, --ply-thickness and --ply or --material"
             raise click.UsageError(message)
         else:
-            laminate, own = self.laminate.authored({}, ()), self.laminate
+            laminate, options = self.laminate.authored({}, ()), self.laminate
             try:
-                found = waves_in(laminate, shear_factor=self.shear_factor, units=own.units)
+                result = waves_in(laminate, shear_factor=self.shear_factor, units=options.units)
             except ObjectError as error:
-                raise click.UsageError(as_options(str(error), vars(own))) from None
-        note(*found.notes)
-        return found
+                raise click.UsageError(as_options(str(error), vars(options))) from None
+        note(*result.notes)
+        return result
 
     def _of_deck(self, deck: Path) -> Waves:
         """Return the waves in the laminate of a deck's first problem."""
         for name, value in vars(self.laminate).items():
             if value is not None:
-                given = name.replace("_", "-")
-                raise click.UsageError(f"--{given} describes a laminate; {deck} has one already")
+                option = name.replace("_", "-")
+                raise click.UsageError(f"--{option} describes a laminate; {deck} has one already")
         problems = load_valid(deck, "; no waves were computed", warnings=False)
         if len(problems) > 1:
             note(f"{deck} has {len(problems)} problems; the laminate of the first is used")
@@ -278,16 +278,16 @@ def fronts(
     _bound(5 * len(times) * 360.0 / step)
     waves = source.waves()
     start = waves.thickness if radius is None else radius
-    found = waves.fronts(_normals(step))
-    if not math.isfinite(max(times) * float(found.velocity.max()) + start):
+    surfaces = waves.fronts(_normals(step))
+    if not math.isfinite(max(times) * float(surfaces.velocity.max()) + start):
         raise RefusedError("the positions of the fronts overflow at these times")
-    positions = [found.positions(time, start).tolist() for time in times]
-    rays, normals = found.ray_angle.tolist(), found.normal.tolist()
+    positions = [surfaces.positions(time, start).tolist() for time in times]
+    rays, normals = surfaces.ray_angle.tolist(), surfaces.normal.tolist()
     rows = (
-        (mode, normal, time, *positions[at][row][place], rays[row][place])
-        for place, mode in enumerate(found.modes)
+        (mode, normal, time, *positions[number][row][place], rays[row][place])
+        for place, mode in enumerate(surfaces.modes)
         for row, normal in enumerate(normals)
-        for at, time in enumerate(times)
+        for number, time in enumerate(times)
     )
     targets.draw("studies:fronts_picture", waves.surfaces, times, start, waves.units)
     _note_names(waves)
@@ -295,10 +295,12 @@ def fronts(
         cusps = waves.cusps(time, start)
         if not cusps:
             note(f"no cusps at time {time:g}")
-        for mode in found.modes:
-            if own := [cusp for cusp in cusps if cusp.mode == mode]:
-                texts = (f"normal {c.normal:.4f} deg at {c.x:.6g}, {c.y:.6g}" for c in own)
-                note(f"{mode} has {len(own)} cusps at time {time:g}: {'; '.join(texts)}")
+        for mode in surfaces.modes:
+            if cusps_of_mode := [cusp for cusp in cusps if cusp.mode == mode]:
+                texts = (
+                    f"normal {c.normal:.4f} deg at {c.x:.6g}, {c.y:.6g}" for c in cusps_of_mode
+                )
+                note(f"{mode} has {len(cusps_of_mode)} cusps at time {time:g}: {'; '.join(texts)}")
     dimensions = {
         "mode": "",
         "normal_deg": "",

@@ -296,8 +296,8 @@ class Record:
         if BLANK not in arguments:
             return cls(*arguments, source=source)
         names = (attribute.name for attribute in dataclasses.fields(cls)[1:])
-        given = {n: value for n, value in zip(names, arguments, strict=False) if value != BLANK}
-        return cls(**given, source=source)
+        stated = {n: value for n, value in zip(names, arguments, strict=False) if value != BLANK}
+        return cls(**stated, source=source)
 
     def row(self) -> list[Value]:
         """Return the values in the card's order; a blank for an attribute that is None."""

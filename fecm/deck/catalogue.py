@@ -127,9 +127,9 @@ class NamedPly(NamedTuple):
     def constants(self, system: str) -> dict[str, float]:
         """Return the known constants, and G13 and G23, in a system of units."""
         ply = self.converted(system)
-        known = {key: self.value(key, system) for key in self.values}
-        found = {"G13": ply.g13, "G23": ply.g23, **known}
-        return {key: value for key, value in found.items() if value is not None}
+        stated = {key: self.value(key, system) for key in self.values}
+        all_constants = {"G13": ply.g13, "G23": ply.g23, **stated}
+        return {key: value for key, value in all_constants.items() if value is not None}
 
     def to_dict(self, system: str) -> dict[str, object]:
         """Return name, units, all constants by :data:`KEYS`, and source; None where not known."""
@@ -218,7 +218,7 @@ def _other_form(text: str) -> str:
     try:
         json.loads(text)
     except ValueError:
-        first = next((one for one in lines_of(text) if one.strip() and one[0] != "#"), "")
+        first = next((line for line in lines_of(text) if line.strip() and line[0] != "#"), "")
         is_table = "=" not in first and begin != "[" and re.search("[,;\t]", first)
         return "a table (CSV)" if is_table else ""
     return "JSON"

@@ -156,18 +156,20 @@ class Findings:
             message = f"There are {MOST} errors or more; the rest of the file is not checked."
             self._all.append(Finding("E000", message))
 
-    def extend(self, found: Iterable[Finding]) -> None:
+    def extend(self, findings: Iterable[Finding]) -> None:
         """Add findings as :meth:`add` does."""
-        for finding in found:
+        for finding in findings:
             self.add(finding.code, finding.message, finding.place, finding.hint)
 
     def __iter__(self) -> Iterator[Finding]:
         """Iterate in the order of the deck; findings without a place come last."""
         more = len(self) - self.error_count - MOST
-        found = list(self._all)
+        findings = list(self._all)
         if more > 0:
-            found.append(Finding("W000", f"{more} more warnings are not shown."))
-        return iter(sorted(found, key=lambda f: (f.place is None, f.place.line if f.place else 0)))
+            findings.append(Finding("W000", f"{more} more warnings are not shown."))
+        return iter(
+            sorted(findings, key=lambda f: (f.place is None, f.place.line if f.place else 0))
+        )
 
     def __len__(self) -> int:
         return self.counts.total()

@@ -52,7 +52,7 @@ def format_deck(text: str, source: str = "<text>") -> str:
             written += [rest.rstrip() for rest in lines[number:]]
             break
     mark = "\ufeff" if text.startswith("\ufeff") else ""
-    end = found[0] if (found := re.search("\r?\n|\r", text)) else "\n"
+    end = match[0] if (match := re.search("\r?\n|\r", text)) else "\n"
     return mark + end.join([*written, ""])
 
 

@@ -109,9 +109,9 @@ def graded(length: float, elements: int, centre: float, ratio: float) -> list[Gr
             right = _series(length - centre, elements - n, ratio)
             return abs(math.log(_series(centre, n, ratio)[0] / right[0]))
 
-        left = min(range(1, elements), key=unlike)
-        steps = _series(centre, left, ratio)[::-1]
-        steps += _series(length - centre, elements - left, ratio)
+        on_left = min(range(1, elements), key=unlike)
+        steps = _series(centre, on_left, ratio)[::-1]
+        steps += _series(length - centre, elements - on_left, ratio)
     inner = [round_to(total, length) for total in accumulate(steps[:-1])]
     return [GridSection(start, end, 1) for start, end in pairwise([0.0, *inner, length])]
 
@@ -165,12 +165,12 @@ def round_to(value: float, scale: float) -> float:
 
 def grid_lines(sections: Sequence[GridSection]) -> list[float]:
     """Return the coordinates of the lines of nodes: two per element, and the last."""
-    found: list[float] = []
+    lines: list[float] = []
     for section in sections:
         count = 2 * section.elements
         step = (section.end - section.start) / count
-        found += [section.start + i * step for i in range(count)]
-    return [*found, sections[-1].end]
+        lines += [section.start + i * step for i in range(count)]
+    return [*lines, sections[-1].end]
 
 
 @dataclass(frozen=True)
@@ -277,13 +277,13 @@ class ElementGrid:
         for name, code in edges.items():
             np.maximum(parts[name], code, out=parts[name])
         if window is not None:
-            left, right = _nearest_lines(self.columns, window[0])
+            first, last = _nearest_lines(self.columns, window[0])
             low, high = _nearest_lines(self.rows, window[1])
-            across, up = slice(left, right + 1), slice(low, high + 1)
+            across, up = slice(first, last + 1), slice(low, high + 1)
             along_x, along_y = (np.array([*held, *W_HELD]) for held in IN_PLANE[in_plane])
             for line in (low, high):
                 codes[line, across] = np.maximum(codes[line, across], along_x)
-            for line in (left, right):
+            for line in (first, last):
                 codes[up, line] = np.maximum(codes[up, line], along_y)
         return boundary_cards(codes.reshape(self.nodes, -1))
 

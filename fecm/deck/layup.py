@@ -108,17 +108,17 @@ def _readings(plain: str, compact: str, largest: float) -> list[str]:
     """Return the readings of a layup whose separators are ambiguous, separated by ``/``."""
     # Blanks after a comma show that it separates.
     commas = [_DECIMAL_COMMA.sub(".", compact)] if ", " not in plain else []
-    found: list[str] = []
-    for one in (*commas, compact.replace(",", "/")):
-        for blanks in (one, _BEFORE_REPEATS.sub("", one), one.replace(" ", "")):
+    readings: list[str] = []
+    for candidate in (*commas, compact.replace(",", "/")):
+        for blanks in (candidate, _BEFORE_REPEATS.sub("", candidate), candidate.replace(" ", "")):
             reading = blanks.replace(" ", "/")
             try:
                 _parse(reading, largest)
             except LayupError:
                 continue
-            if "," not in reading and reading not in found:
-                found.append(reading)
-    return found
+            if "," not in reading and reading not in readings:
+                readings.append(reading)
+    return readings
 
 
 def _unclear(text: str, what: str, readings: Sequence[str]) -> LayupError:
@@ -190,8 +190,8 @@ def _group(text: str, start: int, largest: float, depth: int = 1) -> tuple[list[
             angle = _angle(match["angle"] or "0", text, position, largest)
             name = match["of"] or match["alone"] or ""
             signs = {"±": (1.0, -1.0), "∓": (-1.0, 1.0)}.get(match["pair"], (1.0,))
-            one = [LayupPly(sign * angle, name) for sign in signs]
-            plies += one * _times(match["times"] or "1", len(one), text, position)
+            signed_plies = [LayupPly(sign * angle, name) for sign in signs]
+            plies += signed_plies * _times(match["times"] or "1", len(signed_plies), text, position)
             position = match.end()
         if len(plies) > MOST_PLIES:
             raise _error(text, position)

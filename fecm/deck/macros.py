@@ -420,29 +420,29 @@ def with_outputs(
     :data:`PLY_ROWS` rows of ply stresses; an existing macro keeps its number. Raises RowsError if a
     number is not positive and whole.
     """
-    made = list(macros)
+    changed = list(macros)
     if every is not None:
         rows = _count("every", every)
         for new in (_Output(HISTORY, rows), _Output(FIELDS, rows)):
-            made = [new.changed(macro) if macro.word == new.word else macro for macro in made]
+            changed = [new.changed(macro) if macro.word == new.word else macro for macro in changed]
     for output in (_of_failure(failure), _of_plies(plies)):
         if output is not None:
-            made = _with_output(made, output)
-    return tuple(made)
+            changed = _with_output(changed, output)
+    return tuple(changed)
 
 
-def _of_plies(given: RowsOfPlies | None) -> _Output | None:
-    if given is None:
+def _of_plies(rows: RowsOfPlies | None) -> _Output | None:
+    if rows is None:
         return None
-    if not isinstance(given, tuple):
-        return _Output(PLIES, _rows("plies", given))
-    if len(given) != 2:
-        raise RowsError(f"`plies` is {given!r}, not a number of steps and one of elements")
-    return _Output(PLIES, _rows("plies", given[0]), _count("plies", given[1]))
+    if not isinstance(rows, tuple):
+        return _Output(PLIES, _rows("plies", rows))
+    if len(rows) != 2:
+        raise RowsError(f"`plies` is {rows!r}, not a number of steps and one of elements")
+    return _Output(PLIES, _rows("plies", rows[0]), _count("plies", rows[1]))
 
 
-def _of_failure(given: Rows | None) -> _Output | None:
-    return None if given is None else _Output(FAILURE, _rows("failure", given))
+def _of_failure(rows: Rows | None) -> _Output | None:
+    return None if rows is None else _Output(FAILURE, _rows("failure", rows))
 
 
 def _rows(name: str, value: object) -> Rows:
@@ -463,7 +463,7 @@ def _with_output(macros: Sequence[Macro], output: _Output) -> list[Macro]:
     if any(macro.word == output.word for macro in macros):
         return [output.changed(m) if m.word == output.word else m for m in macros]
     step = next((every(macro) for macro in macros if macro.word == HISTORY), 1)
-    made: list[Macro] = []
+    changed: list[Macro] = []
     loops: list[int] = []  # passes of the open ones
     stepping: set[int] = set()  # depths of those that take steps
     for macro in macros:
@@ -475,9 +475,9 @@ def _with_output(macros: Sequence[Macro], output: _Output) -> list[Macro]:
         elif macro.word == "NEXT" and loops:
             passes = loops.pop()
             if depth in stepping:
-                made.append(output.macro(passes, step))
+                changed.append(output.macro(passes, step))
             stepping.discard(depth)
-        made.append(macro)
-    if len(made) == len(macros):
-        made.append(output.macro(1, 1))
-    return made
+        changed.append(macro)
+    if len(changed) == len(macros):
+        changed.append(output.macro(1, 1))
+    return changed

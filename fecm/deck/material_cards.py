@@ -125,16 +125,20 @@ class Material(Segment, keyword="MATE"):
             yield record.to_card()
 
 
-def read_layers(head: Card, cards: CardStream, count: int, said: str) -> tuple[Layer, ...] | None:
-    """Read layer cards; None if one of the `said` cards is missing or unreadable."""
-    taken: list[Card] = []
-    while len(taken) < count and (card := cards.take_data()) is not None and not card.is_blank:
-        taken.append(card)
-    numbered = any(text.strip() for card in taken for _, text in card.cut(Layer.fields)[3:4])
+def read_layers(
+    head: Card, cards: CardStream, count: int, stated_by: str
+) -> tuple[Layer, ...] | None:
+    """Read layer cards; None if one of the `stated_by` cards is missing or unreadable."""
+    layer_cards: list[Card] = []
+    while (
+        len(layer_cards) < count and (card := cards.take_data()) is not None and not card.is_blank
+    ):
+        layer_cards.append(card)
+    numbered = any(text.strip() for card in layer_cards for _, text in card.cut(Layer.fields)[3:4])
     fields = Layer.fields if numbered else Layer.plain
-    read = [cards.record(card, Layer, fields) for card in taken]
-    if len(taken) < count:
-        message = f"{head.keyword} has {len(taken)} layer cards where {said} {count}."
+    read = [cards.record(card, Layer, fields) for card in layer_cards]
+    if len(layer_cards) < count:
+        message = f"{head.keyword} has {len(layer_cards)} layer cards where {stated_by} {count}."
         cards.findings.add("E202", message, (card or cards.peek() or head).place)
         return None
     layers = tuple(layer for layer in read if layer is not None)
@@ -221,10 +225,10 @@ class Allowables(Segment, keyword="ALLO"):
     def from_row(cls, values: Sequence[Value], source: CardSource | None) -> Self:
         """Build the strengths of a material from its first card or from both."""
         count = len(cls.fields)
-        *given, s12, s13, s23 = values[:count]
+        *first_values, s12, s13, s23 = values[:count]
         s13 = s12 if s13 == BLANK else s13
         s23 = s13 if s23 == BLANK else s23
-        return super().from_row([*given, s12, s13, s23, *values[count:]], source)
+        return super().from_row([*first_values, s12, s13, s23, *values[count:]], source)
 
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self | None:
@@ -260,8 +264,8 @@ class Allowables(Segment, keyword="ALLO"):
     def cards(self, control: Control) -> Iterator[str]:
         """Return the text of the segment's cards."""
         yield self.keyword
-        for one in (self, *self.others):
-            yield from one._pair()
+        for item in (self, *self.others):
+            yield from item._pair()
 
     def _pair(self) -> Iterator[str]:
         """Return the text of the cards of this material."""
@@ -274,7 +278,10 @@ class Allowables(Segment, keyword="ALLO"):
 
     def of(self, material: int) -> Allowables | None:
         """Return the strengths of a material; None if they are not given."""
-        return next((one for one in (self, *self.others) if one.material == material), None)
+        return next(
+            (strengths for strengths in (self, *self.others) if strengths.material == material),
+            None,
+        )
 
 
 @dataclass(frozen=True)
@@ -404,4 +411,4 @@ class Cure(Segment, keyword="CURE"):
 
     def expansion(self, material: int) -> Expansion | None:
         """Return the expansion of a material; None if it has none."""
-        return next((one for one in self.expansions if one.material == material), None)
+        return next((card for card in self.expansions if card.material == material), None)

@@ -150,8 +150,8 @@ class Deck(Record):
 
     def last(self, kind: type[_S]) -> _S | None:
         """Return the last segment of one kind, which is the effective one; None without one."""
-        found = self.all(kind)
-        return found[-1] if found else None
+        segments = self.all(kind)
+        return segments[-1] if segments else None
 
     def require(self, kind: type[_S]) -> _S:
         """Return the effective segment of one kind.
@@ -172,8 +172,8 @@ class Deck(Record):
         Raises LookupError without a MATE segment.
         """
         card = self.last(Materials)
-        others = {} if card is None else {one.number: one.ply for one in card.plies}
-        return others | {MATERIAL: self.require(Material).ply}
+        other_plies = {} if card is None else {one.number: one.ply for one in card.plies}
+        return other_plies | {MATERIAL: self.require(Material).ply}
 
     @property
     def layers(self) -> dict[int, tuple[Layer, ...]]:
@@ -184,7 +184,7 @@ class Deck(Record):
         layers = {MATERIAL: self.require(Material).layers}
         card = self.last(Laminates)
         if card is not None and self.has(Zones):
-            layers |= {one.number: one.layers for one in card.laminates}
+            layers |= {laminate.number: laminate.layers for laminate in card.laminates}
         return layers
 
     def with_(self, **values: Unpack[Values]) -> Deck:

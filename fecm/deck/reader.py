@@ -281,18 +281,18 @@ class Reader:
         self.findings.add("E004", "The mesh data are not ended by END.", title.place)
         return segments
 
-    def _stray(self, card: Card, known: list[str]) -> None:
+    def _stray(self, card: Card, keywords: list[str]) -> None:
         """Report a card in place of a keyword, once for all cards up to the next keyword."""
         if card.is_keyword:
-            near = _close(card.keyword, known)
+            near = _close(card.keyword, keywords)
             self.cards.unsound.update(near)
             message = f"`{card.data.split()[0]}` is not a keyword here."
-            hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(known)}"
+            hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(keywords)}"
             place = CardPlace(card.line, 1, min(4, len(card.data)), card.text)
             self.findings.add("E005", message, place, hint)
         elif card.data.lstrip()[:1].isalpha():
             word = card.data.split()[0]
-            self.cards.unsound.update(_close(word[:4].upper(), known))
+            self.cards.unsound.update(_close(word[:4].upper(), keywords))
             message = f"The keyword `{word}` does not begin in column 1."
             self.findings.add("E005", message, card.place, "move it to the left")
         else:
@@ -300,7 +300,7 @@ class Reader:
             why = "a segment has more cards than its counts say"
             hint = f"{why}, or a blank card ended it too early"
             self.findings.add("E006", message, card.place, hint)
-        if known != [MACROS]:
+        if keywords != [MACROS]:
             self.cards.skip_data()
 
     def _program(self, title: Card) -> list[Macro]:
@@ -388,14 +388,14 @@ def _other_file(lines: Sequence[str]) -> OtherFile | None:
     text = "\n".join(line.lstrip() for line in lines[:FIRST_LINES])
     if re.search(rf"^{TITLE}", text, re.MULTILINE):
         return None
-    known = (o for o in OTHER_FILES if re.search(f"^(?:{o.lines})", text, re.I | re.M))
-    return next(known, None)
+    matches = (o for o in OTHER_FILES if re.search(f"^(?:{o.lines})", text, re.I | re.M))
+    return next(matches, None)
 
 
-def _close(word: str, known: list[str]) -> list[str]:
+def _close(word: str, keywords: list[str]) -> list[str]:
     import difflib  # 1 ms, and only what is misspelt needs it
 
-    return difflib.get_close_matches(word, known, 1, 0.6)
+    return difflib.get_close_matches(word, keywords, 1, 0.6)
 
 
 def read_deck(path_or_text: str | Path | AnyFile) -> Deck | list[Deck]:

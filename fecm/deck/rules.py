@@ -106,8 +106,8 @@ def apply(
 ) -> bool:
     """Apply rules one after the other; return whether they found no error."""
     before = findings.error_count
-    for one in rules:
-        findings.extend(one(*args, **kwargs))
+    for rule_function in rules:
+        findings.extend(rule_function(*args, **kwargs))
     return findings.error_count == before
 
 
@@ -118,7 +118,7 @@ def apply_first(
     **kwargs: P.kwargs,
 ) -> None:
     """Apply rules up to the first with a finding; the others would repeat it."""
-    for one in rules:
-        if found := one(*args, **kwargs):
-            findings.extend(found)
+    for rule_function in rules:
+        if has_findings := rule_function(*args, **kwargs):
+            findings.extend(has_findings)
             return

@@ -140,14 +140,14 @@ class CardStream:
 
     def until_blank(self, head: Card, kind: type[_R]) -> tuple[_R, ...]:
         """Return the records of a segment's cards up to a blank card."""
-        found: list[_R] = []
+        records: list[_R] = []
         while (card := self.take_data()) is not None and not card.is_blank:
             if (record := self.record(card, kind)) is None:
                 self.unsound.add(head.keyword)
             else:
-                found.append(record)
+                records.append(record)
         self.end(head, card)
-        return tuple(found)
+        return tuple(records)
 
     def table(
         self, head: Card, kind: type[_R], fields: Fields, is_last: Callable[[_R], bool]
@@ -161,10 +161,10 @@ class CardStream:
             else:
                 reader.add((card.line, card.text), [float(value) for value in row[0]])
             self._take_table(reader)
-        found = Table(kind, fields, reader.values, reader.lines)
-        if not (found and is_last(found[-1])):
+        table = Table(kind, fields, reader.values, reader.lines)
+        if not (table and is_last(table[-1])):
             self.end(head, card)
-        return found
+        return table
 
     def _take_table(self, reader: TableReader) -> None:
         """Take the cards that are read in a block, if any."""
@@ -242,9 +242,9 @@ class NumberedSegment(Segment, Generic[_R]):
         """Read the cards up to a blank one; unreadable cards are reported and left out."""
         control = cards.control
         fields = cls.card_fields(control)
-        found = cards.table(head, cls.record, fields, lambda r: cls.is_last(r, control))
+        records = cards.table(head, cls.record, fields, lambda r: cls.is_last(r, control))
         # No class variable can have the type of the class's parameter.
-        return cls(cast("Table[_R]", found), source=CardSource(head))
+        return cls(cast("Table[_R]", records), source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
         """Return the text of the segment's cards."""

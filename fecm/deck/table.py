@@ -140,11 +140,11 @@ class TableReader:
         for end in range(begin, len(lines)):
             line = lines[end][1]
             match = self._with_commas if "," in line else self._in_columns
-            if (found := match(line)) is None:
+            if (matched := match(line)) is None:
                 break
             complete = len(values)
             try:
-                values.extend(map(float, found.groups("0")))
+                values.extend(map(float, matched.groups("0")))
             except ValueError:
                 del values[complete:]
                 break

@@ -65,7 +65,7 @@ def unit_names(deck: Deck) -> dict[str, str]:
 
 def _usual(dimension: str, name: str) -> str:
     """Return the usual name of a unit; the name itself if it is ambiguous without its capitals."""
-    alike = [known for known in KNOWN[dimension] if known.casefold() == name.casefold()]
+    alike = [unit for unit in KNOWN[dimension] if unit.casefold() == name.casefold()]
     return alike[0] if len(alike) == 1 and name not in KNOWN[dimension] else name
 
 
@@ -129,10 +129,10 @@ def thousands(value: float) -> int:
 
 def with_prefix(unit: str, power: int) -> str:
     """Return the name of 10^power of a unit, as kN of 10^3 N; empty if it has none."""
-    base, own = PREFIXED.get(unit, ("", 0))
-    if not base or power + own not in PREFIXES:
+    base, power_of_unit = PREFIXED.get(unit, ("", 0))
+    if not base or power + power_of_unit not in PREFIXES:
         return ""
-    name = PREFIXES[power + own] + base
+    name = PREFIXES[power + power_of_unit] + base
     return "t" if name == "Mg" else name
 
 
@@ -186,23 +186,23 @@ def system_named(name: str) -> str:
     >>> system_named("g-mm-ms"), system_named("kg-mm-ms"), system_named("t-mm-s")
     ('mm-N-ms', 'mm-kN-ms', 'mm-N-s')
     """
-    own: dict[str, str] = {}
+    parts: dict[str, str] = {}
     kinds = {**KNOWN, "mass": MASSES}
     for unit in name.split("-"):
-        kind = next((kind for kind, known in kinds.items() if unit in known), "")
-        if not kind or kind in own:
+        kind = next((kind for kind, units in kinds.items() if unit in units), "")
+        if not kind or kind in parts:
             raise UnitsError(f"{name!r} is not a system of units: name {FORM}")
-        own[kind] = unit
-    if not {"length", "time"} <= own.keys() or not {"force", "mass"} & own.keys():
+        parts[kind] = unit
+    if not {"length", "time"} <= parts.keys() or not {"force", "mass"} & parts.keys():
         raise UnitsError(f"{name!r} is not a whole system of units: name {FORM}")
-    if "mass" in own:
-        said = f"the force of {own['mass']}, {own['length']} and {own['time']}"
-        implied = force_of(own["mass"], own["length"], own["time"])
+    if "mass" in parts:
+        force_text = f"the force of {parts['mass']}, {parts['length']} and {parts['time']}"
+        implied = force_of(parts["mass"], parts["length"], parts["time"])
         if not implied:
-            raise UnitsError(f"{name!r}: {said} is not one of {', '.join(KNOWN['force'])}")
-        if own.setdefault("force", implied) != implied:
-            raise UnitsError(f"{name!r} is not consistent: {said} is {implied}")
-    return "-".join(own[kind] for kind in Units.NAMES)
+            raise UnitsError(f"{name!r}: {force_text} is not one of {', '.join(KNOWN['force'])}")
+        if parts.setdefault("force", implied) != implied:
+            raise UnitsError(f"{name!r} is not consistent: {force_text} is {implied}")
+    return "-".join(parts[kind] for kind in Units.NAMES)
 
 
 def force_of(mass: str, length: str, time: str) -> str:

@@ -117,9 +117,9 @@ def _number(
         findings.add("E109", message, source.place(field.name))
         return None
 
-    left = text.lstrip()
+    stripped = text.lstrip()
     plain = parse(text.replace(" ", ""))
-    padded = parse(left.replace(" ", "0")) if " " in left else plain
+    padded = parse(stripped.replace(" ", "0")) if " " in stripped else plain
     if plain is None and padded is None:
         _report_no_number(field, text, source, findings)
         return None
@@ -167,8 +167,8 @@ def _report_blank(
     else:
         line = card.data.ljust(field.last)
         number = text.replace(" ", "").rjust(field.width)
-        meant = line[: field.first - 1] + number + line[field.last :]
-        hint = f"right-justified, the card is `{meant.rstrip()}`"
+        corrected = line[: field.first - 1] + number + line[field.last :]
+        hint = f"right-justified, the card is `{corrected.rstrip()}`"
     hint = _hint_of_separators(card, source.fields) or hint
     findings.add("E104", message, source.place(field.name), hint)
 
@@ -225,17 +225,19 @@ def _misplaced_in_last(data: str, field: Field) -> _Misplaced | None:
     return _Misplaced("E105", message, first, last, field.width)
 
 
-def _report_misplaced(found: _Misplaced, card: Card, fields: Fields, findings: Findings) -> None:
-    first, last = found.first, found.last
+def _report_misplaced(
+    misplaced: _Misplaced, card: Card, fields: Fields, findings: Findings
+) -> None:
+    first, last = misplaced.first, misplaced.last
     touched = [f for f in fields if f.first <= last and f.last >= first]
     names = ", ".join(f"cols {f.first}-{f.last}: {f.name}" for f in touched)
     place = CardPlace(card.line, first, last, card.text, names)
     hint = (
         _hint_of_separators(card, fields)
-        or _hint_of_length(card, fields, last - first + 1, found.width)
-        or found.hint
+        or _hint_of_length(card, fields, last - first + 1, misplaced.width)
+        or misplaced.hint
     )
-    findings.add(found.code, found.message, place, hint)
+    findings.add(misplaced.code, misplaced.message, place, hint)
 
 
 def _is_joined(data: str, column: int) -> bool:

@@ -55,9 +55,9 @@ class Materials(Segment, keyword="MATS"):
     def cards(self, control: Control) -> Iterator[str]:
         """Return the text of the segment's cards."""
         yield self.keyword
-        for one in self.plies:
-            yield one.head.to_card()
-            yield one.ply.to_card()
+        for item in self.plies:
+            yield item.head.to_card()
+            yield item.ply.to_card()
         yield ""
 
 
@@ -121,9 +121,9 @@ class Laminates(Segment, keyword="LAMS"):
     def cards(self, control: Control) -> Iterator[str]:
         """Return the text of the segment's cards."""
         yield self.keyword
-        for one in self.laminates:
-            yield one.head.to_card()
-            for layer in one.layers:
+        for item in self.laminates:
+            yield item.head.to_card()
+            for layer in item.layers:
                 yield layer.to_card()
         yield ""
 

@@ -89,17 +89,17 @@ class RunOptions:
 def check_run_options(problem: Problem, options: RunOptions) -> None:
     """Raise OptionsError if a problem lacks what an option needs, or has what it excludes."""
     if options.criteria and not problem.work.passes["FAIL"]:
-        names = ", ".join(one.name for one in options.criteria)
+        names = ", ".join(criterion.name for criterion in options.criteria)
         raise OptionsError(
             f"criteria {names}: the program of the deck has no FAIL to evaluate them"
         )
     if not problem.deck.has(model.Nonlinear):
         return
     if options.solver == CSR:
-        known = ", ".join(solver for solver in SOLVERS if solver != CSR)
+        solvers = ", ".join(solver for solver in SOLVERS if solver != CSR)
         raise OptionsError(
             f"the solver {CSR} has one matrix for all displacements, and the plate is nonlinear "
-            f"(NONL); take one of {known}"
+            f"(NONL); take one of {solvers}"
         )
     refuse_on_nonlinear(options.slips)
 
@@ -140,8 +140,8 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
     """Build the model of a checked problem, with the problem's plate unless options change it."""
     chosen = options or RunOptions()
     deck, variant = problem.deck, variant_of(chosen.slips)
-    own = chosen.projectile or build_projectile(deck, variant.impact)
-    rod = own.with_mass(chosen.rod_method.mass)
+    projectile = chosen.projectile or build_projectile(deck, variant.impact)
+    rod = projectile.with_mass(chosen.rod_method.mass)
     mesh, share = problem.mesh, 1.0
     if problem.contact is not None and variant.impact.nodal_force_scales:
         mesh, share = _share_of_contact_force(problem)
@@ -290,7 +290,9 @@ def _stresses(
         kind = CompiledMonitor if motion.solver == KERNELS else FailureMonitor
         strengths = strengths_of_deck(problem.deck)
         first = next((ply for plies in strengths for ply in plies if ply is not None), None)
-        own = [] if first is None else [one.with_modes(first) for one in criteria]
+        user_criteria = (
+            [] if first is None else [criterion.with_modes(first) for criterion in criteria]
+        )
         counts = None if under_load is None else ~under_load
         around = None
         if problem.load_place is not None:
@@ -311,9 +313,9 @@ def _stresses(
                 problem.coarseness(circle.elements),
             )
         far = ~problem.under_load_by_centre
-        failure = kind(made(None), strengths, own, counts, far, around)
+        failure = kind(made(None), strengths, user_criteria, counts, far, around)
         if cure is not None:
-            failure = failure.with_residual([one.stresses for one in cure])
+            failure = failure.with_residual([criterion.stresses for criterion in cure])
     return plies, failure
 
 

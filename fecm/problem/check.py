@@ -93,8 +93,8 @@ def _generated(
     errors, element_errors = findings.error_count, _element_errors(findings)
     checked = Problem(deck, generate(deck, findings), compiled)
     complete = findings.error_count == errors and not unsound & {"COOR", "ELEM"}
-    given = _element_errors(findings) == element_errors and "ELEM" not in unsound
-    if not given or not deck.has(model.Elements):
+    are_given = _element_errors(findings) == element_errors and "ELEM" not in unsound
+    if not are_given or not deck.has(model.Elements):
         return checked
     valid = apply(mesh.OF_ELEMENTS, findings, checked)
     if valid and complete and deck.has(model.Coordinates):
@@ -129,9 +129,9 @@ def _check_each_segment(checked: Problem, findings: Findings, unsound: set[str])
     check_segments(checked.deck, findings)
     if (card := checked.deck.last(model.Materials)) is not None:
         check_segment(card, findings)
-    if (others := checked.deck.last(model.Laminates)) is not None:
-        for one in others.laminates:
-            apply(laminate.OF_LAYERS, findings, one)
+    if (laminates := checked.deck.last(model.Laminates)) is not None:
+        for numbered in laminates.laminates:
+            apply(laminate.OF_LAYERS, findings, numbered)
     of_materials = (*zones.OF_DECK, *damage.OF_MATERIALS)
     if unsound.isdisjoint(zones.KEYWORDS) and apply(of_materials, findings, checked.deck):
         apply(cure.OF_MATERIALS, findings, checked.deck)

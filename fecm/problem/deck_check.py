@@ -49,13 +49,13 @@ class DeckCheck:
 
     def to_dicts(self) -> list[dict[str, object]]:
         """Return the lines of ``fecm check --format json``: findings and problems."""
-        found = [{**finding.to_dict(self.source)} for finding in self.findings]
+        lines = [{**finding.to_dict(self.source)} for finding in self.findings]
         head = {"kind": "summary", "file": self.source}
-        return [*found, *({**head, **problem.to_dict()} for problem in self.problems)]
+        return [*lines, *({**head, **problem.to_dict()} for problem in self.problems)]
 
     def __str__(self) -> str:
         texts = [finding.render(self.source) for finding in self.findings]
-        return "\n".join([*texts, *(line for one in self.problems for line in one.lines())])
+        return "\n".join([*texts, *(line for problem in self.problems for line in problem.lines())])
 
     def _repr_html_(self) -> str:
         """Return tables of the findings and of each problem, for notebooks."""

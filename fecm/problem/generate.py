@@ -101,18 +101,18 @@ def rod_diameters(segment: Projectile, findings: Findings | None = None) -> Floa
     """
     noted = Findings() if findings is None else findings
     values = np.full((segment.elements, 1), np.nan)
-    known: list[NodeValues] = []
+    cards: list[NodeValues] = []
     for record in segment.diameters:
         if not 1 <= record.element <= segment.elements:
             what = f"Rod element {record.element} does not exist"
             message = f"{what}; PROJ defines the rod elements 1 to {segment.elements}."
             noted.add("E420", message, record.place("element"))
-        elif known and record.element <= known[-1].node:
-            what = f"Rod element {record.element} follows element {known[-1].node}"
+        elif cards and record.element <= cards[-1].node:
+            what = f"Rod element {record.element} follows element {cards[-1].node}"
             noted.add("E421", f"{what}; elements must ascend.", record.place("element"))
         else:
-            known.append(NodeValues(record.element, record.increment, (record.diameter,)))
-    _interpolate(values, known, noted, _Budget(segment.elements, noted))
+            cards.append(NodeValues(record.element, record.increment, (record.diameter,)))
+    _interpolate(values, cards, noted, _Budget(segment.elements, noted))
     return values[:, 0]
 
 

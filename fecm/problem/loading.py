@@ -41,7 +41,11 @@ class LoadedDeck(NamedTuple):
     @property
     def warnings(self) -> list[str]:
         """Findings that are warnings, as texts."""
-        return [one.render(self.source) for one in self.findings if one.severity == "warning"]
+        return [
+            finding.render(self.source)
+            for finding in self.findings
+            if finding.severity == "warning"
+        ]
 
 
 # What a deck may be given as: a file's path, its text, an open file, a model, or a deck that was

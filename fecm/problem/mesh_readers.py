@@ -66,10 +66,10 @@ def _ascii(body: bytes) -> Take:
     words = iter(body.partition(b"$End")[0].split())
 
     def take(kind: str, count: int) -> list[int]:
-        found = list(islice(words, count))
-        if len(found) < count:
-            raise ValueError(f"{count} numbers, of which {len(found)} are there")
-        return [] if kind == "d" else [int(word) for word in found]
+        taken_words = list(islice(words, count))
+        if len(taken_words) < count:
+            raise ValueError(f"{count} numbers, of which {len(taken_words)} are there")
+        return [] if kind == "d" else [int(word) for word in taken_words]
 
     return take
 
@@ -81,9 +81,9 @@ def _binary(body: bytes, order: str) -> Take:
     def take(kind: str, count: int) -> list[int]:
         nonlocal position
         form = f"{order}{count}{letters[kind]}"
-        found = struct.unpack_from(form, body, position)
+        taken_words = struct.unpack_from(form, body, position)
         position += struct.calcsize(form)
-        return [] if kind == "d" else list(found)
+        return [] if kind == "d" else list(taken_words)
 
     return take
 
@@ -136,8 +136,8 @@ class NastranCard(NamedTuple):
         if not text and default is not None:
             return default
         if not re.fullmatch(r"\+?[0-9]+", text):
-            found = f"`{text}`" if text else "a blank field"
-            raise self.error(keyword, f"has {found} in place of a whole number")
+            shown = f"`{text}`" if text else "a blank field"
+            raise self.error(keyword, f"has {shown} in place of a whole number")
         return int(text)
 
 
@@ -249,8 +249,8 @@ class _Reader:
     def mesh(self, path: Path) -> Bulk:
         """Return points, cells and groups."""
         if not self._elements:
-            known = ", ".join(ELEMENTS)
-            raise NastranError(f"{path} has no elements of a plate, which are {known}")
+            names = ", ".join(ELEMENTS)
+            raise NastranError(f"{path} has no elements of a plate, which are {names}")
         rows = {number: row for row, number in enumerate(self._grids)}
         cells = []
         first, _ = self._elements[0]
@@ -316,9 +316,9 @@ class _Reader:
         """Return the basic coordinates of a node."""
         if number not in self._places:
             card = self._grids[number]
-            own = np.array([card.real("GRID", n) for n in (2, 3, 4)])
+            coordinates = np.array([card.real("GRID", n) for n in (2, 3, 4)])
             system = self._system(card.whole("GRID", 1, self._default_system), "GRID", card)
-            self._places[number] = system.basic(own)
+            self._places[number] = system.basic(coordinates)
         return self._places[number]
 
     def _system(self, number: int, keyword: str, user: NastranCard) -> System:
@@ -336,12 +336,12 @@ class _Reader:
         if name[4] == "2":
             within = self._system(card.whole(name, 1, 0), name, card)
             values = [card.real(name, n) for n in range(2, 11)]
-            given = [within.basic(np.array(values[n : n + 3])) for n in (0, 3, 6)]
+            points = [within.basic(np.array(values[n : n + 3])) for n in (0, 3, 6)]
         else:
             nodes = [self._node(name, card, first + n) for n in (1, 2, 3)]
-            given = [self._place(node) for node in nodes]
+            points = [self._place(node) for node in nodes]
         self._open.pop()
-        origin, on_z, in_xz = given
+        origin, on_z, in_xz = points
         z = on_z - origin
         y = np.cross(z, in_xz - origin)
         if not (np.any(z) and np.any(y)):

@@ -57,7 +57,7 @@ def rules(material: model.Material) -> tuple[Quadrature, Quadrature, Quadrature]
 def build_plate(deck: Deck, mesh: MeshArrays, variant: PlateVariant = REPORT_PLATE) -> PlateModel:
     """Build the plate of a deck."""
     bending, shear, points = rules(deck.require(model.Material))
-    first, *others = laminates_of_deck(deck, variant)
+    first, *other_laminates = laminates_of_deck(deck, variant)
     used = IntegrationRules(
         bending=bending, shear=shear, strains=points, assumes_shear=has_assumed_shear(deck)
     )
@@ -68,8 +68,8 @@ def build_plate(deck: Deck, mesh: MeshArrays, variant: PlateVariant = REPORT_PLA
         variant.rules(used),
         preload=UNLOADED if preload is None else preload.forces,
         nonlinear=deck.has(model.Nonlinear),
-        others=tuple(others),
-        laminate_numbers=laminate_numbers(deck) if others else None,
+        others=tuple(other_laminates),
+        laminate_numbers=laminate_numbers(deck) if other_laminates else None,
         curvature=FLAT if curved is None else curved.curvatures,
     )
 
@@ -163,13 +163,13 @@ def laminates_of_deck(deck: Deck, variant: PlateVariant = REPORT_PLATE) -> list[
     shear = deck.last(model.Shear) or model.Shear()
     material = deck.require(model.Material)
     plies = {number: variant.ply(ply) for number, ply in deck.plies.items()}
-    found: list[LaminateSection] = []
+    sections: list[LaminateSection] = []
     for number, layers in deck.layers.items():
         total = material.integration.thickness if number == MATERIAL else None
         plain = _laminate_of(layers, plies, total)
         stiffness = equilibrium_shear_stiffness(plain) if shear.equilibrium else plain.shear
-        found.append(replace(plain, shear=shear.factor * stiffness))
-    return found
+        sections.append(replace(plain, shear=shear.factor * stiffness))
+    return sections
 
 
 def residuals_of_deck(
@@ -180,11 +180,11 @@ def residuals_of_deck(
         return None
     from fecm.mechanics.ply_stresses import residual_stresses  # 0.3 ms, for CURE only
 
-    found: list[Residual] = []
-    for layers, own in zip(deck.layers.values(), laminates, strict=True):
+    residuals: list[Residual] = []
+    for layers, section in zip(deck.layers.values(), laminates, strict=True):
         free = np.array([cure.strains(layer.material) for layer in layers])
-        found.append(residual_stresses(own, *free.T))
-    return tuple(found)
+        residuals.append(residual_stresses(section, *free.T))
+    return tuple(residuals)
 
 
 def strengths_of_deck(deck: Deck) -> list[list[model.Allowables | None]]:
@@ -238,11 +238,16 @@ def _are_coupled(
 ) -> bool:
     """Return whether B of one of the laminates is not 0."""
     plies = {MATERIAL: material.ply} | {
-        one.number: one.ply for one in (materials.plies if materials else ())
+        item.number: item.ply for item in (materials.plies if materials else ())
     }
-    layers = [material.layers, *(one.layers for one in (laminates.laminates if laminates else ()))]
+    layers = [
+        material.layers,
+        *(item.layers for item in (laminates.laminates if laminates else ())),
+    ]
     try:
         with np.errstate(all="ignore"):
-            return any(_laminate_of(own, plies, None).is_coupled for own in layers)
+            return any(
+                _laminate_of(laminate_layers, plies, None).is_coupled for laminate_layers in layers
+            )
     except (ArithmeticError, LookupError, ValueError):
         return False

@@ -187,18 +187,18 @@ class PlateMesh:
         _, of_joined, counts = _sides(joined)
         return np.unique(sides[number[counts[of_joined] == 1]])
 
-    def supports(self, wanted: Mapping[str, str]) -> dict[str, str]:
+    def supports(self, requested: Mapping[str, str]) -> dict[str, str]:
         """Return the supports of groups; a group named after a support has it.
 
         Raises MeshError if a group does not exist.
         """
-        for name, support in wanted.items():
+        for name, support in requested.items():
             if name not in self.groups and name != BOUNDARY:
-                known = ", ".join(sorted({*self.groups, BOUNDARY}))
-                raise MeshError(f"the mesh has no group {name!r}; its groups are {known}")
+                names = ", ".join(sorted({*self.groups, BOUNDARY}))
+                raise MeshError(f"the mesh has no group {name!r}; its groups are {names}")
             if support not in SUPPORTS:
                 raise MeshError(f"{name}={support}: the supports are {', '.join(SUPPORTS)}")
-        return {name: name for name in SUPPORTS if name in self.groups} | dict(wanted)
+        return {name: name for name in SUPPORTS if name in self.groups} | dict(requested)
 
 
 class MeshLike(Protocol):
@@ -257,12 +257,12 @@ def _add_groups(read: MeshLike, groups: Mapping[tuple[int, int], list[int]]) -> 
         for number in numbers[1:]:
             if (number, dimension) in named:
                 continue
-            own = [
+            unnamed = [
                 np.flatnonzero((tags == entity) & (block.dim == dimension))
                 for block, tags in zip(read.cells, entities, strict=False)
             ]
-            before = read.cell_sets.get(str(number), [[]] * len(own))
-            read.cell_sets[str(number)] = list(map(np.append, before, own))
+            before = read.cell_sets.get(str(number), [[]] * len(unnamed))
+            read.cell_sets[str(number)] = list(map(np.append, before, unnamed))
 
 
 def _check_whole(path: Path, text: bytes) -> None:
@@ -286,12 +286,12 @@ def _check_abaqus(path: Path, text: bytes) -> None:
             f"{path}:{line}: `{card}` makes or moves nodes or elements, and is not read; write "
             "all of them in full, with coordinates x and y"
         )
-    for found in ABAQUS_GENERATE.finditer(text):
-        numbers = found[1].replace(b",", b" ").split()
+    for match in ABAQUS_GENERATE.finditer(text):
+        numbers = match[1].replace(b",", b" ").split()
         if len(numbers) != 3 or not numbers[2].isdigit() or not int(numbers[2]):
-            line = text.count(b"\n", 0, found.start()) + 1
+            line = text.count(b"\n", 0, match.start()) + 1
             raise MeshError(
-                f"{path}:{line}: GENERATE has `{found[1].decode('latin-1').strip()[:60]}`; write "
+                f"{path}:{line}: GENERATE has `{match[1].decode('latin-1').strip()[:60]}`; write "
                 "first, last and a positive increment in one line"
             )
 
@@ -299,8 +299,8 @@ def _check_abaqus(path: Path, text: bytes) -> None:
 def _why_unreadable(path: Path, text: bytes, error: BaseException, printed: str) -> str:
     """Say what meshio can't read, where it is, and what helps."""
     why = " ".join(str(error).split()) if isinstance(error, Exception) else ""
-    if found := re.search(r"Element type not available: (\S+)", printed):
-        kind = found[1]
+    if match := re.search(r"Element type not available: (\S+)", printed):
+        kind = match[1]
         lines = _lines_with(text, rb"\*element\b.*type\s*=\s*" + re.escape(kind).encode() + rb"\b")
         instead = f"; write it as {ALIKE[kind]}" if kind in ALIKE else ""
         instead = instead or "; write the plate alone, of S4R, S8R, S3 or STRI65 elements"
@@ -337,18 +337,18 @@ def from_pyvista(grid: GridLike) -> PlateMesh:
 
     Groups are numbers in the cell data `gmsh:physical`.
     """
-    made = grid.cast_to_unstructured_grid()
+    data_set = grid.cast_to_unstructured_grid()
     blocks: list[Any] = []
     physical: list[Any] = []
-    for number, cells in made.cells_dict.items():
+    for number, cells in data_set.cells_dict.items():
         kind = VTK_KINDS.get(int(number), f"VTK's type {number}")
         blocks.append(SimpleNamespace(type=kind, data=cells))
-        if PHYSICAL in made.cell_data:
-            physical.append(np.asarray(made.cell_data[PHYSICAL])[made.celltypes == number])
+        if PHYSICAL in data_set.cell_data:
+            physical.append(np.asarray(data_set.cell_data[PHYSICAL])[data_set.celltypes == number])
     cell_data = {PHYSICAL: physical} if physical else {}
     none: dict[str, Any] = {}
     read = SimpleNamespace(
-        points=made.points,
+        points=data_set.points,
         cells=blocks,
         point_data=none,
         cell_data=cell_data,
@@ -378,22 +378,22 @@ def from_meshio(read: MeshLike, where: str = "") -> PlateMesh:
     names = {tuple(pair): name for name, pair in read.field_data.items() if _is_group(pair)}
     families = getattr(read, "cell_tags", {})  # names of groups by family, in MED files
     for number, block in enumerate(read.cells):
-        found, rows = groups, block.data
+        targets, rows = groups, block.data
         if number in blocks:
-            found, rows = surfaces, np.arange(len(block.data)) + first
+            targets, rows = surfaces, np.arange(len(block.data)) + first
             first += len(block.data)
         if PHYSICAL in read.cell_data:
             tags = read.cell_data[PHYSICAL][number]
             for tag in np.unique(tags[tags > 0]).tolist():
                 name = names.get((tag, 2 if number in blocks else DIMENSIONS[block.type]), str(tag))
-                found.setdefault(name, []).append(rows[tags == tag])
+                targets.setdefault(name, []).append(rows[tags == tag])
         for name, sets in read.cell_sets.items():
             if not name.startswith("gmsh:"):
-                found.setdefault(name, []).append(rows[np.asarray(sets[number], int)])
+                targets.setdefault(name, []).append(rows[np.asarray(sets[number], int)])
         for family, of_family in families.items():
             for name in of_family:
                 tags = read.cell_data["cell_tags"][number]
-                found.setdefault(name, []).append(rows[tags == family])
+                targets.setdefault(name, []).append(rows[tags == family])
     for name, rows in read.point_sets.items():
         groups.setdefault(name, []).append(rows)
     for family, of_family in getattr(read, "point_tags", {}).items():
@@ -406,7 +406,7 @@ def from_meshio(read: MeshLike, where: str = "") -> PlateMesh:
 
 def _is_group(value: Any) -> bool:
     """Return whether field data are the number and dimension of a group; MED files have others."""
-    return len(value) == 2 and all(isinstance(one, int | np.integer) for one in value)
+    return len(value) == 2 and all(isinstance(item, int | np.integer) for item in value)
 
 
 def _joined(groups: Mapping[str, list[Any]]) -> dict[str, Integers]:
@@ -464,10 +464,10 @@ def plate_mesh(
         name: (parts * np.asarray(rows, int)[:, None] + np.arange(parts)).ravel()
         for name, rows in (surfaces or {}).items()
     }
-    made = PlateMesh(np.array(rounded), numbers.reshape(nodes.shape), kept, middles, zones)
-    if (_sides(made.cells)[2] > 2).any():
+    mesh = PlateMesh(np.array(rounded), numbers.reshape(nodes.shape), kept, middles, zones)
+    if (_sides(mesh.cells)[2] > 2).any():
         raise MeshError(f"{where}elements overlap: more than two share a side")
-    return made
+    return mesh
 
 
 def _turned(places: Floats, nodes: Integers, size: float, where: str) -> Integers:
@@ -481,9 +481,9 @@ def _turned(places: Floats, nodes: Integers, size: float, where: str) -> Integer
     twice = ~np.isin(np.arange(len(nodes)), first)
     for wrong, what in ((collapsed, "without an area"), (twice, "given twice")):
         if wrong.any():
-            some = ", ".join(map(str, (np.flatnonzero(wrong)[:NAMED] + 1).tolist()))
-            some += ", ..." if wrong.sum() > NAMED else ""
-            text = f"{wrong.sum()} elements {what}: number {some} of the plane elements"
+            numbers = ", ".join(map(str, (np.flatnonzero(wrong)[:NAMED] + 1).tolist()))
+            numbers += ", ..." if wrong.sum() > NAMED else ""
+            text = f"{wrong.sum()} elements {what}: number {numbers} of the plane elements"
             raise MeshError(f"{where}{text}")
     back = [0, *range(count - 1, 0, -1)]
     if nodes.shape[1] > count:  # mid-sides follow their corners
@@ -499,10 +499,10 @@ def _check_joints(places: Floats, nodes: Integers, where: str) -> None:
     if not len(hanging):
         return
     (x, y), node, element = places[hanging[0]], hanging[0] + 1, elements[0] + 1
-    others = f", and so do {len(hanging) - 1} others" if len(hanging) > 1 else ""
+    more = f", and so do {len(hanging) - 1} others" if len(hanging) > 1 else ""
     raise MeshError(
         f"{where}point {node} at {x:g}, {y:g} lies inside a side of number {element} of the plane "
-        f"elements, which does not have it{others}: the plate is cut there; elements must have the "
+        f"elements, which does not have it{more}: the plate is cut there; elements must have the "
         "same nodes along their common side"
     )
 
@@ -557,8 +557,8 @@ def _sides(cells: Integers) -> tuple[Integers, Integers, Integers]:
     parts = [cells[:, :corners], np.roll(cells[:, :corners], -1, axis=1), cells[:, 4:8]]
     sides = np.stack(parts[: 2 if cells.shape[1] == corners else 3], axis=2)
     sides = np.sort(sides, axis=2).reshape(-1, sides.shape[2])
-    found, number, counts = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
-    return found, number.reshape(-1, corners), counts
+    unique, number, counts = np.unique(sides, axis=0, return_inverse=True, return_counts=True)
+    return unique, number.reshape(-1, corners), counts
 
 
 def _inside(sides: Integers, counts: Integers, group: Integers) -> Bools:

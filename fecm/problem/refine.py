@@ -50,13 +50,13 @@ def refined_deck(deck: Deck, mesh: MeshArrays, marked: Bools | None = None) -> D
         local = np.stack([block.shape.xi, block.shape.eta], axis=1)[:count]
         for row in block.rows.tolist():
             cuts = [2 if split[row, axis] else 1 for axis in (0, 1)]
-            own = mesh.elements[row, :count]
+            corners = mesh.elements[row, :count]
             for i, j in np.ndindex(*cuts):
                 low = np.array([-1.0 + 2.0 * i / cuts[0], -1.0 + 2.0 * j / cuts[1]])
-                at = low + (local + 1.0) / cuts
-                values = block.shape.shape_functions(at[:, 0], at[:, 1], block.present)[0]
-                spots = zip(at.tolist(), values[:, block.present], strict=True)
-                elements.append((row, [nodes.number(row, own, tuple(p), n) for p, n in spots]))
+                point = low + (local + 1.0) / cuts
+                values = block.shape.shape_functions(point[:, 0], point[:, 1], block.present)[0]
+                spots = zip(point.tolist(), values[:, block.present], strict=True)
+                elements.append((row, [nodes.number(row, corners, tuple(p), n) for p, n in spots]))
     return _rebuilt(deck, mesh, nodes, sorted(elements))
 
 
@@ -86,23 +86,23 @@ class _Nodes:
         self.codes = list(mesh.codes)
         self.forces = list(mesh.forces)
 
-    def number(self, row: int, own: Ints, place: tuple[float, ...], shares: Floats) -> int:
+    def number(self, row: int, nodes: Ints, place: tuple[float, ...], shares: Floats) -> int:
         """Return the number of the node at a place of an old element; a new one where it is new."""
         old = np.flatnonzero(np.abs(shares - 1.0) < 1e-9)
         if len(old):
-            return int(own[old[0]])
+            return int(nodes[old[0]])
         across = zip((1, 0, 1, 0), (-1.0, 1.0, 1.0, -1.0), strict=True)
-        on = [n for n, (axis, at) in enumerate(across) if abs(place[axis] - at) < 1e-9]
+        on = [n for n, (axis, position) in enumerate(across) if abs(place[axis] - position) < 1e-9]
         key: Hashable = (row, place)
-        around = own
+        around = nodes
         if on:
-            ends = [int(own[corner]) for corner in _SIDES[on[0]]]
+            ends = [int(nodes[corner]) for corner in _SIDES[on[0]]]
             t = place[_ALONG[on[0]]] * (1 if on[0] < 2 else -1)  # from the first end to the second
             key = (min(ends), max(ends), t if ends[0] < ends[1] else -t)
-            around = own[np.abs(shares) > 1e-12]
+            around = nodes[np.abs(shares) > 1e-12]
         if key not in self._known:
             self._known[key] = len(self.coordinates) + 1
-            mesh, rows = self._mesh, own - 1
+            mesh, rows = self._mesh, nodes - 1
             codes = (mesh.codes[around - 1] != 0).all(axis=0).astype(np.int32)
             self.coordinates.append(shares @ mesh.coordinates[rows])
             self.codes.append(codes)

@@ -53,11 +53,11 @@ def equilibrium_change(problem: Problem) -> float | None:
     if contact is None or problem.deck.control.numel > MOST_SOLVED:
         return None
     load = contact[plate.mesh.equations > 0]
-    first, *others = (
+    first, *other_laminates = (
         replace(laminate, shear=equilibrium_shear_stiffness(laminate))
         for laminate in plate.laminates
     )
-    softer = replace(plate, laminate=first, others=tuple(others))
+    softer = replace(plate, laminate=first, others=tuple(other_laminates))
     try:
         return compliance(softer, load) / compliance(plate, load) - 1.0
     except SingularStiffnessError:
@@ -70,8 +70,10 @@ def larger_steps(problem: Problem) -> list[str]:
     if not problem.work.steps or not 0.0 < largest < ROOM * problem.safe_time_step:
         return []
     least = problem.safe_time_step  # known, and a few per cent below the critical one
-    taken = f"{taken_time_step(least):.3g} {unit_of('time', unit_names(problem.deck))}".rstrip()
-    fewer = f"DT 0 takes at least {taken}: {taken_time_step(least) / largest:.1f} times fewer steps"
+    default = f"{taken_time_step(least):.3g} {unit_of('time', unit_names(problem.deck))}".rstrip()
+    fewer = (
+        f"DT 0 takes at least {default}: {taken_time_step(least) / largest:.1f} times fewer steps"
+    )
     return [f"time step         DT is at most {largest / least:.2f} of the critical one; {fewer}"]
 
 
@@ -346,6 +348,6 @@ def _rise(plate: PlateModel) -> float:
 def _matrix_rows(label: str, matrix: Floats, unit: str, size: float) -> Iterator[Row]:
     """Yield the rows of a matrix. Rounding errors beside `size` are shown as 0."""
     shown = np.where(np.abs(matrix) < ROUNDING * size, 0.0, matrix)
-    first, *others = (" ".join(f"{value:12.5g}" for value in row) for row in shown)
+    first, *other_rows = (" ".join(f"{value:12.5g}" for value in row) for row in shown)
     yield (label, f"{first}  {unit}".rstrip())
-    yield from (("", row) for row in others)
+    yield from (("", row) for row in other_rows)

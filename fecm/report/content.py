@@ -124,8 +124,8 @@ def page_table(rows: Iterable[Row], header: Sequence[str] = (), title: str = "")
 
 def note_list(texts: Iterable[str], title: str = "") -> list[PageBlock]:
     """Return a list of one list of sentences, which is empty without sentences."""
-    found = tuple(dict.fromkeys(texts))
-    return [Notes(found, title)] if found else []
+    unique = tuple(dict.fromkeys(texts))
+    return [Notes(unique, title)] if unique else []
 
 
 def listing(title: str, text: str) -> Listing:
@@ -133,20 +133,20 @@ def listing(title: str, text: str) -> Listing:
     if len(text) <= MOST_TEXT:
         return Listing(title, text)
     kept = text[:MOST_TEXT].rpartition("\n")[0]
-    left = text.count("\n") - kept.count("\n") - 1
-    return Listing(title, f"{kept}\n... {left} more lines, which the result has")
+    omitted = text.count("\n") - kept.count("\n") - 1
+    return Listing(title, f"{kept}\n... {omitted} more lines, which the result has")
 
 
-def sections(given: Iterable[tuple[str, Iterable[PageBlock]]]) -> tuple[PageSection, ...]:
+def sections(titled: Iterable[tuple[str, Iterable[PageBlock]]]) -> tuple[PageSection, ...]:
     """Return sections of titles and blocks, without those that have no blocks."""
-    found = ((title, tuple(blocks)) for title, blocks in given)
-    return tuple(PageSection(title, blocks) for title, blocks in found if blocks)
+    filled = ((title, tuple(blocks)) for title, blocks in titled)
+    return tuple(PageSection(title, blocks) for title, blocks in filled if blocks)
 
 
 def worst(judgements: Iterable[Judgement]) -> TrustLevel:
     """Return the worst level of judgements."""
     order = (TrustLevel.OUTSIDE, TrustLevel.DOUBTFUL)
-    levels = {one.level for one in judgements}
+    levels = {judgement.level for judgement in judgements}
     return next((level for level in order if level in levels), TrustLevel.WITHIN)
 
 

@@ -31,11 +31,11 @@ DOTS = 200  # of pixels, per inch
 
 def inside(figure: Figure) -> str:
     """Return a figure as a ``data:`` address: SVG, or PNG where SVG would be large."""
-    found = _bytes(figure, "svg")
+    data = _bytes(figure, "svg")
     kind = "image/svg+xml"
-    if len(found) > LARGEST:
-        found, kind = _bytes(figure, "png"), "image/png"
-    return f"data:{kind};base64,{base64.b64encode(found).decode('ascii')}"
+    if len(data) > LARGEST:
+        data, kind = _bytes(figure, "png"), "image/png"
+    return f"data:{kind};base64,{base64.b64encode(data).decode('ascii')}"
 
 
 def _bytes(figure: Figure, form: str) -> bytes:
@@ -104,8 +104,8 @@ def of_run(name: str, result: Result) -> Iterator[PageBlock]:
         time = float(result["history/time"][result["history/plate_w"].argmax()])
         stored = result["tape3/time"]
         near = float(stored[np.abs(stored - time).argmin()])
-        said = quantity(near, result.unit("time"))
-        caption = f"Deflection at the stored time nearest to its peak, {said}"
+        when = quantity(near, result.unit("time"))
+        caption = f"Deflection at the stored time nearest to its peak, {when}"
         yield from drawn(PictureKind.CONTOUR, results, f"{caption}.", times=[near])
     yield from drawn(
         PictureKind.FAILURE,

@@ -26,68 +26,66 @@ from fecm.report.content import (
 from fecm.report.figures import inside
 
 
-def identification_page(name: str, found: Identification) -> ReportPage:
+def identification_page(name: str, fit: Identification) -> ReportPage:
     """Return the page about a fit. `name` is the name of the measurement."""
-    values = ", ".join(_said(found, key) for key in found.values)
+    values = ", ".join(_said(fit, key) for key in fit.values)
     verdict = [f"Fitted to {name}: {values}."]
     level = TrustLevel.WITHIN
-    if not found.accepted:
+    if not fit.accepted:
         level = TrustLevel.OUTSIDE
         verdict.append("The fit is not accepted: see Trust.")
-    elif found.notes:
+    elif fit.notes:
         level = TrustLevel.DOUBTFUL
         verdict.append("The fit has converged, with doubts: see Trust.")
     else:
         verdict.append("The fit has converged and describes the measurement.")
-    _, *results = identification_tables(found)  # the first is judged under Trust
+    _, *results = identification_tables(fit)  # the first is judged under Trust
     body = sections(
         [
-            ("Trust", [Judgements(tuple(_judgements(found))), *note_list(found.notes, "Notes")]),
+            ("Trust", [Judgements(tuple(_judgements(fit))), *note_list(fit.notes, "Notes")]),
             ("Results", results),
-            ("Pictures", [_picture(found)]),
-            ("Provenance", _provenance(found)),
+            ("Pictures", [_picture(fit)]),
+            ("Provenance", _provenance(fit)),
         ]
     )
-    return ReportPage(
-        found.deck.title or f"Identification from {name}", tuple(verdict), level, body
-    )
+    return ReportPage(fit.deck.title or f"Identification from {name}", tuple(verdict), level, body)
 
 
-def _said(found: Identification, name: str) -> str:
+def _said(fit: Identification, name: str) -> str:
     """Format a parameter with its standard error."""
-    value = found.values[name]
-    power, unit = readable(value, found.unit(name), digits=5)
-    best, error = value / 10.0**power, found.errors[name] / 10.0**power
+    value = fit.values[name]
+    power, unit = readable(value, fit.unit(name), digits=5)
+    best, error = value / 10.0**power, fit.errors[name] / 10.0**power
     return f"{name} = {best:.5g} ± {error:.2g} {unit}".rstrip()
 
 
-def _judgements(found: Identification) -> Iterator[Judgement]:
+def _judgements(fit: Identification) -> Iterator[Judgement]:
     """Judge convergence and residual."""
-    for name, fine in (("converged", found.converged), ("accepted", found.accepted)):
+    for name, fine in (("converged", fit.converged), ("accepted", fit.accepted)):
         yield Judgement(
             TrustLevel.WITHIN if fine else TrustLevel.OUTSIDE, name, "yes" if fine else "no"
         )
-    force = unit_of("force", unit_names(found.deck))
+    force = unit_of("force", unit_names(fit.deck))
     yield Judgement(
-        TrustLevel.UNJUDGED, "residual, rms", number_with_unit(found.rms, force), "noise and model"
+        TrustLevel.UNJUDGED, "residual, rms", number_with_unit(fit.rms, force), "noise and model"
     )
-    yield Judgement(TrustLevel.UNJUDGED, "residual of the peak", share(found.share))
-    count = len(found.time)
-    words = f"{found.dof} degrees of freedom"
+    yield Judgement(TrustLevel.UNJUDGED, "residual of the peak", share(fit.share))
+    count = len(fit.time)
+    words = f"{fit.dof} degrees of freedom"
     yield Judgement(TrustLevel.UNJUDGED, "points", ShownNumber(count, str(count)), words)
 
 
-def _picture(found: Identification) -> PageBlock:
+def _picture(fit: Identification) -> PageBlock:
     """Draw the measured force, the fitted force, and the residual."""
-    picture = force_fit_picture(found, unit_names(found.deck))
+    picture = force_fit_picture(fit, unit_names(fit.deck))
     caption = "Measured and fitted contact force, and the residual."
     return PagePicture(inside(picture.figure), caption, caption)
 
 
-def _provenance(found: Identification) -> Iterator[PageBlock]:
+def _provenance(fit: Identification) -> Iterator[PageBlock]:
     """Yield the cards with the fitted values, and the deck."""
-    text = found.deck.to_text()
+    text = fit.deck.to_text()
     checksum = hashlib.sha256(text.encode()).hexdigest()
     yield from page_table([("fitted deck, SHA-256", checksum)], title="Checksum")
-    yield listing("The fitted cards", found.cards())
+    yield listing("The fitted cards", fit.cards())
     yield listing("The fitted deck", text)

@@ -126,12 +126,18 @@ def _materials(deck: model.Deck) -> Iterator[PageBlock]:
     yield from page_table(rows, header, "Ply constants")
     if (strengths := deck.last(model.Allowables)) is None:
         return
-    given = {one.material: one for one in (strengths, *strengths.others)}
-    header = ["strength", *(names[number] for number in given)]
-    if len(given) == 1:
+    allowables = {strength.material: strength for strength in (strengths, *strengths.others)}
+    header = ["strength", *(names[number] for number in allowables)]
+    if len(allowables) == 1:
         header = ["strength", "ply"]
     rows = [
-        (name, *(_in_units(deck, getattr(one, name), MODULUS) for one in given.values()))
+        (
+            name,
+            *(
+                _in_units(deck, getattr(strength, name), MODULUS)
+                for strength in allowables.values()
+            ),
+        )
         for name in STRENGTHS
     ]
     yield from page_table(rows, header, "Ply strengths")
@@ -166,9 +172,9 @@ def impactor(result: Result, deck: model.Deck) -> Impactor | None:
     initial = result.attributes_of("energy").get("initial")
     if isinstance(initial, float) and velocity:
         mass = 2.0 * initial / velocity**2
-    own = result.attributes.get("projectile")
+    user_projectile = result.attributes.get("projectile")
     kind = "rigid mass" if isinstance(projectile, RigidMass) else "elastic rod"
-    name = f"{own}, instead of PROJ" if own else kind
+    name = f"{user_projectile}, instead of PROJ" if user_projectile else kind
     return Impactor(name, mass, velocity, 0.5 * mass * velocity**2)
 
 
@@ -182,8 +188,8 @@ def _impact(result: Result, deck: model.Deck) -> Iterator[Row]:
     yield "mass", ShownNumber(hits.mass, _mass(deck, hits.mass))
     yield "velocity", in_units(hits.velocity, "length/time")
     yield "energy", in_units(hits.energy, "force*length")
-    if own := result.attributes.get("law"):
-        yield "contact law", f"{own}, instead of EXPE"
+    if user_law := result.attributes.get("law"):
+        yield "contact law", f"{user_law}, instead of EXPE"
     else:
         yield "contact law", "equation 3-7 (ACR)" if law.word else "equation 3-8"
         for name, value, dimension in zip(law.names(), law.values(), LAW, strict=True):

@@ -30,16 +30,16 @@ def page_of(
 
     Raises ReportError if a sweep or a fit is not the only result.
     """
-    runs = {name: one for name, one in results.items() if isinstance(one, Result)}
+    runs = {name: result for name, result in results.items() if isinstance(result, Result)}
     if len(runs) == len(results):
         return run_page(runs, digests or {})
     if len(results) > 1:
         raise ReportError("a sweep has a page of its own; give one sweep, or results of runs")
-    ((name, found),) = results.items()
-    if isinstance(found, SweepResult):
-        return sweep_page(name, found, digests or {})
-    assert isinstance(found, Identification)
-    return identification_page(name, found)
+    ((name, only),) = results.items()
+    if isinstance(only, SweepResult):
+        return sweep_page(name, only, digests or {})
+    assert isinstance(only, Identification)
+    return identification_page(name, only)
 
 
 def write_report(

@@ -70,7 +70,7 @@ def run_page(results: Mapping[str, Result], digests: Mapping[str, str]) -> Repor
     loaded = {name: deck_problem(result) for name, result in results.items()}
     problems = {name: problem for name, (problem, _) in loaded.items()}
     judged = {name: list(judgements(result, problems[name])) for name, result in results.items()}
-    level = worst(one for some in judged.values() for one in some)
+    level = worst(judgement for judgements_of in judged.values() for judgement in judgements_of)
     if level is TrustLevel.WITHIN and any(result.notes for result in results.values()):
         level = TrustLevel.DOUBTFUL
     if len(results) == 1:
@@ -80,8 +80,10 @@ def run_page(results: Mapping[str, Result], digests: Mapping[str, str]) -> Repor
         body = _single(name, result, *loaded[name], judged[name])
     else:
         title = f"{len(results)} impacts: {', '.join(results)}"
-        said = (f"{name}: {_sentence(one, problems[name])}" for name, one in results.items())
-        verdict = [*said, WORDS[level]]
+        sentences = (
+            f"{name}: {_sentence(judgement, problems[name])}" for name, judgement in results.items()
+        )
+        verdict = [*sentences, WORDS[level]]
         body = _several(results, problems, judged)
     provenance = _provenance(results, digests)
     return ReportPage(
@@ -119,10 +121,12 @@ def _several(
     """Return the sections about several results, with a column for each."""
     trust: list[PageBlock] = []
     for name, result in results.items():
-        doubts = tuple(one for one in judged[name] if one.level is not TrustLevel.WITHIN)
+        doubts = tuple(
+            judgement for judgement in judged[name] if judgement.level is not TrustLevel.WITHIN
+        )
         trust += [Judgements(doubts, title=name)] if doubts else []
         trust += note_list(result.notes, f"Notes of {name}")
-    models = {name: _model_row(one, problems[name]) for name, one in results.items()}
+    models = {name: _model_row(judgement, problems[name]) for name, judgement in results.items()}
     names = list(dict.fromkeys(key for row in models.values() for key in row))
     rows = [(key, *(row.get(key, UNKNOWN) for row in models.values())) for key in names]
     return sections(
@@ -137,7 +141,7 @@ def _several(
 
 def _common_pictures(results: Mapping[str, Result]) -> list[PageBlock]:
     """Draw the histories of all results in the same pictures, if their units are the same."""
-    if len({tuple(one.units.items()) for one in results.values()}) > 1:
+    if len({tuple(result.units.items()) for result in results.values()}) > 1:
         return note_list(["The results have different units: they have no pictures in common."])
     return list(figures.of_runs(results))
 
@@ -170,7 +174,7 @@ def _model_row(result: Result, problem: Problem | None) -> dict[str, Cell]:
 
 def _sentence(result: Result, problem: Problem | None) -> str:
     """Say in one sentence what hit what, and what happened."""
-    said = partial(_said, result)
+    in_units = partial(_said, result)
     if "history/force" not in result or not len(result["history/force"]):
         return "No impact: see Results."
     force, time = result["history/force"], result["history/time"]
@@ -178,7 +182,7 @@ def _sentence(result: Result, problem: Problem | None) -> str:
     parts = []
     if force[peak] > 0.0:
         at_least = "at least " if result.end in UNDECIDED else ""
-        size = f"{at_least}{said(force[peak], 'force')} at {said(time[peak], 'time')}"
+        size = f"{at_least}{in_units(force[peak], 'force')} at {in_units(time[peak], 'time')}"
         size += later_contact(result)
         doubt = elastic_doubt(result, float(force[peak]))
         parts.append(f"peak force {size} ({doubt})" if doubt else f"peak force {size}")
@@ -187,23 +191,24 @@ def _sentence(result: Result, problem: Problem | None) -> str:
     if result.threshold:
         limit = float(result.threshold["force"])
         if math.isfinite(float(result.threshold["time"])):
-            energy = said(threshold_energy(result), "force*length")
+            energy = in_units(threshold_energy(result), "force*length")
             parts.append(
-                f"passes the delamination threshold of {said(limit, 'force')} when the projectile "
-                f"has given up {energy} (fecm sweep DECK --find velocity --until "
+                f"passes the delamination threshold of {in_units(limit, 'force')} when the "
+                f"projectile has given up {energy} (fecm sweep DECK --find velocity --until "
                 "peak_force=threshold finds the impact energy that reaches it)"
             )
         else:
             ends = " by the end of the run" if result.end in UNDECIDED else ""
-            parts.append(f"stays below the delamination threshold of {said(limit, 'force')}{ends}")
-    if first := first_failures(result)[:1]:
-        one = first[0]
-        text = f"first failure: {one.mode} ({spelt(one.criterion)}), {one.where}"
-        if not math.isnan(one.force):
-            energy = said(one.energy, "force*length")
-            text = (
-                f"{text}, at {said(one.force, 'force')}, when the projectile has given up {energy}"
+            parts.append(
+                f"stays below the delamination threshold of {in_units(limit, 'force')}{ends}"
             )
+    if first := first_failures(result)[:1]:
+        failure = first[0]
+        text = f"first failure: {failure.mode} ({spelt(failure.criterion)}), {failure.where}"
+        if not math.isnan(failure.force):
+            energy = in_units(failure.energy, "force*length")
+            at_force = in_units(failure.force, "force")
+            text = f"{text}, at {at_force}, when the projectile has given up {energy}"
         parts.append(text)
     elif largest := largest_exposures(result):
         is_open = failure_verdict(largest) is FailureVerdict.OPEN
@@ -251,7 +256,7 @@ def _metrics(results: Mapping[str, Result]) -> list[PageBlock]:
         bounds = [_lower_bound(result) for result in results.values()]
         rows.append(("largest force by the end", *bounds, "lower bound of the peak force"))
     for key, (description, dimension) in METRICS.items():
-        if not any(key in own for own in metrics.values()):
+        if not any(key in run_metrics for run_metrics in metrics.values()):
             continue
         cells: list[Cell] = []
         for name, result in results.items():
@@ -270,14 +275,14 @@ def _metrics(results: Mapping[str, Result]) -> list[PageBlock]:
 def _elastic_peaks(results: Mapping[str, Result]) -> str:
     """List, in brackets, the peaks that are elastic predictions only."""
     doubts = {
-        name: elastic_doubt(one, float(one["history/force"].max(initial=0.0)))
-        for name, one in results.items()
-        if "history/force" in one
+        name: elastic_doubt(result, float(result["history/force"].max(initial=0.0)))
+        for name, result in results.items()
+        if "history/force" in result
     }
-    said = [f"{name} {doubt}" for name, doubt in doubts.items() if doubt]
+    texts = [f"{name} {doubt}" for name, doubt in doubts.items() if doubt]
     if len(results) == 1:
-        said = [doubt for doubt in doubts.values() if doubt]
-    return f" ({'; '.join(said)})" if said else ""
+        texts = [doubt for doubt in doubts.values() if doubt]
+    return f" ({'; '.join(texts)})" if texts else ""
 
 
 def _lower_bound(result: Result) -> Cell:
@@ -289,21 +294,21 @@ def _lower_bound(result: Result) -> Cell:
 
 def _threshold(result: Result) -> list[PageBlock]:
     """Return a table of the delamination threshold and its band."""
-    known = result.threshold
-    if not known:
+    threshold = result.threshold
+    if not threshold:
         return []
     unit = unit_of("force", result.units)
     rows: list[Row] = [
-        ("threshold force", number_with_unit(float(known["force"]), unit)),
-        ("number of delaminations", str(known.get("number", UNKNOWN))),
+        ("threshold force", number_with_unit(float(threshold["force"]), unit)),
+        ("number of delaminations", str(threshold.get("number", UNKNOWN))),
     ]
-    if np.shape(known.get("band", 0)) == (2,):
-        low, high = (number_with_unit(float(force), unit) for force in known["band"])
+    if np.shape(threshold.get("band", 0)) == (2,):
+        low, high = (number_with_unit(float(force), unit) for force in threshold["band"])
         rows += [
             ("one delamination in each interface of unlike plies", low),
             ("a single delamination", high),
         ]
-    reached = float(known["time"])
+    reached = float(threshold["time"])
     if math.isfinite(reached):
         rows.append(("reached at time", number_with_unit(reached, unit_of("time", result.units))))
         rows.append(
@@ -318,19 +323,19 @@ def _threshold(result: Result) -> list[PageBlock]:
 def _criteria(result: Result) -> list[PageBlock]:
     """Return a table of the largest exposure and the first failure of every criterion."""
     length, time, force = (unit_of(name, result.units) for name in ("length", "time", "force"))
-    first = {one.criterion: one for one in first_failures(result)}
+    first = {exposure.criterion: exposure for exposure in first_failures(result)}
     rows: list[Row] = []
-    for one in largest_exposures(result):
-        reached = first.get(one.criterion)
+    for exposure in largest_exposures(result):
+        reached = first.get(exposure.criterion)
         rows.append(
             (
-                spelt(one.criterion),
-                number_with_unit(one.exposure),
-                one.mode,
-                one.where,
-                number_with_unit(one.x, length),
-                number_with_unit(one.y, length),
-                number_with_unit(one.time, time),
+                spelt(exposure.criterion),
+                number_with_unit(exposure.exposure),
+                exposure.mode,
+                exposure.where,
+                number_with_unit(exposure.x, length),
+                number_with_unit(exposure.y, length),
+                number_with_unit(exposure.time, time),
                 UNKNOWN if reached is None else number_with_unit(reached.time, time),
                 UNKNOWN if reached is None else number_with_unit(reached.force, force, 4),
             )

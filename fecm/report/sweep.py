@@ -70,20 +70,26 @@ def _sentences(sweep: SweepResult) -> Iterator[str]:
     names = ", ".join(sweep.cases) or "nothing"
     yield f"A sweep over {names}; {sweep_verdict(sweep)}."
     if (random := sweep.random) is not None and not random.combinations:
-        found = random.exceedance
-        for row, (name, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
-            p, low, high, count, is_open = (float(values[row]) for values in found[2:])
+        exceedance = random.exceedance
+        for row, (name, limit) in enumerate(
+            zip(exceedance.quantity, exceedance.limit, strict=True)
+        ):
+            p, low, high, count, is_open = (float(values[row]) for values in exceedance[2:])
             lacking = random.design.draws - int(count)
-            said = "its threshold" if np.isnan(limit) else f"{limit:.6g} {sweep.unit(name)}"
+            limit_text = "its threshold" if np.isnan(limit) else f"{limit:.6g} {sweep.unit(name)}"
             chances = chance(p, low, high, int(is_open), lacking)
-            yield f"The probability that {name} exceeds {said.rstrip()} is {chances}."
+            yield f"The probability that {name} exceeds {limit_text.rstrip()} is {chances}."
     values = _fine(sweep, what)
     if np.isfinite(values).any():
         unit = sweep.unit(what)
         ends = [quantity(float(end), unit) for end in (np.nanmin(values), np.nanmax(values))]
-        known = int(np.isfinite(values).sum())
-        some = f" in the {known} of {len(values)} cases that have it" if known < len(values) else ""
-        yield f"{what.replace('_', ' ').capitalize()}: {' to '.join(ends)}{some}."
+        with_value = int(np.isfinite(values).sum())
+        where = (
+            f" in the {with_value} of {len(values)} cases that have it"
+            if with_value < len(values)
+            else ""
+        )
+        yield f"{what.replace('_', ' ').capitalize()}: {' to '.join(ends)}{where}."
 
 
 def _fine(sweep: SweepResult, name: str) -> np.ndarray:
@@ -107,8 +113,8 @@ def _judgements(sweep: SweepResult) -> Iterator[Judgement]:
         yield Judgement(
             TrustLevel.OUTSIDE, "failed", ShownNumber(failed, f"{failed} of {count}"), words
         )
-    for reason, some in counted(sweep.validity):
-        cases = int(some.sum())
+    for reason, mask in counted(sweep.validity):
+        cases = int(mask.sum())
         level = TrustLevel.DOUBTFUL if reason in ELASTIC else TrustLevel.OUTSIDE
         yield Judgement(
             level, str(reason), ShownNumber(cases, f"{cases} of {count}"), MEANING[reason]
@@ -127,14 +133,16 @@ def _varied(sweep: SweepResult) -> list[PageBlock]:
         different = list(dict.fromkeys(values.tolist()))
         unit = sweep.unit(name)
         if name in laws:
-            said: Cell = str(laws[name])
+            text: Cell = str(laws[name])
         elif len(different) <= MOST_VALUES or values.dtype.kind != "f":
-            texts = [f"{one:.6g}" if isinstance(one, float) else str(one) for one in different]
-            said = ", ".join(texts[:MOST_VALUES]) + (", …" if len(texts) > MOST_VALUES else "")
+            texts = [
+                f"{value:.6g}" if isinstance(value, float) else str(value) for value in different
+            ]
+            text = ", ".join(texts[:MOST_VALUES]) + (", …" if len(texts) > MOST_VALUES else "")
         else:
-            said = f"{values.min():.6g} to {values.max():.6g}"
+            text = f"{values.min():.6g} to {values.max():.6g}"
         count = ShownNumber(len(different), str(len(different)))
-        rows.append((name, count, said, short_name(unit) or UNKNOWN))
+        rows.append((name, count, text, short_name(unit) or UNKNOWN))
     return page_table(rows, ("name", "different values", "values", "unit"))
 
 
@@ -163,15 +171,15 @@ def _extremes(sweep: SweepResult) -> list[PageBlock]:
 def _convergence(sweep: SweepResult) -> list[PageBlock]:
     """Yield a table of order, limit and error band of the quantities of a refinement study."""
     rows: list[Row] = []
-    for name, one in sweep.convergence.items():
+    for name, study in sweep.convergence.items():
         unit, finest = sweep.unit(name), float(sweep[name][-1])
         sizes = (
             number_with_unit(finest, unit),
-            number_with_unit(one.limit, unit),
-            number_with_unit(one.band, unit),
+            number_with_unit(study.limit, unit),
+            number_with_unit(study.band, unit),
         )
         rows.append(
-            (name.replace("_", " "), *sizes, number_with_unit(one.order, digits=3), one.remark)
+            (name.replace("_", " "), *sizes, number_with_unit(study.order, digits=3), study.remark)
         )
     header = ("quantity", "finest mesh", "limit", "band, ±", "observed order", "remark")
     return page_table(rows, header, "Convergence with the mesh and the time step")
@@ -179,15 +187,15 @@ def _convergence(sweep: SweepResult) -> list[PageBlock]:
 
 def _reduced(sweep: SweepResult) -> list[PageBlock]:
     """Return a table of full runs beside the reduced model."""
-    found = sweep.reduced
-    if found is None:
+    reduced = sweep.reduced
+    if reduced is None:
         return []
-    differences = [found.difference("peak_force"), found.difference(RATIO)]
+    differences = [reduced.difference("peak_force"), reduced.difference(RATIO)]
     rows = [
         (str(case), *(share(float(value)) for value in pair))
-        for case, *pair in zip(found.columns["case"], *differences, strict=True)
+        for case, *pair in zip(reduced.columns["case"], *differences, strict=True)
     ]
-    caption = f"Reduced model with {found.modes} modes: differences from full runs"
+    caption = f"Reduced model with {reduced.modes} modes: differences from full runs"
     return page_table(rows, ("case", "peak force", "deflection"), caption)
 
 
@@ -242,9 +250,9 @@ def _statistics(
     """Return a table of mean, standard deviation and quantiles of the main quantities."""
     rows: list[Row] = []
     for name in (name for name in MAIN if name in random.statistics):
-        own, unit = random.statistics[name], sweep.unit(name)
-        values = [own.mean[place], own.standard_deviation[place], *own.quantiles[place]]
-        draws = int(own.draws[place])
+        moments, unit = random.statistics[name], sweep.unit(name)
+        values = [moments.mean[place], moments.standard_deviation[place], *moments.quantiles[place]]
+        draws = int(moments.draws[place])
         cells = [number_with_unit(float(value), unit) for value in values]
         rows.append((name.replace("_", " "), *cells, ShownNumber(draws, str(draws))))
     quantiles = [f"{100 * q:g} %" for q in QUANTILES]
@@ -255,10 +263,10 @@ def _exceedance(
     sweep: SweepResult, random: RandomResult, place: tuple[int, ...], caption: str
 ) -> list[PageBlock]:
     """Return a table of the probabilities of exceeding limits, with their intervals."""
-    found = random.exceedance
+    exceedance = random.exceedance
     rows: list[Row] = []
-    for row, (name, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
-        p, low, high, draws, is_open = (float(values[(*place, row)]) for values in found[2:])
+    for row, (name, limit) in enumerate(zip(exceedance.quantity, exceedance.limit, strict=True)):
+        p, low, high, draws, is_open = (float(values[(*place, row)]) for values in exceedance[2:])
         level = (
             "its threshold"
             if np.isnan(limit)

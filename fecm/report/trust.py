@@ -87,8 +87,8 @@ def deck_problem(result: Result) -> tuple[Problem | None, list[str]]:
         return None, []
     if loaded.errors(force=True) or len(loaded.problems) != 1:
         return None, []
-    warnings = [one for one in loaded.findings if one.severity == "warning"]
-    return loaded.problems[0], [f"{one.message} [{one.code}]" for one in warnings]
+    warnings = [finding for finding in loaded.findings if finding.severity == "warning"]
+    return loaded.problems[0], [f"{finding.message} [{finding.code}]" for finding in warnings]
 
 
 def judgements(result: Result, problem: Problem | None) -> Iterator[Judgement]:
@@ -104,8 +104,8 @@ def judgements(result: Result, problem: Problem | None) -> Iterator[Judgement]:
             TrustLevel.OUTSIDE, "notes of the run", ShownNumber(count, str(count)), words
         )
     if result.end is not None:
-        level, said, words = ENDS[result.end]
-        yield Judgement(level, "end of the run", said, words)
+        level, size, words = ENDS[result.end]
+        yield Judgement(level, "end of the run", size, words)
     if problem is not None:
         yield from _reached(result, problem, reasons)
     yield from _failure(result)

@@ -100,10 +100,10 @@ class Comparison:
         return ", ".join(parts)
 
 
-def _against(name: str, own: float, measured: float, unit: str) -> str:
+def _against(name: str, computed: float, measured: float, unit: str) -> str:
     """Format two values and their relative difference."""
-    text = f"{name} {own:.4g} against {measured:.4g} {unit}".rstrip()
-    return f"{text} ({own / measured - 1.0:+.1%})" if measured else text
+    text = f"{name} {computed:.4g} against {measured:.4g} {unit}".rstrip()
+    return f"{text} ({computed / measured - 1.0:+.1%})" if measured else text
 
 
 def measurement_of(
@@ -155,17 +155,17 @@ def _from_file(
 ) -> Measurement:
     table = read_table(path)
     column = "transducer" if table.has("transducer") and not table.has("force") else "force"
-    found = table.find(("time", column), columns, units)
-    time, force = table.values(found, units, stated=stated, increasing="time")
+    columns_found = table.find(("time", column), columns, units)
+    time, force = table.values(columns_found, units, stated=stated, increasing="time")
     return Measurement(printable(path.name), column, time, force)
 
 
 def _doubt_trigger(stored: Stored, measured: Measurement, clock: Floats) -> None:
     """Warn if the measured force rises much earlier or later than the force of the result."""
-    own = np.append(0.0, stored[f"history/{measured.column}"])
-    if own.max() <= 0.0 or measured.force.max() <= 0.0:
+    force = np.append(0.0, stored[f"history/{measured.column}"])
+    if force.max() <= 0.0 or measured.force.max() <= 0.0:
         return
-    above = own >= 0.5 * own.max()
+    above = force >= 0.5 * force.max()
     rise = measured.time[(measured.force >= 0.5 * measured.force.max()).argmax()]
     late = float(rise - clock[above.argmax()])
     if abs(late) > TRIGGER * np.count_nonzero(above) / len(clock) * clock[-1]:
@@ -192,19 +192,19 @@ def compare_force(stored: Stored, measured: Measurement) -> Comparison:
             "check its unit of time"
         )
     time, force = measured.time[there], measured.force[there]
-    own = np.interp(time, clock, np.append(0.0, stored[f"history/{measured.column}"]))
+    interpolated = np.interp(time, clock, np.append(0.0, stored[f"history/{measured.column}"]))
     _doubt_trigger(stored, measured, clock)
     weights = 0.5 * (np.diff(time, prepend=time[0]) + np.diff(time, append=time[-1]))
-    varies = np.ptp(own) > 0.0 and np.ptp(force) > 0.0
+    varies = np.ptp(interpolated) > 0.0 and np.ptp(force) > 0.0
     return Comparison(
         points=len(time),
         begin=float(time[0]),
         end=float(time[-1]),
-        peak=float(own.max()),
+        peak=float(interpolated.max()),
         measured_peak=float(force.max()),
-        impulse=float(weights @ own),
+        impulse=float(weights @ interpolated),
         measured_impulse=float(weights @ force),
-        rms=float(np.sqrt(np.mean((own - force) ** 2))),
-        correlation=float(np.corrcoef(own, force)[0, 1]) if varies else math.nan,
+        rms=float(np.sqrt(np.mean((interpolated - force) ** 2))),
+        correlation=float(np.corrcoef(interpolated, force)[0, 1]) if varies else math.nan,
         units=stored.units,
     )

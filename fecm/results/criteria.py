@@ -21,8 +21,11 @@ OWN_CRITERIA = "own_criteria"  # attribute of failure: names of users' criteria 
 
 def criteria_of(failure: Mapping[str, Any]) -> tuple[str, ...]:
     """Return the criteria of a result, from the attributes of its group ``failure``."""
-    own = failure.get(OWN_CRITERIA, ())
-    return (*ALL_CRITERIA, *(map(str, own) if isinstance(own, list | tuple) else ()))
+    user_criteria = failure.get(OWN_CRITERIA, ())
+    return (
+        *ALL_CRITERIA,
+        *(map(str, user_criteria) if isinstance(user_criteria, list | tuple) else ()),
+    )
 
 
 def spelt(criterion: str) -> str:
@@ -81,11 +84,13 @@ def mode_at(deck: Deck, laminate: int, criterion: str, ply: int, mode: str) -> s
     return mode
 
 
-def exposed(deck: Deck, laminate: int, one: PlyExposure) -> str:
+def exposed(deck: Deck, laminate: int, exposure: PlyExposure) -> str:
     """Return mode, criterion and ply of an exposure in a numbered laminate."""
-    mode = mode_at(deck, laminate, one.criterion, one.ply, one.mode)
-    materials = materials_at(deck, laminate, one.criterion, one.ply)
-    return f"{mode}, {spelt(one.criterion)}, {where(one.criterion, one.ply, materials)}"
+    mode = mode_at(deck, laminate, exposure.criterion, exposure.ply, exposure.mode)
+    materials = materials_at(deck, laminate, exposure.criterion, exposure.ply)
+    return (
+        f"{mode}, {spelt(exposure.criterion)}, {where(exposure.criterion, exposure.ply, materials)}"
+    )
 
 
 def is_isotropic(deck: Deck, material: int) -> bool:
@@ -93,8 +98,8 @@ def is_isotropic(deck: Deck, material: int) -> bool:
     if (ply := deck.plies.get(material)) is None or ply.e1 != ply.e2:
         return False
     shear = ply.e1 / (2.0 * (1.0 + ply.nu12))
-    if any(abs(one - shear) > SHEAR_SHARE * shear for one in (ply.g12, ply.g13, ply.g23)):
+    if any(abs(modulus - shear) > SHEAR_SHARE * shear for modulus in (ply.g12, ply.g13, ply.g23)):
         return False
     card = deck.last(Allowables)
-    given = None if card is None else card.of(material)
-    return given is None or (given.xt, given.xc) == (given.yt, given.yc)
+    strengths = None if card is None else card.of(material)
+    return strengths is None or (strengths.xt, strengths.xc) == (strengths.yt, strengths.yc)

@@ -93,34 +93,38 @@ class Pair(NamedTuple):
 
 def compare_dataset(pair: Pair, tolerances: tuple[float, float] | None) -> DatasetDifference:
     """Compare a dataset of both sources, by rtol and atol, or to the last digit of tapes."""
-    found = DatasetDifference(pair.path, pair.shapes, pair.types)
-    if not found.comparable:
-        return found
-    if found.holds_texts:
-        _compare_texts(found, pair)
-        return found
-    infinite = _measure(found, pair)
-    found.scale = found.maximum
-    if own := _own_scale(pair):
-        found.scale, found.scale_name = own, SCALE_NAMES[_scaled_name(pair.path)]
+    difference = DatasetDifference(pair.path, pair.shapes, pair.types)
+    if not difference.comparable:
+        return difference
+    if difference.holds_texts:
+        _compare_texts(difference, pair)
+        return difference
+    infinite = _measure(difference, pair)
+    difference.scale = difference.maximum
+    if scale := _own_scale(pair):
+        difference.scale, difference.scale_name = scale, SCALE_NAMES[_scaled_name(pair.path)]
     if tolerances is None:
-        found.tolerance = float(last_digit(np.array(found.maximum)))
+        difference.tolerance = float(last_digit(np.array(difference.maximum)))
     elif any(source.dtypes[pair.path].kind == "f" for source in pair.sources):
         rtol, atol = tolerances
-        found.tolerance = atol + rtol * found.scale
-    if infinite or found.largest_difference > (0.0 if tolerances is None else found.tolerance):
-        _count(found, pair, to_last_digit=tolerances is None)
-    return found
+        difference.tolerance = atol + rtol * difference.scale
+    if infinite or difference.largest_difference > (
+        0.0 if tolerances is None else difference.tolerance
+    ):
+        _count(difference, pair, to_last_digit=tolerances is None)
+    return difference
 
 
-def _compare_texts(found: DatasetDifference, pair: Pair) -> None:
+def _compare_texts(difference: DatasetDifference, pair: Pair) -> None:
     """Compare a dataset of texts."""
-    left, right = (source.rows(pair.path, 0, found.shapes[0][0]) for source in pair.sources)
-    rows = np.flatnonzero(left != right)
-    found.differing = len(rows)
+    texts_a, texts_b = (
+        source.rows(pair.path, 0, difference.shapes[0][0]) for source in pair.sources
+    )
+    rows = np.flatnonzero(texts_a != texts_b)
+    difference.differing = len(rows)
     if len(rows):
-        found.largest_difference, found.at = math.inf, _place(pair, (int(rows[0]),))
-        found.values = str(left[rows[0]]), str(right[rows[0]])
+        difference.largest_difference, difference.at = math.inf, _place(pair, (int(rows[0]),))
+        difference.values = str(texts_a[rows[0]]), str(texts_b[rows[0]])
 
 
 def _scaled_name(path: str) -> str:
@@ -150,8 +154,8 @@ def _own_scale(pair: Pair) -> float:
         case DifferenceScale.CONTACT:
             group = pair.path.partition("/")[0]
             # A tape has few digits of every number, also in free flight.
-            known = all(f"{group}/step" in source.shapes for source in pair.sources)
-            return _largest(pair, pair.path, above=0.0) if known else 0.0
+            has_steps = all(f"{group}/step" in source.shapes for source in pair.sources)
+            return _largest(pair, pair.path, above=0.0) if has_steps else 0.0
 
 
 def _largest(pair: Pair, path: str, above: float = -np.inf) -> float:
@@ -180,73 +184,75 @@ def _inverse_thickness(pair: Pair) -> float:
 def _largest_laminate(pair: Pair, name: str) -> float:
     """Return the largest value of a stiffness matrix of the laminates."""
     paths = {path for source in pair.sources for path in source.shapes}
-    own = [p for p in paths if p.startswith("laminate/") and p.endswith(f"/{name}")]
-    return max((_largest(pair, path) for path in own), default=0.0)
+    numbered = [p for p in paths if p.startswith("laminate/") and p.endswith(f"/{name}")]
+    return max((_largest(pair, path) for path in numbered), default=0.0)
 
 
 def _initial_energy(pair: Pair) -> float:
     """Return the largest initial energy of both files; 0 if it is not known."""
     files = (source for source in pair.sources if isinstance(source, FileContents))
     initial = (file.groups.get("energy", {}).get("initial") for file in files)
-    known = (abs(e) for e in initial if isinstance(e, int | float) and np.isfinite(e))
-    return max(known, default=0.0)
+    energies = (abs(e) for e in initial if isinstance(e, int | float) and np.isfinite(e))
+    return max(energies, default=0.0)
 
 
-def _measure(found: DatasetDifference, pair: Pair) -> bool:
+def _measure(difference: DatasetDifference, pair: Pair) -> bool:
     """Find the maximum and the largest difference with its place.
 
     Returns whether the difference is infinite.
     """
     place: tuple[int, ...] = ()
     infinite = False
-    for start, left, right in pair.blocks():
-        for values in (left, right):
+    for start, a, b in pair.blocks():
+        for values in (a, b):
             size = np.abs(values, where=np.isfinite(values), out=np.zeros(values.shape))
-            found.maximum = max(found.maximum, float(size.max(initial=0.0)))
-        apart, strange = _differences(left, right)
+            difference.maximum = max(difference.maximum, float(size.max(initial=0.0)))
+        apart, strange = _differences(a, b)
         if infinite or not apart.size:
             continue  # no other difference is larger
         here = int((strange if strange.any() else apart).argmax())
         index = np.unravel_index(here, apart.shape)
-        if strange.any() or apart[index] > found.largest_difference:
+        if strange.any() or apart[index] > difference.largest_difference:
             infinite = bool(strange.any())
-            found.largest_difference = np.inf if infinite else float(apart[index])
-            found.values = float(left[index]), float(right[index])
+            difference.largest_difference = np.inf if infinite else float(apart[index])
+            difference.values = float(a[index]), float(b[index])
             place = (start + int(index[0]), *map(int, index[1:]))
     if place:
-        found.at = _place(pair, place)
+        difference.at = _place(pair, place)
     return infinite
 
 
-def _count(found: DatasetDifference, pair: Pair, *, to_last_digit: bool) -> None:
+def _count(difference: DatasetDifference, pair: Pair, *, to_last_digit: bool) -> None:
     """Count the differences beyond the tolerance, and find the first row that has one."""
-    instants = found.shapes[0] and (_clock(pair) or pair.path.startswith("tape"))
-    for start, left, right in pair.blocks():
-        apart, strange = _differences(left, right)
-        tolerance: Any = found.tolerance
+    instants = difference.shapes[0] and (_clock(pair) or pair.path.startswith("tape"))
+    for start, a, b in pair.blocks():
+        apart, strange = _differences(a, b)
+        tolerance: Any = difference.tolerance
         if to_last_digit:
-            pairs = zip(pair.sources, (left, right), strict=True)
-            printed = [last_digit(values) for one, values in pairs if isinstance(one, TapeText)]
+            pairs = zip(pair.sources, (a, b), strict=True)
+            printed = [
+                last_digit(values) for source, values in pairs if isinstance(source, TapeText)
+            ]
             tolerance = (1.0 + 1e-9) * np.max(printed, axis=0)
         wrong = strange | (apart > tolerance)
-        found.differing += int(np.count_nonzero(wrong))
-        if found.first is None and wrong.any() and instants:
+        difference.differing += int(np.count_nonzero(wrong))
+        if difference.first is None and wrong.any() and instants:
             row = int(wrong.reshape(len(wrong), -1).any(axis=1).argmax())
-            found.first = _place(pair, (start + row,))
+            difference.first = _place(pair, (start + row,))
 
 
-def _differences(left: Array, right: Array) -> tuple[Array, Array]:
+def _differences(a: Array, b: Array) -> tuple[Array, Array]:
     """Return |a - b| where both are finite, else 0; and a mask of other unequal numbers."""
-    if left.dtype.kind in "biu" and right.dtype.kind in "biu":
-        apart = np.abs(left.astype(float) - right.astype(float))
-        unequal = left != right
+    if a.dtype.kind in "biu" and b.dtype.kind in "biu":
+        apart = np.abs(a.astype(float) - b.astype(float))
+        unequal = a != b
         # Different large integers may be equal as floats.
-        return np.where(unequal, np.maximum(apart, 1.0), 0.0), np.zeros(left.shape, bool)
-    left, right = left.astype(float), right.astype(float)
-    finite = np.isfinite(left) & np.isfinite(right)
+        return np.where(unequal, np.maximum(apart, 1.0), 0.0), np.zeros(a.shape, bool)
+    a, b = a.astype(float), b.astype(float)
+    finite = np.isfinite(a) & np.isfinite(b)
     with np.errstate(over="ignore", invalid="ignore"):
-        apart = np.where(finite, np.abs(left - right), 0.0)
-    equal = (left == right) | (np.isnan(left) & np.isnan(right))
+        apart = np.where(finite, np.abs(a - b), 0.0)
+    equal = (a == b) | (np.isnan(a) & np.isnan(b))
     return apart, ~finite & ~equal
 
 
@@ -387,18 +393,18 @@ def diff(
     >>> print(f"{force.largest_difference:.3f} lb of {force.maximum:.2f} lb")
     0.768 lb of 85.76 lb
     """
-    own = {name: _own_tolerance(name, values) for name, values in (tol or {}).items()}
+    tolerance_of = {name: _own_tolerance(name, values) for name, values in (tol or {}).items()}
     for name, value in {"rtol": rtol, "atol": atol}.items():
         _own_tolerance(name, value or 0.0)
     with contextlib.ExitStack() as stack:
-        left, right = (_source(one, stack) for one in (a, b))
-        forms = left.form, right.form
-        if left.form != right.form and {Form.SWEEP, Form.LOCATION} & {*forms}:
+        source_a, source_b = (_source(compared, stack) for compared in (a, b))
+        forms = source_a.form, source_b.form
+        if source_a.form != source_b.form and {Form.SWEEP, Form.LOCATION} & {*forms}:
             names = " and B ".join(SOURCE_NAMES[form] for form in forms)
             raise IncomparableError(f"A is {names}: they can't be compared")
-        left, right = _fitted(left, right), _fitted(right, left)
-        shared = ON_TAPE if TAPES in forms else left.shapes.keys() | right.shapes
-        in_a, in_b = left.shapes.keys() & shared, right.shapes.keys() & shared
+        source_a, source_b = _fitted(source_a, source_b), _fitted(source_b, source_a)
+        shared = ON_TAPE if TAPES in forms else source_a.shapes.keys() | source_b.shapes
+        in_a, in_b = source_a.shapes.keys() & shared, source_b.shapes.keys() & shared
         both = in_a | in_b
         asked = _chosen(both, _names(only)) if only else both
         excluded = asked & _chosen(both, _names(exclude), DATASETS)
@@ -408,24 +414,24 @@ def diff(
         last_digit = TAPES in forms and rtol is None and atol is None
         general = None if last_digit else (rtol or 0.0, atol or 0.0)
         tolerances = dict.fromkeys(chosen, general)
-        for pattern, (relative, *absolute) in own.items():
+        for pattern, (relative, *absolute) in tolerance_of.items():
             for path in _chosen(both, [pattern], DATASETS) & chosen:
                 tolerances[path] = (relative, absolute[0] if absolute else atol or 0.0)
-        for source in (left, right):
+        for source in (source_a, source_b):
             if isinstance(source, FileContents):
                 stack.enter_context(source.held())
-        pairs = [Pair(path, (left, right)) for path in sorted(in_a & in_b & chosen)]
+        pairs = [Pair(path, (source_a, source_b)) for path in sorted(in_a & in_b & chosen)]
         return Difference(
             a=_name(a),
             b=_name(b),
             rtol=rtol or 0.0,
             atol=atol or 0.0,
-            tol=own,
+            tol=tolerance_of,
             last_digit=last_digit,
             datasets=[compare_dataset(pair, tolerances[pair.path]) for pair in pairs],
             only_in_a=sorted((in_a - in_b) & chosen),
             only_in_b=sorted((in_b - in_a) & chosen),
-            listed=_listed(left, right),
+            listed=_listed(source_a, source_b),
             excluded=sorted(excluded),
         )
 
@@ -475,44 +481,44 @@ def assert_same(
     >>> fecm.assert_same(fecm.run_one(deck, solver="csr"), "trusted.h5")
     """
     __tracebackhide__ = True  # pytest shows the line of the test
-    found = diff(result, trusted, rtol, atol, only=only, exclude=exclude, tol=tol)
-    if not found.same:
-        head = f"the result, A: {found.a}, is not the trusted one, B: {found.b}"
-        raise AssertionError("\n".join([head, *found.lines(same=False)]))
+    difference = diff(result, trusted, rtol, atol, only=only, exclude=exclude, tol=tol)
+    if not difference.same:
+        head = f"the result, A: {difference.a}, is not the trusted one, B: {difference.b}"
+        raise AssertionError("\n".join([head, *difference.lines(same=False)]))
 
 
-def _source(one: Compared, stack: contextlib.ExitStack) -> Source:
+def _source(compared: Compared, stack: contextlib.ExitStack) -> Source:
     """Return the contents of a file, a folder of tapes, or a result, which may be in memory."""
-    if isinstance(one, Result) and isinstance(one._arrays, FileContents):
-        return one._arrays
-    if not isinstance(one, str | Path | Savable):
-        raise IncomparableError(f"a {type(one).__name__} is not a result")
-    if not isinstance(one, str | Path):
+    if isinstance(compared, Result) and isinstance(compared._arrays, FileContents):
+        return compared._arrays
+    if not isinstance(compared, str | Path | Savable):
+        raise IncomparableError(f"a {type(compared).__name__} is not a result")
+    if not isinstance(compared, str | Path):
         import tempfile  # 3 ms at start
 
         folder = stack.enter_context(tempfile.TemporaryDirectory(prefix="fecm-"))
         path = Path(folder) / "result.h5"
-        one.save(path)
+        compared.save(path)
         return read(path, *Form)
-    path = Path(one)
+    path = Path(compared)
     return read_tapes(path) if path.is_dir() else read(path, *Form)
 
 
-def _name(one: Compared) -> str:
+def _name(compared: Compared) -> str:
     """Return the path of a result, or ``<memory>``."""
-    if isinstance(one, Result) and isinstance(one._arrays, FileContents):
-        return str(one._arrays.path)
-    return str(one) if isinstance(one, str | Path) else "<memory>"
+    if isinstance(compared, Result) and isinstance(compared._arrays, FileContents):
+        return str(compared._arrays.path)
+    return str(compared) if isinstance(compared, str | Path) else "<memory>"
 
 
-def _names(given: str | Sequence[str]) -> Sequence[str]:
+def _names(names: str | Sequence[str]) -> Sequence[str]:
     """Return names of datasets as a tuple."""
-    return (given,) if isinstance(given, str) else given
+    return (names,) if isinstance(names, str) else names
 
 
-def _own_tolerance(name: str, given: Tolerance) -> tuple[float, ...]:
+def _own_tolerance(name: str, tolerance: Tolerance) -> tuple[float, ...]:
     """Return the relative and the absolute tolerance of a dataset."""
-    values = tuple(given) if isinstance(given, Sequence) else (given,)
+    values = tuple(tolerance) if isinstance(tolerance, Sequence) else (tolerance,)
     valid = all(isinstance(v, Real) and 0.0 <= v < math.inf for v in values)
     if not valid or len(values) not in (1, 2):
         shown = ", ".join(map(str, values))
@@ -528,7 +534,9 @@ def _fitted(source: Source, other: Source) -> Source:
     return source
 
 
-def _chosen(names: set[str], patterns: Sequence[str], known: Collection[str] = ()) -> set[str]:
+def _chosen(
+    names: set[str], patterns: Sequence[str], known_names: Collection[str] = ()
+) -> set[str]:
     """Return the names that match patterns, or lie in groups that match.
 
     Each pattern must match one, or a known name.
@@ -536,11 +544,11 @@ def _chosen(names: set[str], patterns: Sequence[str], known: Collection[str] = (
     chosen: set[str] = set()
     for asked in patterns:
         plain = asked.strip("/")
-        every = names.union(known)
-        found = {n for n in every if fnmatchcase(n, plain) or n.startswith(f"{plain}/")}
-        if not found:
+        every = names.union(known_names)
+        matches = {n for n in every if fnmatchcase(n, plain) or n.startswith(f"{plain}/")}
+        if not matches:
             raise IncomparableError(f"there is no `{asked}` to compare{suggestion(plain, names)}")
-        chosen |= found & names
+        chosen |= matches & names
     return chosen
 
 
@@ -548,18 +556,18 @@ def _listed(a: Source, b: Source) -> list[Listed]:
     """Return attributes, and first lines of texts, that differ between two files."""
     if isinstance(a, TapeText) or isinstance(b, TapeText):
         return []
-    left, right = _attributes(a), _attributes(b)
+    attributes_a, attributes_b = _attributes(a), _attributes(b)
     listed = [
-        Listed(name, left.get(name), right.get(name))
-        for name in dict.fromkeys((*left, *right))
-        if repr(left.get(name)) != repr(right.get(name))
+        Listed(name, attributes_a.get(name), attributes_b.get(name))
+        for name in dict.fromkeys((*attributes_a, *attributes_b))
+        if repr(attributes_a.get(name)) != repr(attributes_b.get(name))
     ]
     for name in dict.fromkeys((*a.texts, *b.texts)):
-        one, other = a.texts.get(name), b.texts.get(name)
-        if one is None or other is None:
-            listed.append(Listed(name, one and "a text", other and "a text"))
-        elif one != other:
-            pairs = itertools.zip_longest(one.split("\n"), other.split("\n"))
+        text_a, text_b = a.texts.get(name), b.texts.get(name)
+        if text_a is None or text_b is None:
+            listed.append(Listed(name, text_a and "a text", text_b and "a text"))
+        elif text_a != text_b:
+            pairs = itertools.zip_longest(text_a.split("\n"), text_b.split("\n"))
             line, (x, y) = next((n, (x, y)) for n, (x, y) in enumerate(pairs, 1) if x != y)
             listed.append(Listed(name, x, y, line))
     return listed

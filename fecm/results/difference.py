@@ -178,8 +178,8 @@ class DatasetDifference:
         """Return unlike shapes and types, the largest difference, and the number of differences."""
         parts: list[str] = []
         if self.shapes[0] != self.shapes[1]:
-            left, right = ("x".join(map(str, shape)) or "single" for shape in self.shapes)
-            parts.append(f"shape {left} against {right}")
+            text_a, text_b = ("x".join(map(str, shape)) or "single" for shape in self.shapes)
+            parts.append(f"shape {text_a} against {text_b}")
         if self.types[0] != self.types[1]:
             parts.append(f"type {self.types[0]} against {self.types[1]}")
         if self.at and self.values:
@@ -192,11 +192,11 @@ class DatasetDifference:
             parts.append(f"first{_at(self.first)}")
         return "; ".join(parts)
 
-    def _largest_in_words(self, at: Position, values: tuple[object, object]) -> str:
+    def _largest_in_words(self, position: Position, values: tuple[object, object]) -> str:
         """Format the largest difference and its place."""
         quote = "`" if self.holds_texts else ""
-        left, right = (f"{quote}{value}{quote}" for value in shown_apart(*values))
-        text = f"{left} against {right}{_at(at)}"
+        text_a, text_b = (f"{quote}{value}{quote}" for value in shown_apart(*values))
+        text = f"{text_a} against {text_b}{_at(position)}"
         if not math.isfinite(self.largest_difference):
             return text
         share = f"{self.relative:.2g} of {self.scale_name} {self.scale:.6g}"
@@ -252,12 +252,12 @@ class Listed(NamedTuple):
     line: int | None = None
 
     def __str__(self) -> str:
-        left, right = (
+        text_a, text_b = (
             "nothing" if value is None else f"`{text}`"
             for value, text in zip((self.a, self.b), shown_apart(self.a, self.b), strict=True)
         )
         line = f" line {self.line}" if self.line else ""
-        return f"{printable(self.name)}{line}: {left} against {right}"
+        return f"{printable(self.name)}{line}: {text_a} against {text_b}"
 
 
 @dataclass(frozen=True)
@@ -304,7 +304,7 @@ class Difference:
     @property
     def different(self) -> list[str]:
         """Names of the datasets that differ, sorted."""
-        unequal = [found.name for found in self.datasets if not found.same]
+        unequal = [dataset.name for dataset in self.datasets if not dataset.same]
         return sorted([*unequal, *self.only_in_a, *self.only_in_b])
 
     @property
@@ -348,9 +348,9 @@ class Difference:
             Whether datasets that are equal have a line too.
         """
         rows = {
-            found.name: ("same" if found.same else "different", str(found))
-            for found in self.datasets
-            if same or not found.same
+            dataset.name: ("same" if dataset.same else "different", str(dataset))
+            for dataset in self.datasets
+            if same or not dataset.same
         }
         rows |= dict.fromkeys(self.only_in_a, ("only in A", ""))
         rows |= dict.fromkeys(self.only_in_b, ("only in B", ""))
@@ -377,7 +377,9 @@ class Difference:
             "atol": self.atol,
             "last_digit": self.last_digit,
             "tol": {pattern: list(values) for pattern, values in self.tol.items()},
-            "datasets": [found.to_dict() for found in self.datasets if same or not found.same],
+            "datasets": [
+                dataset.to_dict() for dataset in self.datasets if same or not dataset.same
+            ],
             "only_in_a": self.only_in_a,
             "only_in_b": self.only_in_b,
             "excluded": self.excluded,

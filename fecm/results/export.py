@@ -112,8 +112,8 @@ def dataset_csv_lines(
         choice = f"choose {', '.join(values[:-1])} or {values[-1]}"
         raise ExportError(f"the datasets of {name} do not fit into one table; {choice}")
     dataset = schema.dataset_of(values[0], len(shape))
-    known = shape if dataset is None else dataset.shape
-    axes = list(zip(known, shape, strict=True))[bool(clock) :]
+    sizes = shape if dataset is None else dataset.shape
+    axes = list(zip(sizes, shape, strict=True))[bool(clock) :]
     columns = _headings(result, values)
     if len(values) == 1 and axes and len(names := NAMED.get(axes[-1][0], ())) >= axes[-1][1]:
         columns = _components(names[: axes.pop()[1]], result.unit(values[0]))
@@ -131,8 +131,8 @@ def _members(result: Stored, name: str) -> list[str]:
     if name in result:
         return [name]
     if members := [path for path in result if path.startswith(f"{name}/")]:
-        known = list(schema.DATASETS)
-        return sorted(members, key=lambda path: known.index(path) if path in known else len(known))
+        order = list(schema.DATASETS)
+        return sorted(members, key=lambda path: order.index(path) if path in order else len(order))
     group = name.partition("/")[0]
     if group in STORED_BY and not any(path.startswith(f"{group}/") for path in result):
         raise ExportError(f"the result has no {name}{remedy(name)}")
@@ -150,8 +150,13 @@ def _components(names: Sequence[str], unit: str) -> tuple[str, ...]:
     `unit` applies to all components, or lists them: ``mm (u, v, w), 1 (theta_x, theta_y)``.
     """
     shared = OF_COMPONENTS.findall(unit)
-    own = {name: one for one, members in shared for name in members.split(", ") if one != "1"}
-    return tuple(column_name(name, own.get(name, "") if shared else unit) for name in names)
+    units = {
+        name: unit_of_members
+        for unit_of_members, members in shared
+        for name in members.split(", ")
+        if unit_of_members != "1"
+    }
+    return tuple(column_name(name, units.get(name, "") if shared else unit) for name in names)
 
 
 def _in_rows(path: str) -> bool:
@@ -204,8 +209,8 @@ def write_vtkhdf(
         _write_mesh(root, result, result["tape3/time"][rows])
         _write_contact(root, result, steps)
         _write_exposures(root, result, steps)
-        for one in plate_fields(result, rows, note):
-            _write_fields(root, len(steps), one)
+        for fields in plate_fields(result, rows, note):
+            _write_fields(root, len(steps), fields)
 
 
 def _write_mesh(root: h5py.Group, result: Stored, times: Array) -> None:
@@ -229,7 +234,7 @@ def _write_mesh(root: h5py.Group, result: Stored, times: Array) -> None:
 
 def _field(
     root: h5py.Group,
-    at: str,
+    path: str,
     name: str,
     steps: int,
     shape: tuple[int, ...],
@@ -237,12 +242,12 @@ def _field(
     constant: bool = False,
 ) -> Any:
     """Create a field with an array of `shape` per step, concatenated, or with a single array."""
-    data = root.require_group(f"{at}Data")
+    data = root.require_group(f"{path}Data")
     count = 1 if constant else steps
     dataset = data.create_dataset(name, (count * shape[0], *shape[1:]), "f8")
     offsets = np.arange(steps, dtype="i8") % count * shape[0]
-    root.require_group(f"Steps/{at}DataOffsets")[name] = offsets
-    if at == TIME:
+    root.require_group(f"Steps/{path}DataOffsets")[name] = offsets
+    if path == TIME:
         sizes = np.tile(np.array([1, shape[0]], dtype="i8"), (steps, 1))
         root.require_group("Steps/FieldDataSizes")[name] = sizes
     return dataset
@@ -250,12 +255,12 @@ def _field(
 
 def _write_fields(root: h5py.Group, steps: int, of: Fields) -> None:
     """Write point or cell data, step after step, or once if they are constant."""
-    made = [
+    datasets = [
         (_field(root, of.at, name, steps, shape, constant=of.constant), shape[0])
         for name, shape in of.shapes.items()
     ]
     for number in range(1 if of.constant else steps):
-        for (dataset, length), values in zip(made, of.of_step(number), strict=True):
+        for (dataset, length), values in zip(datasets, of.of_step(number), strict=True):
             dataset[number * length : (number + 1) * length] = values
 
 
@@ -263,10 +268,10 @@ def _write_contact(root: h5py.Group, result: Stored, steps: Ints) -> None:
     """Write the contact at each step as field data; zero before the first step."""
     if "history/step" not in result:
         return
-    at = np.searchsorted(result["history/step"], steps)
+    rows = np.searchsorted(result["history/step"], steps)
     for name in CONTACT:
         values = np.concatenate((result[f"history/{name}"], [0.0]))
-        at_step = np.where(steps > 0, values[np.minimum(at, len(values) - 1)], 0.0)
+        at_step = np.where(steps > 0, values[np.minimum(rows, len(values) - 1)], 0.0)
         _field(root, TIME, name, len(steps), (1,))[:] = at_step
 
 
@@ -292,8 +297,8 @@ def dataframe(stored: Stored) -> pandas.DataFrame:
     members = [path for path in stored if path.startswith("history/")]
     if not members:
         raise NotStoredError("the result has no history: no impact step was taken")
-    known = [path for path in DATASETS if path in members]
-    columns = {path.partition("/")[2]: stored[path] for path in dict.fromkeys(known + members)}
+    paths = [path for path in DATASETS if path in members]
+    columns = {path.partition("/")[2]: stored[path] for path in dict.fromkeys(paths + members)}
     index = pandas.Index(columns.pop("time"), name="time")
     table = pandas.DataFrame(columns, index=index)
     table.attrs["units"] = {
@@ -328,8 +333,8 @@ def datatree(stored: Stored) -> xarray.DataTree:
     tree = {"/": xarray.Dataset(coords=unknowns, attrs=stored.attributes)}
     for name, variables in groups.items():
         at_nodes = any("node" in axes for axes, _, _ in variables.values())
-        own = stored.attributes_of(name)
-        tree[name] = xarray.Dataset(variables, places if at_nodes else {}, own)
+        group_attributes = stored.attributes_of(name)
+        tree[name] = xarray.Dataset(variables, places if at_nodes else {}, group_attributes)
     return xarray.DataTree.from_dict(tree)
 
 
@@ -354,16 +359,16 @@ def pyvista_grid(stored: Stored, time: float | None) -> pyvista.UnstructuredGrid
     (row,) = [-1] if time is None else rows_at(stored["tape3/time"], [time], "displacements")
     connectivity, offsets, types = vtk_cells(stored["mesh/elements"])
     cells = np.insert(connectivity, offsets[:-1], np.diff(offsets))
-    made: Any = pyvista.UnstructuredGrid(cells, types, vtk_points(stored))
+    grid: Any = pyvista.UnstructuredGrid(cells, types, vtk_points(stored))
     notes = [*stored.notes]
-    for one in plate_fields(stored, np.array([row]), notes.append):
-        data = made.point_data if one.at is At.POINTS else made.cell_data
-        for name, values in zip(one.shapes, one.of_step(0), strict=True):
+    for fields in plate_fields(stored, np.array([row]), notes.append):
+        data = grid.point_data if fields.at is At.POINTS else grid.cell_data
+        for name, values in zip(fields.shapes, fields.of_step(0), strict=True):
             data[name] = values
-    made.field_data["time"] = [stored["tape3/time"][row]]
+    grid.field_data["time"] = [stored["tape3/time"][row]]
     if notes:
-        made.field_data["notes"] = notes
-    return made
+        grid.field_data["notes"] = notes
+    return grid
 
 
 class ExportFormat(StrEnum):
@@ -382,9 +387,9 @@ def format_of(path: Path, to: str | None) -> ExportFormat:
     try:
         return ExportFormat(name)
     except ValueError:
-        known = " and ".join(ExportFormat)
+        formats = " and ".join(ExportFormat)
         raise ExportError(
-            f"{path}: {name!r} is not a format of exports; known are {known}"
+            f"{path}: {name!r} is not a format of exports; known are {formats}"
         ) from None
 
 

@@ -85,10 +85,12 @@ class FailureVerdict(StrEnum):
 
 def failure_verdict(largest: Sequence[LargestExposure]) -> FailureVerdict:
     """Judge whether any of the largest exposures reaches 1 on every finer mesh, none, or some."""
-    if any(one.exposure >= 1.0 and not one.is_open for one in largest):
+    if any(exposure.exposure >= 1.0 and not exposure.is_open for exposure in largest):
         return FailureVerdict.REACHED
     return (
-        FailureVerdict.OPEN if any(one.is_open for one in largest) else FailureVerdict.NOT_REACHED
+        FailureVerdict.OPEN
+        if any(exposure.is_open for exposure in largest)
+        else FailureVerdict.NOT_REACHED
     )
 
 
@@ -122,7 +124,7 @@ def band_of_largest(largest: Sequence[LargestExposure]) -> tuple[float, float]:
 
     Both are NaN where they are not known.
     """
-    bands = [one.band for one in largest if one.band is not None]
+    bands = [exposure.band for exposure in largest if exposure.band is not None]
     if not bands or len(bands) < len(largest):
         return math.nan, math.nan
     low, high = (max(ends) for ends in zip(*bands, strict=True))
@@ -140,9 +142,9 @@ def largest_exposures(stored: Stored) -> list[LargestExposure]:
     largest = []
     for number, criterion in enumerate(criteria_of(stored.attributes_of("failure"))):
         candidates = [_outside(stored, criterion), _on_circle(stored, criterion, number)]
-        known = [one for one in candidates if one is not None]
-        if known:
-            largest.append(max(known, key=lambda one: one.exposure))
+        present = [candidate for candidate in candidates if candidate is not None]
+        if present:
+            largest.append(max(present, key=lambda candidate: candidate.exposure))
     return largest
 
 
@@ -156,7 +158,7 @@ def _outside(stored: Stored, criterion: str) -> LargestExposure | None:
     place = np.unravel_index(int((outside >= limit).argmax()), outside.shape)
     # (element, point, ply, face), or (element, interface)
     points = 2 if exposure.ndim > 2 else 1
-    at, ply = place[:points], place[points]
+    point, ply = place[:points], place[points]
     x, y = stored["failure/x"], stored["failure/y"]
     tied = (outside >= limit).reshape(*outside.shape[:points], -1).any(axis=-1)
     return _largest(
@@ -165,8 +167,8 @@ def _outside(stored: Stored, criterion: str) -> LargestExposure | None:
         float(exposure[place]),
         int(stored[f"failure/{criterion}/mode"][place]),
         int(ply) + 1,
-        float(x[at].mean()),
-        float(y[at].mean()),
+        float(x[point].mean()),
+        float(y[point].mean()),
         float(stored[f"failure/{criterion}/time"][place]),
         int(np.count_nonzero(tied)) - 1,
     )
@@ -339,7 +341,7 @@ def first_failures(stored: Stored, level: float = 1.0) -> list[FirstFailure]:
     about = stored.attributes_of("failure")
     modes = dict(enumerate(map(str, about.get("modes", ()))))
     history = _history(stored)
-    found = []
+    failures = []
     for number, (criterion, exposure) in enumerate(
         zip(criteria_of(about), exposures.T, strict=False)
     ):
@@ -354,7 +356,7 @@ def first_failures(stored: Stored, level: float = 1.0) -> list[FirstFailure]:
             stored[f"exposures/{name}"][row, number].item() for name in ("mode", "ply", "x", "y")
         )
         name, materials = of_material(stored, criterion, ply, (x, y), modes.get(mode, "unknown"))
-        found.append(
+        failures.append(
             FirstFailure(
                 criterion,
                 mode=name,
@@ -369,7 +371,7 @@ def first_failures(stored: Stored, level: float = 1.0) -> list[FirstFailure]:
                 materials=materials,
             )
         )
-    return sorted(found, key=lambda one: one.time)
+    return sorted(failures, key=lambda one: one.time)
 
 
 def threshold_energy(stored: Stored) -> float:
@@ -453,7 +455,7 @@ def failure_metrics(stored: Stored) -> FailureJson:
         "evaluations_in_contact": evaluations_in_contact(stored),
         "largest": {criterion: exposures[-1] for criterion, exposures in so_far.items()},
         "history": {"time": times, "exposure": so_far},
-        "first": [asdict(one) for one in first_failures(stored)],
+        "first": [asdict(failure) for failure in first_failures(stored)],
         **_of_cure(stored),
     }
 
@@ -461,9 +463,13 @@ def failure_metrics(stored: Stored) -> FailureJson:
 def _of_cure(stored: Stored) -> CureJson:
     """Return the attributes of the criteria of a run with CURE, by criterion."""
     criteria = criteria_of(stored.attributes_of("failure"))
-    known = {name: stored.attributes_of(f"failure/{name}") for name in criteria}
-    found = {
-        attribute: {name: float(own[attribute]) for name, own in known.items() if attribute in own}
+    groups = {name: stored.attributes_of(f"failure/{name}") for name in criteria}
+    attribute_values = {
+        attribute: {
+            name: float(attributes[attribute])
+            for name, attributes in groups.items()
+            if attribute in attributes
+        }
         for attribute in (AT_REST, LOAD_FACTOR)
     }
-    return cast("CureJson", {name: values for name, values in found.items() if values})
+    return cast("CureJson", {name: values for name, values in attribute_values.items() if values})

@@ -68,8 +68,8 @@ def not_stored(asked: str, paths: Collection[str]) -> str:
     if members := sorted(path for path in paths if path.startswith(f"{asked}/")):
         return f"{asked} is a group, not a dataset; its datasets are {', '.join(members)}"
     group = asked.partition("/")[0]
-    known = any(path.startswith(f"{group}/") for path in paths)
-    more = suggestion(asked, paths) if known else remedy(asked) or suggestion(asked, paths)
+    group_exists = any(path.startswith(f"{group}/") for path in paths)
+    more = suggestion(asked, paths) if group_exists else remedy(asked) or suggestion(asked, paths)
     return f"there is no {asked} in this result{more}"
 
 
@@ -77,13 +77,17 @@ def suggestion(asked: str, paths: Iterable[str]) -> str:
     """Return the end of a message about a missing name: similar names, or the groups."""
     import difflib  # 1 ms, only after a mistake
 
-    known = sorted({name for path in paths for name in (path, path.rpartition("/")[0])} - {""})
-    last_parts = [name.rpartition("/")[2] for name in known]
+    known_names = sorted(
+        {name for path in paths for name in (path, path.rpartition("/")[0])} - {""}
+    )
+    last_parts = [name.rpartition("/")[2] for name in known_names]
     close = difflib.get_close_matches(asked, last_parts, n=3) if "/" not in asked else []
-    alike = [name for name, last in zip(known, last_parts, strict=True) if last in (asked, *close)]
-    if alike := alike or difflib.get_close_matches(asked, known, n=3):
+    alike = [
+        name for name, last in zip(known_names, last_parts, strict=True) if last in (asked, *close)
+    ]
+    if alike := alike or difflib.get_close_matches(asked, known_names, n=3):
         return f"; did you mean {' or '.join(alike)}?"
-    groups = sorted({name.partition("/")[0] for name in known})
+    groups = sorted({name.partition("/")[0] for name in known_names})
     return f"; there are {', '.join(groups)}" if groups else ""
 
 

@@ -167,11 +167,11 @@ def read(source: str | Path | AnyFile, *forms: str) -> FileContents:
         attributes = _attributes(file)
         form = attributes.get("format")
         version = attributes.get("format_version")
-        wanted = forms or (Form.RUN,)
-        if form not in wanted:
+        expected = forms or (Form.RUN,)
+        if form not in expected:
             what = "not a result of fecm"
             if form in RESULT_OF:
-                asked = " or ".join(RESULT_OF[one] for one in wanted)
+                asked = " or ".join(RESULT_OF[expected_form] for expected_form in expected)
                 what = f"the result of {RESULT_OF[form]}, not of {asked}"
             raise ResultFileError(f"{path}: this HDF5 file is {what}")
         if version != FORMAT_VERSION:
@@ -317,9 +317,9 @@ def first_misfit(
             expected = ", ".join(map(str, dataset.shape))
             return Misfit(path, f"{path} has the shape {shape}, not ({expected})")
         for name, size in zip(dataset.shape, shape, strict=True):
-            known = (name, "every result") if isinstance(name, int) else (size, path)
+            origin = (name, "every result") if isinstance(name, int) else (size, path)
             key = f"{dataset.group} {name}" if name == "rows" else name
-            needed, source = known_sizes.setdefault(key, known)
+            needed, source = known_sizes.setdefault(key, origin)
             if size != needed:
                 message = f"{path} has the shape {shape}, but {name} is {needed} in {source}"
                 return Misfit(path, message)
@@ -344,14 +344,14 @@ def attribute_error(groups: Mapping[str, Mapping[str, Any]]) -> str:
     numbers = NUMBERS | {f"failure/{name}": (AT_REST, LOAD_FACTOR) for name in criteria}
     for table, fits, what in ((numbers, _is_number, "a number"), (TEXTS, _is_texts, "texts")):
         for group, names in table.items():
-            found = groups.get(group, {})
-            missing = [name for name in names if name not in found]
+            stored = groups.get(group, {})
+            missing = [name for name in names if name not in stored]
             if group in groups and group in COMPLETE and missing:
                 return f"{group} has no attribute {missing[0]}"
             for name in names:
-                if name in found and not fits(found[name]):
+                if name in stored and not fits(stored[name]):
                     return (
-                        f"the attribute {name} of {group} is {short_text(found[name])}, not {what}"
+                        f"the attribute {name} of {group} is {short_text(stored[name])}, not {what}"
                     )
     return ""
 

@@ -72,7 +72,7 @@ class FileSink:
         if not group:
             self._units = declared_units(values)
         for name, value in values.items():
-            if isinstance(value, list | tuple) and all(isinstance(one, str) for one in value):
+            if isinstance(value, list | tuple) and all(isinstance(item, str) for item in value):
                 target.attrs.create(name, value, (len(value),), TEXT)
             else:
                 target.attrs[name] = value
@@ -93,13 +93,13 @@ class FileSink:
         kind = _type_of(dataset.dtype)
         name = dataset.name.encode()
         group = self._group(dataset.group).id
-        made = h5py.Dataset(h5py.h5d.create(group, name, kind, place, PROPERTIES))
-        _set_text(made, dataset.description, "description", "long_name")
+        created = h5py.Dataset(h5py.h5d.create(group, name, kind, place, PROPERTIES))
+        _set_text(created, dataset.description, "description", "long_name")
         if dataset.dimension:
-            _set_text(made, dataset.dimension, "dimension")
+            _set_text(created, dataset.dimension, "dimension")
             if unit := unit_of(dataset.dimension, self._units):
-                _set_text(made, unit, "unit", "units")  # xarray and pint read units
-        self.arrays[dataset.path] = made
+                _set_text(created, unit, "unit", "units")  # xarray and pint read units
+        self.arrays[dataset.path] = created
         self._made[dataset.path] = dataset, shape
 
     def label_axes(self) -> None:
@@ -129,13 +129,13 @@ class FileSink:
         name, description = schema.SCALES[size]
         if name not in self._scales:
             if texts := self.axis_names.get(size):
-                made = self._file.create_dataset(name, data=texts[:length], dtype=TEXT)
+                scale = self._file.create_dataset(name, data=texts[:length], dtype=TEXT)
             else:
                 numbers = np.arange(length, dtype="i4") + (size not in schema.FROM_0)
-                made = self._file.create_dataset(name, data=numbers)
-            made.make_scale(name)
-            _set_text(made, description, "description", "long_name")
-            self._scales[name] = made
+                scale = self._file.create_dataset(name, data=numbers)
+            scale.make_scale(name)
+            _set_text(scale, description, "description", "long_name")
+            self._scales[name] = scale
         return self._scales[name]
 
     def write(self, path: str, start: int, rows: Array) -> None:
@@ -150,18 +150,18 @@ class FileSink:
         dataset.id.write(h5py.h5s.create_simple(values.shape), place, values)
 
     def store(self, path: str, values: Array, dimension: str = "") -> None:
-        """Store a whole dataset of the schema, numbers or texts; see :meth:`known`.
+        """Store a whole dataset of the schema, numbers or texts; see :meth:`dataset`.
 
         `dimension` replaces the dimension of the schema.
         """
-        known = self.known(path, values.ndim)
-        if known.dtype == schema.TEXTS or values.dtype.kind in "US":
-            made = self.arrays[path] = self._text(path, values.tolist(), known.description)
-            self._made[path] = known, made.shape
+        dataset = self.known(path, values.ndim)
+        if dataset.dtype == schema.TEXTS or values.dtype.kind in "US":
+            stored = self.arrays[path] = self._text(path, values.tolist(), dataset.description)
+            self._made[path] = dataset, stored.shape
             return
-        if known.dtype in (schema.ANY, schema.NUMBERS):
-            known = replace(known, dtype="i8" if values.dtype.kind in "iu" else "f8")
-        self._create(replace(known, dimension=dimension or known.dimension), values.shape)
+        if dataset.dtype in (schema.ANY, schema.NUMBERS):
+            dataset = replace(dataset, dtype="i8" if values.dtype.kind in "iu" else "f8")
+        self._create(replace(dataset, dimension=dimension or dataset.dimension), values.shape)
         self.write(path, 0, values)
 
     def keep(self, path: str, values: Array) -> None:
@@ -182,8 +182,8 @@ class FileSink:
         kept = old[:rows]
         del self._file[path]
         if rows:
-            self.arrays[path] = made = self._file.create_dataset(path, data=kept)
-            made.attrs.update(attributes)
+            self.arrays[path] = dataset = self._file.create_dataset(path, data=kept)
+            dataset.attrs.update(attributes)
         elif not len(group):
             empty = path.rpartition("/")[0]
             del self._file[empty]
@@ -198,9 +198,9 @@ class FileSink:
     def _text(self, path: str, value: str | list[str], description: str) -> h5py.Dataset:
         """Create a dataset of a text or of texts."""
         group, _, name = path.rpartition("/")
-        made = self._group(group).create_dataset(name, data=value, dtype=TEXT)
-        made.attrs["description"] = description
-        return made
+        dataset = self._group(group).create_dataset(name, data=value, dtype=TEXT)
+        dataset.attrs["description"] = description
+        return dataset
 
 
 @cache
@@ -239,8 +239,8 @@ def save_result(stored: Stored, path: Path, *, overwrite: bool) -> None:
         sink.deck(stored.deck_text)
         for name in stored:
             values = stored[name]
-            known = schema.dataset_of(name, values.ndim)
-            (sink.keep if known is None else sink.store)(name, values)
+            dataset = schema.dataset_of(name, values.ndim)
+            (sink.keep if dataset is None else sink.store)(name, values)
         for group in filter(None, stored._groups):
             sink.attributes(group, stored.attributes_of(group))
 

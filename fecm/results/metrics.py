@@ -170,38 +170,38 @@ def impact_metrics(
     and the peaks too unless the projectile leaves and they have passed.
     """
     limit = None if threshold is None else np.broadcast_to(threshold, force.shape[1])
-    found = _from_forces(force, times, limit)
+    of_forces = _from_forces(force, times, limit)
     mass, velocity = (np.broadcast_to(v, force.shape[1]) for v in projectiles)
-    impulse, reached, met = found.impulse, found.reached, found.met
+    impulse, reached, met = of_forces.impulse, of_forces.reached, of_forces.met
     rebound = impulse / mass - velocity
     leaving = rebound + mobility * impulse
     # The velocity of the rigid motion belongs to both.
     plate = plate._replace(speed=np.maximum(plate.speed - mobility * impulse, 0.0))
     is_slow = leaving <= CLEAR * plate.speed
-    before, contact_peak = _present_contact(force, found.last)
+    before, contact_peak = _present_contact(force, of_forces.last)
     last = LastContact(
-        found.last,
+        of_forces.last,
         before,
         reached,
         contact_peak,
         leaving=leaving,
-        position=_position(force, times, mass, velocity, (found.last <= 0.0) & is_slow),
+        position=_position(force, times, mass, velocity, (of_forces.last <= 0.0) & is_slow),
     )
     end = ends(last, plate, is_held=mobility == 0.0)
-    finished, known = over(end), peak_known(end)
-    is_first_over = known | (found.contacts > 1.0) | (found.last == 0.0)
+    finished, peak_is_known = over(end), peak_known(end)
+    is_first_over = peak_is_known | (of_forces.contacts > 1.0) | (of_forces.last == 0.0)
 
     def where(mask: Bools, values: Floats) -> Floats:
         return np.where(mask, values, np.nan)
 
     columns = {
-        "peak_force": where(known, reached),
-        "time_of_peak": where(known & met, found.time_of_peak),
-        "peak_contact": where(known & met, found.peak_contact),
-        "first_peak": where(is_first_over, found.first_peak),
-        "contacts": where(finished, found.contacts),
-        "contact_time": where(finished, found.contact_time),
-        "last_contact": where(finished & met, found.last_contact),
+        "peak_force": where(peak_is_known, reached),
+        "time_of_peak": where(peak_is_known & met, of_forces.time_of_peak),
+        "peak_contact": where(peak_is_known & met, of_forces.peak_contact),
+        "first_peak": where(is_first_over, of_forces.first_peak),
+        "contacts": where(finished, of_forces.contacts),
+        "contact_time": where(finished, of_forces.contact_time),
+        "last_contact": where(finished & met, of_forces.last_contact),
         "max_indentation": decided(indentation.largest, indentation.last, end),
         "permanent_indentation": where(finished, indentation.permanent),
         "impulse": where(finished, impulse),
@@ -210,9 +210,9 @@ def impact_metrics(
     }
     if limit is not None:
         columns[THRESHOLD_FORCE] = limit.copy()
-        columns["threshold_margin"] = where(known, 1.0 - reached / limit)
-        columns["threshold_time"] = found.threshold_time
-        columns["time_above"] = where(finished, found.time_above)
+        columns["threshold_margin"] = where(peak_is_known, 1.0 - reached / limit)
+        columns["threshold_time"] = of_forces.threshold_time
+        columns["time_above"] = where(finished, of_forces.time_above)
     return Metrics(columns, end, reached, last, plate, is_held=mobility == 0.0)
 
 

@@ -84,7 +84,7 @@ def plate_fields(stored: Stored, rows: Ints, note: Note = lambda text: None) -> 
 
 def _constant(values: Mapping[str, Array]) -> Fields:
     """Return values of the cells that do not depend on time."""
-    shapes = {name: one.shape for name, one in values.items()}
+    shapes = {name: array.shape for name, array in values.items()}
     return Fields(At.CELLS, shapes, lambda number: list(values.values()), constant=True)
 
 
@@ -96,8 +96,8 @@ def _displacements(stored: Array, rows: Ints) -> Fields:
         del shapes["rotation"]
 
     def of_step(number: int) -> list[Array]:
-        one = stored[rows[number]]
-        return [one[:, :3], one[:, 2], one[:, 3:]][: len(shapes)]
+        fields = stored[rows[number]]
+        return [fields[:, :3], fields[:, 2], fields[:, 3:]][: len(shapes)]
 
     return Fields(At.POINTS, shapes, of_step)
 
@@ -130,7 +130,7 @@ def _strains(stored: Stored, steps: Ints, note: Note) -> Iterator[Fields]:
     def of_step(number: int) -> list[Array]:
         if not shared[number]:
             return [np.full(length, np.nan) for _ in STRAINS]
-        return [mean(one[at[number]]) for one in values]
+        return [mean(fields[at[number]]) for fields in values]
 
     where = At.POINTS if at_nodes else At.CELLS
     yield Fields(where, dict.fromkeys(STRAINS, (length,)), of_step)
@@ -140,15 +140,15 @@ def _rows_of(
     stored: Stored, group: str, steps: Ints, what: str, note: Note
 ) -> tuple[Ints, NDArray[np.bool_]]:
     """Return the rows of a group at the time steps, and a mask of the steps that have one."""
-    own = stored[f"{group}/step"]
-    at = np.minimum(np.searchsorted(own, steps), len(own) - 1)
-    shared = own[at] == steps
+    stored_steps = stored[f"{group}/step"]
+    nearest = np.minimum(np.searchsorted(stored_steps, steps), len(stored_steps) - 1)
+    shared = stored_steps[nearest] == steps
     if not shared.any():
         note(f"{what} ({group}) and displacements (tape3) share no step; {what} are omitted")
     elif not shared.all():
         were = f"were stored at {shared.sum()} of {len(steps)} time steps"
         note(f"{what} ({group}) {were}; at the others they are NaN")
-    return at, shared
+    return nearest, shared
 
 
 def _ply_stresses(stored: Stored, steps: Ints, note: Note) -> Iterator[Fields]:
@@ -167,10 +167,10 @@ def _ply_stresses(stored: Stored, steps: Ints, note: Note) -> Iterator[Fields]:
         values = stored[f"plies/{name}"]
 
         def of_step(number: int) -> Array:
-            found = np.full((2, length), np.nan)
+            extremes = np.full((2, length), np.nan)
             if shared[number]:
-                found[:, cells] = _largest(values[at[number]])
-            return found
+                extremes[:, cells] = _largest(values[at[number]])
+            return extremes
 
         return Fields(At.CELLS, dict.fromkeys((name, f"{name}_ply"), (length,)), of_step)
 
@@ -193,11 +193,11 @@ def _exposures(stored: Stored, note: Note) -> Iterator[Fields]:
     for criterion in criteria_of(stored.attributes_of("failure")):
         values = stored[f"failure/{criterion}/exposure"]
         left_out = near_load(stored, criterion) | (values < 0.0)  # plies without strengths
-        known = np.where(left_out, np.nan, values)
-        if not np.isfinite(known).any():
+        counted = np.where(left_out, np.nan, values)
+        if not np.isfinite(counted).any():
             continue
         name = f"exposure_{criterion}"
-        exposure, ply = _largest(known[..., None] if criterion == INTERLAMINAR else known)
+        exposure, ply = _largest(counted[..., None] if criterion == INTERLAMINAR else counted)
         yield _constant({name: exposure, f"{name}_ply": ply})
     under = (stored["failure/under_load"] != 0).any(axis=1)
     yield _constant({"under_load": under.astype(float)})
@@ -212,6 +212,6 @@ def _largest(row: Array) -> Array:
     values = np.moveaxis(row, -2, 1)
     flat = values.reshape(len(values), -1)
     place = np.where(np.isnan(flat), -1.0, np.abs(flat)).argmax(axis=1)
-    found = flat[np.arange(len(flat)), place]
+    largest = flat[np.arange(len(flat)), place]
     ply = place // (flat.shape[1] // values.shape[1]) + 1.0
-    return np.stack([found, np.where(np.isnan(found), np.nan, ply)])
+    return np.stack([largest, np.where(np.isnan(largest), np.nan, ply)])

@@ -174,19 +174,19 @@ def _fits(deck: Deck, z: Floats) -> bool:
     """Return whether a deck has the laminates of stored z, and the materials of their layers."""
     layups = deck.layers.values()
     several = (len(layups),) if len(layups) > 1 else ()
-    known = deck.plies
+    plies = deck.plies
     return z.shape[:-1] == (*several, max(map(len, layups))) and all(
-        layer.material in known for layers in layups for layer in layers
+        layer.material in plies for layers in layups for layer in layers
     )
 
 
 def _positions(stored: Stored, deck: Deck, numbers: Array) -> Indices:
     """Return the positions of the elements' laminates among the deck's laminates."""
-    own = list(deck.layers)
-    found = stored["mesh/laminate"][numbers - 1]
-    if not np.isin(found, own).all():
+    order = list(deck.layers)
+    numbers_stored = stored["mesh/laminate"][numbers - 1]
+    if not np.isin(numbers_stored, order).all():
         raise ResultFileError("the result's deck does not have the laminates of its elements")
-    return np.array([own.index(number) for number in found.tolist()], dtype=np.intp)
+    return np.array([order.index(number) for number in numbers_stored.tolist()], dtype=np.intp)
 
 
 def cure_stress_of(stored: Stored, element: int) -> Floats | None:
@@ -205,8 +205,8 @@ def cure_stress_of(stored: Stored, element: int) -> Floats | None:
 
 def _layups(stored: Stored, deck: Deck, numbers: Array) -> Layup | list[Layup]:
     """Return the layers of the plate, or of each element where there are several laminates."""
-    first, *others = layups = list(deck.layers.values())
-    if not others:
+    first, *other_layups = layups = list(deck.layers.values())
+    if not other_layups:
         return first
     return [layups[position] for position in _positions(stored, deck, numbers)]
 
@@ -215,10 +215,10 @@ def _of_layers(layups: Layup | list[Layup], count: int, value: Callable[[Layer],
     """Return a value of each layer, (plies,), or of each element, NaN where it has no layer."""
     if isinstance(layups, tuple):
         return np.array([value(layer) for layer in layups])
-    found = np.full((len(layups), count), np.nan)
-    for row, layers in zip(found, layups, strict=True):
+    values = np.full((len(layups), count), np.nan)
+    for row, layers in zip(values, layups, strict=True):
         row[: len(layers)] = [value(layer) for layer in layers]
-    return found
+    return values
 
 
 class _Constants(NamedTuple):
@@ -276,11 +276,11 @@ def points_of(stored: Stored, numbers: Array, count: int, at_nodes: bool) -> Flo
 
 def places(elements: Array, coordinates: Floats, rule: Quadrature) -> Floats:
     """Return the places of the points of a rule in elements: (elements, points, 2), length."""
-    found = np.empty((len(elements), len(rule.xi), 2))
+    points = np.empty((len(elements), len(rule.xi), 2))
     for family in element_blocks(elements, coordinates):
         N = local_shape_functions(family, rule)[0]
-        found[family.rows] = np.einsum("pn,eni->epi", N, family.coordinates)
-    return found
+        points[family.rows] = np.einsum("pn,eni->epi", N, family.coordinates)
+    return points
 
 
 def rows_at(stored: Floats, times: Sequence[float] | Floats, what: str) -> Indices:

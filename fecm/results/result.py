@@ -372,8 +372,8 @@ class Result(Stored, schema.ContactRows):
         """
         from fecm.results.comparison import compare_force, measurement_of  # 4 ms at start
 
-        given = measurement_of(measured, self.units, columns, units)
-        return compare_force(self, given.corrected(delay, offset))
+        measurement = measurement_of(measured, self.units, columns, units)
+        return compare_force(self, measurement.corrected(delay, offset))
 
     if not TYPE_CHECKING:  # so that a misspelt name is a type error
 

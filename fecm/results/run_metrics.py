@@ -24,15 +24,15 @@ from fecm.results.stored import Stored
 
 def end_of(stored: Stored) -> End | None:
     """Return the state of the contact at the end of the run; None without impact steps."""
-    found = _summarised(stored)
-    return None if found is None else End(found.end.item())
+    metrics = _summarised(stored)
+    return None if metrics is None else End(metrics.end.item())
 
 
 def metrics_of(stored: Stored) -> dict[str, float]:
     """Return the impact metrics by name: NaN where not known, empty without impact steps."""
-    if (found := _summarised(stored)) is None:
+    if (metrics := _summarised(stored)) is None:
         return {}
-    columns = found.columns | {"max_deflection": found.deflection}
+    columns = metrics.columns | {"max_deflection": metrics.deflection}
     values: dict[str, float] = {name: columns[name].item() for name in METRICS if name in columns}
     return values | {name: int(values[name]) for name in INTEGERS if math.isfinite(values[name])}
 

@@ -560,13 +560,13 @@ FILES = {
 def dataset_of(path: str, rank: int, form: Form = Form.RUN) -> Dataset | None:
     """Return the dataset of a path with this number of axes; None if the schema lacks it."""
     datasets, parts = FILES[form].datasets, path.split("/")
-    known = datasets.get(path)
-    if known is None and len(parts) > 1:
+    dataset = datasets.get(path)
+    if dataset is None and len(parts) > 1:
         pattern = datasets.get("/".join([parts[0], "*", *parts[2:]]))
-        known = pattern and _named(pattern, path)
-    if known is None:
+        dataset = pattern and _named(pattern, path)
+    if dataset is None:
         return None
-    return known.with_outer() if known.outer and rank > len(known.shape) else known
+    return dataset.with_outer() if dataset.outer and rank > len(dataset.shape) else dataset
 
 
 def required_dataset(path: str, rank: int, form: Form = Form.RUN) -> Dataset:

@@ -154,8 +154,8 @@ class Stored:
         """
         if name in METRICS:
             return unit_of(METRICS[name].dimension, self.units)
-        known = dataset_of(self._stored(name), rank=0)
-        return "" if known is None else unit_of(known.dimension, self.units)
+        dataset = dataset_of(self._stored(name), rank=0)
+        return "" if dataset is None else unit_of(dataset.dimension, self.units)
 
     def attributes_of(self, group: str) -> dict[str, Any]:
         """Return the attributes of a group; empty without the group."""

@@ -112,9 +112,9 @@ def describe_groups(contents: FileContents) -> list[GroupJson]:
     return groups
 
 
-def _sorted(names: Iterable[str], known: Iterable[str]) -> list[str]:
+def _sorted(names: Iterable[str], order_of_known: Iterable[str]) -> list[str]:
     """Return known names in their order, then other names sorted."""
-    order = {name: number for number, name in enumerate(known)}
+    order = {name: number for number, name in enumerate(order_of_known)}
     return sorted(names, key=lambda name: (order.get(name, len(order)), name))
 
 
@@ -207,9 +207,9 @@ def _run_rows(result: Stored) -> list[Row]:
     if "failure/x" in result and (count := np.count_nonzero(result["failure/under_load"])):
         lines.append(("left out", f"{count} points under the load or at corners of supports"))
     if "modes/angular_frequency" in result:
-        found = result["modes/angular_frequency"]
-        texts = ", ".join(significant(omega) for omega in found[:LISTED])
-        more = f" and {len(found) - LISTED} more" if len(found) > LISTED else ""
+        frequencies = result["modes/angular_frequency"]
+        texts = ", ".join(significant(omega) for omega in frequencies[:LISTED])
+        more = f" and {len(frequencies) - LISTED} more" if len(frequencies) > LISTED else ""
         lines.append(
             ("frequencies", f"{texts}{more} {result.unit('modes/angular_frequency')}".rstrip())
         )
@@ -221,9 +221,11 @@ def radii_of(result: Stored) -> dict[str, float]:
 
     The result is empty for a flat panel.
     """
-    given = result.attributes_of("mesh")
-    radii = {axis: given.get(f"radius_{axis}") for axis in ("x", "y", "xy")}
-    return {axis: float(one) for axis, one in radii.items() if isinstance(one, int | float)}
+    attributes = result.attributes_of("mesh")
+    radii = {axis: attributes.get(f"radius_{axis}") for axis in ("x", "y", "xy")}
+    return {
+        axis: float(radius) for axis, radius in radii.items() if isinstance(radius, int | float)
+    }
 
 
 def _curved(result: Stored) -> list[Row]:
@@ -231,8 +233,8 @@ def _curved(result: Stored) -> list[Row]:
     if "mesh/z" not in result:
         return []
     named = [
-        f"R{axis} {_quantity(result, one, 'length', DECK_DIGITS)}"
-        for axis, one in radii_of(result).items()
+        f"R{axis} {_quantity(result, radius, 'length', DECK_DIGITS)}"
+        for axis, radius in radii_of(result).items()
     ]
     rise = _quantity(result, float(np.ptp(result["mesh/z"])), "length", DECK_DIGITS)
     return [("curved panel", ", ".join([*named, f"rise {rise}"]))]
@@ -240,8 +242,8 @@ def _curved(result: Stored) -> list[Row]:
 
 def _preload(result: Stored) -> list[Row]:
     """Return the row of the initial membrane force of PREL."""
-    given = result.attributes_of("laminate")
-    forces = {f"N_{name}": given.get(f"N0_{name}") for name in ("x", "y", "xy")}
+    attributes = result.attributes_of("laminate")
+    forces = {f"N_{name}": attributes.get(f"N0_{name}") for name in ("x", "y", "xy")}
     named = [
         f"{name} = {_quantity(result, force, 'force/length', DECK_DIGITS)}"
         for name, force in forces.items()
@@ -262,44 +264,46 @@ def _membrane(result: Stored) -> str:
     elastic = result["membrane/strain_energy"].copy()
     if "membrane/preload_energy" in result:
         elastic -= result["membrane/preload_energy"]
-    row, at = int(elastic.argmax()), "where it is largest"
+    row, when = int(elastic.argmax()), "where it is largest"
     if "history/force" in result and (force := result["history/force"]).any():
         time, peak = result["membrane/time"], float(result["history/time"][force.argmax()])
-        row, at = int(np.abs(time - peak).argmin()), "at the peak"
+        row, when = int(np.abs(time - peak).argmin()), "at the peak"
         if abs(time[row] - peak) > NEAR * peak:
-            at = f"at time {_quantity(result, time[row], 'time')}, the row nearest to the peak"
+            when = f"at time {_quantity(result, time[row], 'time')}, the row nearest to the peak"
     if not elastic[row] > 0.0:
         return ""
     percent = 100.0 * float(result["membrane/energy"][row]) / float(elastic[row])
-    return f"{percent:.{0 if percent > 9.5 else 1}f} % of the strain energy {at}"
+    return f"{percent:.{0 if percent > 9.5 else 1}f} % of the strain energy {when}"
 
 
 def _delaminations(result: Stored) -> str:
     """Say how many delaminations the threshold assumes, and the forces for other numbers."""
-    known = result.threshold
+    threshold = result.threshold
     band, number, interfaces = (
-        np.asarray(known.get(name, "")) for name in ("band", "number", "interfaces")
+        np.asarray(threshold.get(name, "")) for name in ("band", "number", "interfaces")
     )
     kinds = [(array.dtype.kind, array.shape) for array in (band, number, interfaces)]
     if kinds != [("f", (2,)), ("i", ()), ("i", ())]:
         return ""  # a result of an older version
     least, most = (_quantity(result, force, "force") for force in band.tolist())
-    others = {1: most, max(1, int(interfaces)): least}
-    others.pop(int(number), None)
+    other_counts = {1: most, max(1, int(interfaces)): least}
+    other_counts.pop(int(number), None)
     count = "one delamination" if number == 1 else f"{number} delaminations"
-    texts = [f"{force} for {'one' if n == 1 else n}" for n, force in others.items()]
+    texts = [f"{force} for {'one' if n == 1 else n}" for n, force in other_counts.items()]
     return f" ({'; '.join([f'for {count}, as in DELA', *texts])})"
 
 
 def _exposures(result: Stored) -> list[Row]:
     """Return rows about the largest exposures and the first failure."""
     largest, first = largest_exposures(result), _first_failures(result)
-    reached = {one.criterion: one.force for one in first if not math.isnan(one.force)}
+    reached = {
+        failure.criterion: failure.force for failure in first if not math.isnan(failure.force)
+    }
     lines: list[Row] = []
     for exposure in largest:
         force = reached.get(exposure.criterion)
-        known = "" if force is None else f"; reaches 1 at {_quantity(result, force, 'force')}"
-        text = f"{_exposure(result, exposure)}{known}{_at_rest(exposure)}"
+        reaches = "" if force is None else f"; reaches 1 at {_quantity(result, force, 'force')}"
+        text = f"{_exposure(result, exposure)}{reaches}{_at_rest(exposure)}"
         lines.append((spelt(exposure.criterion), text))
     count = evaluations_in_contact(result)
     if count is not None and "history/force" in result:
@@ -372,16 +376,19 @@ def _at_rest(largest: LargestExposure) -> str:
     """Format the exposure of residual stresses, which makes exposure and load not proportional."""
     if largest.at_rest is None:
         return ""
-    said = f"; at rest {largest.at_rest:.3g}"
+    text = f"; at rest {largest.at_rest:.3g}"
     if largest.load_factor is None or not math.isfinite(largest.load_factor):
-        return said
-    return f"{said}, 1 at {largest.load_factor:.4g} of the load's stresses"
+        return text
+    return f"{text}, 1 at {largest.load_factor:.4g} of the load's stresses"
 
 
 def _delamination(result: Stored) -> str:
     """Format the threshold of delamination, and whether it is reached."""
-    known = result.threshold
-    force, crossing = _quantity(result, float(known["force"]), "force"), float(known["time"])
+    threshold = result.threshold
+    force, crossing = (
+        _quantity(result, float(threshold["force"]), "force"),
+        float(threshold["time"]),
+    )
     if math.isfinite(crossing):
         return f"{force} reached at time {_quantity(result, crossing, 'time')}"
     if (end := end_of(result)) in UNDECIDED:
@@ -415,8 +422,8 @@ def _peak_force(result: Stored) -> str:
     peak = int(np.argmax(force))
     text = "0: there was no contact"
     if force[peak] > 0.0:
-        at = _quantity(result, time[peak], "time")
-        text = f"{_quantity(result, force[peak], 'force')} at time {at} (step {peak + 1})"
+        when = _quantity(result, time[peak], "time")
+        text = f"{_quantity(result, force[peak], 'force')} at time {when} (step {peak + 1})"
         if (end := end_of(result)) in UNDECIDED:
             text = f"at least {text}, as the run ends {UNDECIDED[end]}"
         text += later_contact(result)
@@ -472,8 +479,8 @@ def _left(result: Stored) -> str:
     if end_of(result) is not End.OVER:
         return "open"
     permanent = float(result.attributes_of("history")["permanent_indentation"])
-    said = _quantity(result, permanent, "length")
-    return said if permanent else f"{said} by the contact law"
+    text = _quantity(result, permanent, "length")
+    return text if permanent else f"{text} by the contact law"
 
 
 def _rebound(result: Stored) -> str:
@@ -500,7 +507,7 @@ def elastic_doubt(result: Stored, peak: float) -> str:
     beyond = []
     if result.threshold and peak > CROSSED * (force := float(result.threshold["force"])):
         beyond.append(f"delamination is expected from {_quantity(result, force, 'force')}")
-    if any(found.exposure > CROSSED for found in largest_exposures(result)):
+    if any(exposure.exposure > CROSSED for exposure in largest_exposures(result)):
         beyond.append("the first ply fails before")
     return f"elastic prediction; {', and '.join(beyond)}" if beyond else ""
 
@@ -534,8 +541,8 @@ def _metrics(result: Stored) -> MetricsJson:
         return cast("MetricsJson", metrics_of(result))
     from fecm.results.exposures import failure_metrics  # 1 ms, for FAIL only
 
-    found = {**metrics_of(result), "failure": failure_metrics(result)}
-    return cast("MetricsJson", found)
+    metrics = {**metrics_of(result), "failure": failure_metrics(result)}
+    return cast("MetricsJson", metrics)
 
 
 def _missing(result: Stored) -> list[str]:

@@ -83,10 +83,10 @@ def in_plane_of(codes: Array, coordinates: Array | None = None) -> InPlane:
     all_held = bool(held[:, :2].all())
     slides = all_held or not supports[:, :2].any(axis=1).mean() > 0.5
     if coordinates is not None and slides:
-        at = coordinates[held[:, 2]]
+        places = coordinates[held[:, 2]]
         low, high = coordinates.min(axis=0), coordinates.max(axis=0)
-        inside = (at.min(axis=0) > low).all() and (at.max(axis=0) < high).all()
-        if inside and (np.ptp(at, axis=0) > 0.0).all():
+        inside = (places.min(axis=0) > low).all() and (places.max(axis=0) < high).all()
+        if inside and (np.ptp(places, axis=0) > 0.0).all():
             return InPlane.WINDOW
     if all_held:
         return InPlane.UNKNOWN
@@ -186,15 +186,15 @@ def counted(validity: Texts) -> Iterator[tuple[Reason, Bools]]:
 
     Reasons of other versions, whose number is not bounded, are counted together.
     """
-    known = set(Reason)
+    reasons = set(Reason)
     texts = validity.tolist()
-    own = {
-        text: {name if name in known else Reason.OTHER for name in reasons_of(text)}
+    cases_of = {
+        text: {name if name in reasons else Reason.OTHER for name in reasons_of(text)}
         for text in set(texts)
     }
     for reason in Reason:
-        if any(reason in names for names in own.values()):
-            yield reason, np.array([reason in own[text] for text in texts], dtype=bool)
+        if any(reason in names for names in cases_of.values()):
+            yield reason, np.array([reason in cases_of[text] for text in texts], dtype=bool)
 
 
 @dataclass(frozen=True)

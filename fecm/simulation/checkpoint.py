@@ -124,7 +124,8 @@ def identity(simulation: Simulation) -> dict[str, Any]:
         "a run with another projectile": (
             None if options.projectile is None else projectile.projectile_name(options.projectile)
         ),
-        "a run with other failure criteria": [one.name for one in options.criteria] or None,
+        "a run with other failure criteria": [criterion.name for criterion in options.criteria]
+        or None,
         "a run with another choice of --print": simulation.printer.is_on,
     }
 
@@ -158,10 +159,10 @@ def finished_before(result: Path) -> list[str]:
         about, _ = _read(path)
         if about["identity"].get(OTHER_FORMAT) != FORMAT:
             raise CheckpointError(f"{path} belongs to {OTHER_FORMAT}")
-        return [str(one) for one in about["finished"]]
+        return [str(item) for item in about["finished"]]
 
 
-def _difference(what: str, theirs: object, own: object) -> str:
+def _difference(what: str, theirs: object, ours: object) -> str:
     """Describe how a checkpoint differs from the run, starting with a blank.
 
     The text is empty if the difference would not help.
@@ -169,8 +170,8 @@ def _difference(what: str, theirs: object, own: object) -> str:
     if what == SOLVER and theirs == KERNELS and kernels.LIBRARY is None:
         return ", the compiled kernels, which this installation lacks"
     if what == SOLVER:
-        return f" ({theirs}, not {own}): --solver {theirs} continues it"
-    return f" ({theirs}, not {own})" if own == __version__ else ""
+        return f" ({theirs}, not {ours}): --solver {theirs} continues it"
+    return f" ({theirs}, not {ours})" if ours == __version__ else ""
 
 
 class Checkpointer:
@@ -284,12 +285,12 @@ class Checkpointer:
         """Repeat the operations in the first part of a spool on the result."""
         import json  # 2 ms
 
-        found = 0
-        left = part.length
-        while left > 0 and (data := file.read(min(left, CHUNK))):
-            found = zlib.crc32(data, found)
-            left -= len(data)
-        if found != part.checksum:
+        checksum = 0
+        remaining = part.length
+        while remaining > 0 and (data := file.read(min(remaining, CHUNK))):
+            checksum = zlib.crc32(data, checksum)
+            remaining -= len(data)
+        if checksum != part.checksum:
             raise CheckpointError(f"{self._spool} is damaged, or was written by another run")
         file.seek(0)
         while file.tell() < part.length:

@@ -307,7 +307,7 @@ class Run:
     @property
     def findings(self) -> tuple[Finding, ...]:
         """Warnings and notes about the deck."""
-        return tuple(one for one in self._loaded.findings if one.severity != "error")
+        return tuple(finding for finding in self._loaded.findings if finding.severity != "error")
 
     @cached_property
     def price(self) -> Price:
@@ -461,8 +461,8 @@ class ProblemRun:
 
         needed, free = self.problem.output_bytes, shutil.disk_usage(path.parent).free
         if needed > free:
-            left = f"the disk has {format_bytes(free)} left"
-            raise OutputError(f"{path}: the result takes about {format_bytes(needed)}, and {left}")
+            space = f"the disk has {format_bytes(free)} left"
+            raise OutputError(f"{path}: the result takes about {format_bytes(needed)}, and {space}")
         with contextlib.ExitStack() as stack:
             if self.resumes:
                 stack.enter_context(resuming(path))

@@ -171,8 +171,10 @@ def _blocks(
 
 def _peak(values: Floats, times: Floats, x: Array, y: Array) -> RunPeak:
     """Return the largest of values, (rows, ...), at places (...)."""
-    row, *at = np.unravel_index(int(values.argmax()), values.shape)
-    return RunPeak(float(values[row, *at]), float(times[row]), float(x[*at]), float(y[*at]))
+    row, *place = np.unravel_index(int(values.argmax()), values.shape)
+    return RunPeak(
+        float(values[row, *place]), float(times[row]), float(x[*place]), float(y[*place])
+    )
 
 
 def _peak_at(values: Floats, times: Floats, place: tuple[float, float]) -> RunPeak:
@@ -209,7 +211,9 @@ def _time_step(simulation: Simulation, result: Result) -> Iterator[str]:
     if not simulation.state.plate.step or tension <= 0.0 or plate is not problem.moving_plate:
         return
     side = min(map(shortest_side, plate.families))
-    growth = tension * (2.0 * math.pi / side) ** 2 / min(one.mass for one in plate.laminates)
+    growth = (
+        tension * (2.0 * math.pi / side) ** 2 / min(laminate.mass for laminate in plate.laminates)
+    )
     allowed = (2.0 / dt) ** 2
     if (2.0 / problem.safe_time_step) ** 2 + growth <= NEAR**2 * allowed:
         return
@@ -218,10 +222,10 @@ def _time_step(simulation: Simulation, result: Result) -> Iterator[str]:
     limit = allowed * (NEAR**2 if linear < NEAR**2 * allowed else 1.0)
     if linear + growth > limit:
         force = quantity(largest.value, unit_of("force/length", result.units))
-        at = quantity(largest.time, unit_of("time", result.units))
+        when = quantity(largest.time, unit_of("time", result.units))
         share = math.sqrt((linear + growth) / allowed)
         yield (
-            f"the membrane force reaches {force} at time {at}: it may raise the plate's largest "
+            f"the membrane force reaches {force} at time {when}: it may raise the plate's largest "
             f"frequency from {math.sqrt(linear / allowed):.1%} of 2/DT to {share:.1%}; a smaller "
             "DT is safer"
         )
@@ -235,13 +239,13 @@ def _delamination(simulation: Simulation, result: Result) -> Iterator[str]:
     if math.isnan(crossing):
         crossing = float(result["history/time"][result["history/force"].argmax()])
     row = int(np.abs(result["membrane/time"] - crossing).argmin())
-    at, force, moment = (
+    when, force, moment = (
         float(result[f"membrane/{name}"][row])
         for name in ("time", "force_at_load", "moment_at_load")
     )
     bending = 6.0 * moment / simulation.problem.laminate.thickness
     if bending > 0.0 and force > STRETCHED * bending:
-        time = quantity(at, unit_of("time", result.units))
+        time = quantity(when, unit_of("time", result.units))
         pull = quantity(force, unit_of("force/length", result.units))
         yield (
             f"at time {time} the membrane force under the load is {pull}, {force / bending:.0%} of "
@@ -327,9 +331,9 @@ def _late_values(result: Result, end: End) -> Iterator[str]:
     if times[w.argmax()] > LATE * times[-1]:
         late.append("deflection")
     late += [
-        f"exposure {spelt(one.criterion)}"
-        for one in largest_exposures(result)
-        if one.time > LATE * times[-1]
+        f"exposure {spelt(exposure.criterion)}"
+        for exposure in largest_exposures(result)
+        if exposure.time > LATE * times[-1]
     ]
     if late:
         yield (
@@ -421,13 +425,13 @@ def _coarse_elements(simulation: Simulation, result: Result) -> Iterator[str]:
     if monitor is None or monitor.around is None or monitor.around.coarseness <= RESOLVED:
         return
     reach, unit = simulation.problem.reach_of_load, result.units.get("length", "")
-    side, radius, wanted = (
+    side, radius, needed = (
         f"{factor * reach:.3g} {unit}".rstrip()
         for factor in (monitor.around.coarseness, 1.0, RESOLVED)
     )
     yield (
         f"exposures at the load are lower bounds: the elements there have sides of {side}, and "
-        f"c + h/2 is {radius}; refine the mesh at the load to sides of {wanted}"
+        f"c + h/2 is {radius}; refine the mesh at the load to sides of {needed}"
     )
 
 
@@ -459,7 +463,11 @@ def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:
         yield Doubt(
             Reason.SOFT, f"{reached} h/4{of_face} the contact law of a half-space is doubtful"
         )
-    broken = [spelt(one.criterion) for one in largest_exposures(result) if one.exposure > CROSSED]
+    broken = [
+        spelt(exposure.criterion)
+        for exposure in largest_exposures(result)
+        if exposure.exposure > CROSSED
+    ]
     if broken:
         yield Doubt(
             Reason.BROKEN,

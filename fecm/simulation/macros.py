@@ -30,8 +30,8 @@ def set_time_step(run: Simulation, dt: float) -> None:
     run.state.dt = dt
     if not dt:
         plate, problem = run.model.motion.plate, run.problem
-        known = plate is problem.moving_plate  # unless the options change the plate
-        critical = problem.critical_time_step if known else critical_time_step(plate)
+        is_moving_plate = plate is problem.moving_plate  # unless the options change the plate
+        critical = problem.critical_time_step if is_moving_plate else critical_time_step(plate)
         run.state.dt = dt = taken_time_step(critical)
         run.state.notes.append(f"DT 0: took {dt:g}, {SAFE:g} of the critical {critical:.4g}")
 
@@ -98,16 +98,16 @@ def impact_steps(run: Simulation, macros: Sequence[Macro]) -> bool:
         count, stored = int(stored[most]), stored[:most]
     if count < 2:
         return False
-    found = steps.take(impact, state.dt, count, stored)
+    states = steps.take(impact, state.dt, count, stored)
     if any(item.word == "TIME" for item in macros):
         state.clock = float(np.add.accumulate([state.clock, *[state.dt] * count])[-1])
-    recorder.steps.add(plate, found.columns, found.strains, due["RODP"][:count])
-    for word, at in due.items():
-        chosen = at[stored]
+    recorder.steps.add(plate, states.columns, states.strains, due["RODP"][:count])
+    for word, steps_due in due.items():
+        chosen = steps_due[stored]
         if chosen.any():
-            fields = found.fields if chosen.all() else found.fields[chosen]
-            at_steps = found.columns["step"][stored[chosen]].astype(int).tolist()
-            STORING[word](run, at_steps, found.columns["time"][stored[chosen]].tolist(), fields)
+            fields = states.fields if chosen.all() else states.fields[chosen]
+            at_steps = states.columns["step"][stored[chosen]].astype(int).tolist()
+            STORING[word](run, at_steps, states.columns["time"][stored[chosen]].tolist(), fields)
     run.interpreter.skip(count)
     run.observe()
     return True
@@ -192,12 +192,12 @@ def find_modes(run: Simulation, n: int) -> None:
     """Execute EIGE: find the lowest modes, of a nonlinear plate about its present displacement."""
     state, plate = run.state, run.model.plate
     about = run.displacement_field() if plate.nonlinear else None
-    found = modes(plate, n, consistent=state.consistent_mass, field=about)
-    pairs = zip(found.angular_frequency, found.shapes, strict=True)
+    natural_modes = modes(plate, n, consistent=state.consistent_mass, field=about)
+    pairs = zip(natural_modes.angular_frequency, natural_modes.shapes, strict=True)
     for mode, (omega, shape) in enumerate(pairs, start=1):
         columns = {"number": mode, "angular_frequency": omega, "shape": plate.field(shape, 0.0)}
         run.recorder.row("modes", state.plate.step, state.plate.time, columns)
-    run.printer.modes(found.angular_frequency)
+    run.printer.modes(natural_modes.angular_frequency)
 
 
 def _at_passes(word: str, run: Simulation, n: int) -> None:
@@ -224,8 +224,8 @@ def _store_ply_stresses(run: Simulation, steps: Steps, times: Times, fields: Flo
 def _evaluate_failure(run: Simulation, steps: Steps, times: Times, fields: Floats) -> None:
     envelope, monitor, places = run.state.failure, run.model.failure, run.model.stress_places
     if envelope is not None and monitor is not None and places is not None:
-        found = monitor.update(envelope, fields, times)
-        run.recorder.rows("exposures", steps, times, monitor.located(found, places))
+        exposures = monitor.update(envelope, fields, times)
+        run.recorder.rows("exposures", steps, times, monitor.located(exposures, places))
         for other in run.others:
             other.monitor.update(other.envelope, fields, times)
 

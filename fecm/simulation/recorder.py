@@ -146,8 +146,8 @@ class StepRecorder:
         `sums` has the weighted sums of the gages, (steps, rows).
         """
         work = np.full(len(sums), plate.external_work)
-        given = {**columns, "external_work": work, "on_tape9": on_tape9}
-        values = np.vstack([*(given[name] for name in NAMES), self._strains(sums).T])
+        columns_given = {**columns, "external_work": work, "on_tape9": on_tape9}
+        values = np.vstack([*(columns_given[name] for name in NAMES), self._strains(sums).T])
         while values.size:
             self._add_projectile()
             part, values = np.split(values, [BLOCK - self._count], axis=1)
@@ -289,27 +289,27 @@ def _padded(parts: Sequence[Floats]) -> Floats:
     if len(parts) == 1:
         return parts[0]
     most = max(map(len, parts))
-    found = np.full((len(parts), most, *parts[0].shape[1:]), np.nan)
-    for row, part in zip(found, parts, strict=True):
+    padded = np.full((len(parts), most, *parts[0].shape[1:]), np.nan)
+    for row, part in zip(padded, parts, strict=True):
         row[: len(part)] = part
-    return found
+    return padded
 
 
 def exposures_of(
-    monitor: FailureMonitor, found: FailureEnvelope, places: PlyPoints
+    monitor: FailureMonitor, envelope: FailureEnvelope, places: PlyPoints
 ) -> dict[str, Array]:
     """Return the datasets of the largest exposures by criterion.
 
     Exposures of plies are (states,).
     """
-    arrays, plies = {}, monitor.every_state(found)
+    arrays, plies = {}, monitor.every_state(envelope)
     for part in ("exposure", "time", "mode"):
         for name, values in zip(monitor.criteria, getattr(plies, part), strict=True):
             if part == "exposure":
                 values = np.where(values < 0.0, np.nan, values)
             arrays[f"failure/{name}/{part}"] = values
-        arrays[f"failure/{INTERLAMINAR}/{part}"] = getattr(found.interfaces, part)
-    on_circle = monitor.circle_columns(found, places)
+        arrays[f"failure/{INTERLAMINAR}/{part}"] = getattr(envelope.interfaces, part)
+    on_circle = monitor.circle_columns(envelope, places)
     return arrays | {f"failure/circle/{name}": values for name, values in on_circle.items()}
 
 
@@ -375,7 +375,7 @@ class Recorder:
             "npt": self._model.strains.shape[1],
             "nps": self._model.stress_points.shape[1],
             "gages": 0 if gages is None else len(gages.numbers),
-            "layers": max(len(one.plies.angles) for one in self._model.plate.laminates),
+            "layers": max(len(laminate.plies.angles) for laminate in self._model.plate.laminates),
             "laminates": len(self._model.plate.laminates),
             **FIXED,
             "criteria": len(ALL_CRITERIA) + len(self._own),
@@ -402,7 +402,11 @@ class Recorder:
             self._sink.attributes("patch", values)
         if model.plate.is_curved:
             radii = zip(("x", "y", "xy"), model.plate.curvature, strict=True)
-            values = {f"radius_{n}": float(f"{1.0 / one:.12g}") for n, one in radii if one}
+            values = {
+                f"radius_{n}": float(f"{1.0 / curvature:.12g}")
+                for n, curvature in radii
+                if curvature
+            }
             self._sink.attributes("mesh", values)
         if model.plate.is_preloaded:
             values = dict(zip(("N0_x", "N0_y", "N0_xy"), model.plate.preload, strict=True))
@@ -426,43 +430,43 @@ class Recorder:
         """Yield the datasets that do not change during the run."""
         model = self._model
         mesh, laminates = model.plate.mesh, model.plate.laminates
-        found: dict[str, Array] = {
+        datasets: dict[str, Array] = {
             f"mesh/{n}": getattr(mesh, n) for n in ("coordinates", "elements", "equations")
         }
         for number, laminate in zip(model.laminates, laminates, strict=True):
             group = f"{LAMINATE}/{number}" if model.plate.others else LAMINATE
-            found |= {f"{group}/{n}": getattr(laminate, n) for n in ("A", "B", "D", "shear")}
+            datasets |= {f"{group}/{n}": getattr(laminate, n) for n in ("A", "B", "D", "shear")}
         if model.plate.laminate_numbers is not None:
-            found["mesh/laminate"] = np.array(model.laminates)[model.plate.laminate_numbers]
+            datasets["mesh/laminate"] = np.array(model.laminates)[model.plate.laminate_numbers]
         if model.plate.is_curved:
-            found["mesh/z"] = midplane_height(mesh.coordinates, model.plate.curvature)
+            datasets["mesh/z"] = midplane_height(mesh.coordinates, model.plate.curvature)
         if self._room["gages"] and model.gages is not None:
-            found["gages/number"] = model.gages.numbers
+            datasets["gages/number"] = model.gages.numbers
         if (patch := model.patch) is not None:
             (nodes,) = np.nonzero(patch.weights)
-            found["patch/node"] = nodes + 1
-            found["patch/weight"] = patch.weights[nodes]
+            datasets["patch/node"] = nodes + 1
+            datasets["patch/weight"] = patch.weights[nodes]
         near = model.under_load
         if near is not None and self._room["plies"] and model.plies is not None:
             members = model.plies.members
-            found["plies/element"] = members + 1
-            found["plies/z"] = _padded([one.plies.z for one in laminates])
-            found["plies/under_load"] = near[members].any(axis=1).astype(int)
+            datasets["plies/element"] = members + 1
+            datasets["plies/z"] = _padded([item.plies.z for item in laminates])
+            datasets["plies/under_load"] = near[members].any(axis=1).astype(int)
         if model.cure is not None:
-            found[CURE_STRESS] = _padded([one.stresses for one in model.cure])
+            datasets[CURE_STRESS] = _padded([item.stresses for item in model.cure])
         if model.materials is not None and (model.plies is not None or model.failure is not None):
-            found[MATERIAL] = model.materials if model.plate.others else model.materials[0]
+            datasets[MATERIAL] = model.materials if model.plate.others else model.materials[0]
         if near is not None and model.failure is not None:
             x, y = model.stress_points.places(mesh.coordinates)
-            found["failure/x"] = x
-            found["failure/y"] = y
-            found["failure/under_load"] = near.astype(int)
-            found["failure/centre_under_load"] = (~model.failure.far).astype(int)
+            datasets["failure/x"] = x
+            datasets["failure/y"] = y
+            datasets["failure/under_load"] = near.astype(int)
+            datasets["failure/centre_under_load"] = (~model.failure.far).astype(int)
         if self._room["stresses"]:
             x, y = model.stress_points.places(mesh.coordinates)
-            found["stresses/x"] = x
-            found["stresses/y"] = y
-        return found
+            datasets["stresses/x"] = x
+            datasets["stresses/y"] = y
+        return datasets
 
     def row(self, group: str, step: int, time: float, columns: Mapping[str, Any]) -> None:
         """Store a row of a group: a value or an array for each dataset."""
@@ -471,8 +475,8 @@ class Recorder:
 
     def rows(self, group: str, steps: Steps, times: Times, columns: Mapping[str, Array]) -> None:
         """Store rows of a group, the first axis of every array."""
-        own = {"step": np.array(steps), "time": np.array(times)}
-        self._buffers[group].put({**own, **columns})
+        instants = {"step": np.array(steps), "time": np.array(times)}
+        self._buffers[group].put({**instants, **columns})
 
     def strains(self, steps: Steps, times: Times, fields: Floats) -> None:
         """Store rows of tape8: strains from the displacements at `times`, (rows, numnp, 5)."""
@@ -503,16 +507,16 @@ class Recorder:
         for path, part in self._parts().items():
             part.restore(subset(state, f"{path}/"))
 
-    def failure(self, found: FailureEnvelope) -> None:
+    def failure(self, envelope: FailureEnvelope) -> None:
         """Store the largest exposures of FAIL."""
         monitor, places = self._model.failure, self._model.stress_places
         if monitor is None or places is None:
             return
         shapes = {dataset.path: shape for dataset, shape in self._datasets}
-        for path, values in exposures_of(monitor, found, places).items():
+        for path, values in exposures_of(monitor, envelope, places).items():
             self._sink.write(path, 0, values.reshape(shapes[path]))
         if monitor.has_residual:
-            for name, factor in monitor.load_factors(found).items():
+            for name, factor in monitor.load_factors(envelope).items():
                 self._sink.attributes(f"failure/{name}", {LOAD_FACTOR: factor})
 
     def finish(self) -> None:

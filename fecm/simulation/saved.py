@@ -29,7 +29,7 @@ def saved_values(value: object, path: str, seen: set[int] | None = None) -> dict
         return {}
     seen.add(id(value))
     members = (saved_values(getattr(value, name), f"{path}/{name}", seen) for name in names)
-    return {name: one for member in members for name, one in member.items()}
+    return {name: saved for member in members for name, saved in member.items()}
 
 
 def restore(value: Any, path: str, stored: Mapping[str, Any], seen: set[int] | None = None) -> Any:
@@ -51,8 +51,8 @@ def restore(value: Any, path: str, stored: Mapping[str, Any], seen: set[int] | N
     new = {name: restore(getattr(value, name), f"{path}/{name}", stored, seen) for name in names}
     if isinstance(value, tuple) or "__setattr__" in vars(type(value)):  # frozen
         return type(value)(**new)
-    for name, one in new.items():
-        setattr(value, name, one)
+    for name, saved in new.items():
+        setattr(value, name, saved)
     return value
 
 

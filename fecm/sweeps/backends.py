@@ -120,10 +120,10 @@ class BendingModes:
         """Compute impacts, together if their time steps are halved as often."""
         parts = []
         for times, rows in by_halvings(self.plate, impacts).items():
-            plate, some = self.plate.halved(times), impacts.select(rows)
+            plate, chosen = self.plate.halved(times), impacts.select(rows)
             parts.append(
                 _outcome_together(
-                    self.problem, plate, self.measures, some, judged, history=self.history
+                    self.problem, plate, self.measures, chosen, judged, history=self.history
                 )
             )
         return merge(parts)
@@ -210,9 +210,9 @@ class _ByKind(NamedTuple):
     back: NDArray[np.intp]  # rows in the order of the impacts
 
 
-def _by_kind(given: Impacts) -> _ByKind:
-    order = np.argsort(given.kind, kind="stable")
-    rows = given.select(order)
+def _by_kind(impacts: Impacts) -> _ByKind:
+    order = np.argsort(impacts.kind, kind="stable")
+    rows = impacts.select(order)
     law: Law[Floats] = HystereticLaw(rows.constants)
     if rows.own_law is not None:
         law = CaseByCase(rows.own_law, len(rows))
@@ -229,16 +229,16 @@ def _outcome_together(
     checked: Problem,
     plate: PlateResponse | ReducedImpacts,
     measures: Sequence[Measure],
-    given: Impacts,
+    impacts: Impacts,
     judged: bool,
     *,
     history: bool,
 ) -> Outcome:
     """Compute impacts on a plate; if judged, impacts with doubtful energies in full."""
     steps, dt = plate.steps, plate.dt
-    require_memory(ADVANCED_BYTES * steps * len(given), f"{len(given)} cases of {steps} steps")
+    require_memory(ADVANCED_BYTES * steps * len(impacts), f"{len(impacts)} cases of {steps} steps")
     with np.errstate(all="ignore"):
-        ordered = _by_kind(given)
+        ordered = _by_kind(impacts)
         struck = plate.impacts(ordered.hits)
         metrics = impact_metrics(
             struck.force,
@@ -269,5 +269,5 @@ def _outcome_together(
     if not (judged and doubtful.any()):
         return outcome
     # Cases near the limits of a run are run in full, which accepts or rejects them.
-    full = FullRuns(checked, measures).outcomes(given.select(np.flatnonzero(doubtful)))
+    full = FullRuns(checked, measures).outcomes(impacts.select(np.flatnonzero(doubtful)))
     return merge([outcome.select(np.flatnonzero(~doubtful)), full])

@@ -38,25 +38,25 @@ def doubtful_values(checked: Problem, cases: Sequence[Case]) -> list[str]:
     and the largest value of each name, one name at a time.
     """
     notes = list(_notes_of_places(checked, cases))
-    known = {(finding.code, finding.message) for finding in _findings(checked)}
+    known_findings = {(finding.code, finding.message) for finding in _findings(checked)}
     for name in cases[0]:
         if name not in JUDGED:
             continue
         values = [float(case[name]) for case in cases]
         least, greatest = min(values), max(values)
         notes += _thickness_notes(checked.deck, name, least)
-        told: set[str] = set()  # codes of this name
+        reported: set[str] = set()  # codes of this name
         for value in dict.fromkeys((least, greatest)):
-            found = [
+            doubts = [
                 finding
                 for finding in _of_value(checked, name, value)
-                if (finding.code, finding.message) not in known
+                if (finding.code, finding.message) not in known_findings
             ]
-            if not found:
+            if not doubts:
                 continue
-            best = max(found, key=lambda finding: "looks like" in finding.message)
-            if best.code not in told:
-                told.add(best.code)
+            best = max(doubts, key=lambda finding: "looks like" in finding.message)
+            if best.code not in reported:
+                reported.add(best.code)
                 notes.append(f"{name} = {value:g}: {best.message} [{best.code}]")
     return notes
 
@@ -148,10 +148,10 @@ def _findings(problem: Problem) -> list[Finding]:
     return [finding for finding in findings if finding.severity == "warning"]
 
 
-def freed(some: Sequence[Task]) -> int:
+def freed(tasks: Sequence[Task]) -> int:
     """Count cases with B != 0 in which u and v, restrained at every node, are released."""
     count = 0
-    for task in some:
+    for task in tasks:
         if "support" in task.cases[0]:  # which has its own u and v
             continue
         deck = task.settings.deck
@@ -188,21 +188,21 @@ class SweepMemory(NamedTuple):
 
 
 def sweep_memory(
-    checked: Problem, made: Plan, workers: int, *, streamed: bool = False
+    checked: Problem, definition: Plan, workers: int, *, streamed: bool = False
 ) -> SweepMemory:
     """Return the memory of a sweep.
 
     `workers` is the number of workers on this machine, 0 if a cluster runs the cases. If histories
     are `streamed` to files, only the histories of one task are held.
     """
-    settings = made.settings
-    if REFINE in made.cases[-1]:
-        checked = check_deck(apply_case(settings.deck, made.cases[-1]))
-    elif not LONGER.isdisjoint(made.cases[-1]):
+    settings = definition.settings
+    if REFINE in definition.cases[-1]:
+        checked = check_deck(apply_case(settings.deck, definition.cases[-1]))
+    elif not LONGER.isdisjoint(definition.cases[-1]):
         with suppress(CasesError):  # of a case that fails
-            checked = check_deck(apply_case(settings.deck, max(made.cases, key=_steps)))
-    steps, cases = checked.work.steps, len(made.cases)
-    at_once = min(workers, len(tasks(checked, made))) if workers > 1 else workers
+            checked = check_deck(apply_case(settings.deck, max(definition.cases, key=_steps)))
+    steps, cases = checked.work.steps, len(definition.cases)
+    at_once = min(workers, len(tasks(checked, definition))) if workers > 1 else workers
     plate = checked if settings.measure else without_output(checked, settings.measures)
     in_memory = settings.measure is not None or (
         settings.modes is None and stores_rows(checked, settings.measures)
@@ -215,14 +215,14 @@ def sweep_memory(
         run = needed_bytes(plate, in_memory=in_memory, exact=exact)
         if settings.modes is not None:  # beside the full runs of some cases
             run = max(run, reduction_bytes(checked.plate, settings.modes))
-        return run + ADVANCED_BYTES * steps * _held_together(checked, made, steps)
+        return run + ADVANCED_BYTES * steps * _held_together(checked, definition, steps)
 
     return SweepMemory(stored, at_once, of_process)
 
 
-def _held_together(checked: Problem, made: Plan, steps: int) -> int:
+def _held_together(checked: Problem, definition: Plan, steps: int) -> int:
     """Return the largest number of runs whose forces are held at once."""
-    together, settings = runs_together(checked, made), made.settings
+    together, settings = runs_together(checked, definition), definition.settings
     by_kernels = LIBRARY is not None and settings.law is None and settings.modes is None
     if settings.history or not by_kernels:
         return together
@@ -230,13 +230,13 @@ def _held_together(checked: Problem, made: Plan, steps: int) -> int:
 
 
 def check_sweep_memory(
-    checked: Problem, made: Plan, workers: int, *, streamed: bool = False
+    checked: Problem, definition: Plan, workers: int, *, streamed: bool = False
 ) -> None:
     """Raise NotEnoughMemoryError for a sweep that needs more memory than is free.
 
     The parameters are those of :func:`sweep_memory`.
     """
-    memory = sweep_memory(checked, made, workers, streamed=streamed)
+    memory = sweep_memory(checked, definition, workers, streamed=streamed)
 
     def remedy(free: int) -> str:
         if memory.needed() - memory.stored <= free:

@@ -111,19 +111,19 @@ def _limit(values: Floats, highest: float) -> Convergence:
 
 
 def convergence_lines(
-    cases: Mapping[str, Column], summary: Mapping[str, Column], found: Mapping[str, Convergence]
+    cases: Mapping[str, Column], summary: Mapping[str, Column], studies: Mapping[str, Convergence]
 ) -> list[str]:
     """Return lines of the values of every case, and of order, limit and band of every quantity."""
-    if not found:
+    if not studies:
         return []
     rows = [[n, *(f"{v:.6g}" for v in cases[n].tolist()), "", "", "", ""] for n in cases]
     rows[0][-4:-1] = "order", "limit", "band"
-    for name, one in found.items():
-        order = "" if math.isnan(one.order) else f"{one.order:.2f}"
-        limit = "" if math.isnan(one.limit) else f"{one.limit:.6g}"
-        band = "" if math.isnan(one.band) else f"±{one.band:.2g}"
+    for name, study in studies.items():
+        order = "" if math.isnan(study.order) else f"{study.order:.2f}"
+        limit = "" if math.isnan(study.limit) else f"{study.limit:.6g}"
+        band = "" if math.isnan(study.band) else f"±{study.band:.2g}"
         values = (f"{value:.6g}" for value in summary[name].tolist())
-        rows.append([name, *values, order, limit, band, one.remark])
+        rows.append([name, *values, order, limit, band, study.remark])
     names, *numbers, remarks = zip(*rows, strict=True)
     justified = ([text.rjust(max(map(len, column))) for text in column] for column in numbers)
     return aligned(list(zip(names, *justified, remarks, strict=True)))
@@ -138,9 +138,9 @@ def refined_cases(checked: Problem, factors: Sequence[int]) -> list[Case]:
     DT is the DT of the deck over the factor. If it is 0, DT is the largest step with which no case
     exceeds 0.9 of its critical time step. Raises CasesError if factors or deck are unsuitable.
     """
-    given = ",".join(map(str, factors))
-    if len(factors) < 2 or given not in FACTORS:
-        raise CasesError(f"refine takes {FACTORS} or a part of it, at least two, not {given}")
+    factor_text = ",".join(map(str, factors))
+    if len(factors) < 2 or factor_text not in FACTORS:
+        raise CasesError(f"refine takes {FACTORS} or a part of it, at least two, not {factor_text}")
     sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
     if len(sizes) != 1:
         raise CasesError("refine needs one DT in the program of the deck")

@@ -211,26 +211,28 @@ def _quantile_method(law: object) -> str | None:
 
 
 def distribution_of(
-    name: str, given: str | OwnDistribution, *, free: bool = False
+    name: str, distribution: str | OwnDistribution, *, free: bool = False
 ) -> ValueDistribution | CustomDistribution:
     """Return the law of a name from a text, or from an object with ``ppf`` or ``icdf``.
 
     `free` allows any name. Raises CasesError if the law is neither a text nor such an object, lacks
     its parameters, or has an invalid one.
     """
-    if isinstance(given, str):
-        return parse_law(name, given, free=free)
+    if isinstance(distribution, str):
+        return parse_law(name, distribution, free=free)
     _check_random(name, free=free)
-    if _quantile_method(given) is None:
+    if _quantile_method(distribution) is None:
         raise CasesError(
-            f"{name}: {given!r} is not a law; write a text such as 'normal:115,10', or an object "
-            "with the method ppf or icdf, as the distributions of scipy.stats are"
+            f"{name}: {distribution!r} is not a law; write a text such as 'normal:115,10', or an "
+            "object with the method ppf or icdf, as the distributions of scipy.stats are"
         )
     # A distribution of scipy.stats before it is called has the mean 0 and the deviation 1.
-    if isinstance(given, type) or callable(getattr(given, "freeze", None)):
-        what = getattr(given, "name", None) or getattr(given, "__name__", type(given).__name__)
+    if isinstance(distribution, type) or callable(getattr(distribution, "freeze", None)):
+        what = getattr(distribution, "name", None) or getattr(
+            distribution, "__name__", type(distribution).__name__
+        )
         raise CasesError(f"{name}: {what} has no parameters; call it with them first")
-    return CustomDistribution(_text_of(given), given)
+    return CustomDistribution(_text_of(distribution), distribution)
 
 
 def _text_of(law: OwnDistribution) -> str:
@@ -248,18 +250,20 @@ def parse_law(name: str, text: str, *, free: bool = False) -> ValueDistribution:
     Raises CasesError if the law or a parameter is invalid.
     """
     _check_random(name, free=free)
-    kind, _, given = (part.strip() for part in str(text).partition(":"))
+    kind, _, numbers_text = (part.strip() for part in str(text).partition(":"))
     if kind not in LAWS:
         raise CasesError(f"{name}: `{text}` is not a law; the laws are {', '.join(FORMS)}")
-    known = LAWS[kind]
+    named_law = LAWS[kind]
     parameters: tuple[float, ...] = ()
     with suppress(ValueError):
-        parameters = tuple(map(float, given.split(",")))
-    wanted = known.parameters.count(",") + 1
-    if len(parameters) != wanted or not all(map(math.isfinite, parameters)):
-        raise CasesError(f"{name}: `{text}` is not {kind}:{known.parameters} with finite numbers")
-    if not known.holds(*parameters):
-        raise CasesError(f"{name}: `{text}`: {known.rule}")
+        parameters = tuple(map(float, numbers_text.split(",")))
+    needed = named_law.parameters.count(",") + 1
+    if len(parameters) != needed or not all(map(math.isfinite, parameters)):
+        raise CasesError(
+            f"{name}: `{text}` is not {kind}:{named_law.parameters} with finite numbers"
+        )
+    if not named_law.holds(*parameters):
+        raise CasesError(f"{name}: `{text}`: {named_law.rule}")
     law = ValueDistribution(kind, parameters)
     if kind == LOGNORMAL and parameters[1] > LARGEST_SIGMA:
         raise CasesError(f"{name}: {_of_logarithm(law)}; it is at most {LARGEST_SIGMA:g}")
@@ -271,19 +275,19 @@ def _check_random(name: str, *, free: bool) -> None:
     if free:
         check_free(name, "random")
         return
-    numbers = [known for known in NAMES if kind_of(known) is ValueKind.NUMBER]
+    numbers = [candidate for candidate in NAMES if kind_of(candidate) is ValueKind.NUMBER]
     if name not in numbers:
-        others = did_you_mean(name, numbers) or f"; the names are {', '.join(numbers)}"
-        raise CasesError(f"`{name}` cannot be random{others}")
+        alternatives = did_you_mean(name, numbers) or f"; the names are {', '.join(numbers)}"
+        raise CasesError(f"`{name}` cannot be random{alternatives}")
 
 
 def _of_logarithm(law: ValueDistribution) -> str:
     """Say that SIGMA of a lognormal law belongs to the logarithm, and give its value for an SD."""
     median, sigma = law.parameters
     # The variance is m^2 s (s - 1) with the median m and s = exp(SIGMA^2).
-    meant = math.sqrt(math.log(0.5 + 0.5 * math.hypot(1.0, 2.0 * sigma / median)))
+    sigma_of_logarithm = math.sqrt(math.log(0.5 + 0.5 * math.hypot(1.0, 2.0 * sigma / median)))
     text = f"SIGMA of {law} is the standard deviation of the logarithm"
-    return f"{text}; a standard deviation of {sigma:g} is SIGMA {meant:.2g}"
+    return f"{text}; a standard deviation of {sigma:g} is SIGMA {sigma_of_logarithm:.2g}"
 
 
 def parse_random(text: str) -> tuple[str, ValueDistribution]:

@@ -103,7 +103,7 @@ class Estimate:
             "lambda": self.inelasticity,
             "stiffness": self.stiffness,
             **about,
-            "models": [{"model": name, **asdict(one)} for name, one in self.models.items()],
+            "models": [{"model": name, **asdict(model)} for name, model in self.models.items()],
         }
 
     def _tables(self) -> tuple[Table, Table]:
@@ -185,16 +185,16 @@ def estimate(deck: str | Path | Deck) -> Estimate:
     >>> print(f"{static.peak_force:.0f} and {run.peak_force:.0f} {found.units['force']}")
     4650 and 4790 N
     """
-    found = estimate_problem(sole_problem(deck))
-    for text in found.notes:
+    result = estimate_problem(sole_problem(deck))
+    for text in result.notes:
         warn(text)
-    return found
+    return result
 
 
 def estimate_problem(problem: Problem) -> Estimate:
     """Estimate the impact of a checked problem; raises StudyError as :func:`estimate`."""
     quick = by_quick_models(problem)
-    own, bent, doubts = _run_itself(problem, quick.mass)
+    of_run, bent, doubts = _run_itself(problem, quick.mass)
     if not problem.plate.nonlinear:
         bent = [*_bent_statically(quick, problem.judge), *bent]
     if bent:
@@ -217,7 +217,7 @@ def estimate_problem(problem: Problem) -> Estimate:
         mass_ratio=quick.mass_ratio,
         inelasticity=quick.parameter,
         stiffness=quick.stiffness,
-        models={**_rows(quick), RUN: own},
+        models={**_rows(quick), RUN: of_run},
         remarks=remarks,
         notes=(*bent, *doubts),
         units=unit_names(problem.deck),
@@ -227,22 +227,22 @@ def estimate_problem(problem: Problem) -> Estimate:
 def _rows(quick: QuickEstimate) -> dict[str, ModelEstimate]:
     """Return the quick models by name."""
     return {
-        one.name: ModelEstimate(
-            one.impact.peak,
-            one.impact.duration,
-            one.threshold,
-            one.velocity,
-            0.5 * quick.mass * one.velocity**2,
-            one.applies,
+        model.name: ModelEstimate(
+            model.impact.peak,
+            model.impact.duration,
+            model.threshold,
+            model.velocity,
+            0.5 * quick.mass * model.velocity**2,
+            model.applies,
         )
-        for one in quick.models
+        for model in quick.models
     }
 
 
 def _run_itself(problem: Problem, mass: float) -> tuple[ModelEstimate, list[str], list[str]]:
     """Return the run itself, notes about its deflections, and notes about what is open in it."""
-    own = carry_out_plan(problem, plan(problem, [{}]))
-    swept, doubts = {"the run": own}, []
+    result = carry_out_plan(problem, plan(problem, [{}]))
+    swept, doubts = {"the run": result}, []
     threshold = velocity = math.nan
     if problem.threshold is not None:
         threshold = problem.threshold.force
@@ -250,14 +250,20 @@ def _run_itself(problem: Problem, mass: float) -> tuple[ModelEstimate, list[str]
             problem, plan(problem, [{}], until=threshold)
         )
         velocity = float(swept["the run at the threshold"]["found_velocity"][0])
-    peak, duration = (float(own[name][0]) for name in ("peak_force", "contact_time"))
+    peak, duration = (float(result[name][0]) for name in ("peak_force", "contact_time"))
     if math.isnan(duration):
         doubts.append("the run ends before its contact does: what is open needs a longer duration")
     doubts += [
-        f"{name}: {one['status'][0]}" for name, one in swept.items() if not one.completed.all()
+        f"{name}: {outcome['status'][0]}"
+        for name, outcome in swept.items()
+        if not outcome.completed.all()
     ]
     h, judge = problem.judge.thickness, problem.judge
-    bent = [text for name, one in swept.items() for text in _bent(name, one[RATIO][0] * h, judge)]
+    bent = [
+        text
+        for name, outcome in swept.items()
+        for text in _bent(name, outcome[RATIO][0] * h, judge)
+    ]
     energy = 0.5 * mass * velocity**2
     row = ModelEstimate(peak, duration, threshold, velocity, energy, applies=True)
     return row, bent, doubts

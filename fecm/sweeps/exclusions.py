@@ -66,17 +66,19 @@ NEEDS = (
 def check_options(job: Sweep) -> None:
     """Raise CasesError if options exclude each other, lack another one, or have the wrong type."""
     _check_types(job)
-    given = _given(job)
-    for option, others, reason in EXCLUSIONS:
-        for other in others:
-            if {option, other} <= given:
+    options_given = _given(job)
+    for option, excluded, reason in EXCLUSIONS:
+        for other in excluded:
+            if {option, other} <= options_given:
                 raise CasesError(f"{_quoted(option)} excludes {_quoted(other)}: {reason}")
     for options, needed, reason in NEEDS:
-        if needed not in given and (lacking := [name for name in options if name in given]):
+        if needed not in options_given and (
+            lacking := [name for name in options if name in options_given]
+        ):
             raise CasesError(f"{_quoted(lacking[0])} needs {_quoted(needed)}: {reason}")
-    if not given & {"deck", "build"}:
+    if not options_given & {"deck", "build"}:
         raise CasesError("give either deck or build")
-    if not given & {"vary", "cases", "random", "until", "refine"}:
+    if not options_given & {"vary", "cases", "random", "until", "refine"}:
         raise CasesError("a sweep needs `vary`, `cases`, `random`, `refine` or `until`")
 
 

@@ -117,12 +117,12 @@ def here_first(
     """
     begin = time.monotonic()
     for count, task in enumerate(tasks):
-        left = tasks[count:]
-        expected = len(left) * (time.monotonic() - begin) / max(1, count)
+        remaining = tasks[count:]
+        expected = len(remaining) * (time.monotonic() - begin) / max(1, count)
         worth = expected >= WORTH_WORKERS and _can_be_sent(task)
-        workers = min(most_workers(), len(left)) if worth else 1
+        workers = min(most_workers(), len(remaining)) if worth else 1
         if workers > 1:
-            on_workers(left, workers, done, idle)
+            on_workers(remaining, workers, done, idle)
             return
         here([task], done, idle)
 
@@ -157,27 +157,27 @@ def on_workers(tasks: Sequence[Task], count: int, done: Done, idle: Idle) -> Non
     Raises SchedulerError if no worker starts. Each worker imports the running script. A script that
     calls this function whenever it is imported can't have workers.
     """
-    left = {task.number: task for task in tasks}
+    remaining = {task.number: task for task in tasks}
     deaths = 0
     start_resource_tracker()
-    while left and deaths < DEATHS:
-        before = len(left)
+    while remaining and deaths < DEATHS:
+        before = len(remaining)
         context = multiprocessing.get_context("spawn")
         started = context.Event()
         pool = futures.ProcessPoolExecutor(count, context, _begin, (started, os.getpid()))
         try:
-            for task, future in _run_on(pool, list(left.values()), idle):
+            for task, future in _run_on(pool, list(remaining.values()), idle):
                 done(task, future.result())
-                del left[task.number]
+                del remaining[task.number]
         except SchedulerError:  # Python starts no process while it imports the script
             raise SchedulerError(UNGUARDED) from None
         except futures.BrokenExecutor:
             if not started.is_set():
                 raise SchedulerError(UNGUARDED) from None
-            deaths = 0 if len(left) < before else deaths + 1
+            deaths = 0 if len(remaining) < before else deaths + 1
         finally:
             pool.shutdown(wait=False, cancel_futures=True)
-    for task in left.values():
+    for task in remaining.values():
         done(task, Outcome.failed(dict.fromkeys(task.numbers, LOST)))
 
 
@@ -295,7 +295,7 @@ def _workers_of(executor: futures.Executor) -> int:
 
 def carry_out_plan(
     problem: Problem,
-    made: Plan,
+    definition: Plan,
     means: Means = HERE,
     *,
     parts: PartialResults | None = None,
@@ -319,7 +319,7 @@ def carry_out_plan(
         If the watch stops the sweep.
     """
     finished = 0
-    count = len(made.cases)
+    count = len(definition.cases)
 
     def idle() -> None:
         if watch.stops():
@@ -334,22 +334,22 @@ def carry_out_plan(
         done(task, outcome)
         watch.advance(finished, count)
 
-    most_workers = partial(_most_workers, problem, made, streamed=not keeps_forces)
+    most_workers = partial(_most_workers, problem, definition, streamed=not keeps_forces)
     run = partial(_outcomes, means, parts, most_workers, idle, watch)
-    if made.settings.modes is None:
-        model, whole = None, tasks(problem, made)
+    if definition.settings.modes is None:
+        model, whole = None, tasks(problem, definition)
     else:
-        model, whole = _by_model(problem, made, made.settings.modes, run, watch)
+        model, whole = _by_model(problem, definition, definition.settings.modes, run, watch)
     if parts is not None:
         parts.tasks = whole
     outcomes = [outcome for _, outcome in run(whole, keep)]
-    history = made.settings.history and keeps_forces
-    return sweep_result(made, merge(outcomes, history=history), model)
+    history = definition.settings.history and keeps_forces
+    return sweep_result(definition, merge(outcomes, history=history), model)
 
 
 def _by_model(
     problem: Problem,
-    made: Plan,
+    definition: Plan,
     modes: int,
     run: Callable[[Sequence[Task], Done], list[tuple[Task, Outcome]]],
     watch: Watch,
@@ -358,19 +358,21 @@ def _by_model(
 
     Raises CasesError if the model holds for no case.
     """
-    ordered, count = by_energy(made), len(made.cases)
-    tried = Trials(made, count, lambda whole: run(whole, lambda task, outcome: None))
+    ordered, count = by_energy(definition), len(definition.cases)
+    tried = Trials(definition, count, lambda whole: run(whole, lambda task, outcome: None))
     held = count_held(ordered, tried.failing)
     model = replace(tried.compared(modes), in_full=len(ordered) - held)
     if not held:
         model.check()
     in_full = set(ordered[held:])
     if not in_full:
-        return model, tasks(problem, made)
+        return model, tasks(problem, definition)
     watch.note(model.note)
     rest = [case for case in range(count) if case not in in_full]
-    fulls = [task for task in trials(made, sorted(in_full), count) if task.settings.modes is None]
-    return model, [*tasks(problem, made, rest), *fulls]
+    fulls = [
+        task for task in trials(definition, sorted(in_full), count) if task.settings.modes is None
+    ]
+    return model, [*tasks(problem, definition, rest), *fulls]
 
 
 def _outcomes(
@@ -384,7 +386,7 @@ def _outcomes(
 ) -> list[tuple[Task, Outcome]]:
     """Compute tasks, or read their stored outcomes."""
     outcomes: list[tuple[Task, Outcome]] = []
-    left: list[Task] = []
+    remaining: list[Task] = []
 
     def keep(task: Task, outcome: Outcome, *, is_new: bool = True) -> None:
         is_lost = any(text.startswith(LOST) for text in outcome.status)
@@ -400,26 +402,26 @@ def _outcomes(
         except DamagedPartError as error:
             watch.note(f"{error}; its cases are run again")
         if stored is None:
-            left.append(task)
+            remaining.append(task)
         else:
             keep(task, stored, is_new=False)
     if means.executor is not None:
-        on_executor(left, means.executor, keep, idle)
+        on_executor(remaining, means.executor, keep, idle)
     elif means.scheduler is not None:
-        on_dask(left, means.scheduler, keep, idle)
+        on_dask(remaining, means.scheduler, keep, idle)
     elif means.workers is None:
-        here_first(left, most_workers, keep, idle)
-    elif means.workers > 1 and len(left) > 1:
-        on_workers(left, means.workers, keep, idle)
+        here_first(remaining, most_workers, keep, idle)
+    elif means.workers > 1 and len(remaining) > 1:
+        on_workers(remaining, means.workers, keep, idle)
     else:
-        here(left, keep, idle)
+        here(remaining, keep, idle)
     return outcomes
 
 
-def _most_workers(problem: Problem, made: Plan, *, streamed: bool) -> int:
+def _most_workers(problem: Problem, definition: Plan, *, streamed: bool) -> int:
     """Return the number of worker processes for which processors and memory are free."""
     for count in range(free_processors(), 1, -1):
         with suppress(NotEnoughMemoryError):
-            check_sweep_memory(problem, made, count, streamed=streamed)
+            check_sweep_memory(problem, definition, count, streamed=streamed)
             return count
     return 1

@@ -42,11 +42,13 @@ OWN = "own"  # instead of the name of a law: that of an object, of which the fil
 
 def stored(random: RandomResult) -> Iterator[tuple[str, Column]]:
     """Yield paths and values of the datasets of a random sweep."""
-    for name, made in random.statistics.items():
-        moments = np.stack([made.draws, made.mean, made.standard_deviation], axis=-1)
-        yield f"statistics/{name}", np.concatenate([moments, made.quantiles], axis=-1)
-    for name, found in random.sensitivity.items():
-        for part, values in found._asdict().items():
+    for name, statistics in random.statistics.items():
+        moments = np.stack(
+            [statistics.draws, statistics.mean, statistics.standard_deviation], axis=-1
+        )
+        yield f"statistics/{name}", np.concatenate([moments, statistics.quantiles], axis=-1)
+    for name, indices in random.sensitivity.items():
+        for part, values in indices._asdict().items():
             yield f"sensitivity/{name}/{part}", values
     if len(random.exceedance.quantity):
         for part, values in random.exceedance._asdict().items():
@@ -57,21 +59,21 @@ def random_attributes(random: RandomResult) -> dict[str, dict[str, Any]]:
     """Return the attributes of the groups of the file."""
     design = random.design
     about = {name: getattr(design, name) for name in ("kind", "samples", "seed", "sensitivity")}
-    made: dict[str, dict[str, Any]] = {
+    groups: dict[str, dict[str, Any]] = {
         "random": {},
         "design": {**about, "names": list(design.laws), "notes": random.notes},
     }
     if random.sensitivity:
-        made["sensitivity"] = {}
+        groups["sensitivity"] = {}
     if design.correlation:
-        made["design"]["correlation"] = np.array(design.correlation)
+        groups["design"]["correlation"] = np.array(design.correlation)
     for name, law in design.laws.items():
-        made[f"random/{name}"] = (
+        groups[f"random/{name}"] = (
             {"law": law.kind, "parameters": np.array(law.parameters)}
             if isinstance(law, ValueDistribution)
             else {"law": OWN, "text": law.text}
         )
-    return made
+    return groups
 
 
 def random_of(
@@ -90,13 +92,13 @@ def random_of(
         if not (whole and design.laws.keys() <= cases.keys()):
             raise ValueError("cases")
         first = (count // design.rows,) if combinations else ()
-        known = [name for name in quantities if name not in VERDICTS]
-        asked = known if design.sensitivity else []
+        names = [name for name in quantities if name not in VERDICTS]
+        asked = names if design.sensitivity else []
         return RandomResult(
             design,
-            {name: _statistics(contents, name, first) for name in known},
+            {name: _statistics(contents, name, first) for name in names},
             {name: _indices(contents, name, first, len(design.laws)) for name in asked},
-            _exceedance(contents, known, first),
+            _exceedance(contents, names, first),
             combinations,
             tuple(map(str, contents.groups["design"]["notes"])),
         )
@@ -148,17 +150,19 @@ def _indices(contents: FileContents, name: str, first: tuple[int, ...], laws: in
     ))  # fmt: skip
 
 
-def _exceedance(contents: FileContents, known: Iterable[str], first: tuple[int, ...]) -> Exceedance:
+def _exceedance(contents: FileContents, names: Iterable[str], first: tuple[int, ...]) -> Exceedance:
     if "exceedance/quantity" not in contents:
-        none = {name: np.empty((*first, 0)) for name in known}
+        none = {name: np.empty((*first, 0)) for name in names}
         return exceedances(none, np.empty((*first, 0), dtype=bool), [])
     parts = {part: contents[f"exceedance/{part}"] for part in Exceedance._fields if part != "open"}
     missing = np.zeros_like(parts["draws"])  # in files of earlier versions
-    found = Exceedance(**parts, open=contents.get("exceedance/open", missing))
-    shape = (*first, len(found.quantity))
-    if found.limit.shape != shape[-1:] or {values.shape for values in found[2:]} != {shape}:
+    exceedance = Exceedance(**parts, open=contents.get("exceedance/open", missing))
+    shape = (*first, len(exceedance.quantity))
+    if exceedance.limit.shape != shape[-1:] or {values.shape for values in exceedance[2:]} != {
+        shape
+    }:
         raise ValueError("exceedance")
-    return found
+    return exceedance
 
 
 FORCE = "history/force"
@@ -215,8 +219,8 @@ def _write_forces(sink: FileSink, count: int, longest: int, forces: Iterable[For
             rows[:, : force.shape[1]] = force
         # Numbers without a gap are written at once.
         ends = np.flatnonzero(np.diff(numbers) != 1) + 1
-        for start, some in zip([0, *ends.tolist()], np.split(rows, ends), strict=True):
-            sink.write(FORCE, numbers[start], some)
+        for start, block in zip([0, *ends.tolist()], np.split(rows, ends), strict=True):
+            sink.write(FORCE, numbers[start], block)
 
 
 CASES = "cases"

@@ -63,9 +63,11 @@ def thresholds_of(checked: Problem, toughness: Floats) -> Floats | None:
 
     `toughness` (force/length) is (cases,).
     """
-    if (own := checked.threshold) is None:
+    if (threshold := checked.threshold) is None:
         return None
-    values = {g: threshold_force(own.rigidity, g, own.number) for g in set(toughness.tolist())}
+    values = {
+        g: threshold_force(threshold.rigidity, g, threshold.number) for g in set(toughness.tolist())
+    }
     return np.array([values[g] for g in toughness.tolist()])
 
 
@@ -85,7 +87,7 @@ def judge_cases(
     `of_rows` has the reasons from the stored rows of a full run.
     """
     rules, end, plate = checked.judge, metrics.end, metrics.plate
-    known = {name: decided(peak.largest, peak.last, end) for name, peak in peaks.items()}
+    decided_values = {name: decided(peak.largest, peak.last, end) for name, peak in peaks.items()}
     deflection = plate.largest
     if rules.mobility:  # the plate moves as a whole
         deflection = np.full(len(end), np.nan)
@@ -101,9 +103,9 @@ def judge_cases(
     )
     ratio = metrics.deflection / rules.thickness
     if Measure.DEFLECTION in measures:
-        known[Measure.DEFLECTION] = metrics.deflection
-    known[RATIO] = np.where(np.isnan(deflection), np.nan, ratio)
-    outcome.columns |= {**known, About.VALIDITY: rules.validity(extent)}
+        decided_values[Measure.DEFLECTION] = metrics.deflection
+    decided_values[RATIO] = np.where(np.isnan(deflection), np.nan, ratio)
+    outcome.columns |= {**decided_values, About.VALIDITY: rules.validity(extent)}
 
 
 def peaks_of(measures: Sequence[Measure], result: Result) -> dict[str, CasePeaks]:
@@ -114,9 +116,11 @@ def peaks_of(measures: Sequence[Measure], result: Result) -> dict[str, CasePeaks
         numbers = result["gages/number"]
         for number, values in zip(numbers, strains, strict=True):
             peaks[f"{GAGE}{number}"] = CasePeaks(values.max(keepdims=True), values[-1:])
-    for one in largest_exposures(result) if Measure.FAILURE in measures else ():
-        last = one.exposure if one.time >= result["history/time"][-1] else 0.0
-        peaks[f"exposure_{one.criterion}"] = CasePeaks(np.array([one.exposure]), np.array([last]))
+    for exposure in largest_exposures(result) if Measure.FAILURE in measures else ():
+        last = exposure.exposure if exposure.time >= result["history/time"][-1] else 0.0
+        peaks[f"exposure_{exposure.criterion}"] = CasePeaks(
+            np.array([exposure.exposure]), np.array([last])
+        )
     return peaks
 
 
@@ -197,36 +201,40 @@ def in_one_motion(
     One run has the motion of all cases, and its FAIL evaluates the exposures of each.
     """
     measures, sink = settings.measures, MemorySink()
-    made: dict[int, tuple[Problem, Case]] = {}
+    built_cases: dict[int, tuple[Problem, Case]] = {}
     reasons: dict[int, str] = {}
     for number, case in zip(numbers, cases, strict=True):
         try:
-            made[number] = problem_of_case(settings, case), case
+            built_cases[number] = problem_of_case(settings, case), case
         except CasesError as error:
             reasons[number] = str(error)
     invalid = [Outcome.failed(reasons)] if reasons else []
-    if not made:
+    if not built_cases:
         return invalid
-    problems = [problem for problem, _ in made.values()]
+    problems = [problem for problem, _ in built_cases.values()]
     try:
         options = RunOptions(law=settings.law)
         simulation = Simulation(without_output(problems[0], measures), sink, options)
         if Measure.FAILURE in measures:
-            simulation.others = [_criteria(simulation, one) for one in problems[1:]]
+            simulation.others = [
+                _criteria(simulation, built_problem) for built_problem in problems[1:]
+            ]
         run_program(simulation)
     except (CasesError, DivergenceError, LawError, ArithmeticError) as error:
-        return [*invalid, Outcome.failed(dict.fromkeys(made, str(error)))]
-    found: list[dict[str, Floats]] = [{} for _ in problems]
+        return [*invalid, Outcome.failed(dict.fromkeys(built_cases, str(error)))]
+    arrays_of_case: list[dict[str, Floats]] = [{} for _ in problems]
     places = simulation.model.stress_places
     for number, other in enumerate(simulation.others, start=1):
         assert places is not None  # the program has FAIL
-        found[number] = exposures_of(other.monitor, other.envelope, places)
+        arrays_of_case[number] = exposures_of(other.monitor, other.envelope, places)
     outcomes = invalid
-    for (number, (one, case)), arrays in zip(made.items(), found, strict=True):
-        own = {path: values.reshape(sink.arrays[path].shape) for path, values in arrays.items()}
-        result = Result({**sink.arrays, **own}, sink.texts, sink.groups)
-        outcome = _outcome(number, one, measures, result, simulation.state.dt)
-        outcomes.append(with_hit(outcome, one, case))
+    for (number, (built_problem, case)), arrays in zip(
+        built_cases.items(), arrays_of_case, strict=True
+    ):
+        shaped = {path: values.reshape(sink.arrays[path].shape) for path, values in arrays.items()}
+        result = Result({**sink.arrays, **shaped}, sink.texts, sink.groups)
+        outcome = _outcome(number, built_problem, measures, result, simulation.state.dt)
+        outcomes.append(with_hit(outcome, built_problem, case))
     return outcomes
 
 
@@ -234,14 +242,14 @@ def _criteria(simulation: Simulation, checked: Problem) -> Criteria:
     """Return failure criteria of plies with the residual stresses and strengths of another case."""
     monitor, residuals = simulation.model.failure, checked.residuals
     assert monitor is not None
-    made = monitor.with_residual(
-        None if residuals is None else [one.stresses for one in residuals],
+    with_residual = monitor.with_residual(
+        None if residuals is None else [residual.stresses for residual in residuals],
         strengths_of_deck(checked.deck),
     )
-    envelope = made.start()
+    envelope = with_residual.start()
     if simulation.model.is_stressed_at_rest:
-        made.update(envelope, np.zeros((1, *checked.mesh.equations.shape)), [0.0])
-    return Criteria(made, envelope)
+        with_residual.update(envelope, np.zeros((1, *checked.mesh.equations.shape)), [0.0])
+    return Criteria(with_residual, envelope)
 
 
 def _outcome(
@@ -254,12 +262,12 @@ def _outcome(
     indentation = IndentationMetrics(
         np.maximum(depth.max(keepdims=True), 0.0), depth[-1:], permanent
     )
-    own = strike_of(checked.deck)
+    strike = strike_of(checked.deck)
     metrics = impact_metrics(
         force[:, None],
         times,
         indentation,
-        Projectiles(own.projectile.total_mass, own.velocity),
+        Projectiles(strike.projectile.total_mass, strike.velocity),
         deflection_of(result),
         None if checked.threshold is None else checked.threshold.force,
         checked.judge.mobility,
@@ -297,10 +305,10 @@ def _measured(
 ) -> dict[str, Floats]:
     """Return the columns that the caller computes from the result of a case."""
     try:
-        found = measure(result)
-        if not isinstance(found, Mapping):
-            raise TypeError(f"returned {type(found).__name__}, not numbers by name")
-        values = {name: np.asarray(value) for name, value in found.items()}
+        columns = measure(result)
+        if not isinstance(columns, Mapping):
+            raise TypeError(f"returned {type(columns).__name__}, not numbers by name")
+        values = {name: np.asarray(value) for name, value in columns.items()}
     except Exception as error:
         raise CasesError(f"measure: {told(error)}") from error
     for name, value in values.items():

@@ -403,20 +403,24 @@ class Sweep:
 
         On a nonlinear plate, say how long they take, too.
         """
-        made, texts = self.plan, []
-        if made.design is not None:
-            shared = shares_plate(self.problem) and not made.settings.in_full
+        definition, texts = self.plan, []
+        if definition.design is not None:
+            shared = shares_plate(self.problem) and not definition.settings.in_full
             texts.append(
                 cost(
-                    made.cases,
-                    made.design,
-                    shared=shared or made.settings.modes is not None,
-                    motions=made.settings.shares_motion,
+                    definition.cases,
+                    definition.design,
+                    shared=shared or definition.settings.modes is not None,
+                    motions=definition.settings.shares_motion,
                 )
             )
-        if made.settings.modes is None and self.build is None and self.problem.plate.nonlinear:
+        if (
+            definition.settings.modes is None
+            and self.build is None
+            and self.problem.plate.nonlinear
+        ):
             workers = 0 if self.scheduler is not None else self.workers
-            texts.append(expected(self.problem, made, workers))
+            texts.append(expected(self.problem, definition, workers))
         return texts
 
     @cached_property
@@ -425,12 +429,12 @@ class Sweep:
 
         Steps are steps of the plate: cases that share a plate take its steps once.
         """
-        problem, made = self.problem, self.plan
-        steps, seconds = seconds_of(problem, made)
+        problem, definition = self.problem, self.plan
+        steps, seconds = seconds_of(problem, definition)
         if not self._means.is_chosen:
-            seconds /= max(1, min(self.workers or 1, len(tasks(problem, made))))
-        memory = sweep_memory(problem, made, self._means.here, streamed=self._streams)
-        return Price(steps, output_bytes(problem, made), memory.needed(), seconds)
+            seconds /= max(1, min(self.workers or 1, len(tasks(problem, definition))))
+        memory = sweep_memory(problem, definition, self._means.here, streamed=self._streams)
+        return Price(steps, output_bytes(problem, definition), memory.needed(), seconds)
 
     def execute(self, watch: Watch | None = None) -> SweepResult:
         """Compute the cases that are not stored, write the result, and run the cases of `full`.
@@ -621,22 +625,22 @@ def _measures(
     return None, names
 
 
-def _texts(given: object) -> list[str]:
+def _texts(texts: object) -> list[str]:
     """Return one or several texts of the form NAME=...; an empty list for anything else."""
-    if isinstance(given, str):
-        return [given]
-    if isinstance(given, list | tuple) and all(isinstance(one, str) for one in given):
-        return list(given)
+    if isinstance(texts, str):
+        return [texts]
+    if isinstance(texts, list | tuple) and all(isinstance(text, str) for text in texts):
+        return list(texts)
     return []
 
 
-def _by_name(option: str, given: Any, form: str) -> dict[str, Any]:
+def _by_name(option: str, argument: Any, form: str) -> dict[str, Any]:
     """Return values by name, from a mapping or from texts of a form."""
-    if isinstance(given, Mapping):
-        return dict(given)
-    pairs = [text.partition("=")[::2] for text in _texts(given)]
+    if isinstance(argument, Mapping):
+        return dict(argument)
+    pairs = [text.partition("=")[::2] for text in _texts(argument)]
     if not pairs or not all(name.strip() and value for name, value in pairs):
-        raise CasesError(f"{option} is {given!r}; write {form}, or a mapping of names to values")
+        raise CasesError(f"{option} is {argument!r}; write {form}, or a mapping of names to values")
     values = {name.strip(): value.strip() for name, value in pairs}
     if len(values) < len(pairs):
         raise CasesError(f"`{option}`: a name is given twice")
@@ -651,8 +655,8 @@ def _limits(exceed: Any) -> tuple[Limit, ...]:
         raise CasesError(f'exceed is {exceed!r}; write {{"peak_force": [100.0]}} or the like')
     return tuple(
         parse_exceed(f"{name}={value}")
-        for name, given in (exceed or {}).items()
-        for value in np.atleast_1d(given).tolist()
+        for name, limit in (exceed or {}).items()
+        for value in np.atleast_1d(limit).tolist()
     )
 
 
@@ -665,9 +669,9 @@ def _same_names() -> Done:
             return
         first.setdefault(", ".join(sorted(outcome.measured)), task.numbers[0])
         if len(first) > 1:
-            one, other = (f"{names} for case {case}" for names, case in first.items())
+            names_a, names_b = (f"{names} for case {case}" for names, case in first.items())
             hint = "return the same names, NaN where there is no value"
-            raise CasesError(f"measure returns {other}, and {one}; {hint}")
+            raise CasesError(f"measure returns {names_b}, and {names_a}; {hint}")
 
     return check
 

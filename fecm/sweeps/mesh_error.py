@@ -114,17 +114,17 @@ def mesh_error(
     options = RunOptions(active_slips(mode, ()))
     problem = load_one(deck, mode)
     fine = bisected(problem)
-    steps, taken = problem.work.steps + fine.work.steps, 0
+    steps, done = problem.work.steps + fine.work.steps, 0
 
     def advance(more: int) -> None:
-        nonlocal taken
-        taken += more
+        nonlocal done
+        done += more
         if progress is not None:
-            progress(taken, steps)
+            progress(done, steps)
 
-    found = compare_peaks(problem, fine, options, advance)
-    advance(steps - taken)  # short runs have reported nothing
-    return found
+    estimate = compare_peaks(problem, fine, options, advance)
+    advance(steps - done)  # short runs have reported nothing
+    return estimate
 
 
 def bisected(problem: Problem) -> Problem:
@@ -135,20 +135,20 @@ def bisected(problem: Problem) -> Problem:
     """
     near = problem.distances <= max(_distance(problem), problem.distances.min())
     deck = refined_deck(problem.deck, problem.mesh, near)
-    taken = taken_time_step(problem.critical_time_step)
-    sizes = [macro.value or taken for macro in flat(problem.program) if macro.word == "DT"]
+    default_step = taken_time_step(problem.critical_time_step)
+    sizes = [macro.value or default_step for macro in flat(problem.program) if macro.word == "DT"]
     try:
-        return check_deck(with_time_step(deck, min(*sizes, stable_time_step(deck)), taken))
+        return check_deck(with_time_step(deck, min(*sizes, stable_time_step(deck)), default_step))
     except CasesError as error:
         raise RefineError(f"the mesh with bisected elements cannot be run: {error}") from None
 
 
 def _distance(problem: Problem) -> float:
     """Return the distance from the load within which elements are bisected: a bending wave."""
-    found = resolution(problem) if problem.has_impact else None
-    if found is None:
+    waves = resolution(problem) if problem.has_impact else None
+    if waves is None:
         raise RefineError("nothing hits the plate: there is no peak force whose mesh error to find")
-    return found.wave
+    return waves.wave
 
 
 def compare_peaks(
@@ -159,14 +159,14 @@ def compare_peaks(
     `advance` is called with the number of new steps. Raises DivergenceError if a motion grows
     without bound, NotEnoughMemoryError if a run needs more memory than is free.
     """
-    coarse, refined = (_run(one, options, advance) for one in (problem, fine))
+    coarse, refined = (_run(item, options, advance) for item in (problem, fine))
     return MeshErrorEstimate(
         peak_force=float(coarse["history/force"].max()),
         refined_peak_force=float(refined["history/force"].max()),
         elements=problem.deck.control.numel,
         refined_elements=fine.deck.control.numel,
         distance=_distance(problem),
-        undecided=any(end_of(one) in OPEN_PEAKS for one in (coarse, refined)),
+        undecided=any(end_of(item) in OPEN_PEAKS for item in (coarse, refined)),
         exposures=_exposures(coarse),
         refined_exposures=_exposures(refined),
     )
@@ -174,7 +174,7 @@ def compare_peaks(
 
 def _exposures(stored: Stored) -> dict[str, float]:
     """Return the largest exposure by criterion."""
-    return {one.criterion: one.exposure for one in largest_exposures(stored)}
+    return {exposure.criterion: exposure.exposure for exposure in largest_exposures(stored)}
 
 
 def _run(problem: Problem, options: RunOptions, advance: Callable[[int], object]) -> Stored:

@@ -136,12 +136,14 @@ def outcome_of(
 
 def merge(parts: Sequence[Outcome], *, history: bool = True) -> Outcome:
     """Merge outcomes, ordered by the numbers of the cases, with their forces if `history`."""
-    given = [number for part in parts for number in part.numbers]
-    order, numbers = np.argsort(given), sorted(given)
+    case_numbers = [number for part in parts for number in part.numbers]
+    order, numbers = np.argsort(case_numbers), sorted(case_numbers)
     columns: dict[str, Column] = {}
     for name in dict.fromkeys(name for part in parts for name in part.columns):
-        found = [part.columns.get(name, np.full(len(part.numbers), np.nan)) for part in parts]
-        columns[name] = np.concatenate(found)[order]
+        column_parts = [
+            part.columns.get(name, np.full(len(part.numbers), np.nan)) for part in parts
+        ]
+        columns[name] = np.concatenate(column_parts)[order]
     if not history:
         return Outcome(numbers, columns)
     longest = max((0 if part.force is None else part.force.shape[1] for part in parts), default=0)

@@ -168,8 +168,8 @@ def _is_sound(outcome: Outcome) -> bool:
     for name, values in columns.items():
         is_gage = name.startswith(GAGE) and name.removeprefix(GAGE).isdecimal()
         kinds = KINDS.get(About(name), "") if name in KINDS else "fiu"
-        known = is_gage or name in KINDS or name in COLUMNS
-        if not known or values.shape != (count,) or values.dtype.kind not in kinds:
+        is_known = is_gage or name in KINDS or name in COLUMNS
+        if not is_known or values.shape != (count,) or values.dtype.kind not in kinds:
             return False
     steps = columns[About.STEPS]
     if (steps < 0).any():

@@ -83,9 +83,9 @@ class Settings:
     @property
     def shares_motion(self) -> bool:
         """Whether full runs that differ only in values of failure are one motion."""
-        others = self.build, self.measure, self.search, self.modes
+        obstacles = self.build, self.measure, self.search, self.modes
         in_full = Measure.FAILURE in self.measures or self.deck.has(Nonlinear)
-        return in_full and all(other is None for other in others)
+        return in_full and all(other is None for other in obstacles)
 
     @property
     def in_full(self) -> bool:
@@ -106,10 +106,16 @@ class Plan:
 
     def fingerprint(self) -> str:
         """Return the hash that identifies the outcomes of this sweep."""
-        own = self.settings
-        parts = [__version__, own.deck.to_text(), self.cases, own.history, own.search]
-        law = () if own.law is None else (law_name(own.law),)
-        text = json.dumps([*parts, own.measures, own.modes, MOST_TOGETHER, *law])
+        settings = self.settings
+        parts = [
+            __version__,
+            settings.deck.to_text(),
+            self.cases,
+            settings.history,
+            settings.search,
+        ]
+        law = () if settings.law is None else (law_name(settings.law),)
+        text = json.dumps([*parts, settings.measures, settings.modes, MOST_TOGETHER, *law])
         return hashlib.sha256(text.encode()).hexdigest()
 
 
@@ -185,11 +191,13 @@ def plan(
 
 def check_law(law: Law, names: Collection[str], modes: int | None = None) -> None:
     """Raise CasesError if a user's law excludes values that vary, or the reduced model."""
-    own = f"the contact law {law_name(law)} takes the place of EXPE"
+    replacement = f"the contact law {law_name(law)} takes the place of EXPE"
     if constants := [name for name in names if name in LAW_VALUES]:
-        raise CasesError(f"{own}, so that {', '.join(constants)} would change nothing")
+        raise CasesError(f"{replacement}, so that {', '.join(constants)} would change nothing")
     if modes is not None:
-        raise CasesError(f"{own}, which the reduced model needs: leave out the reduced model")
+        raise CasesError(
+            f"{replacement}, which the reduced model needs: leave out the reduced model"
+        )
 
 
 def _measures(names: Sequence[str], deck: Deck) -> tuple[Measure, ...]:
@@ -203,7 +211,7 @@ def _measures(names: Sequence[str], deck: Deck) -> tuple[Measure, ...]:
         raise CasesError("measure gages: the deck has no strain gages; add a GAGE segment")
     if Measure.FAILURE in names and not any(macro.word == "FAIL" for macro in deck.macros):
         raise CasesError("measure failure: the program of the deck has no FAIL; add it to the loop")
-    return tuple(one for one in Measure if one in names)
+    return tuple(measure for measure in Measure if measure in names)
 
 
 def _check_limits(
@@ -214,15 +222,15 @@ def _check_limits(
     has_threshold: bool,
 ) -> None:
     """Raise CasesError if the summary of the sweep will not have the quantity of a limit."""
-    known = [*SUMMARY]
+    quantities = [*SUMMARY]
     if search is not None:
-        known += FOUND
+        quantities += FOUND
     if measures:
         names = (limit.quantity for limit in limits)
-        known += [name for name in names if name in COLUMNS or name.startswith(GAGE)]
+        quantities += [name for name in names if name in COLUMNS or name.startswith(GAGE)]
     if has_threshold:
-        known += OF_THRESHOLD
-    check_limits(limits, known, threshold=has_threshold)
+        quantities += OF_THRESHOLD
+    check_limits(limits, quantities, threshold=has_threshold)
 
 
 def _check_reduced(checked: Problem, names: Collection[str], settings: Settings) -> None:
@@ -262,38 +270,38 @@ def _only_impacts(checked: Problem) -> bool:
     return {"EXCD", "TANG", "FORM", "SOLV"}.isdisjoint(words) and not checked.mesh.forces.any()
 
 
-def runs_together(checked: Problem, made: Plan) -> int:
+def runs_together(checked: Problem, definition: Plan) -> int:
     """Return the largest number of runs that are advanced together."""
-    if made.settings.modes is not None:
-        return min(MOST_REDUCED, len(made.cases))
-    if made.settings.in_full or not shares_plate(checked):
+    if definition.settings.modes is not None:
+        return min(MOST_REDUCED, len(definition.cases))
+    if definition.settings.in_full or not shares_plate(checked):
         return 1
-    return min(MOST_TOGETHER, len(made.cases) * _runs_of_case(made))
+    return min(MOST_TOGETHER, len(definition.cases) * _runs_of_case(definition))
 
 
-def _runs_of_case(made: Plan) -> int:
+def _runs_of_case(definition: Plan) -> int:
     """Return the number of runs of a case in the first round of a search."""
-    return 1 if made.settings.search is None else FIRST_VELOCITIES
+    return 1 if definition.settings.search is None else FIRST_VELOCITIES
 
 
-def tasks(checked: Problem, made: Plan, cases: Sequence[int] | None = None) -> list[Task]:
+def tasks(checked: Problem, definition: Plan, cases: Sequence[int] | None = None) -> list[Task]:
     """Split a plan, or some of its cases, into tasks.
 
     A task has cases that share a plate, full runs that share a motion, or a single case.
     """
-    together = max(1, runs_together(checked, made) // _runs_of_case(made))
+    together = max(1, runs_together(checked, definition) // _runs_of_case(definition))
     common = plate_values
-    if made.settings.shares_motion:
+    if definition.settings.shares_motion:
         together, common = MOST_IN_MOTION, motion_values
     plates: dict[object, list[int]] = {}
-    for number in range(len(made.cases)) if cases is None else cases:
-        plates.setdefault(frozenset(common(made.cases[number]).items()), []).append(number)
+    for number in range(len(definition.cases)) if cases is None else cases:
+        plates.setdefault(frozenset(common(definition.cases[number]).items()), []).append(number)
     parts = [
         tuple(numbers[start : start + together])
         for numbers in plates.values()
         for start in range(0, len(numbers), together)
     ]
     return [
-        Task(made.settings, number, numbers, tuple(made.cases[n] for n in numbers))
+        Task(definition.settings, number, numbers, tuple(definition.cases[n] for n in numbers))
         for number, numbers in enumerate(parts)
     ]

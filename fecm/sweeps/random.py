@@ -43,13 +43,17 @@ def parse_correlation(text: str) -> tuple[Pair, float]:
     return (pair[0], pair[1]), number_of_text(f"RHO of {names.strip()}", value)
 
 
-def correlation_of(names: Sequence[str], given: object) -> Correlation:
+def correlation_of(names: Sequence[str], correlation: object) -> Correlation:
     """Return the correlation matrix in the order of `names`.
 
     Correlations are given by pairs of names, or as the whole matrix: in the order of the names, or
     with names as a DataFrame has them. Raises CasesError if the matrix is not a correlation matrix.
     """
-    matrix = _of_pairs(names, given) if isinstance(given, Mapping) else _of_table(names, given)
+    matrix = (
+        _of_pairs(names, correlation)
+        if isinstance(correlation, Mapping)
+        else _of_table(names, correlation)
+    )
     diagonal = matrix.diagonal()
     if np.abs(matrix - matrix.T).max() > ROUNDING or np.abs(diagonal - 1.0).max() > ROUNDING:
         raise CasesError("correlation: the matrix must be symmetric, with 1 on its diagonal")
@@ -61,14 +65,14 @@ def correlation_of(names: Sequence[str], given: object) -> Correlation:
     return tuple(map(tuple, matrix.tolist()))
 
 
-def _of_pairs(names: Sequence[str], given: Mapping[Any, Any]) -> Floats:
+def _of_pairs(names: Sequence[str], correlations: Mapping[Any, Any]) -> Floats:
     """Return the matrix of correlations by pairs of names; missing pairs are 0."""
     matrix = np.eye(len(names))
     seen: set[frozenset[str]] = set()
-    for pair, value in given.items():
+    for pair, value in correlations.items():
         if not (isinstance(pair, tuple) and len(pair) == 2 and {*pair} <= {*names}):
-            known = ", ".join(names)
-            raise CasesError(f"correlation: {pair!r} is not a pair of random names ({known})")
+            known_names = ", ".join(names)
+            raise CasesError(f"correlation: {pair!r} is not a pair of random names ({known_names})")
         if len(both := frozenset(pair)) < 2 or both in seen:
             raise CasesError(f"correlation: {', '.join(pair)} is one name, or is given twice")
         rho = math.nan
@@ -83,13 +87,13 @@ def _of_pairs(names: Sequence[str], given: Mapping[Any, Any]) -> Floats:
     return matrix
 
 
-def _of_table(names: Sequence[str], given: Any) -> Floats:
+def _of_table(names: Sequence[str], table: Any) -> Floats:
     """Return the matrix from an array, or from a table whose rows and columns have names."""
     size = len(names)
     try:
-        if hasattr(given, "columns"):
-            given = [[given[column][row] for column in names] for row in names]
-        matrix = np.array(given, dtype=float)
+        if hasattr(table, "columns"):
+            table = [[table[column][row] for column in names] for row in names]
+        matrix = np.array(table, dtype=float)
     except (KeyError, TypeError, ValueError):
         matrix = np.empty(0)
     if matrix.shape != (size, size) or not np.isfinite(matrix).all():
@@ -244,19 +248,19 @@ def cost(cases: Sequence[Case], design: Design, *, shared: bool, motions: bool) 
 
     Cases may share the response of a plate, or a motion if only failure differs.
     """
-    given = f"{design.draws} draws"
+    what = f"{design.draws} draws"
     if len(cases) != design.draws:
-        given = f"{len(cases)} cases of {given}"
+        what = f"{len(cases)} cases of {what}"
     if not shared:
         names = [name for name in cases[0] if motions and name in FAILURE_NAMES]
         how = (
             f"; those that differ only in {', '.join(names)}, together" if names else ", one by one"
         )
-        return f"{given} are run in full{how}"
+        return f"{what} are run in full{how}"
     plates = len({frozenset(plate_values(case).items()) for case in cases})
     causes = [name for name in design.laws if name in PLATE_NAMES]
     if not causes:
-        return f"{given} share {plates} plate{'s' * (plates > 1)}"
+        return f"{what} share {plates} plate{'s' * (plates > 1)}"
     why = f"because {' and '.join(causes)} {'is' if len(causes) == 1 else 'are'} random"
-    others = "velocity, k, alpha_p, s_p, q and the projectile share one"
-    return f"{given} need {plates} plates, {why}; {others}"
+    sharing = "velocity, k, alpha_p, s_p, q and the projectile share one"
+    return f"{what} need {plates} plates, {why}; {sharing}"

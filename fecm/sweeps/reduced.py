@@ -135,13 +135,13 @@ def reduced(checked: Problem, modes: int) -> ReducedImpacts:
     return ReducedImpacts(plate, duration / steps, steps)
 
 
-def by_halvings(made: ReducedImpacts, impacts: Impacts) -> Mapping[int, Indices]:
+def by_halvings(model: ReducedImpacts, impacts: Impacts) -> Mapping[int, Indices]:
     """Group rows of impacts by the halvings of the time step that resolve their contact."""
     groups: dict[int, list[int]] = {}
     for row in range(len(impacts)):
-        step = largest_time_step(made.plate, impacts.cards(row))
-        largest = max(step, made.dt / 2**MOST_HALVINGS)
-        times = max(0, math.ceil(math.log2(made.dt / largest)))
+        step = largest_time_step(model.plate, impacts.cards(row))
+        largest = max(step, model.dt / 2**MOST_HALVINGS)
+        times = max(0, math.ceil(math.log2(model.dt / largest)))
         groups.setdefault(times, []).append(row)
     return {times: np.array(rows) for times, rows in groups.items()}
 
@@ -160,13 +160,13 @@ def largest_time_step(plate: ReducedPlate, strike: Strike) -> float:
     width = indentation - float(law.permanent(indentation))
     compliance = min(indentation / 1.5, width / law.q) / force + plate.flexibility
     mobility = float((plate.deflection**2).sum())
-    found = min(
+    largest = min(
         PLATE_PHASE * math.sqrt(compliance / mobility),
         PROJECTILE_PHASE * math.sqrt(compliance * strike.projectile.total_mass),
     )
     if isinstance(rod := strike.projectile, Rod):
-        found = min(found, rod.element_length * math.sqrt(rod.density / rod.modulus))
-    return found
+        largest = min(largest, rod.element_length * math.sqrt(rod.density / rod.modulus))
+    return largest
 
 
 RunTasks = Callable[[Sequence[Task]], list[tuple[Task, Outcome]]]
@@ -245,25 +245,25 @@ class ReducedModel:
         )
 
 
-def trials(made: Plan, cases: Sequence[int], first: int) -> list[Task]:
+def trials(definition: Plan, cases: Sequence[int], first: int) -> list[Task]:
     """Return tasks of cases, in full and by the model; case n has number `first` + 2 n."""
-    both = (replace(made.settings, modes=None), made.settings)
+    both = (replace(definition.settings, modes=None), definition.settings)
     return [
-        Task(own, first + 2 * case + place, (case,), (made.cases[case],))
+        Task(pair, first + 2 * case + place, (case,), (definition.cases[case],))
         for case in cases
-        for place, own in enumerate(both)
+        for place, pair in enumerate(both)
     ]
 
 
-def by_energy(made: Plan) -> list[int]:
+def by_energy(definition: Plan) -> list[int]:
     """Return the cases with an energy, the smallest first.
 
     Raises CasesError if no case has an energy.
     """
     energies: list[tuple[float, int]] = []
-    for number, case in enumerate(made.cases):
+    for number, case in enumerate(definition.cases):
         with suppress(CasesError):  # the case will fail
-            energies.append((strike_of_case(made.settings.deck, case).energy, number))
+            energies.append((strike_of_case(definition.settings.deck, case).energy, number))
     ordered = [number for energy, number in sorted(energies) if energy > 0.0]
     if not ordered:
         raise CasesError("no case has an energy, by which the reduced model could be checked")
@@ -273,8 +273,8 @@ def by_energy(made: Plan) -> list[int]:
 class Trials:
     """Cases that were run in full and by the model."""
 
-    def __init__(self, made: Plan, first: int, run: RunTasks) -> None:
-        self._made, self._first, self._run = made, first, run
+    def __init__(self, definition: Plan, first: int, run: RunTasks) -> None:
+        self._made, self._first, self._run = definition, first, run
         self._fulls: list[Outcome] = []
         self._models: list[Outcome] = []
 
@@ -284,10 +284,10 @@ class Trials:
         new = [case for case in dict.fromkeys(cases) if case not in before]
         for task, outcome in self._run(trials(self._made, new, self._first)) if new else ():
             (self._models if task.settings.modes else self._fulls).append(outcome)
-        full, model = (merge(some, history=False) for some in (self._fulls, self._models))
-        forces = [one.columns[About.REACHED] for one in (model, full)]
+        full, model = (merge(outcomes, history=False) for outcomes in (self._fulls, self._models))
+        forces = [part.columns[About.REACHED] for part in (model, full)]
         holds = ~full.fine | (model.fine & (np.abs(forces[0] - forces[1]) <= LIMIT * forces[1]))
-        return {number for number, one in zip(full.numbers, holds, strict=True) if not one}
+        return {number for number, part in zip(full.numbers, holds, strict=True) if not part}
 
     def compared(self, modes: int) -> ReducedModel:
         """Compare the model with the full runs.
@@ -330,7 +330,7 @@ def compared(modes: int, fulls: Sequence[Outcome], models: Sequence[Outcome]) ->
     full, model = merge(fulls, history=False), merge(models, history=False)
     fine = np.flatnonzero(full.fine & model.fine)
     if not len(fine):
-        (failed, *_) = (one for one in (model, full) if not one.fine.all())
+        (failed, *_) = (outcome for outcome in (model, full) if not outcome.fine.all())
         reason = failed.status[int(np.flatnonzero(~failed.fine)[0])]
         raise CasesError(f"the reduced model can't be checked by full runs: {reason}")
     full, model = full.select(fine), model.select(fine)

@@ -62,16 +62,16 @@ class Convolution:
         self._cuts = [slice(end - n, end) for n, end in zip(tiles, last, strict=True)]
         shifts = TILE * (last - tiles) - np.cumsum(cases) + cases
         self._place = np.arange(len(kinds)) + shifts[kinds]
-        known = np.zeros((count, sums, FAR * (blocks + 1)))
-        known[:, :, : self._steps] = r.transpose(2, 0, 1)
-        self._near = np.repeat(known[:, :, :NEAR, None], tiles, axis=0)
+        sums_known = np.zeros((count, sums, FAR * (blocks + 1)))
+        sums_known[:, :, : self._steps] = r.transpose(2, 0, 1)
+        self._near = np.repeat(sums_known[:, :, :NEAR, None], tiles, axis=0)
         # Row t, column s: r_(t + size - s), the effect of a block of some size on later steps.
         windows = np.lib.stride_tricks.sliding_window_view
         self._tables = {
-            size: windows(known[:, :, 1:], size, axis=2)[:, :, : end - size, ::-1].copy()
+            size: windows(sums_known[:, :, 1:], size, axis=2)[:, :, : end - size, ::-1].copy()
             for size, end in ((NEAR, BLOCK), (BLOCK, FAR))
         }
-        parts = [known[:, :, FAR * n : FAR * (n + 2)] for n in range(blocks - 1)]
+        parts = [sums_known[:, :, FAR * n : FAR * (n + 2)] for n in range(blocks - 1)]
         self._filters = [rfft(np.roll(part, -FAR, axis=2))[..., None] for part in parts]
         self._spectra = np.empty((last[-1], len(parts), FAR + 1, TILE), dtype=complex)
         self._given = np.zeros((last[-1], FAR, TILE))  # of the last block
@@ -82,31 +82,31 @@ class Convolution:
     def next(self) -> Floats:
         """Return x_n (sums, cases) of the next step n = 1, 2, ..."""
         rows = self._block[:, :, self._step % FAR].swapaxes(0, 1)
-        found = rows.reshape(len(rows), -1)[:, self._place]
+        sums = rows.reshape(len(rows), -1)[:, self._place]
         self._step += 1
         if not self._step % NEAR and self._step < self._steps:
             for kind, tiles in enumerate(self._cuts):
                 self._add_block(self._step, kind, tiles)
-        return found
+        return sums
 
     def give(self, values: Floats) -> None:
         """Set f_n of the step last returned by :meth:`next`; f_0 before the first step."""
         self._values[self._place] = values
-        given = self._values.reshape(-1, 1, 1, TILE)
-        row, left = self._step % FAR, NEAR - self._step % NEAR
-        self._given[:, row] = given[:, 0, 0]
-        self._block[:, :, row : row + left] += self._near[:, :, :left] * given
+        block = self._values.reshape(-1, 1, 1, TILE)
+        row, remaining = self._step % FAR, NEAR - self._step % NEAR
+        self._given[:, row] = block[:, 0, 0]
+        self._block[:, :, row : row + remaining] += self._near[:, :, :remaining] * block
 
-    def _add_block(self, known: int, kind: int, tiles: slice) -> None:
+    def _add_block(self, start: int, kind: int, tiles: slice) -> None:
         """Add the effect of a complete block, the last one, of forces on the later steps."""
-        if known % FAR:
-            size, end = (NEAR, BLOCK) if known % BLOCK else (BLOCK, FAR)
-            row, rows = known % FAR, end - known % end
+        if start % FAR:
+            size, end = (NEAR, BLOCK) if start % BLOCK else (BLOCK, FAR)
+            row, rows = start % FAR, end - start % end
             factors = self._tables[size][kind, :, :rows]
             part = self._given[tiles, None, row - size : row]
             self._block[tiles, :, row : row + rows] += factors @ part
             return
-        number = known // FAR
+        number = start // FAR
         for tile in range(tiles.start, tiles.stop):
             spectra = self._spectra[tile]
             spectra[number - 1] = rfft(self._given[tile], 2 * FAR, axis=0)
@@ -401,30 +401,36 @@ def _by_kernels(
         Given.VELOCITY: hits.speed,
         Given.FACTOR: hits.scale,
     }
-    given = np.stack(np.broadcast_arrays(*(rows[row] for row in Given)))
+    inputs = np.stack(np.broadcast_arrays(*(rows[row] for row in Given)))
     cases = len(hits.speed)
-    force, found = np.empty((cases, len(response))), np.empty((len(ResultRow), cases))
+    force, results = np.empty((cases, len(response))), np.empty((len(ResultRow), cases))
     starts = np.searchsorted(hits.kind, np.arange(len(hits.rods) + 1)).tolist()
     for rod, first, last in zip(hits.rods, starts[:-1], starts[1:], strict=True):
         step = WilsonStep(rod.stiffness(), rod.mass(), dt, rigid=rod.rigid)
-        own = slice(first, last)
+        chosen = slice(first, last)
         sweep_impacts(
-            _modes(rod), step, law.kind, response, given[:, own], force[own], found[:, own]
+            _modes(rod),
+            step,
+            law.kind,
+            response,
+            inputs[:, chosen],
+            force[chosen],
+            results[:, chosen],
         )
-    lost = found[ResultRow.LOST] + node_mass * found[ResultRow.LARGEST_DDW] ** 2 / (8.0 * dt**2)
-    initial = found[ResultRow.INITIAL]
+    lost = results[ResultRow.LOST] + node_mass * results[ResultRow.LARGEST_DDW] ** 2 / (8.0 * dt**2)
+    initial = results[ResultRow.INITIAL]
     return ComputedImpacts(
         force=force.T,
         indentation=IndentationMetrics(
-            found[ResultRow.DEEPEST], found[ResultRow.INDENTATION], found[ResultRow.PERMANENT]
+            results[ResultRow.DEEPEST], results[ResultRow.INDENTATION], results[ResultRow.PERMANENT]
         ),
-        unconverged_steps=found[ResultRow.UNCONVERGED].astype(np.int64),
+        unconverged_steps=results[ResultRow.UNCONVERGED].astype(np.int64),
         plate=Deflection(
-            largest=found[ResultRow.HIGHEST],
-            last=found[ResultRow.W],
-            speed=found[ResultRow.LARGEST_DW] / dt,
-            energy=found[ResultRow.PLATE_WORK],
-            compliance=found[ResultRow.COMPLIANCE],
+            largest=results[ResultRow.HIGHEST],
+            last=results[ResultRow.W],
+            speed=results[ResultRow.LARGEST_DW] / dt,
+            energy=results[ResultRow.PLATE_WORK],
+            compliance=results[ResultRow.COMPLIANCE],
         ),
         error=lost / np.where(initial > 0.0, initial, 1.0),
     )

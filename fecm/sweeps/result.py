@@ -167,17 +167,17 @@ class SweepResult(StoredSweep):
         variables = {}
         for name, values in columns.items():
             if name not in levels:
-                own = axes[: len(shape) + values.ndim - 1]
+                own_axes = axes[: len(shape) + values.ndim - 1]
                 variables[name] = (
-                    own,
+                    own_axes,
                     values[rows].reshape(*shape, *values.shape[1:]),
                     about(name),
                 )
         places = {name: (name, values, about(name)) for name, values in coordinates.items()}
-        found = xarray.Dataset(variables, places, {"title": self.title})
+        data_set = xarray.Dataset(variables, places, {"title": self.title})
         if self.force is not None:
-            found = found.assign_coords(step=np.arange(1, self.force.shape[1] + 1))
-        return found.set_coords(list(self.cases))
+            data_set = data_set.assign_coords(step=np.arange(1, self.force.shape[1] + 1))
+        return data_set.set_coords(list(self.cases))
 
     def export(
         self,
@@ -310,9 +310,9 @@ def _grid(cases: Mapping[str, Column], count: int) -> tuple[dict[str, Column], N
     levels: dict[str, Column] = {}
     places: list[NDArray[np.intp]] = []
     for name, values in cases.items():
-        found, first, place = np.unique(values, return_index=True, return_inverse=True)
-        order = np.argsort(first) if values.dtype.kind == "U" else np.arange(len(found))
-        levels[name] = found[order]
+        distinct, first, place = np.unique(values, return_index=True, return_inverse=True)
+        order = np.argsort(first) if values.dtype.kind == "U" else np.arange(len(distinct))
+        levels[name] = distinct[order]
         places.append(np.argsort(order)[place])
     if math.prod(map(len, levels.values())) == count == len(set(zip(*places, strict=True))):
         return levels, np.lexsort(places[::-1])
@@ -389,14 +389,14 @@ def sweep_of(contents: FileContents, *, history: bool = True) -> SweepResult:
 
     path = contents.path
     cases, summary = _group(contents, "cases/"), _group(contents, "summary/")
-    given = ("dt", "steps", "unsettled_steps")
-    steps = {n: contents[f"history/{n}"] for n in given if f"history/{n}" in contents}
+    required_names = ("dt", "steps", "unsettled_steps")
+    steps = {n: contents[f"history/{n}"] for n in required_names if f"history/{n}" in contents}
     required = (*SUMMARY, "status")
     if not (summary.keys() >= {*required} and steps.keys() >= {"dt", "steps"}):
         raise ResultFileError(f"{path}: the result of the sweep is incomplete")
     summary = {name: summary[name] for name in required} | summary  # in their order
     groups = ("history/", "cases/", "summary/")
-    if first_misfit(contents, [one for one in contents if one.startswith(groups)]):
+    if first_misfit(contents, [dataset for dataset in contents if dataset.startswith(groups)]):
         message = f"{path}: the data of this sweep do not match in type or number of cases"
         raise ResultFileError(message)
     shape = contents.shapes.get(FORCE)

@@ -97,21 +97,22 @@ def search(backend: Backend, impacts: Impacts, quantity: Sought, levels: Floats)
 
 def _search_together(backend: Backend, impacts: Impacts, forces: Floats) -> Outcome:
     """Find the velocities for peak forces; longer runs decide open values."""
-    left, parts = np.arange(len(impacts)), []
+    remaining, parts = np.arange(len(impacts)), []
     for factor in LONGER:
         longer, still_open = backend.lengthened(factor), []
-        together = -(-len(left) // factor)  # as many forces in memory as at first
-        for start in range(0, len(left), together):
-            rows = left[start : start + together]
+        together = -(-len(remaining) // factor)  # as many forces in memory as at first
+        for start in range(0, len(remaining), together):
+            rows = remaining[start : start + together]
             outcome, is_open = _searched(longer, impacts.select(rows), forces[rows])
             parts.append(outcome)
             still_open.append(rows[is_open])
-        left = np.concatenate(still_open)
-        if not len(left):
+        remaining = np.concatenate(still_open)
+        if not len(remaining):
             return merge(parts)
     text = f"it is open even in a run {LONGER[-1]} times as long"
     reasons = {
-        impacts.numbers[row]: f"no peak force of {forces[row]:.6g}: {text}" for row in left.tolist()
+        impacts.numbers[row]: f"no peak force of {forces[row]:.6g}: {text}"
+        for row in remaining.tolist()
     }
     return merge([*parts, Outcome.failed(reasons)])
 
@@ -154,15 +155,15 @@ def _searched(backend: Backend, impacts: Impacts, forces: Floats) -> tuple[Outco
     return merge(parts), is_open
 
 
-def _decided(outcome: Outcome, force: Floats, known: Bools) -> list[Outcome]:
+def _decided(outcome: Outcome, force: Floats, peak_is_known: Bools) -> list[Outcome]:
     """Return the outcome of the cases whose peak is known.
 
     Cases fail if their peak is not the required force.
     """
     reached, velocity = outcome.columns[About.REACHED], outcome.columns["found_velocity"]
-    right = outcome.fine & known & (np.abs(reached - force) <= ROUGH * force)
+    right = outcome.fine & peak_is_known & (np.abs(reached - force) <= ROUGH * force)
     reasons = {}
-    for row in np.flatnonzero(~right & known):
+    for row in np.flatnonzero(~right & peak_is_known):
         text = f"at velocity {velocity[row]:.6g}: {outcome.status[row]}"
         if outcome.fine[row]:
             jump = f"from velocity {velocity[row]:.6g} on it is {reached[row]:.6g}"
@@ -183,36 +184,41 @@ def lowest_velocities(
     returns the largest forces of pairs of case and velocity; NaN where unknown. A text is the
     reason why a case has no velocity.
     """
-    found: dict[int, float | str] = dict.fromkeys(starts, "")
+    lowest: dict[int, float | str] = dict.fromkeys(starts, "")
     trials = {n: np.geomspace(v / RANGE, v * RANGE, FIRST_VELOCITIES) for n, v in starts.items()}
     first = True
     while trials:
-        given = peaks([(n, float(v)) for n, values in trials.items() for v in values])
+        peak_values = peaks([(n, float(v)) for n, values in trials.items() for v in values])
         ends = np.cumsum([len(values) for values in trials.values()])[:-1]
-        left: dict[int, Floats] = {}
-        for (n, values), own in zip(trials.items(), np.split(given, ends), strict=True):
+        brackets: dict[int, Floats] = {}
+        for (n, values), pieces in zip(trials.items(), np.split(peak_values, ends), strict=True):
             force = forces[n]
             if not first:  # the ends of a bracket, whatever rounding makes of them
-                own[0], own[-1] = min(own[0], np.nextafter(force, 0.0)), np.fmax(own[-1], force)
-            (above,) = np.nonzero(own >= force)
+                pieces[0], pieces[-1] = (
+                    min(pieces[0], np.nextafter(force, 0.0)),
+                    np.fmax(pieces[-1], force),
+                )
+            (above,) = np.nonzero(pieces >= force)
             after = above[0] if len(above) else 0
             low, high = values[after - 1], values[after]
             if not len(above):
-                found[n] = f"{BELOW} {force:.6g} up to velocity {values[-1]:.6g}"
+                lowest[n] = f"{BELOW} {force:.6g} up to velocity {values[-1]:.6g}"
             elif not after:
-                found[n] = f"the peak force is above {force:.6g} from velocity {values[0]:.6g} on"
+                lowest[n] = f"the peak force is above {force:.6g} from velocity {values[0]:.6g} on"
             elif high - low <= VELOCITY_ERROR * high:
-                found[n] = float(high)
+                lowest[n] = float(high)
             else:
                 with np.errstate(all="ignore"):  # a power law; else the middle alone
-                    share = np.log(force / own[after - 1]) / np.log(own[after] / own[after - 1])
+                    share = np.log(force / pieces[after - 1]) / np.log(
+                        pieces[after] / pieces[after - 1]
+                    )
                     guess = low * (high / low) ** share
                 offsets = (high - low) * 10.0 ** -np.arange(1.0, 9.0)
                 around = np.concatenate([guess - offsets, guess + offsets])
                 inside = around[(around > low) & (around < high)]
-                left[n] = np.unique(np.concatenate([[low, (low + high) / 2.0, high], inside]))
-        trials, first = left, False
-    return found
+                brackets[n] = np.unique(np.concatenate([[low, (low + high) / 2.0, high], inside]))
+        trials, first = brackets, False
+    return lowest
 
 
 LEVEL_EXCESS = 1e-5  # largest relative excess of the value found
@@ -249,21 +255,21 @@ def _search_in_turn(
         return replace(alone, numbers=[impacts.numbers[row]])
 
     def reached(velocity: float) -> float:
-        at = f"at velocity {velocity:.6g}"
+        where = f"at velocity {velocity:.6g}"
         while factors:
             outcome = backend.lengthened(factors[0]).outcomes(trial(velocity))
             outcomes[velocity] = outcome
             if not outcome.fine[0]:
-                raise CasesError(f"{at}: {outcome.status[0]}")
+                raise CasesError(f"{where}: {outcome.status[0]}")
             try:
                 value = largest(outcome)
             except CasesError as error:
-                raise CasesError(f"{at}: {error}") from None
+                raise CasesError(f"{where}: {error}") from None
             if not math.isnan(value):
                 return value
             del factors[0]
         text = f"open even in a run {LONGER[-1]} times as long"
-        raise CasesError(f"{at} the largest {NAMES[quantity]} is {text}")
+        raise CasesError(f"{where} the largest {NAMES[quantity]} is {text}")
 
     start = float(impacts.velocity[row])
     velocity = velocity_at_level(start, level, reached, NAMES[quantity])
@@ -287,9 +293,9 @@ def _add_band(
         return
     exponent = 1.0
     apart = {v: abs(math.log(v / velocity)) for v in exposures}
-    others = [v for v, distance in apart.items() if distance > APART]
-    if others:
-        other = min(others, key=apart.__getitem__)
+    far = [v for v, distance in apart.items() if distance > APART]
+    if far:
+        other = min(far, key=apart.__getitem__)
         slope = math.log(exposures[other] / exposures[velocity]) / math.log(other / velocity)
         exponent = slope if slope > 0.0 else exponent
     for name, end in zip(FOUND_BAND, reversed(BAND), strict=True):
@@ -331,10 +337,10 @@ def velocity_at_level(
     x, slope, last = math.log(start), 1.0, None
     for _ in range(MOST):
         velocity = math.exp(x)
-        found = reached(velocity)
-        if not found > 0.0:
+        value = reached(velocity)
+        if not value > 0.0:
             raise CasesError(f"there is no {name} at velocity {velocity:.6g}")
-        y = math.log(found / level)
+        y = math.log(value / level)
         if 0.0 <= y <= LEVEL_EXCESS:
             return velocity
         if x <= least and y > 0.0:

@@ -112,11 +112,11 @@ def indices(values: Floats, seed: int) -> Indices:
         for start in range(0, RESAMPLES, step)
         for count in [min(step, RESAMPLES - start)]
     ])  # fmt: skip
-    found = ratios(columns.mean(axis=2))
+    estimates = ratios(columns.mean(axis=2))
     ends = np.moveaxis(
         np.quantile(ratios(resampled.reshape(-1, m, rows + d)), INTERVAL_ENDS, axis=0), 0, 2
     )
-    return Indices(found[:, :d], found[:, d:], ends[:, :d], ends[:, d:])
+    return Indices(estimates[:, :d], estimates[:, d:], ends[:, :d], ends[:, d:])
 
 
 def exceedance_bounds(
@@ -217,7 +217,10 @@ class RandomResult:
 
     def __post_init__(self) -> None:
         tables = *self.statistics.values(), *self.sensitivity.values(), self.exceedance
-        for values in (*self.combinations.values(), *(one for table in tables for one in table)):
+        for values in (
+            *self.combinations.values(),
+            *(values_of for table in tables for values_of in table),
+        ):
             if isinstance(values, np.ndarray):
                 values.flags.writeable = False
 
@@ -283,8 +286,8 @@ def open_cases(summary: Columns) -> Bools:
 def exceedances(draws: Columns, is_open: Bools, limits: Sequence[Limit]) -> Exceedance:
     """Return the probabilities that quantities (..., draws) exceed limits."""
     thresholds = draws.get(THRESHOLD_FORCE, np.full(1, np.nan))
-    known = thresholds[np.isfinite(thresholds)]
-    common = known[0] if len(known) and not np.ptp(known) else np.nan
+    finite = thresholds[np.isfinite(thresholds)]
+    common = finite[0] if len(finite) and not np.ptp(finite) else np.nan
     over = [
         draws[limit.quantity] - (thresholds if limit.value == THRESHOLD else limit.value)
         for limit in limits
@@ -293,12 +296,12 @@ def exceedances(draws: Columns, is_open: Bools, limits: Sequence[Limit]) -> Exce
 
     def counted(which: Sequence[Bools]) -> Counts:
         """Return the numbers of draws of every combination and limit."""
-        sums = np.array([one.sum(axis=-1) for one in which], dtype=np.int64)
+        sums = np.array([mask.sum(axis=-1) for mask in which], dtype=np.int64)
         return sums.reshape(len(limits), *combinations).T
 
-    count = counted([np.isfinite(one) for one in over])
-    hits = counted([one > 0.0 for one in over])
-    lacking = counted([np.isnan(one) & is_open for one in over])
+    count = counted([np.isfinite(mask) for mask in over])
+    hits = counted([mask > 0.0 for mask in over])
+    lacking = counted([np.isnan(mask) & is_open for mask in over])
     probability, lower, upper = exceedance_bounds(hits, count, lacking)
     values = [common if limit.value == THRESHOLD else limit.value for limit in limits]
     return Exceedance(

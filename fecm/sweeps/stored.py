@@ -81,8 +81,8 @@ class StoredSweep:
 
     def _lacks(self, name: str) -> NotStoredError:
         """Return the error about an unknown name."""
-        others = did_you_mean(name, self) or f"; there are {', '.join(self)}"
-        return NotStoredError(f"there is no {name} in this sweep{others}")
+        alternatives = did_you_mean(name, self) or f"; there are {', '.join(self)}"
+        return NotStoredError(f"there is no {name} in this sweep{alternatives}")
 
     @property
     def deck(self) -> Deck:

@@ -55,8 +55,8 @@ def sweep_rows(result: StoredSweep) -> list[Row]:
     rows += [*_extremes(result), *_moved(result)]
     for reason, times in failed.most_common(MOST_REASONS):
         rows.append(("failed", f"{times}: {reason}"))
-    if (others := len(failed) - MOST_REASONS) > 0:
-        rows.append(("failed", f"for {others} other reason{'s' * (others > 1)}"))
+    if (more := len(failed) - MOST_REASONS) > 0:
+        rows.append(("failed", f"for {more} other reason{'s' * (more > 1)}"))
     if result.random is not None and failed:
         rows.append(("failed share", f"{(~fine).mean():.3%} of the draws"))
     return [*rows, *(() if result.reduced is None else result.reduced.rows())]
@@ -73,8 +73,8 @@ def _extremes(result: StoredSweep) -> Iterator[Row]:
     for size, case in (("smallest", np.nanargmin(shown)), ("largest", np.nanargmax(shown))):
         texts = [quantity(result[name][case], result.unit(name), DIGITS) for name in names]
         values = ", ".join(f"{name} {_shown(result, name, int(case))}" for name in result.cases)
-        given = f" ({values})" if values else ""
-        text = f"{', '.join(texts)}{given}{_found_band(result, int(case))}"
+        values_text = f" ({values})" if values else ""
+        text = f"{', '.join(texts)}{values_text}{_found_band(result, int(case))}"
         yield (f"{size} {what}", text)
 
 
@@ -108,22 +108,26 @@ def _shown(result: StoredSweep, name: str, case: int) -> str:
     digits = GIVEN
     if result.random is None:
         size = max(abs(float(values[case])), 1e-300)
-        others = np.abs(values[values != values[case]] - values[case])
-        gap = float(np.min(others / size, initial=1.0))
+        distances = np.abs(values[values != values[case]] - values[case])
+        gap = float(np.min(distances / size, initial=1.0))
         digits = min(max(GIVEN, 1 - math.floor(math.log10(gap))), 17)
     return quantity(values[case], result.unit(name) if name in WEIGHED else "", digits)
 
 
 def sweep_verdict(result: StoredSweep) -> str:
     """Count the cases, the failures, and the cases with doubtful results."""
-    found = ", ".join(f"{count} {what}" for count, what in doubtful_counts(result))
-    return f"{len(result)} case{'' if len(result) == 1 else 's'}: {found or 'all ok'}"
+    counts = ", ".join(f"{count} {what}" for count, what in doubtful_counts(result))
+    return f"{len(result)} case{'' if len(result) == 1 else 's'}: {counts or 'all ok'}"
 
 
 def reasons(status: Column) -> str:
     """Return the most common reason of failure, and the number of other reasons."""
-    (first, _), *others = Counter(status.tolist()).most_common()
-    more = f", and {len(others)} other reason{'s' * (len(others) > 1)}" if others else ""
+    (first, _), *other_reasons = Counter(status.tolist()).most_common()
+    more = (
+        f", and {len(other_reasons)} other reason{'s' * (len(other_reasons) > 1)}"
+        if other_reasons
+        else ""
+    )
     return f"{first}{more}"
 
 
@@ -137,20 +141,20 @@ def doubtful_counts(result: StoredSweep) -> list[tuple[int, str]]:
         "with a contact iteration that did not converge": unconverged,
         "failed": ~fine,
     }
-    return [(int(some.sum()), what) for what, some in cases.items() if some.any()]
+    return [(int(mask.sum()), what) for what, mask in cases.items() if mask.any()]
 
 
 def _doubts(result: StoredSweep) -> dict[str, Bools]:
     """Count the cases beyond the range of the model, by kind."""
-    found = {}
-    for reason, some in counted(result.validity):
+    masks = {}
+    for reason, mask in counted(result.validity):
         what = MEANING[reason]
         if reason in BENT.values():
-            ratio = result.summary.get(RATIO, np.full(len(some), np.nan))[some]
+            ratio = result.summary.get(RATIO, np.full(len(mask), np.nan))[mask]
             if np.isfinite(ratio).any():
                 what = f"{what[:-1]}, up to {np.nanmax(ratio):.3g} h)"
-        found[what] = some
-    return found
+        masks[what] = mask
+    return masks
 
 
 def remarks(result: StoredSweep) -> Iterator[str]:
@@ -187,8 +191,8 @@ def _decided_by_mesh(result: StoredSweep) -> int:
     names = ("found_energy_low", "found_energy")
     if not all(name in result.summary for name in names):
         return 0
-    low, found = (result[name] for name in names)
-    return int(np.count_nonzero(low < WIDE * found))
+    low, energy = (result[name] for name in names)
+    return int(np.count_nonzero(low < WIDE * energy))
 
 
 def _in_plane(result: StoredSweep) -> InPlane:
@@ -224,7 +228,7 @@ MAIN = (
 
 def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
     """Return lines about the main quantities: statistics, indices and probabilities."""
-    design, found = random.design, random.exceedance
+    design, exceedance = random.design, random.exceedance
     lines = [f"design            {design.kind}, {design.samples} samples, seed {design.seed}"]
     lines += [
         f"random            {column_name(name, unit(name))} {law}"
@@ -241,12 +245,12 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
     for number in range(min(count, MOST_PRINTED)):
         place = (number,) if random.combinations else ()
         lines += ["", *([random.label(number)] if place else [])]
-        own = [random.statistics[name] for name in chosen]
-        rows = [[s.mean[place], s.standard_deviation[place], *s.quantiles[place]] for s in own]
+        moments = [random.statistics[name] for name in chosen]
+        rows = [[s.mean[place], s.standard_deviation[place], *s.quantiles[place]] for s in moments]
         columns = [chosen, [unit(name) for name in chosen]]
         columns += [[significant(value) for value in row] for row in zip(*rows, strict=True)]
-        lacking = [design.draws - int(s.draws[place]) for s in own]
-        columns.append([str(count) for count in lacking] if any(lacking) else [""] * len(own))
+        lacking = [design.draws - int(s.draws[place]) for s in moments]
+        columns.append([str(count) for count in lacking] if any(lacking) else [""] * len(moments))
         lines += [
             f"{label:12}{''.join(f'{text:>16}' for text in row)}".rstrip()
             for label, row in zip(["", "", *labels, "no value"], columns, strict=True)
@@ -255,8 +259,10 @@ def tables(random: RandomResult, unit: Callable[[str], str]) -> list[str]:
         if random.sensitivity:
             for name in (chosen[0], *(MARGIN if TOUGHNESS in design.laws else ())):
                 lines += ["", *_index_lines(random, name, place)]
-        for row, (name, limit) in enumerate(zip(found.quantity, found.limit, strict=True)):
-            p, low, high, n, lacking = (values[(*place, row)] for values in found[2:])
+        for row, (name, limit) in enumerate(
+            zip(exceedance.quantity, exceedance.limit, strict=True)
+        ):
+            p, low, high, n, lacking = (values[(*place, row)] for values in exceedance[2:])
             value = THRESHOLD if np.isnan(limit) else f"{limit:.6g}"
             lines.append(f"P({name} > {value}) = {chance(p, low, high, lacking, design.draws - n)}")
     if count > MOST_PRINTED:

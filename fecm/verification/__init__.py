@@ -30,11 +30,11 @@ class UnknownCaseError(FecmError, LookupError, ValueError):
 
 def chosen(names: Iterable[str] = ()) -> list[Case]:
     """Return the named cases in their usual order; all cases if there are no names."""
-    wanted = list(names)
-    for name in wanted:
+    requested = list(names)
+    for name in requested:
         if name not in CASE_OF:
             raise UnknownCaseError(f"unknown case {name}; the cases are {', '.join(TABLES)}")
-    return [one for one in CASES if not wanted or one.name in wanted]
+    return [candidate for candidate in CASES if not requested or candidate.name in requested]
 
 
 def verify(*cases: str) -> list[Row]:
@@ -64,4 +64,4 @@ def verify(*cases: str) -> list[Row]:
     >>> print(rows[0].check.quantity, "=", rows[0].check.source)
     A11 (lb/in) = E h/(1 - ν²)
     """
-    return [row for one in chosen(cases) for row in compute_rows(one)]
+    return [row for selected in chosen(cases) for row in compute_rows(selected)]

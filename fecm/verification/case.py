@@ -158,18 +158,18 @@ def case(compute: Compute) -> Compute:
     return compute
 
 
-def compute_rows(one: Case) -> list[Row]:
+def compute_rows(case: Case) -> list[Row]:
     """Compute the rows of a case; an exception becomes the failure of all rows."""
     try:
-        values, failure = one.compute(), ""
-        if len(values) != len(one.checks):
-            raise ValueError(f"{len(values)} numbers for {len(one.checks)} checks")
-        numbers = [_number(v, c.expected) for v, c in zip(values, one.checks, strict=True)]
+        values, failure = case.compute(), ""
+        if len(values) != len(case.checks):
+            raise ValueError(f"{len(values)} numbers for {len(case.checks)} checks")
+        numbers = [_number(v, c.expected) for v, c in zip(values, case.checks, strict=True)]
     except Exception as error:  # any exception fails the rows
         failure = f"{type(error).__name__}: {error}".splitlines()[0]
-        numbers = [math.nan] * len(one.checks)
-    pairs = zip(one.checks, numbers, strict=True)
-    return [Row(one.name, check, number, failure) for check, number in pairs]
+        numbers = [math.nan] * len(case.checks)
+    pairs = zip(case.checks, numbers, strict=True)
+    return [Row(case.name, check, number, failure) for check, number in pairs]
 
 
 def _number(value: Value, expected: float) -> float:
@@ -199,8 +199,10 @@ def cells(row: Row) -> tuple[str, ...]:
 
 def table_lines(cases: Sequence[Case], rows: Iterable[Row]) -> Iterator[str]:
     """Yield the lines of a table as rows are computed; the cases give the widths of the columns."""
-    known = [cells(Row(one.name, check, math.nan)) for one in cases for check in one.checks]
-    columns = zip(HEAD, *known, strict=True)
+    expected_cells = [
+        cells(Row(item.name, check, math.nan)) for item in cases for check in item.checks
+    ]
+    columns = zip(HEAD, *expected_cells, strict=True)
     widths = [max(LEAST_WIDTHS.get(column[0], 0), *map(len, column)) for column in columns]
 
     def line(texts: Sequence[str]) -> str:

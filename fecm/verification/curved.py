@@ -46,9 +46,9 @@ def middle_node(grid: ElementGrid) -> int:
 
 def pressed(curvature: Curvature, grid: ElementGrid) -> tuple[Result, float]:
     """Press the panel in its middle; its deflection is the mean over the patch per force."""
-    found = panel(curvature, grid, STATIC, PATCH)
-    w = found.tape3.w[0, found["patch/node"] - 1] @ found["patch/weight"]
-    return found, float(w) / PATCH.load
+    result = panel(curvature, grid, STATIC, PATCH)
+    w = result.tape3.w[0, result["patch/node"] - 1] @ result["patch/weight"]
+    return result, float(w) / PATCH.load
 
 
 @case
@@ -56,11 +56,11 @@ def _curved_panel() -> Sequence[Value]:
     """Compute static deflections, forces and moments in the middle, and frequencies."""
     coarse, fine = refined_grid(4.0), refined_grid(2.0)
     flatter = pressed(Curvature(radius_y=1000.0), coarse)[1]
-    found, deflection = pressed(Curvature(radius_x=500.0), fine)
-    at = found["mesh/elements"] == middle_node(fine)
+    result, deflection = pressed(Curvature(radius_x=500.0), fine)
+    under_load = result["mesh/elements"] == middle_node(fine)
     resultants = [
-        field[0][at].mean() / PATCH.load
-        for field in decks.field_values(found, "stresses", "N_x N_y M_x M_y")
+        field[0][under_load].mean() / PATCH.load
+        for field in decks.field_values(result, "stresses", "N_x N_y M_x M_y")
     ]
     even = ElementGrid(*(uniform_section(side, round(1.5 * side / ELEMENT)) for side in SIDES))
     modes = panel(Curvature(radius_y=1000.0), even, decks.program("LMAS EIGE=4"))
@@ -74,8 +74,8 @@ def _curved_impact() -> Sequence[Value]:
     grid, patch = refined_grid(4.0), model.Patch("DISC", 4.0)
     hit = (Projectile(0, 0, 2.0e-5), Impact(middle_node(grid), 3, 3000.0), decks.elastic(5.0e4))
     macros = decks.impact_program(1.6e-7, 1250)
-    found = panel(Curvature(radius_x=500.0), grid, macros, patch, *hit)
-    return [*largest_force(found), found.plate_w[-1]]
+    result = panel(Curvature(radius_x=500.0), grid, macros, patch, *hit)
+    return [*largest_force(result), result.plate_w[-1]]
 
 
 @case
@@ -95,7 +95,7 @@ def _curved_strains() -> Sequence[Value]:
         decks.material(ply, (30.0,), 0.2),
     )
     macros = decks.program("TANG FORM SOLV STRE REAC")
-    found = decks.run_of_deck(decks.deck(grid, segments, macros))
-    strains = decks.field_values(found, "stresses", "eps_xx eps_yy gamma_xy")
-    pressure = found["reactions/force"][..., 2].sum() / side**2
+    result = decks.run_of_deck(decks.deck(grid, segments, macros))
+    strains = decks.field_values(result, "stresses", "eps_xx eps_yy gamma_xy")
+    pressure = result["reactions/force"][..., 2].sum() / side**2
     return [*(strain / w for strain in strains), pressure / w]

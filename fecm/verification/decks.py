@@ -82,7 +82,7 @@ def restraints(grid: ElementGrid, codes: str) -> model.Boundary | None:
 
 def held_but(dof: int, node: int = 1) -> model.Boundary:
     """Hold the nodes of an element, except a dof of one node, as a deck needs an equation."""
-    freed = tuple(int(one != dof) for one in range(5))
+    freed = tuple(int(number != dof) for number in range(5))
     return model.Boundary(
         tuple(NodeCodes(n, 0, freed if n == node else (1,) * 5) for n in range(1, 10))
     )
@@ -95,22 +95,22 @@ def deck(
     coordinates: model.Coordinates | None = None,
 ) -> model.Deck:
     """Build a deck of 9-node elements on a grid's numbering."""
-    made = (grid.element_cards(), coordinates or grid.coordinates(), *segments)
-    given = tuple(segment for segment in made if segment is not None)
-    layers = next(len(s.layers) for s in given if isinstance(s, model.Material))
+    segments_and_mesh = (grid.element_cards(), coordinates or grid.coordinates(), *segments)
+    present = tuple(segment for segment in segments_and_mesh if segment is not None)
+    layers = next(len(s.layers) for s in present if isinstance(s, model.Material))
     control = Control(grid.nodes, grid.elements, layers, 2, 5, 9)
-    return model.Deck("verification", control, given, tuple(macros))
+    return model.Deck("verification", control, present, tuple(macros))
 
 
-def run_of_deck(one: model.Deck, mode: Mode = "report") -> Result:
+def run_of_deck(deck_of_run: model.Deck, mode: Mode = "report") -> Result:
     """Run a deck of one problem."""
     with warnings.catch_warnings(action="ignore", category=FecmWarning):
-        return run_one(one, mode=mode)
+        return run_one(deck_of_run, mode=mode)
 
 
-def field_values(found: Result, group: str, names: str) -> list[Floats]:
+def field_values(result: Result, group: str, names: str) -> list[Floats]:
     """Return the fields of a group, by name."""
-    return [found[f"{group}/{name}"] for name in names.split()]
+    return [result[f"{group}/{name}"] for name in names.split()]
 
 
 def constant_strains(
@@ -136,11 +136,11 @@ def forces(field: Floats) -> model.Forces:
 
 def weights(coordinates: Sequence[float]) -> Floats:
     """Return Simpson's weights of the lines of nodes: integrals of their shape functions."""
-    found = np.zeros(len(coordinates))
+    weights_of_nodes = np.zeros(len(coordinates))
     for first in range(0, len(coordinates) - 1, 2):
         part = (coordinates[first + 2] - coordinates[first]) / 6.0
-        found[first : first + 3] += part * np.array([1.0, 4.0, 1.0])
-    return found
+        weights_of_nodes[first : first + 3] += part * np.array([1.0, 4.0, 1.0])
+    return weights_of_nodes
 
 
 def quarter_plate(
@@ -164,8 +164,8 @@ def quarter_plate(
     loads = np.zeros((grid.up, grid.across, 5))
     loads[..., 2] = np.outer(along, along) * load
     loads[-1] = loads[:, -1] = 0.0  # a value there would be a displacement
-    given = forces(loads) if np.any(load) else None
-    return deck(grid, (restraints(grid, codes), given, plate, *others), macros)
+    load_segment = forces(loads) if np.any(load) else None
+    return deck(grid, (restraints(grid, codes), load_segment, plate, *others), macros)
 
 
 def pressed_rectangle(
@@ -220,5 +220,5 @@ def panel_with_gages(along: int, up: int) -> model.Deck:
     grid = ElementGrid(uniform_section(300.0, along), uniform_section(200.0, up))
     kinds = (model.Material, model.Shear, model.Patch, model.Gages)
     middle = grid.nearest(150.0, 100.0)[0]
-    others = (*(example.require(kind) for kind in kinds), model.Impact(middle, 3, 0.0))
-    return deck(grid, (restraints(grid, SUPPORTED), *others), DEFLECTION)
+    kept = (*(example.require(kind) for kind in kinds), model.Impact(middle, 3, 0.0))
+    return deck(grid, (restraints(grid, SUPPORTED), *kept), DEFLECTION)

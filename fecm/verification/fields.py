@@ -37,9 +37,9 @@ def _patch() -> Sequence[Value]:
     plate = decks.material(FIBRES, (0.0, 90.0), THICK / 2.0)
     segments = (decks.restraints(grid, "00000" + 4 * " 11111"), decks.forces(field), plate)
     coordinates = model.Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in places))
-    found = decks.run_of_deck(decks.deck(grid, segments, decks.STRESSES, coordinates))
-    shears = np.array(decks.field_values(found, "stresses", "gamma_xz gamma_yz"))
-    return [*decks.field_values(found, "stresses", IN_PLANE), shears, found["stresses/M_x"]]
+    result = decks.run_of_deck(decks.deck(grid, segments, decks.STRESSES, coordinates))
+    shears = np.array(decks.field_values(result, "stresses", "gamma_xz gamma_yz"))
+    return [*decks.field_values(result, "stresses", IN_PLANE), shears, result["stresses/M_x"]]
 
 
 def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = False) -> Deck:
@@ -74,10 +74,10 @@ def _resultants() -> Sequence[Value]:
     # A couple M does work on -theta.
     pulled = loaded_rectangle((n_x, n_xy, 0.0, -m_x, -m_xy), (n_xy, n_y, 0.0, -m_xy, -m_y))
     shears = (0.0, 0.0, 20.0, 0.0, 0.0), (0.0, 0.0, -8.0, 0.0, 0.0)
-    found = decks.run_of_deck(pulled)
+    result = decks.run_of_deck(pulled)
     sheared = decks.run_of_deck(loaded_rectangle(*shears, shears=True))
     return [
-        *decks.field_values(found, "stresses", f"{IN_PLANE} N_x N_y N_xy M_x M_y M_xy"),
+        *decks.field_values(result, "stresses", f"{IN_PLANE} N_x N_y N_xy M_x M_y M_xy"),
         *decks.field_values(sheared, "stresses", "gamma_xz gamma_yz Q_x Q_y"),
     ]
 
@@ -98,9 +98,9 @@ def _tape8() -> Sequence[Value]:
     hit = (Projectile(0, 0, 1e-6), Impact(struck, 3, 1e-12), decks.elastic(1.0))
     plate = decks.material(FIBRES, (0.0, 90.0), 0.01)
     segments = (model.Boundary(tuple(codes)), decks.forces(field), *hit, plate)
-    found = decks.run_of_deck(decks.deck(grid, segments, decks.impact_program(1e-7, 1)))
+    result = decks.run_of_deck(decks.deck(grid, segments, decks.impact_program(1e-7, 1)))
     names = "kappa_x kappa_y kappa_xy gamma_yz gamma_xz"
-    return [field[:, 1:] for field in decks.field_values(found, "tape8", names)]
+    return [field[:, 1:] for field in decks.field_values(result, "tape8", names)]
 
 
 def held_trapezoid() -> Deck:
@@ -121,12 +121,12 @@ def held_trapezoid() -> Deck:
 @case
 def _assumed_shear() -> Sequence[Value]:
     cards = (decks.material(decks.ONE, [0.0], h) for h in (0.1, 0.001))
-    made = [
+    variants = [
         decks.quarter_plate(4, card, decks.DEFLECTION, 1.0, others=[decks.MITC]) for card in cards
     ]
     x, shear = decks.field_values(decks.run_of_deck(held_trapezoid()), "stresses", "x gamma_yz")
-    sides = [shear[:, np.isclose(x, at)] for at in (-1.0, 1.0)]
-    return [*(decks.run_of_deck(one).tape3.w[0, 0] for one in made), *sides]
+    sides = [shear[:, np.isclose(x, end)] for end in (-1.0, 1.0)]
+    return [*(decks.run_of_deck(deck).tape3.w[0, 0] for deck in variants), *sides]
 
 
 CARBON = Ply(1.6e-9, 0.3, 150e3, 10e3, 5e3, 5e3, 3.5e3)
@@ -152,9 +152,11 @@ def _failure_states() -> Sequence[Value]:
     plate = decks.material(CARBON, ANGLES, PLY_THICKNESS, points=1)
     held = decks.forces(np.stack([u, v, 0.0 * u, -p, -q], axis=1))
     macros = decks.program("TANG FORM SOLV FAIL")
-    found = decks.run_of_deck(decks.deck(grid, (decks.held_but(2), held, STRENGTHS, plate), macros))
-    plies = [found[f"failure/{name}/exposure"].max(axis=(0, 1, 3)) for name in CRITERIA]
-    return [*np.ravel(plies), *found["failure/interlaminar/exposure"][0]]
+    result = decks.run_of_deck(
+        decks.deck(grid, (decks.held_but(2), held, STRENGTHS, plate), macros)
+    )
+    plies = [result[f"failure/{name}/exposure"].max(axis=(0, 1, 3)) for name in CRITERIA]
+    return [*np.ravel(plies), *result["failure/interlaminar/exposure"][0]]
 
 
 # σ2 and τ12 of a ply at 0 degrees that is pressed across its fibres; the action plane is inclined.
@@ -167,11 +169,11 @@ def _inclined_failure() -> Sequence[Value]:
     grid = ElementGrid(uniform_section(1.0, 1), uniform_section(1.0, 1))
     x, y = (v.ravel() - 0.5 for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     plate, macros = decks.material(CARBON, [0.0], 1.0), decks.program("TANG FORM SOLV FAIL")
-    found = []
+    exposures = []
     for across, shear in PRESSED:
         strain = (-CARBON.nu12 * across / CARBON.e1, across / CARBON.e2, shear / CARBON.g12)
         held = decks.forces(decks.constant_strains(x, y, (0.0, 0.0, 0.0), strain=strain))
         segments = (decks.held_but(2), held, STRENGTHS, plate)
         result = decks.run_of_deck(decks.deck(grid, segments, macros))
-        found.append(result["failure/puck/exposure"].max())
-    return found
+        exposures.append(result["failure/puck/exposure"].max())
+    return exposures

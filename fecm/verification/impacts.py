@@ -30,18 +30,18 @@ from fecm.verification.parts import ALPHA_CR
 V = 100.0  # of projectiles
 
 
-def largest_force(found: Result) -> list[float]:
+def largest_force(result: Result) -> list[float]:
     """Return the largest force, and its time."""
-    return [found.force.max(), found.time[found.force.argmax()]]
+    return [result.force.max(), result.time[result.force.argmax()]]
 
 
 @case
 def _rigid_target() -> Sequence[Value]:
 
     def values(law: Indentation) -> list[float]:
-        found = decks.run_of_deck(decks.fixed_target(2.0e-4, V, law, 2e-8, 9000))
-        touching = found.time[found.force > 0.0]
-        return [found.indentation.max(), found.force.max(), touching[-1], found.velocity[-1]]
+        result = decks.run_of_deck(decks.fixed_target(2.0e-4, V, law, 2e-8, 9000))
+        touching = result.time[result.force > 0.0]
+        return [result.indentation.max(), result.force.max(), touching[-1], result.velocity[-1]]
 
     return values(decks.elastic(1.0e6)) + values(Indentation(1.0e6, ALPHA_CR, 0.0, 2.5, "ACR"))
 
@@ -49,20 +49,20 @@ def _rigid_target() -> Sequence[Value]:
 @case
 def _end_of_contact() -> Sequence[Value]:
     """Compute a run that is cut at every phase of a half-sine contact."""
-    phase, one = np.linspace(0.0, np.pi, 20001)[1:-1], np.ones(19999)
+    phase, ones = np.linspace(0.0, np.pi, 20001)[1:-1], np.ones(19999)
     force = np.sin(phase)
     peak = np.maximum.accumulate(force)
-    last = LastContact(force, np.append(0.0, force[:-1]), peak, peak, -np.cos(phase), 0.0 * one)
+    last = LastContact(force, np.append(0.0, force[:-1]), peak, peak, -np.cos(phase), 0.0 * ones)
 
     def known(speed: float) -> float:
         """Return the share of the contact that knows its peak.
 
         The plate has a largest velocity.
         """
-        plate = Deflection(one, 0.0 * one, speed * one, one, one)
+        plate = Deflection(ones, 0.0 * ones, speed * ones, ones, ones)
         return float(peak_known(ends(last, plate)).mean())
 
-    passed = ends(last, Deflection(one, 0.0 * one, one, one, one))
+    passed = ends(last, Deflection(ones, 0.0 * ones, ones, ones, ones))
     # Deflections that go on growing, and that fall with the force.
     growing = np.isfinite(decided(phase, phase, passed)).mean()
     falling = np.isfinite(decided(peak, force, passed)).mean()
@@ -74,10 +74,10 @@ def _free_plate() -> Sequence[Value]:
     """Compute a plate so stiff that it moves as a rigid body, which DAMP slows down."""
     grid = ElementGrid(uniform_section(1.0, 2), uniform_section(1.0, 2))
     plate, law = decks.material(decks.isotropic(1e9, 0.3, 2.5e-4), [0.0], 0.2), decks.elastic(1e5)
-    made = decks.struck_plate(grid, plate, Projectile(0, 0, 2.0e-4), V, law, 3e-8, 10000)
-    found = decks.run_of_deck(replace(made, segments=(*made.segments, model.Damping(2000.0))))
-    ends = (found.velocity[-1], found.plate_w[-1], found.energy.damping_work[-1])
-    return [found.force.max(), *ends]
+    deck = decks.struck_plate(grid, plate, Projectile(0, 0, 2.0e-4), V, law, 3e-8, 10000)
+    result = decks.run_of_deck(replace(deck, segments=(*deck.segments, model.Damping(2000.0))))
+    ends = (result.velocity[-1], result.plate_w[-1], result.energy.damping_work[-1])
+    return [result.force.max(), *ends]
 
 
 @case
@@ -86,8 +86,8 @@ def _infinite_plate() -> Sequence[Value]:
     grid = ElementGrid(uniform_section(12.0, 48), uniform_section(12.0, 48))
     plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4, 13.0), [0.0], 0.1)
     mass, law = Projectile(0, 0, 2.0e-5), decks.elastic(5.0e4)
-    found = decks.run_of_deck(decks.struck_plate(grid, plate, mass, V, law, 5e-8, 4000))
-    return [*largest_force(found), found.velocity[-1]]
+    result = decks.run_of_deck(decks.struck_plate(grid, plate, mass, V, law, 5e-8, 4000))
+    return [*largest_force(result), result.velocity[-1]]
 
 
 @case
@@ -96,25 +96,25 @@ def _supported_plate() -> Sequence[Value]:
     plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.03)
     hit = (Projectile(0, 0, 5.0e-6 / 4.0), Impact(1, 3, V), decks.elastic(1.0e5 / 4.0))
     macros = decks.impact_program(8e-8, 2500)
-    found = decks.run_of_deck(decks.quarter_plate(8, plate, macros, others=hit))
-    force, time = largest_force(found)
-    return [4.0 * force, time, found.plate_w.max(), found.velocity[-1]]
+    result = decks.run_of_deck(decks.quarter_plate(8, plate, macros, others=hit))
+    force, time = largest_force(result)
+    return [4.0 * force, time, result.plate_w.max(), result.velocity[-1]]
 
 
 @case
 def _report_impact() -> Sequence[Value]:
-    found = decks.run_of_deck(decks.report_impact())
-    energy = found.energy
+    result = decks.run_of_deck(decks.report_impact())
+    energy = result.energy
     balance = float(np.abs(energy.balance_error).max()) / float(energy.attributes["initial"])
-    first = int(found.force[found.time < 500e-6].argmax())
+    first = int(result.force[result.time < 500e-6].argmax())
     return [
         balance,
-        _at(found, "force", 42e-6),
-        _at(found, "force", 642e-6),
-        _at(found, "transducer", 642e-6),
-        found.force[first],
-        found.time[first],
-        *largest_force(found),
+        _at(result, "force", 42e-6),
+        _at(result, "force", 642e-6),
+        _at(result, "transducer", 642e-6),
+        result.force[first],
+        result.time[first],
+        *largest_force(result),
     ]
 
 
@@ -126,20 +126,20 @@ def _at(result: Result, name: str, time: float) -> float:
 
 @case
 def _listing_impact() -> Sequence[Value]:
-    found = decks.run_of_deck(decks.report_impact(500), "listing")
-    end = found.time[found.force > 0.0][-1]
-    return [_at(found, "force", 46e-6), _at(found, "transducer", 46e-6), end]
+    result = decks.run_of_deck(decks.report_impact(500), "listing")
+    end = result.time[result.force > 0.0][-1]
+    return [_at(result, "force", 46e-6), _at(result, "transducer", 46e-6), end]
 
 
 @case
 def _convolution() -> Sequence[Value]:
-    made = decks.report_impact(1000)
-    problem = checked_problem(made)
+    deck = decks.report_impact(1000)
+    problem = checked_problem(deck)
     swept = carry_out_plan(problem, plan(problem, [{"velocity": 60.0}], history=True)).force
     if swept is None:
         raise ValueError("the sweep has kept no forces")
-    slower = tuple(replace(s, velocity=60.0) if isinstance(s, Impact) else s for s in made.segments)
-    full = decks.run_of_deck(replace(made, segments=slower)).force
+    slower = tuple(replace(s, velocity=60.0) if isinstance(s, Impact) else s for s in deck.segments)
+    full = decks.run_of_deck(replace(deck, segments=slower)).force
     return [np.abs(swept[0] - full).max() / full.max()]
 
 
@@ -176,9 +176,9 @@ def struck_square(mass: float, end: float) -> Deck:
         decks.MITC,
         decks.material(SQUARE, [0.0], SQUARE_THICKNESS),
     )
-    made = decks.deck(grid, segments, ())
-    dt = rounded_time_step(critical_time_step(build_plate(made, generate(made))))
-    return replace(made, macros=decks.impact_program(dt, round(end / dt)))
+    deck = decks.deck(grid, segments, ())
+    dt = rounded_time_step(critical_time_step(build_plate(deck, generate(deck))))
+    return replace(deck, macros=decks.impact_program(dt, round(end / dt)))
 
 
 @case

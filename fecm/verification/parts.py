@@ -59,36 +59,36 @@ ACR_REMAINS = PEAK - ALPHA_CR**0.4 * PEAK**0.6
 @case
 def _isotropic_ply() -> Sequence[Value]:
     h, plate = 0.1, 1.0e7 / (1.0 - 0.3**2)
-    made = laminate(isotropic(1.0e7, 0.3, 2.5e-4), [30.0], [h])
-    vanishing = [*made.A[:2, 2] / h, *made.B.ravel() / h**2, *made.D[:2, 2] / h**3]
+    section = laminate(isotropic(1.0e7, 0.3, 2.5e-4), [30.0], [h])
+    vanishing = [*section.A[:2, 2] / h, *section.B.ravel() / h**2, *section.D[:2, 2] / h**3]
     return [
-        *made.A[AT],
+        *section.A[AT],
         np.abs(vanishing).max() / plate,
-        *made.D[AT],
-        made.shear[0, 0],
-        made.mass,
-        made.rotary_inertia,
+        *section.D[AT],
+        section.shear[0, 0],
+        section.mass,
+        section.rotary_inertia,
     ]
 
 
 @case
 def _cross_ply() -> Sequence[Value]:
-    made = laminate(FIBRES, [0.0, 90.0], [THICK / 2.0] * 2)
-    b = made.B.diagonal()
-    return [*made.A[AT], b[0], b[1], made.D[0, 0], made.D[2, 2], made.shear[0, 0]]
+    section = laminate(FIBRES, [0.0, 90.0], [THICK / 2.0] * 2)
+    b = section.B.diagonal()
+    return [*section.A[AT], b[0], b[1], section.D[0, 0], section.D[2, 2], section.shear[0, 0]]
 
 
 @case
 def _angle_ply() -> Sequence[Value]:
-    made = laminate(FIBRES, [45.0, -45.0], [THICK / 2.0] * 2)
-    turned, a11 = laminate(FIBRES, [45.0], [THICK]), made.A[0, 0]
+    section = laminate(FIBRES, [45.0, -45.0], [THICK / 2.0] * 2)
+    turned, a11 = laminate(FIBRES, [45.0], [THICK]), section.A[0, 0]
     return [
-        *made.A[AT],
-        made.A[0, 2] / a11,
-        made.B[0, 2],
-        made.B[0, 0] / (a11 * THICK),
-        made.D[0, 0],
-        made.D[2, 2],
+        *section.A[AT],
+        section.A[0, 2] / a11,
+        section.B[0, 2],
+        section.B[0, 0] / (a11 * THICK),
+        section.D[0, 0],
+        section.D[2, 2],
         turned.shear[0, 1],
     ]
 
@@ -105,14 +105,16 @@ def _internal_force() -> Sequence[Value]:
     x, y = (v.ravel() for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     corners = enumerate(np.stack([x + 0.1 * x * y, y + 0.2 * x * y], axis=1).tolist(), start=1)
     places = Coordinates(tuple(NodeValues(n, 0, tuple(place)) for n, place in corners))
-    plate, found = material(FIBRES, (0.0, 30.0), THICK / 2.0), []
+    plate, differences = material(FIBRES, (0.0, 30.0), THICK / 2.0), []
     for shear in (None, MITC):
-        made = deck(grid, (shear, plate), (), places)
-        built = build_plate(made, generate(made))
+        plate_deck = deck(grid, (shear, plate), (), places)
+        built = build_plate(plate_deck, generate(plate_deck))
         u = np.cos(np.arange(built.neq))
         force = built.stiffness @ u
-        found.append(np.abs(PlateMotion(built).product(u) - force).max() / np.abs(force).max())
-    return found
+        differences.append(
+            np.abs(PlateMotion(built).product(u) - force).max() / np.abs(force).max()
+        )
+    return differences
 
 
 @case
@@ -128,18 +130,18 @@ def _threshold() -> Sequence[Value]:
 
 @case
 def _wave_fronts() -> Sequence[Value]:
-    found = WaveSurfaces(Medium(report_laminate())).fronts([0.0, 45.0])
+    fronts = WaveSurfaces(Medium(report_laminate())).fronts([0.0, 45.0])
     names = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shear")
     places = [FRONTS.index(name) for name in names]
     first = places[0]
-    return [*found.velocity[0, places], found.velocity[1, first], found.ray_angle[1, first]]
+    return [*fronts.velocity[0, places], fronts.velocity[1, first], fronts.ray_angle[1, first]]
 
 
 @case
 def _dispersion() -> Sequence[Value]:
-    found = dispersion(Medium(report_laminate()), 0.0, [10.0, 1.0, 1e5]).angular_frequency
+    frequencies = dispersion(Medium(report_laminate()), 0.0, [10.0, 1.0, 1e5]).angular_frequency
     first, last = MODES.index("flexural_1"), MODES.index("flexural_3")
-    return [found[0, first], found[1, first], found[2, last]]
+    return [frequencies[0, first], frequencies[1, first], frequencies[2, last]]
 
 
 def bar(length: float) -> Rod:
@@ -150,18 +152,24 @@ def bar(length: float) -> Rod:
 @case
 def _rod_pulse() -> Sequence[Value]:
     pulse, later = (gauss_pulse(1000.0, middle, 40e-6) for middle in (200e-6, 300e-6))
-    found = simulate_pulse(bar(1.0), pulse, DT, 600e-6, (0.5,))
+    result = simulate_pulse(bar(1.0), pulse, DT, 600e-6, (0.5,))
     second = simulate_pulse(bar(1.0), later, DT, 300e-6, (0.5,))
-    at = np.interp(250e-6, second.time, second.forces[:, 0])
-    velocity = found.accelerations[:, 2].sum() * DT
-    return [found.forces.max(), at, found.mean_ratios[0], velocity, report_rod().total_mass]
+    at_later_time = np.interp(250e-6, second.time, second.forces[:, 0])
+    velocity = result.accelerations[:, 2].sum() * DT
+    return [
+        result.forces.max(),
+        at_later_time,
+        result.mean_ratios[0],
+        velocity,
+        report_rod().total_mass,
+    ]
 
 
 @case
 def _rod_waves() -> Sequence[Value]:
     ends = (1.0, 4.0)
-    found = simulate_pulse(bar(5.0), sine_pulse(1000.0, 8e-6), DT / 2.0, 29e-6, ends)
-    centroids = (found.time @ found.forces) / found.forces.sum(axis=0)
+    result = simulate_pulse(bar(5.0), sine_pulse(1000.0, 8e-6), DT / 2.0, 29e-6, ends)
+    centroids = (result.time @ result.forces) / result.forces.sum(axis=0)
     speed = (ends[1] - ends[0]) / (centroids[1] - centroids[0])
     frequencies = []
     for rod in (bar(1.0), bar(1.0).with_mass(CONSISTENT)):
@@ -169,7 +177,7 @@ def _rod_waves() -> Sequence[Value]:
         matrix = np.diag(mass) if mass.ndim == 1 else mass
         squares = eigh(rod.stiffness(), matrix, eigvals_only=True)
         frequencies.append(math.sqrt(float(squares[1])))  # the first is that of the rigid motion
-    return [speed, found.forces[:, 1].max(), *frequencies]
+    return [speed, result.forces[:, 1].max(), *frequencies]
 
 
 @case

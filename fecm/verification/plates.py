@@ -37,14 +37,14 @@ QUASI = (45.0, 0.0, -45.0, 90.0)
 @case
 def _time_step() -> Sequence[Value]:
     grid = ElementGrid(uniform_section(0.3, 1), uniform_section(0.3, 1))
-    made = decks.deck(grid, [decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.1)], ())
-    mesh, found = generate(made), []
+    deck = decks.deck(grid, [decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.1)], ())
+    mesh, steps = generate(deck), []
     for dof in (2, 3):  # of node 5, the centre
         codes, equations = np.ones_like(mesh.codes), np.zeros_like(mesh.equations)
         codes[4, dof], equations[4, dof] = 0, 1
         held = replace(mesh, codes=codes, equations=equations)
-        found.append(critical_time_step(build_plate(made, held)))
-    return found
+        steps.append(critical_time_step(build_plate(deck, held)))
+    return steps
 
 
 @case
@@ -54,8 +54,8 @@ def _static_bending() -> Sequence[Value]:
     def w(thickness: float, factor: float = 1.0, shear_order: int = 2) -> Floats:
         ply = decks.isotropic(1.0, 0.3, 1.0, factor)
         plate = decks.material(ply, [0.0], thickness, shear_order)
-        made = decks.quarter_plate(ELEMENTS, plate, decks.DEFLECTION, 1.0)
-        return np.asarray(decks.run_of_deck(made).tape3.w[0])
+        deck = decks.quarter_plate(ELEMENTS, plate, decks.DEFLECTION, 1.0)
+        return np.asarray(decks.run_of_deck(deck).tape3.w[0])
 
     quarter = ELEMENTS + ELEMENTS * (2 * ELEMENTS + 1)  # the row of the node at (a/4, a/4)
     thick = w(0.1)
@@ -74,12 +74,14 @@ def _frequencies() -> Sequence[Value]:
     """Compute frequencies of symmetric modes, on a quarter of the plate, and of uniform shear."""
     plate = decks.material(decks.ONE, [0.0], 0.1, 2)
     macros = decks.program("LMAS EIGE=4 CMAS EIGE=4")
-    found = decks.run_of_deck(decks.quarter_plate(ELEMENTS, plate, macros)).modes.angular_frequency
-    scaled = found * math.sqrt(0.1 / (0.1**3 / (12.0 * (1.0 - 0.3**2))))
+    frequencies = decks.run_of_deck(
+        decks.quarter_plate(ELEMENTS, plate, macros)
+    ).modes.angular_frequency
+    scaled = frequencies * math.sqrt(0.1 / (0.1**3 / (12.0 * (1.0 - 0.3**2))))
     grid = ElementGrid(uniform_section(0.7, 2), uniform_section(1.3, 2))
     held = grid.boundary((1, 1, 1, 0, 1), {})
-    made = decks.deck(grid, (held, decks.material(decks.ONE, [0.0], 0.1)), ())
-    free = build_plate(made, generate(made))
+    deck = decks.deck(grid, (held, decks.material(decks.ONE, [0.0], 0.1)), ())
+    free = build_plate(deck, generate(deck))
     ones = np.ones(free.neq)
     # Rayleigh's quotient of a free plate in uniform transverse shear.
     shear = math.sqrt(float(ones @ (free.stiffness @ ones)) / float(free.mass @ ones))
@@ -119,8 +121,8 @@ def _preload() -> Sequence[Value]:
     plate = decks.material(STIFF, CROSS, THICKNESS / len(CROSS))
 
     def made(preload: model.Preload, macros: str, load: float = 0.0) -> model.Deck:
-        others = [decks.MITC, preload]
-        return decks.quarter_plate(ELEMENTS, plate, decks.program(macros), load, others=others)
+        segments = [decks.MITC, preload]
+        return decks.quarter_plate(ELEMENTS, plate, decks.program(macros), load, others=segments)
 
     def factor(n_x: float, n_y: float) -> float:
         deck = made(model.Preload(n_x, n_y), "")
@@ -153,24 +155,24 @@ def _forced_plate() -> Sequence[Value]:
     )
     steps = decks.program("LMAS DT=1.08e-7 PROP=1 LOOP=600 TIME EXCD DISP=600 NEXT")
     card = decks.material(FIBRES, (0.0, 90.0), THICKNESS / 2.0, 2)
-    made = decks.quarter_plate(FEWER, card, steps, 1.0, decks.CROSS_PLY, [model.Gages((gage,))])
+    deck = decks.quarter_plate(FEWER, card, steps, 1.0, decks.CROSS_PLY, [model.Gages((gage,))])
     table = LoadTable(1, 2, 0.0, 1.0, (0.0, 0.0, 1.0, 5.0e4, 0.0))
-    found = decks.run_of_deck(replace(made, tables=(table,)))
-    return [found.tape3.w[-1, 0], found.gages.strain[-1, 0]]
+    result = decks.run_of_deck(replace(deck, tables=(table,)))
+    return [result.tape3.w[-1, 0], result.gages.strain[-1, 0]]
 
 
 @case
 def _patch_compliance() -> Sequence[Value]:
-    found, radii = [], []
+    compliances, radii = [], []
     for shape in ("DISC", "HERT"):
         patch = Patch(shape, 0.5, decks.SIDES[0] / 2.0, decks.SIDES[1] / 2.0, 1.0)
         result = decks.run_of_deck(decks.pressed_rectangle(12, patch, decks.DEFLECTION))
-        found.append(result.tape3.w[0, result["patch/node"] - 1] @ result["patch/weight"])
+        compliances.append(result.tape3.w[0, result["patch/node"] - 1] @ result["patch/weight"])
         blank = decks.run_of_deck(
             decks.pressed_rectangle(3, replace(patch, radius=None), decks.DEFLECTION)
         )
         radii.append(blank.attributes_of("patch")["radius"] / 0.106)
-    return found + radii
+    return compliances + radii
 
 
 @case
@@ -178,8 +180,8 @@ def _equilibrium_shear() -> Sequence[Value]:
 
     def shear(ply: Ply, angles: Sequence[float]) -> Floats:
         plate = decks.material(ply, angles, 1.0 / len(angles))
-        made = decks.quarter_plate(1, plate, (), others=[model.Shear(equilibrium=True)])
-        return build_plate(made, generate(made)).laminate.shear
+        deck = decks.quarter_plate(1, plate, (), others=[model.Shear(equilibrium=True)])
+        return build_plate(deck, generate(deck)).laminate.shear
 
     unsymmetric = shear(STIFF, (30.0, -45.0, 90.0))
     return [
@@ -204,25 +206,25 @@ def bent(
     along = np.cos(np.pi * np.array(grid_lines(uniform_section(0.5, ELEMENTS))))
     plate = decks.material(ply, angles, thickness / len(angles), points=2)
     macros, load = decks.program(f"TANG FORM SOLV STRE {word}"), q * np.outer(along, along)
-    made = decks.quarter_plate(ELEMENTS, plate, macros, load, others=[decks.MITC, *others])
-    return decks.run_of_deck(made)
+    deck = decks.quarter_plate(ELEMENTS, plate, macros, load, others=[decks.MITC, *others])
+    return decks.run_of_deck(deck)
 
 
 @case
 def _ply_stresses() -> Sequence[Value]:
-    found = bent(STIFF, CROSS)
-    x, y = decks.field_values(found, "stresses", "x y")
+    result = bent(STIFF, CROSS)
+    x, y = decks.field_values(result, "stresses", "x y")
     even, odd = np.cos(np.pi * x) * np.cos(np.pi * y), np.sin(np.pi * x) * np.sin(np.pi * y)
     x, y = x.mean(axis=1), y.mean(axis=1)
-    one, two, shear, xz, yz = (
+    sigma_1, sigma_2, shear, xz, yz = (
         field[0]
-        for field in decks.field_values(found, "plies", "sigma_1 sigma_2 tau_12 tau_xz tau_yz")
+        for field in decks.field_values(result, "plies", "sigma_1 sigma_2 tau_12 tau_xz tau_yz")
     )
     return [
-        (one[:, :, 2, 1], even),
-        (two[:, :, 2, 1], even),
+        (sigma_1[:, :, 2, 1], even),
+        (sigma_2[:, :, 2, 1], even),
         (shear[:, :, 2, 1], odd),
-        (one[:, :, 1, 1], even),
+        (sigma_1[:, :, 1, 1], even),
         (xz[:, 1, 1], np.sin(np.pi * x) * np.cos(np.pi * y)),
         (yz[:, 1, 1], np.cos(np.pi * x) * np.sin(np.pi * y)),
     ]
@@ -247,9 +249,9 @@ def _sandwich_deck(ratio: float) -> model.Deck:
 @case
 def _unlike_densities() -> Sequence[Value]:
     """Compute the sandwich of thickness 1, whose core has a fifth of the faces' density."""
-    made = _sandwich_deck(1.0)
-    found = build_plate(made, generate(made)).laminate
-    return [found.mass, found.rotary_inertia]
+    deck = _sandwich_deck(1.0)
+    laminate = build_plate(deck, generate(deck)).laminate
+    return [laminate.mass, laminate.rotary_inertia]
 
 
 @case
@@ -259,22 +261,22 @@ def _sandwich() -> Sequence[Value]:
     even, odd = np.cos(np.pi * x) * np.cos(np.pi * y), np.sin(np.pi * x) * np.sin(np.pi * y)
     x, y = x.mean(axis=1), y.mean(axis=1)
     along, across = np.sin(np.pi * x) * np.cos(np.pi * y), np.cos(np.pi * x) * np.sin(np.pi * y)
-    found: list[Value] = [
+    values: list[Value] = [
         (thin[f"plies/{name}"][0, :, :, 2, 1] / 100.0**2, shape)
         for name, shape in (("sigma_1", even), ("sigma_2", even), ("tau_12", odd))
     ]
     for ratio, result in ((100.0, thin), (10.0, thick)):
         for name, shape in (("tau_xz", along), ("tau_yz", across)):
-            found.append((result[f"plies/{name}"][0, :, 1, 1] / ratio, -shape))
-    return [*found, 100.0 * thick.tape3.w[0, 0] / 10.0**3]
+            values.append((result[f"plies/{name}"][0, :, 1, 1] / ratio, -shape))
+    return [*values, 100.0 * thick.tape3.w[0, 0] / 10.0**3]
 
 
 @case
 def _ply_shear() -> Sequence[Value]:
-    found = bent(decks.ONE, (0.0,) * 4)
-    x, y = (place.mean(axis=1) for place in decks.field_values(found, "stresses", "x y"))
+    result = bent(decks.ONE, (0.0,) * 4)
+    x, y = (place.mean(axis=1) for place in decks.field_values(result, "stresses", "x y"))
     shape = np.sin(np.pi * x) * np.cos(np.pi * y)
-    tau = found["plies/tau_xz"][0]
+    tau = result["plies/tau_xz"][0]
     at_faces = (tau[:, [0, 3], [0, 2]], shape[:, None])
     return [*((tau[:, 2, height], shape) for height in (0, 2, 1)), at_faces]
 
@@ -284,8 +286,8 @@ def _failure() -> Sequence[Value]:
     named = MATERIALS["T300/5208"]
     strengths = named.allowables("m-N-s")
     assert strengths is not None
-    found = bent(named.ply, (0.0, 90.0, 90.0, 0.0), 0.01, "FAIL", strengths)
-    return [1.0 / found[f"failure/{name}/exposure"].max() for name in ("max_stress", "tsai_wu")]
+    result = bent(named.ply, (0.0, 90.0, 90.0, 0.0), 0.01, "FAIL", strengths)
+    return [1.0 / result[f"failure/{name}/exposure"].max() for name in ("max_stress", "tsai_wu")]
 
 
 def cure_of_named_ply(dt: float) -> model.Cure:
@@ -299,8 +301,8 @@ def cure_of_named_ply(dt: float) -> model.Cure:
 def _residual_stresses() -> Sequence[Value]:
     ply, cold = MATERIALS["T300/5208"].ply, cure_of_named_ply(-100.0)
     kaw = laminate(ply, (0.0, 90.0), (0.005, 0.005))
-    found = residual_stresses(kaw, *cure_of_named_ply(-75.0).strains(1))
-    lower, upper = found.stresses[0]
+    stresses = residual_stresses(kaw, *cure_of_named_ply(-75.0).strains(1))
+    lower, upper = stresses.stresses[0]
     across = [
         bent(ply, angles, 0.01, "PLYS", cold)["plies/cure_stress"][0, 0, 1]
         for angles in ((0.0, 90.0, 90.0, 0.0), 4 * QUASI + 4 * QUASI[::-1])
@@ -308,8 +310,8 @@ def _residual_stresses() -> Sequence[Value]:
     moist = model.Cure(0.0, 0.5, (model.Expansion(beta1=2e-4, beta2=6e-3),)).strains(1)
     symmetric = laminate(ply, (0.0, 90.0, 90.0, 0.0), (0.0025,) * 4)
     return [
-        found.strain[0],
-        found.curvature[0],
+        stresses.strain[0],
+        stresses.curvature[0],
         lower[0],
         upper[0],
         lower[1],
@@ -325,6 +327,6 @@ def _cured_failure() -> Sequence[Value]:
     strengths = named.allowables("m-N-s")
     assert strengths is not None
     q, angles = 5e4, (0.0, 90.0, 90.0, 0.0)
-    found = bent(named.ply, angles, 0.01, "FAIL", strengths, cure_of_named_ply(-100.0), q=q)
-    factors = {one.criterion: one.load_factor for one in largest_exposures(found)}
+    result = bent(named.ply, angles, 0.01, "FAIL", strengths, cure_of_named_ply(-100.0), q=q)
+    factors = {exposure.criterion: exposure.load_factor for exposure in largest_exposures(result)}
     return [q * (factors[name] or 0.0) for name in ("max_stress", "tsai_wu", "puck")]

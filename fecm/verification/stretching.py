@@ -35,9 +35,9 @@ PRESSURES = (0.1022849258, 0.02069852564)  # of a clamped disc, and of one that 
 VELOCITY = 2271.56334  # of the mass
 
 
-def middle_deflection(made: Deck) -> float:
+def middle_deflection(deck: Deck) -> float:
     """Return the deflection of node 1."""
-    return float(decks.run_of_deck(made).tape3.w[-1, 0])
+    return float(decks.run_of_deck(deck).tape3.w[-1, 0])
 
 
 @case
@@ -46,8 +46,8 @@ def _stretching_plate() -> Sequence[Value]:
     h = 0.01
     plate = decks.material(decks.isotropic(1.0, 0.1**0.5, 1.0, FACTOR), [0.0], h)
     codes = f"{QUARTER} {CLAMPED}"
-    made = decks.quarter_plate(ELEMENTS, plate, NEWTON, 134.9 * h**4, codes, STRETCHES)
-    return [middle_deflection(made) / h]
+    deck = decks.quarter_plate(ELEMENTS, plate, NEWTON, 134.9 * h**4, codes, STRETCHES)
+    return [middle_deflection(deck) / h]
 
 
 def strip(
@@ -65,7 +65,10 @@ def strip(
     loads[:, -1] = 0.0  # a value there would be a displacement
     plate = decks.material(FIBRES, 4 * (0.0,) + 4 * (90.0,), 0.25)
     held = decks.restraints(grid, f"01001 11011 01001 {end} 01001")
-    x, y = (at.ravel() for at in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
+    x, y = (
+        grid_axis.ravel()
+        for grid_axis in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows))
+    )
     side = half / 8
     x = x + slant * side * np.sin(np.pi * x / (2.0 * side)) * (2.0 * y / width - 1.0)
     places = np.column_stack([x, y]).tolist()
@@ -92,27 +95,30 @@ def disc(rim: str, pressure: float) -> Deck:
     """Build a quarter of a circular plate under pressure; its elements are a mapped square."""
     radius = 100.0
     grid = ElementGrid(uniform_section(1.0, ELEMENTS), uniform_section(1.0, ELEMENTS))
-    x, y = (at.ravel() for at in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
+    x, y = (
+        coordinates.ravel()
+        for coordinates in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows))
+    )
     places = radius * np.stack([x * np.sqrt(1.0 - y**2 / 2.0), y * np.sqrt(1.0 - x**2 / 2.0)], 1)
     cards = (NodeValues(n, 0, tuple(place)) for n, place in enumerate(places.tolist(), start=1))
     held = decks.restraints(grid, f"{QUARTER} {rim}")
     plate = decks.material(ALUMINIUM, [0.0], THICKNESS)
-    made = decks.deck(grid, (held, plate, *STRETCHES), NEWTON, model.Coordinates(tuple(cards)))
-    loads = pressure * areas(made)
+    deck = decks.deck(grid, (held, plate, *STRETCHES), NEWTON, model.Coordinates(tuple(cards)))
+    loads = pressure * areas(deck)
     loads[(x == 1.0) | (y == 1.0)] = 0.0  # a value there would be a displacement
     field = np.zeros((grid.nodes, 5))
     field[:, 2] = loads
-    return replace(made, segments=(*made.segments, decks.forces(field)))
+    return replace(deck, segments=(*deck.segments, decks.forces(field)))
 
 
-def areas(made: Deck) -> Floats:
+def areas(deck: Deck) -> Floats:
     """Return the integrals of the nodes' shape functions, (numnp,)."""
-    plate = build_plate(made, generate(made))
-    found = np.zeros(len(plate.mesh.coordinates))
+    plate = build_plate(deck, generate(deck))
+    integrals = np.zeros(len(plate.mesh.coordinates))
     for family in plate.families:
-        at = interpolate(family, plate.rules.bending)
-        np.add.at(found, family.nodes, at.jxw @ at.N)
-    return found
+        points = interpolate(family, plate.rules.bending)
+        np.add.at(integrals, family.nodes, points.jxw @ points.N)
+    return integrals
 
 
 @case
@@ -136,12 +142,12 @@ def _stretching_impact() -> Sequence[Value]:
         *STRETCHES,
         decks.material(ALUMINIUM, [0.0], THICKNESS),
     )
-    made = decks.deck(grid, segments, ())
-    dt = rounded_time_step(critical_time_step(build_plate(made, generate(made))))
-    made = replace(made, macros=decks.impact_program(dt, round(end / dt)))
-    found = decks.run_of_deck(made)
-    balance = np.abs(found.energy.balance_error).max() / found.energy.attributes["initial"]
-    return [found.plate_w.max(), found.force.max(), balance]
+    deck = decks.deck(grid, segments, ())
+    dt = rounded_time_step(critical_time_step(build_plate(deck, generate(deck))))
+    deck = replace(deck, macros=decks.impact_program(dt, round(end / dt)))
+    result = decks.run_of_deck(deck)
+    balance = np.abs(result.energy.balance_error).max() / result.energy.attributes["initial"]
+    return [result.plate_w.max(), result.force.max(), balance]
 
 
 @case
@@ -150,8 +156,8 @@ def _reduced_plate() -> Sequence[Value]:
     codes = f"{QUARTER} 10101 01110"
     plate = decks.material(ALUMINIUM, [0.0], THICKNESS)
     side = 200.0 * THICKNESS
-    made = decks.quarter_plate(4, plate, (), 0.0, codes, STRETCHES, side)
-    stretched = build_plate(made, generate(made))
+    deck = decks.quarter_plate(4, plate, (), 0.0, codes, STRETCHES, side)
+    stretched = build_plate(deck, generate(deck))
     load = np.zeros((len(stretched.mesh.coordinates), 5))
     load[0, 2] = 1.0
     mode = reduced_plate(stretched, load, 1)

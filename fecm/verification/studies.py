@@ -41,14 +41,14 @@ def _random_values() -> Sequence[Value]:
     design = Design(dict.fromkeys("xyz", law), samples, 0, "sobol", sensitivity=True)
     x, y, z = matrix(design).T
     values = np.sin(x) + 7.0 * np.sin(y) ** 2 + 0.1 * z**4 * np.sin(x)
-    found = indices(values.reshape(1, 5, samples), 0)
+    estimates = indices(values.reshape(1, 5, samples), 0)
     drawn = statistics(
         matrix(Design({"k": ValueDistribution("lognormal", (115.0, 0.08))}, samples))[:, 0]
     )
     low, high = wilson(np.array(3), np.array(40))
     return [
-        *found.first[0],
-        *found.total[0],
+        *estimates.first[0],
+        *estimates.total[0],
         float(drawn.mean),
         float(drawn.standard_deviation),
         drawn.quantiles[3],
@@ -61,8 +61,8 @@ def _random_values() -> Sequence[Value]:
 def _refinement() -> Sequence[Value]:
     factors = np.array([1, 2, 4])
     cases, summary = {"refine": factors}, {"peak_force": 1.0 + 3.0 * factors**-1.7}
-    found = convergence(cases, summary, nodes=9)["peak_force"]
-    return [found.order, found.limit]
+    study = convergence(cases, summary, nodes=9)["peak_force"]
+    return [study.order, study.limit]
 
 
 @case
@@ -74,10 +74,10 @@ def _identification() -> Sequence[Value]:
     half = 0.4 * beta(0.4, 0.5) * deepest / velocity
     time = np.linspace(0.0, 2.0 * half, 101)
     share = betaincinv(0.4, 0.5, 1.0 - np.abs(time / half - 1.0))
-    made = decks.fixed_target(mass, 110.0, decks.elastic(0.9e6), 2e-7, 900)
+    deck = decks.fixed_target(mass, 110.0, decks.elastic(0.9e6), 2e-7, 900)
     with warnings.catch_warnings(action="ignore", category=FecmWarning):
-        found = identify(made, time, k * deepest**1.5 * share**0.6, ["k", "velocity"])
-    return [found.values["k"], found.values["velocity"]]
+        fit = identify(deck, time, k * deepest**1.5 * share**0.6, ["k", "velocity"])
+    return [fit.values["k"], fit.values["velocity"]]
 
 
 @case
@@ -85,8 +85,8 @@ def _contact_coefficient() -> Sequence[Value]:
     ply = Ply(1.0, 0.28, 181e9, 10.3e9, 7.17e9, 7.17e9, 3.68e9)
     angles = (0.0, 45.0, -45.0, 90.0)
     modulus = indentation_modulus(effective_stiffness(ply, angles, [1.0] * 4, 0.4))
-    one = indentation_modulus(ply_stiffness(decks.isotropic(1.0, 0.3, 1.0), 0.3))
-    return [one, modulus, hertz_coefficient(0.008, 207e9, 0.3, modulus)]
+    unit_modulus = indentation_modulus(ply_stiffness(decks.isotropic(1.0, 0.3, 1.0), 0.3))
+    return [unit_modulus, modulus, hertz_coefficient(0.008, 207e9, 0.3, modulus)]
 
 
 STRUCK = (112.5, 81.0)  # place of the impact (mm)
@@ -101,8 +101,8 @@ def _location() -> Sequence[Value]:
     strains = table.time[:POINTS], table.strains[:, :POINTS].T
     near = (90.0, 60.0, 140.0, 100.0)
     with warnings.catch_warnings(action="ignore", category=FecmWarning):
-        found = locate(panel, strains, region=near, grid=25.0, basis=2e-5)
-    return [found.x, found.y, found.peak_force]
+        location = locate(panel, strains, region=near, grid=25.0, basis=2e-5)
+    return [location.x, location.y, location.peak_force]
 
 
 @case
@@ -115,8 +115,8 @@ def _reciprocity() -> Sequence[Value]:
     sampling = Sampling(dt=4e-7, every=5, count=60, width=3)
 
     every = np.arange(len(weights))
-    found = responses(motion, rows_of(read, len(every)), every, sampling, dtype=np.float64)
-    by_gages = np.einsum("n,gns->sg", weights, found)
+    computed = responses(motion, rows_of(read, len(every)), every, sampling, dtype=np.float64)
+    by_gages = np.einsum("n,gns->sg", weights, computed)
 
     shares = np.zeros((len(weights), NDOF))
     shares[:, W] = weights

@@ -47,8 +47,8 @@ def report_elements(deck: Deck, rows: NDArray[np.intp], what: str, hint: str = "
         yield Report(f"{len(rows)} elements ({ranges(rows + 1)}): each {what}.", place, hint)
         return
     for place, numbers in by_card.items():
-        one = len(numbers) == 1
-        which = f"Element {numbers[0]}" if one else f"Elements {ranges(numbers)}: each"
+        is_single = len(numbers) == 1
+        which = f"Element {numbers[0]}" if is_single else f"Elements {ranges(numbers)}: each"
         yield Report(f"{which} {what}.", place, hint)
 
 

@@ -142,8 +142,8 @@ def doubtful_coefficient(problem: Problem) -> Reports:
     if deck.has(model.Materials):  # a face on a soft core gives way as no ply alone does
         return
     law, radius = deck.require(model.Indentation), sphere_radius(deck)
-    own, real = in_si(COEFFICIENT, names), REAL["contact coefficient"]
-    if own is not None and not real.least <= law.k * own <= real.greatest:  # the same
+    size, real = in_si(COEFFICIENT, names), REAL["contact coefficient"]
+    if size is not None and not real.least <= law.k * size <= real.greatest:  # the same
         return
     unit = in_si("length", names)
     if unit is not None:
@@ -167,20 +167,20 @@ def doubtful_coefficient(problem: Problem) -> Reports:
 
 def _misread(deck: model.Deck, radius: float, unit: float, names: dict[str, str]) -> str:
     """Say which unit of k, or of the radius that it was computed from, gives a usual indenter."""
-    k, own = deck.require(model.Indentation).k, in_si(COEFFICIENT, names)
-    found: dict[str, float] = {}
-    if own is not None:
-        for known, factor in USED[COEFFICIENT].items():
-            text = f"k = {k:g} looks like {known}; {needed_unit(COEFFICIENT, names)}"
-            found[text] = radius * unit * (factor / own) ** 2
-    for known, factor in USED["length"].items():
-        text = f"the radius that it was estimated from looks like {known}"
-        if known == "m":  # E of the sphere in GPa gives as small a k
+    k, size = deck.require(model.Indentation).k, in_si(COEFFICIENT, names)
+    units: dict[str, float] = {}
+    if size is not None:
+        for named_unit, factor in USED[COEFFICIENT].items():
+            text = f"k = {k:g} looks like {named_unit}; {needed_unit(COEFFICIENT, names)}"
+            units[text] = radius * unit * (factor / size) ** 2
+    for named_unit, factor in USED["length"].items():
+        text = f"the radius that it was estimated from looks like {named_unit}"
+        if named_unit == "m":  # E of the sphere in GPa gives as small a k
             text += " or the sphere's modulus like GPa"
-        found[f"{text}; {needed_unit('length', names)}"] = radius * factor
-    if not all(0.0 < value < math.inf for value in found.values()):
+        units[f"{text}; {needed_unit('length', names)}"] = radius * factor
+    if not all(0.0 < value < math.inf for value in units.values()):
         return ""
-    far = {text: abs(math.log(value / USUAL_RADIUS)) for text, value in found.items()}
+    far = {text: abs(math.log(value / USUAL_RADIUS)) for text, value in units.items()}
     nearest = min(far, key=far.__getitem__)
     return nearest if far[nearest] <= math.log(REACH) else ""
 

@@ -32,11 +32,11 @@ def missing_expansion(card: model.Cure) -> Reports:
     Remedy: After the changes a card with the material (blank: 1), alpha1 and alpha2.
     """
     hint = FIELDS
-    materials = [one.material for one in card.expansions]
-    for position, one in enumerate(card.expansions):
-        if one.material in materials[:position]:
-            message = f"Material {one.material} has a second card of expansions."
-            yield Report(message, one.place("material"), "remove one of them")
+    materials = [expansion.material for expansion in card.expansions]
+    for position, expansion in enumerate(card.expansions):
+        if expansion.material in materials[:position]:
+            message = f"Material {expansion.material} has a second card of expansions."
+            yield Report(message, expansion.place("material"), "remove one of them")
     if (free := card.expansion(MATERIAL)) is None:
         yield Report(f"CURE has no card of material {MATERIAL}, that of MATE.", card.place(), hint)
         return
@@ -58,13 +58,13 @@ def implausible_expansion(card: model.Cure) -> Reports:
 
     Remedy: Coefficients per kelvin: 22.5E-6, not 22.5.
     """
-    for one in card.expansions:
-        for name in one.THERMAL:
-            value = getattr(one, name)
-            if abs(value) > one.LARGEST:
-                message = f"{name} = {value:g} is above {one.LARGEST:g}; it is per kelvin."
+    for expansion in card.expansions:
+        for name in expansion.THERMAL:
+            value = getattr(expansion, name)
+            if abs(value) > expansion.LARGEST:
+                message = f"{name} = {value:g} is above {expansion.LARGEST:g}; it is per kelvin."
                 hint = f"{value:g} millionths are {value * 1e-6:.4g}"
-                yield Report(message, one.place(name), hint)
+                yield Report(message, expansion.place(name), hint)
 
 
 @rule("W496", Subject.LAMINATE)
@@ -76,13 +76,13 @@ def implausible_moisture(problem: Problem) -> Reports:
     Remedy: A hundredth of the book's value: 0.006 for 0.6.
     """
     card = problem.deck.last(model.Cure)
-    for one in () if card is None else card.expansions:
-        for name in one.MOISTURE:
-            value = getattr(one, name)
+    for expansion in () if card is None else card.expansions:
+        for name in expansion.MOISTURE:
+            value = getattr(expansion, name)
             if abs(value) > LARGEST_BETA:
                 message = f"{name} = {value:g} is large for a strain per per cent of weight."
                 hint = f"{value:g} at 100 % is {value / 100.0:.4g} per per cent"
-                yield Report(message, one.place(name), hint)
+                yield Report(message, expansion.place(name), hint)
 
 
 @rule("W462", Subject.LAMINATE)
@@ -144,16 +144,16 @@ def exchanged_expansions(problem: Problem) -> Reports:
 
     Remedy: alpha1, along the fibres, before alpha2.
     """
-    for one in _expansions_of_fibrous_plies(problem):
-        for along, across in (one.THERMAL, one.MOISTURE):
-            first, second = getattr(one, along), getattr(one, across)
+    for expansion in _expansions_of_fibrous_plies(problem):
+        for along, across in (expansion.THERMAL, expansion.MOISTURE):
+            first, second = getattr(expansion, along), getattr(expansion, across)
             if first > second:
                 message = (
                     f"{along} = {first:g} is above {across} = {second:g}, unlike in any ply of "
                     "parallel fibres: they look exchanged."
                 )
                 hint = f"{along} is along the fibres, {across} across them"
-                yield Report(message, one.place(along), hint)
+                yield Report(message, expansion.place(along), hint)
 
 
 @rule("W552", Subject.LAMINATE)
@@ -164,26 +164,26 @@ def expansion_per_fahrenheit(problem: Problem) -> Reports:
 
     Remedy: Coefficients per kelvin: 1.8 times those per degree Fahrenheit.
     """
-    for one in _expansions_of_fibrous_plies(problem):
+    for card in _expansions_of_fibrous_plies(problem):
         least, greatest = PER_FAHRENHEIT
-        if one.alpha1 <= one.alpha2 and least < one.alpha2 < greatest:
+        if card.alpha1 <= card.alpha2 and least < card.alpha2 < greatest:
             message = (
-                f"alpha2 = {one.alpha2:g} is small for a resin and looks like a coefficient per "
+                f"alpha2 = {card.alpha2:g} is small for a resin and looks like a coefficient per "
                 "degree Fahrenheit; CURE takes coefficients per kelvin."
             )
-            converted = f"{1.8 * one.alpha1:.4g} and {1.8 * one.alpha2:.4g}"
+            converted = f"{1.8 * card.alpha1:.4g} and {1.8 * card.alpha2:.4g}"
             hint = f"per kelvin alpha1 and alpha2 would be {converted}"
-            yield Report(message, one.place("alpha2"), hint)
+            yield Report(message, card.place("alpha2"), hint)
 
 
 def _expansions_of_fibrous_plies(problem: Problem) -> list[model.Expansion]:
     """Yield the coefficients of expansion of the plies with parallel fibres."""
     card, plies = problem.deck.last(model.Cure), problem.deck.plies
-    given = () if card is None else card.expansions
+    expansions = () if card is None else card.expansions
     return [
-        one
-        for one in given
-        if (ply := plies.get(one.material)) is not None and ply.e1 > FIBROUS * ply.e2
+        expansion
+        for expansion in expansions
+        if (ply := plies.get(expansion.material)) is not None and ply.e1 > FIBROUS * ply.e2
     ]
 
 
@@ -208,9 +208,9 @@ def warped_plate(problem: Problem) -> Reports:
     rise = _largest_curvature(residual.curvature) * problem.longer_side**2 / 8.0
     thickness = problem.laminate.thickness
     if rise > LARGEST_WARP * thickness:
-        said = quantity(rise, unit_of("length", unit_names(problem.deck)), 3)
+        rise_text = quantity(rise, unit_of("length", unit_names(problem.deck)), 3)
         message = (
-            f"The free plate warps by {said} over its longer side, {rise / thickness:.2g} "
+            f"The free plate warps by {rise_text} over its longer side, {rise / thickness:.2g} "
             "times its thickness: the laminate is not symmetric."
         )
         hint = "the plate is taken as flat when mounted; what flattens it is not in the model"
@@ -236,14 +236,14 @@ def missing_expansions(deck: model.Deck) -> Reports:
     """Find materials of layers without coefficients of expansion, and unknown ones with them."""
     if (card := deck.last(model.Cure)) is None or not deck.has(model.Material):
         return
-    known = material_numbers(deck)
-    for one in card.expansions:
-        if one.material not in known:
-            only = ", ".join(map(str, sorted(known)))
-            message = f"The deck has no material {one.material}, only {only}."
-            yield Report(message, one.place("material"), FIELDS)
+    numbers = material_numbers(deck)
+    for expansion in card.expansions:
+        if expansion.material not in numbers:
+            only = ", ".join(map(str, sorted(numbers)))
+            message = f"The deck has no material {expansion.material}, only {only}."
+            yield Report(message, expansion.place("material"), FIELDS)
     used = {layer.material for layers in deck.layers.values() for layer in layers}
-    for number in sorted(used - {MATERIAL, *(one.material for one in card.expansions)}):
+    for number in sorted(used - {MATERIAL, *(expansion.material for expansion in card.expansions)}):
         yield Report(f"CURE has no card of material {number}.", card.place(), FIELDS)
 
 

@@ -64,13 +64,13 @@ def invalid_strength(card: model.Allowables) -> Reports:
 
     Remedy: Compressive strengths are positive too.
     """
-    for one in (card, *card.others):
-        for (name, _, _), value in zip(SHARES, one.row(), strict=False):
+    for strengths in (card, *card.others):
+        for (name, _, _), value in zip(SHARES, strengths.row(), strict=False):
             if isinstance(value, str) or not value > 0.0:
                 is_known = name in ("XC", "YC")
                 hint = "compressive strengths are positive on this card" if is_known else ""
                 message = f"The strength {name} is {value:g}; it must be positive."
-                yield Report(message, one.place(name), hint)
+                yield Report(message, strengths.place(name), hint)
 
 
 @rule("E456", Subject.DAMAGE)
@@ -79,14 +79,14 @@ def invalid_constant_of_criterion(card: model.Allowables) -> Reports:
 
     Remedy: Blanks take -0.5, 0.35, 0.3 (carbon fibres; glass: 0.30, 0.25).
     """
-    for one in (card, *card.others):
-        for name, value in (("p+", one.p_plus), ("p-", one.p_minus)):
+    for strengths in (card, *card.others):
+        for name, value in (("p+", strengths.p_plus), ("p-", strengths.p_minus)):
             if not 0.0 < value < 1.0:
                 message = f"Puck's slope {name} is {value:g}; it must be between 0 and 1."
-                yield Report(message, one.place(), "a blank takes 0.35 for p+ and 0.3 for p-")
-        if not abs(one.f12) < 1.0:
-            message = f"F12* is {one.f12:g}; it must be between -1 and 1."
-            yield Report(message, one.place(), "a blank takes -0.5")
+                yield Report(message, strengths.place(), "a blank takes 0.35 for p+ and 0.3 for p-")
+        if not abs(strengths.f12) < 1.0:
+            message = f"F12* is {strengths.f12:g}; it must be between -1 and 1."
+            yield Report(message, strengths.place(), "a blank takes -0.5")
 
 
 @rule("E457", Subject.DAMAGE)
@@ -154,8 +154,10 @@ def strengths_in_another_unit(problem: Problem) -> Reports:
 def _strengths(problem: Problem) -> list[tuple[model.Allowables, model.Ply]]:
     """Yield the strengths and constants of the materials that have both."""
     card, plies = problem.deck.last(model.Allowables), problem.deck.plies
-    given = () if card is None else (card, *card.others)
-    return [(one, plies[one.material]) for one in given if one.material in plies]
+    cards = () if card is None else (card, *card.others)
+    return [
+        (strengths, plies[strengths.material]) for strengths in cards if strengths.material in plies
+    ]
 
 
 def _strengths_in_another_unit(
@@ -163,9 +165,9 @@ def _strengths_in_another_unit(
 ) -> Reports:
     if not has_real_moduli(ply, names):  # W435 says so
         return
-    own = in_si(MODULUS, names)
-    guessed = likely_unit(ply.e1, MODULUS, USUAL_MODULUS) if own is None else ""
-    unit_of_stress = own or USED[MODULUS].get(guessed, 1.0)
+    size = in_si(MODULUS, names)
+    guessed = likely_unit(ply.e1, MODULUS, USUAL_MODULUS) if size is None else ""
+    unit_of_stress = size or USED[MODULUS].get(guessed, 1.0)
     wrong: dict[str, str] = {}  # what is said of a strength
     likely = Counter[str]()
     for (name, modulus, usual), strength in zip(SHARES, card.row(), strict=False):
@@ -174,17 +176,17 @@ def _strengths_in_another_unit(
         if WEAKEST <= share <= STRONGEST or share > ENDLESS:
             continue
         wrong[name] = f"{name} = {value:g} is {share:.2g} times {modulus}"
-        if own is not None:
-            wrong[name] += f", {value * own:.2g} Pa in the units of UNIT"
+        if size is not None:
+            wrong[name] += f", {value * size:.2g} Pa in the units of UNIT"
         likely[likely_unit(value, MODULUS, usual * stiffness * unit_of_stress)] += 1
     if not wrong:
         return
-    first, *others = wrong
-    message = wrong[first] + (f" (also {', '.join(others)})" if others else "")
+    first, *other_faults = wrong
+    message = wrong[first] + (f" (also {', '.join(other_faults)})" if other_faults else "")
     unit = likely.most_common(1)[0][0]
     if unit and unit != guessed:
         needed = f"E1 = {ply.e1:g} looks like {guessed}" if guessed else needed_unit(MODULUS, names)
-        these = "the strengths look" if others else "it looks"
+        these = "the strengths look" if other_faults else "it looks"
         message += f": {these} like {unit}; {needed}"
     hint = "strengths and moduli must be in the same unit"
     yield Report(f"{message}.", card.place(first), hint)
@@ -204,13 +206,13 @@ def strengths_in_another_order(problem: Problem) -> Reports:
 
 
 def _strengths_in_another_order(card: model.Allowables, ply: model.Ply) -> Reports:
-    given = card.xt, card.xc, card.yt, card.yc
-    faults = _faults(given, ply)
-    if ply.e1 <= FIBROUS * ply.e2 or not faults or max(given) > ENDLESS * ply.e1:
+    values = card.xt, card.xc, card.yt, card.yc
+    faults = _faults(values, ply)
+    if ply.e1 <= FIBROUS * ply.e2 or not faults or max(values) > ENDLESS * ply.e1:
         return
     message = f"{' and '.join(faults.values())}, unlike in any ply of parallel fibres"
     for order, places in ORDERS.items():
-        if not _faults([given[place] for place in places], ply):
+        if not _faults([values[place] for place in places], ply):
             message += f": the strengths look typed {order}"
             break
     hint = "the card's order is XT, XC, YT, YC, S12, S13, S23: X along the fibres, T in tension"
@@ -250,8 +252,8 @@ def weak_in_shear(problem: Problem) -> Reports:
         if not weak:
             continue
         first, value = next(iter(weak.items()))
-        others = f" ({' and '.join([*weak][1:])} too)" if len(weak) > 1 else ""
-        message = f"{first} = {value:g} is below a quarter of YT = {card.yt:g}{others}"
+        too = f" ({' and '.join([*weak][1:])} too)" if len(weak) > 1 else ""
+        message = f"{first} = {value:g} is below a quarter of YT = {card.yt:g}{too}"
         factor = in_si(MODULUS, names)
         if factor is not None and (looks := looks_like(value, MODULUS, card.yt * factor, names)):
             message += f": it {looks}"
@@ -427,10 +429,10 @@ def limited_slope(problem: Problem) -> Reports:
 def strengths_of_missing_material(deck: model.Deck) -> Reports:
     """Find materials of ALLO that the deck does not have."""
     if (card := deck.last(model.Allowables)) is not None:
-        known = material_numbers(deck)
-        for one in (card, *card.others):
-            if one.material not in known:
-                yield unknown_material(one.material, known, one.place("material"))
+        numbers = material_numbers(deck)
+        for strengths in (card, *card.others):
+            if strengths.material not in numbers:
+                yield unknown_material(strengths.material, numbers, strengths.place("material"))
 
 
 @rule("W498", Subject.DAMAGE)
@@ -447,7 +449,7 @@ def layers_without_strengths(problem: Problem) -> Reports:
     for n, (number, layers) in enumerate(deck.layers.items()):
         if n not in problem.used_laminates:
             continue
-        missing = [i for i, one in enumerate(layers, start=1) if card.of(one.material) is None]
+        missing = [i for i, layer in enumerate(layers, start=1) if card.of(layer.material) is None]
         if missing:
             materials = sorted({layers[i - 1].material for i in missing})
             named = "layer" if len(missing) == 1 else "layers"

@@ -64,7 +64,7 @@ def gage_outside_laminate(problem: Problem) -> Reports:
 
     Remedy: z from -h/2 to h/2.
     """
-    half = max(one.thickness for one in problem.plate.laminates) / 2.0
+    half = max(laminate.thickness for laminate in problem.plate.laminates) / 2.0
     for record in problem.deck.require(model.Gages).records:
         if abs(record.z) > half * (1.0 + 1e-9):
             what = f"Gage {record.number} at z = {record.z:g} is outside the laminate"
@@ -112,9 +112,9 @@ def shallow_gage(problem: Problem) -> Reports:
     if not shallow:
         return
     first = shallow[0]
-    others = f" (and {len(shallow) - 1} more)" if len(shallow) > 1 else ""
+    more = f" (and {len(shallow) - 1} more)" if len(shallow) > 1 else ""
     message = (
-        f"Gage {first.number}{others} at z = {first.z:g} is almost in the mid-plane; the faces "
+        f"Gage {first.number}{more} at z = {first.z:g} is almost in the mid-plane; the faces "
         f"are at {thickness / 2.0:g}"
     )
     for unit, factor in USED["length"].items():

@@ -52,8 +52,8 @@ def restrained_impact_dof(problem: Problem) -> Reports:
     Remedy: Another node, or no support there.
     """
     impact = problem.deck.require(model.Impact)
-    known = 1 <= impact.node <= problem.deck.control.numnp
-    if known and problem.mesh.equations[impact.node - 1, impact.dof - 1] == 0:
+    exists = 1 <= impact.node <= problem.deck.control.numnp
+    if exists and problem.mesh.equations[impact.node - 1, impact.dof - 1] == 0:
         message = f"Dof {impact.dof} of the impact node {impact.node} is restrained."
         yield Report(message, impact.place("impact node"), "a BOUN card restrains it")
 
@@ -151,18 +151,18 @@ def coarse_mesh(problem: Problem) -> Reports:
 
     Remedy: A finer mesh there: see [checking a deck](making.md#checking).
     """
-    found = resolution(problem)
-    if found is None or found.elements >= ENOUGH_PER_WAVE:
+    waves = resolution(problem)
+    if waves is None or waves.elements >= ENOUGH_PER_WAVE:
         return
-    coarse = found.elements < LEAST_PER_WAVE
-    if not coarse and (found.error is None or found.error < WORTH_SAYING):
+    coarse = waves.elements < LEAST_PER_WAVE
+    if not coarse and (waves.error is None or waves.error < WORTH_SAYING):
         return
-    about = "" if found.error is None else f": {said_error(found.error)}"
+    about = "" if waves.error is None else f": {said_error(waves.error)}"
     what = f"The mesh is {'too coarse' if coarse else 'coarse'} at the impact node"
-    sides = f"{found.elements:.1f} elements of side {found.side:.3g}"
-    wave = f"bending wave of the contact's duration, which is {found.wave:.3g} long"
+    sides = f"{waves.elements:.1f} elements of side {waves.side:.3g}"
+    wave = f"bending wave of the contact's duration, which is {waves.wave:.3g} long"
     hint = (
-        f"use {ENOUGH_PER_WAVE} elements per wave: sides up to {found.wave / ENOUGH_PER_WAVE:.2g}"
+        f"use {ENOUGH_PER_WAVE} elements per wave: sides up to {waves.wave / ENOUGH_PER_WAVE:.2g}"
     )
     place = problem.deck.require(model.Impact).place("impact node")
     yield Report(f"{what}: {sides} per {wave}{about}.", place, hint)

@@ -69,7 +69,7 @@ def _plies_of(segment: Plies) -> list[model.Ply]:
     """Return the materials of a segment."""
     if isinstance(segment, model.Material):
         return [segment.ply]
-    return [one.ply for one in segment.plies]
+    return [numbered.ply for numbered in segment.plies]
 
 
 def _invalid_constants(ply: model.Ply) -> list[tuple[str, float]]:
@@ -167,11 +167,11 @@ def layers_do_not_add_up(material: model.Material) -> Reports:
     Remedy: Stiffness follows the layers, inertia the card: they must agree.
     """
     card, thicknesses = material.integration, [layer.thickness for layer in material.layers]
-    total, given = sum(thicknesses), card.thickness
-    if given <= 0.0 or any(h <= 0.0 for h in thicknesses):
+    total, stated = sum(thicknesses), card.thickness
+    if stated <= 0.0 or any(h <= 0.0 for h in thicknesses):
         return
-    if abs(total - given) > THICKNESS_TOLERANCE * given:
-        message = f"The layers are {total:g} thick together, the MATE card says {given:g}."
+    if abs(total - stated) > THICKNESS_TOLERANCE * stated:
+        message = f"The layers are {total:g} thick together, the MATE card says {stated:g}."
         hint = "stiffness follows the layers, inertia the card: they must agree"
         yield Report(message, card.place("total thickness"), hint)
 
@@ -249,9 +249,9 @@ def shares_as_angles(problem: Problem) -> Reports:
     for layers in problem.deck.layers.values():
         angles = [layer.angle for layer in layers]
         half = angles[: len(angles) // 2] if angles == angles[::-1] else []
-        for some in (angles, half):
-            if len(some) == SHARES and min(some) > 0.0 and sum(some) == 100.0:
-                listed = "/".join(f"{angle:g}" for angle in some)
+        for shares in (angles, half):
+            if len(shares) == SHARES and min(shares) > 0.0 and sum(shares) == 100.0:
+                listed = "/".join(f"{angle:g}" for angle in shares)
                 message = f"The angles {listed} add up to 100: they look like shares in per cent."
                 yield Report(message, layers[0].place("fibre angle"), "give the angle of every ply")
                 break
@@ -278,8 +278,8 @@ def angles_in_radians(problem: Problem) -> Reports:
     """
     turned = [layer for layer in _all_layers(problem) if layer.angle]
     if turned and are_like_radians([layer.angle for layer in turned]):
-        known = dict.fromkeys(layer.angle for layer in turned[:SHOWN_ANGLES])
-        shown = ", ".join(f"{angle:g} is {math.degrees(angle):.0f} degrees" for angle in known)
+        distinct = dict.fromkeys(layer.angle for layer in turned[:SHOWN_ANGLES])
+        shown = ", ".join(f"{angle:g} is {math.degrees(angle):.0f} degrees" for angle in distinct)
         message = f"The fibre angles look like radians: {shown}."
         yield Report(message, turned[0].place("fibre angle"), "angles are in degrees")
 

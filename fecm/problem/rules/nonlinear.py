@@ -152,11 +152,11 @@ def _on_edges_across(problem: Problem, axis: int) -> Bools:
     sides = np.stack([mesh.elements[:, [n, (n + 1) % 4, 4 + n]] for n in range(4)], axis=1)
     sides = sides.reshape(-1, 3) - 1
     _, first, counts = np.unique(sides[:, 2], return_index=True, return_counts=True)
-    own = sides[first[counts == 1]]
-    along = np.ptp(mesh.coordinates[own, axis], axis=1) <= SAME_LINE * problem.longer_side
-    found = np.zeros(len(mesh.coordinates), dtype=bool)
-    found[own[along]] = True
-    return found
+    unshared = sides[first[counts == 1]]
+    along = np.ptp(mesh.coordinates[unshared, axis], axis=1) <= SAME_LINE * problem.longer_side
+    on_edge = np.zeros(len(mesh.coordinates), dtype=bool)
+    on_edge[unshared[along]] = True
+    return on_edge
 
 
 OF_NONLINEAR = (

@@ -55,8 +55,8 @@ def incomplete_centre(problem: Problem) -> Reports:
     """
     card = problem.deck.require(model.Patch)
     if (card.x is None) != (card.y is None):
-        given, missing = ("y0", "x0") if card.x is None else ("x0", "y0")
-        message = f"The centre of the patch has {given}, but no {missing}."
+        present, missing = ("y0", "x0") if card.x is None else ("x0", "y0")
+        message = f"The centre of the patch has {present}, but no {missing}."
         hint = "give both coordinates, or leave both blank for the node of ROD"
         yield Report(message, card.place(f"centre {missing}"), hint)
     elif card.x is None and not problem.deck.has(model.Impact):
@@ -172,13 +172,15 @@ def blank_radius(problem: Problem) -> Reports:
     x, y = problem.mesh.coordinates[problem.deck.require(model.Impact).node - 1]
     if math.hypot(card.y - x, card.load - y) >= math.hypot(card.x - x, card.y - y):
         return
-    shape, _, *others = (text for _, text in card.source.card.cut(card.source.fields))
+    shape, _, *texts = (text for _, text in card.source.card.cut(card.source.fields))
     message = (
         f"The radius on PATC is blank; the values after it are the centre ({card.x:g}, {card.y:g}) "
         f"and a static load of {card.load:g}."
     )
-    meant = ",".join([shape, *others])
-    hint = f"if {card.x:g} is the radius, the card is `{meant}`: a comma ends a field, no columns"
+    corrected = ",".join([shape, *texts])
+    hint = (
+        f"if {card.x:g} is the radius, the card is `{corrected}`: a comma ends a field, no columns"
+    )
     yield Report(message, card.place("radius c"), hint)
 
 

@@ -56,8 +56,10 @@ def large_preload(problem: Problem) -> Reports:
     if largest > LARGEST_STRAIN:
         factor = in_si(FORCE, unit_names(problem.deck))
         force = max(map(abs, card.forces))
-        known = "" if factor is None else f", up to {force * factor:.3g} N/m in the units of UNIT,"
-        message = f"The preload of PREL{known} strains the plate by {largest:.2%}."
+        in_newtons = (
+            "" if factor is None else f", up to {force * factor:.3g} N/m in the units of UNIT,"
+        )
+        message = f"The preload of PREL{in_newtons} strains the plate by {largest:.2%}."
         hint = "N0 is a stress times the thickness: N/mm in mm and N; 1 N/mm is 1000 N/m"
         yield Report(message, card.place(), hint)
 
@@ -73,8 +75,8 @@ def preload_of_unlike_laminates(problem: Problem) -> Reports:
     card = problem.deck.last(model.Preload)
     if card is None or not any(card.forces):
         return
-    first, *others = (problem.plate.laminates[n].A for n in problem.used_laminates)
-    if any(np.abs(A - first).max() > ROUNDING * np.abs(first).max() for A in others):
+    first, *other_stiffnesses = (problem.plate.laminates[n].A for n in problem.used_laminates)
+    if any(np.abs(A - first).max() > ROUNDING * np.abs(first).max() for A in other_stiffnesses):
         message = "The laminates differ in A: a force in the plane is not uniform, as PREL says."
         hint = "preload it by a static solution before the impact, with NONL: FORC, TANG to CONV"
         yield Report(message, card.place(), hint)

@@ -92,10 +92,10 @@ def no_interlaminar_stresses(problem: Problem) -> Reports:
     Remedy: 9-node quadrilaterals.
     """
     cards = _cards(problem, "PLYS", "FAIL")
-    others = np.flatnonzero(~is_complete(problem.mesh.elements))
-    if cards and len(others):
-        what = f"Interlaminar stresses of {len(others)} elements without nine nodes"
-        message = f"{what} are not computed (element {others[0] + 1} first): they are NaN."
+    incomplete = np.flatnonzero(~is_complete(problem.mesh.elements))
+    if cards and len(incomplete):
+        what = f"Interlaminar stresses of {len(incomplete)} elements without nine nodes"
+        message = f"{what} are not computed (element {incomplete[0] + 1} first): they are NaN."
         yield Report(message, cards[0].place("macro"))
 
 
@@ -154,8 +154,8 @@ def _unused_segment(problem: Problem) -> model.Segment | None:
     """Return the first segment of an impact in a deck whose program has no RODP."""
     if "RODP" in _movers(problem):
         return None
-    found = (problem.deck.last(kind) for kind in OF_AN_IMPACT)
-    return next((segment for segment in found if segment is not None), None)
+    segments = (problem.deck.last(kind) for kind in OF_AN_IMPACT)
+    return next((segment for segment in segments if segment is not None), None)
 
 
 def _storing_at_rest(problem: Problem) -> Macro | None:

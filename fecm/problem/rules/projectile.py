@@ -134,10 +134,10 @@ def doubtful_mass(problem: Problem) -> Reports:
         return
     mass, names = projectile.total_mass, unit_names(deck)
     message = f"The projectile's mass {mass:.4g} is {ratio:.3g} times the plate's"
-    own = in_si(MASS, names)
-    usual = USUAL_MASS_RATIO * mass / ratio * (own or 1.0)
+    size = in_si(MASS, names)
+    usual = USUAL_MASS_RATIO * mass / ratio * (size or 1.0)
     in_inches = names.get("length") == "in"
-    if not in_inches and own is not None and (looks := looks_like(mass, MASS, usual, names)):
+    if not in_inches and size is not None and (looks := looks_like(mass, MASS, usual, names)):
         message += f"; it {looks}"
     card, impact = deck.last(model.Projectile), deck.require(model.Impact)
     place = impact.place("impact node") if card is None else card.place("length or mass")

@@ -190,8 +190,8 @@ def _loss_within_program(problem: Problem) -> tuple[float, float]:
 
 
 def _damping_hint(problem: Problem) -> str:
-    one = f"a = 2 zeta omega, about {0.02 * clamped_frequency(problem):.2g} for zeta = 1 %"
-    return f"a is in 1/time: {one} of the lowest mode"
+    example = f"a = 2 zeta omega, about {0.02 * clamped_frequency(problem):.2g} for zeta = 1 %"
+    return f"a is in 1/time: {example} of the lowest mode"
 
 
 @rule("W479", Subject.DAMAGE)

@@ -124,12 +124,12 @@ def unit_of_another_kind(card: model.Units) -> Reports:
     Remedy: Length, force and time in this order: `mm N s`.
     """
     kinds = {**{kind: tuple(units) for kind, units in KNOWN.items()}, **OTHERS}
-    for wanted, name in zip(card.NAMES, (card.length, card.force, card.time), strict=True):
-        kind = next((kind for kind, units in kinds.items() if name in units), wanted)
-        if name in KNOWN[wanted] or kind == wanted:
+    for dimension, name in zip(card.NAMES, (card.length, card.force, card.time), strict=True):
+        kind = next((kind for kind, units in kinds.items() if name in units), dimension)
+        if name in KNOWN[dimension] or kind == dimension:
             continue
-        message = f"`{name}` on UNIT is a unit of {kind}, not of {wanted}"
-        if wanted == "force" and (unit := force_of(name, card.length, card.time)):
+        message = f"`{name}` on UNIT is a unit of {kind}, not of {dimension}"
+        if dimension == "force" and (unit := force_of(name, card.length, card.time)):
             message += f"; with {card.length}, {name} and {card.time} the force is in {unit}"
         hint = "UNIT names the units of length, force and time in this order, as in mm N s"
         yield Report(f"{message}.", card.place(), hint)
@@ -167,7 +167,7 @@ def _judged(problem: Problem) -> list[tuple[str, Record, str, float]]:
     """Kind in :data:`REAL`, card, name and value of the fields that are judged."""
     deck = problem.deck
     ply = deck.require(model.Material).ply
-    layers = [layer for own in deck.layers.values() for layer in own]
+    layers = [layer for laminate in deck.layers.values() for layer in laminate]
     # Other materials may be cores, which are thicker than plies and softer than any matrix.
     plies = [layer for layer in layers if layer.material == MATERIAL] or layers
     thickest = max(plies, key=lambda layer: layer.thickness)

@@ -26,15 +26,15 @@ def _laminates(deck: model.Deck) -> tuple[model.NumberedLaminate, ...]:
     return () if card is None else card.laminates
 
 
-def unknown_material(number: int, known: set[int], place: CardPlace | None) -> Report:
+def unknown_material(number: int, known_numbers: set[int], place: CardPlace | None) -> Report:
     """Report a material that is not among those of the deck."""
-    numbers = ", ".join(map(str, sorted(known)))
+    numbers = ", ".join(map(str, sorted(known_numbers)))
     return Report(f"The deck has no material {number}.", place, f"its materials are {numbers}")
 
 
 def material_numbers(deck: model.Deck) -> set[int]:
     """Return the numbers of the materials."""
-    return {MATERIAL, *(one.number for one in _materials(deck))}
+    return {MATERIAL, *(material.number for material in _materials(deck))}
 
 
 @rule("E496", Subject.LAMINATE)
@@ -48,12 +48,12 @@ def number_taken(deck: model.Deck) -> Reports:
     heads = (("material", _materials(deck)), ("laminate", _laminates(deck)))
     for kind, numbered in heads:
         seen: set[int] = set()
-        for one in numbered:
-            if one.number <= MATERIAL or one.number in seen:
-                why = "taken" if one.number in seen else "that of MATE or less"
-                message = f"The number {one.number} of a {kind} is {why}."
-                yield Report(message, one.head.place(kind), f"a {kind} has a number from 2")
-            seen.add(one.number)
+        for item in numbered:
+            if item.number <= MATERIAL or item.number in seen:
+                why = "taken" if item.number in seen else "that of MATE or less"
+                message = f"The number {item.number} of a {kind} is {why}."
+                yield Report(message, item.head.place(kind), f"a {kind} has a number from 2")
+            seen.add(item.number)
 
 
 def _in_layers(deck: model.Deck) -> Iterator[model.Layer]:
@@ -72,10 +72,10 @@ def missing_material(deck: model.Deck) -> Reports:
 
     Remedy: The material's cards on MATS, or another number.
     """
-    known = material_numbers(deck)
+    numbers = material_numbers(deck)
     for layer in _in_layers(deck):
-        if layer.material not in known:
-            yield unknown_material(layer.material, known, layer.place("material"))
+        if layer.material not in numbers:
+            yield unknown_material(layer.material, numbers, layer.place("material"))
     for laminate in _laminates(deck):
         if not laminate.layers:
             message = f"Laminate {laminate.number} has no layers."
@@ -89,7 +89,7 @@ def invalid_zone(deck: model.Deck) -> Reports:
     Remedy: Elements up to NUMEL; laminate 1 is that of MATE, the others are those of LAMS.
     """
     card, count = deck.last(model.Zones), deck.control.numel
-    known = {MATERIAL, *(one.number for one in _laminates(deck))}
+    laminate_numbers = {MATERIAL, *(laminate.number for laminate in _laminates(deck))}
     for zone in () if card is None else card.records:
         last = zone.last or zone.first
         for number, name in ((zone.first, "first element"), (last, "last element")):
@@ -99,8 +99,8 @@ def invalid_zone(deck: model.Deck) -> Reports:
         if last < zone.first or zone.step < 0:
             message = f"A zone from element {zone.first} to {last} by {zone.step or 1} is empty."
             yield Report(message, zone.place("last element"), "a blank step is 1")
-        if zone.laminate not in known:
-            numbers = ", ".join(map(str, sorted(known)))
+        if zone.laminate not in laminate_numbers:
+            numbers = ", ".join(map(str, sorted(laminate_numbers)))
             message = f"The deck has no laminate {zone.laminate}."
             yield Report(message, zone.place("laminate"), f"its laminates are {numbers}")
 
@@ -115,10 +115,10 @@ def unused(problem: Problem) -> Reports:
     """
     deck = problem.deck
     in_layers = {layer.material for layers in deck.layers.values() for layer in layers}
-    for one in _materials(deck):
-        if one.number not in in_layers:
-            message = f"No layer of the plate has material {one.number}."
-            yield Report(message, one.head.place(), "a layer's material is in columns 21-25")
+    for material in _materials(deck):
+        if material.number not in in_layers:
+            message = f"No layer of the plate has material {material.number}."
+            yield Report(message, material.head.place(), "a layer's material is in columns 21-25")
     used = [number for n, number in enumerate(deck.layers) if n in problem.used_laminates]
     for laminate in _laminates(deck):
         if laminate.number not in used:
@@ -134,9 +134,9 @@ def _used(problem: Problem) -> list[tuple[int, LaminateSection]]:
 
 def _place(deck: model.Deck, number: int) -> CardPlace | None:
     """Return the position of the cards of a laminate."""
-    own = (one for one in _laminates(deck) if one.number == number)
-    if (found := next(own, None)) is not None:
-        return found.head.place()
+    matches = (item for item in _laminates(deck) if item.number == number)
+    if (laminate := next(matches, None)) is not None:
+        return laminate.head.place()
     return deck.require(model.Material).place()
 
 
