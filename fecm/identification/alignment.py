@@ -1,4 +1,4 @@
-"""A measured force beside that of a deck's own run: units, noise, onset and lags, before a fit."""
+"""Alignment of a measured force with the deck's own run: units, noise, onset and lags."""
 
 from __future__ import annotations
 
@@ -33,10 +33,10 @@ class IdentifyError(FecmError):
 
 
 def noise(force: Floats) -> float:
-    """Standard deviation of the noise of a force, from its second differences.
+    """Return the standard deviation of the noise of a force, from its second differences.
 
-    Of independent errors these have the variance 6 sigma^2; a smooth force hardly has any.  The
-    median makes the estimate robust against the few points where the force bends.
+    Second differences of independent errors have the variance 6 sigma^2; a smooth force hardly has
+    any. The median makes the estimate robust against the few points where the force bends.
 
     >>> values = np.random.default_rng(0).normal(size=4000)
     >>> round(noise(values + 1e-5 * np.arange(4000.0) ** 2), 1)
@@ -46,18 +46,18 @@ def noise(force: Floats) -> float:
 
 
 def contact_points(force: Floats) -> NDArray[np.bool_]:
-    """Points whose force is above the level of an onset."""
+    """Return a mask of the points whose force is above the level of an onset."""
     return np.asarray(force > level(force) * force.max())
 
 
 def level(force: Floats) -> float:
-    """Share of the peak that a force passes at its onset: above its noise."""
+    """Return the share of the peak that a force passes at its onset: above its noise."""
     share = CLEAR * noise(force) / float(force.max())
     return min(max(share, LEAST_LEVEL), MOST_LEVEL)
 
 
 def onset(time: Floats, force: Floats, share: float) -> float:
-    """First time at which a force and the next one are a share of the peak above the base line."""
+    """Return the first time at which two consecutive forces exceed a share of the peak."""
     base = min(float(np.median(force[:FIRST])), 0.5 * float(force.max()))
     above = force > base + share * (force.max() - base)
     both = np.flatnonzero(above[:-1] & above[1:])
@@ -65,9 +65,9 @@ def onset(time: Floats, force: Floats, share: float) -> float:
 
 
 def lags(measured: Measurement, clock: Floats, own: Floats) -> list[float]:
-    """Likely delays of a measurement: difference of the onsets, and largest cross-correlations.
+    """Return likely delays of a measurement: difference of onsets, and largest cross-correlations.
 
-    `clock` are the equally spaced times of the deck's own force.
+    `clock` has the equally spaced times of the deck's own force.
     """
     share = level(measured.force)
     found = [onset(measured.time, measured.force, share) - onset(clock, own, share)]
@@ -89,7 +89,7 @@ def lags(measured: Measurement, clock: Floats, own: Floats) -> list[float]:
 
 
 def _top(time: Floats, force: Floats) -> float:
-    """Time from the first to the last value above half of the peak."""
+    """Return the time from the first to the last value above half of the peak."""
     top = time[force > 0.5 * force.max()]
     return float(np.ptp(top)) if len(top) else 0.0
 
@@ -97,11 +97,7 @@ def _top(time: Floats, force: Floats) -> float:
 def check_measured(
     measured: Measurement, clock: Floats, own: Floats, units: Mapping[str, str]
 ) -> float:
-    """Compare peak and duration of a measurement with those of the deck's own run.
-
-    Returns the time that the own run is above half of its peak.  Raises IdentifyError if the
-    measured force is constant, StudyError if it is not a contact force in the deck's units.
-    """
+    """Compare peak and duration of a measurement with the deck's own run."""
     name, force, peak = measured.name, measured.force, float(own.max())
     width = _top(clock, own)
     if measured.column != "force":
@@ -130,7 +126,7 @@ def check_measured(
 
 
 def _cause(dimension: str, ratio: float, units: Mapping[str, str]) -> str:
-    """Likely cause of a measurement that is off by a factor, and the remedy."""
+    """Return the likely cause of a measurement that is off by a factor, and the remedy."""
     known, own = KNOWN[dimension], units.get(dimension, "")
     text = f"is the column in another unit of {dimension}?  Name the unit in its header"
     if own in known:

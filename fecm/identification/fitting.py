@@ -41,7 +41,7 @@ MOST_FITS = 4  # with fewer points each: those of the run of the deck depend on 
 
 
 def fitted(deck: Deck, values: Mapping[str, float]) -> Strike:
-    """Return the strike of a deck with values, without those of the record."""
+    """Return the strike of a deck with the fitted values of the deck, not those of the record."""
     case: Case = {name: v for name, v in values.items() if name not in OF_RECORD}
     check_names(case)
     return strike_of_case(deck, case)
@@ -62,7 +62,7 @@ class ForceModel(NamedTuple):
         return self.backend.outcomes(impacts, judged=judged)
 
     def histories(self, trials: Sequence[Mapping[str, float]]) -> tuple[Floats, Floats]:
-        """Times, from one duration before the contact on, and forces (times, trials)."""
+        """Return times, from one duration before the contact on, and forces (times, trials)."""
         found = self.outcome([fitted(self.deck, one) for one in trials], judged=False)
         assert found.force is not None
         failed = np.flatnonzero(~np.isfinite(found.force).all(axis=1))
@@ -76,7 +76,7 @@ class ForceModel(NamedTuple):
         return clock, forces if self.sensor is None else self.sensor(clock, forces)
 
     def at(self, time: Floats, trials: Sequence[Mapping[str, float]]) -> Floats:
-        """Measured forces that trial values mean, (times, trials)."""
+        """Return the measured forces that trial values predict, (times, trials)."""
         clock, forces = self.histories(trials)
         columns = [
             trial.get(OFFSET, 0.0) + np.interp(time - trial.get(DELAY, 0.0), clock, force)
@@ -95,13 +95,13 @@ class Scaling:
     high: Floats
 
     def values(self, x: Floats) -> dict[str, float]:
-        """Values of the parameters by name."""
+        """Return the values of the parameters by name."""
         middle = np.array(list(self.start.values()))
         found = np.where(self.size > 0.0, middle + self.size * x, middle * np.exp(x))
         return dict(zip(self.start, found.tolist(), strict=True))
 
     def slopes(self, x: Floats) -> Floats:
-        """Derivatives of the values."""
+        """Return the derivatives of the values."""
         return np.where(self.size > 0.0, self.size, list(self.values(x).values()))
 
 
@@ -136,12 +136,12 @@ class FittedPoints:
 
 
 def during_run(time: Floats, clock: Floats, delay: float) -> NDArray[np.bool_]:
-    """Measured times that the histories of a model have."""
+    """Return a mask of the measured times that the histories of a model cover."""
     return np.asarray(np.abs(time - delay) <= clock[-1] * (1.0 + 1e-9))
 
 
 def share_lost(force: Floats, inside: NDArray[np.bool_]) -> float:
-    """Share of the points of the contact that are outside the run of the deck."""
+    """Return the share of the points of the contact that are outside the run of the deck."""
     loaded = contact_points(force)
     return float(np.mean(~inside[loaded]))
 
@@ -149,9 +149,9 @@ def share_lost(force: Floats, inside: NDArray[np.bool_]) -> float:
 def fit_parameters(
     model: ForceModel, measured: Measurement, scaling: Scaling, x: Floats, evaluations: int
 ) -> FittedPoints | None:
-    """Fit parameters from x; the delay selects the points that the run of the deck has.
+    """Fit parameters from x; the delay selects the points that the run of the deck covers.
 
-    None if these are fewer than :data:`POINTS`.
+    Returns None if there are fewer than :data:`POINTS`.
     """
     clock, _ = model.histories([scaling.start])
 
@@ -187,7 +187,7 @@ def _least_squares(
 
     @lru_cache(maxsize=1)
     def evaluate(*given: float) -> tuple[Floats, Floats]:
-        """Force over peak and its Jacobian."""
+        """Return force over peak and its Jacobian."""
         x, steps = np.array(given), STEP * np.eye(len(given))
         up, down = np.minimum(x + steps, scaling.high), np.maximum(x - steps, scaling.low)
         forces = model.at(time, [scaling.values(row) for row in (x, *up, *down)]) / peak
@@ -217,7 +217,10 @@ def _least_squares(
 
 
 def covariance(found: FittedPoints) -> Floats:
-    """Covariance of the scaled parameters; IdentifyError if the residual doesn't determine them."""
+    """Return the covariance of the scaled parameters.
+
+    Raises IdentifyError if the residual does not determine them.
+    """
     names, peak = list(found.scaling.start), float(np.abs(found.force).max())
     jac = found.jacobian / peak
     columns = np.sqrt(np.sum(jac**2, axis=0))
@@ -252,9 +255,9 @@ def join_names(names: Sequence[str]) -> str:
 def parameter_bounds(
     name: str, start: float, sizes: Mapping[str, float]
 ) -> tuple[float, float, float]:
-    """Size of a parameter (0: exponential) and bounds of its x.
+    """Return the size of a parameter (0: exponential) and the bounds of its x.
 
-    `sizes` are a time of the delay, a force of the offset and an indentation of alpha_p.
+    `sizes` are a time for the delay, a force for the offset and an indentation for alpha_p.
     """
     bound = 1e3
     if name in OF_RECORD:

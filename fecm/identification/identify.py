@@ -1,4 +1,4 @@
-"""Fit parameters of an impact to a measured force history."""
+"""Fit of parameters of an impact to a measured force history."""
 
 from __future__ import annotations
 
@@ -74,10 +74,11 @@ def identify(
 ) -> Identification:
     """Fit parameters of an impact to a measured contact force.
 
-    The values of the deck are the start of the fit, by least squares with equal weights; a delay is
-    started from several lags.  Standard errors are those of independent errors of the measured
-    points, with the variance of the residual; errors of the model come in addition, of which
-    :attr:`Identification.plate_errors` are two.  The notes of the result are :class:`FecmWarning`.
+    The values of the deck are the start of the fit, by least squares with equal weights. A delay is
+    started from several lags. Standard errors hold for independent errors of the measured points,
+    with the variance of the residual. Errors of the model come in addition;
+    :attr:`Identification.plate_errors` has two of them. The notes of the result are
+    :class:`FecmWarning`.
 
     Parameters
     ----------
@@ -141,7 +142,7 @@ def identify(
 
 @lru_cache(maxsize=4)
 def _shared(deck: Deck) -> Backend:
-    """What computes impacts on the plate of a deck by its response."""
+    """Return the back end that computes impacts on the plate of a deck by its response."""
     problem = checked_problem(deck)
     if problem.deck.has(Nonlinear):
         raise StudyError(
@@ -165,7 +166,7 @@ def fit_deck(
 ) -> Identification:
     """Fit parameters of a deck to a measurement; see :func:`identify`.
 
-    `computed` is called with the number of forces whenever some have been computed.
+    `computed` is called with the number of new trial forces.
     """
     if not free or not set(free) <= set(FREE) or len(set(free)) < len(free):
         given = ", ".join(map(str, free)) or "none"
@@ -185,7 +186,7 @@ def fit_deck(
     sizes = {DELAY: width, OFFSET: UNIT_OFFSET * float(own.max()), "alpha_p": depth}
 
     def best(names: Sequence[str], by: ForceModel = model) -> FittedPoints | None:
-        """The best fit of all starts of the delay; None if the run of the deck is too short."""
+        """Return the best fit over all starts of the delay; None if the deck's run is too short."""
         known = {name: _start(deck, name) for name in names}
         trials = [{**known, DELAY: lag} for lag in starts] if DELAY in names else [known]
         scalings, x = [_scaling(one, sizes) for one in trials], np.zeros(len(names))
@@ -204,7 +205,7 @@ def fit_deck(
         raise StudyError(f"{measured.name}: {_outside(free, starts[0], width, units)}")
 
     def filtered(filter: Filter) -> FittedPoints | None:
-        """The best fit of a run behind a filter."""
+        """Return the best fit of a run behind a filter."""
         return best(free, model._replace(sensor=filter))
 
     fault, suspicion = proposal(model, found, lambda: best([*free, DELAY]), filtered, units)
@@ -220,7 +221,7 @@ def fit_deck(
 def _identification(
     model: ForceModel, measured: Measurement, found: FittedPoints, cov: Floats, fault: str
 ) -> Identification:
-    """Values, errors and notes of a fit; `fault` is why it is not accepted."""
+    """Return values, errors and notes of a fit; `fault` is the reason to reject it."""
     deviation = np.sqrt(np.diagonal(cov))
     correlation = cov / np.outer(deviation, deviation)
     np.fill_diagonal(correlation, 1.0)
@@ -252,7 +253,7 @@ def _identification(
 
 
 def _rank(found: FittedPoints | None) -> tuple[bool, float]:
-    """Order of fits: those with the points of the contact, then by their residuals."""
+    """Return the sort key of a fit: fits with the points of the contact first, then by residual."""
     return (True, math.inf) if found is None else (found.lost > LOST, found.variance)
 
 
@@ -290,7 +291,7 @@ def _start(deck: Deck, name: str) -> float:
 def _notes(
     found: Identification, solution: FittedPoints, given: Measurement, model: ForceModel
 ) -> Iterator[str]:
-    """Reasons to doubt the values: those of the fit, and those of the run of the fitted deck."""
+    """Yield reasons to doubt the values, from the fit and from the run of the fitted deck."""
     if not found.converged:
         yield "the fit has not converged; start from better values in the deck"
     if out := len(given.time) - len(found.time):

@@ -1,4 +1,4 @@
-"""What speaks against a fit: a delay, an offset or a filter left out, another model, the plate."""
+"""Reasons against a fit: a missing delay, offset or filter, another model, the plate."""
 
 from __future__ import annotations
 
@@ -46,12 +46,12 @@ PROPERTIES = ("thickness", "e1")
 
 
 def neighbour_correlation(residual: Floats) -> float:
-    """Correlation of neighbouring residuals."""
+    """Return the correlation of neighbouring residuals."""
     return float(residual[1:] @ residual[:-1] / (residual @ residual))
 
 
 def sign_runs(residual: Floats) -> float:
-    """Number of runs of equal signs, in standard deviations from that of independent errors.
+    """Return the number of runs of equal signs, in standard deviations from independent errors.
 
     Wald and Wolfowitz 1940; 0 if all signs are equal.
 
@@ -70,7 +70,7 @@ def sign_runs(residual: Floats) -> float:
 
 
 def coloured(found: FittedPoints) -> bool:
-    """Whether the residual has a shape, and is not as small as the errors of arithmetic."""
+    """Return whether the residual has a shape, and exceeds the errors of arithmetic."""
     return not _faint(found) and neighbour_correlation(found.residual) > COLOURED
 
 
@@ -105,17 +105,17 @@ def _describes(residual: Floats, force: Floats) -> bool:
 
 
 class LargerFit(NamedTuple):
-    """A fit with more parameters."""
+    """Fit with more parameters."""
 
     added: dict[str, float]  # values of the added parameters
     residual: Floats
     certain: bool  # whether each added value is beyond its noise
 
     def explains(self, before: Floats, force: Floats) -> bool:
-        """Whether the model describes the force with less than half of a systematic residual.
+        """Return whether the model describes the force.
 
-        The systematic part is estimated by the covariance of neighbours, in which noise of
-        independent points has no part.
+        Less than half of a systematic residual may remain. The covariance of neighbours estimates
+        the systematic part; noise of independent points has no share in it.
         """
         first = float(before[1:] @ before[:-1]) / len(before)
         rest = float(self.residual[1:] @ self.residual[:-1]) / len(self.residual)
@@ -131,12 +131,12 @@ def proposal(
     filtered: Callable[[Filter], FittedPoints | None],
     units: dict[str, str],
 ) -> tuple[str, str]:
-    """Propose to fit a delay or an offset too, or to name a filter; and a note of a likely filter.
+    """Propose to fit a delay or an offset too, or to name a filter, and note a likely filter.
 
-    Both are empty if nothing explains the residual.  Linearised fits come first; if the residual
-    has a shape, `refit` fits the delay too, from several starts, and `filtered` fits with the most
-    likely filter of first order.  A filter that lowers the residual by more than chance, but does
-    not explain half of its shape, is a note.
+    Both texts are empty if nothing explains the residual. Linearised fits come first. If the
+    residual has a shape, `refit` fits the delay too, from several starts, and `filtered` fits with
+    the most likely filter of first order. A filter that lowers the residual by more than chance,
+    but does not explain half of its shape, is a note.
     """
     trial, text = _of_record(model, found, refit, units)
     other, sensor = _filter(model, found, filtered)
@@ -161,7 +161,7 @@ def _of_record(
     refit: Callable[[], FittedPoints | None],
     units: dict[str, str],
 ) -> tuple[LargerFit | None, str]:
-    """A delay or an offset that explains the residual, and the proposal; empty without."""
+    """Return a delay or an offset that explains the residual, and the proposal; else empty."""
     before = found.residual
     missing = [name for name in (OFFSET, DELAY) if name not in found.scaling.start]
     choices = [[name] for name in missing] + ([missing] if len(missing) > 1 else [])
@@ -185,7 +185,7 @@ def _of_record(
 def _filter(
     model: ForceModel, found: FittedPoints, filtered: Callable[[Filter], FittedPoints | None]
 ) -> tuple[LargerFit | None, Filter]:
-    """The fit with the likeliest filter of first order; None if it is no better than by chance."""
+    """Return the fit with the likeliest filter of first order; None if chance explains it."""
     none = Filter(FilterKind.FIRST_ORDER, 0.0)
     if model.sensor is not None or _faint(found):
         return None, none
@@ -193,7 +193,7 @@ def _filter(
     width = float(np.ptp(top)) if len(top) else 0.0
 
     def rest(rise: float) -> float:
-        """Squares that are left if the linearised fit has a filter."""
+        """Return the remaining squares if the linearised fit has a filter."""
         own = model._replace(sensor=Filter(FilterKind.FIRST_ORDER, rise))
         residual = found.force - own.at(found.time, [found.values])[:, 0]
         x = np.linalg.lstsq(found.jacobian, residual, rcond=None)[0]
@@ -217,7 +217,7 @@ def _filter(
 
 
 def is_runs_few(found: FittedPoints) -> bool:
-    """Whether the residual changes its sign less often than chance explains."""
+    """Return whether the residual changes its sign less often than chance explains."""
     return not _faint(found) and sign_runs(found.residual) < FEW_RUNS
 
 
@@ -253,15 +253,16 @@ def _told(trial: LargerFit, before: Floats, units: dict[str, str]) -> str:
 
 
 def _fall(trial: LargerFit, before: Floats, units: dict[str, str]) -> str:
-    """How much smaller the residual of a trial is."""
+    """Return how much smaller the residual of a trial is."""
     force = f"{_rms(trial.residual):.3g} {unit_of('force', units)}".rstrip()
     return f"the rms of the residual falls from {_rms(before):.3g} to {force}"
 
 
 def _out_of_contact(model: ForceModel, found: FittedPoints) -> float:
-    """Median force before the contact, or after it; 0 if it is noise, or there is no such time.
+    """Return the median force before the contact, or after it; 0 if it is noise.
 
-    After the contact the force must have no shape, which another model could explain.
+    It is also 0 if there is no such time. After the contact the force must have no shape, which
+    another model could explain.
     """
     without = {**found.values, OFFSET: 0.0}
     model_force = model.at(found.time, [without])[:, 0]
@@ -288,9 +289,9 @@ def _out_of_contact(model: ForceModel, found: FittedPoints) -> float:
 def plate_errors(
     model: ForceModel, found: FittedPoints, runs: Callable[[Deck], ForceModel]
 ) -> dict[str, dict[str, float]]:
-    """Changes of the fitted values with 1 % more thickness, or E1, of the plate in the deck.
+    """Return the changes of the fitted values with 1 % more thickness, or E1, of the deck's plate.
 
-    The fit is linearised.  `runs` gives the model of another deck.  A property is left out if the
+    The fit is linearised. `runs` returns the model of another deck. A property is left out if the
     plate can't be run with the time step of the deck.
     """
     material = model.deck.require(Material)

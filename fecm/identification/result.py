@@ -1,4 +1,4 @@
-"""Result of a fit to a measured force, and the tables that terminals, notebooks and pages show."""
+"""Result of a fit to a measured force, and its tables."""
 
 from __future__ import annotations
 
@@ -98,7 +98,7 @@ class Identification:
         return unit_names(self.deck)
 
     def unit(self, name: str) -> str:
-        """Unit of a fitted value; empty for a pure number, or if the deck names no units.
+        """Return the unit of a fitted value; empty for a pure number, or without named units.
 
         Raises
         ------
@@ -137,7 +137,7 @@ class Identification:
         report_results({"the measurement": self}, path, overwrite=overwrite)
 
     def cards(self) -> str:
-        """Cards of the deck with fitted values."""
+        """Return the cards of the deck with fitted values."""
         kinds = dict.fromkeys(CARDS[name] for name in self.values if name in CARDS)
         segments = (self.deck.require(kind) for kind in kinds)
         return "\n".join(line for s in segments for line in s.cards(self.deck.control)).rstrip()
@@ -171,7 +171,7 @@ class Identification:
         return f"<fecm identification of {', '.join(self.values)}: {verdict}>"
 
     def _repr_html_(self) -> str:
-        """Tables of the fit and its notes, for notebooks."""
+        """Return tables of the fit and its notes, for notebooks."""
         notes = (Table(tuple(("note", note) for note in self.notes)),) if self.notes else ()
         return html_table(*identification_tables(self), *notes)
 

@@ -1,4 +1,7 @@
-"""Least squares for the place and the history of a force, and what of it the strains determine."""
+"""Least squares for the place and the history of a force.
+
+The strains do not determine every value of the force; the standard errors decide which.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +39,7 @@ class PlaceTrial(NamedTuple):
 
     @property
     def active(self) -> Bools:
-        """Hats that the force has, (hats,)."""
+        """Mask of the hats that the force has, (hats,)."""
         return np.asarray(self.force > 0.0)
 
     @property
@@ -62,7 +65,7 @@ class Errors(NamedTuple):
 
 @dataclass(frozen=True)
 class LocationFit:
-    """Least squares of a model, and what is fitted besides place and force."""
+    """Least squares of a model, with the parameters that are fitted besides place and force."""
 
     model: StrainModel
     side: float  # of an element
@@ -70,7 +73,7 @@ class LocationFit:
     gains: bool = False
 
     def at(self, x: float, y: float, shift: float = 0.0, gains: Floats | None = None) -> PlaceTrial:
-        """Best force at a place.
+        """Return the best force at a place.
 
         Raises PatchError or OutsideError if the force is not on the plate.
         """
@@ -84,7 +87,7 @@ class LocationFit:
         return PlaceTrial(x, y, shift, own, force, design, residual, square)
 
     def halved(self) -> LocationFit | None:
-        """The fit with hats of half the width; None if strains or responses are too few."""
+        """Return the fit with hats of half the width; None if strains or responses are too few."""
         parts, odd = divmod(self.model.width // self.model.unit, 2)
         if odd or not parts:
             return None
@@ -95,19 +98,19 @@ class LocationFit:
         return replace(self, model=half)
 
     def deviation(self, trial: PlaceTrial) -> float:
-        """Standard deviation of the residual."""
+        """Return the standard deviation of the residual."""
         seen = self.model.observation
         parameters = self._others(trial) + int(trial.active.sum())
         return math.sqrt(trial.square / max(1, seen.count - parameters))
 
     def _others(self, trial: PlaceTrial) -> int:
-        """Number of fitted parameters besides the force."""
+        """Return the number of fitted parameters besides the force."""
         return 2 + self.shift + self.gains * (len(trial.gains) - 1)
 
     def jacobian(self, trial: PlaceTrial) -> Floats:
-        """Strains per x, y, shift, gains, as far as they are fitted, and active hat.
+        """Return the strains per x, y, shift, gains, as far as they are fitted, and active hat.
 
-        (values, parameters); the gains change without their product.
+        The result is (values, parameters). The gains change without their product.
         """
         h, t = STEP * self.side, 0.5 * self.model.observation.interval
         columns = [self._slope(trial, h, 0.0, 0.0), self._slope(trial, 0.0, h, 0.0)]
@@ -120,9 +123,9 @@ class LocationFit:
         return np.hstack([others, trial.basis[:, trial.active]])
 
     def _slope(self, trial: PlaceTrial, dx: float, dy: float, dt: float) -> Floats:
-        """Strains per length or time in one direction, (gages, rows).
+        """Return the strains per length or time in one direction, (gages, rows).
 
-        Central differences; at an edge of the plate one-sided ones, and 0 between two edges.
+        Differences are central, one-sided at an edge of the plate, and 0 between two edges.
         """
         ends, reach = [], 0.0
         for sign in (1.0, -1.0):
@@ -136,7 +139,10 @@ class LocationFit:
         return np.asarray((ends[0] - ends[1]) / (max(reach, 1.0) * (dx + dy + dt)))
 
     def refined(self, start: PlaceTrial, box: Floats) -> PlaceTrial:
-        """Gauss-Newton iteration from a trial; the place stays in a box, lowest and highest."""
+        """Refine a trial by Gauss-Newton iteration; the place stays in a box.
+
+        The box has the lowest and the highest coordinates.
+        """
         best = start
         for _ in range(PASSES):
             jacobian = self.jacobian(best)
@@ -152,7 +158,7 @@ class LocationFit:
         return best
 
     def _lower(self, best: PlaceTrial, change: Floats, box: Floats) -> PlaceTrial | None:
-        """A trial with a smaller misfit along a change; None if there is none."""
+        """Return a trial with a smaller misfit along a change, or None."""
         for halving in range(HALVINGS):
             part = 0.5**halving
             x, y = np.clip(np.array([best.x, best.y]) + part * change[:2], *box).tolist()
@@ -173,10 +179,10 @@ class LocationFit:
         return None
 
     def errors(self, trial: PlaceTrial, noise: float, change: Floats | None = None) -> Errors:
-        """Standard errors by the Cramer-Rao bound, with a standard deviation of the strains.
+        """Return standard errors by the Cramer-Rao bound for a standard deviation of the strains.
 
-        `change` are the strains by which another model of the plate, with less error, differs,
-        (gages, rows).  The place that would be fitted to them is added as an error.
+        `change` has the strains by which a more exact model of the plate differs, (gages, rows).
+        The shift of the place that is fitted to them is added as an error.
         """
         jacobian = self.jacobian(trial)
         idle = trial.basis[:, ~trial.active]
@@ -208,13 +214,13 @@ class LocationFit:
 
 
 def scales(matrix: Floats) -> Floats:
-    """Norms of columns, 1 of those that are 0."""
+    """Return the norms of columns, 1 for norms that are 0."""
     size = np.linalg.norm(matrix, axis=0)
     return np.where(size > 0.0, size, 1.0)
 
 
 def non_negative(matrix: Floats, values: Floats) -> Floats:
-    """Least squares with coefficients that are not negative, (columns,)."""
+    """Solve least squares with coefficients that are not negative, (columns,)."""
     from scipy.optimize import nnls  # takes 0.2 s to import
 
     size = np.linalg.norm(matrix, axis=0)
@@ -228,7 +234,7 @@ def non_negative(matrix: Floats, values: Floats) -> Floats:
 
 
 def ratios(gages: int) -> Floats:
-    """Orthonormal changes of the logarithms of gains that keep their sum, (gages - 1, gages)."""
+    """Return orthonormal changes of logarithms of gains that keep their sum, (gages - 1, gages)."""
     rows = np.tri(gages - 1, gages) - np.diag(np.arange(1.0, gages), 1)[: gages - 1]
     return np.asarray(rows / np.linalg.norm(rows, axis=1, keepdims=True))
 
@@ -243,10 +249,10 @@ DRAWS = 2000  # of the bias of a peak
 
 
 def is_determined(error: Floats) -> Bools:
-    """Whether a force is determined at the peaks of hats, by its standard errors there.
+    """Return whether the standard errors determine a force at the peaks of hats.
 
     A force shortly before the end of the record has hardly reached a gage: its standard error is
-    far above those of the others.
+    far above the others.
     """
     return np.asarray(error <= UNCERTAIN * float(np.percentile(error, USUAL)))
 
@@ -269,7 +275,7 @@ class Force(NamedTuple):
 def judged_force(time: Floats, force: Floats, errors: Errors, basis: float) -> Force:
     """Judge a force and its errors at the peaks of hats.
 
-    What is determined, and the end of the contact, follow from the noise; the standard deviations
+    The determined values and the end of the contact follow from the noise. The standard deviations
     include the change of the force with the strains of another model.
     """
     error, covariance, change = errors.force, errors.covariance, errors.force_change
@@ -296,11 +302,10 @@ def judged_force(time: Floats, force: Floats, errors: Errors, basis: float) -> F
 
 
 def _end(force: Floats, covariance: Floats, top: int) -> int | None:
-    """First hat after which the force has no impulse beyond its noise; None if there is none.
+    """Return the first hat after which the force has no impulse beyond its noise, or None.
 
-    The force may be small for long, and each of its values below its noise.  Their sums show it:
-    that of no number of hats that follow, for a third of the time of the contact, may be beyond
-    its standard error.
+    The force may be small for long, with each of its values below its noise. Sums show it: no sum
+    over the following hats, for a third of the time of the contact, may exceed its standard error.
     """
     first = int(np.argmax(force > ONSET * force[top]))
     for hat in range(top + 1, len(force)):
@@ -317,7 +322,7 @@ def _end(force: Floats, covariance: Floats, top: int) -> int | None:
 
 
 def _bias(force: Floats, covariance: Floats) -> float:
-    """Mean difference of the largest of forces with errors from the largest without."""
+    """Return the mean excess of the largest force with errors over the largest without errors."""
     squares, axes = np.linalg.eigh(covariance)
     root = axes * np.sqrt(np.maximum(squares, 0.0))
     draws = np.random.default_rng(0).normal(size=(DRAWS, len(force))) @ root.T

@@ -1,4 +1,4 @@
-"""Locate an impact from the strains of gages."""
+"""Location of an impact from the strains of gages."""
 
 from __future__ import annotations
 
@@ -40,12 +40,13 @@ def locate(
 ) -> Location:
     """Locate an impact, and find its force history, from the strains of gages.
 
-    The plate is linear: the strain of a gage is the sum of its responses to the force.  One run of
-    the plate a gage gives these for a force anywhere (reciprocity).  The force is a sum of hats and
-    nowhere negative; its history follows from least squares at every candidate place, and the place
-    from a Gauss-Newton iteration that starts at the best ones.  The plate is at rest before time 0
-    of the table, or its first time if that is negative.  The notes of the result are
-    :class:`FecmWarning`.
+    The plate is linear: the strain of a gage is the sum of its responses to the force. One run of
+    the plate per gage gives these for a force anywhere (reciprocity). The force is a sum of hats
+    and nowhere negative. Least squares give its history at every candidate place, and a
+    Gauss-Newton iteration from the best candidates gives the place.
+
+    The plate is at rest before time 0 of the table, or before its first time if that is negative.
+    The notes of the result are :class:`FecmWarning`.
 
     Parameters
     ----------
@@ -149,7 +150,7 @@ class Searched(NamedTuple):
 def _cause(
     problem: Problem, table: StrainTable, options: LocationSettings, searched: Searched
 ) -> Cause | None:
-    """What may be wrong with strains that the model does not describe."""
+    """Return the likely cause of strains that the model does not describe."""
     fit, best, region = searched
     cause = likely_cause(fit, best, region, options.grid, table.gages.tolist())
     if options.shift or (cause is not None and cause.ratio > CERTAIN):
@@ -174,7 +175,7 @@ def _location(
     fitted: tuple[LocationFit, Timing],
     minima: SearchResult,
 ) -> Location:
-    """Errors, verdict and notes of a fit."""
+    """Return the location with errors, verdict and notes of a fit."""
     (fit, times), found = fitted, minima.best
     rms = fit.deviation(found)
     noise = options.noise or rms
@@ -231,7 +232,7 @@ def _location(
 def _finer_mesh(
     problem: Problem, table: StrainTable, fitted: tuple[LocationFit, Timing], found: PlaceTrial
 ) -> Floats | None:
-    """Error of the strains by the deck's mesh, (gages, rows); None if it is unknown."""
+    """Return the error of the strains due to the mesh, (gages, rows); None if not known."""
     fit, times = fitted
     history = (
         np.append(0.0, fit.model.knots(0.0)),

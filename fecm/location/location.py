@@ -1,4 +1,4 @@
-"""The place and the force of an impact as strain gages show them, and their files."""
+"""Location: the place and the force of an impact from strain gages, and its file."""
 
 from __future__ import annotations
 
@@ -79,7 +79,7 @@ OF_PLACE = (
 
 
 class Candidate(NamedTuple):
-    """A place, and its misfit over that of the place found."""
+    """Place with its misfit over the misfit of the located place."""
 
     x: float
     y: float
@@ -90,9 +90,9 @@ class Candidate(NamedTuple):
 class Location:
     """Place and force history of an impact, located from strain gages.
 
-    Standard deviations are those of independent errors of the strains with the standard deviation
-    `noise` times `misfit`, if that is above 1 (Cramér-Rao bound), and of the mesh, by the strains
-    of elements half as long.  Other errors of the model come in addition.
+    Standard deviations are computed for independent errors of the strains with the standard
+    deviation `noise`, times `misfit` if that is above 1 (Cramér-Rao bound), and for the error of
+    the mesh, from the strains of elements half as long. Other errors of the model come in addition.
 
     Attributes
     ----------
@@ -216,9 +216,9 @@ class Location:
 
     @property
     def energy_bound(self) -> float | None:
-        """Energy of a projectile of `mass` that the impulse I just stops, I^2/2m; None without it.
+        """Energy I^2/2m of a projectile of `mass` that the impulse I just stops; None without it.
 
-        A projectile that rebounds had less energy, one that moves on had more.
+        A projectile that rebounds had less energy, one that continues had more.
         """
         return None if self.mass is None else self.impulse**2 / (2.0 * self.mass)
 
@@ -228,7 +228,7 @@ class Location:
         return unit_names(self.deck)
 
     def unit(self, name: str) -> str:
-        """Unit of an attribute; empty for a pure number, or if the deck names no units.
+        """Return the unit of an attribute; empty for a pure number, or if the deck names no units.
 
         Raises
         ------
@@ -240,7 +240,7 @@ class Location:
         return unit_of(DIMENSIONS.get(name, ""), self.units)
 
     def ellipse(self, level: float = 0.95) -> Floats:
-        """Closed polygon around the confidence region of the place, (points, 2).
+        """Return a closed polygon around the confidence region of the place, (points, 2).
 
         Parameters
         ----------
@@ -353,18 +353,18 @@ class Location:
         return f"<fecm location at ({self.x:.4g}, {self.y:.4g}): {verdict}>"
 
     def _repr_html_(self) -> str:
-        """Table of the location and its notes, for notebooks."""
+        """Return a table of the location and its notes, for notebooks."""
         rows = (*location_table(self).rows, *(("note", note) for note in self.notes))
         return html_table(Table(rows, title=repr(self)[1:-1]))
 
     def _about(self) -> dict[str, Any]:
-        """Attributes of the file."""
+        """Return the attributes of the file."""
         units = {f"unit_{name}": unit for name, unit in self.units.items()}
         heading = schema.heading(schema.Form.LOCATION, self.deck.title)
         return {**heading, "notes": list(self.notes), **units}
 
     def _of_place(self) -> dict[str, Any]:
-        """Attributes of the group of the place."""
+        """Return the attributes of the group of the place."""
         second = {} if self.second is None else self.second._asdict()
         return {
             **self._present(*OF_PLACE),
@@ -374,7 +374,7 @@ class Location:
         }
 
     def _present(self, *names: str) -> dict[str, Any]:
-        """Attributes of these names that are not None."""
+        """Return the attributes of these names that are not None."""
         values = {name: getattr(self, name) for name in names}
         return {name: value for name, value in values.items() if value is not None}
 
@@ -433,7 +433,7 @@ def location_table(location: Location) -> Table:
 
 
 def _mesh(location: Location) -> str:
-    """How far a finer mesh moves the place."""
+    """Say how far a finer mesh moves the place."""
     if location.mesh_error is None:
         return "its error is unknown"
     moved = quantity(location.mesh_error, location.unit("mesh_error"), 2)
@@ -441,14 +441,14 @@ def _mesh(location: Location) -> str:
 
 
 def _with_error(location: Location, name: str) -> str:
-    """A value with its standard deviation, if that is known."""
+    """Format a value with its standard deviation, if it is known."""
     error = getattr(location, f"sd_{name}")
     spread = "" if error is None else f" ± {error:.2g}"
     return f"{getattr(location, name):.5g}{spread} {location.unit(name)}".rstrip()
 
 
 def _end(location: Location) -> float:
-    """Time until which the impulse is taken."""
+    """Return the end of the time over which the impulse is taken."""
     return location.determined_until if location.contact_end is None else location.contact_end
 
 
@@ -482,7 +482,10 @@ def load_location(path: str | Path | AnyFile) -> Location:
 
 
 def location_of(contents: FileContents) -> Location:
-    """Create a location from the contents of its file; ResultFileError if it is incomplete."""
+    """Create a location from the contents of its file.
+
+    Raises ResultFileError if it is incomplete.
+    """
     try:
         arrays = _arrays(contents)
         place, force = (contents.groups[name] for name in ("locate", "locate/force"))
@@ -509,7 +512,10 @@ def location_of(contents: FileContents) -> Location:
 
 
 def _arrays(contents: FileContents) -> dict[str, Any]:
-    """Arrays by the attribute of a location; KeyError or ValueError if one is missing or wrong."""
+    """Return the arrays by attribute of a location.
+
+    Raises KeyError or ValueError if an array is missing or wrong.
+    """
     from fecm.results.hdf5_reader import first_misfit  # h5py takes 60 ms to import
 
     arrays = {name: contents[path] for name, path in PATHS.items()}
@@ -526,12 +532,15 @@ def _arrays(contents: FileContents) -> dict[str, Any]:
 
 
 def _optional(attributes: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:
-    """Finite floats among attributes by name, None for those that are missing."""
+    """Return finite floats among attributes by name; missing ones are None."""
     return {name: _number(attributes, name) if name in attributes else None for name in names}
 
 
 def _number(attributes: Mapping[str, Any], name: str) -> Any:
-    """A finite float among attributes; ValueError if it is none."""
+    """Return a finite float among attributes.
+
+    Raises ValueError if it is not finite.
+    """
     value = float(attributes[name])
     if not math.isfinite(value):
         raise ValueError(name)

@@ -1,10 +1,10 @@
 """Strains of gages as functions of the place and the history of a force, and observations of them.
 
-The strain of a gage is b u, with the row b of its strain-displacement relation.  The plate is
-linear and its mass diagonal, so that u after n steps is P_n(M^-1 K) M^-1 g for an impulse on the
-nodal shares g, with a polynomial P_n: a symmetric matrix.  The strain after an impulse on g is
-therefore the sum of g times the displacement after an impulse on b.  One run a gage gives the
-strains of an impulse anywhere.
+The strain of a gage is b u, with the row b of its strain-displacement relation. The plate is linear
+and its mass diagonal, so that u after n steps is P_n(M^-1 K) M^-1 g for an impulse on the nodal
+shares g, with a polynomial P_n: a symmetric matrix. The strain after an impulse on g is therefore
+the sum of g times the displacement after an impulse on b. One run per gage gives the strains of an
+impulse anywhere.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ STENCIL = np.array([-1, 0, 1, 2])
 
 @dataclass(frozen=True)
 class Observation:
-    """Measured strains and the functions' values that they observe.
+    """Measured strains, and the values of the functions that they observe.
 
-    Many points are replaced by as many rows as there are samples, by an orthogonal transformation:
-    the sum of the squares of a residual is that of the rows plus `left`.
+    Many points are replaced by as many rows as there are samples, by an orthogonal transformation.
+    The sum of the squares of a residual is the sum over the rows plus `left`.
     """
 
     values: Floats  # (gages, rows)
@@ -62,7 +62,7 @@ class Observation:
         return len(self.values) * self.points
 
     def of(self, samples: Floats) -> Floats:
-        """Rows of functions with samples, (..., samples): (..., rows)."""
+        """Return the rows of functions with samples, (..., samples): (..., rows)."""
         if self.rows.ndim == 1:
             return samples[..., self.rows]
         *outer, count = samples.shape
@@ -88,9 +88,9 @@ def observe(time: Floats, strains: Floats, interval: float, count: int) -> Obser
 
 
 def interpolation(places: Floats, count: int) -> Floats:
-    """Cubic interpolation between samples at places, counted in samples, (places, samples).
+    """Return the cubic interpolation between samples at places, (places, samples).
 
-    The functions are 0 before their first sample.
+    Places are counted in samples. The functions are 0 before their first sample.
     """
     before = np.floor(places)
     part = places - before
@@ -111,7 +111,7 @@ def interpolation(places: Floats, count: int) -> Floats:
 
 
 def triangular(matrix: Floats) -> Floats:
-    """Triangular factor of a matrix with the same inner products of columns."""
+    """Return the triangular factor of a matrix with the same inner products of columns."""
     factor = np.zeros((0, matrix.shape[1]))
     step = max(BLOCK, matrix.shape[1])
     for start in range(0, len(matrix), step):
@@ -122,7 +122,7 @@ def triangular(matrix: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Footprint:
-    """Where a contact force acts: on a circle, or on a point without one."""
+    """Circle on which a contact force acts, or a point."""
 
     mesh: MeshArrays
     shape: str  # ``"DISC"`` or ``"HERT"``; empty for a point
@@ -130,7 +130,7 @@ class Footprint:
     held: Bools  # (nodes,): whether w is restrained
 
     def weights(self, x: float, y: float) -> Floats:
-        """Shares of the nodes in a unit force at a place, (nodes,).
+        """Return the shares of the nodes in a unit force at a place, (nodes,).
 
         Raises PatchError or OutsideError if the circle, or the point, is not on the plate.
         """
@@ -142,7 +142,7 @@ class Footprint:
 
 
 def point_weights(mesh: MeshArrays, x: float, y: float) -> Floats:
-    """Shape functions at a point, (nodes,): shares of the nodes in a unit force on it.
+    """Return the shape functions at a point, (nodes,): shares of the nodes in a unit force.
 
     Raises OutsideError if the point is not on the plate.
     """
@@ -161,8 +161,8 @@ def point_weights(mesh: MeshArrays, x: float, y: float) -> Floats:
 class StrainModel:
     """Strains of gages under a force at a place.
 
-    The force is a sum of hats, with their peaks `width` samples apart and the first peak that time
-    after the force's start.
+    The force is a sum of hats. Their peaks are `width` samples apart, and the first peak comes this
+    time after the start of the force.
     """
 
     footprint: Footprint
@@ -185,18 +185,18 @@ class StrainModel:
         return self.width * self.observation.interval
 
     def knots(self, shift: float) -> Floats:
-        """Times of the peaks of the hats, (hats,), of a force that starts at `shift`."""
+        """Return the times of the peaks of the hats, (hats,), of a force that starts at `shift`."""
         return shift + self.basis * np.arange(1.0, self.hats + 1.0)
 
     @cached_property
     def _kept(self) -> Indices:
-        """Row of every node among the kept ones; -1 without."""
+        """Row of every node among the kept nodes; -1 for other nodes."""
         rows = np.full(len(self.footprint.mesh.coordinates), -1, np.intp)
         rows[self.nodes] = np.arange(len(self.nodes))
         return rows
 
     def first_hat(self, x: float, y: float) -> Floats:
-        """Strains of the first hat of a force at a place, (gages, samples).
+        """Return the strains of the first hat of a force at a place, (gages, samples).
 
         Raises PatchError or OutsideError as :meth:`Footprint.weights`, and outside the region.
         """
@@ -210,7 +210,7 @@ class StrainModel:
         return self._of_width(narrow)
 
     def _of_width(self, narrow: Floats) -> Floats:
-        """Strains of a hat of the force from those of a hat of the responses: a sum of such."""
+        """Return the strains of a hat of the force as a sum of hats of the responses."""
         parts, count = self.width // self.unit, narrow.shape[1]
         wide = np.zeros_like(narrow)
         for part in range(1, 2 * parts):
@@ -221,7 +221,7 @@ class StrainModel:
         return wide
 
     def every_hat(self, x: float, y: float, shift: float) -> Floats:
-        """Samples of the strains of every hat of a force that starts at `shift`."""
+        """Return samples of the strains of every hat of a force that starts at `shift`."""
         first = self.first_hat(x, y)
         gages, count = first.shape
         if shift:
@@ -235,11 +235,11 @@ class StrainModel:
         return every
 
     def design(self, x: float, y: float, shift: float = 0.0) -> Floats:
-        """Observed strains per coefficient of the force, (gages, rows, hats)."""
+        """Return the observed strains per coefficient of the force, (gages, rows, hats)."""
         return self.observation.of(self.every_hat(x, y, shift)).swapaxes(1, 2)
 
     def strains(self, x: float, y: float, shift: float, force: Floats) -> Floats:
-        """Samples of the strains of a force, (gages, samples)."""
+        """Return samples of the strains of a force, (gages, samples)."""
         return np.asarray(np.einsum("h,ghs->gs", force, self.every_hat(x, y, shift)))
 
 
@@ -267,13 +267,13 @@ class Sampling:
 
 
 def moving_plate(plate: PlateModel) -> PlateModel:
-    """The plate under forces across it alone, without the deck's nodal loads."""
+    """Return the plate under transverse forces only, without the deck's nodal loads."""
     mesh = replace(plate.mesh, forces=np.zeros_like(plate.mesh.forces))
     return restrain_resting_dofs(replace(plate, mesh=mesh), None)
 
 
 def rows_of(gages: GageArray, nodes: int) -> Floats:
-    """Strain of every gage per displacement of every dof, (gages, nodes, 5)."""
+    """Return the strain of every gage per displacement of every dof, (gages, nodes, 5)."""
     rows = np.zeros((len(gages.numbers), nodes * NDOF))
     for row, at, weights in zip(rows, gages.dof_indices, gages.weights, strict=False):
         np.add.at(row, at, weights)
@@ -281,7 +281,7 @@ def rows_of(gages: GageArray, nodes: int) -> Floats:
 
 
 def deflections(motion: PlateMotion, row: Floats, sampling: Sampling) -> Iterator[Floats]:
-    """Deflection of every node, (rows, nodes), at the samples after time 0, some at a time.
+    """Yield the deflection of every node, (rows, nodes), at the samples after time 0, in parts.
 
     The nodal forces are the row of a gage, (nodes, 5), times the force of the sampling.
     """
@@ -310,9 +310,9 @@ def responses(
     sampling: Sampling,
     dtype: DTypeLike = np.float32,
 ) -> NDArray[np.floating]:
-    """Strains of gages per force at some nodes, (gages, nodes, samples).
+    """Return the strains of gages per force at some nodes, (gages, nodes, samples).
 
-    `rows` are those of :func:`rows_of`.  The force is that of the sampling.
+    `rows` come from :func:`rows_of`. The force is the force of the sampling.
     """
     found = np.zeros((len(rows), len(nodes), sampling.count), dtype)
     for row, into in zip(rows, found, strict=True):

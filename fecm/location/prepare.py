@@ -1,4 +1,4 @@
-"""Prepares a location: the model of the strains, places that gages confuse, a finer mesh."""
+"""Preparation of a location: model of the strains, places that gages confuse, finer mesh."""
 
 from __future__ import annotations
 
@@ -50,14 +50,14 @@ SAME = 1e-9  # relative difference of equal stiffnesses and rows
 
 
 class Symmetry(NamedTuple):
-    """A symmetry of a plate."""
+    """Symmetry of a plate."""
 
     name: str  # in messages
     flip: tuple[float, float]  # factors of x and y from the centre
 
     @property
     def is_mirror(self) -> bool:
-        """Whether it reverses angles, and is not the half turn."""
+        """Whether it reverses angles, unlike the half turn."""
         return self.flip[0] != self.flip[1]
 
     @property
@@ -75,9 +75,10 @@ SYMMETRIES = (
 
 
 def shared_symmetry(plate: PlateModel, rows: Floats) -> Symmetry | None:
-    """A symmetry of plate, supports and laminates that leaves every gage's reading; None without.
+    """Return a symmetry of the plate that keeps every gage's reading, or None.
 
-    `rows` are the strains of the gages per displacement, (gages, nodes, 5).
+    Plate, supports and laminates have the symmetry. `rows` are the strains of the gages per
+    displacement, (gages, nodes, 5).
     """
     for one in SYMMETRIES:
         nodes = images(plate.mesh.coordinates, one.flip)
@@ -90,7 +91,7 @@ def shared_symmetry(plate: PlateModel, rows: Floats) -> Symmetry | None:
 
 
 def _maps(plate: PlateModel, one: Symmetry, nodes: Indices) -> bool:
-    """Whether a symmetry of the nodes maps elements, supports, laminates and loads too."""
+    """Return whether a symmetry of the nodes maps elements, supports, laminates and loads too."""
     mesh = plate.mesh
     if ((mesh.codes != 0) != (mesh.codes[nodes] != 0)).any():
         return False
@@ -103,7 +104,7 @@ def _maps(plate: PlateModel, one: Symmetry, nodes: Indices) -> bool:
 
 
 def _elements(mesh: MeshArrays, numbers: Indices, nodes: Indices | None) -> Floats:
-    """Sorted nodes and laminate of every element, in one order; with images for its nodes."""
+    """Return sorted nodes and laminate of every element, in one order, optionally of its image."""
     own = mesh.elements.astype(np.intp)
     if nodes is not None:
         own = np.where(own > 0, nodes[own - 1] + 1, 0)
@@ -112,7 +113,7 @@ def _elements(mesh: MeshArrays, numbers: Indices, nodes: Indices | None) -> Floa
 
 
 def _unturned(plate: PlateModel) -> bool:
-    """Whether laminates, preload and curvature are those of reversed angles."""
+    """Return whether laminates, preload and curvature are those of reversed angles."""
     for laminate in plate.laminates:
         for matrix in (laminate.A, laminate.B, laminate.D):
             scale = SAME * np.abs(laminate.A if matrix is laminate.B else matrix).max()
@@ -150,7 +151,7 @@ class LocationSettings(NamedTuple):
     mesh_error: bool = True
 
     def check(self) -> None:
-        """Refuse values that make no sense, by a StudyError."""
+        """Refuse values that make no sense with a StudyError."""
         for name in ("grid", "basis", "noise", "mass"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < math.inf:
@@ -158,7 +159,7 @@ class LocationSettings(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """Times of a fit, in samples but for the first two."""
+    """Times of a fit; all but the first two are in samples."""
 
     origin: float  # time of the table from which on the force may act
     interval: float  # between two samples
@@ -169,7 +170,10 @@ class Timing(NamedTuple):
 
 
 def timing(table: StrainTable, options: LocationSettings) -> Timing:
-    """Samples and hats for a table; StudyError if it is too coarse for them."""
+    """Return samples and hats for a table.
+
+    Raises StudyError if the table is too coarse for them.
+    """
     name, time = table.name, table.time
     origin = min(0.0, float(time[0]))
     record = float(time[-1]) - origin
@@ -202,7 +206,7 @@ def timing(table: StrainTable, options: LocationSettings) -> Timing:
 
 
 def _interval(time: Floats, basis: float) -> float:
-    """Time between two samples: equal times are samples if possible."""
+    """Return the time between two samples: equal times are samples if possible."""
     spacing = (float(time[-1]) - float(time[0])) / (len(time) - 1)
     equal = time[0] + spacing * np.arange(len(time))
     if np.abs(time - equal).max() > UNIFORM * spacing:
@@ -215,7 +219,7 @@ def _interval(time: Floats, basis: float) -> float:
 def prepared(
     problem: Problem, table: StrainTable, options: LocationSettings
 ) -> tuple[LocationFit, Region, Timing]:
-    """The model of the strains, and the region in which the place is sought."""
+    """Return the model of the strains, and the region in which the place is searched."""
     own = timing(table, options)
     footprint = _footprint(problem)
     region = Region.of(problem.mesh, footprint.radius, options.region)
@@ -228,7 +232,7 @@ def prepared(
 
 
 def _footprint(problem: Problem) -> Footprint:
-    """The circle of the deck's patch, or a point."""
+    """Return the circle of the deck's patch, or a point."""
     mesh = problem.mesh
     held = np.asarray(mesh.codes[:, W] != 0)
     card = problem.deck.last(model.Patch)
@@ -242,7 +246,7 @@ def _footprint(problem: Problem) -> Footprint:
 def _shared(
     deck: Deck, numbers: tuple[int, ...], samples: tuple[float, int, int], region: Region
 ) -> tuple[Indices, NDArray[np.floating]]:
-    """Nodes of a region and the responses of gages there, which another table may need too."""
+    """Return nodes of a region and responses of gages there, cached for other tables."""
     interval, unit, count = samples
     problem = checked_problem(deck)
     mesh, plate = problem.mesh, moving_plate(problem.plate)
@@ -297,7 +301,7 @@ def _refuse_records(problem: Problem, record: float, critical: float) -> None:
 
 
 def _period(problem: Problem) -> float:
-    """Fundamental period of a simply supported plate with the sides of the mesh.
+    """Return the fundamental period of a simply supported plate with the sides of the mesh.
 
     Navier's formula for an orthotropic plate without shear deformation.
     """
@@ -312,7 +316,7 @@ def _period(problem: Problem) -> float:
 def _refuse_mirrors(
     plate: PlateModel, rows: Floats, numbers: tuple[int, ...], region: Region
 ) -> None:
-    """Raise LocateError if the gages can't tell a place from its image."""
+    """Raise LocateError if the gages can't distinguish a place from its image."""
     if (symmetry := shared_symmetry(plate, rows)) is None:
         return
     low, high = plate.mesh.coordinates.min(axis=0), plate.mesh.coordinates.max(axis=0)
@@ -341,11 +345,11 @@ def finer_strains(
     footprint: Footprint,
     times: Timing,
 ) -> Floats | None:
-    """Samples of the strains of gages on a mesh of elements half as long, (gages, samples).
+    """Return samples of the strains on a mesh of elements half as long, (gages, samples).
 
-    The force acts at a place on the area of a footprint on the deck's mesh; its history is times
-    from 0 on, and the forces then.  Returns None if an element can't be bisected, or the finer
-    plate can't be run.
+    The force acts at a place on the area of a footprint on the deck's mesh. Its history is times
+    from 0 on, and the forces then. Returns None if an element can't be bisected, or the finer plate
+    can't be run.
     """
     try:
         deck = refined_deck(problem.deck, problem.mesh)

@@ -1,4 +1,4 @@
-"""Search for the place: candidates on a grid, and the minima that start from the best of them."""
+"""Search for the place: candidates on a grid, and the minima from the best of them."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ BEFORE = 0.25  # how much earlier a force may begin if the shift is fitted, over
 
 
 class Region(NamedTuple):
-    """Rectangle in which the place is sought: x0, y0, x1, y1."""
+    """Rectangle in which the place is searched: x0, y0, x1, y1."""
 
     corners: tuple[float, float, float, float]
 
@@ -36,7 +36,7 @@ class Region(NamedTuple):
     def of(
         cls, mesh: MeshArrays, radius: float, asked: tuple[float, float, float, float] | None
     ) -> Self:
-        """The rectangle that was asked for, or that in which the circle is on the plate's one."""
+        """Return the requested rectangle, or the largest with the circle on the plate."""
         places = mesh.coordinates[mesh.used]
         low, high = places.min(axis=0) + radius, places.max(axis=0) - radius
         if asked is not None:
@@ -66,7 +66,7 @@ class Region(NamedTuple):
         return self.high - self.low
 
     def grid(self, asked: float | None) -> tuple[Floats, Floats]:
-        """Coordinates of the columns and of the rows of candidates in the region."""
+        """Return the coordinates of the columns and of the rows of candidates in the region."""
         pitch = asked or math.sqrt(float(self.size.prod()) / CANDIDATES)
         counts = np.maximum(np.round(self.size / pitch), 1.0).astype(int)
         if counts.prod() > MOST_CANDIDATES:
@@ -80,7 +80,7 @@ class Region(NamedTuple):
         return x, y
 
     def nodes(self, mesh: MeshArrays) -> Indices:
-        """Nodes of the elements that a force in the region may act on, sorted."""
+        """Return the nodes of the elements that a force in the region may act on, sorted."""
         margin = 1.5 * float(longest_sides(mesh.elements, mesh.coordinates).max())
         margin += max(0.0, float((self.low - mesh.coordinates[mesh.used].min(axis=0)).min()))
         low, high = self.low - margin, self.high + margin
@@ -88,13 +88,13 @@ class Region(NamedTuple):
         return np.flatnonzero(near & mesh.used)
 
     def at_edge(self, x: float, y: float) -> bool:
-        """Whether a place is on the edge."""
+        """Return whether a place is on the edge."""
         place, margin = np.array([x, y]), EDGE * self.size
         return bool(((place <= self.low + margin) | (place >= self.high - margin)).any())
 
 
 class SearchResult(NamedTuple):
-    """The best fit, another minimum, and the candidates, (k, 2), with their misfits, (k,)."""
+    """Best fit, another minimum, and the candidates, (k, 2), with their misfits, (k,)."""
 
     best: PlaceTrial
     second: Candidate | None
@@ -111,7 +111,7 @@ class Scan(NamedTuple):
     squares: Floats  # (columns, rows): sums of the squares; infinite off the plate
 
     def minima(self) -> list[tuple[float, float]]:
-        """Candidates that no neighbour is better than, the best first."""
+        """Return the candidates that no neighbour is better than, the best first."""
         around = np.pad(self.squares, 1, constant_values=math.inf)
         windows = np.lib.stride_tricks.sliding_window_view(around, (3, 3))
         least = (self.squares <= windows.min(axis=(2, 3))) & np.isfinite(self.squares)
@@ -122,7 +122,7 @@ class Scan(NamedTuple):
 def best_fits(fit: LocationFit, region: Region, pitch: float | None) -> SearchResult:
     """Find the minima of the misfit.
 
-    Raises LocateError if the strains of no candidate are those of a force.
+    Raises LocateError if no candidate has a force that fits the strains.
     """
     x, y = region.grid(pitch)
     box = np.array([region.low, region.high])
@@ -150,9 +150,9 @@ def narrowed(
 ) -> tuple[LocationFit, SearchResult]:
     """Fit place and force with narrower hats, from the minimum of wider ones.
 
-    A force of straight lines is off by the curvature of the true one, which moves the place.  Hats
-    of half the width are always taken if there are strains enough; and as long as the misfit falls
-    by more than chance.
+    A force of straight lines differs from the curved true force, which moves the place. Hats of
+    half the width are always taken if there are enough strains, and again as long as the misfit
+    falls by more than chance.
     """
     box, best = np.array([region.low, region.high]), found.best
     first = True
@@ -166,21 +166,21 @@ def narrowed(
 
 
 def is_wide(fit: LocationFit, best: PlaceTrial, noise: float | None) -> bool:
-    """Whether hats of half the width describe the strains better than by chance."""
+    """Return whether hats of half the width describe the strains better than by chance."""
     if (half := fit.halved()) is None:
         return False
     return falls(half, best, half.at(best.x, best.y, best.shift, best.gains), noise)
 
 
 def falls(half: LocationFit, wide: PlaceTrial, narrow: PlaceTrial, noise: float | None) -> bool:
-    """Whether the misfit falls from wide to narrow hats by more than chance."""
+    """Return whether the misfit falls from wide to narrow hats by more than chance."""
     added = max(1, int(narrow.active.sum()) - int(wide.active.sum()))
     variance = (noise or half.deviation(narrow)) ** 2
     return wide.square - narrow.square > variance * (added + CHANCE * math.sqrt(2.0 * added))
 
 
 def _scanned(fit: LocationFit, x: Floats, y: Floats, shift: float) -> Scan:
-    """Misfits at the candidates of columns x and rows y."""
+    """Compute misfits at the candidates of columns x and rows y."""
     squares, pushed = np.full((len(x), len(y)), math.inf), False
     for i, j in np.ndindex(squares.shape):
         try:
@@ -198,10 +198,10 @@ def _scanned(fit: LocationFit, x: Floats, y: Floats, shift: float) -> Scan:
 
 
 def _beginning(fit: LocationFit, x: Floats, y: Floats, box: Floats) -> float:
-    """Time at which the force begins, which may be before time 0.
+    """Return the time at which the force starts, which may be before time 0.
 
-    A force that may act much earlier fits as well as one that begins with its first hat.  The last
-    of the beginnings that describe the strains is that of the force.
+    A force that may act much earlier fits as well as one that starts with its first hat. The last
+    start that describes the strains is taken.
     """
     record = fit.model.observation.interval * (fit.model.responses.shape[2] - 1)
     earliest = -BEFORE / (1.0 + BEFORE) * record

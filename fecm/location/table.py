@@ -39,9 +39,9 @@ class StrainTable(NamedTuple):
 def strain_table(
     source: StrainSource, units: Mapping[str, str], numbers: Sequence[int]
 ) -> StrainTable:
-    """Strains of gages with these numbers on the cards, in the order of the table.
+    """Return the strains of gages with these numbers on the cards, in the order of the table.
 
-    `units` are the names of the deck's, which may be empty.  Raises StudyError if the table is
+    `units` has the names of the deck's units, which may be empty. Raises StudyError if the table is
     invalid, in other units, or not of strains; OSError if a file can't be read.
     """
     if isinstance(source, str | Path):
@@ -55,7 +55,7 @@ def strain_table(
 
 
 def _check(made: StrainTable) -> None:
-    """Refuse strains that are no numbers, too few, or in microstrain."""
+    """Refuse strains that are not numbers, too few, or in microstrain."""
     name, time, strains = made.name, made.time, made.strains
     if not (np.isfinite(time).all() and np.isfinite(strains).all()):
         raise StudyError(f"{name}: times and strains must be finite numbers")
@@ -74,7 +74,7 @@ def _check(made: StrainTable) -> None:
 
 
 def _likely_unit(largest: float) -> str:
-    """Units in which a strain that is too large would be a usual one, and the remedy."""
+    """Return units in which a too large strain would be a usual one, and the remedy."""
     texts = [
         f"{unit} ({largest / divisor:.2g}; divide by {divisor:g})"
         for unit, divisor in DIVISORS.items()
@@ -89,7 +89,7 @@ def _likely_unit(largest: float) -> str:
 
 
 def _numbered(name: str, heads: Mapping[_K, str], numbers: Sequence[int]) -> dict[_K, int]:
-    """Numbers of the gages of columns; in the order of the deck if no column has a number.
+    """Return the gage numbers of columns; in the deck's order if no column has a number.
 
     Columns without a number beside others with one are not strains, and left out.
     """
@@ -126,7 +126,7 @@ def _made(name: str, time: Any, gages: Sequence[int], strains: Any) -> StrainTab
 
 
 def _from_arrays(source: tuple[Any, Any], numbers: Sequence[int]) -> StrainTable:
-    """Times and strains, (points, gages), in the order of the deck."""
+    """Return times and strains, (points, gages), in the order of the deck."""
     hint = "the strains are a CSV file, columns by name, or a pair of times and strains"
     try:
         time, strains = (np.asarray(values, dtype=float) for values in source)
@@ -143,7 +143,7 @@ def _from_arrays(source: tuple[Any, Any], numbers: Sequence[int]) -> StrainTable
 def _from_columns(
     source: Mapping[str, Any], units: Mapping[str, str], numbers: Sequence[int]
 ) -> StrainTable:
-    """A column of times and those of gages, by name."""
+    """Read a column of times and columns of gages, by name."""
     try:
         columns = {str(name): np.asarray(source[name], dtype=float) for name in source}
     except (TypeError, ValueError):
@@ -180,7 +180,7 @@ def _from_file(path: Path, units: Mapping[str, str], numbers: Sequence[int]) -> 
 def _from_long(
     table: MeasuredTable, name: str, units: Mapping[str, str], numbers: Sequence[int]
 ) -> StrainTable:
-    """A row for every time and gage, as ``fecm export`` writes them."""
+    """Read a row for every time and gage, as ``fecm export`` writes them."""
     time, gage, strain = table.values(table.find(("time", "gage", "strain"), units=units), units)
     gages = [number for number in numbers if (gage == number).any()]
     if unknown := sorted(set(gage.tolist()) - set(gages)):

@@ -1,11 +1,11 @@
-"""Whether a location is to be trusted, and likely causes of strains that do not fit.
+"""Verdict on a location, and likely causes of strains that do not fit.
 
-Every cause is tried at the candidate places and at the place of the strains as they are, with the
-hats of the search, and the likeliest ones at the place that they lead to.  Each gage counts by the
-share of its squares that is left, so that a gage with a wrong factor does not outweigh the others.
-A cause whose effect shows in the sum of the squares of all gages, and not in the noise of the weak
-ones, is named too.  A gain that stands out when the gains of all gages are fitted is tried in any
-case: a gain of 1.3 may hide in the noise, and its fall of the misfit is small.
+Every cause is tried at the candidate places and at the place of the unchanged strains, with the
+hats of the search. The likeliest causes are tried at the place that they lead to. Each gage counts
+by the share of its squares that remains, so that a gage with a wrong factor does not outweigh the
+others. A cause is also named if its effect shows in the sum of the squares of all gages, but not in
+the noise of the weak ones. A gain that stands out when the gains of all gages are fitted is always
+tried: a gain of 1.3 may hide in the noise, as it changes the misfit little.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ NEAR = 0.2  # relative distance from them
 
 @dataclass(frozen=True)
 class Cause:
-    """What may be wrong, and by which factor the misfit is smaller without it."""
+    """Likely cause, and the factor by which the misfit is smaller without it."""
 
     text: str  # with a verb
     remedy: str
@@ -53,7 +53,7 @@ class Cause:
 
 
 class _Hypothesis(NamedTuple):
-    """A hypothesis about the gages of the model."""
+    """Hypothesis about the gages of the model."""
 
     text: str
     remedy: str
@@ -75,7 +75,7 @@ class _Products(NamedTuple):
     norm: float  # square of the constant
 
     def without_zero(self, gage: int) -> tuple[Floats, Floats, float]:
-        """Those of a gage whose mean is subtracted: design, design and strains, strains."""
+        """Return the products of a gage without its mean: design, design and strains, strains."""
         ones, level = self.ones[gage], self.level[gage]
         hats = self.hats[gage] - np.outer(ones, ones) / self.norm
         both = self.both[gage, gage] - ones * level / self.norm
@@ -94,9 +94,9 @@ class _Shares(NamedTuple):
 def likely_cause(
     fit: LocationFit, best: PlaceTrial, region: Region, pitch: float | None, names: list[int]
 ) -> Cause | None:
-    """The cause without which the strains are explained best; None if none of them is clear.
+    """Return the cause without which the strains are explained best, or None if none is clear.
 
-    `best` is the fit of the strains as they are, `names` are the numbers of the gages in messages.
+    `best` is the fit of the unchanged strains, `names` are the numbers of the gages in messages.
     """
     places = [*_products(fit, _candidates(region, pitch, best))]
     gages = len(names)
@@ -127,7 +127,7 @@ def likely_cause(
 
 
 def _odd_gain(fit: LocationFit, best: PlaceTrial, region: Region) -> tuple[int, _Shares]:
-    """The gage whose gain differs most from the other gains, and the start of its search."""
+    """Return the gage whose gain differs most from the others, and the start of its search."""
     free = replace(fit, gains=True)
     trial = free.refined(best, np.array([region.low, region.high]))
     apart = np.log(trial.gains) - np.median(np.log(trial.gains))
@@ -137,7 +137,7 @@ def _odd_gain(fit: LocationFit, best: PlaceTrial, region: Region) -> tuple[int, 
 
 
 def _unexplained(fit: LocationFit, trial: PlaceTrial) -> Floats:
-    """What a fit leaves: sum of the shares of every gage, and share of the sum of all squares."""
+    """Return what a fit leaves: sum of the shares of every gage, and share of all squares."""
     seen = fit.model.observation
     squares = np.maximum((seen.values**2).sum(axis=1) + seen.left, np.finfo(float).tiny)
     rest = (trial.residual**2).sum(axis=1) + seen.left
@@ -147,10 +147,11 @@ def _unexplained(fit: LocationFit, trial: PlaceTrial) -> Floats:
 def _refined(
     fit: LocationFit, region: Region, hypothesis: _Hypothesis, shares: _Shares
 ) -> tuple[Floats, float, float]:
-    """What is left at the place of a hypothesis, as :func:`_unexplained`; factor and level there.
+    """Return the remains at the place of a hypothesis, with its factor and level.
 
-    The gage of the hypothesis alone has another factor: with free gains of all gages, every one of
-    them would explain the strains as well as the right one.
+    The remains are those of :func:`_unexplained`. Only the gage of the hypothesis has another
+    factor: with free gains of all gages, every gage would explain the strains as well as the right
+    one.
     """
     seen, factor, level = fit.model.observation, shares.factor, shares.level
     columns, signs = list(hypothesis.columns), np.array(hypothesis.signs)[:, None]
@@ -183,7 +184,7 @@ def _refined(
 
 
 def _hypotheses(plain: _Hypothesis, worst: list[int], names: list[int]) -> Iterator[_Hypothesis]:
-    """Every hypothesis: signs, exchanges, gains and zeros."""
+    """Yield every hypothesis: signs, exchanges, gains and zeros."""
     gages = len(names)
     opposite = tuple(-sign for sign in plain.signs)
     check = "check the signs of the gages"
@@ -205,17 +206,17 @@ def _hypotheses(plain: _Hypothesis, worst: list[int], names: list[int]) -> Itera
 
 
 def _candidates(region: Region, pitch: float | None, best: PlaceTrial) -> list[tuple[float, float]]:
-    """Candidates of the search, after the place of the strains as they are.
+    """Return candidates of the search, after the place of the unchanged strains.
 
-    A gain, a zero or a sign of one of several gages hardly moves the place, and the candidates are
-    too far from it to tell which gage has it.
+    A gain, a zero or a sign of one of several gages hardly moves the place. The other candidates
+    are too far from it to tell which gage has it.
     """
     x, y = region.grid(pitch)
     return [(best.x, best.y), *((u, v) for u in x.tolist() for v in y.tolist())]
 
 
 def _products(fit: LocationFit, candidates: list[tuple[float, float]]) -> Iterator[_Products]:
-    """Inner products at the candidates."""
+    """Return the inner products at the candidates."""
     seen = fit.model.observation
     values = seen.values
     one = seen.of(np.ones(fit.model.responses.shape[2]))
@@ -234,7 +235,7 @@ def _products(fit: LocationFit, candidates: list[tuple[float, float]]) -> Iterat
 
 
 def _normal(at: _Products, hypothesis: _Hypothesis) -> tuple[Floats, Floats]:
-    """Normal equations of the force, weighted by the squares of every gage's strains."""
+    """Return the normal equations of the force, weighted by the squares of every gage's strains."""
     matrix, vector = np.zeros(at.hats.shape[1:]), np.zeros(at.hats.shape[1])
     for gage, (column, sign) in enumerate(zip(hypothesis.columns, hypothesis.signs, strict=True)):
         if gage == hypothesis.gain:
@@ -249,7 +250,7 @@ def _normal(at: _Products, hypothesis: _Hypothesis) -> tuple[Floats, Floats]:
 
 
 def _least(places: list[_Products], hypothesis: _Hypothesis) -> _Shares:
-    """Shares that are left at the best of the candidates."""
+    """Return the remaining shares at the best of the candidates."""
     from scipy.optimize import nnls  # takes 0.2 s to import
 
     normals = [_normal(at, hypothesis) for at in places]
@@ -265,7 +266,7 @@ def _least(places: list[_Products], hypothesis: _Hypothesis) -> _Shares:
 
 
 def _shares(at: _Products, hypothesis: _Hypothesis, force: Floats) -> _Shares:
-    """Shares of the squares that a force leaves."""
+    """Return the shares of the squares that a force leaves."""
     left, factor, level = np.ones(len(hypothesis.columns)), 1.0, 0.0
     for gage, (column, sign) in enumerate(zip(hypothesis.columns, hypothesis.signs, strict=True)):
         hats, both, square = at.hats[gage], at.both[gage, column], float(at.squares[column])
@@ -283,7 +284,7 @@ def _shares(at: _Products, hypothesis: _Hypothesis, force: Floats) -> _Shares:
 
 
 def _rounded(factor: float) -> str:
-    """A factor, or the factor of a unit that it is near to."""
+    """Return a factor, or the factor of a unit that it is near to."""
     for size in (*ROUND, *(1.0 / one for one in ROUND)):
         if abs(factor / size - 1.0) < NEAR:
             return f"{size:g}"
@@ -300,19 +301,22 @@ VAGUE = 0.25  # standard deviation of a place over the side of the region
 
 
 def is_doubtful(found: Location) -> bool:
-    """Whether the model does not describe the strains down to their noise."""
+    """Return whether the model does not describe the strains down to their noise."""
     bad = found.misfit > NOT_DESCRIBED or residual_correlation(found) > COLOURED
     return bad or found.misfit > likely_misfit(found) or bool(undescribed_gages(found))
 
 
 def likely_misfit(found: Location) -> float:
-    """Largest misfit that noise explains: its standard deviation is 1/sqrt(2 n) of n values."""
+    """Return the largest misfit that noise explains.
+
+    Its standard deviation is 1/sqrt(2 n) for n values.
+    """
     parameters = 2 + int((found.force > 0.0).sum())
     return 1.0 + UNLIKELY / math.sqrt(2.0 * max(1, found.strains.size - parameters))
 
 
 def undescribed_gages(found: Location) -> list[int]:
-    """Numbers of gages whose residual has a shape, and is a large share of their strains."""
+    """Return the gages whose residual has a shape, and is a large share of their strains."""
     rest = found.strains - found.fitted
     own = (rest**2).sum(axis=1)
     follow = (rest[:, 1:] * rest[:, :-1]).sum(axis=1)
@@ -321,9 +325,9 @@ def undescribed_gages(found: Location) -> list[int]:
 
 
 def judged(found: Location, region: Region, wide: bool, cause: Cause | None) -> Location:
-    """The location with its notes, and whether it is accepted.
+    """Return the location with its notes, and whether it is accepted.
 
-    `wide`: whether narrower hats of the force describe the strains better; `cause`: what may be
+    `wide` says whether narrower hats of the force describe the strains better, `cause` what may be
     wrong with the strains.
     """
     serious = [*_serious(found, region)]
@@ -333,7 +337,7 @@ def judged(found: Location, region: Region, wide: bool, cause: Cause | None) -> 
 
 
 def _serious(found: Location, region: Region) -> Iterator[str]:
-    """Reasons not to accept a location."""
+    """Yield reasons not to accept a location."""
     near = residual_correlation(found)
     compare = "compare supports, laminate, patch, mesh and gages with those of the test"
     share = float(((found.strains - found.fitted) ** 2).sum() / (found.strains**2).sum())
@@ -380,7 +384,7 @@ def _serious(found: Location, region: Region) -> Iterator[str]:
 
 
 def _remarks(found: Location, wide: bool) -> Iterator[str]:
-    """Other notes."""
+    """Yield other notes."""
     clock = unit_of("time", found.units)
     if wide:
         half = f"{0.5 * (found.time[1] - found.time[0]):.3g} {clock}".rstrip()
@@ -413,7 +417,7 @@ def _remarks(found: Location, wide: bool) -> Iterator[str]:
 
 
 def residual_correlation(found: Location) -> float:
-    """Correlation of residuals that follow each other."""
+    """Return the correlation of consecutive residuals."""
     rest = found.strains - found.fitted
     size = float((rest**2).sum())
     return float((rest[:, 1:] * rest[:, :-1]).sum()) / size if size else 0.0

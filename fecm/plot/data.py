@@ -1,6 +1,6 @@
 """Data of pictures: rows by time, points of the plate, segments of the deck.
 
-What a result lacks, or can't be drawn, is a :class:`~fecm.plot.kinds.PlotError`.
+Data that a result lacks, or that can't be drawn, raise :class:`~fecm.plot.kinds.PlotError`.
 """
 
 from __future__ import annotations
@@ -26,10 +26,10 @@ MANY = 2000  # meshes with more elements are drawn with fewer points per element
 
 
 def require_datasets(result: Result, name: str, *paths: str, padded: bool = False) -> list[Array]:
-    """Datasets of a result.
+    """Return datasets of a result.
 
     Raises LackingError if one is missing (the message names the macro that stores it) or empty,
-    PlotError if it holds numbers that an axis can't show.  With `padded` NaN is allowed in results
+    PlotError if it holds numbers that an axis can't show. With `padded` NaN is allowed in results
     of several laminates or materials: plies that an element lacks, or that have no strengths.
     """
     padded &= "mesh/laminate" in result or "plies/material" in result
@@ -51,7 +51,10 @@ def require_datasets(result: Result, name: str, *paths: str, padded: bool = Fals
 
 
 def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
-    """Elements, and x and y of all nodes (length), which do not lie on a line along an axis."""
+    """Return elements, and x and y of all nodes (length).
+
+    Nodes on one line along an axis are refused.
+    """
     elements, coordinates = require_datasets(result, name, "mesh/elements", "mesh/coordinates")
     coordinates = coordinates[:, :2]
     extent = np.ptp(coordinates, axis=0)
@@ -63,7 +66,7 @@ def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
 
 
 def result_deck(result: Result, name: str) -> Deck:
-    """Model of a result's deck."""
+    """Return the model of a result's deck."""
     try:
         return result.deck
     except ResultFileError:
@@ -71,7 +74,7 @@ def result_deck(result: Result, name: str) -> Deck:
 
 
 def circle(result: Result, name: str) -> tuple[Floats, float] | None:
-    """Centre, (2,), and radius of the contact patch, length; None without a patch."""
+    """Return centre, (2,), and radius of the contact patch, length; None without a patch."""
     if "patch/weight" not in result:
         return None
     stored = [result.patch.attributes.get(key) for key in ("x", "y", "radius")]
@@ -85,7 +88,7 @@ def circle(result: Result, name: str) -> tuple[Floats, float] | None:
 
 
 def struck(result: Result, name: str) -> Floats:
-    """Centre of the contact patch, or the impact node, (1, 2), length; (0, 2) without either."""
+    """Return the centre of the contact patch, or the impact node, (1, 2); (0, 2) without either."""
     patch = circle(result, name)
     if patch is not None:
         return patch[0][None]
@@ -98,7 +101,10 @@ def struck(result: Result, name: str) -> Floats:
 
 
 def impact_point(result: Result, name: str) -> Floats:
-    """Centre of the contact patch, or the impact node, (2,), length; refuse a deck without."""
+    """Return the centre of the contact patch, or the impact node, (2,), length.
+
+    A deck without either is refused.
+    """
     points = struck(result, name)
     if not len(points):
         raise PlotError(f"nothing strikes the plate of {name}: its deck has no ROD segment")
@@ -106,9 +112,9 @@ def impact_point(result: Result, name: str) -> Floats:
 
 
 def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -> Indices:
-    """Rows of tape3 nearest to the given times; by default `count` rows at equal distances.
+    """Return the rows of tape3 nearest to the given times, by default `count` equally spaced ones.
 
-    If the contact ends within the run, these lie before its end.
+    If the contact ends within the run, the default rows lie before its end.
     """
     (stored,) = require_datasets(result, name, "tape3/time")
     if not times:
@@ -125,7 +131,7 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
 
 
 def contact_end(result: Result) -> float:
-    """Time at which the last contact ends, (time); infinite if it does not, or without impact."""
+    """Return the time at which the last contact ends; infinite without an end or an impact."""
     if "history/force" not in result or result.still_in_contact:
         return np.inf
     touching = result["history/time"][result["history/force"] > 0.0]
@@ -133,7 +139,7 @@ def contact_end(result: Result) -> float:
 
 
 class Patches(NamedTuple):
-    """The plate divided into small quadrilaterals, equally many per element."""
+    """Plate divided into small quadrilaterals, equally many per element."""
 
     points: Floats  # (n, 2): corners (length)
     quads: Indices  # (m, 4): rows of the corners in `points`
@@ -142,7 +148,7 @@ class Patches(NamedTuple):
     parts: list[tuple[ElementBlock, Floats]]  # elements, and the shape functions at their points
 
     def values(self, nodal: Array) -> Floats:
-        """Values at the points from values at the nodes, by the elements' own shape functions."""
+        """Return values at the points, by the elements' shape functions from the nodes."""
         return np.concatenate([(nodal[family.nodes] @ N.T).ravel() for family, N in self.parts])
 
     @property
@@ -178,13 +184,13 @@ def patches(result: Result, cuts: int, name: str = "the result") -> Patches:
 
 
 def reach(result: Result, name: str, thickness: float) -> float:
-    """Distance from the load below which plate theory does not hold: the patch's radius + h/2."""
+    """Return the distance from the load below which plate theory does not hold: radius + h/2."""
     patch = circle(result, name)
     return thickness / 2.0 + (0.0 if patch is None else patch[1])
 
 
 def strain_points(result: Result, name: str) -> Floats:
-    """Coordinates of the points of tape8, (numel, npt, 2), length."""
+    """Return the coordinates of the points of tape8, (numel, npt, 2), length."""
     (stored,) = require_datasets(result, name, "tape8/kappa_x")
     elements, _ = mesh_of(result, name)
     at_nodes = result.tape8.attributes.get("location") == "nodes"
@@ -206,7 +212,10 @@ def on_plate(points: Floats, at: Floats, name: str) -> None:
 
 
 def nearest(points: Floats, at: Floats, name: str) -> Bools:
-    """Mask of the points nearest to a place on the plate; several if elements meet there."""
+    """Return a mask of the points nearest to a place on the plate.
+
+    There are several if elements meet there.
+    """
     on_plate(points, at, name)
     distance = np.hypot(*np.moveaxis(points - at, -1, 0))
     size = float(np.ptp(points, axis=(0, 1)).max())

@@ -58,7 +58,7 @@ TICKS = 16  # numbers on the axis of the plies at most
 
 
 class DrawnExposures(NamedTuple):
-    """What is drawn of a result."""
+    """Exposures of a result that are drawn."""
 
     under_load: Bools  # (numel, points): mask of the points that are left out
     # (numel, points): largest exposure of all plies (or interfaces) at every point.
@@ -81,13 +81,14 @@ class DrawnExposures(NamedTuple):
 
 
 def failure(results: Mapping[str, Result], *, quantity: str = "", width: Width = "full") -> Picture:
-    """Largest exposures over time: of the worst ply on the plate, and of every ply in bars.
+    """Draw the largest exposures over time.
 
-    Points under the load are hatched; the bars leave them out.  Values between two plies belong to
-    an element, which the bars leave out if its centre is under the load.  Exposures are also
-    evaluated on the dashed circle around the load, of which the largest ones have rings in the
-    bars.  `quantity` is a criterion; by default the bars show all of them, and the plate the plies,
-    or the interfaces between them if their exposure is the largest.
+    The plate shows the worst ply, the bars show every ply. Points under the load are hatched; the
+    bars leave them out. Values between two plies belong to an element, which the bars leave out if
+    its centre is under the load. Exposures are also evaluated on the dashed circle around the load;
+    the largest ones have rings in the bars. `quantity` is a criterion. By default the bars show all
+    criteria, and the plate the plies, or the interfaces between them if their exposure is the
+    largest.
     """
     ((name, result),) = results.items()
     found = _exposures(result, name, quantity)
@@ -116,13 +117,13 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: Width =
 
 
 def _in_words(one: LargestExposure) -> str:
-    """An exposure for a title; names of materials take a line of their own."""
+    """Format an exposure for a title; names of materials take their own line."""
     separator = "\n" if one.materials else " "
     return f"{one.exposure:.4g} ({spelt(one.criterion)}): {one.mode},{separator}{one.plies}"
 
 
 def _panels(width: Width, high: float, bars: int) -> tuple[Figure, Axes, Axes]:
-    """Axes of the plate, of `high` over width, and of the bars, below it or beside it."""
+    """Return axes of the plate, of `high` over width, and of the bars, below it or beside it."""
     inches = style.WIDTHS[width]
     height_of_bars = float(np.clip(0.8 + 0.1 * bars, 1.4, 5.0))
     if width == "column":
@@ -166,7 +167,7 @@ def _warn_of_load(name: str, under_load: Bools) -> None:
 
 
 def _exposures(result: Result, name: str, quantity: str) -> DrawnExposures:
-    """Largest exposures by one criterion or by all."""
+    """Return the largest exposures by one criterion or by all."""
     if quantity and quantity not in NAMES:
         raise PlotError(f"there is no criterion {quantity!r}; there are {', '.join(NAMES)}")
     (near,) = require_datasets(result, name, "failure/under_load")
@@ -207,12 +208,12 @@ def _exposures(result: Result, name: str, quantity: str) -> DrawnExposures:
 
 
 def _known(exposures: Floats) -> Floats:
-    """Exposures, NaN where no ply has strengths."""
+    """Return the exposures, NaN where no ply has strengths."""
     return np.where(exposures == UNKNOWN, np.nan, exposures)
 
 
 def _cells(result: Result, name: str, count: int) -> Floats:
-    """Corners of the part of the element around each point, (numel, points, 4, 2), length."""
+    """Return the corners of the cell around each point, (numel, points, 4, 2), length."""
     rule = rules(result_deck(result, name).require(Material))[2]
     if len(rule.xi) != count:
         raise PlotError(
@@ -228,7 +229,7 @@ def _cells(result: Result, name: str, count: int) -> Floats:
 
 
 def outline(cells: Floats) -> Floats:
-    """Sides of cells, (n, 4, 2), that belong to one of them only: (sides, 2, 2)."""
+    """Return the sides of cells, (n, 4, 2), that belong to only one of them: (sides, 2, 2)."""
     sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2, 2)
     if not len(sides):
         return sides
@@ -240,7 +241,7 @@ def outline(cells: Floats) -> Floats:
 
 
 def _map(axes: Axes, cells: Floats, found: DrawnExposures) -> None:
-    """One cell per point."""
+    """Draw one cell per point."""
     outside = ~found.under_load
     values = found.over_plate[outside]
     peak = float(np.nanmax(values))

@@ -30,7 +30,7 @@ POINTS = 200  # measured points drawn one by one at most
 
 
 class DrawnForces(NamedTuple):
-    """Forces of a run; those of the transducer of a rigid mass are the contact forces."""
+    """Forces of a run; a rigid mass has its contact force as the force of the transducer."""
 
     time: Array
     contact: Array
@@ -38,7 +38,7 @@ class DrawnForces(NamedTuple):
 
 
 class Abscissa(NamedTuple):
-    """What a loop is drawn against."""
+    """Abscissa of a loop."""
 
     column: str  # of the history
     sign: float
@@ -83,14 +83,14 @@ def force(
     offset: float = 0.0,
     width: Width = "column",
 ) -> Picture:
-    """Contact force and transducer against time; of several results, one above the other.
+    """Draw contact force and transducer against time; several results below each other.
 
-    The transducers of rigid masses show the contact force and are not drawn again.  A dashed line
-    marks the delamination threshold of a result that has one.  `overlay` is a
-    measured force: a CSV file with the columns time and force (or transducer), or times and forces.
-    It is converted to the deck's units if it names its own.  `columns` has the names or the numbers
-    (from 1) of the columns of time and force, and `units` their units, for a measurement that names
-    none.  `delay` and `offset`, in the deck's units, are subtracted from times and forces.
+    A rigid mass has the contact force as transducer, which is not drawn again. A dashed line marks
+    the delamination threshold of a result that has one. `overlay` is a measured force: a CSV file
+    with the columns time and force (or transducer), or times and forces. It is converted to the
+    deck's units if it names its own. `columns` has the names or the numbers (from 1) of the columns
+    of time and force, and `units` their units, for a measurement that names none. `delay` and
+    `offset`, in the deck's units, are subtracted from times and forces.
     """
     if overlay is None and (delay or offset or columns or units):
         raise PlotError(
@@ -174,7 +174,7 @@ def _mark_thresholds(
 
 
 def _measured_look(time: Array) -> style.Look:
-    """Look of measured numbers: points if they are few, else a thin line."""
+    """Return the style of measured numbers: points if they are few, else a thin line."""
     if len(time) <= POINTS:
         return {"lw": 0.6, "ls": "none", "marker": ".", "ms": 3.0}
     return {"lw": 0.6}
@@ -182,7 +182,7 @@ def _measured_look(time: Array) -> style.Look:
 
 @style.styled
 def force_fit_picture(found: Identification, units: Mapping[str, str]) -> Picture:
-    """Measured and fitted force above, the residual below with plus and minus its rms."""
+    """Draw measured and fitted force above, the residual and its rms below."""
     clock = style.scale_in(units, "time", found.time)
     figure, (above, below) = style.panels("column", 2, sharex=True, tall=0.6)
     look = _measured_look(found.time)
@@ -200,7 +200,7 @@ def force_fit_picture(found: Identification, units: Mapping[str, str]) -> Pictur
 
 
 def _thresholds(results: Results) -> dict[str, float]:
-    """Delamination thresholds by the names of the results that have one."""
+    """Return the delamination thresholds by the names of the results that have one."""
     values: dict[str, float] = {}
     for name, result in results.items():
         if result.threshold:
@@ -212,11 +212,12 @@ def _thresholds(results: Results) -> dict[str, float]:
 
 
 def loop(results: Results, *, against: Against | None = None, width: Width = "column") -> Picture:
-    """Contact force against indentation or displacement, beginning at rest.
+    """Draw the contact force against indentation or displacement, from rest.
 
-    ``"deflection"`` is the displacement of the plate under the load, ``"displacement"`` that of the
-    projectile's impacted end towards the plate, in contact the sum of both others.  The default is
-    the displacement if every projectile is a rigid mass, else the indentation.
+    ``"deflection"`` is the displacement of the plate under the load, ``"displacement"`` the
+    displacement of the projectile's impacted end towards the plate, in contact the sum of both
+    others. The default is the displacement if every projectile is a rigid mass, else the
+    indentation.
     """
     style.limit_count(len(results), "loops")
     if against is None:
@@ -247,7 +248,10 @@ def loop(results: Results, *, against: Against | None = None, width: Width = "co
 
 
 def energy(results: Results, *, width: Width = "column") -> Picture:
-    """Energies of plate, projectile and indentation, and their sum; one line style per result."""
+    """Draw energies of plate, projectile and indentation, and their sum.
+
+    Each result has a line style.
+    """
     style.limit_count(len(results), "results", len(style.STYLES))
     energies = dict(ENERGIES)
     if not all("energy/damping_work" in result for result in results.values()):
@@ -283,13 +287,16 @@ def energy(results: Results, *, width: Width = "column") -> Picture:
 
 
 def _is_rigid(result: Result) -> bool:
-    """Whether the projectile is a rigid mass, which has no strain energy."""
+    """Return whether the projectile is a rigid mass, which has no strain energy."""
     path = "energy/projectile_strain"
     return path in result and not result[path].any()
 
 
 def _membrane(axes: Axes, results: Results) -> Line2D | None:
-    """Draw the membrane's part of the strain energy at its rows; None where it is not stored."""
+    """Draw the membrane's part of the strain energy at its rows.
+
+    Returns None where it is not stored.
+    """
     ((name, result),) = results.items()
     if "membrane/energy" not in result:
         return None
@@ -310,14 +317,12 @@ def strain_picture(
     face: Face = "far",
     width: Width = "column",
 ) -> Picture:
-    """Surface strain z κ, or curvature, in given directions at given points against time.
+    """Draw surface strain z κ, or curvature, in directions at points against time.
 
     At an angle θ from the x-axis κ = κx cos² θ + κy sin² θ + κxy sin θ cos θ, with the engineering
-    twist κxy.  At a node it is the mean of the adjacent elements.
-
-    The points `at` (length) are by default the one with the largest bending strain outside the
-    load; `gages` are degrees from the x-axis; `face` is ``"far"`` (z = h/2), ``"struck"``
-    (z = -h/2), or ``"curvature"``.
+    twist κxy. At a node it is the mean of the adjacent elements. The points `at` (length) are by
+    default the one with the largest bending strain outside the load; `gages` are degrees from the
+    x-axis; `face` is ``"far"`` (z = h/2), ``"struck"`` (z = -h/2), or ``"curvature"``.
     """
     lines: dict[str, tuple[Array, Array]] = {}
     for name, result in results.items():
@@ -348,7 +353,7 @@ def strain_picture(
 def _strains(
     result: Result, name: str, at: Sequence[tuple[float, float]], gages: Sequence[float], face: Face
 ) -> dict[str, Array]:
-    """Histories of one result, by point and direction."""
+    """Return the histories of one result, by point and direction."""
     columns = data.require_datasets(
         result, name, "tape8/kappa_x", "tape8/kappa_y", "tape8/kappa_xy"
     )
@@ -385,12 +390,12 @@ def _strains(
 
 
 def _may_stretch(result: Result) -> bool:
-    """Whether a point of the midplane can move in the plane."""
+    """Return whether a point of the midplane can move in the plane."""
     return bool(result["mesh/equations"][:, :2].any())
 
 
 def _distance(result: Result, name: str, points: Array) -> Array:
-    """Distance of points, (..., 2), from the load; infinite without a load."""
+    """Return the distance of points, (..., 2), from the load; infinite without a load."""
     load = data.struck(result, name)
     if not len(load):
         return np.full(points.shape[:-1], np.inf)
@@ -398,9 +403,9 @@ def _distance(result: Result, name: str, points: Array) -> Array:
 
 
 def _most_strained(curvatures: Sequence[Array], points: Array, outside: Array) -> Array:
-    """Place, (2,), of the largest principal curvature of all rows, outside the load if possible.
+    """Return the place, (2,), of the largest principal curvature, outside the load if possible.
 
-    Of equal ones, as of a symmetric plate, the place with the largest x, then y.
+    Of equal values, as in a symmetric plate, the place with the largest x, then y, is taken.
     """
     x, y, xy = curvatures
     largest = (np.abs(x + y) + np.hypot(x - y, xy)).max(axis=0)

@@ -33,7 +33,7 @@ class MatplotlibError(FecmError, ImportError):
 
 
 class Picture(NamedTuple):
-    """A figure; `frames` draw its frames if it is animated; `notes` say what it shows in words."""
+    """Figure; `frames` draw its frames if it is animated; `notes` describe it in words."""
 
     figure: Figure
     frames: Sequence[Callable[[], None]] = ()
@@ -71,7 +71,7 @@ class Shows(Enum):
 
 
 class Drawing(NamedTuple):
-    """How a kind of picture is drawn."""
+    """Function and options of a kind of picture."""
 
     function: str  # ``module:name`` in this package; it is imported when it draws
     shows: Shows

@@ -41,7 +41,7 @@ OTHER: style.Look = {"marker": "D", "mec": FOUND, "mfc": "white", "ms": 4.5, "ls
 
 
 def location(results: Mapping[str, Location]) -> Picture:
-    """Map of the misfit with the place found, fitted force, measured and fitted strains.
+    """Draw the map of the misfit with the located place, fitted force, measured and fitted strains.
 
     The second panel enlarges the place and its 95 % ellipse.
     """
@@ -80,12 +80,12 @@ def location(results: Mapping[str, Location]) -> Picture:
 
 @style.styled
 def location_picture(found: Location) -> Picture:
-    """The picture of :func:`location` in the style of the command line."""
+    """Return the picture of :func:`location` in the style of the command line."""
     return location({"": found})
 
 
 def _outline(found: Location) -> Floats:
-    """Sides of the plate's edges, corner to corner, (n, 2, 2): those of a single element."""
+    """Return the sides of the plate's edges, corner to corner, (n, 2, 2)."""
     mesh = generate(found.deck)
     sides: list[Indices] = []
     for block in element_blocks(mesh.elements, mesh.coordinates):
@@ -96,7 +96,7 @@ def _outline(found: Location) -> Floats:
 
 
 def _cells(found: Location, size: float) -> Floats:
-    """Corners of a rectangle around every candidate, (n, 4, 2), which nearly touch.
+    """Return corners of a rectangle around every candidate, (n, 4, 2), which nearly touch.
 
     Their sides are the distances of neighbouring candidates, or a tenth of the plate's size.
     """
@@ -106,7 +106,7 @@ def _cells(found: Location, size: float) -> Floats:
 
 
 def _draw_map(axes: Axes, found: Location, outline: Floats, place: style.AxisScale) -> None:
-    """Misfit of the candidates, the gages, and the places found on the plate."""
+    """Draw the misfit of the candidates, the gages, and the best places on the plate."""
     extent = np.ptp(outline.reshape(-1, 2), axis=0)
     axes.add_collection(LineCollection(list(outline), colors="0.3", linewidths=0.8))
     worst = max(float(found.candidate_misfit.max()), 1.1)
@@ -137,7 +137,7 @@ def _draw_map(axes: Axes, found: Location, outline: Floats, place: style.AxisSca
 
 
 def _draw_gages(axes: Axes, found: Location, length: float) -> None:
-    """A line along the direction of every gage, with its number."""
+    """Draw a line along the direction of every gage, with its number."""
     degrees = {card.number: card.direction for card in found.deck.require(Gages).records}
     halo = [withStroke(linewidth=2.0, foreground="white")]
     for number, (x, y) in zip(found.gages.tolist(), found.gage_places, strict=True):
@@ -163,7 +163,7 @@ def _draw_gages(axes: Axes, found: Location, length: float) -> None:
 
 
 def _draw_zoom(axes: Axes, found: Location, place: style.AxisScale) -> None:
-    """The place and its ellipse, enlarged; distances from the place found."""
+    """Draw the place and its ellipse, enlarged; axes are distances from the place."""
     ellipse = found.ellipse(0.95) - np.array([found.x, found.y])
     axes.set_title("95 % confidence region", loc="left")
     reach = ZOOM * float(np.abs(ellipse).max())
@@ -178,7 +178,7 @@ def _draw_zoom(axes: Axes, found: Location, place: style.AxisScale) -> None:
 
 
 def _draw_force(axes: Axes, found: Location) -> None:
-    """The fitted force with its band; where it is not determined, no value but a hatched area."""
+    """Draw the fitted force with its band; where it is not determined, a hatched area."""
     # The force begins one interval before its first value.
     begin = 2.0 * found.time[0] - found.time[1]
     time = np.append(begin, found.time)
@@ -212,7 +212,7 @@ def _draw_force(axes: Axes, found: Location) -> None:
 
 
 def _draw_strains(axes: list[Axes], found: Location) -> None:
-    """Measured and fitted strains, a graph per gage, all with the same axes."""
+    """Draw measured and fitted strains, a graph per gage, all with the same axes."""
     micro = style.scale(style.largest_absolute(found.strains, found.fitted), "")
     clock = style.scale_in(found.units, "time", found.strain_time)
     largest = max(float(values.max()) for values in (found.strains, found.fitted))

@@ -42,7 +42,7 @@ RING: style.Look = {"ms": 4.2, "mfc": "none", "mec": LEVEL_COLOUR}
 
 
 class MarkedLevel(NamedTuple):
-    """A value of the quantity to mark."""
+    """Value of the quantity to mark."""
 
     value: float
     is_threshold: bool = False  # of delamination
@@ -68,21 +68,21 @@ class MapContents(NamedTuple):
 
 
 class Graph(NamedTuple):
-    """Axes, and what lies along them."""
+    """Axes, and the variables along them."""
 
     axes: Axes
     x: DrawnVariable
     y: DrawnVariable
 
     def label(self) -> None:
-        """Label the axes, but for texts in rows."""
+        """Label the axes, except for texts in rows."""
         self.x.mark(self.axes.xaxis)
         if not self.y.ticks:
             self.y.mark(self.axes.yaxis)
 
 
 class ValueGrid(NamedTuple):
-    """A quantity on a full grid of two parameters."""
+    """Quantity on a full grid of two parameters."""
 
     x: Array  # (nx,), ascending
     y: Array  # (ny,), ascending
@@ -90,7 +90,7 @@ class ValueGrid(NamedTuple):
 
 
 def value_grid(x: DrawnVariable, y: DrawnVariable, values: Floats) -> ValueGrid | None:
-    """Values of all cases as a full grid; None if the cases do not form one."""
+    """Return the values of all cases as a full grid; None if the cases do not form one."""
     columns, column = np.unique(x.values, return_inverse=True)
     rows, row = np.unique(y.values, return_inverse=True)
     places = row * len(columns) + column
@@ -146,7 +146,10 @@ def choose(
 def _parameters(
     sweep: SweepResult, name: str, rows: Indices, over: Sequence[str]
 ) -> tuple[list[DrawnVariable], DrawnVariable | None]:
-    """Parameters of the axes, and the other one of a map over one; refuse hidden cases."""
+    """Return the parameters of the axes, and the other one of a map over one.
+
+    Hidden cases are refused.
+    """
     varying = [n for n, values in sweep.cases.items() if len(np.unique(values[rows])) > 1]
     axes = [
         variable_of(sweep, parameter, sweep[parameter][rows])
@@ -173,7 +176,7 @@ def _parameters(
 def _names_of_axes(
     sweep: SweepResult, name: str, varying: list[str], asked: Sequence[str]
 ) -> list[str]:
-    """One or two parameters of the axes."""
+    """Return one or two parameters of the axes."""
     for parameter in asked:
         if parameter not in varying and len(parameter_values(sweep, name, parameter)):
             raise PlotError(f"{parameter} does not vary among the cases; a map needs one that does")
@@ -190,7 +193,7 @@ def _names_of_axes(
 
 
 def _text(sweep: SweepResult, name: str, row: int) -> str:
-    """A value for a title."""
+    """Format a value for a title."""
     value = sweep[name][row]
     if isinstance(value, str):
         return str(value)
@@ -290,7 +293,7 @@ def _draw_points(graph: Graph, shown: DrawnVariable, levels: Collection[float]) 
 
 
 def norm_of(shown: DrawnVariable) -> Normalize:
-    """Colour scale of the values; counts have one colour each."""
+    """Return the colour scale of the values; counts have one colour each."""
     low, high = shown.range
     if shown.whole and high - low < SHADES - 1:
         return BoundaryNorm(np.arange(low - 0.5, high + 1.0), SHADES)
@@ -391,7 +394,7 @@ def draw_points(graph: Graph, contents: MapContents) -> None:
 
 
 def runs_in_order(x: DrawnVariable, texts: DrawnVariable | None) -> list[Indices]:
-    """Cases in the order of x: those of every text, or all."""
+    """Return cases in the order of x: those of each text, or all."""
     order = np.argsort(x.values, kind="stable")
     if texts is None:
         return [order]
@@ -524,7 +527,7 @@ def _draw(contents: MapContents, width: Width) -> Graph:
 
 
 def _mark_cases(graph: Graph, masks: Mapping[str, Bools], look: style.Look, sign: str) -> list[str]:
-    """Mark cases that are something; return lines that count them, `sign` is the mark as text."""
+    """Mark a kind of cases; return lines that count them. `sign` is the mark as text."""
     if masks:
         some = np.logical_or.reduce(list(masks.values()))
         graph.axes.plot(graph.x.values[some], graph.y.values[some], **look)

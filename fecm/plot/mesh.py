@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Support(StrEnum):
-    """How a node is held against bending, as the legend names it."""
+    """Bending support of a node, as the legend names it."""
 
     CLAMPED = "clamped"
     W_HELD = "w held"
@@ -41,7 +41,7 @@ MARKS: dict[Support, style.Look] = {
 
 
 def support_masks(result: Result) -> dict[Support, Bools]:
-    """Masks of the nodes held against bending, by kind of support; each (numnp,)."""
+    """Return masks of the nodes held against bending, by kind of support; each (numnp,)."""
     held = result["mesh/equations"][:, 2:5] == 0
     w, rotations = held[:, 0], held[:, 1:]
     full = w & rotations.all(axis=1)
@@ -66,7 +66,7 @@ def mesh_picture(
     at: Sequence[tuple[float, float]] = (),
     width: Width = "column",
 ) -> Picture:
-    """Elements, supports, impact point, contact patch, and points to mark (`at`)."""
+    """Draw elements, supports, impact point, contact patch, and points to mark (`at`)."""
     ((name, result),) = results.items()
     coordinates, _ = data.require_datasets(result, name, "mesh/coordinates", "mesh/elements")
     cut = data.patches(result, 4, name)
@@ -96,14 +96,14 @@ def mesh_picture(
 
 
 def _curved(result: Result, name: str, place: style.AxisScale) -> str:
-    """Title of a curved panel, which is seen from above: its radii and its rise."""
+    """Return the title of a curved panel, which is seen from above: its radii and its rise."""
     (z,) = data.require_datasets(result, name, "mesh/z")
     named = [f"$R_{{{axis}}}$ {place.show(radius)}" for axis, radius in radii_of(result).items()]
     return ", ".join(["curved", *named, f"rise {place.show(float(np.ptp(z)))}"])
 
 
 def _colour_laminates(axes: Axes, result: Result, name: str, cut: data.Patches) -> None:
-    """Fill the elements with a colour of their laminate, where there are several."""
+    """Fill the elements with a colour for each laminate, where there are several."""
     if "mesh/laminate" not in result:
         return
     (of_elements,) = data.require_datasets(result, name, "mesh/laminate")

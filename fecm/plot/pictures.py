@@ -1,9 +1,8 @@
-"""Draws and saves pictures of results: the report's figures.
+"""Drawing and saving of pictures of results: the report's figures.
 
-A kind of picture is a row of :data:`~fecm.plot.kinds.KINDS`.  Its function takes named results and
-the options of the kind as keywords, and returns a :class:`~fecm.plot.kinds.Picture`.
-
-matplotlib is imported when something is drawn: it takes half a second, and it may be absent.
+A kind of picture is a row of :data:`~fecm.plot.kinds.KINDS`. Its function takes named results and
+the options of the kind as keywords, and returns a :class:`~fecm.plot.kinds.Picture`. matplotlib is
+imported when something is drawn: it takes half a second, and it may be absent.
 """
 
 from __future__ import annotations
@@ -83,7 +82,7 @@ def function_of(kind: str) -> Callable[..., Picture]:
 
 
 def options_of(kind: str) -> list[str]:
-    """Names of the options that a kind takes."""
+    """Return the names of the options that a kind takes."""
     _, *options = inspect.signature(function_of(kind)).parameters  # the first are the results
     return options
 
@@ -116,7 +115,7 @@ def _errors_as_one(what: str) -> Iterator[None]:
 
 
 def _source(result: Result | SweepResult | Location) -> str:
-    """What a result is, as a word of :data:`SOURCES`."""
+    """Return the kind of a result, as a word of :data:`SOURCES`."""
     if isinstance(result, Result):
         return SOURCES[Shows.RUN]
     from fecm.sweeps.result import SweepResult  # loaded already if there is such a result
@@ -127,7 +126,7 @@ def _source(result: Result | SweepResult | Location) -> str:
 def _check_source(
     kind: PictureKind, results: Mapping[str, Result | SweepResult | Location]
 ) -> None:
-    """Refuse a result that this kind can't show, such as that of a sweep for a kind of runs."""
+    """Refuse a result that this kind can't show, such as a sweep for a kind of runs."""
     for name, result in results.items():
         what = _source(result)
         if what != SOURCES[KINDS[kind].shows]:
@@ -142,11 +141,11 @@ def draw(
     style: Mapping[str, Any] | None = None,
     **options: Unpack[PictureOptions],
 ) -> Picture:
-    """Draw a picture of the kind from results by their names in the legend, and the kind's options.
+    """Draw a picture of the kind from results by their names in the legend.
 
-    `style` are matplotlib's settings; by default those of the command line.  Raises PlotError if
-    the kind is unknown, a result lacks what it shows, or the options do not fit.  Raises
-    ImportError if matplotlib is not installed.
+    `style` has matplotlib's settings; by default those of the command line. Raises PlotError if the
+    kind is unknown, a result lacks what it shows, or the options do not fit. Raises ImportError if
+    matplotlib is not installed.
     """
     chosen = kind_named(kind)
     if len(results) > 1 and KINDS[chosen].shows is not Shows.RUNS:
@@ -174,8 +173,8 @@ def draw_results(
 ) -> Axes:
     """Draw one or more results: in a file, on given axes, or on a new figure of pyplot.
 
-    On axes and figures of pyplot the user's settings of matplotlib hold; files are those of the
-    command line.
+    The user's settings of matplotlib apply to axes and figures of pyplot; files have the settings
+    of the command line.
 
     Parameters
     ----------
@@ -259,8 +258,8 @@ def save_picture(
 ) -> None:
     """Write a picture in the format of the path's suffix; equal pictures give equal bytes.
 
-    `advance` is called with 1 after each frame.  Raises PlotError if matplotlib can't draw it.
-    Raises OSError if the file can't be written; an existing file is then untouched.
+    `advance` is called with 1 after each frame. Raises PlotError if matplotlib can't draw it.
+    Raises OSError if the file can't be written; an existing file then stays unchanged.
     """
     import matplotlib
 

@@ -35,7 +35,7 @@ LEVELS = 21
 
 
 def aspect(points: Floats) -> float:
-    """Height over width of the plate's picture, from its points (n, 2)."""
+    """Return height over width of the plate's picture, from its points (n, 2)."""
     wide, high = np.ptp(points, axis=0)
     return float(np.clip(high / wide, 0.3, 2.0))
 
@@ -56,11 +56,7 @@ def mark_impact(axes: Axes, result: Result, name: str) -> None:
 
 
 def profile(result: Result, name: str, along: Direction, rows: Array) -> tuple[Floats, Floats]:
-    """Deflection on a line through the impact point along x or y, at some rows of tape3.
-
-    Returns the positions, (n,), and w, (rows, n), of the nodes on the line if they cover it, else
-    of equidistant points.
-    """
+    """Return the deflection on a line through the impact point along x or y, at rows of tape3."""
     coordinates, w = result["mesh/coordinates"], result["tape3/w"][rows]
     axis, across = AXES[along], 1 - AXES[along]
     level = data.impact_point(result, name)[across]
@@ -95,10 +91,10 @@ def line_picture(
     along: Direction = "x",
     width: Width = "column",
 ) -> Picture:
-    """Deflection along a line through the impact point; of several results, one graph per time.
+    """Draw the deflection along a line through the impact point.
 
-    Drawn are the stored rows nearest to `times` (the deck's unit), by default a few, in the
-    direction `along`.
+    Several results have one graph per time. The stored rows nearest to `times` (the deck's unit)
+    are drawn, by default a few, in the direction `along`.
     """
     drawn = {}
     for name, result in results.items():
@@ -134,7 +130,7 @@ def line_picture(
 
 
 def contour(results: Results, *, times: Sequence[float] = (), width: Width = "column") -> Picture:
-    """Deflection of the plate at given times, seen from above, on one colour scale."""
+    """Draw the deflection of the plate at given times, seen from above, on one colour scale."""
     ((name, result),) = results.items()
     data.require_datasets(result, name, "tape3/w")
     rows = data.stored_rows(result, name, times, 4)
@@ -179,7 +175,7 @@ ON_PANEL = 0.15  # the same of the deflection that is drawn on a curved panel
 def surface_picture(
     results: Results, *, times: Sequence[float] = (), width: Width = "column"
 ) -> Picture:
-    """The deflected plate; by default at the instant of largest deflection range."""
+    """Draw the deflected plate, by default at the instant of the largest deflection range."""
     ((name, result),) = results.items()
     (w,) = data.require_datasets(result, name, "tape3/w")
     largest = np.array([int(np.ptp(w, axis=1).argmax())])
@@ -192,7 +188,7 @@ def surface_picture(
 
 
 def animation(results: Results, *, times: Sequence[float] = (), width: Width = "column") -> Picture:
-    """The deflected plate, frame by frame; the figure shows the last frame."""
+    """Draw the deflected plate, frame by frame; the figure shows the last frame."""
     ((name, result),) = results.items()
     data.require_datasets(result, name, "tape3/w")
     rows = data.stored_rows(result, name, times, FRAMES)
@@ -205,7 +201,10 @@ def animation(results: Results, *, times: Sequence[float] = (), width: Width = "
 def _plates(
     results: Results, width: Width, rows: Array, count: int, clock: style.AxisScale
 ) -> tuple[Figure, list[Show]]:
-    """Draw `count` plates at rest on the common scale of all rows, and what shows a row on each."""
+    """Draw `count` plates at rest on the common scale of all rows.
+
+    Returns a function that shows a row on each plate.
+    """
     ((name, result),) = results.items()
     cut, w = data.patches(result, 2, name), result["tape3/w"]
     stored = w[rows]
@@ -255,7 +254,7 @@ def _plates(
 
 
 def _at_rest(result: Result, name: str, cut: data.Patches, largest: float) -> tuple[Floats, float]:
-    """Heights of the points at rest, (n,), and the factor by which deflections are drawn.
+    """Return the heights of the points at rest, (n,), and the scale of the deflections.
 
     The shape of a curved panel has the scale of its sides, on which a deflection would not be seen.
     """

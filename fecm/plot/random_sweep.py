@@ -38,7 +38,7 @@ class Draws(NamedTuple):
     rows: dict[int, Indices]  # cases by the number of the combination of varied values
 
     def only(self) -> tuple[int, Indices]:
-        """The only combination, and its cases; refuse several."""
+        """Return the only combination, and its cases; refuse several."""
         if len(self.rows) > 1:
             raise PlotError(
                 f"{self.name} has {len(self.rows)} combinations of varied values; select one of "
@@ -47,7 +47,7 @@ class Draws(NamedTuple):
         return next(iter(self.rows.items()))
 
     def limits(self, quantity: str, level: Sequence[float]) -> list[float]:
-        """Limits of a quantity to mark: those given, or else those of the sweep."""
+        """Return the limits of a quantity to mark: the given ones, or those of the sweep."""
         found = self.random.exceedance
         own = found.limit[(found.quantity == quantity) & np.isfinite(found.limit)]
         return list(level) or own.tolist()
@@ -58,7 +58,7 @@ class Draws(NamedTuple):
 
 
 def _draws(results: Sweeps, where: Where | None) -> Draws:
-    """Draws of the combinations of varied values that `where` selects."""
+    """Return the draws of the combinations of varied values that `where` selects."""
     where = where or {}
     ((name, sweep),) = results.items()
     if sweep.random is None:

@@ -41,7 +41,7 @@ POINTS = 100
 
 
 class GraphLine(NamedTuple):
-    """A line of a graph."""
+    """Line of a graph."""
 
     label: str
     values: Floats
@@ -53,7 +53,7 @@ class GraphLine(NamedTuple):
 def indentation_fit_picture(
     indentation: Floats, force: Floats, found: ContactLawFit, units: Mapping[str, str]
 ) -> Picture:
-    """Points of a test with the fitted curves, and permanent against largest indentation."""
+    """Draw a test with the fitted curves, and permanent against largest indentation."""
     both = len(found.cycles) > 1
     ratio = style.RATIO["column"]
     if both:
@@ -91,7 +91,7 @@ def indentation_fit_picture(
 
 
 def _permanent(axes: Axes, found: ContactLawFit, length: style.AxisScale) -> None:
-    """Permanent against largest indentation (figure 3.6)."""
+    """Draw permanent against largest indentation (figure 3.6)."""
     pairs = [(cycle.alpha_m, cycle.alpha_0) for cycle in found.cycles]
     x, y, down, across = np.array([(m.value, o.value, o.error, m.error) for m, o in pairs]).T
     axes.errorbar(x, y, down, across, "o", color=style.COLOURS[0], ms=3.0, lw=0.8, capsize=2.0)
@@ -105,7 +105,7 @@ def _permanent(axes: Axes, found: ContactLawFit, length: style.AxisScale) -> Non
 
 @style.styled
 def path_picture(indentation: Floats, force: Floats, units: Mapping[str, str]) -> Picture:
-    """Force along an indentation path."""
+    """Draw the force along an indentation path."""
     figure, (axes,) = style.panels("column")
     axes.plot(indentation, force, color=style.COLOURS[0])
     style.scale_in(units, "length", indentation).name(axes.xaxis, "Indentation")
@@ -117,9 +117,9 @@ def path_picture(indentation: Floats, force: Floats, units: Mapping[str, str]) -
 def rigidity_picture(
     peaks: Floats, relations: Mapping[str, Floats], power: float, units: Mapping[str, str]
 ) -> Picture:
-    """Unloading rigidity against largest indentation (figure 3.19).
+    """Draw the unloading rigidity against the largest indentation (figure 3.19).
 
-    Drawn are the rigidities, force/length^power, of each relation at the `peaks`, (n,).
+    Rigidities, force/length^power, of each relation are drawn at the `peaks`, (n,).
     """
     # The rigidity is unbounded towards zero: the deeper half sets the height of the axis.
     top = 3.0 * max(float(s[len(s) // 2 :].max()) for s in relations.values())
@@ -157,7 +157,7 @@ def _against_time(
 def pulse_picture(
     history: RodHistory, filtered: Floats | None, units: Mapping[str, str]
 ) -> Picture:
-    """Forces above, accelerations below, as in figures 4.7 and 4.8.
+    """Draw forces above, accelerations below, as in figures 4.7 and 4.8.
 
     `filtered` are the filtered forces at the stations, (rows, stations).
     """
@@ -192,9 +192,9 @@ def pulse_picture(
 def filter_picture(
     time: Floats, named: Mapping[str, Floats], units: Mapping[str, str], dimension: str
 ) -> Picture:
-    """A history, the filtered history, and others beside them, (rows,) each, against time.
+    """Draw a history, the filtered history, and others beside them, (rows,) each, against time.
 
-    The histories have their names in the legend; their dimension is empty if it is unknown.
+    The legend has the names of the histories. Their dimension is empty if it is unknown.
     """
     figure, (axes,) = style.panels("column")
     looks = zip(named.items(), style.COLOURS, strict=False)
@@ -209,9 +209,9 @@ def filter_picture(
 def calibration_picture(
     time: Floats, v_f: Floats, v_a: Floats, found: Calibration, units: Sequence[str]
 ) -> Picture:
-    """Both outputs against time (figure 4.5), and one against the other with the fit (4.6).
+    """Draw both outputs against time (figure 4.5), and against each other with the fit (4.6).
 
-    `units` are those of time, V_F and V_a.
+    `units` are the units of time, V_F and V_a.
     """
     figure, (left, right) = style.panels("full", 1, 2, ratio=2 * style.RATIO["full"])
     other = left.twinx()
@@ -247,10 +247,10 @@ CUSP: Look = {"ls": "", "marker": "o", "ms": 3.0, "mfc": "white", "mec": "black"
 
 @styled
 def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
-    """Phase velocities and frequencies of all modes against the wavelength.
+    """Draw phase velocities and frequencies of all modes against the wavelength.
 
     Velocities are divided by the transverse shear velocity, frequencies by that velocity over the
-    thickness, as in figures 2.4 and 2.5.  The axes end just above the in-plane modes and the
+    thickness, as in figures 2.4 and 2.5. The axes end just above the in-plane modes and the
     cut-off.
     """
     limit_count(len(curves), "directions")
@@ -280,7 +280,7 @@ def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
 
 @styled
 def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
-    """Polar graphs of the normal velocities of in-plane and flexural fronts."""
+    """Draw polar graphs of the normal velocities of in-plane and flexural fronts."""
     fronts = surfaces.fronts(AROUND)
     speed = scale_in(units, "length/time", fronts.velocity)
     figure, axes = panels("full", 1, 2, ratio=1.16, projection="polar")
@@ -304,7 +304,7 @@ def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
 def fronts_picture(
     surfaces: WaveSurfaces, times: Sequence[float], radius: float, units: Mapping[str, str]
 ) -> Picture:
-    """Fronts at several times with rays and cusps, one graph per mode."""
+    """Draw fronts at several times with rays and cusps, one graph per mode."""
     limit_count(len(times), "times")
     fronts, some = surfaces.fronts(AROUND), surfaces.fronts(np.arange(0.0, 360.0, RAYS))
     places = [fronts.positions(time, radius) for time in times]

@@ -1,6 +1,6 @@
 """Style of the pictures: journal sizes and colours, units on the axes, legends beside the data.
 
-Axes hold numbers in the deck's units; their ticks show them times the factor of an
+Axes hold numbers in the deck's units. Their ticks show them times the factor of an
 :class:`AxisScale`.
 """
 
@@ -108,7 +108,7 @@ def literal(text: str) -> str:
 
 
 class Multiple(Formatter):
-    """Shows ticks times a factor, all with the decimals that one of them needs."""
+    """Formatter of ticks times a factor, all with the decimals that one of them needs."""
 
     MOST_DECIMALS = 11
 
@@ -117,7 +117,7 @@ class Multiple(Formatter):
         self._decimals: int | None = None  # None if no number of decimals shows the ticks
 
     def set_locs(self, locs: Sequence[float]) -> None:
-        """Take the positions of the ticks."""
+        """Receive the positions of the ticks."""
         if not len(locs):
             return
         shown = self._factor * np.asarray(locs)
@@ -129,12 +129,12 @@ class Multiple(Formatter):
                 break
 
     def __call__(self, x: float, pos: int | None = None) -> str:
-        """Text of a tick."""
+        """Return the text of a tick."""
         form = ".4g" if self._decimals is None else f".{self._decimals}f"
         return self.fix_minus(f"{self._factor * x:z{form}}")
 
     def format_data_short(self, value: float) -> str:
-        """Text of the cursor's position."""
+        """Return the text of the cursor's position."""
         return f"{self._factor * value:.4g}"
 
 
@@ -146,11 +146,11 @@ class AxisScale(NamedTuple):
 
     @property
     def shown(self) -> str:
-        """The unit with its broken powers, as in N/mm^1.5, above the line."""
+        """Unit with its broken powers, as in N/mm^1.5, as superscripts."""
         return re.sub(r"\^(\d+\.\d+)", r"$^{\1}$", literal(self.unit))
 
     def label(self, name: str) -> str:
-        """Label of an axis."""
+        """Return the label of an axis."""
         return f"{name} ({self.shown})" if self.unit else name
 
     def name(self, axis: Axis, name: str) -> None:
@@ -159,13 +159,13 @@ class AxisScale(NamedTuple):
         axis.set_major_formatter(Multiple(self.factor))
 
     def show(self, value: float) -> str:
-        """A value with its unit, to four significant digits."""
+        """Format a value with its unit, to four significant digits."""
         times = " ×" if self.unit.startswith("10") else ""
         return f"{self.factor * value:.4g}{times} {self.shown}".rstrip()
 
 
 def scale(peak: float, unit: str) -> AxisScale:
-    """Scale for numbers up to `peak`, in powers of 1000; none for numbers near 1.
+    """Return the scale for numbers up to `peak`, in powers of 1000; 1 for numbers near 1.
 
     Some units take a prefix (800 µs), others follow the power (1.3, 10⁻³ in).
     """
@@ -181,14 +181,20 @@ def scale(peak: float, unit: str) -> AxisScale:
 
 
 def open_ends_note(results: Mapping[str, Result]) -> str:
-    """Say that contacts last to the end; name the results unless all do.  Empty if none does."""
+    """Say that contacts last to the end; name the results unless all do.
+
+    The text is empty if no contact does.
+    """
     named = [name for name, result in results.items() if result.still_in_contact]
     which = f" ({', '.join(named)})" if len(named) < len(results) else ""
     return f"still in contact at the end{which}" if named else ""
 
 
 def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Array]) -> AxisScale:
-    """Scale for arrays of one dimension, in the results' unit if all name it; units must agree."""
+    """Return the scale for arrays of one dimension, in the results' unit.
+
+    The units of the results must agree.
+    """
     units = {name: unit_of(dimension, result.units) for name, result in results.items()}
     named = {unit: name for name, unit in units.items() if unit}
     if len(named) > 1:
@@ -198,13 +204,13 @@ def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Arr
 
 
 def largest_absolute(*arrays: Array) -> float:
-    """Largest finite absolute value of arrays; 0 if there is none."""
+    """Return the largest finite absolute value of arrays; 0 if there is none."""
     finite = (np.abs(array[np.isfinite(array)]) for array in arrays)
     return max((float(values.max(initial=0.0)) for values in finite), default=0.0)
 
 
 def scale_in(units: Mapping[str, str], dimension: str, *arrays: Array) -> AxisScale:
-    """Scale for arrays of one dimension, in named units."""
+    """Return the scale for arrays of one dimension, in named units."""
     return scale(largest_absolute(*arrays), unit_of(dimension, dict(units)))
 
 
@@ -215,15 +221,15 @@ def limit_count(count: int, what: str, most: int = len(COLOURS)) -> None:
 
 
 def colours() -> list[str]:
-    """Colours of the lines: this style's, or the user's own."""
+    """Return the colours of the lines: this style's, or the user's own."""
     own = matplotlib.rcParams["axes.prop_cycle"].by_key().get("color", COLOURS)
     return list(itertools.islice(itertools.cycle(own), len(COLOURS)))
 
 
 def style_on(axes: Axes | None) -> Look:
-    """The part of this style that the user's settings leave open, or the style on given axes.
+    """Return the part of this style that the user's settings leave open, or the style on axes.
 
-    On given axes it is the user's, with the colours after those of the lines there.
+    On given axes it is the user's style, with the colours after those of the lines there.
     """
     own = matplotlib.rcParams
     if axes is not None:
@@ -246,9 +252,10 @@ def panels(
     width_ratios: Sequence[float] | None = None,
     height_ratios: Sequence[float] | None = None,
 ) -> tuple[Figure, list[Axes]]:
-    """Figure with equal axes by rows: height over width is `ratio`, or `tall` times a graph's.
+    """Return a figure with equal axes by rows.
 
-    The ratios of widths and heights make axes unequal.
+    Height over width is `ratio`, or `tall` times a graph's. The ratios of widths and heights make
+    axes unequal.
     """
     target = TARGET.get()
     if isinstance(target, Axes):
@@ -281,7 +288,7 @@ def panels(
 
 
 def _figure_of(target: Axes, count: int, *, solid: bool) -> Figure:
-    """Figure of the user's axes; refuse a picture that does not fit them."""
+    """Return the figure of the user's axes; refuse a picture that does not fit them."""
     if count > 1:
         raise PlotError(f"this picture has {count} axes and can't be drawn on one")
     if solid and target.name != "3d":
@@ -303,7 +310,7 @@ def colour_bar(
     pad: float = 0.03,
     shrink: float = 1.0,
 ) -> Colorbar:
-    """Draw the colour bar of what is drawn above axes.
+    """Draw a colour bar above axes.
 
     `aspect` is its length over its height; `fraction`, `pad` and `shrink` are relative to the axes.
     """

@@ -43,7 +43,7 @@ Where = Mapping[str, float | str]  # values of parameters, by name, that select 
 
 
 class DrawnVariable(NamedTuple):
-    """A parameter or quantity of cases, shown by an axis or by colours."""
+    """Parameter or quantity of cases, shown by an axis or by colours."""
 
     name: str
     scale: style.AxisScale
@@ -75,7 +75,7 @@ class DrawnVariable(NamedTuple):
 
 
 def variable_of(sweep: SweepResult, name: str, values: Array) -> DrawnVariable:
-    """Variable of a parameter's or a quantity's values; counts are not scaled."""
+    """Return the variable of a parameter's or a quantity's values; counts are not scaled."""
     plain = style.AxisScale(1.0, "")
     if values.dtype.kind == "U":
         ticks = tuple(dict.fromkeys(values.tolist()))
@@ -91,7 +91,7 @@ def variable_of(sweep: SweepResult, name: str, values: Array) -> DrawnVariable:
 
 
 def case_rows(sweep: SweepResult, name: str, where: Where) -> Indices:
-    """Cases at given values; numbers select the nearest value."""
+    """Return the cases at given values; numbers select the nearest value."""
     kept = np.ones(len(sweep), dtype=bool)
     for parameter, wanted in where.items():
         values = parameter_values(sweep, name, parameter)
@@ -105,7 +105,7 @@ def case_rows(sweep: SweepResult, name: str, where: Where) -> Indices:
 
 
 def _equal_texts(values: Array, wanted: float | str, otherwise: str) -> Bools:
-    """Mask of the cases with a text; begin the refusal of another with `otherwise`."""
+    """Return a mask of the cases with a text; `otherwise` starts the refusal of another."""
     chosen = np.asarray(values == str(wanted))
     if not chosen.any():
         raise PlotError(f"{otherwise}; there is {names_in_words(dict.fromkeys(values))}")
@@ -113,7 +113,7 @@ def _equal_texts(values: Array, wanted: float | str, otherwise: str) -> Bools:
 
 
 def _nearest_numbers(values: Array, wanted: float | str, otherwise: str) -> Bools:
-    """Mask of the cases nearest to a number; begin the refusal of another with `otherwise`."""
+    """Return a mask of the cases nearest to a number; `otherwise` starts a refusal."""
     try:
         number = float(wanted)
     except ValueError:
@@ -126,7 +126,7 @@ def _nearest_numbers(values: Array, wanted: float | str, otherwise: str) -> Bool
 
 
 def parameter_values(sweep: SweepResult, name: str, parameter: str) -> Array:
-    """Values of a parameter, (cases,); refuse one that the sweep does not have."""
+    """Return the values of a parameter, (cases,); refuse an unknown parameter."""
     if parameter not in sweep.cases:
         raise PlotError(
             f"{name} has no parameter {parameter}; it has {names_in_words(sweep.cases)}"
@@ -141,9 +141,9 @@ def names_in_words(names: Iterable[object]) -> str:
 
 
 def quantity_of(sweep: SweepResult, name: str, rows: Indices, quantity: str) -> DrawnVariable:
-    """Quantity to show of cases, NaN where a case has none; warn of cases that lack it.
+    """Return the quantity to show, NaN for cases without a value, with a warning about them.
 
-    The default is the velocity found, or else the peak force.
+    The default is the velocity that was searched, or else the peak force.
     """
     quantity = quantity or ("found_velocity" if "found_velocity" in sweep.summary else "peak_force")
     known = [name for name in sweep.summary if name not in VERDICTS]
@@ -186,19 +186,19 @@ def _warn_of_gaps(
 
 
 def beyond(sweep: SweepResult, rows: Indices) -> dict[str, Bools]:
-    """Cases beyond the range of the model, by what they are."""
+    """Return masks of the cases beyond the range of the model, by kind."""
     elsewhere = (Reason.OPEN, Reason.DELAMINATED)  # they have a mark and a line of their own
     masks = counted(sweep.validity[rows])
     return {MEANING[reason]: mask for reason, mask in masks if reason not in elsewhere}
 
 
 def ended(sweep: SweepResult, rows: Indices) -> dict[str, Bools]:
-    """Cases whose contact is not over, by what they are; empty if there are none."""
+    """Return masks of the cases whose contact is not over, by kind."""
     mask = sweep.completed[rows] & ~sweep.contact_over[rows]
     what = STILL if np.array_equal(mask, sweep.still_in_contact[rows]) else ENDED
     return {what: mask} if mask.any() else {}
 
 
 def case_counts(masks: Mapping[str, Bools], sign: str = "") -> list[str]:
-    """Lines for below a picture: how many cases are what."""
+    """Return lines below a picture with the numbers of cases by kind."""
     return [f"{sign}{what}: {mask.sum()} of {len(mask)} cases" for what, mask in masks.items()]

@@ -30,7 +30,7 @@ _PARABOLA = np.stack(
 
 
 class Stress(NamedTuple):
-    """A stress over the thickness."""
+    """Stress over the thickness."""
 
     label: str
     z: Array  # (plies, n), from the midplane
@@ -45,15 +45,15 @@ def thickness(
     times: Sequence[float] = (),
     width: Width = "column",
 ) -> Picture:
-    """Stresses of the plies of one element over z, the struck face at the top.
+    """Draw the stresses of the plies of one element over z, the struck face at the top.
 
-    In-plane stresses are in the axes of each ply, interlaminar ones in those of the plate; the last
-    graph is the resultant of these.  sigma_z is not computed.  A thin line is the residual stress
-    of CURE, which the others do not contain.
+    In-plane stresses are in the axes of each ply, interlaminar ones in the axes of the plate; the
+    last graph is the resultant of the latter. sigma_z is not computed. A thin line is the residual
+    stress of CURE, which the others do not contain.
 
-    Of `at` (length) at most one place selects the nearest element with ply stresses, and its
-    nearest point; of `times` (the deck's unit) at most one the nearest stored row.  By default both
-    are those of the largest abs(sigma_1) outside the elements under the load.
+    `at` (length) has at most one place, which selects the nearest element with ply stresses and its
+    nearest point. `times` (the deck's unit) has at most one time, which selects the nearest stored
+    row. By default both belong to the largest abs(sigma_1) outside the elements under the load.
     """
     ((name, result),) = results.items()
     plies, point = _chosen(result, name, at, times)
@@ -91,7 +91,7 @@ def thickness(
 
 
 def _stresses(plies: PlyResults, point: int, result: Result) -> list[Stress]:
-    """Stresses at a point; those between the plies only where they are computed."""
+    """Return stresses at a point; interlaminar stresses only where they are computed."""
     faces = plies.z[:, ::2]
     residual: list[Array | None] = [None] * 3
     cured = cure_stress_of(result, int(plies.element[0]))
@@ -115,7 +115,7 @@ def _stresses(plies: PlyResults, point: int, result: Result) -> list[Stress]:
 def _chosen(
     result: Result, name: str, at: Sequence[tuple[float, float]], times: Sequence[float]
 ) -> tuple[PlyResults, int]:
-    """Plies of one element at one time, and the number of the point in it, from 0."""
+    """Return the plies of one element at one time, and the number of the point in it, from 0."""
     if len(at) > 1 or len(times) > 1:
         raise PlotError("the kind thickness shows one point at one time; give --at and --time once")
     sigma, stored, numbers, near = require_datasets(
@@ -149,7 +149,7 @@ def _chosen(
 
 
 def _own(plies: PlyResults) -> PlyResults:
-    """The plies of one element, without those that only other laminates have."""
+    """Return the plies of one element, without those that only other laminates have."""
     if plies.z.ndim == 2:
         return plies
     z = plies.z[0]
@@ -159,7 +159,7 @@ def _own(plies: PlyResults) -> PlyResults:
 
 
 def _nearest_element(mesh: tuple[Array, Floats], numbers: Array, at: Floats, name: str) -> int:
-    """Position of the element that contains a place, or else of the one with the nearest centre."""
+    """Return the position of the element that contains a place, or of the nearest one."""
     coordinates = mesh[1]
     elements = mesh[0][numbers - 1]
     on_plate(coordinates, at, name)
@@ -179,7 +179,7 @@ def _nearest_element(mesh: tuple[Array, Floats], numbers: Array, at: Floats, nam
 
 
 def _warn(result: Result, name: str, plies: PlyResults) -> None:
-    """Say what limits the stresses of an element."""
+    """Name what limits the stresses of an element."""
     element = f"element {plies.element[0]} of {name}"
     if plies.under_load[0]:
         near = reach(result, name, 2.0 * float(plies.z[-1, 2]))

@@ -1,4 +1,4 @@
-"""Quick estimates of a problem's impact, and when they reach the threshold of DELA."""
+"""Quick estimates of a problem's impact, and of the velocity that reaches DELA's threshold."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ LOW = "the nonlinear static plate is 9 to 26 % low in force at M/M_plate = 24"
 
 @dataclass(frozen=True)
 class QuickModel:
-    """One quick model of an impact."""
+    """Quick model of an impact."""
 
     name: str
     impact: QuickImpact
@@ -69,7 +69,10 @@ class QuickEstimate(NamedTuple):
 
 
 def quick_estimate(problem: Problem) -> QuickEstimate:
-    """Estimate the impact of a checked problem; without an impact, raise a StudyError."""
+    """Estimate the impact of a checked problem.
+
+    Raises StudyError without an impact.
+    """
     contact = problem.contact
     if contact is None:
         raise StudyError("the deck has no impact: RODP in the program, with ROD and EXPE")
@@ -109,10 +112,10 @@ def quick_estimate(problem: Problem) -> QuickEstimate:
 
 
 def velocity_at(problem: Problem, force: float) -> float:
-    """Velocity at which the better of the quick models reaches a peak force.
+    """Return the velocity at which the better of the quick models reaches a peak force.
 
-    Between both ranges all forces are too low.  The velocity of the deck where no model applies: a
-    free plate under a large mass.
+    Between the ranges of both models all forces are too low. Where no model applies, as for a free
+    plate under a large mass, it is the velocity of the deck.
     """
     deck, contact = problem.deck, problem.contact
     assert contact is not None  # the program has impact steps
@@ -132,7 +135,7 @@ def velocity_at(problem: Problem, force: float) -> float:
 def _nonlinear_model(
     curve: StaticCurve, mass: float, velocity: float, k: float, threshold: float, *, applies: bool
 ) -> QuickModel:
-    """The static model of a nonlinear plate."""
+    """Return the static model of a nonlinear plate."""
     found = math.nan
     if math.isfinite(threshold):
         found = _static_velocity(curve, mass, k, threshold)
@@ -141,26 +144,26 @@ def _nonlinear_model(
 
 
 def _static_velocity(curve: StaticCurve, mass: float, k: float, force: float) -> float:
-    """Velocity at which the static model reaches a force of the curve."""
+    """Return the velocity at which the static model reaches a force of the curve."""
     most = curve.deflection[-1]
     at = root(lambda w: stored_at(curve, k, w)[0] - force, 0.0, most, 1e-12 * most)
     return math.sqrt(2.0 * stored_at(curve, k, at)[1] / mass)
 
 
 def _inelasticity(problem: Problem, mass: float, velocity: float) -> float:
-    """Zener's parameter of an impact on the plate of a problem."""
+    """Return Zener's parameter of an impact on the plate of a problem."""
     laminate, k = problem.laminate, problem.deck.require(Indentation).k
     return inelasticity(mass, velocity, k, laminate.mass, effective_rigidity(laminate))
 
 
 def _peaks_on_infinite_plate(problem: Problem, mass: float) -> Callable[[float], float]:
-    """Peak forces on the infinite plate by the velocity."""
+    """Return the peak forces on the infinite plate by velocity."""
     k = problem.deck.require(Indentation).k
     return lambda v: peak_on_infinite_plate(mass, v, k, _inelasticity(problem, mass, v))
 
 
 def _velocity(peak: Callable[[float], float], start: float, force: float) -> float:
-    """Velocity at which a peak force that grows with it has a value; NaN if it is not finite."""
+    """Return the velocity at which an increasing peak force has a value; NaN if not finite."""
     if not math.isfinite(force):
         return math.nan
     low = high = start

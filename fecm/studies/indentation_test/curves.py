@@ -86,7 +86,7 @@ class ParameterLayout:
 
 
 def parameter_layout(division: Division, tied: frozenset[int] = frozenset()) -> ParameterLayout:
-    """Number the parameters: k, q, corners, permanent indentations, and origins not in `tied`."""
+    """Assign numbers to k, q, corners, permanent indentations, and origins not in `tied`."""
     corners = list(range(2, 2 + len(division.corners)))
     permanents = [2 + len(corners) + n for n in range(len(division.peaks))]
     origins: dict[int, int] = {}

@@ -1,4 +1,4 @@
-"""The contact law of an indentation test."""
+"""Contact law of an indentation test."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from fecm.studies.indentation_test.turns import Test, read_test
 
 @dataclass(frozen=True)
 class IndentationFit:
-    """Contact law fitted to an indentation test; printed, it is the page of `fecm indent fit`.
+    """Contact law fitted to an indentation test; ``str()`` is the page of `fecm indent fit`.
 
-    A fitted value has a `value` and its standard `error`, 0 for a prescribed value; it is None
+    A fitted value has a `value` and its standard `error`, 0 for a prescribed value. It is None
     where the test does not determine it.
 
     Attributes
@@ -107,7 +107,7 @@ class IndentationFit:
         return constants.law(self.fit)
 
     def to_dict(self) -> dict[str, Any]:
-        """Plain values, as `fecm indent fit --format json` prints them."""
+        """Return plain values, as `fecm indent fit --format json` prints them."""
         return {"units": dict(self.units) or None, **constants.plain(self.fit)}
 
     def __str__(self) -> str:
@@ -207,7 +207,7 @@ def _measured(
     columns: Sequence[str],
     units: tuple[str, str] | None,
 ) -> Test:
-    """A test from a table or from arrays."""
+    """Return a test from a table or from arrays."""
     for name, pair in (("columns", columns), ("units", units)):
         if pair and (isinstance(pair, str) or len(pair) != 2):
             raise StudyError(f"`{name}` is {pair!r}, not two names: of indentation and of force")

@@ -62,7 +62,7 @@ def smoothed(indentation: Floats) -> SmoothedIndentation:
 
 
 def _moving_mean(values: Floats, reach: int) -> Floats:
-    """Mean of each point and up to `reach` neighbours on either side."""
+    """Return the mean of each point and up to `reach` neighbours on either side."""
     sums = np.concatenate([[0.0], np.cumsum(values)])
     n = np.arange(len(values))
     first, last = np.maximum(n - reach, 0), np.minimum(n + reach + 1, len(values))

@@ -68,7 +68,7 @@ class Filter:
     is_zero_phase: bool = False
 
     def in_unit(self, time: str) -> Filter:
-        """The same filter for times in a unit; a class and a frequency are in Hz.
+        """Return the same filter for times in a unit; a class and a frequency are in Hz.
 
         Raises StudyError if the filter has one of them, and the unit is unknown.
         """
@@ -154,7 +154,10 @@ class Filter:
 
 
 def _equal_step(time: Floats, kind: str) -> float:
-    """Time step of a history; StudyError if the steps differ."""
+    """Return the time step of a history.
+
+    Raises StudyError if the steps differ.
+    """
     dt = float(time[-1] - time[0]) / (len(time) - 1)
     if np.abs(np.diff(time) - dt).max() > UNEQUAL * dt:
         raise StudyError(f"a {kind} filter needs equal time steps; resample the history")

@@ -42,7 +42,7 @@ class Pulse(NamedTuple):
 
 
 def gauss_pulse(peak: float, tau: float, b: float) -> Pulse:
-    """Exponential pulse F0 exp(-(t - tau)^2 / 4 b^2), equation 4-5.
+    """Return the exponential pulse F0 exp(-(t - tau)^2 / 4 b^2), equation 4-5.
 
     It starts at t = 0 with a jump of F0 exp(-tau^2 / 4 b^2), and has fallen to 1/500 of its peak at
     the end of the test.
@@ -54,7 +54,7 @@ def gauss_pulse(peak: float, tau: float, b: float) -> Pulse:
 
 
 def sine_pulse(peak: float, b: float) -> Pulse:
-    """Half wave F0 sin(pi t / b), equation 4-6; the rod rings for b/2 after it."""
+    """Return the half wave F0 sin(pi t / b), equation 4-6; the rod rings for b/2 after it."""
     return Pulse(
         lambda time: np.where((time >= 0.0) & (time < b), peak * np.sin(np.pi * time / b), 0.0),
         1.5 * b,
@@ -62,7 +62,7 @@ def sine_pulse(peak: float, b: float) -> Pulse:
 
 
 def table_pulse(times: Floats, forces: Floats) -> Pulse:
-    """Table of forces, linear between rows, and zero before the first and after the last."""
+    """Return a table of forces, linear between rows, and zero before and after them."""
     return Pulse(
         lambda time: np.asarray(np.interp(time, times, forces, left=0.0, right=0.0)),
         float(times[-1]),
@@ -207,7 +207,7 @@ def _march(
 
 
 def _place(rod: Rod, x: float) -> tuple[int, float]:
-    """Element at x (the farther of two) and the local coordinate, from 0 to 1."""
+    """Return the element at x (the farther of two) and the local coordinate, from 0 to 1."""
     along = x / rod.length * rod.elements
     node = round(along)
     if abs(along - node) < 1e-9 * rod.elements:

@@ -51,7 +51,7 @@ class Struck(NamedTuple):
 
 @dataclass(frozen=True)
 class PulseTest(RodHistory):
-    """History of a rod under a pulse; printed, it is the summary of `fecm rod`.
+    """History of a rod under a pulse; ``str()`` is the summary of `fecm rod`.
 
     Attributes
     ----------
@@ -185,13 +185,16 @@ def pulse_test(
 
 
 def uniform_rod(rod: Rod, units: str | None) -> Struck:
-    """A rod by itself, in a system of units."""
+    """Return a uniform rod in a system of units."""
     system = system_asked(units)
     return Struck(rod, rod.length / 2.0, None, units_of(system) if system else {})
 
 
 def rod_of(deck: Deck) -> Struck:
-    """The rod of a checked deck; StudyError if the projectile is a rigid mass."""
+    """Return the rod of a checked deck.
+
+    Raises StudyError if the projectile is a rigid mass.
+    """
     projectile = build_projectile(deck)
     if isinstance(projectile, RigidMass):
         raise StudyError("the projectile is a rigid mass; a pulse needs a rod")
@@ -235,7 +238,7 @@ def simulate_rod_test(
 
 
 def _pulse(pulse: str | Path | tuple[ArrayLike, ArrayLike], units: Mapping[str, str]) -> Pulse:
-    """A pulse from a text, a table or arrays."""
+    """Return a pulse from a text, a table or arrays."""
     if isinstance(pulse, str | Path):
         return pulse_of(str(pulse), units)
     try:

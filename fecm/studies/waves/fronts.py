@@ -87,21 +87,25 @@ class Fronts:
         return np.asarray(np.where(angle <= -180.0 + 1e-9, angle + 360.0, angle))
 
     def positions(self, time: float, radius: float) -> Floats:
-        """Positions, (n, 5, 2), of fronts that start as a circle, equations 2-85 to 2-87.
+        """Return the positions, (n, 5, 2), of fronts that start as a circle.
 
-        The report's radius of the circle (length) is the laminate's thickness.
+        Equations 2-85 to 2-87. The report's radius of the circle (length) is the laminate's
+        thickness.
         """
         start = radius * np.stack(trigonometry(self.normal), axis=-1)
         return np.asarray(start[:, None] + time * self.ray)
 
     def growth(self, time: float, radius: float) -> Floats:
-        """Length of the front per radian of the normal, (n, 5); zero at a cusp, then negative."""
+        """Return the length of the front per radian of the normal, (n, 5).
+
+        It is zero at a cusp, then negative.
+        """
         return radius + time * (self.velocity + self.curvature)
 
 
 @dataclass(frozen=True)
 class Sheets(Fronts):
-    """The five solutions for a series of normals, in descending order of velocity."""
+    """Five solutions for a series of normals, in descending order of velocity."""
 
     # Modes as columns, (n, 5, 5), orthonormal after scaling by the inertia's Cholesky factor.
     mode: Floats
@@ -156,7 +160,7 @@ def track_branch(medium: Medium, first: float, last: float) -> Indices:
 
 
 def _stiffness(medium: Medium, normal: Floats) -> Floats:
-    """L(n) and its first and second derivative with respect to the angle, (3, n, 5, 5)."""
+    """Return L(n) and its first and second derivative by the angle, (3, n, 5, 5)."""
     both = np.zeros((3, len(normal), 6, 4))
     for matrix, part in zip(both, gradients(normal), strict=True):
         matrix[:, :3, :2] = matrix[:, 3:, 2:] = part
@@ -177,7 +181,7 @@ def _stiffness(medium: Medium, normal: Floats) -> Floats:
 
 
 def _solved(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues, descending, and eigenvectors; those of equal eigenvalues follow the sheets."""
+    """Return descending eigenvalues and eigenvectors; equal eigenvalues follow the sheets."""
     # Uncoupled in-plane and flexural components are solved separately.
     coupled = operator[:, :2, 2:4].any()
     values = np.empty(operator.shape[:2])
@@ -196,7 +200,7 @@ def _solved(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Fl
 
 
 def _kept_apart(values: Floats, vectors: Floats, derivatives: Floats, limit: float) -> Floats:
-    """Eigenvectors that are continuous in the normal where sheets meet."""
+    """Return eigenvectors that are continuous in the normal where sheets meet."""
     # Among equal eigenvalues they diagonalise the first, then the second derivative of the
     # operator; for identical sheets they separate the components.
     parts: list[Floats] = []
@@ -213,7 +217,7 @@ def _kept_apart(values: Floats, vectors: Floats, derivatives: Floats, limit: flo
 
 
 def _runs(values: Floats, limit: float) -> list[Indices]:
-    """Indices of runs of sorted values that are equal up to `limit`."""
+    """Return the indices of runs of sorted values that are equal up to `limit`."""
     steps = np.flatnonzero(np.abs(np.diff(values)) >= limit) + 1
     return np.split(np.arange(len(values)), steps)
 
@@ -235,7 +239,7 @@ AROUND = 360 * STEPS  # steps over all normals
 
 @dataclass(frozen=True)
 class Cusp:
-    """A cusp of a front.
+    """Cusp of a front.
 
     Attributes
     ----------
@@ -283,7 +287,7 @@ class WaveSurfaces:
         self._place = place[:, ORDERS[first_largest(scores[None])[0]]]
 
     def fronts(self, normals: ArrayLike) -> Fronts:
-        """The five fronts at normals, (n,), in degrees."""
+        """Return the five fronts at normals, (n,), in degrees."""
         found = sheets(self.medium, np.atleast_1d(np.asarray(normals, dtype=np.float64)))
         turn = np.mod(found.normal, 360.0) * STEPS
         near = np.round(turn).astype(np.intp)
@@ -302,10 +306,11 @@ class WaveSurfaces:
         )
 
     def cusps(self, time: float, radius: float) -> list[Cusp]:
-        """Cusps of the fronts that start as a circle, by mode, then by the normal's angle.
+        """Return the cusps of the fronts that start as a circle.
 
-        A front turns back where its length per radian of the normal, radius + time (c_n + c_n''),
-        changes sign.  The search step is a tenth of a degree, a thousandth where fronts are close.
+        They are sorted by mode, then by the normal's angle. A front turns back where its length per
+        radian of the normal, radius + time (c_n + c_n''), changes sign. The search step is a tenth
+        of a degree, a thousandth where fronts are close.
         """
         inside = (np.flatnonzero(self._close)[:, None] + np.arange(100) / 100.0).ravel()
         normals = np.union1d(np.arange(AROUND + 1) - 0.5, inside) / STEPS
@@ -326,7 +331,10 @@ class WaveSurfaces:
         return sorted(found, key=lambda cusp: (FRONTS.index(cusp.mode), cusp.normal))
 
     def misnamed(self) -> dict[str, list[tuple[float, float]]]:
-        """Intervals of the normal (degrees), by front, where another component dominates."""
+        """Return the intervals of the normal (degrees) where another component dominates.
+
+        They are listed by front.
+        """
         normals = np.arange(AROUND + 1) / STEPS
         share = self.fronts(normals).share
         runs: dict[str, list[tuple[float, float]]] = {}

@@ -1,4 +1,4 @@
-"""The infinite laminate, and harmonic plane waves in it: velocities, frequencies, section 2.2."""
+"""Infinite laminate, and harmonic plane waves in it: velocities, frequencies, section 2.2."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ OUT_OF_RANGE = "the laminate's constants are too large or too far apart to compu
 
 @dataclass(frozen=True)
 class Medium:
-    """An infinite laminate; raises StudyError if stiffness or inertia is not positive definite."""
+    """Infinite laminate.
+
+    Raises StudyError if stiffness or inertia is not positive definite.
+    """
 
     # Stiffness, mass P, rotary inertia I, and R, the first moment of density about the midplane.
     laminate: LaminateSection
@@ -66,7 +69,7 @@ class Medium:
 
 
 def trigonometry(degrees: ArrayLike) -> tuple[Floats, Floats]:
-    """Cosine and sine, (n,) each, exact at multiples of 90 degrees."""
+    """Return cosine and sine, (n,) each, exact at multiples of 90 degrees."""
     angle = np.atleast_1d(np.asarray(degrees, dtype=np.float64))
     quarter = np.round(angle / 90.0)
     rest = np.deg2rad(angle - 90.0 * quarter)
@@ -77,9 +80,9 @@ def trigonometry(degrees: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def gradients(degrees: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Strains xx, yy, xy of a unit gradient along n of u_n and u_t, (n, 3, 2).
+    """Return the strains xx, yy, xy of a unit gradient along n of u_n and u_t, (n, 3, 2).
 
-    The first and second derivative with respect to the angle (radian) follow.
+    The first and second derivative by the angle (radian) follow.
     """
     cos, sin = trigonometry(degrees)
     one, two = cos**2 - sin**2, 2.0 * sin * cos  # cosine and sine of twice the angle
@@ -94,20 +97,23 @@ def gradients(degrees: ArrayLike) -> tuple[Floats, Floats, Floats]:
 
 
 def in_normal_axes(tensor: Floats, degrees: ArrayLike) -> Floats:
-    """Components nn, nt; tn, tt, (n, 2, 2), of a symmetric tensor with xx, xy; yx, yy."""
+    """Return nn, nt; tn, tt, (n, 2, 2), of a symmetric tensor with xx, xy; yx, yy."""
     cos, sin = trigonometry(degrees)
     axes = np.stack([np.stack([cos, -sin], axis=-1), np.stack([sin, cos], axis=-1)], axis=1)
     return np.asarray(axes.transpose(0, 2, 1) @ tensor @ axes)
 
 
 def shares(inertia: Floats, vectors: Floats) -> Floats:
-    """Share of every component in the energy of modes, (..., modes, 5), columns of `vectors`."""
+    """Return the share of each component in the energy of modes, (..., modes, 5).
+
+    The modes are the columns of `vectors`.
+    """
     energy = vectors * (inertia @ vectors)
     return np.asarray(np.swapaxes(energy / energy.sum(axis=-2, keepdims=True), -1, -2))
 
 
 def first_largest(scores: Floats) -> Indices:
-    """Index of the largest score of every row; the first of those equal up to rounding."""
+    """Return the index of the largest score of every row; the first of equal ones."""
     equal = scores > scores.max(axis=-1, keepdims=True) - 1e-9  # sums of shares, of order 1
     return np.asarray(equal.argmax(axis=-1))
 
@@ -154,12 +160,12 @@ class Dispersion:
 
 
 def dispersion(medium: Medium, angle: float, wavelengths: ArrayLike) -> Dispersion:
-    """Phase velocities and frequencies of all five modes, equations 2-27 to 2-34.
+    """Return phase velocities and frequencies of all five modes, equations 2-27 to 2-34.
 
-    The angle is in degrees; the wavelengths, (n,), are over the thickness.  With B and R the
-    determinants 2-29 and 2-30 become one of order 5.  All frequencies are accurate to about 12
-    digits, even for long waves, where they differ by many orders of magnitude.  Raises StudyError
-    if a wavelength is outside 1e-9 to 1e9, or the laminate's constants are out of range.
+    The angle is in degrees; the wavelengths, (n,), are over the thickness. With B and R the
+    determinants 2-29 and 2-30 become one of order 5. All frequencies are accurate to about 12
+    digits, even for long waves, where they differ by many orders of magnitude. Raises StudyError if
+    a wavelength is outside 1e-9 to 1e9, or the laminate's constants are out of range.
     """
     ratio = np.atleast_1d(np.asarray(wavelengths, dtype=np.float64))
     if not np.all((ratio >= 1e-9) & (ratio <= 1e9)):
@@ -174,7 +180,7 @@ def dispersion(medium: Medium, angle: float, wavelengths: ArrayLike) -> Dispersi
 
 
 def _problem(medium: Medium, angle: float, k: Floats) -> tuple[Floats, Floats, Floats]:
-    """Stiffness, inertia, and transformation to the components u_n ... w, each (n, 5, 5)."""
+    """Return stiffness, inertia, and transformation to u_n ... w, each (n, 5, 5)."""
     # With w a quarter of a period ahead of the others all matrices are real: 2-32 without i.  In
     # long flexural waves phi_n nearly cancels k w; the variable phi_n + tau k w replaces phi_n to
     # avoid the cancellation.  In short waves tau vanishes.
@@ -198,11 +204,11 @@ def _problem(medium: Medium, angle: float, k: Floats) -> tuple[Floats, Floats, F
 
 
 def graded_modes(stiffness: Floats, inertia: Floats) -> tuple[Floats, Floats]:
-    """Frequencies and modes of K a = omega^2 M a with diagonals of very different magnitude.
+    """Solve K a = omega^2 M a with diagonals of very different magnitude.
 
     The matrices, (n, m, m), must be symmetric, positive definite, and well conditioned after
-    scaling to a unit diagonal: then every frequency, not only the highest, is accurate to nearly
-    all digits.  omega, (n, m), is descending; the modes are columns, (n, m, m), with unit
+    scaling to a unit diagonal. Then every frequency, not only the highest, is accurate to nearly
+    all digits. omega, (n, m), is descending; the modes are columns, (n, m, m), with unit
     generalized mass.
     """
     of_k, of_m = (np.sqrt(np.diagonal(matrix, axis1=1, axis2=2)) for matrix in (stiffness, inertia))
@@ -227,7 +233,7 @@ def graded_modes(stiffness: Floats, inertia: Floats) -> tuple[Floats, Floats]:
 
 
 def _singular_values(matrices: Floats) -> tuple[Floats, Floats]:
-    """Singular values, descending, and right singular vectors as columns of matrices (n, m, m)."""
+    """Return descending singular values, and right singular vectors as columns, (n, m, m)."""
     if not np.isfinite(matrices).all():
         raise StudyError(OUT_OF_RANGE)
     values, vectors = np.empty(matrices.shape[:2]), np.empty(matrices.shape)
@@ -243,7 +249,10 @@ def _singular_values(matrices: Floats) -> tuple[Floats, Floats]:
 
 
 def _in_order(share: Floats) -> Indices:
-    """Indices of the modes, sorted by velocity, in the order of :data:`MODES`; (n, 5)."""
+    """Return the indices of the modes in the order of :data:`MODES`, (n, 5).
+
+    Modes of equal name are sorted by velocity.
+    """
     in_plane = share[:, :, :2].sum(axis=2)
     pair = _PAIRS[first_largest(in_plane[:, _PAIRS].sum(axis=2))]
     rest = [[mode for mode in (4, 3, 2, 1, 0) if mode not in taken] for taken in pair.tolist()]

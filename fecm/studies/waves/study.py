@@ -22,7 +22,7 @@ from fecm.studies.waves.harmonic import Dispersion, Medium, dispersion
 
 
 class Waves:
-    """Plane waves and wave fronts in an infinite laminate; `fecm.waves` makes one.
+    """Plane waves and wave fronts in an infinite laminate, created by `fecm.waves`.
 
     Angles are in degrees, counter-clockwise from the x-axis.
 
@@ -52,7 +52,7 @@ class Waves:
         return WaveSurfaces(self.medium)
 
     def dispersion(self, angle: float, wavelengths: ArrayLike) -> Dispersion:
-        """Phase velocities and frequencies of all five modes, equations 2-27 to 2-34.
+        """Return phase velocities and frequencies of all five modes, equations 2-27 to 2-34.
 
         Parameters
         ----------
@@ -74,7 +74,7 @@ class Waves:
         return dispersion(self.medium, angle, wavelengths)
 
     def fronts(self, normals: ArrayLike) -> Fronts:
-        """Velocities, rays and positions of the five fronts, equations 2-60 to 2-87.
+        """Return velocities, rays and positions of the five fronts, equations 2-60 to 2-87.
 
         Parameters
         ----------
@@ -89,7 +89,7 @@ class Waves:
         return self.surfaces.fronts(normals)
 
     def cusps(self, time: float, radius: float | None = None) -> list[Cusp]:
-        """Cusps of the fronts that start as a circle.
+        """Return the cusps of the fronts that start as a circle.
 
         Parameters
         ----------
@@ -117,10 +117,10 @@ class Waves:
 def waves(
     laminate: Laminate | str | Path | Deck, *, shear_factor: float = 1.0, units: str | None = None
 ) -> Waves:
-    """Plane waves and wave fronts in the laminate of a deck, or of a layup (report, chapter 2).
+    """Return plane waves and wave fronts in a laminate (report, chapter 2).
 
-    Of a plate with several laminates it is the one under the load; an initial membrane force is
-    left out, and a note says so.
+    The laminate is a layup, or the laminate of a deck. A plate with several laminates has the one
+    under the load. An initial membrane force is neglected, and a note says so.
 
     Parameters
     ----------
@@ -168,7 +168,7 @@ def waves(
 
 
 def waves_of(problem: Problem, shear_factor: float) -> Waves:
-    """Waves in the laminate of a checked problem."""
+    """Return the waves in the laminate of a checked problem."""
     notes: list[str] = []
     if problem.plate.is_preloaded:
         notes.append("PREL is left out: these are waves of the laminate without preload")
@@ -180,6 +180,6 @@ def waves_of(problem: Problem, shear_factor: float) -> Waves:
 
 
 def _waves(stiffness: Stiffness, factor: float, units: dict[str, str], notes: list[str]) -> Waves:
-    """Waves in a laminate with a factor of its shear stiffness."""
+    """Return the waves in a laminate with a factor on its shear stiffness."""
     scaled = replace(stiffness, shear=factor * stiffness.shear)
     return Waves(Medium(scaled), units, tuple(notes))
