@@ -64,28 +64,28 @@ def onset(time: Floats, force: Floats, share: float) -> float:
     return float(time[both[0]] if len(both) else time[np.argmax(force)])
 
 
-def lags(measured: Measurement, clock: Floats, own: Floats) -> list[float]:
+def lags(measured: Measurement, clock: Floats, computed: Floats) -> list[float]:
     """Return likely delays of a measurement: difference of onsets, and largest cross-correlations.
 
     `clock` has the equally spaced times of the deck's own force.
     """
     share = level(measured.force)
-    found = [onset(measured.time, measured.force, share) - onset(clock, own, share)]
+    delays = [onset(measured.time, measured.force, share) - onset(clock, computed, share)]
     dt = float(clock[1] - clock[0])
     first = float(measured.time[0])
     count = math.ceil((float(measured.time[-1]) - first) / dt) + 1
     grid = first + dt * np.arange(min(count, LONGEST))
     force = np.interp(grid, measured.time, measured.force)
-    size = len(grid) + len(own)
-    spectrum = np.fft.rfft(force, size) * np.conj(np.fft.rfft(own, size))
+    size = len(grid) + len(computed)
+    spectrum = np.fft.rfft(force, size) * np.conj(np.fft.rfft(computed, size))
     # Element n + len(own) is the sum of force[i + n] own[i].
-    both = np.roll(np.fft.irfft(spectrum, size), len(own))
-    shift = first - float(clock[0]) + dt * (np.arange(size) - len(own))
+    both = np.roll(np.fft.irfft(spectrum, size), len(computed))
+    shift = first - float(clock[0]) + dt * (np.arange(size) - len(computed))
     inner = both[1:-1]
     tops = 1 + np.flatnonzero((inner > both[:-2]) & (inner >= both[2:]))
     for top in tops[np.argsort(-both[tops])][:LAGS]:
-        found.append(float(shift[top]))
-    return found
+        delays.append(float(shift[top]))
+    return delays
 
 
 def _top(time: Floats, force: Floats) -> float:
@@ -95,11 +95,11 @@ def _top(time: Floats, force: Floats) -> float:
 
 
 def check_measured(
-    measured: Measurement, clock: Floats, own: Floats, units: Mapping[str, str]
+    measured: Measurement, clock: Floats, computed: Floats, units: Mapping[str, str]
 ) -> float:
     """Compare peak and duration of a measurement with the deck's own run."""
-    name, force, peak = measured.name, measured.force, float(own.max())
-    width = _top(clock, own)
+    name, force, peak = measured.name, measured.force, float(computed.max())
+    width = _top(clock, computed)
     if measured.column != "force":
         text = "has a column transducer and no force; the contact force is fitted"
         raise StudyError(f"{name} {text}")
@@ -116,21 +116,30 @@ def check_measured(
     if np.count_nonzero(force > 0.5 * force.max()) < TOP_POINTS:
         raise StudyError(f"{name} has fewer than {TOP_POINTS} points above half of its peak")
     long = _top(measured.time, force)
-    for dimension, found, expected in (("force", force.max(), peak), ("time", long, width)):
-        if not 1.0 / OFF < found / expected < OFF:
+    for dimension, measured_value, expected in (
+        ("force", force.max(), peak),
+        ("time", long, width),
+    ):
+        if not 1.0 / OFF < measured_value / expected < OFF:
             what = {"force": "peak force", "time": "time above half of the peak"}[dimension]
-            unit, cause = units.get(dimension, ""), _cause(dimension, found / expected, units)
+            unit, cause = (
+                units.get(dimension, ""),
+                _cause(dimension, measured_value / expected, units),
+            )
             usual = f"that of the deck's own run {expected:.3g} {unit}".rstrip()
-            raise StudyError(f"{name}: the {what} is {found:.3g}, {usual}; {cause}")
+            raise StudyError(f"{name}: the {what} is {measured_value:.3g}, {usual}; {cause}")
     return width
 
 
 def _cause(dimension: str, ratio: float, units: Mapping[str, str]) -> str:
     """Return the likely cause of a measurement that is off by a factor, and the remedy."""
-    known, own = KNOWN[dimension], units.get(dimension, "")
+    units_known, named_unit = KNOWN[dimension], units.get(dimension, "")
     text = f"is the column in another unit of {dimension}?  Name the unit in its header"
-    if own in known:
-        unit = min(known, key=lambda one: abs(math.log(ratio * known[one] / known[own])))
-        if 0.2 < ratio * known[unit] / known[own] < 5.0:
+    if named_unit in units_known:
+        unit = min(
+            units_known,
+            key=lambda one: abs(math.log(ratio * units_known[one] / units_known[named_unit])),
+        )
+        if 0.2 < ratio * units_known[unit] / units_known[named_unit] < 5.0:
             text = f"the column seems to be in {unit}; name the unit in its header"
     return f"{text}, or exchange time and force if they are swapped"

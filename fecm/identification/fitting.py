@@ -63,16 +63,16 @@ class ForceModel(NamedTuple):
 
     def histories(self, trials: Sequence[Mapping[str, float]]) -> tuple[Floats, Floats]:
         """Return times, from one duration before the contact on, and forces (times, trials)."""
-        found = self.outcome([fitted(self.deck, one) for one in trials], judged=False)
-        assert found.force is not None
-        failed = np.flatnonzero(~np.isfinite(found.force).all(axis=1))
+        outcome = self.outcome([fitted(self.deck, trial) for trial in trials], judged=False)
+        assert outcome.force is not None
+        failed = np.flatnonzero(~np.isfinite(outcome.force).all(axis=1))
         if self.law is not None and len(failed):  # the run alone tells why
-            one = self.outcome([fitted(self.deck, trials[failed[0]])], judged=True)
-            raise IdentifyError(str(one.status[0]))
+            trial = self.outcome([fitted(self.deck, trials[failed[0]])], judged=True)
+            raise IdentifyError(str(trial.status[0]))
         self.computed(len(trials))
-        steps = found.force.shape[1]
-        clock = float(found.columns["dt"][0]) * np.arange(-steps, steps + 1.0)
-        forces = np.vstack([np.zeros((steps + 1, len(trials))), found.force.T])
+        steps = outcome.force.shape[1]
+        clock = float(outcome.columns["dt"][0]) * np.arange(-steps, steps + 1.0)
+        forces = np.vstack([np.zeros((steps + 1, len(trials))), outcome.force.T])
         return clock, forces if self.sensor is None else self.sensor(clock, forces)
 
     def at(self, time: Floats, trials: Sequence[Mapping[str, float]]) -> Floats:
@@ -97,8 +97,8 @@ class Scaling:
     def values(self, x: Floats) -> dict[str, float]:
         """Return the values of the parameters by name."""
         middle = np.array(list(self.start.values()))
-        found = np.where(self.size > 0.0, middle + self.size * x, middle * np.exp(x))
-        return dict(zip(self.start, found.tolist(), strict=True))
+        numbers = np.where(self.size > 0.0, middle + self.size * x, middle * np.exp(x))
+        return dict(zip(self.start, numbers.tolist(), strict=True))
 
     def slopes(self, x: Floats) -> Floats:
         """Return the derivatives of the values."""
@@ -158,18 +158,18 @@ def fit_parameters(
     def within(x: Floats) -> NDArray[np.bool_]:
         return during_run(measured.time, clock, scaling.values(x).get(DELAY, 0.0))
 
-    inside, found = within(x), None
+    inside, points = within(x), None
     for number in range(MOST_FITS):
         if np.count_nonzero(inside) < POINTS:
             return None
-        found = _least_squares(model, measured, inside, scaling, x, evaluations)
-        still = within(found.x)
+        points = _least_squares(model, measured, inside, scaling, x, evaluations)
+        still = within(points.x)
         if number:  # points at the end of the run don't come and go
             still &= inside
         if np.array_equal(still, inside):
             break
-        inside, x = still, found.x
-    return found
+        inside, x = still, points.x
+    return points
 
 
 def _least_squares(
@@ -194,7 +194,7 @@ def _least_squares(
         above, below = np.split(forces[:, 1:], 2, axis=1)
         return forces[:, 0], (above - below) / np.diagonal(up - down)
 
-    found = least_squares(
+    solution = least_squares(
         lambda x: evaluate(*x)[0] - force / peak,
         x0,
         jac=lambda x: evaluate(*x)[1],
@@ -205,24 +205,24 @@ def _least_squares(
     )
     return FittedPoints(
         scaling=scaling,
-        x=found.x,
+        x=solution.x,
         time=time,
         force=force,
-        model=found.fun * peak + force,
-        jacobian=found.jac * peak,
-        converged=found.status > 0,
-        active=found.active_mask,
+        model=solution.fun * peak + force,
+        jacobian=solution.jac * peak,
+        converged=solution.status > 0,
+        active=solution.active_mask,
         lost=share_lost(measured.force, inside),
     )
 
 
-def covariance(found: FittedPoints) -> Floats:
+def covariance(points: FittedPoints) -> Floats:
     """Return the covariance of the scaled parameters.
 
     Raises IdentifyError if the residual does not determine them.
     """
-    names, peak = list(found.scaling.start), float(np.abs(found.force).max())
-    jac = found.jacobian / peak
+    names, peak = list(points.scaling.start), float(np.abs(points.force).max())
+    jac = points.jacobian / peak
     columns = np.sqrt(np.sum(jac**2, axis=0))
     if idle := [n for n, c in zip(names, columns, strict=True) if c < NO_EFFECT * len(jac) ** 0.5]:
         text = f"the force does not depend on {join_names(idle)} here"
@@ -235,7 +235,7 @@ def covariance(found: FittedPoints) -> Floats:
         hint = "give one of them the known value in the deck and leave it out"
         raise IdentifyError(f"the force determines only {text}; {hint}")
     root = right.T / singular / columns[:, None]
-    found_covariance: Floats = found.variance / peak**2 * root @ root.T
+    found_covariance: Floats = points.variance / peak**2 * root @ root.T
     errors = zip(names, np.sqrt(np.diagonal(found_covariance)), strict=True)
     # Delay and offset may be 0, which no error can be compared with.
     vague = [f"{n} ({100.0 * e:.0f} %)" for n, e in errors if e > 1.0 and n not in OF_RECORD]

@@ -132,12 +132,12 @@ def identify(
     1900000.0
     """
     measured = measurement_of((time, force), {})
-    known = filter_of(filter) if isinstance(filter, str) else filter
+    sensor = filter_of(filter) if isinstance(filter, str) else filter
     names = (free,) if isinstance(free, str) else tuple(free)
-    found = fit_deck(checked_problem(deck).deck, measured, names, known, own_law(law))
-    for text in found.notes:
+    fit = fit_deck(checked_problem(deck).deck, measured, names, sensor, own_law(law))
+    for text in fit.notes:
         warn(text)
-    return found
+    return fit
 
 
 @lru_cache(maxsize=4)
@@ -169,36 +169,40 @@ def fit_deck(
     `computed` is called with the number of new trial forces.
     """
     if not free or not set(free) <= set(FREE) or len(set(free)) < len(free):
-        given = ", ".join(map(str, free)) or "none"
-        raise StudyError(f"can't fit {given}; fit different ones of {', '.join(FREE)}")
+        free_names = ", ".join(map(str, free)) or "none"
+        raise StudyError(f"can't fit {free_names}; fit different ones of {', '.join(FREE)}")
     if law is not None:
         check_law(law, free)
     units = unit_names(deck)
     sensor = None if sensor is None else sensor.in_unit(units.get("time", ""))
     model = ForceModel(deck, _shared(deck), sensor, law, computed)
-    clock, own = model.histories([{}])
-    width = check_measured(measured, clock, own[:, 0], units)
+    clock, force = model.histories([{}])
+    width = check_measured(measured, clock, force[:, 0], units)
     if len(measured.time) < POINTS:
         text = f"{len(measured.time)} points; at least {POINTS} are needed"
         raise StudyError(f"{measured.name} has {text}")
-    starts = lags(measured, clock, own[:, 0])
-    depth = (own.max() / deck.require(Indentation).k) ** (2.0 / 3.0)
-    sizes = {DELAY: width, OFFSET: UNIT_OFFSET * float(own.max()), "alpha_p": depth}
+    starts = lags(measured, clock, force[:, 0])
+    depth = (force.max() / deck.require(Indentation).k) ** (2.0 / 3.0)
+    sizes = {DELAY: width, OFFSET: UNIT_OFFSET * float(force.max()), "alpha_p": depth}
 
     def best(names: Sequence[str], by: ForceModel = model) -> FittedPoints | None:
         """Return the best fit over all starts of the delay; None if the deck's run is too short."""
-        known = {name: _start(deck, name) for name in names}
-        trials = [{**known, DELAY: lag} for lag in starts] if DELAY in names else [known]
-        scalings, x = [_scaling(one, sizes) for one in trials], np.zeros(len(names))
+        start_values = {name: _start(deck, name) for name in names}
+        trials = (
+            [{**start_values, DELAY: lag} for lag in starts] if DELAY in names else [start_values]
+        )
+        scalings, x = [_scaling(scaling, sizes) for scaling in trials], np.zeros(len(names))
         chosen = 0
         if len(scalings) > 1:
-            short = [fit_parameters(by, measured, one, x, FIRST_EVALUATIONS) for one in scalings]
+            short = [
+                fit_parameters(by, measured, scaling, x, FIRST_EVALUATIONS) for scaling in scalings
+            ]
             chosen = min(range(len(short)), key=lambda n: _rank(short[n]))
-        found = fit_parameters(by, measured, scalings[chosen], x, MOST_EVALUATIONS)
-        return None if found is None or found.lost > LOST else found
+        points = fit_parameters(by, measured, scalings[chosen], x, MOST_EVALUATIONS)
+        return None if points is None or points.lost > LOST else points
 
-    found = best(free)
-    if found is None:
+    points = best(free)
+    if points is None:
         lag = starts[0] if DELAY in free else 0.0
         if share_lost(measured.force, during_run(measured.time, clock, lag)) <= LOST:
             raise IdentifyError(wrong_model("the fit shifts the run away from the contact"))
@@ -208,53 +212,57 @@ def fit_deck(
         """Return the best fit of a run behind a filter."""
         return best(free, model._replace(sensor=filter))
 
-    fault, suspicion = proposal(model, found, lambda: best([*free, DELAY]), filtered, units)
-    fault = fault or undescribed(found, units)
+    fault, suspicion = proposal(model, points, lambda: best([*free, DELAY]), filtered, units)
+    fault = fault or undescribed(points, units)
     try:
-        cov = covariance(found)
+        cov = covariance(points)
     except IdentifyError as error:
         raise IdentifyError(f"{fault}; besides, {error}" if fault else str(error)) from None
-    made = _identification(model, measured, found, cov, fault)
-    return replace(made, notes=(*made.notes, suspicion)) if suspicion else made
+    identification = _identification(model, measured, points, cov, fault)
+    return (
+        replace(identification, notes=(*identification.notes, suspicion))
+        if suspicion
+        else identification
+    )
 
 
 def _identification(
-    model: ForceModel, measured: Measurement, found: FittedPoints, cov: Floats, fault: str
+    model: ForceModel, measured: Measurement, points: FittedPoints, cov: Floats, fault: str
 ) -> Identification:
     """Return values, errors and notes of a fit; `fault` is the reason to reject it."""
     deviation = np.sqrt(np.diagonal(cov))
     correlation = cov / np.outer(deviation, deviation)
     np.fill_diagonal(correlation, 1.0)
-    values, start = found.values, found.scaling.start
-    errors = deviation * found.scaling.slopes(found.x)
+    values, start = points.values, points.scaling.start
+    errors = deviation * points.scaling.slopes(points.x)
     rounded = {name: float(f"{value:.5g}") for name, value in values.items()}
     plates = {}
     if not fault:
         plates = plate_errors(
-            model, found, lambda deck: model._replace(deck=deck, backend=_shared(deck))
+            model, points, lambda deck: model._replace(deck=deck, backend=_shared(deck))
         )
-    made = Identification(
+    identification = Identification(
         values=values,
         errors=dict(zip(start, errors.tolist(), strict=True)),
         start=start,
         correlation=correlation,
-        time=found.time,
-        force=found.force,
-        model=found.model,
-        converged=found.converged,
-        accepted=found.converged and not fault,
+        time=points.time,
+        force=points.force,
+        model=points.model,
+        converged=points.converged,
+        accepted=points.converged and not fault,
         plate_errors=plates,
         deck=fitted(model.deck, rounded).deck(),
         notes=(),
         law="" if model.law is None else law_name(model.law),
     )
-    notes = filter(None, (fault, *_notes(made, found, measured, model)))
-    return replace(made, notes=tuple(notes))
+    notes = filter(None, (fault, *_notes(identification, points, measured, model)))
+    return replace(identification, notes=tuple(notes))
 
 
-def _rank(found: FittedPoints | None) -> tuple[bool, float]:
+def _rank(points: FittedPoints | None) -> tuple[bool, float]:
     """Return the sort key of a fit: fits with the points of the contact first, then by residual."""
-    return (True, math.inf) if found is None else (found.lost > LOST, found.variance)
+    return (True, math.inf) if points is None else (points.lost > LOST, points.variance)
 
 
 def _scaling(start: dict[str, float], sizes: Mapping[str, float]) -> Scaling:
@@ -289,37 +297,37 @@ def _start(deck: Deck, name: str) -> float:
 
 
 def _notes(
-    found: Identification, solution: FittedPoints, given: Measurement, model: ForceModel
+    fit: Identification, solution: FittedPoints, measured: Measurement, model: ForceModel
 ) -> Iterator[str]:
     """Yield reasons to doubt the values, from the fit and from the run of the fitted deck."""
-    if not found.converged:
+    if not fit.converged:
         yield "the fit has not converged; start from better values in the deck"
-    if out := len(given.time) - len(found.time):
-        yield f"{out} of {len(given.time)} points are outside the run of the deck and left out"
-    for name, side in zip(found.values, solution.active, strict=True):
+    if out := len(measured.time) - len(fit.time):
+        yield f"{out} of {len(measured.time)} points are outside the run of the deck and left out"
+    for name, side in zip(fit.values, solution.active, strict=True):
         if side:
-            yield f"{name} is at its bound {found.values[name]:.6g}; its standard error is void"
-    names = list(found.values)
-    for i, j in zip(*np.nonzero(np.triu(np.abs(found.correlation) > CORRELATED, 1)), strict=True):
-        text = f"{names[i]} and {names[j]} have the correlation {found.correlation[i, j]:.4f}"
+            yield f"{name} is at its bound {fit.values[name]:.6g}; its standard error is void"
+    names = list(fit.values)
+    for i, j in zip(*np.nonzero(np.triu(np.abs(fit.correlation) > CORRELATED, 1)), strict=True):
+        text = f"{names[i]} and {names[j]} have the correlation {fit.correlation[i, j]:.4f}"
         yield f"{text}: their values can hardly be told apart"
     if coloured(solution):
-        near = neighbour_correlation(found.residual)
+        near = neighbour_correlation(fit.residual)
         text = "the model does not describe the measurement down to its noise"
         text = f"{text}, and the standard errors are too small"
         yield f"neighbouring residuals have the correlation {near:.2f}: {text}"
     elif is_runs_few(solution):
-        far = -sign_runs(found.residual)
+        far = -sign_runs(fit.residual)
         yield (
             f"the residual changes its sign too seldom for independent errors ({far:.1f} standard "
             "deviations of a runs test): the model does not describe the measurement down to its "
             "noise; is a filter of the measurement not named by --filter?"
         )
-    fitted = model.outcome([strike_of(found.deck)], judged=True)
+    fitted = model.outcome([strike_of(fit.deck)], judged=True)
     if not fitted.fine[0]:
         yield f"the run of the fitted deck fails: {fitted.status[0]}"
     # A measurement may end before the peak does; what the model lacks biases the parameters.
     beyond = [r for r in reasons_of(str(fitted.columns["validity"][0])) if r != Reason.OPEN]
     if beyond:
-        meant = ", ".join(MEANING.get(reason, reason) for reason in beyond)
-        yield f"the run of the fitted deck is {meant}: the parameters make up for what it lacks"
+        meaning = ", ".join(MEANING.get(reason, reason) for reason in beyond)
+        yield f"the run of the fitted deck is {meaning}: the parameters make up for what it lacks"

@@ -69,21 +69,21 @@ def sign_runs(residual: Floats) -> float:
     return float((number - mean) / math.sqrt(variance))
 
 
-def coloured(found: FittedPoints) -> bool:
+def coloured(points: FittedPoints) -> bool:
     """Return whether the residual has a shape, and exceeds the errors of arithmetic."""
-    return not _faint(found) and neighbour_correlation(found.residual) > COLOURED
+    return not _faint(points) and neighbour_correlation(points.residual) > COLOURED
 
 
-def _faint(found: FittedPoints) -> bool:
-    return math.sqrt(found.variance) <= FAINT * float(found.force.max())
+def _faint(points: FittedPoints) -> bool:
+    return math.sqrt(points.variance) <= FAINT * float(points.force.max())
 
 
-def undescribed(found: FittedPoints, units: dict[str, str]) -> str:
+def undescribed(points: FittedPoints, units: dict[str, str]) -> str:
     """Say that the model does not describe the data; empty if it does."""
-    if _faint(found) or _describes(found.residual, found.force):
+    if _faint(points) or _describes(points.residual, points.force):
         return ""
-    rms = f"{math.sqrt(found.variance):.3g} {unit_of('force', units)}".rstrip()
-    share = 100.0 * math.sqrt(found.variance) / float(np.std(found.force))
+    rms = f"{math.sqrt(points.variance):.3g} {unit_of('force', units)}".rstrip()
+    share = 100.0 * math.sqrt(points.variance) / float(np.std(points.force))
     return wrong_model(
         f"the rms of the residual, {rms}, is {share:.0f} % of the standard deviation"
     )
@@ -126,7 +126,7 @@ class LargerFit(NamedTuple):
 
 def proposal(
     model: ForceModel,
-    found: FittedPoints,
+    points: FittedPoints,
     refit: Callable[[], FittedPoints | None],
     filtered: Callable[[Filter], FittedPoints | None],
     units: dict[str, str],
@@ -138,15 +138,15 @@ def proposal(
     the most likely filter of first order. A filter that lowers the residual by more than chance,
     but does not explain half of its shape, is a note.
     """
-    trial, text = _of_record(model, found, refit, units)
-    other, sensor = _filter(model, found, filtered)
+    trial, text = _of_record(model, points, refit, units)
+    other, sensor = _filter(model, points, filtered)
     if other is None or (trial and _rms(other.residual) > CLEARLY * _rms(trial.residual)):
         return text, ""
     seems = (
         f"the measurement seems to be filtered: with --filter first-order:{sensor.size:.2g} "
-        f"{_fall(other, found.residual, units)}"
+        f"{_fall(other, points.residual, units)}"
     )
-    if other.explains(found.residual, found.force):
+    if other.explains(points.residual, points.force):
         return f"{seems}; the values given here are biased", ""
     return text, f"{seems}, which is more than chance; the values may be biased"
 
@@ -157,25 +157,25 @@ def _rms(residual: Floats) -> float:
 
 def _of_record(
     model: ForceModel,
-    found: FittedPoints,
+    points: FittedPoints,
     refit: Callable[[], FittedPoints | None],
     units: dict[str, str],
 ) -> tuple[LargerFit | None, str]:
     """Return a delay or an offset that explains the residual, and the proposal; else empty."""
-    before = found.residual
-    missing = [name for name in (OFFSET, DELAY) if name not in found.scaling.start]
+    before = points.residual
+    missing = [name for name in (OFFSET, DELAY) if name not in points.scaling.start]
     choices = [[name] for name in missing] + ([missing] if len(missing) > 1 else [])
-    if _faint(found):
+    if _faint(points):
         return None, ""
     for names in choices:
-        trial = _linear(model, found, names)
-        if trial.explains(before, found.force):
+        trial = _linear(model, points, names)
+        if trial.explains(before, points.force):
             return trial, _told(trial, before, units)
-    if DELAY in missing and coloured(found) and (other := refit()) is not None:
+    if DELAY in missing and coloured(points) and (other := refit()) is not None:
         trial = LargerFit({DELAY: other.values[DELAY]}, other.residual, certain=True)
         if trial.explains(before, other.force):
             return trial, _told(trial, before, units)
-    if OFFSET in missing and (level := _out_of_contact(model, found)):
+    if OFFSET in missing and (level := _out_of_contact(model, points)):
         force = f"{level:.3g} {unit_of('force', units)}".rstrip()
         text = f"fit {OFFSET} too: without contact the measured force is {force}, beyond its noise"
         return None, text
@@ -183,21 +183,21 @@ def _of_record(
 
 
 def _filter(
-    model: ForceModel, found: FittedPoints, filtered: Callable[[Filter], FittedPoints | None]
+    model: ForceModel, points: FittedPoints, filtered: Callable[[Filter], FittedPoints | None]
 ) -> tuple[LargerFit | None, Filter]:
     """Return the fit with the likeliest filter of first order; None if chance explains it."""
     none = Filter(FilterKind.FIRST_ORDER, 0.0)
-    if model.sensor is not None or _faint(found):
+    if model.sensor is not None or _faint(points):
         return None, none
-    top = found.time[found.model > 0.5 * found.model.max()]
+    top = points.time[points.model > 0.5 * points.model.max()]
     width = float(np.ptp(top)) if len(top) else 0.0
 
     def rest(rise: float) -> float:
         """Return the remaining squares if the linearised fit has a filter."""
-        own = model._replace(sensor=Filter(FilterKind.FIRST_ORDER, rise))
-        residual = found.force - own.at(found.time, [found.values])[:, 0]
-        x = np.linalg.lstsq(found.jacobian, residual, rcond=None)[0]
-        return float(((residual - found.jacobian @ x) ** 2).sum())
+        filtered_model = model._replace(sensor=Filter(FilterKind.FIRST_ORDER, rise))
+        residual = points.force - filtered_model.at(points.time, [points.values])[:, 0]
+        x = np.linalg.lstsq(points.jacobian, residual, rcond=None)[0]
+        return float(((residual - points.jacobian @ x) ** 2).sum())
 
     if width <= 0.0:
         return None, none
@@ -205,38 +205,38 @@ def _filter(
     best = min(rises.tolist(), key=rest)
     step = float(RISES[1] / RISES[0])
     best = min((best * np.geomspace(1.0 / step, step, FINER)).tolist(), key=rest)
-    sensor, left = Filter(FilterKind.FIRST_ORDER, best), rest(best)
-    before = float(found.residual @ found.residual)
-    fall = (before - left) / left * max(1, len(found.residual) - len(found.x) - 1)
+    sensor, remaining = Filter(FilterKind.FIRST_ORDER, best), rest(best)
+    before = float(points.residual @ points.residual)
+    fall = (before - remaining) / remaining * max(1, len(points.residual) - len(points.x) - 1)
     if fall < LIKELY**2:
         return None, sensor
     other = filtered(sensor)
-    if other is None or _rms(other.residual) >= _rms(found.residual):
+    if other is None or _rms(other.residual) >= _rms(points.residual):
         return None, sensor
     return LargerFit({}, other.residual, certain=fall > CERTAIN**2), sensor
 
 
-def is_runs_few(found: FittedPoints) -> bool:
+def is_runs_few(points: FittedPoints) -> bool:
     """Return whether the residual changes its sign less often than chance explains."""
-    return not _faint(found) and sign_runs(found.residual) < FEW_RUNS
+    return not _faint(points) and sign_runs(points.residual) < FEW_RUNS
 
 
-def _linear(model: ForceModel, found: FittedPoints, names: Sequence[str]) -> LargerFit:
+def _linear(model: ForceModel, points: FittedPoints, names: Sequence[str]) -> LargerFit:
     """Add parameters to the linearised fit."""
-    columns = {OFFSET: np.ones(len(found.time))}
+    columns = {OFFSET: np.ones(len(points.time))}
     if DELAY in names:
-        values, step = found.values, float(np.median(np.diff(found.time)))
+        values, step = points.values, float(np.median(np.diff(points.time)))
         trials = [{**values, DELAY: values.get(DELAY, 0.0) + s * step} for s in (1.0, -1.0)]
-        columns[DELAY] = model.at(found.time, trials) @ [1.0, -1.0] / (2.0 * step)
-    old = len(found.x)
-    jac = np.column_stack([found.jacobian, *(columns[name] for name in names)])
+        columns[DELAY] = model.at(points.time, trials) @ [1.0, -1.0] / (2.0 * step)
+    old = len(points.x)
+    jac = np.column_stack([points.jacobian, *(columns[name] for name in names)])
     size = np.linalg.norm(jac, axis=0)
     size[size == 0.0] = 1.0
     left, singular, right = np.linalg.svd(jac / size, full_matrices=False)
     kept = singular > 1e-10 * singular[0]
     root = right[kept].T / singular[kept]
-    x = root @ (left[:, kept].T @ found.residual) / size
-    rest = found.residual - jac @ x
+    x = root @ (left[:, kept].T @ points.residual) / size
+    rest = points.residual - jac @ x
     variance = float(rest @ rest) / (len(rest) - len(x))
     errors = np.sqrt(variance * np.sum(root**2, axis=1)) / size
     certain = bool(np.all(np.abs(x[old:]) > CERTAIN * errors[old:]))
@@ -258,25 +258,25 @@ def _fall(trial: LargerFit, before: Floats, units: dict[str, str]) -> str:
     return f"the rms of the residual falls from {_rms(before):.3g} to {force}"
 
 
-def _out_of_contact(model: ForceModel, found: FittedPoints) -> float:
+def _out_of_contact(model: ForceModel, points: FittedPoints) -> float:
     """Return the median force before the contact, or after it; 0 if it is noise.
 
     It is also 0 if there is no such time. After the contact the force must have no shape, which
     another model could explain.
     """
-    without = {**found.values, OFFSET: 0.0}
-    model_force = model.at(found.time, [without])[:, 0]
+    without = {**points.values, OFFSET: 0.0}
+    model_force = model.at(points.time, [without])[:, 0]
     quiet = model_force <= QUIET * model_force.max()
-    before = quiet & (found.time <= found.values.get(DELAY, 0.0))
+    before = quiet & (points.time <= points.values.get(DELAY, 0.0))
     if np.count_nonzero(before) >= LEAST_QUIET:
         quiet = before  # whatever the model is
     elif np.count_nonzero(quiet) < LEAST_QUIET:
         return 0.0
-    force = found.force[quiet]
+    force = points.force[quiet]
     level = float(np.median(force))
     deviation = float(np.median(np.abs(force - level))) / 0.6745
     error = 1.2533 * deviation / math.sqrt(len(force))  # of a median
-    least = max(CERTAIN * error, SMALL * float(found.force.max()))
+    least = max(CERTAIN * error, SMALL * float(points.force.max()))
     shaped = (
         quiet is not before and deviation > 0.0 and neighbour_correlation(force - level) > COLOURED
     )
@@ -287,7 +287,7 @@ def _out_of_contact(model: ForceModel, found: FittedPoints) -> float:
 
 
 def plate_errors(
-    model: ForceModel, found: FittedPoints, runs: Callable[[Deck], ForceModel]
+    model: ForceModel, points: FittedPoints, runs: Callable[[Deck], ForceModel]
 ) -> dict[str, dict[str, float]]:
     """Return the changes of the fitted values with 1 % more thickness, or E1, of the deck's plate.
 
@@ -295,19 +295,21 @@ def plate_errors(
     plate can't be run with the time step of the deck.
     """
     material = model.deck.require(Material)
-    own = {"thickness": sum(y.thickness for y in material.layers), "e1": material.ply.e1}
-    clock, _ = model.histories([found.values])
+    properties = {"thickness": sum(y.thickness for y in material.layers), "e1": material.ply.e1}
+    clock, _ = model.histories([points.values])
     dt = float(clock[len(clock) // 2 + 1])  # the first time after 0
     errors: dict[str, dict[str, float]] = {}
     for name in PROPERTIES:
         for change in (CHANGED, -CHANGED):  # one of them may be unstable
             try:
-                other = runs(apply_case(model.deck, {name: (1.0 + change) * own[name], "dt": dt}))
-                force = other.at(found.time, [found.values])[:, 0]
+                other = runs(
+                    apply_case(model.deck, {name: (1.0 + change) * properties[name], "dt": dt})
+                )
+                force = other.at(points.time, [points.values])[:, 0]
             except FecmError:
                 continue
-            x = np.linalg.lstsq(found.jacobian, found.model - force, rcond=None)[0]
-            changes = PERCENT / change * found.scaling.slopes(found.x) * x
-            errors[name] = dict(zip(found.scaling.start, changes.tolist(), strict=True))
+            x = np.linalg.lstsq(points.jacobian, points.model - force, rcond=None)[0]
+            changes = PERCENT / change * points.scaling.slopes(points.x) * x
+            errors[name] = dict(zip(points.scaling.start, changes.tolist(), strict=True))
             break
     return errors

@@ -78,13 +78,13 @@ class LocationFit:
         Raises PatchError or OutsideError if the force is not on the plate.
         """
         seen = self.model.observation
-        own = np.ones(len(seen.values)) if gains is None else gains
+        gains_used = np.ones(len(seen.values)) if gains is None else gains
         design = self.model.design(x, y, shift)
-        basis = (own[:, None, None] * design).reshape(-1, design.shape[2])
+        basis = (gains_used[:, None, None] * design).reshape(-1, design.shape[2])
         force = non_negative(basis, seen.values.ravel())
-        residual = seen.values - own[:, None] * (design @ force)
+        residual = seen.values - gains_used[:, None] * (design @ force)
         square = float((residual**2).sum() + seen.left.sum())
-        return PlaceTrial(x, y, shift, own, force, design, residual, square)
+        return PlaceTrial(x, y, shift, gains_used, force, design, residual, square)
 
     def halved(self) -> LocationFit | None:
         """Return the fit with hats of half the width; None if strains or responses are too few."""
@@ -117,10 +117,10 @@ class LocationFit:
         if self.shift:
             columns.append(self._slope(trial, 0.0, 0.0, t))
         if self.gains:
-            own = trial.gains[:, None] * (trial.design @ trial.force)
-            columns += [turn[:, None] * own for turn in ratios(len(own))]
-        others = np.stack([column.ravel() for column in columns], axis=1)
-        return np.hstack([others, trial.basis[:, trial.active]])
+            strains_of_force = trial.gains[:, None] * (trial.design @ trial.force)
+            columns += [turn[:, None] * strains_of_force for turn in ratios(len(strains_of_force))]
+        columns_of_rest = np.stack([column.ravel() for column in columns], axis=1)
+        return np.hstack([columns_of_rest, trial.basis[:, trial.active]])
 
     def _slope(self, trial: PlaceTrial, dx: float, dy: float, dt: float) -> Floats:
         """Return the strains per length or time in one direction, (gages, rows).
@@ -149,10 +149,10 @@ class LocationFit:
             size = scales(jacobian)
             both = triangular(np.column_stack([jacobian / size, best.residual.ravel()]))
             change = np.linalg.lstsq(both[:, :-1], both[:, -1], 1e-10)[0] / size
-            found = self._lower(best, change[: self._others(best)], box)
-            if found is None:
+            better = self._lower(best, change[: self._others(best)], box)
+            if better is None:
                 break
-            gain, best = best.square - found.square, found
+            gain, best = best.square - better.square, better
             if gain <= SETTLED**2 * best.square / best.residual.size:
                 break
         return best
@@ -171,11 +171,11 @@ class LocationFit:
                 turned = np.clip(part * (change[-len(turns) :] @ turns), -MOST_TURN, MOST_TURN)
                 gains = gains * np.exp(turned)
             try:
-                found = self.at(x, y, shift, gains)
+                trial = self.at(x, y, shift, gains)
             except FecmError:  # off the plate
                 continue
-            if found.square < best.square:
-                return found
+            if trial.square < best.square:
+                return trial
         return None
 
     def errors(self, trial: PlaceTrial, noise: float, change: Floats | None = None) -> Errors:
@@ -189,26 +189,29 @@ class LocationFit:
         size = scales(jacobian)
         extra = np.zeros((len(jacobian), 1)) if change is None else change.reshape(-1, 1)
         factor = triangular(np.hstack([jacobian / size, idle, extra]))
-        count, others = jacobian.shape[1], self._others(trial)
+        count, count_of_rest = jacobian.shape[1], self._others(trial)
         left, singular, right = np.linalg.svd(factor[:, :count], full_matrices=False)
         root = right.T / np.maximum(singular, SINGULAR * singular[0]) / size[:, None]
         covariance = noise**2 * root @ root.T
         moved = root @ (left.T @ factor[:, -1])
         force = np.empty(len(trial.force))
-        force[trial.active] = np.sqrt(np.diagonal(covariance)[others:])
+        force[trial.active] = np.sqrt(np.diagonal(covariance)[count_of_rest:])
         rest = factor[:, count:-1] - left @ (left.T @ factor[:, count:-1])
         least = SINGULAR * float(scales(trial.basis).max())
         force[~trial.active] = noise / np.maximum(np.linalg.norm(rest, axis=0), least)
         gains = np.zeros(len(trial.gains))
         if self.gains:
             turns = ratios(len(gains))
-            block = covariance[others - len(turns) : others, others - len(turns) : others]
+            block = covariance[
+                count_of_rest - len(turns) : count_of_rest,
+                count_of_rest - len(turns) : count_of_rest,
+            ]
             gains = trial.gains * np.sqrt(np.diagonal(turns.T @ block @ turns))
         shift = float(np.sqrt(covariance[2, 2])) if self.shift else 0.0
         full = np.zeros((len(trial.force), len(trial.force)))
-        full[np.ix_(trial.active, trial.active)] = covariance[others:, others:]
+        full[np.ix_(trial.active, trial.active)] = covariance[count_of_rest:, count_of_rest:]
         force_change = np.zeros(len(trial.force))
-        force_change[trial.active] = moved[others:]
+        force_change[trial.active] = moved[count_of_rest:]
         place = covariance[:2, :2] + np.outer(moved[:2], moved[:2])
         return Errors(place, shift, gains, force, full, moved[:2], force_change)
 
@@ -225,12 +228,12 @@ def non_negative(matrix: Floats, values: Floats) -> Floats:
 
     size = np.linalg.norm(matrix, axis=0)
     kept = size > NEGLIGIBLE * size.max(initial=0.0)
-    found = np.zeros(matrix.shape[1])
+    solution = np.zeros(matrix.shape[1])
     if kept.any():
         # The triangular factor has the same solution, and few rows.
         both = triangular(np.column_stack([matrix[:, kept] / size[kept], values]))
-        found[kept] = nnls(both[:, :-1], both[:, -1], maxiter=30 * both.shape[1])[0] / size[kept]
-    return found
+        solution[kept] = nnls(both[:, :-1], both[:, -1], maxiter=30 * both.shape[1])[0] / size[kept]
+    return solution
 
 
 def ratios(gages: int) -> Floats:
@@ -281,22 +284,22 @@ def judged_force(time: Floats, force: Floats, errors: Errors, basis: float) -> F
     error, covariance, change = errors.force, errors.covariance, errors.force_change
     sd = np.hypot(error, change)
     determined = is_determined(error)
-    known = np.where(determined, force, 0.0)
+    determined_force = np.where(determined, force, 0.0)
     both = covariance * np.outer(determined, determined)
-    top = int(known.argmax())
+    top = int(determined_force.argmax())
     last = int(np.flatnonzero(determined)[-1])
-    end = _end(known[: last + 1], both, top)
+    end = _end(determined_force[: last + 1], both, top)
     variance = float(both[:end, :end].sum()) + float((change * determined)[:end].sum()) ** 2
     return Force(
         determined=determined,
         sd=sd,
         determined_until=float(time[last]),
-        peak=float(known[top]),
+        peak=float(determined_force[top]),
         peak_sd=float(sd[top]),
-        peak_bias=_bias(known, both),
+        peak_bias=_bias(determined_force, both),
         time_of_peak=float(time[top]),
         end=None if end is None else float(time[end]),
-        impulse=basis * float(known[:end].sum()),
+        impulse=basis * float(determined_force[:end].sum()),
         impulse_sd=basis * math.sqrt(max(0.0, variance)),
     )
 

@@ -104,10 +104,10 @@ def locate(
     if box is not None and len(box) != 4:
         raise StudyError(f"region has {len(box)} numbers; it takes x0, y0, x1, y1")
     options = LocationSettings(box, grid, basis, noise, shift, gains, mass, mesh_error)
-    found = located(checked_problem(deck), strains, options)
-    for text in found.notes:
+    location = located(checked_problem(deck), strains, options)
+    for text in location.notes:
         warn(text)
-    return found
+    return location
 
 
 def located(problem: Problem, strains: StrainSource, options: LocationSettings) -> Location:
@@ -127,16 +127,16 @@ def located(problem: Problem, strains: StrainSource, options: LocationSettings) 
     if options.gains and len(table.gages) < 3:
         raise StudyError("gains needs the strains of three gages at least")
     fit, region, times = prepared(problem, table, options)
-    found = best_fits(fit, region, options.grid)
-    searched = Searched(fit, found.best, region)
+    minima = best_fits(fit, region, options.grid)
+    searched = Searched(fit, minima.best, region)
     wide = False
     if options.basis is None:
-        fit, found = narrowed(fit, found, region, options.noise)
+        fit, minima = narrowed(fit, minima, region, options.noise)
     else:
-        wide = is_wide(fit, found.best, options.noise)
-    made = _location(problem, table, options, (fit, times), found)
-    cause = _cause(problem, table, options, searched) if is_doubtful(made) else None
-    return judged(made, region, wide, cause)
+        wide = is_wide(fit, minima.best, options.noise)
+    location = _location(problem, table, options, (fit, times), minima)
+    cause = _cause(problem, table, options, searched) if is_doubtful(location) else None
+    return judged(location, region, wide, cause)
 
 
 class Searched(NamedTuple):
@@ -176,26 +176,26 @@ def _location(
     minima: SearchResult,
 ) -> Location:
     """Return the location with errors, verdict and notes of a fit."""
-    (fit, times), found = fitted, minima.best
-    rms = fit.deviation(found)
+    (fit, times), best = fitted, minima.best
+    rms = fit.deviation(best)
     noise = options.noise or rms
     if noise == 0.0:
         noise = float(np.finfo(np.float32).eps) * float(np.abs(table.strains).max())
     misfit = rms / noise if options.noise is not None else 1.0
-    finer = _finer_mesh(problem, table, (fit, times), found) if options.mesh_error else None
-    errors = fit.errors(found, noise * max(1.0, misfit), finer)
-    knots = times.origin + fit.model.knots(found.shift)
-    force = judged_force(knots, found.force, errors, fit.model.basis)
+    finer = _finer_mesh(problem, table, (fit, times), best) if options.mesh_error else None
+    errors = fit.errors(best, noise * max(1.0, misfit), finer)
+    knots = times.origin + fit.model.knots(best.shift)
+    force = judged_force(knots, best.force, errors, fit.model.basis)
     cards = {card.number: card for card in problem.deck.require(Gages).records}
     places = [(cards[number].x, cards[number].y) for number in table.gages.tolist()]
-    samples = fit.model.strains(found.x, found.y, found.shift, found.force)
-    at = interpolation((table.time - times.origin) / times.interval, times.samples)
+    samples = fit.model.strains(best.x, best.y, best.shift, best.force)
+    interpolated = interpolation((table.time - times.origin) / times.interval, times.samples)
     return Location(
-        x=found.x,
-        y=found.y,
+        x=best.x,
+        y=best.y,
         covariance=errors.place,
         time=knots,
-        force=np.where(force.determined, found.force, 0.0),
+        force=np.where(force.determined, best.force, 0.0),
         force_sd=force.sd,
         determined=force.determined,
         determined_until=force.determined_until,
@@ -218,10 +218,10 @@ def _location(
         gage_places=np.array(places),
         strain_time=table.time,
         strains=table.strains,
-        fitted=found.gains[:, None] * (samples @ at.T),
-        shift=times.origin + found.shift,
+        fitted=best.gains[:, None] * (samples @ interpolated.T),
+        shift=times.origin + best.shift,
         sd_shift=errors.shift,
-        gains=found.gains,
+        gains=best.gains,
         sd_gains=errors.gains,
         notes=(),
         accepted=True,
@@ -230,21 +230,21 @@ def _location(
 
 
 def _finer_mesh(
-    problem: Problem, table: StrainTable, fitted: tuple[LocationFit, Timing], found: PlaceTrial
+    problem: Problem, table: StrainTable, fitted: tuple[LocationFit, Timing], best: PlaceTrial
 ) -> Floats | None:
     """Return the error of the strains due to the mesh, (gages, rows); None if not known."""
     fit, times = fitted
     history = (
         np.append(0.0, fit.model.knots(0.0)),
-        np.append(0.0, found.force),
+        np.append(0.0, best.force),
     )
-    place, numbers = (found.x, found.y), table.gages.tolist()
+    place, numbers = (best.x, best.y), table.gages.tolist()
     finer = finer_strains(problem, numbers, place, history, fit.model.footprint, times)
     if finer is None:
         return None
     count = finer.shape[1]
-    if found.shift:
-        shifted = np.arange(float(count)) - found.shift / times.interval
+    if best.shift:
+        shifted = np.arange(float(count)) - best.shift / times.interval
         finer = finer @ interpolation(shifted, count).T
-    change = finer - fit.model.strains(found.x, found.y, found.shift, found.force)
-    return EXTRAPOLATED * found.gains[:, None] * fit.model.observation.of(change)
+    change = finer - fit.model.strains(best.x, best.y, best.shift, best.force)
+    return EXTRAPOLATED * best.gains[:, None] * fit.model.observation.of(change)

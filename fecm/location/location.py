@@ -492,7 +492,7 @@ def location_of(contents: FileContents) -> Location:
         names = [f"second_{name}" for name in Candidate._fields]
         second = Candidate(*(_number(place, n) for n in names)) if names[0] in place else None
         notes = contents.attributes.get("notes", ())
-        made = Location(
+        location = Location(
             **{name: values for name, values in arrays.items() if name != "place"},
             x=float(arrays["place"][0]),
             y=float(arrays["place"][1]),
@@ -508,7 +508,7 @@ def location_of(contents: FileContents) -> Location:
         )
     except (KeyError, ValueError, TypeError) as error:
         raise ResultFileError(f"{contents.path}: the location is incomplete ({error})") from None
-    return made
+    return location
 
 
 def _arrays(contents: FileContents) -> dict[str, Any]:

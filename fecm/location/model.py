@@ -78,13 +78,13 @@ def observe(time: Floats, strains: Floats, interval: float, count: int) -> Obser
         rows: Indices | Floats = near.astype(np.intp)
         return Observation(strains, np.zeros(len(strains)), len(time), step, interval, rows)
     matrix = interpolation(places, count)
-    left = np.zeros(len(strains))
+    remainder = np.zeros(len(strains))
     if len(time) > MANY * count:
         factor = triangular(np.column_stack([matrix, strains.T]))
         matrix, values = factor[:count, :count], factor[:count, count:].T
-        left = (factor[count:, count:] ** 2).sum(axis=0)
-        return Observation(values, left, len(time), step, interval, matrix)
-    return Observation(strains, left, len(time), step, interval, csr_array(matrix))
+        remainder = (factor[count:, count:] ** 2).sum(axis=0)
+        return Observation(values, remainder, len(time), step, interval, matrix)
+    return Observation(strains, remainder, len(time), step, interval, csr_array(matrix))
 
 
 def interpolation(places: Floats, count: int) -> Floats:
@@ -104,9 +104,9 @@ def interpolation(places: Floats, count: int) -> Floats:
     )
     matrix = np.zeros((len(places), count))
     for offset, weight in zip(STENCIL, weights, strict=True):
-        at = before.astype(np.intp) + offset
-        inside = np.flatnonzero((at >= 0) & (at < count))
-        matrix[inside, at[inside]] += weight[inside]
+        samples = before.astype(np.intp) + offset
+        inside = np.flatnonzero((samples >= 0) & (samples < count))
+        matrix[inside, samples[inside]] += weight[inside]
     return matrix
 
 
@@ -135,10 +135,10 @@ class Footprint:
         Raises PatchError or OutsideError if the circle, or the point, is not on the plate.
         """
         if self.shape:
-            made = patch_weights(self.mesh, self.shape, self.radius, x, y)
+            shares = patch_weights(self.mesh, self.shape, self.radius, x, y)
         else:
-            made = point_weights(self.mesh, x, y)
-        return np.asarray(np.where(self.held, 0.0, made))
+            shares = point_weights(self.mesh, x, y)
+        return np.asarray(np.where(self.held, 0.0, shares))
 
 
 def point_weights(mesh: MeshArrays, x: float, y: float) -> Floats:
@@ -275,8 +275,8 @@ def moving_plate(plate: PlateModel) -> PlateModel:
 def rows_of(gages: GageArray, nodes: int) -> Floats:
     """Return the strain of every gage per displacement of every dof, (gages, nodes, 5)."""
     rows = np.zeros((len(gages.numbers), nodes * NDOF))
-    for row, at, weights in zip(rows, gages.dof_indices, gages.weights, strict=False):
-        np.add.at(row, at, weights)
+    for row, dofs, weights in zip(rows, gages.dof_indices, gages.weights, strict=False):
+        np.add.at(row, dofs, weights)
     return rows.reshape(-1, nodes, NDOF)
 
 
@@ -314,10 +314,10 @@ def responses(
 
     `rows` come from :func:`rows_of`. The force is the force of the sampling.
     """
-    found = np.zeros((len(rows), len(nodes), sampling.count), dtype)
-    for row, into in zip(rows, found, strict=True):
+    strains = np.zeros((len(rows), len(nodes), sampling.count), dtype)
+    for row, into in zip(rows, strains, strict=True):
         first = 1
         for fields in deflections(motion, row, sampling):
             into[:, first : first + len(fields)] = fields[:, nodes].T
             first += len(fields)
-    return found
+    return strains

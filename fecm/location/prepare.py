@@ -80,22 +80,22 @@ def shared_symmetry(plate: PlateModel, rows: Floats) -> Symmetry | None:
     Plate, supports and laminates have the symmetry. `rows` are the strains of the gages per
     displacement, (gages, nodes, 5).
     """
-    for one in SYMMETRIES:
-        nodes = images(plate.mesh.coordinates, one.flip)
-        if nodes is None or not _maps(plate, one, nodes):
+    for symmetry in SYMMETRIES:
+        nodes = images(plate.mesh.coordinates, symmetry.flip)
+        if nodes is None or not _maps(plate, symmetry, nodes):
             continue
-        turned = one.signs * rows[:, nodes]
+        turned = symmetry.signs * rows[:, nodes]
         if np.abs(turned - rows).max() <= SAME * np.abs(rows).max():
-            return one
+            return symmetry
     return None
 
 
-def _maps(plate: PlateModel, one: Symmetry, nodes: Indices) -> bool:
+def _maps(plate: PlateModel, symmetry: Symmetry, nodes: Indices) -> bool:
     """Return whether a symmetry of the nodes maps elements, supports, laminates and loads too."""
     mesh = plate.mesh
     if ((mesh.codes != 0) != (mesh.codes[nodes] != 0)).any():
         return False
-    if one.is_mirror and not _unturned(plate):
+    if symmetry.is_mirror and not _unturned(plate):
         return False
     numbers = np.zeros(len(mesh.elements), int)
     if plate.laminate_numbers is not None:
@@ -105,10 +105,10 @@ def _maps(plate: PlateModel, one: Symmetry, nodes: Indices) -> bool:
 
 def _elements(mesh: MeshArrays, numbers: Indices, nodes: Indices | None) -> Floats:
     """Return sorted nodes and laminate of every element, in one order, optionally of its image."""
-    own = mesh.elements.astype(np.intp)
+    elements = mesh.elements.astype(np.intp)
     if nodes is not None:
-        own = np.where(own > 0, nodes[own - 1] + 1, 0)
-    every = np.column_stack([np.sort(own, axis=1), numbers])
+        elements = np.where(elements > 0, nodes[elements - 1] + 1, 0)
+    every = np.column_stack([np.sort(elements, axis=1), numbers])
     return np.asarray(every[np.lexsort(every.T[::-1])])
 
 
@@ -220,15 +220,17 @@ def prepared(
     problem: Problem, table: StrainTable, options: LocationSettings
 ) -> tuple[LocationFit, Region, Timing]:
     """Return the model of the strains, and the region in which the place is searched."""
-    own = timing(table, options)
+    sampled = timing(table, options)
     footprint = _footprint(problem)
     region = Region.of(problem.mesh, footprint.radius, options.region)
-    samples = own.interval, own.unit, own.samples
-    nodes, found = _shared(problem.deck, tuple(table.gages.tolist()), samples, region)
-    seen = observe(table.time - own.origin, table.strains, own.interval, own.samples)
-    made = StrainModel(footprint, seen, nodes, found, own.unit, own.width, own.length)
+    samples = sampled.interval, sampled.unit, sampled.samples
+    nodes, strains = _shared(problem.deck, tuple(table.gages.tolist()), samples, region)
+    seen = observe(table.time - sampled.origin, table.strains, sampled.interval, sampled.samples)
+    model = StrainModel(
+        footprint, seen, nodes, strains, sampled.unit, sampled.width, sampled.length
+    )
     side = float(np.median(longest_sides(problem.mesh.elements, problem.mesh.coordinates)))
-    return LocationFit(made, side, options.shift, options.gains), region, own
+    return LocationFit(model, side, options.shift, options.gains), region, sampled
 
 
 def _footprint(problem: Problem) -> Footprint:
@@ -284,8 +286,8 @@ def _refuse_records(problem: Problem, record: float, critical: float) -> None:
         f"the record lasts {what}, {times:.2g} times the fundamental period of the plate (about "
         f"{usual})"
     )
-    others = [u for u in ("s", "ms", "us") if clock in sizes and sizes[u] != sizes[clock]]
-    likely = [(abs(math.log(times * sizes[u] / sizes[clock])), u) for u in others]
+    other_units = [u for u in ("s", "ms", "us") if clock in sizes and sizes[u] != sizes[clock]]
+    likely = [(abs(math.log(times * sizes[u] / sizes[clock])), u) for u in other_units]
     scales = [1e-3, 1e-6, 1e3, 1e6] if clock not in sizes else []
     factors = [(abs(math.log(times * scale)), f"{scale:g}") for scale in scales]
     if likely and min(likely)[0] < LIKELY:
@@ -321,14 +323,14 @@ def _refuse_mirrors(
         return
     low, high = plate.mesh.coordinates.min(axis=0), plate.mesh.coordinates.max(axis=0)
     middle = 0.5 * (low + high)
-    one = region.low + 0.25 * region.size
-    other = middle + (one - middle) * symmetry.flip
+    place = region.low + 0.25 * region.size
+    other = middle + (place - middle) * symmetry.flip
     named = ", ".join(map(str, numbers))
     raise LocateError(
         f"mirror places can't be told apart: a {symmetry.name} maps plate, supports, laminate and "
         f"the readings of all gages ({named}) onto themselves, so that an impact at "
-        f"({one[0]:.4g}, {one[1]:.4g}) and one at ({other[0]:.4g}, {other[1]:.4g}) give the same "
-        "strains; add a gage off its axis"
+        f"({place[0]:.4g}, {place[1]:.4g}) and one at ({other[0]:.4g}, {other[1]:.4g}) give the "
+        "same strains; add a gage off its axis"
     )
 
 

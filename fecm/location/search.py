@@ -132,13 +132,13 @@ def best_fits(fit: LocationFit, region: Region, pitch: float | None) -> SearchRe
     refined = sorted((fit.refined(start, box) for start in starts), key=lambda one: one.square)
     best = refined[0]
     apart = APART * float(np.hypot(region.size[0] / len(x), region.size[1] / len(y)))
-    others = [r for r in refined if math.hypot(r.x - best.x, r.y - best.y) > apart]
+    distant = [r for r in refined if math.hypot(r.x - best.x, r.y - best.y) > apart]
     least = max(best.square, np.finfo(float).tiny)
     there = np.isfinite(scan.squares)
     return SearchResult(
         best,
-        Candidate(others[0].x, others[0].y, math.sqrt(others[0].square / least))
-        if others
+        Candidate(distant[0].x, distant[0].y, math.sqrt(distant[0].square / least))
+        if distant
         else None,
         np.column_stack([x[np.nonzero(there)[0]], y[np.nonzero(there)[1]]]),
         np.sqrt(scan.squares[there] / least),
@@ -146,7 +146,7 @@ def best_fits(fit: LocationFit, region: Region, pitch: float | None) -> SearchRe
 
 
 def narrowed(
-    fit: LocationFit, found: SearchResult, region: Region, noise: float | None
+    fit: LocationFit, minima: SearchResult, region: Region, noise: float | None
 ) -> tuple[LocationFit, SearchResult]:
     """Fit place and force with narrower hats, from the minimum of wider ones.
 
@@ -154,7 +154,7 @@ def narrowed(
     half the width are always taken if there are enough strains, and again as long as the misfit
     falls by more than chance.
     """
-    box, best = np.array([region.low, region.high]), found.best
+    box, best = np.array([region.low, region.high]), minima.best
     first = True
     while (half := fit.halved()) is not None:
         trial = half.refined(half.at(best.x, best.y, best.shift, best.gains), box)
@@ -162,7 +162,7 @@ def narrowed(
         if not (first and enough) and not falls(half, best, trial, noise):
             break
         fit, best, first = half, trial, False
-    return fit, found._replace(best=best)
+    return fit, minima._replace(best=best)
 
 
 def is_wide(fit: LocationFit, best: PlaceTrial, noise: float | None) -> bool:
@@ -208,8 +208,8 @@ def _beginning(fit: LocationFit, x: Floats, y: Floats, box: Floats) -> float:
     (place, *_) = _scanned(fit, x, y, earliest).minima()
     fit_of_place = replace(fit, shift=False)
     early = fit_of_place.refined(fit.at(*place, earliest), box)
-    known = np.where(is_determined(fit_of_place.errors(early, 1.0).force), early.force, 0.0)
-    first = int(np.argmax(known > ONSET * known.max()))
+    determined = np.where(is_determined(fit_of_place.errors(early, 1.0).force), early.force, 0.0)
+    first = int(np.argmax(determined > ONSET * determined.max()))
     rough = float(fit.model.knots(early.shift)[first]) - fit.model.basis
     begins = rough + fit.model.basis * np.linspace(-2.0, 2.0, BEGINNINGS)
     squares = np.array([fit.at(early.x, early.y, begin).square for begin in begins.tolist()])

@@ -45,25 +45,25 @@ def strain_table(
     invalid, in other units, or not of strains; OSError if a file can't be read.
     """
     if isinstance(source, str | Path):
-        made = _from_file(Path(source), units, numbers)
+        table = _from_file(Path(source), units, numbers)
     elif isinstance(source, tuple):
-        made = _from_arrays(source, numbers)
+        table = _from_arrays(source, numbers)
     else:
-        made = _from_columns(source, units, numbers)
-    _check(made)
-    return made
+        table = _from_columns(source, units, numbers)
+    _check(table)
+    return table
 
 
-def _check(made: StrainTable) -> None:
+def _check(table: StrainTable) -> None:
     """Refuse strains that are not numbers, too few, or in microstrain."""
-    name, time, strains = made.name, made.time, made.strains
+    name, time, strains = table.name, table.time, table.strains
     if not (np.isfinite(time).all() and np.isfinite(strains).all()):
         raise StudyError(f"{name}: times and strains must be finite numbers")
     if not (np.diff(time) > 0.0).all():
         raise StudyError(f"{name}: the times must increase")
-    if len(made.gages) < 2:
+    if len(table.gages) < 2:
         raise StudyError(
-            f"{name} has {len(made.gages)} gage; a place needs the strains of two gages at least"
+            f"{name} has {len(table.gages)} gage; a place needs the strains of two gages at least"
         )
     if len(time) < FEWEST:
         raise StudyError(f"{name} has {len(time)} points; at least {FEWEST} are needed")
@@ -93,21 +93,23 @@ def _numbered(name: str, heads: Mapping[_K, str], numbers: Sequence[int]) -> dic
 
     Columns without a number beside others with one are not strains, and left out.
     """
-    found = {n: _NUMBER.fullmatch(unit_free(head).casefold()) for n, head in heads.items()}
-    known = ", ".join(map(str, numbers))
-    if not any(found.values()):
+    matches = {n: _NUMBER.fullmatch(unit_free(head).casefold()) for n, head in heads.items()}
+    numbers_of_deck = ", ".join(map(str, numbers))
+    if not any(matches.values()):
         if len(heads) != len(numbers):
             raise StudyError(
                 f"{name} has {len(heads)} columns of strains, and the deck {len(numbers)} gages: "
-                f"{known}; name the columns by the numbers of their gages"
+                f"{numbers_of_deck}; name the columns by the numbers of their gages"
             )
         listing = ", ".join(f"{heads[n]} of {m}" for n, m in zip(heads, numbers, strict=True))
         warn(f"{name}: the columns name no gages; their strains are taken as {listing}")
         return dict(zip(heads, numbers, strict=True))
-    gages = {n: int(one[1]) for n, one in found.items() if one}
+    gages = {n: int(match[1]) for n, match in matches.items() if match}
     for n, gage in gages.items():
         if gage not in numbers:
-            raise StudyError(f"{name}: {heads[n]} is not a gage of the deck; its gages are {known}")
+            raise StudyError(
+                f"{name}: {heads[n]} is not a gage of the deck; its gages are {numbers_of_deck}"
+            )
     if len(set(gages.values())) < len(gages):
         raise StudyError(f"{name}: a gage has two columns")
     return gages
@@ -184,8 +186,10 @@ def _from_long(
     time, gage, strain = table.values(table.find(("time", "gage", "strain"), units=units), units)
     gages = [number for number in numbers if (gage == number).any()]
     if unknown := sorted(set(gage.tolist()) - set(gages)):
-        known = ", ".join(map(str, numbers))
-        raise StudyError(f"{name}: {unknown[0]:g} is not a gage of the deck; its gages are {known}")
+        numbers_of_deck = ", ".join(map(str, numbers))
+        raise StudyError(
+            f"{name}: {unknown[0]:g} is not a gage of the deck; its gages are {numbers_of_deck}"
+        )
     rows = [gage == number for number in gages]
     if any(not np.array_equal(time[row], time[rows[0]]) for row in rows):
         raise StudyError(f"{name}: the gages have different times")

@@ -106,24 +106,24 @@ def likely_cause(
     tried = [(hypothesis, _least(places, hypothesis)) for hypothesis in hypotheses]
     tried.sort(key=lambda pair: float(pair[1].left.sum()))
     before = _unexplained(fit, best)
-    found: list[Cause] = []
+    causes: list[Cause] = []
     likely = tried[:REFINED]
     if gages >= FEWEST:
         odd, shares = _odd_gain(fit, best, region)
         likely = [(h, shares) for h, _ in tried if h.gain == odd]
         likely += [pair for pair in tried if pair[0].gain != odd][:REFINED]
     for hypothesis, shares in likely:
-        left, factor, level = _refined(fit, region, hypothesis, shares)
+        remains, factor, level = _refined(fit, region, hypothesis, shares)
         text = hypothesis.text
         if hypothesis.gain >= 0:
             text = f"gage {names[hypothesis.gain]}, divided by {_rounded(factor)}, explains"
         if hypothesis.zero >= 0:
             text = f"gage {names[hypothesis.zero]} less {level:.2g} explains"
-        ratio = float(np.sqrt((before / np.maximum(left, LEAST)).max()))
+        ratio = float(np.sqrt((before / np.maximum(remains, LEAST)).max()))
         distinct = hypothesis.gain >= 0 and max(factor, 1.0 / factor) > DISTINCT
         if ratio >= (SLIGHT if distinct else BETTER):
-            found.append(Cause(text, hypothesis.remedy, ratio))
-    return max(found, key=lambda one: one.ratio, default=None)
+            causes.append(Cause(text, hypothesis.remedy, ratio))
+    return max(causes, key=lambda one: one.ratio, default=None)
 
 
 def _odd_gain(fit: LocationFit, best: PlaceTrial, region: Region) -> tuple[int, _Shares]:
@@ -155,32 +155,32 @@ def _refined(
     """
     seen, factor, level = fit.model.observation, shares.factor, shares.level
     columns, signs = list(hypothesis.columns), np.array(hypothesis.signs)[:, None]
-    one = seen.of(np.ones(fit.model.responses.shape[2]))
+    constant = seen.of(np.ones(fit.model.responses.shape[2]))
     box = np.array([region.low, region.high])
     place, shift, gains = shares.place, 0.0, None
     passes = PASSES if hypothesis.gain >= 0 else 1
     while True:
-        values, left = signs * seen.values[columns], seen.left[columns]
+        values, remainder = signs * seen.values[columns], seen.left[columns]
         if hypothesis.gain >= 0:
             values[hypothesis.gain] /= factor
-            left[hypothesis.gain] /= factor**2
+            remainder[hypothesis.gain] /= factor**2
         if hypothesis.zero >= 0:
-            values[hypothesis.zero] -= level * one
-        corrected = replace(seen, values=values, left=left)
-        own = replace(fit, model=replace(fit.model, observation=corrected))
-        trial = own.refined(own.at(*place, shift, gains), box)
+            values[hypothesis.zero] -= level * constant
+        corrected = replace(seen, values=values, left=remainder)
+        corrected_fit = replace(fit, model=replace(fit.model, observation=corrected))
+        trial = corrected_fit.refined(corrected_fit.at(*place, shift, gains), box)
         place, shift, gains = (trial.x, trial.y), trial.shift, trial.gains
         passes -= 1
         if not passes:
             break
-        given = values[hypothesis.gain]
-        computed = given - trial.residual[hypothesis.gain]
-        factor *= max(float(given @ computed), LEAST) / max(float(computed @ computed), LEAST)
+        measured = values[hypothesis.gain]
+        computed = measured - trial.residual[hypothesis.gain]
+        factor *= max(float(measured @ computed), LEAST) / max(float(computed @ computed), LEAST)
     if hypothesis.zero >= 0:
-        level += float(trial.residual[hypothesis.zero] @ one) / float(one @ one)
-        values[hypothesis.zero] = seen.values[hypothesis.zero] - level * one
-        trial = own.at(trial.x, trial.y, trial.shift, trial.gains)
-    return _unexplained(own, trial), factor, level
+        level += float(trial.residual[hypothesis.zero] @ constant) / float(constant @ constant)
+        values[hypothesis.zero] = seen.values[hypothesis.zero] - level * constant
+        trial = corrected_fit.at(trial.x, trial.y, trial.shift, trial.gains)
+    return _unexplained(corrected_fit, trial), factor, level
 
 
 def _hypotheses(plain: _Hypothesis, worst: list[int], names: list[int]) -> Iterator[_Hypothesis]:
@@ -197,10 +197,10 @@ def _hypotheses(plain: _Hypothesis, worst: list[int], names: list[int]) -> Itera
         if gages >= FEWEST:
             remedy = "compare its unit and its gain with those of the other gages"
             yield plain._replace(remedy=remedy, gain=gage)
-    for one, other in combinations(worst, 2):
+    for first, second in combinations(worst, 2):
         columns = list(plain.columns)
-        columns[one], columns[other] = other, one
-        text = f"gages {names[one]} and {names[other]} exchanged explain"
+        columns[first], columns[second] = second, first
+        text = f"gages {names[first]} and {names[second]} exchanged explain"
         remedy = "compare the order of the columns with that of the gages"
         yield plain._replace(text=text, remedy=remedy, columns=tuple(columns))
 
@@ -219,9 +219,9 @@ def _products(fit: LocationFit, candidates: list[tuple[float, float]]) -> Iterat
     """Return the inner products at the candidates."""
     seen = fit.model.observation
     values = seen.values
-    one = seen.of(np.ones(fit.model.responses.shape[2]))
+    constant = seen.of(np.ones(fit.model.responses.shape[2]))
     squares = np.maximum((values**2).sum(axis=1) + seen.left, np.finfo(float).tiny)
-    level = values @ one
+    level = values @ constant
     for place in candidates:
         try:
             design = fit.model.design(*place)
@@ -230,19 +230,29 @@ def _products(fit: LocationFit, candidates: list[tuple[float, float]]) -> Iterat
         turned = np.ascontiguousarray(design.swapaxes(1, 2))  # (gages, hats, rows)
         both = (turned @ values.T).swapaxes(1, 2)
         yield _Products(
-            place, turned @ design, both, turned @ one, level, squares, float(one @ one)
+            place,
+            turned @ design,
+            both,
+            turned @ constant,
+            level,
+            squares,
+            float(constant @ constant),
         )
 
 
-def _normal(at: _Products, hypothesis: _Hypothesis) -> tuple[Floats, Floats]:
+def _normal(products: _Products, hypothesis: _Hypothesis) -> tuple[Floats, Floats]:
     """Return the normal equations of the force, weighted by the squares of every gage's strains."""
-    matrix, vector = np.zeros(at.hats.shape[1:]), np.zeros(at.hats.shape[1])
+    matrix, vector = np.zeros(products.hats.shape[1:]), np.zeros(products.hats.shape[1])
     for gage, (column, sign) in enumerate(zip(hypothesis.columns, hypothesis.signs, strict=True)):
         if gage == hypothesis.gain:
             continue
-        hats, both, square = at.hats[gage], at.both[gage, column], float(at.squares[column])
+        hats, both, square = (
+            products.hats[gage],
+            products.both[gage, column],
+            float(products.squares[column]),
+        )
         if gage == hypothesis.zero:
-            hats, both, square = at.without_zero(gage)
+            hats, both, square = products.without_zero(gage)
         matrix += hats / square
         vector += sign / square * both
     matrix[np.diag_indices(len(matrix))] += RIDGE * float(np.diagonal(matrix).max()) + LEAST
@@ -253,39 +263,43 @@ def _least(places: list[_Products], hypothesis: _Hypothesis) -> _Shares:
     """Return the remaining shares at the best of the candidates."""
     from scipy.optimize import nnls  # takes 0.2 s to import
 
-    normals = [_normal(at, hypothesis) for at in places]
+    normals = [_normal(products, hypothesis) for products in places]
     factors = np.linalg.cholesky(np.array([matrix for matrix, _ in normals]))
     vectors = np.array([vector for _, vector in normals])
     roots = np.linalg.solve(factors, vectors[:, :, None])[:, :, 0]
     described = (roots**2).sum(axis=1)  # squares, by coefficients of any sign
-    found = []
+    shares_left = []
     for place in np.argsort(-described, kind="stable")[:PLACES].tolist():
         force = nnls(factors[place].T, roots[place], maxiter=30 * len(roots[place]))[0]
-        found.append(_shares(places[place], hypothesis, force))
-    return min(found, key=lambda shares: float(shares.left.sum()))
+        shares_left.append(_shares(places[place], hypothesis, force))
+    return min(shares_left, key=lambda shares: float(shares.left.sum()))
 
 
-def _shares(at: _Products, hypothesis: _Hypothesis, force: Floats) -> _Shares:
+def _shares(products: _Products, hypothesis: _Hypothesis, force: Floats) -> _Shares:
     """Return the shares of the squares that a force leaves."""
-    left, factor, level = np.ones(len(hypothesis.columns)), 1.0, 0.0
+    remains, factor, level = np.ones(len(hypothesis.columns)), 1.0, 0.0
     for gage, (column, sign) in enumerate(zip(hypothesis.columns, hypothesis.signs, strict=True)):
-        hats, both, square = at.hats[gage], at.both[gage, column], float(at.squares[column])
+        hats, both, square = (
+            products.hats[gage],
+            products.both[gage, column],
+            float(products.squares[column]),
+        )
         if gage == hypothesis.zero:
-            level = float(at.level[gage] - at.ones[gage] @ force) / at.norm
-            hats, both, square = at.without_zero(gage)
+            level = float(products.level[gage] - products.ones[gage] @ force) / products.norm
+            hats, both, square = products.without_zero(gage)
         computed, product = float(force @ hats @ force), sign * float(both @ force)
         if gage == hypothesis.gain:
             if product > 0.0 and computed > 0.0:
                 factor = product / computed
-                left[gage] = 1.0 - product**2 / (computed * square)
+                remains[gage] = 1.0 - product**2 / (computed * square)
         else:
-            left[gage] = (computed - 2.0 * product + square) / square
-    return _Shares(np.maximum(left, 0.0), at.place, factor, level)
+            remains[gage] = (computed - 2.0 * product + square) / square
+    return _Shares(np.maximum(remains, 0.0), products.place, factor, level)
 
 
 def _rounded(factor: float) -> str:
     """Return a factor, or the factor of a unit that it is near to."""
-    for size in (*ROUND, *(1.0 / one for one in ROUND)):
+    for size in (*ROUND, *(1.0 / number for number in ROUND)):
         if abs(factor / size - 1.0) < NEAR:
             return f"{size:g}"
     return f"{factor:.3g}"
@@ -300,124 +314,124 @@ OF_MESH = 0.8  # share of the mesh in the standard deviation of the place
 VAGUE = 0.25  # standard deviation of a place over the side of the region
 
 
-def is_doubtful(found: Location) -> bool:
+def is_doubtful(location: Location) -> bool:
     """Return whether the model does not describe the strains down to their noise."""
-    bad = found.misfit > NOT_DESCRIBED or residual_correlation(found) > COLOURED
-    return bad or found.misfit > likely_misfit(found) or bool(undescribed_gages(found))
+    bad = location.misfit > NOT_DESCRIBED or residual_correlation(location) > COLOURED
+    return bad or location.misfit > likely_misfit(location) or bool(undescribed_gages(location))
 
 
-def likely_misfit(found: Location) -> float:
+def likely_misfit(location: Location) -> float:
     """Return the largest misfit that noise explains.
 
     Its standard deviation is 1/sqrt(2 n) for n values.
     """
-    parameters = 2 + int((found.force > 0.0).sum())
-    return 1.0 + UNLIKELY / math.sqrt(2.0 * max(1, found.strains.size - parameters))
+    parameters = 2 + int((location.force > 0.0).sum())
+    return 1.0 + UNLIKELY / math.sqrt(2.0 * max(1, location.strains.size - parameters))
 
 
-def undescribed_gages(found: Location) -> list[int]:
+def undescribed_gages(location: Location) -> list[int]:
     """Return the gages whose residual has a shape, and is a large share of their strains."""
-    rest = found.strains - found.fitted
-    own = (rest**2).sum(axis=1)
+    rest = location.strains - location.fitted
+    energies = (rest**2).sum(axis=1)
     follow = (rest[:, 1:] * rest[:, :-1]).sum(axis=1)
-    large = own > LEFT * (found.strains**2).sum(axis=1)
-    return [int(n) for n in found.gages[large & (follow > COLOURED * own)]]
+    large = energies > LEFT * (location.strains**2).sum(axis=1)
+    return [int(n) for n in location.gages[large & (follow > COLOURED * energies)]]
 
 
-def judged(found: Location, region: Region, wide: bool, cause: Cause | None) -> Location:
+def judged(location: Location, region: Region, wide: bool, cause: Cause | None) -> Location:
     """Return the location with its notes, and whether it is accepted.
 
     `wide` says whether narrower hats of the force describe the strains better, `cause` what may be
     wrong with the strains.
     """
-    serious = [*_serious(found, region)]
+    serious = [*_serious(location, region)]
     if cause is not None:
         serious.append(str(cause))
-    return replace(found, notes=(*serious, *_remarks(found, wide)), accepted=not serious)
+    return replace(location, notes=(*serious, *_remarks(location, wide)), accepted=not serious)
 
 
-def _serious(found: Location, region: Region) -> Iterator[str]:
+def _serious(location: Location, region: Region) -> Iterator[str]:
     """Yield reasons not to accept a location."""
-    near = residual_correlation(found)
+    near = residual_correlation(location)
     compare = "compare supports, laminate, patch, mesh and gages with those of the test"
-    share = float(((found.strains - found.fitted) ** 2).sum() / (found.strains**2).sum())
-    if found.misfit > NOT_DESCRIBED:
+    share = float(((location.strains - location.fitted) ** 2).sum() / (location.strains**2).sum())
+    if location.misfit > NOT_DESCRIBED:
         yield (
-            f"the model does not describe these signals: the residual is {found.misfit:.2g} times "
-            f"the noise; {compare}"
+            "the model does not describe these signals: the residual is "
+            f"{location.misfit:.2g} times the noise; {compare}"
         )
-    elif not found.noise_given and near > COLOURED:
+    elif not location.noise_given and near > COLOURED:
         yield (
             f"the model does not describe these signals: neighbouring residuals have the "
             f"correlation {near:.2f}, and {100.0 * share:.2g} % of the squares of the strains are "
             f"left; {compare}"
         )
-    elif gages := undescribed_gages(found):
+    elif gages := undescribed_gages(location):
         which = ", ".join(map(str, gages))
         yield (
             f"the model does not describe gage {which}: more than half of the squares of its "
             f"strains are left; {compare}"
         )
-    largest = float(np.abs(found.strains).max())
+    largest = float(np.abs(location.strains).max())
     if largest > LARGE:
         yield (
             f"the largest strain is {100.0 * largest:.2g} %, at which plies fail: the peak force "
             "is doubtful; are the strains in per cent?"
         )
-    if found.second is not None and found.second.ratio < RIVAL:
-        x, y, ratio = found.second
+    if location.second is not None and location.second.ratio < RIVAL:
+        x, y, ratio = location.second
         yield (
             f"({x:.4g}, {y:.4g}) explains the strains almost as well: its misfit is {ratio:.3f} "
             "times that of the place found"
         )
-    if region.at_edge(found.x, found.y):
+    if region.at_edge(location.x, location.y):
         yield "the place is on the edge of the region; the impact may be outside"
-    for name, error, side in zip("xy", (found.sd_x, found.sd_y), region.size, strict=True):
+    for name, error, side in zip("xy", (location.sd_x, location.sd_y), region.size, strict=True):
         if not error < VAGUE * side:
             yield (
                 f"{name} is not determined: its standard deviation is {error:.3g}, and the region "
                 f"is {side:.3g} wide"
             )
-    top = int(np.abs(found.time - found.time_of_peak).argmin())
-    if found.peak_force < CLEAR * float(found.force_sd[top]):
+    top = int(np.abs(location.time - location.time_of_peak).argmin())
+    if location.peak_force < CLEAR * float(location.force_sd[top]):
         yield "the force is not above its noise"
 
 
-def _remarks(found: Location, wide: bool) -> Iterator[str]:
+def _remarks(location: Location, wide: bool) -> Iterator[str]:
     """Yield other notes."""
-    clock = unit_of("time", found.units)
+    clock = unit_of("time", location.units)
     if wide:
-        half = f"{0.5 * (found.time[1] - found.time[0]):.3g} {clock}".rstrip()
+        half = f"{0.5 * (location.time[1] - location.time[0]):.3g} {clock}".rstrip()
         yield (
             f"a force every {half} describes the strains better: its error is not in the standard "
             "deviations; take a smaller basis"
         )
-    near = residual_correlation(found)
-    if likely_misfit(found) < found.misfit <= NOT_DESCRIBED:
+    near = residual_correlation(location)
+    if likely_misfit(location) < location.misfit <= NOT_DESCRIBED:
         yield (
-            f"the residual is {found.misfit:.3g} times the noise, which chance does not explain: "
-            "the model has errors, and the standard deviations are multiplied by it"
+            f"the residual is {location.misfit:.3g} times the noise, which chance does not "
+            "explain: the model has errors, and the standard deviations are multiplied by it"
         )
-    if found.noise_given and near > COLOURED:
+    if location.noise_given and near > COLOURED:
         yield (
             f"neighbouring residuals have the correlation {near:.2f}: the model does not describe "
             "the strains down to their noise, and the standard deviations are too small"
         )
-    if found.mesh_error is None:
+    if location.mesh_error is None:
         yield "the standard deviations do not include the error of the mesh, which is unknown"
-    elif found.mesh_error > OF_MESH * math.hypot(found.sd_x, found.sd_y):
-        length = f"{found.mesh_error:.2g} {unit_of('length', found.units)}".rstrip()
+    elif location.mesh_error > OF_MESH * math.hypot(location.sd_x, location.sd_y):
+        length = f"{location.mesh_error:.2g} {unit_of('length', location.units)}".rstrip()
         yield (
             f"elements half as long move the place by {length}, which is in the standard "
             "deviations; take a finer mesh"
         )
-    if found.contact_end is None:
-        until = f"{found.determined_until:.4g} {clock}".rstrip()
+    if location.contact_end is None:
+        until = f"{location.determined_until:.4g} {clock}".rstrip()
         yield f"the force has not ended at {until}: the impulse is at least that until then"
 
 
-def residual_correlation(found: Location) -> float:
+def residual_correlation(location: Location) -> float:
     """Return the correlation of consecutive residuals."""
-    rest = found.strains - found.fitted
+    rest = location.strains - location.fitted
     size = float((rest**2).sum())
     return float((rest[:, 1:] * rest[:, :-1]).sum()) / size if size else 0.0

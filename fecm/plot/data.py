@@ -154,11 +154,11 @@ class Patches(NamedTuple):
     @property
     def triangles(self) -> Indices:
         """Two triangles per quadrilateral; those without area are left out."""
-        found = np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]])
-        first, second = (self.points[found[:, n]] - self.points[found[:, 0]] for n in (1, 2))
+        corners = np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]])
+        first, second = (self.points[corners[:, n]] - self.points[corners[:, 0]] for n in (1, 2))
         area = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
         kept = area > 1e-9 * float(area.max())
-        return np.asarray(found[kept])
+        return np.asarray(corners[kept])
 
 
 def patches(result: Result, cuts: int, name: str = "the result") -> Patches:

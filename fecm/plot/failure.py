@@ -76,8 +76,10 @@ class DrawnExposures(NamedTuple):
     def title(self) -> str:
         """The largest exposure, and that of the interfaces or of the plies below it."""
         between = self.worst.criterion == BETWEEN
-        others = [one for one in self.largest if (one.criterion == BETWEEN) != between]
-        return "\n".join(map(_in_words, (self.worst, *others[:1])))
+        of_other_kind = [
+            exposure for exposure in self.largest if (exposure.criterion == BETWEEN) != between
+        ]
+        return "\n".join(map(_in_words, (self.worst, *of_other_kind[:1])))
 
 
 def failure(results: Mapping[str, Result], *, quantity: str = "", width: Width = "full") -> Picture:
@@ -91,35 +93,36 @@ def failure(results: Mapping[str, Result], *, quantity: str = "", width: Width =
     largest.
     """
     ((name, result),) = results.items()
-    found = _exposures(result, name, quantity)
-    corners = _cells(result, name, found.under_load.shape[1])
+    exposures = _exposures(result, name, quantity)
+    corners = _cells(result, name, exposures.under_load.shape[1])
     place = style.scale_of(results, "length", [corners])
-    most = max(map(len, found.over_plies.values()))
+    most = max(map(len, exposures.over_plies.values()))
     figure, plate, bars = _panels(width, aspect(corners.reshape(-1, 2)), most)
-    _map(plate, corners, found)
+    _map(plate, corners, exposures)
     mark_impact(plate, result, name)
     has_circle = _draw_circle(plate, result, name)
-    plate.plot(found.worst.x, found.worst.y, clip_on=False, **LARGEST)
-    title = found.title
+    plate.plot(exposures.worst.x, exposures.worst.y, clip_on=False, **LARGEST)
+    title = exposures.title
     if result.still_in_contact:
         title += "\nstill in contact at the end: exposures may grow"
     plate.set_title(title, loc="left")
     place.name(plate.xaxis, "$x$")
     place.name(plate.yaxis, "$y$")
-    entries = _bars(bars, found)
+    entries = _bars(bars, exposures)
     if has_circle:
         entries["circle around the load"] = Line2D([], [], **CIRCLE)
     style.legend(figure, list(entries.values()), list(entries))
     if text := style.open_ends_note(results):
         bars.set_title(f"{text}: lower bounds", loc="right", fontsize=7.0)
-    _warn_of_load(name, found.under_load)
+    _warn_of_load(name, exposures.under_load)
     return Picture(figure)
 
 
-def _in_words(one: LargestExposure) -> str:
+def _in_words(exposure: LargestExposure) -> str:
     """Format an exposure for a title; names of materials take their own line."""
-    separator = "\n" if one.materials else " "
-    return f"{one.exposure:.4g} ({spelt(one.criterion)}): {one.mode},{separator}{one.plies}"
+    separator = "\n" if exposure.materials else " "
+    size = f"{exposure.exposure:.4g} ({spelt(exposure.criterion)})"
+    return f"{size}: {exposure.mode},{separator}{exposure.plies}"
 
 
 def _panels(width: Width, high: float, bars: int) -> tuple[Figure, Axes, Axes]:
@@ -197,10 +200,12 @@ def _exposures(result: Result, name: str, quantity: str) -> DrawnExposures:
         if (outside != UNKNOWN).any():
             over_plies[criterion] = _known(outside.max(axis=0))
         fields[criterion] = np.broadcast_to(field, under.shape)
-    largest = [one for one in largest_exposures(result) if one.criterion in over_plies]
+    largest = [
+        exposure for exposure in largest_exposures(result) if exposure.criterion in over_plies
+    ]
     if not largest:
         raise PlotError(f"the load is over all elements of {name}: no exposure is left to show")
-    largest.sort(key=lambda one: -one.exposure)
+    largest.sort(key=lambda exposure: -exposure.exposure)
     between = largest[0].criterion == BETWEEN
     shown = [field for criterion, field in fields.items() if (criterion == BETWEEN) == between]
     left_out = whole if between else under
@@ -219,9 +224,11 @@ def _cells(result: Result, name: str, count: int) -> Floats:
         raise PlotError(
             f"{name} has exposures at {count} points of an element, its deck has {len(rule.xi)}"
         )
-    at = np.unique(rule.xi.round(12))
-    bounds = np.concatenate(([-1.0], (at[1:] + at[:-1]) / 2.0, [1.0]))
-    column, row = (np.abs(at - local[:, None]).argmin(axis=1) for local in (rule.xi, rule.eta))
+    abscissae = np.unique(rule.xi.round(12))
+    bounds = np.concatenate(([-1.0], (abscissae[1:] + abscissae[:-1]) / 2.0, [1.0]))
+    column, row = (
+        np.abs(abscissae - local[:, None]).argmin(axis=1) for local in (rule.xi, rule.eta)
+    )
     right, upper = np.array([0, 1, 1, 0]), np.array([0, 0, 1, 1])
     xi, eta = bounds[column[:, None] + right].ravel(), bounds[row[:, None] + upper].ravel()
     grid = Quadrature(xi, eta, np.zeros(len(xi)))  # points only; nothing is integrated
@@ -240,10 +247,10 @@ def outline(cells: Floats) -> Floats:
     return np.asarray(sides[index[times == 1]])
 
 
-def _map(axes: Axes, cells: Floats, found: DrawnExposures) -> None:
+def _map(axes: Axes, cells: Floats, exposures: DrawnExposures) -> None:
     """Draw one cell per point."""
-    outside = ~found.under_load
-    values = found.over_plate[outside]
+    outside = ~exposures.under_load
+    values = exposures.over_plate[outside]
     peak = float(np.nanmax(values))
     drawn = PolyCollection(
         list(cells[outside]),
@@ -256,24 +263,24 @@ def _map(axes: Axes, cells: Floats, found: DrawnExposures) -> None:
     )
     axes.add_collection(drawn)
     axes.add_collection(PolyCollection(list(cells[~outside]), linewidths=0.0, **HATCH))
-    above = outline(cells[outside & (found.over_plate >= 1.0)])
+    above = outline(cells[outside & (exposures.over_plate >= 1.0)])
     axes.add_collection(LineCollection(list(above), colors=RED, linewidths=0.8))
     low, high = cells.min(axis=(0, 1, 2)), cells.max(axis=(0, 1, 2))
     axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
-    what = "the interfaces" if found.worst.criterion == BETWEEN else "the plies"
+    what = "the interfaces" if exposures.worst.criterion == BETWEEN else "the plies"
     scale, label = style.AxisScale(1.0, ""), f"Largest exposure of {what}"
     bar = style.colour_bar(axes, drawn, scale, label, MaxNLocator(5))
     if peak >= 1.0:
         bar.ax.axvline(1.0, **LIMIT)
 
 
-def _bars(axes: Axes, found: DrawnExposures) -> dict[str, Artist]:
+def _bars(axes: Axes, exposures_drawn: DrawnExposures) -> dict[str, Artist]:
     """Draw a bar per ply, the struck face at the top, and one per interface between them.
 
     Returns the entries of the legend.
     """
-    plies = {name: values for name, values in found.over_plies.items() if name != BETWEEN}
-    between = found.over_plies.get(BETWEEN)
+    plies = {name: values for name, values in exposures_drawn.over_plies.items() if name != BETWEEN}
+    between = exposures_drawn.over_plies.get(BETWEEN)
     entries: dict[str, Artist] = {}
     if plies:
         largest = np.max(list(plies.values()), axis=0)
@@ -294,15 +301,15 @@ def _bars(axes: Axes, found: DrawnExposures) -> dict[str, Artist]:
         entries[BETWEEN] = Patch(color=COLOUR_OF[BETWEEN])
     entries["exposure 1"] = axes.axvline(1.0, zorder=4, **LIMIT)
     entries["largest"] = Line2D([], [], **LARGEST)
-    if found.under_load.any():
+    if exposures_drawn.under_load.any():
         entries["under the load"] = Patch(linewidth=0.0, **HATCH)
-    for one in reversed(found.largest):  # some are on the circle around the load
-        height = one.ply + (0.5 if plies and one.criterion == BETWEEN else 0.0)
-        colour = RED if one is found.worst else COLOUR_OF[one.criterion]
-        axes.plot(one.exposure, height, **LARGEST | {"color": colour, "zorder": 5.0})
-    count = max(map(len, found.over_plies.values()))
+    for exposure in reversed(exposures_drawn.largest):  # some are on the circle around the load
+        height = exposure.ply + (0.5 if plies and exposure.criterion == BETWEEN else 0.0)
+        colour = RED if exposure is exposures_drawn.worst else COLOUR_OF[exposure.criterion]
+        axes.plot(exposure.exposure, height, **LARGEST | {"color": colour, "zorder": 5.0})
+    count = max(map(len, exposures_drawn.over_plies.values()))
     axes.set_ylim(count + 0.6, 0.4)
-    most = max(1.0, found.worst.exposure)
+    most = max(1.0, exposures_drawn.worst.exposure)
     axes.set_xlim(0.0, 1.05 * most)
     axes.yaxis.set_major_locator(MaxNLocator(TICKS, integer=True, min_n_ticks=1))
     axes.set_ylabel("Ply (1: struck face)" if plies else "Interface below ply (1: struck face)")

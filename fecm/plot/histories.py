@@ -102,9 +102,9 @@ def force(
         name: DrawnForces(*data.require_datasets(result, name, *paths))
         for name, result in results.items()
     }
-    times = [one.time for one in drawn.values()]
+    times = [forces.time for forces in drawn.values()]
     limits = _thresholds(results)
-    sizes = [values for one in drawn.values() for values in (one.contact, one.transducer)]
+    sizes = [values for forces in drawn.values() for values in (forces.contact, forces.transducer)]
     sizes.append(np.array(list(limits.values())))
     measured = None
     if overlay is not None:
@@ -136,7 +136,10 @@ def _draw_forces(
 ) -> tuple[Figure, list[Axes]]:
     """Draw the forces of one result in one graph, of several above the transducers."""
     colours = style.colours()
-    rigid = all(np.array_equal(one.contact, one.transducer) for one in drawn.values())
+    rigid = all(
+        np.array_equal(forces_of_run.contact, forces_of_run.transducer)
+        for forces_of_run in drawn.values()
+    )
     if len(drawn) == 1:
         figure, axes = style.panels(width)
         (forces,) = drawn.values()
@@ -181,18 +184,18 @@ def _measured_look(time: Array) -> style.Look:
 
 
 @style.styled
-def force_fit_picture(found: Identification, units: Mapping[str, str]) -> Picture:
+def force_fit_picture(fit: Identification, units: Mapping[str, str]) -> Picture:
     """Draw measured and fitted force above, the residual and its rms below."""
-    clock = style.scale_in(units, "time", found.time)
+    clock = style.scale_in(units, "time", fit.time)
     figure, (above, below) = style.panels("column", 2, sharex=True, tall=0.6)
-    look = _measured_look(found.time)
-    above.plot(found.time, found.force, color="0.4", label="measured", **look)
-    above.plot(found.time, found.model, color=style.COLOURS[0], label="fitted")
-    below.plot(found.time, found.residual, color="0.4", **look)
+    look = _measured_look(fit.time)
+    above.plot(fit.time, fit.force, color="0.4", label="measured", **look)
+    above.plot(fit.time, fit.model, color=style.COLOURS[0], label="fitted")
+    below.plot(fit.time, fit.residual, color="0.4", **look)
     below.axhline(0.0, color=style.COLOURS[0])
-    for value in (-found.rms, found.rms):
+    for value in (-fit.rms, fit.rms):
         below.axhline(value, color=style.COLOURS[0], ls=style.DASHED, lw=0.6)
-    for axes, name, values in ((above, "Force", found.force), (below, "Residual", found.residual)):
+    for axes, name, values in ((above, "Force", fit.force), (below, "Residual", fit.residual)):
         style.scale_in(units, "force", values).name(axes.yaxis, name)
     clock.name(below.xaxis, "Time")
     style.lines_legend(figure, above)
@@ -376,7 +379,7 @@ def _strains(
             f"the midplane of {name} may stretch; its strains are not stored, and the picture "
             "shows those of bending alone"
         )
-    found: dict[str, Array] = {}
+    histories: dict[str, Array] = {}
     for place in places:
         there = data.nearest(points, place, name)
         x, y = points[there].mean(axis=0)
@@ -385,8 +388,8 @@ def _strains(
             c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
             values = height * (c * c * kappa_x + s * s * kappa_y + s * c * kappa_xy)
             direction = AXES.get(angle, f" {angle:g}°")
-            found[f"{symbol}{direction} at {x:.4g}, {y:.4g}"] = values
-    return found
+            histories[f"{symbol}{direction} at {x:.4g}, {y:.4g}"] = values
+    return histories
 
 
 def _may_stretch(result: Result) -> bool:

@@ -45,11 +45,11 @@ def location(results: Mapping[str, Location]) -> Picture:
 
     The second panel enlarges the place and its 95 % ellipse.
     """
-    (found,) = results.values()
-    count = len(found.gages)
+    (located,) = results.values()
+    count = len(located.gages)
     shown = min(count, MOST_GAGES)
     rows = -(-shown // COLUMNS)
-    outline = _outline(found)
+    outline = _outline(located)
     ends = outline.reshape(-1, 2)
     extent = np.ptp(ends, axis=0)
     inches = style.WIDTHS["full"]
@@ -69,24 +69,24 @@ def location(results: Mapping[str, Location]) -> Picture:
     for unused in (*axes[2:4], *axes[4 + shown :]):
         unused.remove()
 
-    place = style.scale_in(found.units, "length", ends)
-    _draw_map(axes[0], found, outline, place)
-    _draw_zoom(axes[1], found, place)
-    _draw_force(figure.add_subplot(grid[1, :]), found)
-    _draw_strains(axes[4 : 4 + shown], found)
+    place = style.scale_in(located.units, "length", ends)
+    _draw_map(axes[0], located, outline, place)
+    _draw_zoom(axes[1], located, place)
+    _draw_force(figure.add_subplot(grid[1, :]), located)
+    _draw_strains(axes[4 : 4 + shown], located)
     notes = [f"the strains of {shown} of {count} gages are drawn"] if shown < count else []
     return Picture(figure, notes=notes)
 
 
 @style.styled
-def location_picture(found: Location) -> Picture:
+def location_picture(located: Location) -> Picture:
     """Return the picture of :func:`location` in the style of the command line."""
-    return location({"": found})
+    return location({"": located})
 
 
-def _outline(found: Location) -> Floats:
+def _outline(located: Location) -> Floats:
     """Return the sides of the plate's edges, corner to corner, (n, 2, 2)."""
-    mesh = generate(found.deck)
+    mesh = generate(located.deck)
     sides: list[Indices] = []
     for block in element_blocks(mesh.elements, mesh.coordinates):
         corners = block.nodes[:, : block.shape.corners]
@@ -95,34 +95,34 @@ def _outline(found: Location) -> Floats:
     return np.asarray(mesh.coordinates[ends[times == 1], :2])
 
 
-def _cells(found: Location, size: float) -> Floats:
+def _cells(located: Location, size: float) -> Floats:
     """Return corners of a rectangle around every candidate, (n, 4, 2), which nearly touch.
 
     Their sides are the distances of neighbouring candidates, or a tenth of the plate's size.
     """
-    steps = [np.diff(np.unique(values)) for values in found.candidates.T]
-    sides = np.array([one.min() if len(one) else 0.1 * size for one in steps])
-    return np.asarray(found.candidates[:, None] + 0.46 * sides * CORNERS)
+    steps = [np.diff(np.unique(values)) for values in located.candidates.T]
+    sides = np.array([distances.min() if len(distances) else 0.1 * size for distances in steps])
+    return np.asarray(located.candidates[:, None] + 0.46 * sides * CORNERS)
 
 
-def _draw_map(axes: Axes, found: Location, outline: Floats, place: style.AxisScale) -> None:
+def _draw_map(axes: Axes, located: Location, outline: Floats, place: style.AxisScale) -> None:
     """Draw the misfit of the candidates, the gages, and the best places on the plate."""
     extent = np.ptp(outline.reshape(-1, 2), axis=0)
     axes.add_collection(LineCollection(list(outline), colors="0.3", linewidths=0.8))
-    worst = max(float(found.candidate_misfit.max()), 1.1)
+    worst = max(float(located.candidate_misfit.max()), 1.1)
     cells = PolyCollection(
-        list(_cells(found, float(extent.max()))),
-        array=found.candidate_misfit,
+        list(_cells(located, float(extent.max()))),
+        array=located.candidate_misfit,
         norm=LogNorm(1.0, worst),
         cmap=style.SEQUENTIAL,
     )
     axes.add_collection(cells)
-    _draw_gages(axes, found, GAGE_LENGTH * float(extent.max()))
+    _draw_gages(axes, located, GAGE_LENGTH * float(extent.max()))
     halo = [withStroke(linewidth=3.0, foreground="white")]
-    axes.plot(found.x, found.y, label="place found", path_effects=halo, zorder=5, **CROSS)
-    if found.second is not None:
-        text = f"second place, misfit × {found.second.ratio:.2f}"
-        axes.plot(found.second.x, found.second.y, label=text, zorder=4, **OTHER)
+    axes.plot(located.x, located.y, label="place found", path_effects=halo, zorder=5, **CROSS)
+    if located.second is not None:
+        text = f"second place, misfit × {located.second.ratio:.2f}"
+        axes.plot(located.second.x, located.second.y, label=text, zorder=4, **OTHER)
     axes.set_aspect("equal")
     axes.margins(0.04)
     place.name(axes.xaxis, "$x$")
@@ -136,11 +136,11 @@ def _draw_map(axes: Axes, found: Location, outline: Floats, place: style.AxisSca
     bar.set_ticks(ticks if len(ticks) > 1 else [1.0, worst])
 
 
-def _draw_gages(axes: Axes, found: Location, length: float) -> None:
+def _draw_gages(axes: Axes, located: Location, length: float) -> None:
     """Draw a line along the direction of every gage, with its number."""
-    degrees = {card.number: card.direction for card in found.deck.require(Gages).records}
+    degrees = {card.number: card.direction for card in located.deck.require(Gages).records}
     halo = [withStroke(linewidth=2.0, foreground="white")]
-    for number, (x, y) in zip(found.gages.tolist(), found.gage_places, strict=True):
+    for number, (x, y) in zip(located.gages.tolist(), located.gage_places, strict=True):
         angle = np.deg2rad(degrees[number])
         along = 0.5 * length * np.array([np.cos(angle), np.sin(angle)])
         axes.plot(
@@ -162,9 +162,9 @@ def _draw_gages(axes: Axes, found: Location, length: float) -> None:
         )
 
 
-def _draw_zoom(axes: Axes, found: Location, place: style.AxisScale) -> None:
+def _draw_zoom(axes: Axes, located: Location, place: style.AxisScale) -> None:
     """Draw the place and its ellipse, enlarged; axes are distances from the place."""
-    ellipse = found.ellipse(0.95) - np.array([found.x, found.y])
+    ellipse = located.ellipse(0.95) - np.array([located.x, located.y])
     axes.set_title("95 % confidence region", loc="left")
     reach = ZOOM * float(np.abs(ellipse).max())
     axes.fill(*ellipse.T, color=FITTED, alpha=0.25, lw=0.0)
@@ -177,13 +177,13 @@ def _draw_zoom(axes: Axes, found: Location, place: style.AxisScale) -> None:
     place.name(axes.yaxis, "$y$ from the place found")
 
 
-def _draw_force(axes: Axes, found: Location) -> None:
+def _draw_force(axes: Axes, located: Location) -> None:
     """Draw the fitted force with its band; where it is not determined, a hatched area."""
     # The force begins one interval before its first value.
-    begin = 2.0 * found.time[0] - found.time[1]
-    time = np.append(begin, found.time)
-    force = np.append(0.0, np.where(found.determined, found.force, np.nan))
-    room = np.append(0.0, 2.0 * found.force_sd)
+    begin = 2.0 * located.time[0] - located.time[1]
+    time = np.append(begin, located.time)
+    force = np.append(0.0, np.where(located.determined, located.force, np.nan))
+    room = np.append(0.0, 2.0 * located.force_sd)
     axes.fill_between(
         time,
         force - room,
@@ -194,10 +194,10 @@ def _draw_force(axes: Axes, found: Location) -> None:
         label="± 2 standard deviations",
     )
     axes.plot(time, force, color=FITTED, label="fitted force")
-    if found.determined_until < found.time[-1]:
+    if located.determined_until < located.time[-1]:
         axes.axvspan(
-            found.determined_until,
-            found.time[-1],
+            located.determined_until,
+            located.time[-1],
             fc="0.95",
             ec="0.7",
             hatch="////",
@@ -205,26 +205,26 @@ def _draw_force(axes: Axes, found: Location) -> None:
             label="not determined by these strains",
         )
     axes.axhline(0.0, color="0.2", lw=0.6)
-    axes.set_xlim(min(0.0, begin), float(found.time[-1]))
-    style.scale_in(found.units, "time", found.time).name(axes.xaxis, "Time")
-    style.scale_in(found.units, "force", force).name(axes.yaxis, "Contact force")
+    axes.set_xlim(min(0.0, begin), float(located.time[-1]))
+    style.scale_in(located.units, "time", located.time).name(axes.xaxis, "Time")
+    style.scale_in(located.units, "force", force).name(axes.yaxis, "Contact force")
     axes.legend(loc="lower right", bbox_to_anchor=(1.0, 0.96), ncols=3)
 
 
-def _draw_strains(axes: list[Axes], found: Location) -> None:
+def _draw_strains(axes: list[Axes], located: Location) -> None:
     """Draw measured and fitted strains, a graph per gage, all with the same axes."""
-    micro = style.scale(style.largest_absolute(found.strains, found.fitted), "")
-    clock = style.scale_in(found.units, "time", found.strain_time)
-    largest = max(float(values.max()) for values in (found.strains, found.fitted))
-    least = min(float(values.min()) for values in (found.strains, found.fitted))
+    micro = style.scale(style.largest_absolute(located.strains, located.fitted), "")
+    clock = style.scale_in(located.units, "time", located.strain_time)
+    largest = max(float(values.max()) for values in (located.strains, located.fitted))
+    least = min(float(values.min()) for values in (located.strains, located.fitted))
     room = 0.06 * (largest - least)
     for ax, number, measured, fitted in zip(
-        axes, found.gages.tolist(), found.strains, found.fitted, strict=False
+        axes, located.gages.tolist(), located.strains, located.fitted, strict=False
     ):
-        ax.plot(found.strain_time, measured, color="0.65", lw=2.0, label="measured")
-        ax.plot(found.strain_time, fitted, color=FITTED, label="fitted")
+        ax.plot(located.strain_time, measured, color="0.65", lw=2.0, label="measured")
+        ax.plot(located.strain_time, fitted, color=FITTED, label="fitted")
         ax.set_title(f"gage {number}", loc="left")
-        ax.set_xlim(min(0.0, float(found.strain_time[0])), float(found.strain_time[-1]))
+        ax.set_xlim(min(0.0, float(located.strain_time[0])), float(located.strain_time[-1]))
         ax.set_ylim(least - room, largest + room)
         clock.name(ax.xaxis, "Time")
         micro.name(ax.yaxis, "Strain")

@@ -155,20 +155,23 @@ def _parameters(
         variable_of(sweep, parameter, sweep[parameter][rows])
         for parameter in _names_of_axes(sweep, name, varying, over)
     ]
-    others = [parameter for parameter in varying if parameter not in [axis.name for axis in axes]]
-    if not others:
+    other_parameters = [
+        parameter for parameter in varying if parameter not in [axis.name for axis in axes]
+    ]
+    if not other_parameters:
         return axes, None
 
-    vary = f"{names_in_words(others)} {'varies' if len(others) == 1 else 'vary'} too"
-    selects = f"--where {others[0]}=VALUE selects some of"
+    verb = "varies" if len(other_parameters) == 1 else "vary"
+    vary = f"{names_in_words(other_parameters)} {verb} too"
+    selects = f"--where {other_parameters[0]}=VALUE selects some of"
     if len(axes) > 1:
         points = np.column_stack([axis.values for axis in axes])
         if len(np.unique(points, axis=0)) < len(points):
             raise PlotError(f"{vary}, so that cases would hide one another; {selects} them")
         return axes, None
-    other = variable_of(sweep, others[0], sweep[others[0]][rows])
-    if len(others) > 1 or len(other.ticks) > MOST_CURVES:
-        both = f"--over {axes[0].name},{others[0]} draws over both"
+    other = variable_of(sweep, other_parameters[0], sweep[other_parameters[0]][rows])
+    if len(other_parameters) > 1 or len(other.ticks) > MOST_CURVES:
+        both = f"--over {axes[0].name},{other_parameters[0]} draws over both"
         raise PlotError(f"{vary}; {selects} the cases, {both}")
     return axes, other
 
@@ -268,8 +271,8 @@ def _mark_crossings(axes: Axes, grid: ValueGrid, level: float) -> None:
         before, after = values[:-1], values[1:]
         passed = np.isfinite(before + after) & ((before < 0.0) != (after < 0.0))
         share = before[passed] / (before[passed] - after[passed])
-        at = x[:-1][passed] + share * np.diff(x)[passed]
-        axes.vlines(at, row - 0.5, row + 0.5, color=LEVEL_COLOUR, linewidth=LEVEL_WIDTH)
+        crossings = x[:-1][passed] + share * np.diff(x)[passed]
+        axes.vlines(crossings, row - 0.5, row + 0.5, color=LEVEL_COLOUR, linewidth=LEVEL_WIDTH)
 
 
 def _draw_points(graph: Graph, shown: DrawnVariable, levels: Collection[float]) -> None:
@@ -318,8 +321,8 @@ def mark_threshold_contours(graph: Graph, contents: MapContents) -> None:
     above = contents.shown.values - contents.thresholds
     grid = value_grid(x, y, above)
     if grid is None:
-        at = above >= 0.0
-        axes.plot(x.values[at], y.values[at], "o", label=f"from {THRESHOLD} on", **RING)
+        is_above = above >= 0.0
+        axes.plot(x.values[is_above], y.values[is_above], "o", label=f"from {THRESHOLD} on", **RING)
     elif grid.values.min() < 0.0 < grid.values.max():
         if y.ticks:
             _mark_crossings(axes, grid, 0.0)
@@ -439,7 +442,9 @@ def mark_threshold_curves(graph: Graph, contents: MapContents) -> None:
 
     axes.set_ylim(top=max(axes.get_ylim()[1], highest))
     parameters = [*contents.over, contents.other]
-    texts = next((one for one in parameters if one is not None and one.ticks), None)
+    texts = next(
+        (parameter for parameter in parameters if parameter is not None and parameter.ticks), None
+    )
     if texts is None and contents.other is not None:
         axes.plot(x.values, thresholds, "_", color="0.2", label=THRESHOLD)
         return
@@ -529,6 +534,6 @@ def _draw(contents: MapContents, width: Width) -> Graph:
 def _mark_cases(graph: Graph, masks: Mapping[str, Bools], look: style.Look, sign: str) -> list[str]:
     """Mark a kind of cases; return lines that count them. `sign` is the mark as text."""
     if masks:
-        some = np.logical_or.reduce(list(masks.values()))
-        graph.axes.plot(graph.x.values[some], graph.y.values[some], **look)
+        is_marked = np.logical_or.reduce(list(masks.values()))
+        graph.axes.plot(graph.x.values[is_marked], graph.y.values[is_marked], **look)
     return case_counts(masks, f"{sign} ")

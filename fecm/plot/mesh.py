@@ -47,12 +47,12 @@ def support_masks(result: Result) -> dict[Support, Bools]:
     full = w & rotations.all(axis=1)
     # At a corner of a simply supported plate one node of an element is fully held, others hold w.
     nodes, present = result["mesh/elements"] - 1, result["mesh/elements"] > 0
-    one = (full[nodes] & present).sum(axis=1) == 1
+    has_one_end = (full[nodes] & present).sum(axis=1) == 1
     several = (w[nodes] & present).sum(axis=1) > 1
-    corners, others = np.zeros_like(full), np.zeros_like(full)
-    corners[nodes[(one & several)[:, None] & present]] = True
-    others[nodes[~one[:, None] & present]] = True
-    clamped = full & ~(corners & ~others)
+    corners, other_nodes = np.zeros_like(full), np.zeros_like(full)
+    corners[nodes[(has_one_end & several)[:, None] & present]] = True
+    other_nodes[nodes[~has_one_end[:, None] & present]] = True
+    clamped = full & ~(corners & ~other_nodes)
     return {
         Support.CLAMPED: clamped,
         Support.W_HELD: w & ~clamped,
@@ -111,12 +111,12 @@ def _colour_laminates(axes: Axes, result: Result, name: str, cut: data.Patches) 
     numbers = np.unique(of_elements)
     shades = colormaps[style.SEQUENTIAL](np.linspace(1.0, 0.25, len(numbers)))
     for number, shade in zip(numbers, shades, strict=True):
-        own = [
+        used = [
             cut.points[edge]
             for edge, row in zip(cut.edges, rows, strict=True)
             if of_elements[row] == number
         ]
-        axes.add_collection(PolyCollection(own, facecolors=shade, alpha=FAINT, linewidths=0.0))
+        axes.add_collection(PolyCollection(used, facecolors=shade, alpha=FAINT, linewidths=0.0))
         label = f"laminate {number}"
         axes.plot([], [], "s", color=shade, alpha=FAINT, ms=5.0, label=label)
 

@@ -52,10 +52,10 @@ def kind_named(name: str) -> PictureKind:
     try:
         return PictureKind(name)
     except ValueError:
-        others = (
+        alternatives = (
             did_you_mean(name, list(PictureKind)) or f"; the kinds are {', '.join(PictureKind)}"
         )
-        raise PlotError(f"unknown kind of picture {name!r}{others}") from None
+        raise PlotError(f"unknown kind of picture {name!r}{alternatives}") from None
 
 
 def require_matplotlib() -> None:
@@ -90,9 +90,9 @@ def options_of(kind: str) -> list[str]:
 def check_picture_options(kinds: Iterable[str], options: Iterable[str]) -> None:
     """Refuse options that none of these kinds of picture takes."""
     kinds = list(kinds)
-    taken = {option for kind in kinds for option in options_of(kind)}
+    options_taken = {option for kind in kinds for option in options_of(kind)}
     for option in options:
-        if option not in taken:
+        if option not in options_taken:
             takers = [kind for kind in KINDS if option in options_of(kind)]
             if not takers:
                 raise PlotError(f"unknown option {option}")
@@ -130,7 +130,9 @@ def _check_source(
     for name, result in results.items():
         what = _source(result)
         if what != SOURCES[KINDS[kind].shows]:
-            able = [one for one, drawing in KINDS.items() if SOURCES[drawing.shows] == what]
+            able = [
+                kind_name for kind_name, drawing in KINDS.items() if SOURCES[drawing.shows] == what
+            ]
             kinds = f"kind {able[0]} does" if len(able) == 1 else f"kinds {', '.join(able)} do"
             raise PlotError(f"{name} is {what}, which the kind {kind} can't show; the {kinds}")
 

@@ -42,8 +42,8 @@ def aspect(points: Floats) -> float:
 
 def draw_circle(axes: Axes, result: Result, name: str, **look: Any) -> None:
     """Draw the circle of the contact patch, if there is one, on axes of x and y."""
-    if (found := data.circle(result, name)) is not None:
-        centre, radius = found
+    if (patch := data.circle(result, name)) is not None:
+        centre, radius = patch
         angle = np.linspace(0.0, 2.0 * np.pi, 73)
         x, y = centre[:, None] + radius * np.stack([np.cos(angle), np.sin(angle)])
         axes.plot(x, y, lw=0.7, **look)
@@ -70,8 +70,8 @@ def profile(result: Result, name: str, along: Direction, rows: Array) -> tuple[F
     a, b = corners[..., across] - level, ends[..., across] - level
     crossed = (a * b <= 0.0) & (a != b)
     share = a[crossed] / (a[crossed] - b[crossed])
-    at = corners[crossed][:, axis] + share * (ends[crossed] - corners[crossed])[:, axis]
-    position = np.linspace(at.min(), at.max(), SAMPLES)
+    positions = corners[crossed][:, axis] + share * (ends[crossed] - corners[crossed])[:, axis]
+    position = np.linspace(positions.min(), positions.max(), SAMPLES)
     inside = coordinates[on, axis]
     sides = np.diff(inside).max() if len(on) > 2 else math.inf
     longest = longest_sides(result["mesh/elements"], coordinates).max()
@@ -214,8 +214,8 @@ def _plates(
     rest, factor = _at_rest(result, name, cut, max(abs(low), abs(high)))
     columns = 1 if width == "column" else min(count, 2)
     lines = math.ceil(count / columns)
-    figure, found = style.panels(width, lines, columns, ratio=0.7, projection="3d")
-    axes = cast("list[Axes3D]", found)
+    figure, plate_axes = style.panels(width, lines, columns, ratio=0.7, projection="3d")
+    axes = cast("list[Axes3D]", plate_axes)
     for ax in axes[count:]:
         ax.set_axis_off()
 

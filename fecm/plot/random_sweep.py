@@ -48,9 +48,11 @@ class Draws(NamedTuple):
 
     def limits(self, quantity: str, level: Sequence[float]) -> list[float]:
         """Return the limits of a quantity to mark: the given ones, or those of the sweep."""
-        found = self.random.exceedance
-        own = found.limit[(found.quantity == quantity) & np.isfinite(found.limit)]
-        return list(level) or own.tolist()
+        exceedance = self.random.exceedance
+        limits_of_sweep = exceedance.limit[
+            (exceedance.quantity == quantity) & np.isfinite(exceedance.limit)
+        ]
+        return list(level) or limits_of_sweep.tolist()
 
     def say_doubts(self, axes: Axes) -> None:
         """Count the draws beyond the range of the model below a graph."""
@@ -64,7 +66,7 @@ def _draws(results: Sweeps, where: Where | None) -> Draws:
     if sweep.random is None:
         raise PlotError(f"{name} has no random values; `fecm sweep --random` makes such a sweep")
     design = sweep.random.design
-    if wrong := [one for one in where if one in design.laws]:
+    if wrong := [parameter for parameter in where if parameter in design.laws]:
         raise PlotError(f"{wrong[0]} is random; where selects values that are varied")
     firsts = np.arange(0, len(sweep), design.rows)
     chosen = np.flatnonzero(np.isin(firsts, case_rows(sweep, name, where))).tolist()
@@ -143,18 +145,18 @@ def sensitivity(
         raise LackingError(f"{name} has no indices; run the sweep with --sensitivity")
     place, rows = drawn.only()
     shown = quantity_of(sweep, name, rows, quantity)
-    found = random.sensitivity[shown.name]
+    indices = random.sensitivity[shown.name]
     if random.combinations:
-        found = SobolIndices(*(values[place] for values in found))
-    if np.isnan(found.total).all():
+        indices = SobolIndices(*(values[place] for values in indices))
+    if np.isnan(indices.total).all():
         raise PlotError(f"{shown.name} has no indices: it is constant, or a case has no value")
     names = [variable_of(sweep, law, sweep[law][:1]).label for law in random.design.laws]
     figure, (axes,) = panels(width, ratio=(AROUND + PAIR * len(names)) / WIDTHS[width])
     heights = np.arange(len(names))
     whiskers: Look = {"elinewidth": 0.8, "capsize": 2.0, "ecolor": "0.2"}
     for part, interval, offset, colour, label in (
-        (found.first, found.first_interval, -0.19, colours()[0], "first order"),
-        (found.total, found.total_interval, 0.19, colours()[1], "total"),
+        (indices.first, indices.first_interval, -0.19, colours()[0], "first order"),
+        (indices.total, indices.total_interval, 0.19, colours()[1], "total"),
     ):
         ends = np.abs(interval.T - part)
         axes.barh(

@@ -51,16 +51,16 @@ class GraphLine(NamedTuple):
 
 @style.styled
 def indentation_fit_picture(
-    indentation: Floats, force: Floats, found: ContactLawFit, units: Mapping[str, str]
+    indentation: Floats, force: Floats, fit: ContactLawFit, units: Mapping[str, str]
 ) -> Picture:
     """Draw a test with the fitted curves, and permanent against largest indentation."""
-    both = len(found.cycles) > 1
+    both = len(fit.cycles) > 1
     ratio = style.RATIO["column"]
     if both:
         figure, axes = style.panels("full", 1, 2, ratio=ratio)
     else:
         figure, axes = style.panels("column", ratio=ratio)
-    curves, p = found.solution.curves, found.solution.scaled
+    curves, p = fit.solution.curves, fit.solution.scaled
     labels = {
         StretchKind.LOADING: "first loading",
         StretchKind.FALLING: "unloading",
@@ -75,7 +75,7 @@ def indentation_fit_picture(
         if number in curves.numbers(stretch.kind) and len(a):
             top = float(a.max())
             if stretch.kind is StretchKind.FALLING:  # begin at the turning point
-                top = max(top, found.solution.values[curves.layout.corners[stretch.begin]])
+                top = max(top, fit.solution.values[curves.layout.corners[stretch.begin]])
             x = np.linspace(max(0.0, a.min()), top, POINTS)
             y = curves.force * curves.stretch(p, number, x / curves.length)
             axes[0].plot(x, y, color=colour)
@@ -86,17 +86,17 @@ def indentation_fit_picture(
     for handle in figure.legends[0].get_lines():
         handle.set(markersize=5.0, alpha=1.0)
     if both:
-        _permanent(axes[1], found, length)
+        _permanent(axes[1], fit, length)
     return Picture(figure)
 
 
-def _permanent(axes: Axes, found: ContactLawFit, length: style.AxisScale) -> None:
+def _permanent(axes: Axes, fit: ContactLawFit, length: style.AxisScale) -> None:
     """Draw permanent against largest indentation (figure 3.6)."""
-    pairs = [(cycle.alpha_m, cycle.alpha_0) for cycle in found.cycles]
+    pairs = [(cycle.alpha_m, cycle.alpha_0) for cycle in fit.cycles]
     x, y, down, across = np.array([(m.value, o.value, o.error, m.error) for m, o in pairs]).T
     axes.errorbar(x, y, down, across, "o", color=style.COLOURS[0], ms=3.0, lw=0.8, capsize=2.0)
     peaks = np.linspace(0.0, 1.05 * x.max(), 4 * POINTS)
-    if (relation := found.relation()) is not None:
+    if (relation := fit.relation()) is not None:
         axes.plot(peaks, np.asarray(relation.permanent(peaks)), color=style.COLOURS[1])
     axes.set_xlim(left=0.0)
     length.name(axes.xaxis, "Largest indentation")
@@ -207,7 +207,7 @@ def filter_picture(
 
 @style.styled
 def calibration_picture(
-    time: Floats, v_f: Floats, v_a: Floats, found: Calibration, units: Sequence[str]
+    time: Floats, v_f: Floats, v_a: Floats, calibration: Calibration, units: Sequence[str]
 ) -> Picture:
     """Draw both outputs against time (figure 4.5), and against each other with the fit (4.6).
 
@@ -220,7 +220,9 @@ def calibration_picture(
     handles += other.plot(time, v_a, color=style.COLOURS[1])
     handles += right.plot(v_a, v_f, "o", color=style.COLOURS[0], ms=2.0)
     ends = np.array([min(0.0, float(v_a.min())), max(0.0, float(v_a.max()))])
-    handles += right.plot(ends, found.offset + found.slope * ends, color=style.COLOURS[-1])
+    handles += right.plot(
+        ends, calibration.offset + calibration.slope * ends, color=style.COLOURS[-1]
+    )
     peaks = float(time[-1]), style.largest_absolute(v_f), style.largest_absolute(v_a)
     clock, f_scale, a_scale = map(style.scale, peaks, units)
     clock.name(left.xaxis, "Time")
@@ -228,7 +230,12 @@ def calibration_picture(
     f_scale.name(right.yaxis, "$V_F$")
     a_scale.name(other.yaxis, "$V_a$")
     a_scale.name(right.xaxis, "$V_a$")
-    labels = ["$V_F$", "$V_a$", "measured", f"slope {found.slope:.4g} ± {found.slope_error:.2g}"]
+    labels = [
+        "$V_F$",
+        "$V_a$",
+        "measured",
+        f"slope {calibration.slope:.4g} ± {calibration.slope_error:.2g}",
+    ]
     style.legend(figure, handles, labels)
     for text in figure.legends[0].get_texts():
         text.set_parse_math(True)
@@ -306,9 +313,9 @@ def fronts_picture(
 ) -> Picture:
     """Draw fronts at several times with rays and cusps, one graph per mode."""
     limit_count(len(times), "times")
-    fronts, some = surfaces.fronts(AROUND), surfaces.fronts(np.arange(0.0, 360.0, RAYS))
+    fronts, rays = surfaces.fronts(AROUND), surfaces.fronts(np.arange(0.0, 360.0, RAYS))
     places = [fronts.positions(time, radius) for time in times]
-    ends = some.positions(0.0, radius), some.positions(max(times), radius)
+    ends = rays.positions(0.0, radius), rays.positions(max(times), radius)
     turns = [surfaces.cusps(time, radius) for time in times]
     length = scale_in(units, "length", *places)
     clock = scale_in(units, "time", np.array(times))
@@ -317,11 +324,11 @@ def fronts_picture(
     figure, axes = panels("full", 2, 3, ratio=0.95)
     for mode, ax in enumerate(axes[:5]):
         ax.plot(*circle, color="0.4", ls=DOTTED)
-        for start, end in zip(*(at[:, mode] for at in ends), strict=True):
+        for start, end in zip(*(position[:, mode] for position in ends), strict=True):
             ax.plot(*zip(start, end, strict=True), color="0.6", lw=0.5)
-        for at, colour in zip(places, COLOURS, strict=False):
-            ax.plot(*at[:, mode].T, color=colour)
-        dots = [(c.x, c.y) for found in turns for c in found if c.mode == FRONTS[mode]]
+        for position, colour in zip(places, COLOURS, strict=False):
+            ax.plot(*position[:, mode].T, color=colour)
+        dots = [(c.x, c.y) for cusps in turns for c in cusps if c.mode == FRONTS[mode]]
         ax.plot(*np.reshape(dots, (-1, 2)).T, **CUSP)
         ax.set_title(WORDS[FRONTS[mode]])
         ax.locator_params(nbins=5)

@@ -222,8 +222,8 @@ def limit_count(count: int, what: str, most: int = len(COLOURS)) -> None:
 
 def colours() -> list[str]:
     """Return the colours of the lines: this style's, or the user's own."""
-    own = matplotlib.rcParams["axes.prop_cycle"].by_key().get("color", COLOURS)
-    return list(itertools.islice(itertools.cycle(own), len(COLOURS)))
+    cycle = matplotlib.rcParams["axes.prop_cycle"].by_key().get("color", COLOURS)
+    return list(itertools.islice(itertools.cycle(cycle), len(COLOURS)))
 
 
 def style_on(axes: Axes | None) -> Look:
@@ -231,12 +231,12 @@ def style_on(axes: Axes | None) -> Look:
 
     On given axes it is the user's style, with the colours after those of the lines there.
     """
-    own = matplotlib.rcParams
+    settings = matplotlib.rcParams
     if axes is not None:
-        cycle = own["axes.prop_cycle"]
+        cycle = settings["axes.prop_cycle"]
         first = len(axes.get_lines()) % len(cycle)
         return {"axes.prop_cycle": cycle[first:].concat(cycle[:first])}
-    return {name: RC[name] for name in RC if own[name] == matplotlib.rcParamsDefault[name]}
+    return {name: RC[name] for name in RC if settings[name] == matplotlib.rcParamsDefault[name]}
 
 
 def panels(

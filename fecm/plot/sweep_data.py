@@ -54,8 +54,8 @@ class DrawnVariable(NamedTuple):
     def label(self) -> str:
         """Name in words."""
         plain = self.name.replace("_", " ")
-        own = self.name not in (*COLUMNS, *NAMES)  # the caller's symbol or word
-        return LABELS.get(self.name, plain if own else plain.capitalize())
+        is_named_by_caller = self.name not in (*COLUMNS, *NAMES)  # the caller's symbol or word
+        return LABELS.get(self.name, plain if is_named_by_caller else plain.capitalize())
 
     @property
     def whole(self) -> bool:
@@ -93,29 +93,29 @@ def variable_of(sweep: SweepResult, name: str, values: Array) -> DrawnVariable:
 def case_rows(sweep: SweepResult, name: str, where: Where) -> Indices:
     """Return the cases at given values; numbers select the nearest value."""
     kept = np.ones(len(sweep), dtype=bool)
-    for parameter, wanted in where.items():
+    for parameter, value in where.items():
         values = parameter_values(sweep, name, parameter)
         if values.dtype.kind == "U":
-            kept &= _equal_texts(values, wanted, f"{name} has no {parameter} {wanted}")
+            kept &= _equal_texts(values, value, f"{name} has no {parameter} {value}")
         else:
-            kept &= _nearest_numbers(values, wanted, f"{name} has no {parameter} {wanted}")
+            kept &= _nearest_numbers(values, value, f"{name} has no {parameter} {value}")
     if not kept.any():
         raise PlotError(f"{name} has no case with these values of {names_in_words(where)}")
     return np.flatnonzero(kept)
 
 
-def _equal_texts(values: Array, wanted: float | str, otherwise: str) -> Bools:
+def _equal_texts(values: Array, text: float | str, otherwise: str) -> Bools:
     """Return a mask of the cases with a text; `otherwise` starts the refusal of another."""
-    chosen = np.asarray(values == str(wanted))
+    chosen = np.asarray(values == str(text))
     if not chosen.any():
         raise PlotError(f"{otherwise}; there is {names_in_words(dict.fromkeys(values))}")
     return chosen
 
 
-def _nearest_numbers(values: Array, wanted: float | str, otherwise: str) -> Bools:
+def _nearest_numbers(values: Array, value: float | str, otherwise: str) -> Bools:
     """Return a mask of the cases nearest to a number; `otherwise` starts a refusal."""
     try:
-        number = float(wanted)
+        number = float(value)
     except ValueError:
         number = np.nan
     low, high = values.min(), values.max()
@@ -146,10 +146,10 @@ def quantity_of(sweep: SweepResult, name: str, rows: Indices, quantity: str) -> 
     The default is the velocity that was searched, or else the peak force.
     """
     quantity = quantity or ("found_velocity" if "found_velocity" in sweep.summary else "peak_force")
-    known = [name for name in sweep.summary if name not in VERDICTS]
-    if quantity not in known:
-        others = did_you_mean(quantity, known) or f"; the sweep has {names_in_words(known)}"
-        raise PlotError(f"unknown quantity {quantity}{others}")
+    names = [name for name in sweep.summary if name not in VERDICTS]
+    if quantity not in names:
+        alternatives = did_you_mean(quantity, names) or f"; the sweep has {names_in_words(names)}"
+        raise PlotError(f"unknown quantity {quantity}{alternatives}")
     fine = sweep.completed[rows]
     values = np.where(fine, sweep[quantity][rows].astype(float), np.nan)
     _warn_of_gaps(sweep, name, rows, quantity, np.isnan(values))

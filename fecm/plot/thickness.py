@@ -64,16 +64,25 @@ def thickness(
     lines = math.ceil(len(drawn) / columns)
     figure, axes = style.panels(width, lines, columns, sharey=True, ratio=1.8 / columns)
     place = style.scale_of(results, "length", [z])
-    for ax, one in zip(axes, drawn, strict=False):
-        shown = [one.values] if one.residual is None else [one.values, one.residual]
+    for ax, drawn_stress in zip(axes, drawn, strict=False):
+        shown = (
+            [drawn_stress.values]
+            if drawn_stress.residual is None
+            else [drawn_stress.values, drawn_stress.residual]
+        )
         stress = style.scale_of(results, "force/length^2", shown)
         for face in np.unique(z[:, ::2]):
             ax.axhline(face, color="0.6", lw=0.4, ls=":")
         ax.axvline(0.0, color="0.6", lw=0.4)
-        ax.plot(one.values.ravel(), one.z.ravel(), color=style.colours()[0])
-        if one.residual is not None:
-            ax.plot(one.residual.ravel(), one.z.ravel(), color=style.colours()[1], lw=THIN)
-        stress.name(ax.xaxis, one.label)
+        ax.plot(drawn_stress.values.ravel(), drawn_stress.z.ravel(), color=style.colours()[0])
+        if drawn_stress.residual is not None:
+            ax.plot(
+                drawn_stress.residual.ravel(),
+                drawn_stress.z.ravel(),
+                color=style.colours()[1],
+                lw=THIN,
+            )
+        stress.name(ax.xaxis, drawn_stress.label)
         ax.set_ylim(z[-1, 2], z[0, 0])
     for ax in axes[len(drawn) :]:
         ax.set_axis_off()
@@ -98,18 +107,18 @@ def _stresses(plies: PlyResults, point: int, result: Result) -> list[Stress]:
     if cured is not None:
         residual = list(np.moveaxis(cured[: len(plies.z)], -1, 0))
     xz, yz, z = (values @ _PARABOLA for values in (plies.tau_xz[0, 0], plies.tau_yz[0, 0], plies.z))
-    found = [
+    stresses = [
         Stress(r"$\sigma_1$", faces, plies.sigma_1[0, 0, point], residual[0]),
         Stress(r"$\sigma_2$", faces, plies.sigma_2[0, 0, point], residual[1]),
         Stress(r"$\tau_{12}$", faces, plies.tau_12[0, 0, point], residual[2]),
     ]
     if np.isfinite([xz, yz]).all():
-        found += [
+        stresses += [
             Stress(r"$\tau_{xz}$", z, xz),
             Stress(r"$\tau_{yz}$", z, yz),
             Stress(r"$(\tau_{xz}^2 + \tau_{yz}^2)^{1/2}$", z, np.hypot(xz, yz)),
         ]
-    return found
+    return stresses
 
 
 def _chosen(
@@ -153,9 +162,11 @@ def _own(plies: PlyResults) -> PlyResults:
     if plies.z.ndim == 2:
         return plies
     z = plies.z[0]
-    own = np.isfinite(z[:, 0])
+    is_present = np.isfinite(z[:, 0])
     names = (*IN_PLANE, *INTERLAMINAR)
-    return replace(plies, z=z[own], **{n: getattr(plies, n)[..., own, :] for n in names})
+    return replace(
+        plies, z=z[is_present], **{n: getattr(plies, n)[..., is_present, :] for n in names}
+    )
 
 
 def _nearest_element(mesh: tuple[Array, Floats], numbers: Array, at: Floats, name: str) -> int:

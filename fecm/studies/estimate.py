@@ -136,18 +136,18 @@ def _nonlinear_model(
     curve: StaticCurve, mass: float, velocity: float, k: float, threshold: float, *, applies: bool
 ) -> QuickModel:
     """Return the static model of a nonlinear plate."""
-    found = math.nan
+    at_threshold = math.nan
     if math.isfinite(threshold):
-        found = _static_velocity(curve, mass, k, threshold)
+        at_threshold = _static_velocity(curve, mass, k, threshold)
     impact = curved_plate(mass, velocity, k, curve)
-    return QuickModel("nonlinear static plate", impact, threshold, found, applies)
+    return QuickModel("nonlinear static plate", impact, threshold, at_threshold, applies)
 
 
 def _static_velocity(curve: StaticCurve, mass: float, k: float, force: float) -> float:
     """Return the velocity at which the static model reaches a force of the curve."""
     most = curve.deflection[-1]
-    at = root(lambda w: stored_at(curve, k, w)[0] - force, 0.0, most, 1e-12 * most)
-    return math.sqrt(2.0 * stored_at(curve, k, at)[1] / mass)
+    deflection = root(lambda w: stored_at(curve, k, w)[0] - force, 0.0, most, 1e-12 * most)
+    return math.sqrt(2.0 * stored_at(curve, k, deflection)[1] / mass)
 
 
 def _inelasticity(problem: Problem, mass: float, velocity: float) -> float:

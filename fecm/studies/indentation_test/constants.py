@@ -139,27 +139,27 @@ def fit_contact_law(
             raise StudyError(f"the {name} are not between {1.0 / LARGEST:g} and {LARGEST:g}")
     curves = scaled(divide(a, retreat), a, f)
     solution = fit_curves(curves, ACR_POWER if acr else q)
-    at, division, p = solution.curves.layout, curves.division, solution.values
-    peaks = [at.corners[n] for n in division.peaks]
-    places = peaks + at.permanents
+    layout, division, p = solution.curves.layout, curves.division, solution.values
+    peaks = [layout.corners[n] for n in division.peaks]
+    places = peaks + layout.permanents
     covariance = solution.covariance[np.ix_(places, places)]
     if places:
         covariance = covariance + np.eye(len(places)) * (ROUNDING * p[peaks].max()) ** 2
-    found = p[peaks], p[at.permanents], covariance
+    points = p[peaks], p[layout.permanents], covariance
     cycles = tuple(_cycle(solution, n) for n in range(len(peaks)))
-    straight = fit_permanent_line(*found) if not acr and len(cycles) > 1 else None
+    straight = fit_permanent_line(*points) if not acr and len(cycles) > 1 else None
     of_curves = {
         kind.value: r_squared(*solution.curves.of(solution.scaled, kind)) for kind in StretchKind
     }
     fitted, measured = solution.curves.of(solution.scaled, *StretchKind)
     return ContactLawFit(
-        k=_parameter(solution, at.K),
+        k=_parameter(solution, layout.K),
         free=free_power(curves),
-        q=_parameter(solution, at.Q) if cycles else None,
+        q=_parameter(solution, layout.Q) if cycles else None,
         cycles=cycles,
         line=straight,
-        critical=critical(*found) if acr and cycles else None,
-        r_squared={**of_curves, "permanent": _explained(straight, *found[:2])},
+        critical=critical(*points) if acr and cycles else None,
+        r_squared={**of_curves, "permanent": _explained(straight, *points[:2])},
         scatter=float(np.sqrt(np.mean((fitted - measured) ** 2))),
         solution=solution,
     )
@@ -180,18 +180,20 @@ def _parameter(solution: CurveSolution, place: int) -> FittedValue:
 
 def _cycle(solution: CurveSolution, number: int) -> Cycle:
     """Return the values of a cycle and the rigidities derived from them."""
-    at, division = solution.curves.layout, solution.curves.division
+    layout, division = solution.curves.layout, solution.curves.division
     corner = division.peaks[number]
-    peak, permanent = at.corners[corner], at.permanents[number]
+    peak, permanent = layout.corners[corner], layout.permanents[number]
 
     def rigidity(origin: int) -> FittedValue:
         def k_1(p: Floats) -> float:
-            return float(p[at.K] * (p[peak] / (p[peak] - p[origin])) ** LOADING_POWER)
+            return float(p[layout.K] * (p[peak] / (p[peak] - p[origin])) ** LOADING_POWER)
 
         return solution.estimate(k_1)
 
-    own = [place for n, place in at.origins.items() if division.stretches[n].cycle == number]
-    measured = rigidity(own[0]) if own else None
+    origins = [
+        place for n, place in layout.origins.items() if division.stretches[n].cycle == number
+    ]
+    measured = rigidity(origins[0]) if origins else None
     recorded = division.corners[corner].indentation
     alpha_m, alpha_0 = _parameter(solution, peak), _parameter(solution, permanent)
     return Cycle(alpha_m, recorded, alpha_0, rigidity(permanent), measured)
@@ -217,52 +219,52 @@ def law(fit: ContactLawFit) -> Contact | None:
 
 def card(fit: ContactLawFit) -> str:
     """Return the EXPE segment; empty if the test does not determine all parameters."""
-    found = law(fit)
-    return found.text() if found else ""
+    contact = law(fit)
+    return contact.text() if contact else ""
 
 
 def fit_notes(fit: ContactLawFit) -> list[str]:
     """Return notes on the reliability of the fit."""
-    found: list[str] = []
+    notes: list[str] = []
     corners = [fit.solution.curves.division.corners[n] for n in fit.solution.held]
     held = [corner.cycle + 1 for corner in corners if corner.is_peak]
     if not fit.cycles:
-        found.append("the test has no unloading: it gives only k and n, and no card")
+        notes.append("the test has no unloading: it gives only k and n, and no card")
     elif fit.line is None and fit.critical is None:
-        found.append(
+        notes.append(
             "no card: s_p and alpha_p require two or more peaks with a permanent indentation; "
             "`acr` requires one"
         )
     if fit.solution.at_limit:
-        found.append("a value is at a bound of the fit: the law does not fit this test")
+        notes.append("a value is at a bound of the fit: the law does not fit this test")
     if fit.scatter > BAD:
-        found.append(f"the points scatter by {100.0 * fit.scatter:.2g} % of the largest force")
+        notes.append(f"the points scatter by {100.0 * fit.scatter:.2g} % of the largest force")
     if held:
         which = ", ".join(map(str, sorted(held)))
-        found.append(
+        notes.append(
             f"alpha_m of cycle {which} is the recorded value: the curves do not determine it"
         )
     straight = fit.line
     if straight is not None:
         if straight.s_p.value < NOT_ZERO * straight.s_p.error or straight.s_p.value >= 1.0:
-            found.append("s_p does not differ significantly from 0")
+            notes.append("s_p does not differ significantly from 0")
         if straight.alpha_p.value < 0.0 < straight.s_p.value:
-            found.append("alpha_p is negative; the card has 0")
+            notes.append("alpha_p is negative; the card has 0")
         if straight.elastic:
             which = ", ".join(str(n + 1) for n in straight.elastic)
-            found.append(f"cycle {which} is below alpha_p and has no permanent indentation")
+            notes.append(f"cycle {which} is below alpha_p and has no permanent indentation")
         if side := _one_side(fit.cycles, straight):
-            found.append(
+            notes.append(
                 f"the line of s_p and alpha_p is {side} all of its points: the test does not "
                 "follow the law; compare n with 3/2, and fit single cycles to compare q"
             )
     scatter = straight.scatter if straight else fit.critical.scatter if fit.critical else 1.0
     if scatter > 1.0:
-        found.append(
+        notes.append(
             f"the scatter of the permanent indentations is {scatter:.1f} times that expected from "
             "the noise of the forces: the errors of their parameters are multiplied by it"
         )
-    return found
+    return notes
 
 
 def _one_side(cycles: tuple[Cycle, ...], straight: PermanentLine) -> str:
@@ -293,25 +295,25 @@ def fit_lines(fit: ContactLawFit) -> list[str]:
     division = fit.solution.curves.division
     loading, falling, rising = (len(division.rows(kind)) for kind in StretchKind)
     shares = {kind: _share(value) for kind, value in fit.r_squared.items()}
-    found = [
+    lines = [
         f"first loading   {loading} points",
         f"  k             {_format(fit.k)} (n = 3/2){shares[StretchKind.LOADING]}",
         f"  n             {_format(fit.free.n)}, with k {_format(fit.free.k)}"
         f"{_share(fit.free.r_squared)}",
     ]
     if fit.q is not None:
-        found.append(f"unloading       {falling} points")
-        found.append(f"  q             {_format(fit.q)}{shares[StretchKind.FALLING]}")
+        lines.append(f"unloading       {falling} points")
+        lines.append(f"  q             {_format(fit.q)}{shares[StretchKind.FALLING]}")
     if rising:
-        found.append(f"reloading       {rising} points{shares[StretchKind.RISING]}")
+        lines.append(f"reloading       {rising} points{shares[StretchKind.RISING]}")
     if fit.line is not None:
-        found.append(f"permanent       {shares['permanent'].strip()}".rstrip())
-        found.append(f"  s_p           {_format(fit.line.s_p)}")
-        found.append(f"  alpha_p       {_format(fit.line.alpha_p)}")
+        lines.append(f"permanent       {shares['permanent'].strip()}".rstrip())
+        lines.append(f"  s_p           {_format(fit.line.s_p)}")
+        lines.append(f"  alpha_p       {_format(fit.line.alpha_p)}")
     if fit.critical is not None:
-        found.append(f"alpha_cr        {_format(fit.critical.alpha_cr)}")
-    found.append(f"scatter         {100.0 * fit.scatter:.2g} % of the largest force")
-    return [*found, "", *_table(fit.cycles), ""] if fit.cycles else found
+        lines.append(f"alpha_cr        {_format(fit.critical.alpha_cr)}")
+    lines.append(f"scatter         {100.0 * fit.scatter:.2g} % of the largest force")
+    return [*lines, "", *_table(fit.cycles), ""] if fit.cycles else lines
 
 
 def _table(cycles: tuple[Cycle, ...]) -> list[str]:

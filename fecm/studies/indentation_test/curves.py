@@ -121,30 +121,30 @@ class Curves:
 
     def stretch(self, p: Floats, number: int, a: Floats) -> Floats:
         """Return the scaled force on the curve of a stretch for scaled `p` and `a`."""
-        s, at = self.division.stretches[number], self.layout
+        s, layout = self.division.stretches[number], self.layout
         if s.kind == StretchKind.LOADING:
-            return np.asarray(power_curve(p[at.K], 0.0, 1.0, LOADING_POWER, a))
+            return np.asarray(power_curve(p[layout.K], 0.0, 1.0, LOADING_POWER, a))
         if s.kind == StretchKind.RISING:
             return self._rising(p, number, s.cycle, a)
-        corner, top = self.division.corners[s.begin], p[at.corners[s.begin]]
+        corner, top = self.division.corners[s.begin], p[layout.corners[s.begin]]
         if corner.is_peak:
             begin = self.peak_force(p, s.cycle)
         else:
             begin = float(self._rising(p, corner.rise, s.cycle, np.array([top]))[0])
-        origin = p[at.permanents[s.cycle]]
-        return np.asarray(power_curve(begin, origin, top - origin, p[at.Q], a))
+        origin = p[layout.permanents[s.cycle]]
+        return np.asarray(power_curve(begin, origin, top - origin, p[layout.Q], a))
 
     def _rising(self, p: Floats, number: int, cycle: int, a: Floats) -> Floats:
-        at = self.layout
-        peak = p[at.corners[self.division.peaks[cycle]]]
-        origin = p[at.origins.get(number, at.permanents[cycle])]
+        layout = self.layout
+        peak = p[layout.corners[self.division.peaks[cycle]]]
+        origin = p[layout.origins.get(number, layout.permanents[cycle])]
         top = self.peak_force(p, cycle)
         return np.asarray(power_curve(top, origin, peak - origin, LOADING_POWER, a))
 
     def numbers(self, *kinds: StretchKind) -> list[int]:
         """Return the numbers of the stretches of some kinds with enough points."""
-        own = [(n, s) for n, s in enumerate(self.division.stretches) if s.kind in kinds]
-        return [n for n, s in own if s.kind != StretchKind.RISING or len(s.rows) >= FEWEST]
+        numbered = [(n, s) for n, s in enumerate(self.division.stretches) if s.kind in kinds]
+        return [n for n, s in numbered if s.kind != StretchKind.RISING or len(s.rows) >= FEWEST]
 
     def of(self, p: Floats, *kinds: StretchKind) -> tuple[Floats, Floats]:
         """Return fitted and measured forces of the stretches of some kinds."""
@@ -207,7 +207,7 @@ def fit_curves(curves: Curves, q: float | None = None) -> CurveSolution:
     solution = _held_or_not(curves, q)
     lowest = solution.values - SURE * np.sqrt(np.diag(solution.covariance))
     turns = {n: curves.division.stretches[n].turn for n in curves.layout.origins}
-    tied = frozenset(n for n, at in curves.layout.origins.items() if lowest[at] > turns[n])
+    tied = frozenset(n for n, place in curves.layout.origins.items() if lowest[place] > turns[n])
     if not tied:
         return solution
     return _held_or_not(replace(curves, layout=parameter_layout(curves.division, tied)), q)
@@ -218,8 +218,8 @@ def _held_or_not(curves: Curves, q: float | None) -> CurveSolution:
     held: frozenset[int] = frozenset()
     while True:
         solution = _solve(curves, q, held)
-        known = np.sqrt(np.diag(solution.covariance)) < VAGUE * solution.values
-        vague = {n for n, place in enumerate(curves.layout.corners) if not known[place]}
+        is_determined = np.sqrt(np.diag(solution.covariance)) < VAGUE * solution.values
+        vague = {n for n, place in enumerate(curves.layout.corners) if not is_determined[place]}
         if not vague:
             return solution
         held |= vague
@@ -242,7 +242,7 @@ def _solve(curves: Curves, q: float | None, held: frozenset[int]) -> CurveSoluti
 
     p = start.copy()
     if free.any():
-        found = least_squares(
+        solution = least_squares(
             residuals,
             start[free],
             bounds=(low[free], high[free]),
@@ -250,7 +250,7 @@ def _solve(curves: Curves, q: float | None, held: frozenset[int]) -> CurveSoluti
             ftol=1e-12,
             gtol=1e-12,
         )
-        p[free] = found.x
+        p[free] = solution.x
     units = curves.units
     covariance = _covariance(curves, p, free) * np.outer(units, units)
     near = np.minimum(p - low, high - p)[free] < AT_LIMIT * (high - low)[free]
@@ -259,14 +259,14 @@ def _solve(curves: Curves, q: float | None, held: frozenset[int]) -> CurveSoluti
 
 def _start(curves: Curves, q: float | None) -> tuple[Floats, Floats, Floats]:
     """Return initial values and bounds of all parameters; k is final."""
-    at, division = curves.layout, curves.division
+    layout, division = curves.layout, curves.division
     rows = division.rows(StretchKind.LOADING)
     x = np.maximum(curves.a[rows], 0.0) ** LOADING_POWER
-    p, low, high = (np.zeros(at.size) for _ in range(3))
-    p[at.K] = float(x @ curves.f[rows]) / float(x @ x)
-    p[at.Q] = FIRST_Q if q is None else q
-    low[at.Q], high[at.Q] = LIMITS_Q
-    for number, corner in zip(at.corners, division.corners, strict=True):
+    p, low, high = (np.zeros(layout.size) for _ in range(3))
+    p[layout.K] = float(x @ curves.f[rows]) / float(x @ x)
+    p[layout.Q] = FIRST_Q if q is None else q
+    low[layout.Q], high[layout.Q] = LIMITS_Q
+    for number, corner in zip(layout.corners, division.corners, strict=True):
         p[number] = corner.indentation / curves.length
         low[number] = (1.0 - PEAK_MOVES) * p[number]
         high[number] = (1.0 + PEAK_MOVES) * p[number]
@@ -274,14 +274,14 @@ def _start(curves: Curves, q: float | None) -> tuple[Floats, Floats, Floats]:
     def start_origin(
         place: int, rows: Rows, *, cycle: int, power: float, limits: tuple[float, float]
     ) -> None:
-        low[place], high[place] = np.array(limits) * p[at.corners[division.peaks[cycle]]]
+        low[place], high[place] = np.array(limits) * p[layout.corners[division.peaks[cycle]]]
         guess = _origin(curves.a[rows], curves.f[rows], power)
         p[place] = min(max(guess, 0.9 * low[place]), 0.9 * high[place])
 
-    for cycle, place in enumerate(at.permanents):
+    for cycle, place in enumerate(layout.permanents):
         rows = division.rows(StretchKind.FALLING, cycle)
-        start_origin(place, rows, cycle=cycle, power=p[at.Q], limits=LIMITS_PERMANENT)
-    for number, place in at.origins.items():
+        start_origin(place, rows, cycle=cycle, power=p[layout.Q], limits=LIMITS_PERMANENT)
+    for number, place in layout.origins.items():
         s = division.stretches[number]
         start_origin(place, s.rows, cycle=s.cycle, power=LOADING_POWER, limits=LIMITS_ORIGIN)
     return p, low, high
@@ -350,12 +350,12 @@ def fit_permanent_line(
     order = np.argsort(peaks)
     fits: list[tuple[float, PermanentLine]] = []
     for count in range(len(peaks) - 1):
-        found = _split(peaks, permanents, covariance, order[:count])
-        if found is None:
+        line = _split(peaks, permanents, covariance, order[:count])
+        if line is None:
             continue
-        start = found[1].alpha_p.value
+        start = line[1].alpha_p.value
         if not count or peaks[order[count - 1]] <= start < peaks[order[count]]:
-            fits.append(found)
+            fits.append(line)
     return min(fits, key=lambda one: one[0])[1] if fits else None
 
 
@@ -380,8 +380,8 @@ def _split(
     if slope == 0.0:
         return None
     errors = np.linalg.inv(normal)
-    left = permanents - design @ [slope, level]
-    chi = float(left @ weight @ left)
+    residual = permanents - design @ [slope, level]
+    chi = float(residual @ weight @ residual)
     scatter = _scatter(chi, n - 2)
     by = np.array([level / slope**2, -1.0 / slope])
     s_p = FittedValue(float(slope), scatter * float(errors[0, 0] ** 0.5))
@@ -411,18 +411,20 @@ def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:
     Parameters are those of :func:`fit_permanent_line`.  A cycle below alpha_cr has no permanent
     indentation and only bounds alpha_cr: such cycles are excluded if there are others.
     """
-    own = (peaks - permanents) ** ACR_POWER / peaks**LOADING_POWER
-    by_peak = own * (ACR_POWER / (peaks - permanents) - LOADING_POWER / peaks)
-    by_permanent = -own * ACR_POWER / (peaks - permanents)
+    values = (peaks - permanents) ** ACR_POWER / peaks**LOADING_POWER
+    by_peak = values * (ACR_POWER / (peaks - permanents) - LOADING_POWER / peaks)
+    by_permanent = -values * ACR_POWER / (peaks - permanents)
     across = np.concatenate([np.diag(by_peak), np.diag(by_permanent)], axis=1)
     variance = across @ covariance @ across.T
-    deep = peaks > own + np.sqrt(np.diag(variance))
+    deep = peaks > values + np.sqrt(np.diag(variance))
     if not deep.any():
         deep[:] = True
     weight = np.linalg.pinv(variance[np.ix_(deep, deep)], hermitian=True)
     total = float(weight.sum())
-    mean = float((weight @ own[deep]).sum()) / total if total > 0.0 else float(own[deep].mean())
-    left = own[deep] - mean
-    scatter = _scatter(float(left @ weight @ left), int(deep.sum()) - 1)
+    mean = (
+        float((weight @ values[deep]).sum()) / total if total > 0.0 else float(values[deep].mean())
+    )
+    residual = values[deep] - mean
+    scatter = _scatter(float(residual @ weight @ residual), int(deep.sum()) - 1)
     error = scatter * total**-0.5 if total > 0.0 else 0.0
     return Critical(FittedValue(mean, error), scatter)

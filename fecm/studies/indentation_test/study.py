@@ -111,9 +111,11 @@ class IndentationFit:
         return {"units": dict(self.units) or None, **constants.plain(self.fit)}
 
     def __str__(self) -> str:
-        own = tuple(self.units.values())
-        stated = "" if self.stated in (("", ""), own) else f" (the test: {', '.join(self.stated)})"
-        about = f"{', '.join(own)}{stated}" if own else "those of the test, which names none"
+        units = tuple(self.units.values())
+        stated = (
+            "" if self.stated in (("", ""), units) else f" (the test: {', '.join(self.stated)})"
+        )
+        about = f"{', '.join(units)}{stated}" if units else "those of the test, which names none"
         card = constants.card(self.fit)
         shown = [*constants.fit_lines(self.fit), f"units           {about}"]
         return "\n".join([*shown, card] if card else shown)
@@ -176,10 +178,10 @@ def fit_indentation(
     >>> found.law
     Contact(k=1330500.0, alpha_p=0.00076098, s_p=0.10378, q=2.4795, word='')
     """
-    found = fit_law(_measured(test, columns or (), units), q=q, acr=acr, turn=turn)
-    for text in found.notes:
+    fit = fit_law(_measured(test, columns or (), units), q=q, acr=acr, turn=turn)
+    for text in fit.notes:
         warn(text)
-    return found
+    return fit
 
 
 def fit_law(
@@ -198,8 +200,8 @@ def fit_law(
                 f"{name} is {values[peak]:g} at the largest force; both are positive in "
                 f"compression: a minus before a name or number of `columns` changes the sign"
             )
-    found = fit_contact_law(test.indentation, test.force, retreat=turn, q=q, acr=acr)
-    return IndentationFit(test.indentation, test.force, test.units, test.stated, found)
+    fit = fit_contact_law(test.indentation, test.force, retreat=turn, q=q, acr=acr)
+    return IndentationFit(test.indentation, test.force, test.units, test.stated, fit)
 
 
 def _measured(

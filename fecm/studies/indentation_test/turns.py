@@ -72,7 +72,7 @@ def _moving_mean(values: Floats, reach: int) -> Floats:
 def turns(path: SmoothedIndentation, retreat: float) -> list[int]:
     """Find points from which the path retreats by more than `retreat`, and the first and last."""
     s = path.smooth
-    found = [0]
+    numbers = [0]
     high = low = 0  # points of the largest and smallest indentation since the last turn
     direction = 0  # 1 while the indentation rises, -1 while it falls, 0 until either is sure
     for i in range(1, len(s)):
@@ -82,17 +82,17 @@ def turns(path: SmoothedIndentation, retreat: float) -> list[int]:
             low = i
         if direction >= 0 and s[high] - s[i] > retreat:
             if direction:
-                found.append(high)
+                numbers.append(high)
             direction = -1
             low = i
         elif direction <= 0 and s[i] - s[low] > retreat:
             if direction:
-                found.append(low)
+                numbers.append(low)
             direction = 1
             high = i
-    if found[-1] != len(s) - 1:
-        found.append(len(s) - 1)
-    return found
+    if numbers[-1] != len(s) - 1:
+        numbers.append(len(s) - 1)
+    return numbers
 
 
 class StretchKind(StrEnum):
@@ -137,8 +137,8 @@ class Division(NamedTuple):
 
     def rows(self, kind: StretchKind, cycle: int | None = None) -> Rows:
         """Return the points of all stretches of a kind, or of those of a cycle."""
-        own = [s for s in self.stretches if s.kind == kind]
-        parts = [s.rows for s in own if cycle is None or s.cycle == cycle]
+        stretches = [s for s in self.stretches if s.kind == kind]
+        parts = [s.rows for s in stretches if cycle is None or s.cycle == cycle]
         return np.concatenate([np.empty(0, dtype=np.int64), *parts])
 
 
@@ -155,14 +155,14 @@ def divide(indentation: Floats, retreat: float | None = None) -> Division:
         retreat = max(LEAST_RETREAT * path.range, QUIET * path.noise)
     if retreat >= path.range:
         raise StudyError(f"the range of the path is below the threshold of a turn ({retreat:g})")
-    found = turns(path, retreat)
+    turning_points = turns(path, retreat)
     s = path.smooth
-    if s[found[1]] <= s[0]:
+    if s[turning_points[1]] <= s[0]:
         raise StudyError("the test begins with unloading; it must begin with the first loading")
-    return _stretches(path, found, near=max(retreat / 2.0, 4.0 * path.noise))
+    return _stretches(path, turning_points, near=max(retreat / 2.0, 4.0 * path.noise))
 
 
-def _stretches(path: SmoothedIndentation, found: list[int], *, near: float) -> Division:
+def _stretches(path: SmoothedIndentation, turning_points: list[int], *, near: float) -> Division:
     """Divide a path at its turns; peaks within a distance `near` are one."""
     s = path.smooth
     stretches: list[CurveStretch] = []
@@ -170,8 +170,8 @@ def _stretches(path: SmoothedIndentation, found: list[int], *, near: float) -> D
     cycle = -1
     begin = -1  # corner at which the next unloading begins
     peak = -math.inf
-    for first, end in pairwise(found):
-        ends_in_turn = end != found[-1]
+    for first, end in pairwise(turning_points):
+        ends_in_turn = end != turning_points[-1]
         rows, top = _between(path, first, end, ends_in_turn), float(s[end])
         if top <= s[first]:
             stretches.append(CurveStretch(StretchKind.FALLING, cycle, rows, begin))

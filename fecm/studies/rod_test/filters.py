@@ -231,10 +231,10 @@ def recorded(path: Path, column: str | None = None) -> TimeHistory:
 
 
 def _of_result(path: Path, result: Result, column: str | None) -> TimeHistory:
-    known = [name.partition("/")[2] for name in result if name.startswith("history/")]
-    if not known:
+    columns = [name.partition("/")[2] for name in result if name.startswith("history/")]
+    if not columns:
         raise StudyError(f"{path} has no history: the run has no impact step")
-    choice = [name for name in known if name not in ("step", "time")]
+    choice = [name for name in columns if name not in ("step", "time")]
     name = column or TRANSDUCER
     if name not in choice:
         raise StudyError(f"{path} has no history of {name}; it has {', '.join(choice)}")
@@ -257,15 +257,15 @@ def _of_table(path: Path, column: str | None) -> TimeHistory:
     if heads and column and not (column.isdecimal() or table.has(column)):
         raise StudyError(f"{path} has no column {column}; it has {', '.join(table.names)}")
     if not (heads or column):
-        found = table.find(("time", "value"))
+        columns = table.find(("time", "value"))
     else:
         clock = table.find(["time"])[0].place if heads and table.has("time") else 0
         value = column or (TRANSDUCER if table.has(TRANSDUCER) else "")
         place = table.find(["value"], [value])[0].place if value else int(clock == 0)
         if not value and len(heads) > 2:
             warn(f"{path}: the column {heads[place]} is filtered; --column takes another")
-        found = [table.column("time", clock), table.column("value", place)]
-    time, values = table.values(found, increasing="time")
-    unit = found[0].unit
-    name = table.names[found[1].place] if heads else "value"
+        columns = [table.column("time", clock), table.column("value", place)]
+    time, values = table.values(columns, increasing="time")
+    unit = columns[0].unit
+    name = table.names[columns[1].place] if heads else "value"
     return TimeHistory(name, time, values, dimension="", units={"time": unit} if unit else {})

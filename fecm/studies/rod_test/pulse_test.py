@@ -95,8 +95,8 @@ def _table(text: str, units: Mapping[str, str]) -> Pulse:
     if not path.is_file():
         raise StudyError(f"{text} is neither a file nor a pulse; use {USAGE}")
     table = read_table(path)
-    found = table.find(("time", "force"), units=units)
-    time, force = table.values(found, units, increasing="time")
+    columns = table.find(("time", "force"), units=units)
+    time, force = table.values(columns, units, increasing="time")
     if time[-1] <= 0.0:
         raise StudyError(f"{path}: the pulse ends before time 0")
     return table_pulse(time, force)
@@ -300,7 +300,7 @@ def calibrate_transducer(
         slope_error = float(np.sqrt(variance / xx))
         share = 0.0 if through_origin else 1.0 / len(x) + middle_a**2 / xx
         factor = c_a / mass
-    found = Calibration(
+    calibration = Calibration(
         points=len(x),
         slope=slope,
         slope_error=slope_error,
@@ -310,6 +310,6 @@ def calibrate_transducer(
         sensitivity=factor * slope,
         sensitivity_error=abs(factor) * slope_error,
     )
-    if not np.isfinite(list(vars(found).values())).all():
+    if not np.isfinite(list(vars(calibration).values())).all():
         raise StudyError("the sums overflow: check the numbers and their units")
-    return found
+    return calibration

@@ -159,12 +159,12 @@ def pulse_test(
     mean ratio to the applied force: 0.498
     """
     check_positive(dt=dt, duration=duration)
-    for name, value, known in (
+    for name, value, choices in (
         ("mass_matrix", mass_matrix, MASSES),
         ("integrator", integrator, INTEGRATORS),
     ):
-        if value not in known:
-            raise StudyError(f"`{name}` is {value!r}, none of {', '.join(known)}")
+        if value not in choices:
+            raise StudyError(f"`{name}` is {value!r}, none of {', '.join(choices)}")
     if isinstance(rod, Rod):
         struck = uniform_rod(rod, units)
     elif units is not None:
@@ -232,8 +232,8 @@ def simulate_rod_test(
     )
     filtered = None
     if transducer is not None:
-        own = transducer.in_unit(struck.units.get("time", ""))
-        filtered = own(history.time, history.forces)
+        sensor = transducer.in_unit(struck.units.get("time", ""))
+        filtered = sensor(history.time, history.forces)
     return PulseTest(**vars(history), rod=rod, filtered=filtered, units=struck.units)
 
 

@@ -152,11 +152,11 @@ def track_branch(medium: Medium, first: float, last: float) -> Indices:
     sheets that cross keep them.
     """
     mode = sheets(medium, np.array([first, last])).mode
-    (found,), (likeness,) = match_modes(mode[:1], mode[1:])
+    (order,), (likeness,) = match_modes(mode[:1], mode[1:])
     if likeness <= SURE and last - first >= FINEST:
         middle = (first + last) / 2.0
-        found = track_branch(medium, middle, last)[track_branch(medium, first, middle)]
-    return np.asarray(found)
+        order = track_branch(medium, middle, last)[track_branch(medium, first, middle)]
+    return np.asarray(order)
 
 
 def _stiffness(medium: Medium, normal: Floats) -> Floats:
@@ -172,12 +172,12 @@ def _stiffness(medium: Medium, normal: Floats) -> Floats:
 
     shear = in_normal_axes(medium.laminate.shear, normal)
     nn, nt, tt = shear[:, 0, 0], shear[:, 0, 1], shear[:, 1, 1]
-    found = np.zeros((3, len(normal), 5, 5))
-    found[0, :, :4, :4] = product(strain, strain)
-    found[1, :, :4, :4] = 2.0 * product(strain, first)
-    found[2, :, :4, :4] = 2.0 * product(strain, second) + 2.0 * product(first, first)
-    found[:, :, 4, 4] = nn, 2.0 * nt, 2.0 * (tt - nn)
-    return found
+    stiffness = np.zeros((3, len(normal), 5, 5))
+    stiffness[0, :, :4, :4] = product(strain, strain)
+    stiffness[1, :, :4, :4] = 2.0 * product(strain, first)
+    stiffness[2, :, :4, :4] = 2.0 * product(strain, second) + 2.0 * product(first, first)
+    stiffness[:, :, 4, 4] = nn, 2.0 * nt, 2.0 * (tt - nn)
+    return stiffness
 
 
 def _solved(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
@@ -207,8 +207,8 @@ def _kept_apart(values: Floats, vectors: Floats, derivatives: Floats, limit: flo
     first, second = derivatives
     for group in _runs(values, limit):
         basis = vectors[:, group]
-        others = np.delete(vectors, group, axis=1)
-        slopes = first @ others
+        other_vectors = np.delete(vectors, group, axis=1)
+        slopes = first @ other_vectors
         gaps = values[group[0]] - np.delete(values, group)
         bends = second + 2.0 * (slopes / gaps) @ slopes.T
         components = np.diag(np.linspace(1.0, 0.0, len(values))) * values[-1]
@@ -288,21 +288,21 @@ class WaveSurfaces:
 
     def fronts(self, normals: ArrayLike) -> Fronts:
         """Return the five fronts at normals, (n,), in degrees."""
-        found = sheets(self.medium, np.atleast_1d(np.asarray(normals, dtype=np.float64)))
-        turn = np.mod(found.normal, 360.0) * STEPS
+        solved = sheets(self.medium, np.atleast_1d(np.asarray(normals, dtype=np.float64)))
+        turn = np.mod(solved.normal, 360.0) * STEPS
         near = np.round(turn).astype(np.intp)
-        alike, _ = match_modes(self._mode[near], found.mode)
+        alike, _ = match_modes(self._mode[near], solved.mode)
         place = np.take_along_axis(alike, self._place[near], axis=1)
         # In close steps the velocities identify the sheets, not the modes.
         step = np.minimum(turn.astype(np.intp), AROUND - 1)
         place = np.where(self._close[step, None], self._place[step], place)
         rows = np.arange(len(place))[:, None]
         return Fronts(
-            normal=found.normal,
-            velocity=found.velocity[rows, place],
-            slope=found.slope[rows, place],
-            curvature=found.curvature[rows, place],
-            share=found.share[rows, place],
+            normal=solved.normal,
+            velocity=solved.velocity[rows, place],
+            slope=solved.slope[rows, place],
+            curvature=solved.curvature[rows, place],
+            share=solved.share[rows, place],
         )
 
     def cusps(self, time: float, radius: float) -> list[Cusp]:
@@ -316,7 +316,7 @@ class WaveSurfaces:
         normals = np.union1d(np.arange(AROUND + 1) - 0.5, inside) / STEPS
         growth = self.fronts(normals).growth(time, radius)
         passes = (growth[:-1] > 0.0) != (growth[1:] > 0.0)
-        found = []
+        turning_points = []
         for mode, row in np.argwhere(passes.T).tolist():
 
             def at(normal: float, mode: int = mode) -> float:
@@ -327,8 +327,8 @@ class WaveSurfaces:
             # Where fronts touch, the sign may change by a jump instead of a zero.
             if abs(at(normal)) < 1e-5 * (radius + time * fronts.velocity[0, mode]):
                 x, y = fronts.positions(time, radius)[0, mode].tolist()
-                found.append(Cusp(FRONTS[mode], normal % 360.0, x, y))
-        return sorted(found, key=lambda cusp: (FRONTS.index(cusp.mode), cusp.normal))
+                turning_points.append(Cusp(FRONTS[mode], normal % 360.0, x, y))
+        return sorted(turning_points, key=lambda cusp: (FRONTS.index(cusp.mode), cusp.normal))
 
     def misnamed(self) -> dict[str, list[tuple[float, float]]]:
         """Return the intervals of the normal (degrees) where another component dominates.

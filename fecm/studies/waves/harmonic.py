@@ -85,10 +85,10 @@ def gradients(degrees: ArrayLike) -> tuple[Floats, Floats, Floats]:
     The first and second derivative by the angle (radian) follow.
     """
     cos, sin = trigonometry(degrees)
-    one, two = cos**2 - sin**2, 2.0 * sin * cos  # cosine and sine of twice the angle
-    normal = np.stack([cos**2, sin**2, two], axis=-1)
-    tangential = np.stack([-two / 2.0, two / 2.0, one], axis=-1)
-    slope = np.stack([-one, one, -2.0 * two], axis=-1)
+    cos_2, sin_2 = cos**2 - sin**2, 2.0 * sin * cos  # cosine and sine of twice the angle
+    normal = np.stack([cos**2, sin**2, sin_2], axis=-1)
+    tangential = np.stack([-sin_2 / 2.0, sin_2 / 2.0, cos_2], axis=-1)
+    slope = np.stack([-cos_2, cos_2, -2.0 * sin_2], axis=-1)
     return (
         np.stack([normal, tangential], axis=-1),
         np.stack([2.0 * tangential, slope], axis=-1),
@@ -255,5 +255,5 @@ def _in_order(share: Floats) -> Indices:
     """
     in_plane = share[:, :, :2].sum(axis=2)
     pair = _PAIRS[first_largest(in_plane[:, _PAIRS].sum(axis=2))]
-    rest = [[mode for mode in (4, 3, 2, 1, 0) if mode not in taken] for taken in pair.tolist()]
+    rest = [[mode for mode in (4, 3, 2, 1, 0) if mode not in in_pair] for in_pair in pair.tolist()]
     return np.concatenate([np.array(rest, dtype=np.intp), pair], axis=1)
