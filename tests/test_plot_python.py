@@ -195,7 +195,7 @@ def test_a_notebook_shows_plates_laminates_and_estimates_as_tables() -> None:
     assert "`ply` is None" in fecm.Laminate("[0/90]s")._repr_html_()
     assert f">mesh{cell}(20, 12)<" in fecm.Plate.on_fixture("D7136")._repr_html_()
     path = fecm.examples.path("impact-patch")
-    assert f">run{cell}peak force 85.01 lbf, duration" in fecm.estimate(path)._repr_html_()
+    assert f">run{cell}85.01 lbf" in fecm.estimate(path)._repr_html_()
     assert f">nodes{cell}609<" in fecm.check(path)._repr_html_()
     slower = fecm.read_one(small()).with_(velocity=1.0)
     assert (

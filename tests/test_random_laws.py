@@ -115,7 +115,7 @@ def test_correlations_that_no_values_have_are_refused(given: Any, message: str) 
 
 def test_indices_of_correlated_values_are_refused() -> None:
     given: Any = {("k", "velocity"): 0.5}
-    with pytest.raises(CasesError, match="Sobol' indices are those of independent values"):
+    with pytest.raises(CasesError, match="Sobol' indices need independent values"):
         fecm.sweep(small(), random=PAIR, samples=16, correlation=given, sensitivity=True)
     with pytest.raises(CasesError, match=r"`correlation` needs `random`"):
         fecm.sweep(small(), {"k": [1e6]}, correlation=given)

@@ -188,7 +188,7 @@ def test_built_decks_give_the_results_of_runs_and_keep_names_and_measured_column
     assert found.completed.tolist() == 2 * [True, True, False, False]
     assert found["status"].tolist()[2:4] == [
         "build: KeyError: 'no such plate'",
-        "build: the units of the deck are not those of the other cases",
+        "build: the units of the deck differ from the other cases",
     ]
     assert found.force is not None
     for case in np.flatnonzero(found.completed):

@@ -166,8 +166,8 @@ def _refuse(deck: model.Deck, name: str, *kinds: type[model.Segment]) -> None:
     """Raise ObjectError if the deck has segments that refer to the replaced part."""
     if there := [kind.keyword for kind in kinds if deck.has(kind)]:
         raise ObjectError(
-            f"`{name}` can't replace that of a deck with {' and '.join(there)}, which would no "
-            "longer fit"
+            f"`{name}` can't be replaced in a deck with {' and '.join(there)}, which would then "
+            "not fit"
         )
 
 

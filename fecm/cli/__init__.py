@@ -76,7 +76,9 @@ GROUPED = {
             "fecm.cli.locate", "Find place and force of an impact by strain gages."
         ),
         "indent": LazyCommand("fecm.cli.indent", "Indentation tests and the law of contact."),
-        "rod": LazyCommand("fecm.cli.rod", "The projectile's rod alone: pulses and calibration."),
+        "rod": LazyCommand(
+            "fecm.cli.rod", "The instrumented rod: pulses, filters and calibration."
+        ),
         "waves": LazyCommand("fecm.cli.waves", "Waves in a laminate."),
     },
 }

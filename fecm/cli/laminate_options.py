@@ -121,7 +121,7 @@ def laminate_options(
     *, required: bool, thickness_required: bool = False
 ) -> Callable[[Decorated], Decorated]:
     """Add the options of a laminate, which the command receives as `laminate`."""
-    default = "" if thickness_required else "  [default: that of a named ply]"
+    default = "" if thickness_required else "  [default: from the named ply]"
     return stack_options(
         option(
             "--layup",
@@ -149,7 +149,7 @@ def laminate_options(
             type=Parsed(str, "[LETTER=]NAME", MATERIALS),
             multiple=True,
             help="Named ply, instead of --ply; `fecm materials` lists them.  With a letter, as in "
-            "C=IM7/8552, that of the plies with this letter in the layup.",
+            "C=IM7/8552, it is for the plies with this letter in the layup.",
         ),
         option(
             "--materials",

@@ -65,7 +65,7 @@ class LocateOptions:
     "--grid",
     type=POSITIVE,
     metavar="LENGTH",
-    help="Distance of the places that are tried first.  [default: that of about 126 places]",
+    help="Distance of the places that are tried first.  [default: gives about 126 places]",
 )
 @option(
     "--basis",
@@ -78,7 +78,7 @@ class LocateOptions:
     "--noise",
     type=POSITIVE,
     metavar="STRAIN",
-    help="Standard deviation of the strains' errors.  [default: that of the residual]",
+    help="Standard deviation of the strains' errors.  [default: from the residual]",
 )
 @option(
     "--shift",

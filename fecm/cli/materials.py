@@ -28,7 +28,7 @@ LINES = (
 )
 @click.argument("plies", type=PLIES, metavar="[FILE.toml]", required=False)
 @click.option(
-    "--units", type=SYSTEM, help="Units of the constants.  [default: those of each ply's source]"
+    "--units", type=SYSTEM, help="Units of the constants.  [default: from each ply's source]"
 )
 @FORMAT_OPTION
 def materials_command(plies: dict[str, NamedPly] | None, units: str | None, form: Format) -> None:

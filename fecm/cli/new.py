@@ -246,8 +246,8 @@ class NewOptions:
     "--zone",
     type=Parsed(new_values.zone, "X0,Y0,X1,Y1:LAYUP"),
     multiple=True,
-    help="Layup of the elements whose centres lie in a rectangle, of the same materials; or of a "
-    "group of surfaces of the mesh, as in PATCH:[0/90]4s.  A later zone goes over an earlier one.",
+    help="Layup, from the same materials, of elements whose centres lie in a rectangle, or of a "
+    "group of surfaces of the mesh, as in PATCH:[0/90]4s.  A later zone overrides an earlier one.",
 )
 @option(
     "--damage",
@@ -259,15 +259,15 @@ class NewOptions:
     "--giic",
     type=POSITIVE,
     metavar="G",
-    help="Toughness G_IIc of the delamination threshold (DELA), force/length; goes before that "
-    "of a named ply.",
+    help="Toughness G_IIc of the delamination threshold (DELA), force/length; replaces the "
+    "toughness of a named ply.",
 )
 @option(
     "--cure",
     metavar="DT|FREE:USE",
     help="Residual stresses of the cure (CURE) of a named ply with coefficients of expansion: "
     "change of temperature since the plies were free of stress, as in -100; or the stress-free "
-    "temperature, by default that of the ply, and the one of use, as in 177:20 or :20.",
+    "temperature, by default the ply's, and the temperature of use, as in 177:20 or :20.",
 )
 @option(
     "--support",

@@ -140,7 +140,7 @@ class PlotOptions:
     "--overlay",
     type=DECK_PATH,
     metavar="FILE.csv",
-    help="Measured force to draw over that of the kind force: columns time and force (or "
+    help="Measured force to draw over the kind force: columns time and force (or "
     "transducer), converted to the deck's units.  Notes compare both.",
 )
 @COLUMNS_OPTION

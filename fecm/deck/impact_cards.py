@@ -60,7 +60,7 @@ class Indentation(Segment, keyword="EXPE"):
         """Read the card of the law that the keyword card names."""
         word = " ".join(head.words[1:]).upper()
         if word not in cls.fields_of:
-            message = f"`{word}` after EXPE is not read: the law is that of equation 3-8."
+            message = f"`{word}` after EXPE is not read: the law is equation 3-8."
             hint = "EXPE ACR takes the law of equation 3-7"
             cards.findings.add("W416", message, head.place, hint)
             word = ""

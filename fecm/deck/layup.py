@@ -67,7 +67,7 @@ def parse_layup(text: str, largest: float = LARGEST_ANGLE) -> list[float]:
     plies = parse_plies(text, largest)
     if named := next((ply.name for ply in plies if ply.name), ""):
         raise LayupError(
-            f"the layup `{_quoted(text)}` has the material {named}; here a layup has angles alone"
+            f"the layup `{_quoted(text)}` has the material {named}; here a layup has angles only"
         )
     return [ply.angle for ply in plies]
 

@@ -112,7 +112,7 @@ OTHER_FILES = (
     OtherFile(
         r"feap\b",
         "an input file of FEAP",
-        "the first word is FECM here, and the third number of the next card is that of the layers; "
+        "the first word is FECM here, and the third number of the next card counts the layers; "
         "COOR, ELEM and BOUN are read as FEAP reads them; MATE and the program, MACR to END, are "
         "those of this program",
     ),
@@ -174,7 +174,7 @@ class Reader:
         last = self.cards.last
         if not problems and not self.findings.errors:
             message = "The file contains no problem."
-            self.findings.add("E001", message, None, "a problem begins with a FECM card")
+            self.findings.add("E001", message, None, "a problem starts with a FECM card")
         elif last is not None and not stopped and not self.findings.counts["E004"]:
             self.findings.add("W002", "The deck does not end with a STOP card.", last.place)
         return problems
@@ -293,7 +293,7 @@ class Reader:
         elif card.data.lstrip()[:1].isalpha():
             word = card.data.split()[0]
             self.cards.unsound.update(_close(word[:4].upper(), keywords))
-            message = f"The keyword `{word}` does not begin in column 1."
+            message = f"The keyword `{word}` does not start in column 1."
             self.findings.add("E005", message, card.place, "move it to the left")
         else:
             message = "A keyword is expected, not a card of data."
@@ -320,7 +320,7 @@ class Reader:
             if card.is_keyword:  # misspelt MACR: the program follows nevertheless
                 return self._macros(card)
         message = "The problem has no macro program."
-        self.findings.add("E009", message, title.place, "it begins with a MACR card")
+        self.findings.add("E009", message, title.place, "it starts with a MACR card")
         cards.unsound.add(MACROS)
         return []
 

@@ -26,7 +26,7 @@ declare(
     "E001",
     Subject.FRAME,
     "The file has no problem.",
-    remedy="A problem begins with a FECM card.",
+    remedy="A problem starts with a FECM card.",
 )
 declare(
     "W002",
@@ -49,13 +49,13 @@ declare(
 declare(
     "E005",
     Subject.FRAME,
-    "A word is not a keyword here, or does not begin in column 1.",
+    "A word is not a keyword here, or does not start in column 1.",
     remedy="Correct the word. The hint names the closest one.",
 )
 declare(
     "E006",
     Subject.FRAME,
-    "A card of data stands where a keyword is expected.",
+    "A card of data is in place of a keyword.",
     remedy="A segment has more cards than its counts say, or a blank card ended it too early.",
 )
 declare(
@@ -182,13 +182,13 @@ declare(
 declare(
     "W416",
     Subject.IMPACT,
-    "An unknown word stands after EXPE.",
+    "An unknown word follows EXPE.",
     remedy="`EXPE ACR` takes equation 3-7.",
 )
 declare(
     "E446",
     Subject.POINTS,
-    "An unknown word stands after SHEA.",
+    "An unknown word follows SHEA.",
     remedy="MITC, EQUI or both.",
 )
 

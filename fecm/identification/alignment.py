@@ -107,7 +107,7 @@ def check_measured(
         raise StudyError("the deck's own run has no contact force to compare with; check its ROD")
     if np.ptp(force) <= FLAT * np.abs(force).max():
         text = f"the measured force is constant, {np.mean(force):.3g}"
-        raise IdentifyError(f"{name}: {text}; there is no contact in it")
+        raise IdentifyError(f"{name}: {text}; it contains no contact")
     if -force.min() > force.max():
         raise StudyError(
             f"{name}: the contact force is negative; it is positive in compression; write "
@@ -126,7 +126,7 @@ def check_measured(
                 units.get(dimension, ""),
                 _cause(dimension, measured_value / expected, units),
             )
-            usual = f"that of the deck's own run {expected:.3g} {unit}".rstrip()
+            usual = f"the deck's own run gives {expected:.3g} {unit}".rstrip()
             raise StudyError(f"{name}: the {what} is {measured_value:.3g}, {usual}; {cause}")
     return width
 

@@ -276,7 +276,7 @@ def _outside(free: Sequence[str], lag: float, width: float, units: dict[str, str
     if DELAY not in free and abs(lag) > width:
         side = "after" if lag > 0.0 else "before"
         late = f"{abs(lag):.3g} {units.get('time', '')}".rstrip()
-        rise = f"the force rises {late} {side} that of the deck's own run"
+        rise = f"the force rises {late} {side} the deck's own run"
         return f"{text}, and {rise}; fit delay too, or shift the times"
     return f"{text} of the deck; lengthen the run, or cut the table"
 

@@ -91,7 +91,7 @@ def undescribed(points: FittedPoints, units: dict[str, str]) -> str:
 
 def wrong_model(why: str) -> str:
     """Say that the model does not describe the data, and what to look at."""
-    hint = "compare supports, laminate, patch, mesh and filter with those of the test"
+    hint = "compare supports, laminate, patch, mesh and filter with the test"
     return f"the model does not describe the data: {why}; {hint}"
 
 

@@ -411,7 +411,7 @@ def location_table(location: Location) -> Table:
             ("energy bound", f"{bound} would be stopped by this impulse; a projectile that"),
             ("", f"rebounds had less (down to {least}), one that moves on had more"),
         ]
-    noise, misfit = "from the residual", "1, as the noise is that of the residual"
+    noise, misfit = "from the residual", "1, as the noise is taken from the residual"
     if location.noise_given:
         noise, misfit = "as given", f"{location.misfit:.3g} times the noise"
     rows += [

@@ -195,13 +195,13 @@ def _hypotheses(plain: _Hypothesis, worst: list[int], names: list[int]) -> Itera
         yield plain._replace(text=text, remedy="check its sign and direction", signs=signs)
         yield plain._replace(remedy="subtract its reading at rest", zero=gage)
         if gages >= FEWEST:
-            remedy = "compare its unit and its gain with those of the other gages"
+            remedy = "compare its unit and its gain with the other gages"
             yield plain._replace(remedy=remedy, gain=gage)
     for first, second in combinations(worst, 2):
         columns = list(plain.columns)
         columns[first], columns[second] = second, first
         text = f"gages {names[first]} and {names[second]} exchanged explain"
-        remedy = "compare the order of the columns with that of the gages"
+        remedy = "compare the order of the columns with the order of the gages"
         yield plain._replace(text=text, remedy=remedy, columns=tuple(columns))
 
 
@@ -353,7 +353,7 @@ def judged(location: Location, region: Region, wide: bool, cause: Cause | None) 
 def _serious(location: Location, region: Region) -> Iterator[str]:
     """Yield reasons not to accept a location."""
     near = residual_correlation(location)
-    compare = "compare supports, laminate, patch, mesh and gages with those of the test"
+    compare = "compare supports, laminate, patch, mesh and gages with the test"
     share = float(((location.strains - location.fitted) ** 2).sum() / (location.strains**2).sum())
     if location.misfit > NOT_DESCRIBED:
         yield (
@@ -382,7 +382,7 @@ def _serious(location: Location, region: Region) -> Iterator[str]:
         x, y, ratio = location.second
         yield (
             f"({x:.4g}, {y:.4g}) explains the strains almost as well: its misfit is {ratio:.3f} "
-            "times that of the place found"
+            "times the misfit of the located place"
         )
     if region.at_edge(location.x, location.y):
         yield "the place is on the edge of the region; the impact may be outside"

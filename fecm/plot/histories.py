@@ -377,7 +377,7 @@ def _strains(
     if face != "curvature" and _may_stretch(result):
         warn(
             f"the midplane of {name} may stretch; its strains are not stored, and the picture "
-            "shows those of bending alone"
+            "shows bending strains only"
         )
     histories: dict[str, Array] = {}
     for place in places:

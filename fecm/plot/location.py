@@ -130,7 +130,7 @@ def _draw_map(axes: Axes, located: Location, outline: Floats, place: style.AxisS
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2, borderaxespad=0.8)
     ratio = style.AxisScale(1.0, "")
     bar = style.colour_bar(
-        axes, cells, ratio, "Misfit over that of the place found", MaxNLocator(6), aspect=40.0
+        axes, cells, ratio, "Misfit over the least misfit", MaxNLocator(6), aspect=40.0
     )
     ticks = [tick for tick in (1, 2, 3, 5, 10, 20, 30, 50, 100) if tick <= worst]
     bar.set_ticks(ticks if len(ticks) > 1 else [1.0, worst])

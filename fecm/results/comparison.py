@@ -187,7 +187,7 @@ def compare_force(stored: Stored, measured: Measurement) -> Comparison:
     there = (measured.time >= 0.0) & (measured.time <= clock[-1])
     if np.count_nonzero(there) < 2:
         raise StudyError(
-            f"{measured.name} has fewer than two times within those of the result: measured from "
+            f"{measured.name} has fewer than two times within the run of the result: measured from "
             f"{measured.time[0]:g} to {measured.time[-1]:g}, computed from 0 to {clock[-1]:g}; "
             "check its unit of time"
         )

@@ -198,7 +198,7 @@ def write_vtkhdf(
     the result has no displacements.  Raises OSError if the file can't be written.
     """
     if "tape3/displacement" not in result:
-        lack = "the result has no displacements (tape3), and hence no time step to export"
+        lack = "the result has no displacements (tape3), so there is no time step to export"
         raise ExportError(f"{lack}{remedy('tape3')}")
     # A state stored twice is one time step.
     steps, rows = np.unique(result["tape3/step"], return_index=True)

@@ -197,7 +197,7 @@ def _open_file(file: AnyFile) -> tuple[Path, io.BytesIO]:
     data = b"" if isinstance(file, io.TextIOBase) else file.read()
     if not data or isinstance(data, str):
         what = "is open as text" if isinstance(file, io.TextIOBase) else "has no bytes to read"
-        raise OptionsError(f'{path} {what}; open it anew with the mode "rb"')
+        raise OptionsError(f'{path} {what}; open it again with the mode "rb"')
     return path, io.BytesIO(data)
 
 

@@ -20,12 +20,12 @@ from fecm.results.end import End, Texts
 
 TOO_SOFT = "a linear plate, without membrane stiffening, is too soft"
 # The errors are those of plates without preload.
-PRELOADED = "that is without PREL, whose compression makes it more and whose tension less"
+PRELOADED = "compressive preload increases this error, tensile preload reduces it"
 REMEDY = "NONL includes the stiffening (fecm new --nonlinear)"
 UNSAFE = "threshold energies are therefore too high (unsafe)"
 CURVED = (
-    "all this is of a flat plate: a curved panel that is struck on its convex side softens and may "
-    "snap through"
+    "these figures are for a flat plate: a curved panel that is struck on its convex side softens "
+    "and may snap through"
 )
 
 

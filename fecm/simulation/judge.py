@@ -249,7 +249,7 @@ def _delamination(simulation: Simulation, result: Result) -> Iterator[str]:
         pull = quantity(force, unit_of("force/length", result.units))
         yield (
             f"at time {time} the membrane force under the load is {pull}, {force / bending:.0%} of "
-            "6 M/h: the threshold of DELA is that of a plate in bending"
+            "6 M/h: the threshold of DELA is for a plate in bending"
         )
 
 
@@ -471,7 +471,7 @@ def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:
     if broken:
         yield Doubt(
             Reason.BROKEN,
-            f"exposure above 1 ({', '.join(broken)}): the run continues elastically; the "
+            f"exposure above 1 ({', '.join(broken)}): the run continues elastically; "
             "softening after the first failure is not modelled",
         )
 
@@ -480,7 +480,7 @@ def _bent(simulation: Simulation, result: Result, peak: RunPeak) -> str:
     """Yield a note if the deflection is beyond the linear plate."""
     limits = simulation.problem.judge
     is_free = rigid_deflections(simulation.problem.mesh).size > 0
-    what = "deflection, less its rigid motion," if is_free else "deflection"
+    what = "deflection without the rigid-body motion" if is_free else "deflection"
     h = limits.thickness
     size = _size(result, peak.value, h)
     note = f"{_reached(result, what, size, peak)} {limits.limit} h {TOO_SOFT}"

@@ -110,8 +110,8 @@ def _thickness_notes(deck: model.Deck, name: str, least: float) -> Iterator[str]
         return
     if name == THICKNESS:
         yield (
-            f"{THICKNESS} is that of the laminate, as laminate_thickness; that of one ply is "
-            "ply_thickness"
+            f"{THICKNESS} is the thickness of the laminate, like laminate_thickness; ply_thickness "
+            "is the thickness of a ply"
         )
     layers = deck.require(model.Material).layers
     ply = max(layer.thickness for layer in layers)

@@ -46,7 +46,7 @@ EXCLUSIONS = (
         ("vary", "cases", "random", "until", "build", "measure"),
         "a study of the mesh varies nothing else, and measures what it needs",
     ),
-    Exclusion("sensitivity", ("correlation",), "Sobol' indices are those of independent values"),
+    Exclusion("sensitivity", ("correlation",), "Sobol' indices need independent values"),
     Exclusion("until", ("build", FUNCTION), "a search varies the velocity of the deck"),
     Exclusion("until", ("full",), "run the velocity found: `vary` velocity=FOUND and `full` 0"),
     Exclusion(PEAK, (FAILURE,), "exposures need full runs, and this search takes none"),

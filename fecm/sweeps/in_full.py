@@ -137,7 +137,7 @@ def problem_of_case(settings: Settings, case: Case) -> Problem:
         return with_clock(apply_case(settings.deck, case), settings.clock, case)
     (checked,) = built(settings.build, case).problems
     if unit_names(checked.deck) != unit_names(settings.deck):
-        raise CasesError("build: the units of the deck are not those of the other cases")
+        raise CasesError("build: the units of the deck differ from the other cases")
     return checked
 
 

@@ -147,7 +147,7 @@ def _distance(problem: Problem) -> float:
     """Return the distance from the load within which elements are bisected: a bending wave."""
     waves = resolution(problem) if problem.has_impact else None
     if waves is None:
-        raise RefineError("nothing hits the plate: there is no peak force whose mesh error to find")
+        raise RefineError("the deck has no impact: there is no peak force to find a mesh error for")
     return waves.wave
 
 

@@ -175,7 +175,7 @@ def design_of(
         raise CasesError(f"the seed must not be negative, not {seed}")
     if sensitivity and correlation:
         raise CasesError(
-            "Sobol' indices are those of independent values; leave out sensitivity or correlation"
+            "Sobol' indices need independent values; leave out sensitivity or correlation"
         )
     return Design(dict(laws), int(samples), int(seed), kind, sensitivity, correlation)
 

@@ -266,7 +266,7 @@ def by_energy(definition: Plan) -> list[int]:
             energies.append((strike_of_case(definition.settings.deck, case).energy, number))
     ordered = [number for energy, number in sorted(energies) if energy > 0.0]
     if not ordered:
-        raise CasesError("no case has an energy, by which the reduced model could be checked")
+        raise CasesError("no case has an energy, so the reduced model can't be checked")
     return ordered
 
 

@@ -45,7 +45,7 @@ class Search(NamedTuple):
         if not {"velocity", "energy"}.isdisjoint(names):
             raise CasesError("velocity is what is searched; it can't be varied as well")
         if not deck.require(Impact).velocity:
-            raise CasesError("the search begins at the velocity of ROD, which must not be 0")
+            raise CasesError("the search starts at the velocity of ROD, which must not be 0")
         if self.level == THRESHOLD:
             if deck.last(Delamination) is None:
                 raise CasesError(NO_THRESHOLD)

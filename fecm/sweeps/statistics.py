@@ -267,7 +267,7 @@ def _notes(design: Design, columns: Columns, fine: Bools) -> Iterator[str]:
     """Return doubts about the results."""
     failed = int((~fine).sum())
     if failed > MANY_FAILED * len(fine):
-        text = "of the draws failed, and the statistics are those of the others"
+        text = "of the draws failed; the statistics are computed from the other draws"
         yield f"{failed / len(fine):.3%} {text}; {REMEDY}"
     if design.sensitivity:
         missing = {name: int(np.isnan(values).sum()) for name, values in columns.items()}

@@ -157,7 +157,7 @@ def doubtful_coefficient(problem: Problem) -> Reports:
     if possible:
         return
     message = (
-        f"k = {law.k:g} is that of a rigid sphere with a radius of about {shown} on the plies' E2"
+        f"k = {law.k:g} belongs to a rigid sphere with a radius of about {shown} on the plies' E2"
     )
     if unit is not None and (looks := _misread(deck, radius, unit, names)):
         message += f"; {looks}"

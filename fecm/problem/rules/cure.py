@@ -38,7 +38,7 @@ def missing_expansion(card: model.Cure) -> Reports:
             message = f"Material {expansion.material} has a second card of expansions."
             yield Report(message, expansion.place("material"), "remove one of them")
     if (free := card.expansion(MATERIAL)) is None:
-        yield Report(f"CURE has no card of material {MATERIAL}, that of MATE.", card.place(), hint)
+        yield Report(f"CURE has no card for material {MATERIAL}, that of MATE.", card.place(), hint)
         return
     for change, value, names in (
         ("temperature", card.delta_t, model.Expansion.THERMAL),
@@ -244,7 +244,7 @@ def missing_expansions(deck: model.Deck) -> Reports:
             yield Report(message, expansion.place("material"), FIELDS)
     used = {layer.material for layers in deck.layers.values() for layer in layers}
     for number in sorted(used - {MATERIAL, *(expansion.material for expansion in card.expansions)}):
-        yield Report(f"CURE has no card of material {number}.", card.place(), FIELDS)
+        yield Report(f"CURE has no card for material {number}.", card.place(), FIELDS)
 
 
 OF_MATERIALS = (missing_expansions,)

@@ -133,7 +133,7 @@ def twisted_threshold(problem: Problem) -> Reports:
     if twist > MOST_TWIST:
         message = (
             f"Bending twists the plate: D16 or D26 is {twist:.2g} (D11 D22)^(1/2). The threshold "
-            "is that of an isotropic plate with the mean stiffness D*."
+            "is computed for an isotropic plate with the mean stiffness D*."
         )
         hint = "threshold and D* do not depend on the axes; how delaminations grow does"
         yield Report(message, delamination.place(), hint)
@@ -382,7 +382,7 @@ def threshold_of_a_sandwich(problem: Problem) -> Reports:
     card = problem.deck.last(model.Delamination)
     if card is not None and problem.laminate.has_core:
         message = (
-            "The plate has a core: the threshold of DELA is that of a solid laminate and is not "
+            "The plate has a core: the threshold of DELA holds for a solid laminate and is not "
             "computed. The faces delaminate, or leave the core, far below it."
         )
         yield Report(message, card.place(), "remove DELA; FAIL has the exposures of the core")

@@ -33,7 +33,7 @@ FASTEST = 30.0
 declare(
     "E420",
     Subject.IMPACT,
-    "A diameter is that of an element that the rod does not have.",
+    "A diameter is given for an element that the rod does not have.",
     remedy="Correct PROJ.",
 )
 declare(

@@ -115,7 +115,7 @@ class IndentationFit:
         stated = (
             "" if self.stated in (("", ""), units) else f" (the test: {', '.join(self.stated)})"
         )
-        about = f"{', '.join(units)}{stated}" if units else "those of the test, which names none"
+        about = f"{', '.join(units)}{stated}" if units else "not named in the test"
         card = constants.card(self.fit)
         shown = [*constants.fit_lines(self.fit), f"units           {about}"]
         return "\n".join([*shown, card] if card else shown)

@@ -158,7 +158,7 @@ def divide(indentation: Floats, retreat: float | None = None) -> Division:
     turning_points = turns(path, retreat)
     s = path.smooth
     if s[turning_points[1]] <= s[0]:
-        raise StudyError("the test begins with unloading; it must begin with the first loading")
+        raise StudyError("the test starts with unloading; it must start with the first loading")
     return _stretches(path, turning_points, near=max(retreat / 2.0, 4.0 * path.noise))
 
 

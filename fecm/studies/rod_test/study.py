@@ -168,7 +168,7 @@ def pulse_test(
     if isinstance(rod, Rod):
         struck = uniform_rod(rod, units)
     elif units is not None:
-        raise StudyError("`units` are those of the deck; leave them out")
+        raise StudyError("the deck has its own `units`; leave them out")
     else:
         struck = rod_of(sole_problem(rod, warns=False).deck)
     chosen = filter_of(filter) if isinstance(filter, str) else filter

@@ -160,7 +160,7 @@ def waves(
     check_positive(shear_factor=shear_factor)
     if not isinstance(laminate, Laminate):
         if units is not None:
-            raise StudyError("`units` are those of the deck; leave them out")
+            raise StudyError("the deck has its own `units`; leave them out")
         return waves_of(sole_problem(laminate, warns=False), shear_factor)
     notes: list[str] = []
     stiffness, names = stiffness_of_laminate(laminate, units, notes)
