@@ -33,7 +33,7 @@ class ListingLaw(MeasuredLaw[Number]):
     def trial(
         self, memory: LoadingHistory[Number], last: ContactPoint[Number], indentation: Number
     ) -> tuple[Number, LoadingHistory[Number]]:
-        """Contact force at a trial indentation, and the loading history after the trial."""
+        """Return the contact force at a trial indentation, and the history after the trial."""
         m, c = memory, self.constants
         force = branch_force(m, indentation)
         leaves = (m.branch == VIRGIN) & (force < last.force)
@@ -58,5 +58,5 @@ class ListingLaw(MeasuredLaw[Number]):
     def accept(
         self, memory: LoadingHistory[Number], last: ContactPoint[Number], indentation: Number
     ) -> LoadingHistory[Number]:
-        """Loading history after a step, which its trials have already changed."""
+        """Return the loading history after a step, as its trials have left it."""
         return memory

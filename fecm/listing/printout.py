@@ -1,7 +1,7 @@
 """The printed output of the original program, in a readable layout.
 
-PRIN and NOPR switch the echo of the mesh on and off, PAGE sets the carriage control at the head of
-a page: ``1`` a new page (a form feed), ``0`` a blank line, ``-`` two of them.
+PRIN and NOPR switch the echo of the mesh on and off.  PAGE sets the carriage control at the head of
+a page: ``1`` for a new page (a form feed), ``0`` for a blank line, ``-`` for two blank lines.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ CARRIAGE = {"1": "\f", "0": "\n", "-": "\n\n"}
 
 
 class Printer:
-    """Writes the printed output of a run; without a file nothing."""
+    """Writer of a run's printed output.  It prints nothing without a file."""
 
     def __init__(self, file: TextIO | None = None) -> None:
         self._file = file
@@ -44,7 +44,7 @@ class Printer:
         return self._file is not None
 
     def state(self) -> dict[str, Any]:
-        """Text printed so far, and the head of the next page."""
+        """Return the text printed so far, and the head of the next page."""
         text = ""
         if self._file is not None:
             self._file.flush()
@@ -52,7 +52,7 @@ class Printer:
         return {"head": (self._title, self._control, self._pages), "text": text}
 
     def restore(self, state: Mapping[str, Any]) -> None:
-        """Print again what was printed up to a :meth:`state`."""
+        """Print the text of a :meth:`state` again, and restore the head of the next page."""
         self._title, self._control, self._pages = state["head"]
         if self._file is not None:
             self._file.write(state["text"])
@@ -62,14 +62,14 @@ class Printer:
             self._file.writelines(f"{line.rstrip()}\n" for line in lines)
 
     def _page(self, heading: str, lines: Iterable[str] = ()) -> None:
-        """Begin a page: carriage control, title, heading; then print lines on it."""
+        """Start a page with carriage control, title and heading, then print lines on it."""
         head = CARRIAGE.get(self._control, "") if self._pages else ""
         self._pages += 1
         self._write([f"{head}{self._title}", "", f"  {heading}", ""])
         self._write(lines)
 
     def _table(self, names: Sequence[str], rows: Iterable[Sequence[object]]) -> None:
-        """A table of right-aligned columns."""
+        """Print a table of right-aligned columns."""
         self._write(map(_row, itertools.chain([names], rows, [()])))
 
     def problem(self, deck: model.Deck, mesh: MeshArrays, plate: PlateModel) -> None:
@@ -96,19 +96,19 @@ class Printer:
                     self._control = segment.carriage_control
                 case _:
                     self._segment(segment, mesh, plate, echo)
-        self._others(deck, plate)
+        self._other_materials(deck, plate)
         if echo:
             self._page("Equation numbers")
             self._nodes(mesh.equations)
         self._program(deck.macros)
 
     def replaced(self, parts: Mapping[str, str]) -> None:
-        """Name the parts that replace those of the deck."""
+        """Print the names of the parts that replace parts of the deck."""
         if self.is_on and parts:
             self._page("In place of the deck's", _values(parts))
 
     def _program(self, macros: Iterable[Macro]) -> None:
-        """Echo the macro program, its loops indented."""
+        """Echo the macro program with indented loops."""
         self._page("Macro program")
         depth = 0
         for macro in macros:
@@ -123,7 +123,7 @@ class Printer:
     def _segment(
         self, segment: model.Segment, mesh: MeshArrays, plate: PlateModel, echo: bool
     ) -> None:
-        """Echo one segment; mesh data only while echoing is on."""
+        """Echo one segment.  Mesh data are printed only while the echo is on."""
         match segment:
             case model.Material():
                 self._material(segment, plate)
@@ -162,7 +162,7 @@ class Printer:
         self._page("Indentation law", _values(values))
 
     def _nodes(self, values: NDArray[np.generic], only: NDArray[np.bool_] | None = None) -> None:
-        """A table of every dof of every node, or of some nodes."""
+        """Print a table of all dofs of all nodes, or of the nodes marked by `only`."""
         chosen = np.arange(len(values)) if only is None else np.flatnonzero(only)
         self._table(("node", *DOF_NAMES), ((n + 1, *values[n].tolist()) for n in chosen.tolist()))
 
@@ -179,37 +179,37 @@ class Printer:
         self._page("Material", lines)
         self._laminate(material.layers, plate.laminate)
 
-    def _others(self, deck: model.Deck, plate: PlateModel) -> None:
-        """Materials and laminates beside those of MATE."""
+    def _other_materials(self, deck: model.Deck, plate: PlateModel) -> None:
+        """Print the materials and laminates that MATE does not define."""
         if (card := deck.last(model.Materials)) is not None:
             names = [field.label for field in model.Ply.fields]
             self._page("Other materials")
-            rows = ((one.number, *map(float, one.ply.row())) for one in card.plies)
+            rows = ((material.number, *map(float, material.ply.row())) for material in card.plies)
             self._table(("material", *names), rows)
-        (_, *others), (_, *laminates) = deck.layers.items(), plate.laminates
-        for (number, layers), laminate in zip(others, laminates, strict=True):
+        (_, *other_layers), (_, *laminates) = deck.layers.items(), plate.laminates
+        for (number, layers), laminate in zip(other_layers, laminates, strict=True):
             self._page(f"Laminate {number}")
             self._laminate(layers, laminate)
 
     def _laminate(self, layers: Sequence[model.Layer], laminate: LaminateSection) -> None:
-        """Layers and stiffness of a laminate."""
-        several = any(one.material != MATERIAL for one in layers)
+        """Print the layers and the stiffness of a laminate."""
+        several = any(layer.material != MATERIAL for layer in layers)
         header = ("layer", "angle", "thickness", *(["material"] if several else []))
         rows = (
-            (n, one.angle, one.thickness, *([one.material] if several else []))
-            for n, one in enumerate(layers, start=1)
+            (n, layer.angle, layer.thickness, *([layer.material] if several else []))
+            for n, layer in enumerate(layers, start=1)
         )
         self._table(header, rows)
         for name in ("A", "B", "D", "shear"):
             self._write([f"  {name}", *map(_row, getattr(laminate, name).tolist()), ""])
 
     def displacements(self, field: Floats, time: float) -> None:
-        """Displacements of every node."""
+        """Print the displacements of every node."""
         self._page(f"Nodal displacements at time {time:.6g}")
         self._nodes(field)
 
     def reactions(self, force: Floats, mesh: MeshArrays, time: float) -> None:
-        """Forces of the supports, and their sum."""
+        """Print the forces of the supports and their sum."""
         supports = np.where(mesh.equations == 0, force, 0.0)
         largest = np.abs(supports).max(axis=1)
         self._page(f"Reactions at time {time:.6g}")
@@ -219,28 +219,28 @@ class Printer:
     def stresses(
         self, values: Mapping[str, Floats], places: tuple[Floats, Floats], clock: float
     ) -> None:
-        """Strains, and below each line the stress resultants, at every point."""
+        """Print the strains at every point, each line followed by the stress resultants."""
         strains = [*places, *(values[name] for name in GENERALISED_STRAINS)]
         resultants = [values[name] for name in RESULTANTS]
 
         def rows() -> Iterator[Sequence[object]]:
             yield "", "", "", *RESULTANTS
-            for at in np.ndindex(places[0].shape):
-                yield at[0] + 1, *(float(column[at]) for column in strains)
-                yield "", "", "", *(float(column[at]) for column in resultants)
+            for point in np.ndindex(places[0].shape):
+                yield point[0] + 1, *(float(column[point]) for column in strains)
+                yield "", "", "", *(float(column[point]) for column in resultants)
 
         self._page(f"Element strains and stress resultants at time {clock:.6g}")
         self._table(("element", "x", "y", *GENERALISED_STRAINS), rows())
 
     def modes(self, angular_frequency: Floats) -> None:
-        """Natural frequencies."""
+        """Print the natural frequencies."""
         omega = angular_frequency
         rows = np.column_stack([omega**2, omega, omega / (2.0 * np.pi)])
         self._page("Natural modes")
         self._table(("mode", "eigenvalue", "angular", "frequency"), _numbered(rows))
 
     def check(self, plate: PlateModel, profile: int) -> None:
-        """Mesh and storage."""
+        """Print the size of the mesh and of the stored matrices."""
         values = {
             "Equations": f"{plate.neq:12d}",
             "Entries of the profile, JDIAG(NEQ)": f"{profile:12d}",
@@ -251,18 +251,18 @@ class Printer:
 
 
 def _values(values: Mapping[str, float | str], width: int = 32) -> list[str]:
-    """Lines of names and values, and a blank line."""
+    """Format names and values, one pair a line, and a blank line."""
     formats = {int: "8d", float: "14.6g", str: ""}
     lines = [f"  {name:{width}}{value:{formats[type(value)]}}" for name, value in values.items()]
     return [*lines, ""]
 
 
 def _numbered(rows: NDArray[np.generic]) -> Iterator[Sequence[object]]:
-    """Rows of a table, with their numbers from 1."""
+    """Prefix the rows of a table with their numbers, from 1."""
     return ((n, *row) for n, row in enumerate(rows.tolist(), start=1))
 
 
 def _row(values: Iterable[object]) -> str:
-    """Line of right-aligned cells."""
+    """Format a line of right-aligned cells."""
     cells = (f"{v:13.5g}" if isinstance(v, float) else str(v).rjust(13) for v in values)
     return "  " + "".join(cells)

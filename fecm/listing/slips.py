@@ -11,7 +11,7 @@ Mode = Literal["report", "listing"]
 REPORT: Mode = "report"
 LISTING: Mode = "listing"
 MODES = (REPORT, LISTING)
-# Each has a row of the errata page, docs/errata.md.
+# Each slip has a row on the errata page, docs/errata.md.
 NAMES = (
     "target", "density", "rod-start", "reload", "jacobian", "station", "tapes", "g12",
     "shear-order", "time", "prop", "force-scale", "rod-force", "prop-contact", "counter",
@@ -20,9 +20,10 @@ NAMES = (
 
 
 def active_slips(mode: str = REPORT, single: Iterable[str] = ()) -> frozenset[str]:
-    """Names of the slips that are on: single ones in report mode, all of them in listing mode.
+    """Return the names of the active slips: single ones in report mode, all in listing mode.
 
-    Raises OptionsError if the mode or a slip is unknown, or single slips are given in listing mode.
+    Raises OptionsError if the mode or a slip is unknown, or if single slips are passed in listing
+    mode.
     """
     names = frozenset(single)
     if mode not in MODES:
@@ -37,11 +38,11 @@ def active_slips(mode: str = REPORT, single: Iterable[str] = ()) -> frozenset[st
 
 
 def refuse_on_nonlinear(slips: frozenset[str]) -> None:
-    """Raise OptionsError if one of the slips is for linear plates only."""
+    """Raise OptionsError if one of the slips needs a linear plate."""
     if "jacobian" in slips:
         raise OptionsError("the slip jacobian is for linear plates only, and the deck has NONL")
 
 
 def mode_of(slips: frozenset[str]) -> str:
-    """Mode of a result with these slips."""
+    """Return the mode of a result with these slips."""
     return LISTING if slips == frozenset(NAMES) else REPORT

@@ -1,12 +1,17 @@
-"""Reads and writes the three tapes as text, in the formats of the printed program.
+"""The three tapes as text, in the formats of the printed program.
 
-Numbers are in columns of twelve characters, as Fortran's E12.4 writes them.  tape3 holds w of every
-node, (6E12.4).  In the report tape8 holds strains, (2I6,5E12.4), beginning with element and point,
-gamma_yz before gamma_xz, and tape9 contact, (6E12.4); the slip ``tapes`` exchanges both tapes and
-the columns of the shear strains.  The lines show which one a file is.
+Numbers are in columns of twelve characters, as Fortran's E12.4 writes them.
 
-The text does not state the number of nodes.  Short lines show it unless it is a multiple of six;
-then tape3 is read as lines, and :meth:`TapeText.fitted` divides them into rows.
+- tape3 holds w of every node, (6E12.4).
+- tape8 holds strains in the report, (2I6,5E12.4).  A line starts with element and point; gamma_yz
+  precedes gamma_xz.
+- tape9 holds the contact in the report, (6E12.4).
+
+The slip ``tapes`` exchanges tape8 with tape9, and the columns of the shear strains.  The lines show
+which of the two a file is.
+
+The text does not state the number of nodes.  Short lines reveal it unless it is a multiple of six.
+In that case tape3 is read as lines, and :meth:`TapeText.fitted` divides them into rows.
 """
 
 from __future__ import annotations
@@ -24,25 +29,25 @@ from fecm._errors import ResultFileError
 from fecm._files import beside
 from fecm._typing import Array, Floats
 
-TAPES = "tapes"  # form of a folder of tapes, as `Contents.form` of a file; and the slip's name
+TAPES = "tapes"  # `form` of a folder of tapes, see `Contents.form`; also the name of the slip
 NAMES = ("tape3", "tape8", "tape9")
 WIDTH = 12  # characters per number
-DIGITS = 4  # of them
+DIGITS = 4  # digits of the mantissa
 PER_LINE = 6  # numbers per line without labels
-LABEL = 6  # characters of the number of an element or of a point
+LABEL = 6  # characters of an element's or a point's number
 SHEARS = {"tape8": ("gamma_yz", "gamma_xz"), "tape9": ("gamma_xz", "gamma_yz")}
 W = "tape3/w"
 CURVATURES = ("kappa_x", "kappa_y", "kappa_xy")
 CONTACT = ("force", "indentation", "transducer", "displacement", "velocity", "acceleration")
 _LABELS = re.compile(rb" *\d+")
-# Allowed letters are those of Infinity, NaN and the exponents' E and D.
+# The allowed letters occur in Infinity, in NaN and in exponents (E and D).
 _FOREIGN = re.compile(rb"[^0-9+\-. EDINFTYA]", re.IGNORECASE)
 _NUMBER = re.compile(rb"([+-]?(?:\d+\.?\d*|\.\d+))(?:[ED]([+-]?\d+)|([+-]\d+))?", re.IGNORECASE)
 _SPECIAL = re.compile(rb"[+-]?(?:inf(?:inity)?|nan)", re.IGNORECASE)
 
 
 class OnTape(Protocol):
-    """What tapes are written from: datasets by path, and the slips of their run."""
+    """Source of tapes: datasets by path, and the slips of their run."""
 
     @property
     def slips(self) -> tuple[str, ...]:
@@ -53,7 +58,7 @@ class OnTape(Protocol):
 
 
 def fortran_e(value: float) -> str:
-    """Write a number in the format E12.4: ``  0.2322E+01``."""
+    """Format a number as E12.4: ``  0.2322E+01``."""
     if not np.isfinite(value):
         text = "NaN" if np.isnan(value) else ("-Infinity" if value < 0 else "Infinity")
         return text.rjust(WIDTH)
@@ -67,22 +72,22 @@ def fortran_e(value: float) -> str:
 
 
 def last_digit(values: Floats) -> Floats:
-    """One unit of the last printed digit of numbers on a tape; 0 where it is zero or not finite."""
+    """Return one unit of the last printed digit of numbers; 0 for zeros and non-finite numbers."""
     size = np.abs(values)
-    known = np.isfinite(values) & (size > 0.0)
-    power = np.floor(np.log10(np.where(known, size, 1.0)) + 1e-9) + 1.0
-    return np.where(known, 10.0 ** (power - DIGITS), 0.0)
+    has_digits = np.isfinite(values) & (size > 0.0)
+    power = np.floor(np.log10(np.where(has_digits, size, 1.0)) + 1e-9) + 1.0
+    return np.where(has_digits, 10.0 ** (power - DIGITS), 0.0)
 
 
 def _lines(table: Floats) -> Iterator[str]:
-    """Lines of six numbers; the last line of a row may be shorter."""
+    """Yield lines of six numbers; the last line of a row may be shorter."""
     for row in table:
         for start in range(0, len(row), PER_LINE):
             yield "".join(map(fortran_e, row[start : start + PER_LINE].tolist()))
 
 
 def _strain_lines(columns: Sequence[Array]) -> Iterator[str]:
-    """Lines of element, point and strains."""
+    """Yield lines of element, point and strains."""
     for row in zip(*columns, strict=True):
         values = np.stack(row, axis=-1)
         for element, point in np.ndindex(values.shape[:2]):
@@ -91,7 +96,7 @@ def _strain_lines(columns: Sequence[Array]) -> Iterator[str]:
 
 
 def tape_texts(result: OnTape) -> dict[str, Iterator[str]]:
-    """Lines of every tape that the run stored, by name."""
+    """Return the lines of every tape that the run stored, by name."""
     strains, contact = "tape8", "tape9"
     if TAPES in result.slips:
         strains, contact = contact, strains
@@ -114,7 +119,7 @@ def tape_texts(result: OnTape) -> dict[str, Iterator[str]]:
 
 
 def write_tapes(result: OnTape, folder: Path, *, overwrite: bool = True) -> list[Path]:
-    """Write all tapes into a folder, or none; a missing folder is created.
+    """Write all tapes into a folder, or none of them.  A missing folder is created.
 
     Returns the paths of the files.  Raises OSError if a file can't be written.
     """
@@ -135,7 +140,8 @@ class TapeText:
     # By path: ``tape3/w`` (rows, nodes), ``tape8/kappa_x`` etc. (rows, elements, points),
     # ``tape9/force`` etc. (rows,).
     arrays: Mapping[str, Array]
-    lines: bool = False  # of ``tape3/w``, (lines, 6), as the number of nodes is not known
+    # Whether ``tape3/w`` has lines, (lines, 6), because the number of nodes is not known.
+    lines: bool = False
     form = TAPES
 
     @property
@@ -149,32 +155,32 @@ class TapeText:
         return {name: values.dtype for name, values in self.arrays.items()}
 
     def rows(self, path: str, start: int, stop: int) -> Array:
-        """Rows `start` to `stop` of a dataset."""
+        """Return the rows `start` to `stop` of a dataset."""
         return self.arrays[path][start:stop]
 
     def fitted(self, nodes: int) -> TapeText:
-        """Copy with the lines of ``tape3/w`` divided into rows of `nodes`, if possible."""
+        """Return a copy with the lines of ``tape3/w`` divided into rows of `nodes`, if possible."""
         if not self.lines or nodes < 1 or nodes % PER_LINE or self.arrays[W].size % nodes:
             return self
         return TapeText({**self.arrays, W: self.arrays[W].reshape(-1, nodes)})
 
 
 def read_tapes(folder: Path) -> TapeText:
-    """Read tape3, tape8 and tape9 of a folder, with or without ``.txt``; some may be missing.
+    """Read tape3, tape8 and tape9 of a folder, with or without ``.txt``.  Some may be missing.
 
     Raises ResultFileError if the folder has no tape, or a tape is invalid.
     """
     arrays: dict[str, Array] = {}
     lines = False
     for name in NAMES:
-        found = [path for path in (folder / name, folder / f"{name}.txt") if path.exists()]
-        if len(found) > 1:
+        paths = [path for path in (folder / name, folder / f"{name}.txt") if path.exists()]
+        if len(paths) > 1:
             raise ResultFileError(f"{folder}: there is both a {name} and a {name}.txt")
-        if not found:
+        if not paths:
             continue
-        text = _Lines(found[0])
+        text = _Lines(paths[0])
         if not text.lines:
-            continue  # opened by the program, but never written
+            continue  # the program opened the tape but never wrote to it
         if name == "tape3":
             arrays[W], lines = _displacements(text)
             continue
@@ -190,7 +196,7 @@ def read_tapes(folder: Path) -> TapeText:
             table = text.table(lead=0, width=len(names), what=kind)
         if any(path.startswith(group) for path in arrays):
             raise ResultFileError(f"{folder}: tape8 and tape9 both hold {kind}")
-        arrays |= {f"{group}/{one}": table[..., i].copy() for i, one in enumerate(names)}
+        arrays |= {f"{group}/{quantity}": table[..., i].copy() for i, quantity in enumerate(names)}
     if not arrays:
         message = f"{folder}: no tape3, tape8 or tape9 in this folder, with or without .txt"
         raise ResultFileError(message)
@@ -211,14 +217,14 @@ class _Lines:
         self.labelled = all(_LABELS.fullmatch(label) for label in _pair(first))
 
     def refuse(self, wrong: Array, message: str, *values: Array) -> None:
-        """Raise an error about the first wrong line, if any, with its values in the message."""
+        """Raise an error about the first wrong line, if any; its values go into the message."""
         if wrong.any():
             n = int(wrong.argmax())
             text = message.format(*(value[n] for value in values))
             raise ResultFileError(f"{self.path}:{n + 1}: {text}")
 
     def counts(self, lead: int) -> Array:
-        """Numbers of every line, (lines,), after `lead` characters of labels."""
+        """Count the numbers of every line, (lines,), after `lead` characters of labels."""
         lengths = np.fromiter(map(len, self.lines), dtype=np.int64)
         counts, rest = np.divmod(lengths - lead, WIDTH)
         message = f"a line of {{}} characters does not consist of columns of {WIDTH}"
@@ -226,46 +232,46 @@ class _Lines:
         return counts
 
     def table(self, lead: int, width: int, what: str) -> Floats:
-        """Numbers of lines of equal length, (lines, width)."""
+        """Return the numbers of lines of equal length, (lines, width)."""
         counts = self.counts(lead)
         self.refuse(counts != width, f"a line of {what} has {width} numbers, not {{}}", counts)
         return self.numbers(lead).reshape(-1, width)
 
     def numbers(self, lead: int) -> Floats:
-        """All numbers of all lines, in order."""
+        """Return all numbers of all lines, in order."""
         text = b"".join(line[lead:] for line in self.lines)
         if not _FOREIGN.search(text):
-            # Fails at an exponent without letter, and what is not a number.
+            # This fails for exponents without a letter, and for text that is not a number.
             with contextlib.suppress(ValueError):
                 values = np.frombuffer(text, dtype=f"S{WIDTH}").astype(np.float64)
                 if not np.isinf(values).any():
                     return values
-        found: list[float] = []
+        parsed: list[float] = []
         for index, line in enumerate(self.lines):
             for start in range(lead, len(line), WIDTH):
                 field = line[start : start + WIDTH]
                 if (value := fortran_number(field)) is None:
                     wrong = ascii(field.decode("latin-1"))[1:-1]
                     raise ResultFileError(f"{self.path}:{index + 1}: `{wrong}` is not a number")
-                found.append(value)
-        return np.array(found)
+                parsed.append(value)
+        return np.array(parsed)
 
     def require_complete(self, complete: bool) -> None:
-        """Require that the last line ends a row."""
+        """Raise ResultFileError unless the last line ends a row."""
         if not complete:
             raise ResultFileError(f"{self.path}:{len(self.lines)}: the last row is not complete")
 
 
 def _pair(line: bytes) -> tuple[bytes, bytes]:
-    """Labels of element and point that begin a line of strains."""
+    """Return the labels of element and point at the start of a line of strains."""
     return line[:LABEL], line[LABEL : 2 * LABEL]
 
 
 def fortran_number(field: bytes) -> float | None:
-    """Value of a field of Fortran's format E12.4; None if it is invalid or too large.
+    """Return the value of a Fortran E12.4 field; None if it is invalid or too large.
 
-    Such are ``  0.1234E+01``, ``  0.1234+100`` (a three-digit exponent has no letter),
-    ``         NaN``, ``   -Infinity``.
+    Valid fields are ``  0.1234E+01``, ``  0.1234+100`` (a three-digit exponent has no letter),
+    ``         NaN`` and ``   -Infinity``.
     """
     text = field.strip(b" ")
     if _SPECIAL.fullmatch(text):
@@ -277,7 +283,7 @@ def fortran_number(field: bytes) -> float | None:
 
 
 def _displacements(text: _Lines) -> tuple[Array, bool]:
-    """Displacements w, (rows, nodes); or (lines, 6) and True if the nodes can't be counted."""
+    """Return w, (rows, nodes) and False; (lines, 6) and True if the nodes can't be counted."""
     counts = text.counts(0)
     values = text.numbers(0)
     ends = np.flatnonzero(counts < PER_LINE)
@@ -292,7 +298,7 @@ def _displacements(text: _Lines) -> tuple[Array, bool]:
 
 
 def _strains(text: _Lines) -> Floats:
-    """Table of the strain tape, (rows, elements, points, 5)."""
+    """Return the table of the strain tape, (rows, elements, points, 5)."""
     table = text.table(lead=2 * LABEL, width=5, what="strains")
     pairs = [_pair(line) for line in text.lines]
     unlabelled = [not all(map(_LABELS.fullmatch, pair)) for pair in pairs]

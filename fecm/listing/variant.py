@@ -1,7 +1,7 @@
-"""What slips change in the parts of a run, as parameters of these parts.
+"""Effects of the slips on the parts of a run, as parameters of these parts.
 
-The defaults are the report's.  A part asks its variant for a value, a rule or a factor; which slips
-are active, or which mode it is in, it does not know.
+The defaults are the report's.  A part asks its variant for a value, a rule or a factor.  The part
+does not know which slips are active, or which mode the run is in.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from fecm.mechanics.element_matrices import IntegrationRules
 from fecm.mechanics.laminate import LaminateSection
 from fecm.mechanics.projectile import REPORT_DENSITY
 
-MISREAD_DENSITY = 0.0003225  # of the report's rod, in the listing
+MISREAD_DENSITY = 0.0003225  # density of the report's rod in the listing
 
 
 class PlateVariant(NamedTuple):
@@ -31,17 +31,17 @@ class PlateVariant(NamedTuple):
     transposed_jacobian: bool = False
 
     def ply(self, ply: Ply) -> Ply:
-        """Constants of a ply of the deck."""
+        """Return the constants of a ply of the deck."""
         if self.isotropic_g12 and ply.e1 == ply.e2:
             return replace(ply, g12=ply.e1 / (2.0 * (1.0 + ply.nu12)))
         return ply
 
     def laminate(self, laminate: LaminateSection) -> LaminateSection:
-        """Stiffness of the laminate of MATE."""
+        """Return the section of MATE's laminate."""
         return laminate.without_small_entries() if self.cuts_small_stiffness else laminate
 
     def rules(self, rules: IntegrationRules) -> IntegrationRules:
-        """Quadrature rules of the plate."""
+        """Return the quadrature rules of the plate."""
         return replace(
             rules,
             shear=rules.bending if self.shear_at_bending_points else rules.shear,
@@ -55,9 +55,9 @@ class ImpactVariant(NamedTuple):
 
     rod_density: float = REPORT_DENSITY  # without a PROJ segment
     law: Callable[[ContactParameters], HystereticLaw | ListingLaw] = HystereticLaw
-    plate_moves: bool = True  # in the contact law
+    plate_moves: bool = True  # the contact law takes the plate's motion into account
     strains_start_moving: bool = False  # the rod's du/dx start at the approach velocity
-    keeps_first_step: bool = False  # in the constants of the rod's integrator
+    keeps_first_step: bool = False  # the rod's integrator keeps the constants of the first step
     nodal_force_scales: bool = False  # FORC's force at ROD's dof scales the contact force
     station_after_middle: int = 0  # nodes from the rod's middle to the transducer
     station_sign: float = -1.0
@@ -66,37 +66,40 @@ class ImpactVariant(NamedTuple):
 class ProgramVariant(NamedTuple):
     """Parameters of the macro program."""
 
-    clock_rate: float = 1.0  # of TIME's clock
+    clock_rate: float = 1.0  # rate of TIME's clock
     last_words: frozenset[str] = frozenset()  # macros that end the program
     table_stands: bool = False  # PROP has the table's value at t = 0
-    prop_replaces_contact: bool = False  # as the force on the plate, in the step after PROP
-    contact_scales_forces: bool = False  # FORC's values have the contact force as factor
+    prop_replaces_contact: bool = False  # PROP's factor is the force on the plate in the next step
+    contact_scales_forces: bool = False  # the contact force is the factor of FORC's values
     counts_from_output: bool = False  # RODP's N counts steps since the last output
-    strains_precede_step: bool = False  # strains of the field before RODP's step
-    contact_at_every_step: bool = False  # on tape9, instead of every N-th
+    strains_precede_step: bool = False  # RODP stores the strains before its step
+    contact_at_every_step: bool = False  # tape9 has every step instead of every N-th
 
     def table_factor(self, table: LoadTable, clock: float, first: float) -> float:
-        """Load factor of a table at a time of the clock; `first` is that of the last PROP."""
+        """Return the load factor of a table at a clock time; `first` is the last PROP's factor."""
         return first if self.table_stands else load_factor(table, clock)
 
     def prop_force(self, factor: float) -> float | None:
-        """Force on the plate in the step after PROP, of its load factor; None is the contact's."""
+        """Return the force on the plate in the step after PROP; None for the contact force."""
         return factor if self.prop_replaces_contact else None
 
     def force_factor(self, factor: float, contact: float | None) -> float:
-        """Factor of FORC's values, of the load factor and the force of an impact on the plate."""
+        """Return the factor of FORC's values.
+
+        `factor` is the load factor, `contact` the contact force on the plate in an impact.
+        """
         return factor if contact is None or not self.contact_scales_forces else contact
 
     def is_output(self, step: int, since: int, every: int) -> bool:
-        """Whether RODP stores strains at a step, `since` steps after the last that it stored."""
+        """Return whether RODP stores strains at a step, `since` steps after the last output."""
         return since == every if self.counts_from_output else not step % every
 
     def has_contact(self, is_output: bool) -> bool:
-        """Whether RODP stores the contact of a step."""
+        """Return whether RODP stores the contact of a step."""
         return is_output or self.contact_at_every_step
 
     def contact_rows(self, work: WorkEstimate) -> int:
-        """Largest number of steps whose contact is stored."""
+        """Return the largest number of steps whose contact is stored."""
         return work.steps if self.contact_at_every_step else work.contact_rows
 
 
@@ -121,7 +124,7 @@ REPORT = Variant(REPORT_PLATE, REPORT_IMPACT, ProgramVariant())
 
 
 def variant_of(slips: frozenset[str]) -> Variant:
-    """Parameters of the parts with these slips."""
+    """Return the parameters of the parts with these slips."""
     plate = PlateVariant(
         isotropic_g12="g12" in slips,
         cuts_small_stiffness="small-stiffness" in slips,
