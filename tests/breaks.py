@@ -203,7 +203,7 @@ def turned(of: Callable[[Any, Any], bool], **factors: float) -> Break:
             return after
         return after._replace(**{n: times * getattr(after, n) for n, times in factors.items()})
 
-    return in_numpy(instead(HystereticLaw, "_turned", broken))
+    return in_numpy(instead(HystereticLaw, "_leave_branch", broken))
 
 
 def standing_plate(

@@ -29,7 +29,7 @@ from fecm.mechanics import (
     patch_weights,
     static_stiffness,
 )
-from fecm.mechanics.reduced_plate import _moved, reduced_plate
+from fecm.mechanics.reduced_plate import _moved_eigenvectors, reduced_plate
 from tests.builders import (
     Floats,
     boundary,
@@ -149,7 +149,7 @@ def test_modes_of_equal_frequency_are_the_one_that_moves() -> None:
     turned, _ = np.linalg.qr(np.random.default_rng(5).standard_normal((5, 5)))
     inverse = turned @ np.diag([3.0, 2.0, 2.0, 2.0 - 1e-11, 1.0]) @ turned.T
     load = np.array([1.0, -2.0, 0.5, 3.0, 1.5])
-    values, vectors = _moved(inverse, load)
+    values, vectors = _moved_eigenvectors(inverse, load)
     assert values == pytest.approx([3.0, 2.0, 1.0])
     assert inverse @ vectors == pytest.approx(vectors * values, abs=1e-9)
     # Together they move as far as all modes, and none of equal frequency is left to move.

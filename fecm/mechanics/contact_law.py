@@ -1,12 +1,12 @@
 """Contact laws: the contact force as a function of indentation and loading history.
 
 Every curve of the report's laws (equations 3-1, 3-3 and 3-11) has the form F = f ((a - b)/w)^p, and
-is zero for a <= b.  The loading history is the current curve and the peak at which first loading
-ended; it is immutable.  Force and indentation are positive in compression.
+is zero for a <= b.  The loading history contains the current curve and the peak at which first
+loading ended; it is immutable.  Force and indentation are positive in compression.
 
-A law is that of one case, whose values are floats, or of many, whose values are arrays with an
-entry per case: the type parameter :data:`Number`, which is float where it is left out.  Powers of
-floats are Python's, those of arrays NumPy's.
+A law holds for one case or for many cases.  The values of one case are floats, the values of many
+cases are arrays with an entry per case.  The type parameter :data:`Number` stands for either; it
+defaults to float.  Powers of floats are Python's, powers of arrays are NumPy's.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     import typing_extensions
 
     Number = typing_extensions.TypeVar("Number", float, Floats, default=float)
-else:  # the default is of Python 3.13
+else:  # defaults of type parameters need Python 3.13
     Number = TypeVar("Number", float, Floats)
 
 LOADING_POWER = 1.5
@@ -55,24 +55,26 @@ def select(condition: Bools, a: float | Floats, b: float | Floats) -> Floats: ..
 @overload
 def select(condition: bool | Bools, a: float | Floats, b: float | Floats) -> float | Floats: ...
 def select(condition: bool | Bools, a: float | Floats, b: float | Floats) -> float | Floats:
-    """`a` where the condition holds, otherwise `b`."""
+    """Return `a` where the condition holds, otherwise `b`."""
     if isinstance(condition, np.ndarray):
         return np.where(condition, a, b)
     return a if condition else b
 
 
 def any_case(condition: bool | Bools) -> bool:
-    """Whether the condition holds for any case."""
+    """Return whether the condition holds for any case."""
     return bool(condition.any()) if isinstance(condition, np.ndarray) else bool(condition)
 
 
 def hertz_coefficient(radius: float, e_s: float, nu_s: float, e_t: float) -> float:
-    """Contact coefficient of a sphere (s) on a half-space (t), equation 3-2 (force/length^1.5).
+    """Return the contact coefficient of a sphere (s) on a half-space (t), equation 3-2.
+
+    The coefficient is in force/length^1.5.
 
     Raises
     ------
     ValueError
-        If radius or a modulus is not positive, or Poisson's ratio not between -1 and 0.5.
+        If the radius or a modulus is not positive, or Poisson's ratio is not between -1 and 0.5.
     """
     for name, value in (("radius", radius), ("E_s", e_s), ("E_t", e_t)):
         if not 0.0 < value < math.inf:
@@ -95,10 +97,10 @@ class ContactParameters(ABC, Generic[Number]):
     def permanent(self, peak: Floats) -> Floats: ...
     @abstractmethod
     def permanent(self, peak: float | Floats) -> float | Floats:
-        """Permanent indentation after a peak (length)."""
+        """Return the permanent indentation after a peak (length)."""
 
     def of_cases(self: ContactParameters[Floats], cases: Indices) -> ContactParameters[Floats]:
-        """Select some cases."""
+        """Select cases by their indices."""
         return stack_parameters([self], lambda values: values[0][cases])
 
     @overload
@@ -106,13 +108,14 @@ class ContactParameters(ABC, Generic[Number]):
     @overload
     def loading(self, indentation: Floats) -> Floats: ...
     def loading(self, indentation: float | Floats) -> float | Floats:
-        """Force on the first loading curve, equation 3-1."""
+        """Return the force on the first loading curve, equation 3-1."""
         return power_curve(self.k, 0.0, 1.0, LOADING_POWER, indentation)
 
     def rigidity(self, peak: Floats) -> Floats:
-        """Unloading rigidity s after positive peaks, equation 3-5, force/length^q.
+        """Return the unloading rigidity s after positive peaks, equation 3-5 (force/length^q).
 
-        The permanent indentation of 3-8 gives 3-9 and 3-10, that of 3-7 gives 3-6.
+        The permanent indentation of 3-8 gives 3-9 and 3-10; the permanent indentation of 3-7 gives
+        3-6.
         """
         return self.loading(peak) / (peak - self.permanent(peak)) ** self.q
 
@@ -132,7 +135,7 @@ class LinearPermanent(ContactParameters[Number]):
     @overload
     def permanent(self, peak: Floats) -> Floats: ...
     def permanent(self, peak: float | Floats) -> float | Floats:
-        """Permanent indentation after a peak, equation 3-8, never negative (length)."""
+        """Return the permanent indentation after a peak, equation 3-8 (length), at least 0."""
         value = self.s_p * (peak - self.alpha_p)
         return select(value > 0.0, value, 0.0)
 
@@ -150,7 +153,7 @@ class YangSunPermanent(ContactParameters[Number]):
     @overload
     def permanent(self, peak: Floats) -> Floats: ...
     def permanent(self, peak: float | Floats) -> float | Floats:
-        """Permanent indentation after a peak, equation 3-7, never negative (length)."""
+        """Return the permanent indentation after a peak, equation 3-7 (length), at least 0."""
         top = select(peak > 0.0, peak, 0.0)
         value: float | Floats = top - self.alpha_cr**0.4 * top**0.6
         return select(value > 0.0, value, 0.0)
@@ -177,7 +180,7 @@ def power_curve(
     p: float | Floats,
     a: float | Floats,
 ) -> float | Floats:
-    """F = f ((a - b)/w)^p, zero for a <= b."""
+    """Return F = f ((a - b)/w)^p, zero for a <= b."""
     if isinstance(a, np.ndarray):
         return np.where(a > b, f * (np.maximum(a - b, 0.0) / w) ** p, 0.0)
     return f * ((a - b) / w) ** p if a > b else 0.0
@@ -186,10 +189,10 @@ def power_curve(
 def stack_parameters(
     records: Sequence[Any], function: Callable[[list[Any]], Any] = np.array
 ) -> ContactParameters[Floats]:
-    """Parameters of many cases, all of one class, as arrays: a function of the values of each."""
+    """Stack the parameters of many cases, all of one class; `function` makes the arrays."""
     names = [part.name for part in fields(records[0]) if part.init]
-    made = {name: function([getattr(record, name) for record in records]) for name in names}
-    return cast(ContactParameters[Floats], replace(records[0], **made))
+    arrays = {name: function([getattr(record, name) for record in records]) for name in names}
+    return cast(ContactParameters[Floats], replace(records[0], **arrays))
 
 
 class LoadingHistory(NamedTuple, Generic[Number]):
@@ -215,7 +218,7 @@ class ContactPoint(NamedTuple, Generic[Number]):
 
 
 def branch_force(history: LoadingHistory[Number], indentation: Number) -> Number:
-    """Force on the curve of the history's branch."""
+    """Return the force on the curve of the history's branch."""
     return power_curve(history.f, history.b, history.w, history.p, indentation)
 
 
@@ -223,10 +226,10 @@ def branch_force(history: LoadingHistory[Number], indentation: Number) -> Number
 class Law(Protocol[Number]):
     """A contact law: a force for each trial indentation, and a memory of the loading history.
 
-    A step calls `trial` up to five times, as the contact iteration does, and `accept` once, with
-    the indentation at the end of the step.  The memory is of any immutable type, and the law itself
-    does not change: the cases of a sweep share it.  A law without a memory gives the same force in
-    loading and unloading.
+    A step calls `trial` up to five times, once per contact iteration.  The step then calls `accept`
+    once, with the indentation at the end of the step.  The memory has any immutable type.  The law
+    itself does not change, because the cases of a sweep share it.  A law without a memory returns
+    the same force in loading and unloading.
 
     Examples
     --------
@@ -245,32 +248,32 @@ class Law(Protocol[Number]):
     """
 
     def start(self) -> Any:
-        """Memory before the first contact."""
+        """Return the memory before the first contact."""
 
     def trial(
         self, memory: Any, last: ContactPoint[Number], indentation: Number
     ) -> tuple[Number, Any]:
-        """Contact force at a trial indentation, and the memory after the trial.
+        """Return the contact force at a trial indentation, and the memory after the trial.
 
-        The last point is that at the end of the last step.  An indentation is a length, negative
+        `last` is the point at the end of the last step.  An indentation is a length; it is negative
         where the bodies are apart.
         """
 
     def accept(self, memory: Any, last: ContactPoint[Number], indentation: Number) -> Any:
-        """Memory after a step that ends at an indentation."""
+        """Return the memory after a step that ends at an indentation."""
 
     def permanent(self, memory: Any, last: ContactPoint[Number]) -> Number:
-        """Permanent indentation after unloading from the last point (length)."""
+        """Return the permanent indentation after unloading from the last point (length)."""
 
 
 @dataclass(frozen=True)
 class MeasuredLaw(Generic[Number]):
-    """A law of the report, with measured parameters; subclasses add `trial` and `accept`."""
+    """A law of the report with measured parameters.  Subclasses add `trial` and `accept`."""
 
     constants: ContactParameters[Number]
 
     def start(self) -> LoadingHistory[Number]:
-        """Loading history before the first contact."""
+        """Return the loading history before the first contact."""
         k = self.constants.k
         zero = filled_like(k, 0.0)
         return LoadingHistory(
@@ -285,7 +288,7 @@ class MeasuredLaw(Generic[Number]):
         )
 
     def permanent(self, memory: LoadingHistory[Number], last: ContactPoint[Number]) -> Number:
-        """Permanent indentation after unloading from the last accepted point (length)."""
+        """Return the permanent indentation after unloading from the last point (length)."""
         peak = select(memory.branch == VIRGIN, last.indentation, memory.peak)
         return self.constants.permanent(select(peak > memory.peak, peak, memory.peak))
 
@@ -295,18 +298,18 @@ class HystereticLaw(MeasuredLaw[Number]):
     """The report's law with any sequence of unloadings and reloadings.
 
     The peak is the point at which the indentation falls from the first loading curve (3-1).  Below
-    it every unloading follows (3-3) down to the permanent indentation and every reloading follows
-    (3-11) back to the peak; each starts where the other ended, so that the force is continuous.
-    Beyond the peak first loading continues.
+    the peak, unloading follows (3-3) down to the permanent indentation, and reloading follows
+    (3-11) back to the peak.  Each starts where the other ended, so that the force is continuous.
+    Beyond the peak, first loading continues.
     """
 
     def trial(
         self, memory: LoadingHistory[Number], last: ContactPoint[Number], indentation: Number
     ) -> tuple[Number, LoadingHistory[Number]]:
-        """Contact force at a trial indentation; a trial does not change the history."""
+        """Return the contact force at a trial indentation, and the unchanged history."""
         if not isinstance(indentation, np.ndarray):
             return branch_force(self.accept(memory, last, indentation), indentation), memory
-        cases, new = self._turning(memory, last, indentation)
+        cases, new = self._cases_leaving_branch(memory, last, indentation)
         force = branch_force(memory, indentation)
         if new is not None:
             force[cases] = branch_force(new, indentation[cases])
@@ -315,10 +318,10 @@ class HystereticLaw(MeasuredLaw[Number]):
     def accept(
         self, memory: LoadingHistory[Number], last: ContactPoint[Number], indentation: Number
     ) -> LoadingHistory[Number]:
-        """Loading history after a step that ends at an indentation."""
+        """Return the loading history after a step that ends at an indentation."""
         m, a = memory, indentation
         if isinstance(a, np.ndarray):
-            cases, new = self._turning(m, last, a)
+            cases, new = self._cases_leaving_branch(m, last, a)
             if new is None:
                 return m
             updated = LoadingHistory(*(x.copy() for x in m))
@@ -330,15 +333,15 @@ class HystereticLaw(MeasuredLaw[Number]):
         # Most steps stay on the same curve.
         if not falls if virgin else a < m.peak and falls == unloading:
             return m
-        return self._turned(m, last, a)
+        return self._leave_branch(m, last, a)
 
-    def _turning(
+    def _cases_leaving_branch(
         self: HystereticLaw[Floats],
         m: LoadingHistory[Floats],
         last: ContactPoint[Floats],
         a: Floats,
     ) -> tuple[Indices, LoadingHistory[Floats] | None]:
-        """Cases that may leave their branch, and their loading histories; None without any."""
+        """Return the cases that may leave their branch, and their new histories or None."""
         falls, rises = a < last.indentation, a > last.indentation
         virgin, unloading = m.branch == VIRGIN, m.branch == UNLOADING
         turns = np.where(virgin, falls, (a >= m.peak) | np.where(unloading, rises, falls))
@@ -346,13 +349,13 @@ class HystereticLaw(MeasuredLaw[Number]):
         if not len(cases):
             return cases, None
         law = HystereticLaw(self.constants.of_cases(cases))
-        at = ContactPoint(*(x[cases] for x in last))
-        return cases, law._turned(LoadingHistory(*(x[cases] for x in m)), at, a[cases])
+        points = ContactPoint(*(x[cases] for x in last))
+        return cases, law._leave_branch(LoadingHistory(*(x[cases] for x in m)), points, a[cases])
 
-    def _turned(
+    def _leave_branch(
         self, m: LoadingHistory[Number], last: ContactPoint[Number], a: Number
     ) -> LoadingHistory[Number]:
-        """Loading history where the indentation may leave the branch."""
+        """Return the loading history where the indentation may leave the branch."""
         falls = a < last.indentation
         leaves = (m.branch == VIRGIN) & falls
         returns = (m.branch != VIRGIN) & (a >= m.peak)
@@ -363,9 +366,9 @@ class HystereticLaw(MeasuredLaw[Number]):
         peak_force = select(leaves, c.loading(last.indentation), m.peak_force)
         permanent = select(leaves, c.permanent(last.indentation), m.permanent)
         # Unloading starts on the first loading curve, or at the last point of a reloading curve.
-        begin = select(leaves, peak_force, last.force)
+        start_force = select(leaves, peak_force, last.force)
         down = unloading_branch(
-            c.q, last, begin, peak=peak, peak_force=peak_force, permanent=permanent
+            c.q, last, start_force, peak=peak, peak_force=peak_force, permanent=permanent
         )
         up = self._reloading(m, last)
         first = m._replace(
@@ -384,20 +387,20 @@ class HystereticLaw(MeasuredLaw[Number]):
     def _reloading(
         self, m: LoadingHistory[Number], last: ContactPoint[Number]
     ) -> LoadingHistory[Number]:
-        """Reloading from the last point to the peak, equation 3-11."""
+        """Return the reloading branch from the last point to the peak, equation 3-11."""
         loaded = (last.force > 0.0) & (last.force < m.peak_force)
         share = select(loaded, last.force, 0.0) / select(loaded, m.peak_force, 1.0)
         ratio = share ** (1.0 / LOADING_POWER)
         origin = select(loaded, (last.indentation - ratio * m.peak) / (1.0 - ratio), m.permanent)
-        # The accepted force is one iteration older than the indentation.  If it has not fallen
-        # below the peak's, it stays constant up to the peak.
-        level = (last.force > 0.0) & (last.force >= m.peak_force)
+        # The accepted force is one iteration older than the indentation.  If the force has not
+        # fallen below the peak force, it stays constant up to the peak.
+        is_constant = (last.force > 0.0) & (last.force >= m.peak_force)
         return _curve(
             branch=RELOADING,
             f=m.peak_force,
             b=origin,
             w=m.peak - origin,
-            p=select(level, filled_like(origin, 0.0), filled_like(origin, LOADING_POWER)),
+            p=select(is_constant, filled_like(origin, 0.0), filled_like(origin, LOADING_POWER)),
             peak=m.peak,
             peak_force=m.peak_force,
             permanent=m.permanent,
@@ -407,16 +410,19 @@ class HystereticLaw(MeasuredLaw[Number]):
 def unloading_branch(
     q: float | Number,
     last: ContactPoint[Number],
-    begin: Number,
+    start_force: Number,
     *,
     peak: Number,
     peak_force: Number,
     permanent: Number,
 ) -> LoadingHistory[Number]:
-    """Unloading with the power q from the last point, where the force is `begin`, equation 3-3."""
+    """Return the unloading branch of power q from the last point, equation 3-3.
+
+    `start_force` is the force at the last point.
+    """
     return _curve(
         branch=UNLOADING,
-        f=begin,
+        f=start_force,
         b=permanent,
         w=last.indentation - permanent,
         p=q,
@@ -437,7 +443,7 @@ def _curve(
     peak_force: Number,
     permanent: Number,
 ) -> LoadingHistory[Number]:
-    """A branch; its force is zero if its width is not positive."""
+    """Return a branch; its force is zero if its width is not positive."""
     return LoadingHistory(
         branch=filled_like(f, branch),
         f=select(w > 0.0, f, 0.0),
@@ -453,31 +459,33 @@ def _curve(
 def follow(
     law: Law, corners: Sequence[float], points: int = 1
 ) -> Iterator[tuple[ContactPoint, int]]:
-    """Points and branches of one case: of the start, then `points` per section to each corner."""
-    memory, last, begin = law.start(), ContactPoint(0.0, 0.0), 0.0
+    """Yield points and branches of one case: the start, then `points` per section to a corner."""
+    memory, last, section_start = law.start(), ContactPoint(0.0, 0.0), 0.0
     yield last, VIRGIN
     for corner in corners:
         for n in range(1, points + 1):
-            part = n / points
-            indentation = corner if n == points else begin + part * (corner - begin)
+            share = n / points
+            indentation = (
+                corner if n == points else section_start + share * (corner - section_start)
+            )
             force, memory = law.trial(memory, last, indentation)
             memory = law.accept(memory, last, indentation)
             last = ContactPoint(indentation, float(force))
             yield last, int(memory.branch)
-        begin = corner
+        section_start = corner
 
 
 def choose_history(
     condition: bool | Bools, yes: LoadingHistory[Number], no: LoadingHistory[Number]
 ) -> LoadingHistory[Number]:
-    """`yes` where the condition holds, otherwise `no`."""
+    """Return `yes` where the condition holds, otherwise `no`."""
     if not isinstance(condition, np.ndarray):
         return yes if condition else no
-    # The numbers are arrays as the condition is.
+    # If the condition is an array, the numbers are too.
     chosen = (cast(Number, np.where(condition, a, b)) for a, b in zip(yes, no, strict=True))
     return LoadingHistory(*chosen)
 
 
 def filled_like(number: Number, value: float | Number) -> Number:
-    """A value, for each case where the number is an array."""
+    """Return a value, repeated for each case if `number` is an array."""
     return np.full_like(number, value) if isinstance(number, np.ndarray) else value

@@ -31,23 +31,22 @@ from fecm.mechanics.strains import FLAT, Curvature, strain_of_deflection
 class IntegrationRules:
     """Quadrature rules of a plate."""
 
-    # Membrane, bending and mass; transverse shear.
-    bending: Quadrature
-    shear: Quadrature
+    bending: Quadrature  # membrane, bending and mass
+    shear: Quadrature  # transverse shear
     strains: Quadrature  # points of the stored strains
-    transposed_jacobian: bool = False  # transpose the inverse Jacobian
-    # Take the transverse shear strains of :mod:`~fecm.mechanics.strains`.
+    transposed_jacobian: bool = False  # whether the inverse Jacobian is transposed
+    # Whether transverse shear strains are the assumed ones of :mod:`~fecm.mechanics.strains`.
     assumes_shear: bool = False
 
 
-def membrane_and_bending(at: Interpolation, curvature: Curvature = FLAT) -> Floats:
-    """B matrix of midplane strains and curvatures, equations 2-6 to 2-9: (ne, npt, 6, 5 nn).
+def membrane_and_bending(shapes: Interpolation, curvature: Curvature = FLAT) -> Floats:
+    """Return B of midplane strains and curvatures, equations 2-6 to 2-9: (ne, npt, 6, 5 nn).
 
-    The midplane strains of a curved panel contain those of w.
+    The midplane strains of a curved panel contain the strains of w.
     """
-    ne, npt, _, nn = at.dN.shape
+    ne, npt, _, nn = shapes.dN.shape
     B = np.zeros((ne, npt, 6, nn, NDOF))
-    x, y = at.dN[:, :, 0], at.dN[:, :, 1]
+    x, y = shapes.dN[:, :, 0], shapes.dN[:, :, 1]
     B[:, :, 0, :, 0] = x
     B[:, :, 1, :, 1] = y
     B[:, :, 2, :, 0], B[:, :, 2, :, 1] = y, x
@@ -55,39 +54,39 @@ def membrane_and_bending(at: Interpolation, curvature: Curvature = FLAT) -> Floa
     B[:, :, 4, :, 4] = -y
     B[:, :, 5, :, 3], B[:, :, 5, :, 4] = -y, -x
     if curvature != FLAT:
-        B[:, :, :3, :, 2] = strain_of_deflection(curvature)[:, None] * at.N[:, None]
+        B[:, :, :3, :, 2] = strain_of_deflection(curvature)[:, None] * shapes.N[:, None]
     return B.reshape(ne, npt, 6, nn * NDOF)
 
 
-def _transverse_shear(at: Interpolation) -> Floats:
-    """B matrix of transverse shear strains xz, yz, equations 2-6 to 2-9: (ne, npt, 2, 5 nn)."""
-    ne, npt, _, nn = at.dN.shape
+def _transverse_shear(shapes: Interpolation) -> Floats:
+    """Return B of transverse shear strains xz, yz, equations 2-6 to 2-9: (ne, npt, 2, 5 nn)."""
+    ne, npt, _, nn = shapes.dN.shape
     B = np.zeros((ne, npt, 2, nn, NDOF))
     for direction in (0, 1):
-        B[:, :, direction, :, 2] = at.dN[:, :, direction]
-        B[:, :, direction, :, 3 + direction] = -at.N
+        B[:, :, direction, :, 2] = shapes.dN[:, :, direction]
+        B[:, :, direction, :, 3 + direction] = -shapes.N
     return B.reshape(ne, npt, 2, nn * NDOF)
 
 
 def transverse_shear(
-    family: ElementBlock, rules: IntegrationRules, at: Interpolation
+    family: ElementBlock, rules: IntegrationRules, shapes: Interpolation
 ) -> tuple[Floats, Floats]:
-    """B matrix of transverse shear strains, (ne, npt, 2, 5 nn), and its points' areas, (ne, npt).
+    """Return B of transverse shear, (ne, npt, 2, 5 nn), and the areas of its points, (ne, npt).
 
-    `at` is the interpolation at the points of bending, which are often those of shear too.
-    :mod:`~fecm.mechanics.strains` has its own points.
+    `shapes` is the interpolation at the points of bending, which often are the points of shear too.
+    Assumed shear strains have their own points.
     """
     if rules.assumes_shear:
         rule = strains.quadrature(family)
         jxw = jacobian_determinants(family, rule) * rule.weights
         return strains.strain_matrix(family, rule), jxw
     if rules.shear is not rules.bending:
-        at = interpolate(family, rules.shear, transposed_jacobian=rules.transposed_jacobian)
-    return _transverse_shear(at), at.jxw
+        shapes = interpolate(family, rules.shear, transposed_jacobian=rules.transposed_jacobian)
+    return _transverse_shear(shapes), shapes.jxw
 
 
 def _integrate(B: Floats, C: Floats, jxw: Floats) -> Floats:
-    """Integral of B' C B by quadrature, (ne, n, n); exactly symmetric."""
+    """Integrate B' C B by quadrature, (ne, n, n); the result is exactly symmetric."""
     ne, npt, rows, n = B.shape
     flat = B.reshape(ne, npt * rows, n)
     weighted = (jxw[:, :, None, None] * (C @ B)).reshape(ne, npt * rows, n)
@@ -101,36 +100,37 @@ def stiffness(
     rules: IntegrationRules,
     curvature: Curvature = FLAT,
 ) -> Floats:
-    """Element stiffness matrices, K_p of equation 4-14, (ne, 5 nn, 5 nn)."""
+    """Return the element stiffness matrices, K_p of equation 4-14, (ne, 5 nn, 5 nn)."""
     ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
-    at = interpolate(family, rules.bending, transposed_jacobian=rules.transposed_jacobian)
-    K = _integrate(membrane_and_bending(at, curvature), ABD, at.jxw)
-    B, jxw = transverse_shear(family, rules, at)
+    shapes = interpolate(family, rules.bending, transposed_jacobian=rules.transposed_jacobian)
+    K = _integrate(membrane_and_bending(shapes, curvature), ABD, shapes.jxw)
+    B, jxw = transverse_shear(family, rules, shapes)
     return K + _integrate(B, laminate.shear, jxw)
 
 
 def geometric_stiffness(
     family: ElementBlock, preload: tuple[float, float, float], rules: IntegrationRules
 ) -> Floats:
-    """Element matrices K_sigma of a uniform membrane force on the slopes of w, (ne, 5 nn, 5 nn).
+    """Return the matrices K_sigma of a uniform membrane force, (ne, 5 nn, 5 nn).
 
-    Integral of (w,x; w,y)' [N_x, N_xy; N_xy, N_y] (w,x; w,y) with the rule of bending, where
-    `preload` is N_x, N_y, N_xy (force/length), tension positive.  Exactly symmetric; indefinite
-    under compression or shear.  Zienkiewicz and Taylor, The Finite Element Method.
+    K_sigma is the integral of (w,x; w,y)' [N_x, N_xy; N_xy, N_y] (w,x; w,y) with the rule of
+    bending.  `preload` is N_x, N_y, N_xy (force/length), tension positive.  The matrices are
+    exactly symmetric, and indefinite under compression or shear.  Zienkiewicz and Taylor, The
+    Finite Element Method.
     """
     n_x, n_y, n_xy = preload
     N = np.array([[n_x, n_xy], [n_xy, n_y]])
-    at = interpolate(family, rules.bending, transposed_jacobian=rules.transposed_jacobian)
+    shapes = interpolate(family, rules.bending, transposed_jacobian=rules.transposed_jacobian)
     ne, nn = family.nodes.shape
     K = np.zeros((ne, nn, NDOF, nn, NDOF))
-    K[:, :, 2, :, 2] = _integrate(at.dN, N, at.jxw)
+    K[:, :, 2, :, 2] = _integrate(shapes.dN, N, shapes.jxw)
     return K.reshape(ne, nn * NDOF, nn * NDOF)
 
 
 def lumped_shares(values: Floats, areas: Floats) -> Floats:
-    """Shares of the nodes in the elements' areas, (ne, nn); see :func:`lumped_mass`.
+    """Return the nodes' shares of the elements' areas, (ne, nn); see :func:`lumped_mass`.
 
-    `values` (npt, nn) are those of the shape functions, `areas` (ne, npt) those of the points.
+    `values` (npt, nn) are the shape functions, `areas` (ne, npt) the areas of the points.
     """
     diagonal = np.einsum("ep,pn->en", areas, values**2)
     return np.asarray(diagonal * (areas.sum(axis=1) / diagonal.sum(axis=1))[:, None])
@@ -142,12 +142,14 @@ def lumped_mass(
     rule: Quadrature,
     determinants: Floats | None = None,
 ) -> Floats:
-    """Lumped element masses: diagonal of the consistent matrix, scaled to the element's mass.
+    """Return the lumped element masses, (ne, nn, 5).
 
-    The listing's MASS01, the method of Hinton, Rock and Zienkiewicz (1976).  Every entry is
-    positive unless a node's shape function is zero at all points, as with order 1 for mid-sides.
-    (ne, nn, 5): mass for u, v, w; mass times length squared for the rotations.  `determinants` are
-    those of the Jacobian at the points of the rule, (ne, npt), if they are known.
+    They are the diagonal of the consistent matrix, scaled to the element's mass: the listing's
+    MASS01, the method of Hinton, Rock and Zienkiewicz (1976).  The entries of u, v and w are
+    masses, the entries of the rotations mass times length squared.  Every entry is positive unless
+    a node's shape function is zero at all points, which happens to mid-sides with order 1.
+    `determinants` are the Jacobian determinants at the points of the rule, (ne, npt), if they are
+    known.
     """
     values, _ = local_shape_functions(family, rule)
     if determinants is None:
@@ -158,12 +160,12 @@ def lumped_mass(
 
 
 def consistent_mass(family: ElementBlock, laminate: LaminateSection, rule: Quadrature) -> Floats:
-    """Consistent element mass matrices, M_p of equation 4-14 (the listing's MASS01).
+    """Return the consistent mass matrices, M_p of equation 4-14, (ne, 5 nn, 5 nn).
 
-    The integral of N_i N_j times the mass per area rho h for u, v and w, and times the rotary
-    inertia rho h^3 / 12 for the rotations; different dofs are not coupled.  (ne, 5 nn, 5 nn),
-    exactly symmetric.  The rule is exact on parallelograms with order 2 for the 4-node element, 3
-    with mid-sides, and 4 for the cubic element.
+    The integral of N_i N_j is multiplied by the mass per area rho h for u, v and w, and by the
+    rotary inertia rho h^3 / 12 for the rotations (the listing's MASS01).  Different dofs are not
+    coupled.  The matrices are exactly symmetric.  On parallelograms the rule is exact with order 2
+    for the 4-node element, order 3 with mid-sides, and order 4 for the cubic element.
     """
     values, _ = local_shape_functions(family, rule)
     area = jacobian_determinants(family, rule) * rule.weights

@@ -1,12 +1,13 @@
 """Element shapes and quadrature on the square -1 <= xi, eta <= 1.
 
-Shape functions are in the order of the node numbers; those of an absent node are zero.  Corners run
-counter-clockwise from (-1, -1) and are always present.  A quadrilateral stays compatible with
-neighbours that have the same nodes on the common side, and reproduces every linear field.
+Shape functions are in the order of the node numbers; the shape functions of an absent node are
+zero.  Corners run counter-clockwise from (-1, -1) and are always present.  A quadrilateral is
+compatible with neighbours that have the same nodes on the common side, and reproduces every linear
+field.
 
 Quadrature points are in the report's order: corners counter-clockwise from (-1, -1), mid-sides
-starting at eta = -1, centre.  Order 4 has the corners of the large square, of the tall and the wide
-rectangle, and of the small square.
+starting at eta = -1, centre.  The points of order 4 are the corners of the large square, of the
+tall rectangle, of the wide rectangle and of the small square.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ import numpy as np
 
 from fecm._typing import Bools, Floats
 
-# Corners, mid-sides from node 5 between corners 1 and 2, centre.
+# Corners, mid-sides (node 5 lies between corners 1 and 2), centre.
 _XI_9 = np.array([-1.0, 1.0, 1.0, -1.0, 0.0, 1.0, 0.0, -1.0, 0.0])
 _ETA_9 = np.array([-1.0, -1.0, 1.0, 1.0, -1.0, 0.0, 1.0, 0.0, 0.0])
 
@@ -27,7 +28,7 @@ _ETA_9 = np.array([-1.0, -1.0, 1.0, 1.0, -1.0, 0.0, 1.0, 0.0, 0.0])
 
 HIGHEST_ORDER = 4
 
-# Points and weights of the Gauss-Legendre rules of the orders 1 to 4.
+# Points and weights of the Gauss-Legendre rules of order 1 to 4.
 _LEGENDRE = (
     ((0.0,), (2.0,)),
     ((-0.5773502691896257, 0.5773502691896257), (1.0, 1.0)),
@@ -54,22 +55,25 @@ class Quadrature:
 
 @cache
 def gauss(order: int) -> Quadrature:
-    """Gauss rule with `order` points in each direction; a ValueError outside 1 to 4."""
+    """Return the Gauss rule with `order` points in each direction.
+
+    Raises ValueError if the order is outside 1 to 4.
+    """
     return _rule(order, equal=False)
 
 
 @cache
 def nodal(order: int) -> Quadrature:
-    """Grid of `order` equally spaced points in each direction, including the edges.
+    """Return a grid of `order` equally spaced points in each direction, including the edges.
 
-    Order 3 gives the nodes of the 9-node element.  Weights are those of the Gauss rule and must not
-    be used for integration.  A ValueError outside 1 to 4.
+    Order 3 gives the nodes of the 9-node element.  The weights are copied from the Gauss rule and
+    must not be used for integration.  Raises ValueError if the order is outside 1 to 4.
     """
     return _rule(order, equal=True)
 
 
 def _rule(order: int, *, equal: bool) -> Quadrature:
-    """Tensor product of Gauss points or of equally spaced ones, in the report's order."""
+    """Return the tensor product of Gauss points or equally spaced points, in the report's order."""
     if not 1 <= order <= HIGHEST_ORDER:
         raise ValueError(f"quadrature order {order} is outside 1 to {HIGHEST_ORDER}")
     points, weights = np.array(_LEGENDRE[order - 1])
@@ -95,7 +99,7 @@ class ElementShape:
     # (nodes,): local coordinates of the nodes.
     xi: Floats
     eta: Floats
-    corners: int  # number of corners, the first nodes, which are never absent
+    corners: int  # number of corners; they are the first nodes and never absent
     numbering: str  # order of the nodes, for messages
     # ``functions(xi, eta, present)`` returns values, d/dxi and d/deta at n points, (3, nodes, n).
     functions: Callable[[Floats, Floats, Bools], Floats]
@@ -106,15 +110,18 @@ class ElementShape:
         return len(self.xi)
 
     def shape_functions(self, xi: Floats, eta: Floats, present: Bools) -> tuple[Floats, Floats]:
-        """Shape functions (n, nodes) and their derivatives by xi and eta (n, 2, nodes)."""
+        """Return shape functions (n, nodes) and derivatives by xi and eta (n, 2, nodes)."""
         S = self.functions(np.asarray(xi, float), np.asarray(eta, float), np.asarray(present))
         return S[0].T.copy(), S[1:].transpose(2, 0, 1).copy()
 
 
 def _triangle(xi: Floats, eta: Floats, present: Bools) -> Floats:
-    """The 4-node quadrilateral with coincident corners 3 and 4 (the listing's SHAPE, NEL = 3)."""
+    """Evaluate the three-node triangle (the listing's SHAPE, NEL = 3).
+
+    It is the 4-node quadrilateral with coincident corners 3 and 4.
+    """
     # The side eta = 1 of the square is collapsed to node 3, where the Jacobian is singular.
-    # Strains are constant: the shape functions are the area coordinates.
+    # The shape functions are the area coordinates, so that strains are constant.
     zero, half = np.zeros_like(xi), np.full_like(xi, 0.5)
     values = [(1.0 - xi) * (1.0 - eta) / 4.0, (1.0 + xi) * (1.0 - eta) / 4.0, (1.0 + eta) / 2.0]
     along_xi = [-(1.0 - eta) / 4.0, (1.0 - eta) / 4.0, zero]
@@ -123,7 +130,7 @@ def _triangle(xi: Floats, eta: Floats, present: Bools) -> Floats:
 
 
 def _bilinear(nodes: int, xi: Floats, eta: Floats) -> Floats:
-    """Bilinear functions of the corners (equation 4-11); those of other nodes are zero."""
+    """Evaluate the bilinear functions of the corners (equation 4-11); other nodes get zeros."""
     S = np.zeros((3, nodes, len(xi)))
     for i, (x, y) in enumerate(zip(_XI_9[:4], _ETA_9[:4], strict=True)):
         a, b = 1.0 + x * xi, 1.0 + y * eta
@@ -132,13 +139,13 @@ def _bilinear(nodes: int, xi: Floats, eta: Floats) -> Floats:
 
 
 def _present(nodes: Iterable[int], present: Bools) -> list[int]:
-    """Nodes that are present; the functions of the others stay zero."""
+    """Select the nodes that are present; the functions of absent nodes stay zero."""
     return [i for i in nodes if present[i]]
 
 
 def _quadratic(xi: Floats, eta: Floats, present: Bools) -> Floats:
-    """Four to nine nodes (equations 4-7 ff.)."""
-    # First each function without the other nodes of its side.
+    """Evaluate the functions of four to nine nodes (equations 4-7 ff.)."""
+    # First compute each function without the other nodes of its side.
     S = _bilinear(9, xi, eta)
     for i in _present((4, 6), present):  # mid-sides at eta = -1 and +1
         a, b = 1.0 - xi**2, 1.0 + _ETA_9[i] * eta
@@ -171,8 +178,8 @@ _FAR = ((7, 9), (4, 10), (5, 11), (6, 8))
 
 
 def _cubic(xi: Floats, eta: Floats, present: Bools) -> Floats:
-    """Four to twelve nodes (the listing's SHAP3 and CSHAPE)."""
-    # First each function without the other nodes of its side.
+    """Evaluate the functions of four to twelve nodes (the listing's SHAP3 and CSHAPE)."""
+    # First compute each function without the other nodes of its side.
     S = _bilinear(12, xi, eta)
     for i in _present((4, 6, 9, 11), present):  # third points at eta = -1 and +1
         f, slope = _side(xi, _XI_12[i])
@@ -190,7 +197,10 @@ def _cubic(xi: Floats, eta: Floats, present: Bools) -> Floats:
 
 
 def _side(t: Floats, node: float) -> tuple[Floats, Floats]:
-    """Cubic along a side, 1 at one third point and 0 at the other and the ends, and its slope."""
+    """Evaluate a cubic along a side, and its slope.
+
+    The cubic is 1 at the third point `node`, and 0 at the other third point and at both ends.
+    """
     f = 9.0 / 16.0 * (1.0 - t**2) * (1.0 + 9.0 * node * t)
     return f, 9.0 / 16.0 * (9.0 * node - 2.0 * t - 27.0 * node * t**2)
 

@@ -1,7 +1,7 @@
 """Largest exposures over time, in the elements and on the circle around the load.
 
-Exposures of plies are largest on this circle, r = R, and no point of an element lies on it.
-Strains are interpolated in the elements; where elements meet, they are the mean of both.
+Exposures of plies are largest on this circle, r = R, but no point of an element lies on it.
+Strains are therefore interpolated in the elements.  Where elements meet, the strains are averaged.
 """
 
 from __future__ import annotations
@@ -24,15 +24,15 @@ from fecm.mechanics.points import containing_elements
 from fecm.mechanics.strains import FLAT, Curvature, strain_of_deflection
 
 Numbers = NDArray[np.int64]
-NOWHERE = -1  # number of the state of a criterion none of whose exposures counts
-# Exposures that differ by less than this share are equal: rounding does not decide which is the
-# largest, nor when.  kernels.c has it too.
+NOWHERE = -1  # state of a criterion without an exposure that counts
+# Exposures that differ by less than this share are equal, so that rounding decides neither which
+# exposure is the largest nor when.  kernels.c has the same constant.
 TIE = 1.0e-9
 
 
 @dataclass
 class Maxima:
-    """Largest exposure of every state so far, its time and mode."""
+    """Largest exposure of every state so far, with its time and mode."""
 
     exposure: Floats
     time: Floats
@@ -40,26 +40,26 @@ class Maxima:
 
     @classmethod
     def none(cls, *shape: int) -> Maxima:
-        """No exposure yet."""
+        """Return zeros: no exposure yet."""
         return cls(np.zeros(shape), np.zeros(shape), np.zeros(shape, np.int8))
 
 
 @dataclass
 class Largest:
-    """Largest exposure so far of each criterion, of those that count.
+    """Largest exposure of each criterion so far, among the exposures that count.
 
     The interlaminar criterion comes last.  Ties go to the lowest number.
     """
 
-    exposure: Floats  # (criteria,); NaN where none counts
-    state: Numbers  # (criteria,): number among the evaluated states, or the interfaces; or NOWHERE
+    exposure: Floats  # (criteria,); NaN if no exposure counts
+    state: Numbers  # (criteria,): number of the evaluated state, or of the interface; or NOWHERE
     mode: Codes  # (criteria,)
-    # (criteria, 6): midplane strains and curvatures at its point when it was reached.
+    # (criteria, 6): midplane strains and curvatures at the point when the exposure was reached.
     strain: Floats
 
     @classmethod
     def none(cls, count: int) -> Largest:
-        """No exposure yet, of so many criteria."""
+        """Return the start for `count` criteria: no exposure yet."""
         states = np.full(count, NOWHERE, dtype=np.int64)
         return cls(np.full(count, np.nan), states, np.zeros(count, np.int8), np.zeros((count, 6)))
 
@@ -68,68 +68,70 @@ class Largest:
 class FailureEnvelope:
     """Largest exposures over time, in arrays that are changed in place."""
 
-    # (criteria, states): states are points and those that a monitor evaluates at each; UNKNOWN of
-    # plies without strengths or that an element lacks, and of those that a criterion is not
+    # (criteria, states): the states that a monitor evaluates at each point.  UNKNOWN for plies
+    # without strengths, for plies that an element lacks, and for plies that a criterion is not
     # evaluated for.
     plies: Maxima
-    # (elements, plies - 1); NaN where there is none, or no strength, or an element lacks nodes.
+    # (elements, plies - 1); NaN if an interface or its strength is missing, or an element lacks
+    # nodes.
     interfaces: Maxima
     largest: Largest
-    # Structures of the kernels that point to these arrays; no checkpoint has it.
+    # Structures of the kernels that point to these arrays.  Checkpoints do not store them.
     kept: object = field(default=None, init=False, repr=False, compare=False)
     # Exposures on the circle around the load; None without a load.
     circle: FailureEnvelope | None = None
 
     def find_largest(self, counts: Bools, far: Bools, strains: Floats | None = None) -> None:
-        """Find the largest exposures of the points, (elements, points), and elements that count.
+        """Find the largest exposures among the points and elements that count.
 
-        The strains, (elements, points, 6), are those of the exposures that have just risen.
+        `counts` (elements, points) marks points, `far` (elements,) marks elements for the
+        interfaces.  `strains` (elements, points, 6) belong to the exposures that have just risen.
         """
         largest, plies = self.largest, self.plies
-        of_point = plies.exposure.shape[1] // counts.size
-        for number, state in enumerate(_of_plies(plies.exposure, counts).tolist()):
+        states_per_point = plies.exposure.shape[1] // counts.size
+        for number, state in enumerate(_largest_states(plies.exposure, counts).tolist()):
             exposure = np.nan if state == NOWHERE else plies.exposure[number, state]
-            risen = exposure > largest.exposure[number] or state != largest.state[number]
-            if strains is not None and risen:
-                largest.strain[number] = strains.reshape(-1, 6)[state // of_point]
+            has_risen = exposure > largest.exposure[number] or state != largest.state[number]
+            if strains is not None and has_risen:
+                largest.strain[number] = strains.reshape(-1, 6)[state // states_per_point]
             largest.exposure[number], largest.state[number] = exposure, state
             largest.mode[number] = 0 if state == NOWHERE else plies.mode[number, state]
-        between = self.interfaces
-        largest.state[-1] = state = _of_interfaces(between.exposure, far)
-        largest.exposure[-1] = np.nan if state == NOWHERE else between.exposure.flat[state]
-        largest.mode[-1] = 0 if state == NOWHERE else between.mode.flat[state]
+        interfaces = self.interfaces
+        largest.state[-1] = state = _largest_interface(interfaces.exposure, far)
+        largest.exposure[-1] = np.nan if state == NOWHERE else interfaces.exposure.flat[state]
+        largest.mode[-1] = 0 if state == NOWHERE else interfaces.mode.flat[state]
 
 
-def _of_plies(exposure: Floats, counts: Bools) -> Indices:
-    """State of the largest exposure of each criterion, (criteria,), of points that count."""
-    at = counts.ravel()
-    if not at.any():
+def _largest_states(exposure: Floats, counts: Bools) -> Indices:
+    """Return the state of each criterion's largest exposure, (criteria,), at points that count."""
+    is_counted = counts.ravel()
+    if not is_counted.any():
         return np.full(len(exposure), NOWHERE)
-    of_point = exposure.reshape(len(exposure), at.size, -1)
-    points = first_of_largest(np.where(at, of_point.max(axis=2), -np.inf))
+    by_point = exposure.reshape(len(exposure), is_counted.size, -1)
+    points = first_of_largest(np.where(is_counted, by_point.max(axis=2), -np.inf))
     criteria = np.arange(len(exposure))
-    states = first_of_largest(of_point[criteria, points])
-    found = points * of_point.shape[2] + states
-    # Below 0 where no ply has strengths.
-    return np.where(exposure[criteria, found] < 0.0, NOWHERE, found)
+    states = first_of_largest(by_point[criteria, points])
+    largest = points * by_point.shape[2] + states
+    # The exposure is below 0 if no ply has strengths.
+    return np.where(exposure[criteria, largest] < 0.0, NOWHERE, largest)
 
 
-def _of_interfaces(exposure: Floats, far: Bools) -> int:
-    """Number of the interface with the largest exposure, of elements that count."""
-    known = np.where(far[:, None] & np.isfinite(exposure), exposure, -1.0)
-    if not (known >= 0.0).any():
+def _largest_interface(exposure: Floats, far: Bools) -> int:
+    """Return the number of the interface with the largest exposure in elements that count."""
+    counted = np.where(far[:, None] & np.isfinite(exposure), exposure, -1.0)
+    if not (counted >= 0.0).any():
         return NOWHERE
-    return int(first_of_largest(known.ravel()))
+    return int(first_of_largest(counted.ravel()))
 
 
 def first_of_largest(exposures: Floats) -> Indices:
-    """Position along the last axis of the first exposure that is the largest, but for a tie."""
+    """Return the first position along the last axis of the largest exposure, up to a tie."""
     largest = exposures.max(axis=-1, keepdims=True)
     return np.asarray((exposures >= largest - TIE * np.abs(largest)).argmax(axis=-1))
 
 
 class Evaluations(NamedTuple):
-    """Largest exposures that count after each of some evaluations; see :class:`Largest`."""
+    """Largest exposures that count, after each evaluation; see :class:`Largest`."""
 
     # (evaluations, criteria) each.
     exposure: Floats
@@ -138,7 +140,7 @@ class Evaluations(NamedTuple):
 
     @classmethod
     def of(cls, rows: Sequence[Largest]) -> Self:
-        """Those of some evaluations."""
+        """Stack the largest exposures after each evaluation."""
         return cls(
             np.array([row.exposure for row in rows]),
             np.array([row.state for row in rows]),
@@ -148,22 +150,22 @@ class Evaluations(NamedTuple):
 
 @dataclass(frozen=True)
 class PlyPoints:
-    """Coordinates of the points of the plies, (elements, points)."""
+    """Coordinates of the points at which plies are evaluated, (elements, points)."""
 
     x: Floats
     y: Floats
 
     @cached_property
     def centres(self) -> tuple[Floats, Floats]:
-        """Means of the points of each element, (elements,): x and y."""
+        """Mean x and y of the points of each element, (elements,)."""
         return self.x.mean(axis=1), self.y.mean(axis=1)
 
 
-ANGLES = 48  # points of a whole circle, from the x-axis on
+ANGLES = 48  # points of a whole circle, starting at the x-axis
 
 
 class CircleStresses(PlyStresses):
-    """Stresses of plies at the points of a circle, each of which counts as an element of one point.
+    """Stresses of plies at the points of a circle.  Each point counts as an element of one point.
 
     Parameters
     ----------
@@ -172,7 +174,7 @@ class CircleStresses(PlyStresses):
     centre : tuple of float
         Place of the load, length.
     radius : float
-        Radius R of the circle, length.  Points beyond the edge of the plate are left out.
+        Radius R of the circle, length.  Points outside the plate are left out.
     laminates : Zones
         Laminates with the rows of their elements.
     initial, curvature, nonlinear, stretches
@@ -201,18 +203,18 @@ class CircleStresses(PlyStresses):
         on_plate = np.unique([entry[0] for entry in entries]).astype(np.intp)
         self.points = points[on_plate]  # (n, 2)
         self.elements = np.unique([entry[1] for entry in entries]).astype(np.intp)  # on the circle
-        # Shape functions and their slopes of the elements that have a point, filled with zeros.
-        most = max((element.nodes.shape[1] for _, _, element, _ in entries), default=1)
-        self._nodes = np.zeros((len(entries), most), dtype=np.intp)
-        self._shapes = np.zeros((len(entries), 3, most))
+        # Shape functions and slopes of the elements that contain a point, padded with zeros.
+        most_nodes = max((element.nodes.shape[1] for _, _, element, _ in entries), default=1)
+        self._nodes = np.zeros((len(entries), most_nodes), dtype=np.intp)
+        self._shapes = np.zeros((len(entries), 3, most_nodes))
         self._means = np.zeros((len(on_plate), len(entries)))
-        rows = np.zeros(len(on_plate), dtype=np.intp)  # of an element with each point
+        rows = np.zeros(len(on_plate), dtype=np.intp)  # row of one element that contains each point
         for entry, (number, row, element, xi) in enumerate(entries):
-            at = interpolate(element, Quadrature(xi[:1], xi[1:], np.ones(1)))
+            shapes = interpolate(element, Quadrature(xi[:1], xi[1:], np.ones(1)))
             count = element.nodes.shape[1]
             self._nodes[entry, :count] = element.nodes[0]
-            self._shapes[entry, 0, :count] = at.N[0]
-            self._shapes[entry, 1:, :count] = at.dN[0, 0]
+            self._shapes[entry, 0, :count] = shapes.N[0]
+            self._shapes[entry, 1:, :count] = shapes.dN[0, 0]
             point = np.searchsorted(on_plate, number)
             self._means[point, entry] = 1.0
             rows[point] = row
@@ -226,11 +228,11 @@ class CircleStresses(PlyStresses):
 
     @property
     def families(self) -> list[tuple[ElementBlock, bool]]:
-        """No elements of its own."""
+        """Empty: the points have no elements of their own."""
         return []
 
     def strains(self, field: Floats) -> tuple[Floats, Floats]:
-        """Strains of a displacement field, (numnp, 5), at the points, (n, 1, 6); no gradients."""
+        """Return the strains of a field (numnp, 5) at the points, (n, 1, 6); gradients are NaN."""
         q = field[self._nodes]  # (entries, nodes, 5)
         values = (self._means @ (self._shapes @ q).reshape(len(q), -1)).reshape(-1, 3, 5)
         slopes = values[:, 1:]
@@ -245,5 +247,5 @@ class CircleStresses(PlyStresses):
 
 
 def _points_in(rows: Indices, members: Indices | slice) -> Indices | slice:
-    """Points whose element is among some; all of them where these are all elements."""
+    """Return the points whose element is in `members`; a slice selects all points."""
     return members if isinstance(members, slice) else np.flatnonzero(np.isin(rows, members))

@@ -1,10 +1,10 @@
-"""Failure criteria of plies, fecm's own and those that users define: exposure and mode.
+"""Failure criteria of plies, built-in and user-defined: exposure and mode.
 
-The exposure f = 1/R is the reciprocal of the factor on all stresses that reaches failure; without
+The exposure f = 1/R is the reciprocal of the factor on all stresses that reaches failure.  Without
 residual stresses it is linear in the load.  Stresses are in the axes of the ply; a ply fails at
-f = 1.  Criteria: maximum stress, Tsai and Wu 1971, Hashin 1980 (with S_T = YC/2, for which the
-compressive matrix criterion is a sum of squares), Puck's plane criterion (Puck and Schürmann 1998)
-of unidirectional plies, and a quadratic criterion of the interlaminar shear stresses.
+f = 1.  The criteria are maximum stress, Tsai and Wu 1971, Hashin 1980 (with S_T = YC/2, for which
+the compressive matrix criterion is a sum of squares), Puck's plane criterion (Puck and Schürmann
+1998) of unidirectional plies, and a quadratic criterion of the interlaminar shear stresses.
 """
 
 from __future__ import annotations
@@ -38,20 +38,20 @@ MODES = (
     "interlaminar shear",
 )
 
-LARGEST_FACTOR = 1e9  # on stresses, beyond which they don't lead to failure
-FACTOR_ERROR = 1e-12  # relative
+LARGEST_FACTOR = 1e9  # stresses that reach failure only at a larger factor don't lead to failure
+FACTOR_ERROR = 1e-12  # relative error of a factor
 
 Codes = NDArray[np.int8]
-# Values of a criterion by mode; the exposure is the largest.
+# Values of a criterion by mode.  The largest value is the exposure.
 Candidates = tuple[tuple[str, Floats], ...]
 
 
-# Attributes that need not be assignable, without methods, whose definition takes 0.4 ms.
+# Frozen, so that read-only attributes match; without generated methods, which take 0.4 ms.
 @dataclass(frozen=True, init=False, eq=False, repr=False, match_args=False)
 class Strengths(Protocol):
     """Strengths of a ply, all positive (force/area), and dimensionless constants."""
 
-    # Along and across the fibres, in tension and compression; in shear.
+    # Strengths along and across the fibres, in tension and compression; strengths in shear.
     xt: float
     xc: float
     yt: float
@@ -68,19 +68,22 @@ class Strengths(Protocol):
 def largest_modes(
     candidates: Candidates, where: Indices | None = None, modes: Sequence[str] = MODES
 ) -> Codes:
-    """Mode of the largest candidate, the first one of equals, at all or some flat indices."""
+    """Return the mode of the largest candidate at all or some flat indices.
+
+    Ties go to the first candidate.
+    """
     values = np.stack([v if where is None else v.ravel()[where] for _, v in candidates])
     codes = np.array([modes.index(mode) for mode, _ in candidates], np.int8)
     return np.where(values.max(axis=0) > 0.0, codes[values.argmax(axis=0)], 0).astype(np.int8)
 
 
 def exposure_of(candidates: Candidates) -> Floats:
-    """Largest candidate."""
+    """Return the largest candidate."""
     return reduce(np.maximum, [value for _, value in candidates])
 
 
 def max_stress(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
-    """Ratios of the stresses to their strengths."""
+    """Return the ratios of the stresses to their strengths."""
     return (
         ("fibre tension", s1 / ply.xt),
         ("fibre compression", s1 / -ply.xc),
@@ -91,7 +94,7 @@ def max_stress(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidate
 
 
 def tsai_wu(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
-    """Positive root f of f^2 - l f - q = 0, with the linear and the quadratic terms l and q."""
+    """Return the positive root f of f^2 - l f - q = 0, with linear and quadratic terms l, q."""
     x, y = ply.xt * ply.xc, ply.yt * ply.yc
     q = s1 * (s1 / x + (2.0 * ply.f12 / math.sqrt(x * y)) * s2) + s2**2 / y + (tau / ply.s12) ** 2
     linear = s1 * (1.0 / ply.xt - 1.0 / ply.xc) + s2 * (1.0 / ply.yt - 1.0 / ply.yc)
@@ -99,26 +102,26 @@ def tsai_wu(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
 
 
 def hashin(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
-    """Fibre and matrix failure, each in tension and in compression."""
+    """Return exposures of fibre and matrix failure, each in tension and in compression."""
     shear = (tau / ply.s12) ** 2
     matrix = np.where(s2 >= 0.0, s2 / ply.yt, s2 / ply.yc)
-    both = np.sqrt(matrix**2 + shear)
+    combined = np.sqrt(matrix**2 + shear)
     fibre = np.sqrt((s1 / ply.xt) ** 2 + shear)
     return (
         ("fibre tension", np.where(s1 >= 0.0, fibre, 0.0)),
         ("fibre compression", s1 / -ply.xc),
-        ("matrix tension", np.where(s2 >= 0.0, both, 0.0)),
-        ("matrix compression", np.where(s2 < 0.0, both, 0.0)),
+        ("matrix tension", np.where(s2 >= 0.0, combined, 0.0)),
+        ("matrix compression", np.where(s2 < 0.0, combined, 0.0)),
     )
 
 
 def puck(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
-    """Fibre failure by its stress, inter-fibre failure in the modes A, B and C."""
+    """Return exposures of fibre failure, and of inter-fibre failure in the modes A, B and C."""
     s, yc, plus, minus = ply.s12, ply.yc, puck_slope(ply), ply.p_minus
     resistance, critical = puck_limits(ply)
     slope = minus * resistance / s
     t, pressed = np.abs(tau), s2 < 0.0
-    # A in tension and B in compression have the same form.
+    # Mode A in tension and mode B in compression have the same form.
     factor = np.where(pressed, minus / s, 1.0 / ply.yt - plus / s) * s2
     ab = np.sqrt((t / s) ** 2 + factor**2) + np.where(pressed, minus / s, plus / s) * s2
     steep = pressed & (-s2 * critical > t * resistance)
@@ -134,12 +137,15 @@ def puck(ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
 
 
 def puck_slope(ply: Strengths) -> float:
-    """Slope p+ in tension, at most S12/YT, where the envelope is straight; it is concave beyond."""
+    """Return the slope p+ in tension, at most S12/YT.
+
+    The envelope is straight at S12/YT, and concave beyond.
+    """
     return min(ply.p_plus, ply.s12 / ply.yt)
 
 
 def puck_limits(ply: Strengths) -> tuple[float, float]:
-    """Fracture resistance R_A of the action plane, and shear stress tau_c where B meets C."""
+    """Return the fracture resistance R_A of the action plane, and tau_c where B meets C."""
     s, minus = ply.s12, ply.p_minus
     resistance = s / (2.0 * minus) * (math.sqrt(1.0 + 2.0 * minus * ply.yc / s) - 1.0)
     return resistance, s * math.sqrt(1.0 + 2.0 * minus * resistance / s)
@@ -156,7 +162,7 @@ UNIDIRECTIONAL = ("puck",)  # criteria that hold for fibres in one direction
 
 
 def is_evaluated(criterion: str, *, fabric: bool) -> bool:
-    """Whether a criterion is evaluated for a ply; Puck's is not for a fabric."""
+    """Return whether a criterion is evaluated for a ply; Puck's is not evaluated for a fabric."""
     return not (fabric and criterion in UNIDIRECTIONAL)
 
 
@@ -175,12 +181,12 @@ def largest_in_plies(
     stresses: Floats,
     criteria: Mapping[str, Criterion] = CRITERIA,
 ) -> list[PlyExposure]:
-    """Largest exposure of each criterion under stresses of the plies, (plies, faces, 3).
+    """Return the largest exposure of each criterion under ply stresses, (plies, faces, 3).
 
-    Strengths of a ply are None where they are not given; without any the list is empty.  A
-    criterion that no ply is evaluated for is not in it.
+    The strengths of a ply may be None.  A criterion that is evaluated for no ply is left out of the
+    list.
     """
-    found = []
+    largest = []
     for name, criterion in criteria.items():
         exposures = [
             _largest_in_ply(criterion, name, ply, number, stresses[number])
@@ -188,14 +194,14 @@ def largest_in_plies(
             if ply is not None and is_evaluated(name, fabric=is_fabric(plies[number]))
         ]
         if exposures:
-            found.append(max(exposures, key=lambda one: one.exposure))
-    return found
+            largest.append(max(exposures, key=lambda entry: entry.exposure))
+    return largest
 
 
 def _largest_in_ply(
     criterion: Criterion, name: str, ply: Strengths, number: int, stresses: Floats
 ) -> PlyExposure:
-    """Largest exposure of a ply under the stresses of its faces, (faces, 3)."""
+    """Return the largest exposure of a ply under the stresses of its faces, (faces, 3)."""
     candidates = criterion(ply, *stresses.T)
     exposure = exposure_of(candidates)
     worst = int(exposure.argmax())
@@ -207,10 +213,10 @@ def _largest_in_ply(
 def failure_load_factor(
     ply: Strengths, criterion: Criterion, at_rest: Floats, added: Floats
 ) -> float:
-    """Factor on stresses `added` to those at rest, (3,) each, at which the exposure is 1.
+    """Return the factor on the stresses `added` to `at_rest`, (3,) each, at which f is 1.
 
-    By bisection, as the exposure is not proportional to the factor.  0 if the stresses at rest
-    reach 1 alone, infinite if no factor does.
+    The factor is found by bisection, because the exposure f is not proportional to it.  It is 0 if
+    the stresses at rest reach f = 1 on their own, and infinite if no factor reaches f = 1.
     """
 
     def exposure(factor: float) -> float:
@@ -233,27 +239,27 @@ def failure_load_factor(
 def interlaminar(
     s13: float | Floats, s23: float | Floats, tau_13: Floats, tau_23: Floats
 ) -> Floats:
-    """Quadratic sum of the interlaminar shear stresses over their strengths, in a ply's axes."""
+    """Return the root of the summed squares of tau_13 and tau_23 over their strengths."""
     return np.hypot(tau_13 / s13, tau_23 / s23)
 
 
-MOST_MODES = 32  # of one criterion
-MOST_CODES = 127  # codes of the modes of all criteria are stored as int8
-ROUNDING = 1e-9  # size of a negative exposure that is rounding
-# Other names of a result's group `failure`, and of the criterion of the interfaces.
+MOST_MODES = 32  # modes of one criterion
+MOST_CODES = 127  # modes of all criteria, whose codes are stored as int8
+ROUNDING = 1e-9  # a negative exposure of this size is rounding
+# Other names in a result's group `failure`, and the name of the interlaminar criterion.
 RESERVED = ("x", "y", "under_load", "interlaminar")
 
 
 class CriterionError(FecmError, ValueError):
-    """A user's failure criterion raises an exception, or does not return exposures."""
+    """A user's failure criterion raises an exception or does not return exposures."""
 
 
 @runtime_checkable
 class FailureCriterion(Protocol):
-    """A failure criterion of plies, for FAIL to evaluate beside its own.
+    """A failure criterion of plies that FAIL evaluates beside its own criteria.
 
     The exposure is the reciprocal of the factor on all stresses at which the ply fails: it is 0
-    without stress, and 1 at failure.  Of a quadratic criterion it is the square root.
+    without stress, and 1 at failure.  The exposure of a quadratic criterion is the square root.
 
     Examples
     --------
@@ -266,7 +272,7 @@ class FailureCriterion(Protocol):
     ...     square = (s1 / x) ** 2 - s1 * s2 / (x * y) + (s2 / y) ** 2 + (tau / ply.s12) ** 2
     ...     return np.sqrt(square)
 
-    Two modes of failure, of which the larger exposure counts:
+    Two modes of failure; the larger exposure counts:
 
     >>> def two_modes(ply, s1, s2, tau):
     ...     return {"fibre": abs(s1) / ply.xt, "matrix": np.hypot(s2 / ply.yt, tau / ply.s12)}
@@ -275,68 +281,70 @@ class FailureCriterion(Protocol):
     def __call__(
         self, ply: Strengths, s1: Floats, s2: Floats, tau: Floats, /
     ) -> Floats | Mapping[str, Floats]:
-        """Exposures under many states of stress, in an array of their shape or one for each mode.
+        """Return exposures under many states of stress, as an array or as an array per mode.
 
-        The stresses (force/area) are those along and across the fibres, and the shear stress, in
-        the axes of the ply.
+        Each array has the shape of the stresses.  The stresses (force/area) are along the fibres,
+        across the fibres, and in shear, in the axes of the ply.
         """
 
 
 class OwnCriterion:
-    """A user's criterion, whose exposures are checked; :class:`CriterionError` names the stress."""
+    """A user's criterion with checked exposures.  :class:`CriterionError` names the stress."""
 
     def __init__(self, name: str, function: FailureCriterion) -> None:
         self.name, self._function = name, function
         self.modes: tuple[str, ...] = ()
 
     def with_modes(self, ply: Strengths) -> OwnCriterion:
-        """The same with the modes of failure that it returns for a ply without stress."""
-        made = OwnCriterion(self.name, self._function)
-        made.modes = tuple(mode for mode, _ in made(ply, *np.zeros((3, 1, 1))))
-        return made
+        """Return the criterion with the modes that it returns for a ply without stress."""
+        criterion = OwnCriterion(self.name, self._function)
+        criterion.modes = tuple(mode for mode, _ in criterion(ply, *np.zeros((3, 1, 1))))
+        return criterion
 
     def __call__(self, ply: Strengths, s1: Floats, s2: Floats, tau: Floats) -> Candidates:
-        """Exposures by mode."""
+        """Return the exposures by mode."""
         try:
-            found = self._function(ply, s1, s2, tau)
+            result = self._function(ply, s1, s2, tau)
         except Exception as error:
             raise self._error(f"failed with {type(error).__name__}: {error}") from error
-        by_mode = found if isinstance(found, Mapping) else {self.name.replace("_", " "): found}
+        by_mode = result if isinstance(result, Mapping) else {self.name.replace("_", " "): result}
         if not by_mode or not all(isinstance(mode, str) for mode in by_mode):
-            raise self._error(f"returned {found!r}, not exposures by the names of modes")
+            raise self._error(f"returned {result!r}, not exposures by the names of modes")
         if len(by_mode) > MOST_MODES:
             raise self._error(f"returned {len(by_mode)} modes; at most {MOST_MODES} are allowed")
         if names := [mode for mode in by_mode if not mode.isprintable()]:
             raise self._error(
                 f"returned the mode {names[0]!r}; the names of modes are printable texts"
             )
-        if self.modes and (new := [mode for mode in by_mode if mode not in self.modes]):
+        if self.modes and (unknown := [mode for mode in by_mode if mode not in self.modes]):
             raise self._error(
-                f"returned the mode {new[0]!r}, and without stress {', '.join(self.modes)}: "
+                f"returned the mode {unknown[0]!r}, and without stress {', '.join(self.modes)}: "
                 "return all modes, 0 where one does not apply"
             )
-        made = tuple((mode, self._checked(v, s1, s2, tau)) for mode, v in by_mode.items())
-        largest = exposure_of(made)
+        candidates = tuple(
+            (mode, self._check_values(v, s1, s2, tau)) for mode, v in by_mode.items()
+        )
+        largest = exposure_of(candidates)
         if (wrong := largest < -ROUNDING).any():
             text = "return 0 where the criterion does not apply"
             raise self._wrong_value(largest, wrong, s1, s2, tau, f"; {text}")
-        return made
+        return candidates
 
     def _wrong_value(
         self, exposure: Floats, wrong: Bools, s1: Floats, s2: Floats, tau: Floats, hint: str = ""
     ) -> CriterionError:
-        """Error that names the first wrong exposure and its stresses."""
+        """Return an error that names the first wrong exposure and its stresses."""
         first = tuple(np.argwhere(wrong)[0].tolist())
         where = f"sigma_1 = {s1[first]:.6g}, sigma_2 = {s2[first]:.6g}, tau_12 = {tau[first]:.6g}"
         return self._error(f"returned {exposure[first]:g} for {where}{hint}")
 
-    def _checked(self, values: object, s1: Floats, s2: Floats, tau: Floats) -> Floats:
-        """Exposures of one mode as numbers."""
+    def _check_values(self, values: object, s1: Floats, s2: Floats, tau: Floats) -> Floats:
+        """Return the exposures of one mode as an array of floats."""
         try:
-            given = np.asarray(values)
-            if given.dtype.kind not in "fiu":  # neither complex numbers nor booleans
+            array = np.asarray(values)
+            if array.dtype.kind not in "fiu":  # neither complex numbers nor booleans
                 raise TypeError
-            exposure = given.astype(float)
+            exposure = array.astype(float)
         except (TypeError, ValueError, OverflowError):
             raise self._error(f"returned {reprlib.repr(values)}, not real numbers") from None
         if exposure.shape != s1.shape:
@@ -344,7 +352,7 @@ class OwnCriterion:
                 f"returned an array of the shape {exposure.shape} for stresses of {s1.shape}"
             )
         wrong = ~np.isfinite(exposure)
-        # Stresses that are not finite are those of a diverging motion.
+        # Stresses that are not finite belong to a diverging motion.
         wrong &= np.isfinite(s1) & np.isfinite(s2) & np.isfinite(tau)
         if wrong.any():
             raise self._wrong_value(exposure, wrong, s1, s2, tau)
@@ -354,38 +362,38 @@ class OwnCriterion:
         return CriterionError(f"failure criterion {self.name} {fault}")
 
 
-def own_criteria(given: Iterable[FailureCriterion | str]) -> tuple[OwnCriterion, ...]:
-    """The criteria that a user gives, as functions or by the names of entry points.
+def own_criteria(user_criteria: Iterable[FailureCriterion | str]) -> tuple[OwnCriterion, ...]:
+    """Return the user's criteria, passed as functions or as names of entry points.
 
-    A function has its own name.  Raises CriterionError if one can't be used, ExtensionError if no
-    package has the name.
+    A function keeps its own name.  Raises CriterionError if a criterion can't be used,
+    ExtensionError if no package has the name.
     """
-    if isinstance(given, str) or not isinstance(given, Iterable):
-        raise CriterionError(f"criteria is {given!r}; pass a list of functions or names")
-    found: dict[str, OwnCriterion] = {}
-    for one in given:
-        if isinstance(one, OwnCriterion):
-            found[one.name] = one
+    if isinstance(user_criteria, str) or not isinstance(user_criteria, Iterable):
+        raise CriterionError(f"criteria is {user_criteria!r}; pass a list of functions or names")
+    criteria: dict[str, OwnCriterion] = {}
+    for item in user_criteria:
+        if isinstance(item, OwnCriterion):
+            criteria[item.name] = item
             continue
-        name = one if isinstance(one, str) else getattr(one, "__name__", type(one).__name__)
-        function = installed(EntryPoints.CRITERIA, one) if isinstance(one, str) else one
+        name = item if isinstance(item, str) else getattr(item, "__name__", type(item).__name__)
+        function = installed(EntryPoints.CRITERIA, item) if isinstance(item, str) else item
         if not callable(function) or isinstance(function, type):
             raise CriterionError(f"failure criterion {name} is {function!r}, not a function")
         if not name.isidentifier():
             raise CriterionError(f"failure criterion {name}: a function with a name is needed")
-        if name in CRITERIA or name in RESERVED or name in found:
+        if name in CRITERIA or name in RESERVED or name in criteria:
             raise CriterionError(f"failure criterion {name}: there is another one of this name")
-        found[name] = OwnCriterion(name, function)
-    return tuple(found.values())
+        criteria[name] = OwnCriterion(name, function)
+    return tuple(criteria.values())
 
 
-def with_own(own: Iterable[OwnCriterion]) -> tuple[dict[str, Criterion], tuple[str, ...]]:
-    """All criteria of a run by name, and the modes of failure that their codes mean."""
+def with_own(user_criteria: Iterable[OwnCriterion]) -> tuple[dict[str, Criterion], tuple[str, ...]]:
+    """Return all criteria of a run by name, and the modes of failure by code."""
     criteria: dict[str, Criterion] = {**CRITERIA}
     modes = dict.fromkeys(MODES)
-    for one in own:
-        criteria[one.name] = one
-        modes |= dict.fromkeys(one.modes)
+    for criterion in user_criteria:
+        criteria[criterion.name] = criterion
+        modes |= dict.fromkeys(criterion.modes)
     if len(modes) > MOST_CODES:
         raise CriterionError(
             f"the failure criteria have {len(modes)} modes; at most {MOST_CODES} are allowed"

@@ -1,12 +1,12 @@
 """Failure criteria of plies over time: the largest exposures of all states of stress (FAIL).
 
-A state of stress is a ply at one of its faces, at a point of the plate.  Exposures are evaluated of
-all states, modes only where an exposure rises.
+A state of stress is a face of a ply at a point of the plate.  Exposures are evaluated for all
+states, modes only where an exposure rises.
 
-Where a plate without residual stresses only bends, stresses are proportional to z, and so are
-exposures: of plies of the same stiffness and strengths, on one side of the midplane, the state
-farthest from it has the largest, and represents the others.  A monitor may evaluate these
-:class:`Representatives` alone.
+In a plate that only bends, without residual stresses, stresses and exposures are proportional to z.
+Among plies of the same stiffness and strengths on one side of the midplane, the state farthest from
+the midplane has the largest exposure and represents the other states.  A monitor may evaluate only
+these :class:`Representatives`.
 """
 
 from __future__ import annotations
@@ -36,86 +36,88 @@ from fecm.mechanics.laminate import PlyConstants, is_fabric
 from fecm.mechanics.ply_stresses import ElementZone, PlyStresses
 from fecm.mechanics.strains import Rows
 
-# Points per matrix product: so few that BLAS uses one thread.
+# Points per matrix product, few enough for BLAS to use one thread.
 BLOCK = 512
 
-UNKNOWN = -1.0  # exposure that no criterion can find
-# Strengths of all plies, or of the plies of each laminate, None where they are not given.
+UNKNOWN = -1.0  # exposure that no criterion returns
+# Strengths of all plies, or of the plies of each laminate; None for a ply without strengths.
 AllStrengths = failure.Strengths | Sequence[Sequence[failure.Strengths | None]]
 
 
 class PlyRun(NamedTuple):
-    """Neighbouring plies of the same strengths: states from the lower face of one to another's."""
+    """Neighbouring plies of the same strengths, as a slice of the states of a point."""
 
     strengths: failure.Strengths
     states: slice
     fabric: bool
 
     def is_evaluated(self, criterion: str) -> bool:
-        """Whether a criterion is evaluated for the plies."""
+        """Return whether a criterion is evaluated for the plies."""
         return failure.is_evaluated(criterion, fabric=self.fabric)
 
 
-def _runs(
+def _find_runs(
     strengths: Sequence[failure.Strengths | None], plies: Sequence[PlyConstants]
 ) -> list[PlyRun]:
-    """Runs of plies with strengths; fabrics are apart."""
-    found: list[PlyRun] = []
+    """Split the plies with strengths into runs; fabrics get runs of their own."""
+    runs: list[PlyRun] = []
     first = 0
-    for (own, fabric), group in groupby(zip(strengths, map(is_fabric, plies), strict=True)):
+    for (run_strengths, fabric), group in groupby(
+        zip(strengths, map(is_fabric, plies), strict=True)
+    ):
         end = first + len(list(group))
-        if own is not None:
-            found.append(PlyRun(own, slice(2 * first, 2 * end), fabric))
+        if run_strengths is not None:
+            runs.append(PlyRun(run_strengths, slice(2 * first, 2 * end), fabric))
         first = end
-    return found
+    return runs
 
 
 class Representatives(NamedTuple):
-    """States of a point that are evaluated, and the exposures of all by theirs."""
+    """States of a point that are evaluated, and how they represent all states."""
 
-    states: Indices  # (evaluated,): their numbers among all states of a point, ascending
-    of: Indices  # (states,): which of these represents each state
-    share: Floats  # (states,): its exposure over that of this one
+    states: Indices  # (evaluated,): numbers among all states of a point, ascending
+    of: Indices  # (states,): position in `states` of the representative of each state
+    share: Floats  # (states,): exposure of each state over the exposure of its representative
 
     @classmethod
     def every(cls, count: int) -> Self:
-        """Every state represents itself."""
+        """Let every state represent itself."""
         return cls(np.arange(count), np.arange(count), np.ones(count))
 
     @classmethod
     def outermost(cls, z: Floats, stiffness: Floats, runs: Sequence[PlyRun]) -> Self:
-        """Those farthest from the midplane, of states at z, (states,).
+        """Choose the states farthest from the midplane among states at z, (states,).
 
-        The stiffness is their stresses per midplane strain, (components, states).  States without
+        `stiffness` (components, states) are the stresses per midplane strain.  States without
         strengths represent themselves.
         """
         group = np.arange(len(z))
         for run in runs:
-            # 0.0 is added as zeros may have signs.
-            own = [0.0 + stiffness[:, run.states], z[None, run.states] < 0.0]
-            _, first, same = np.unique(
-                np.concatenate(own), axis=1, return_index=True, return_inverse=True
+            # Adding 0.0 removes the signs of zeros.
+            keys = [0.0 + stiffness[:, run.states], z[None, run.states] < 0.0]
+            _, first, inverse = np.unique(
+                np.concatenate(keys), axis=1, return_index=True, return_inverse=True
             )
-            group[run.states] = run.states.start + first[same.ravel()]
+            group[run.states] = run.states.start + first[inverse.ravel()]
         order = np.lexsort((-np.abs(z), group))
         farthest = order[np.unique(group[order], return_index=True)[1]]
         states = np.sort(farthest)
         of = np.searchsorted(states, farthest)[np.unique(group, return_inverse=True)[1].ravel()]
-        most = np.abs(z)[states][of]
-        share = np.divide(np.abs(z), most, out=np.ones_like(z), where=most > 0.0)
+        largest = np.abs(z)[states][of]
+        share = np.divide(np.abs(z), largest, out=np.ones_like(z), where=largest > 0.0)
         return cls(states, of, share)
 
-    def placed(self, run: PlyRun) -> PlyRun:
-        """A run of all states as one of those that are evaluated."""
+    def evaluated_run(self, run: PlyRun) -> PlyRun:
+        """Renumber a run from all states to the evaluated states."""
         ends = np.searchsorted(self.states, [run.states.start, run.states.stop]).tolist()
         return PlyRun(run.strengths, slice(*ends), run.fabric)
 
 
 class ZoneCriteria:
-    """Stresses and strengths of the plies of some elements.
+    """Stresses and strengths in the plies of a zone of elements.
 
-    `residual` are residual stresses, (plies, 2, 3).  `outermost` asks for the representatives of
-    proportional states.
+    `residual` are residual stresses, (plies, 2, 3).  With `outermost` only the outermost states
+    represent proportional states.
     """
 
     def __init__(
@@ -129,20 +131,21 @@ class ZoneCriteria:
         outermost: bool = False,
     ) -> None:
         self._zone, self._initial = zone, initial
-        self.elements, self.points = zone.rows, points  # rows of its elements and their points
+        self.elements, self.points = zone.rows, points  # rows of the elements and of their points
         self.strengths = strengths
-        # Stresses by components, plies and faces.
+        # Stresses per strain: (strains, components, plies and faces).
         in_plane = zone.in_plane.transpose(3, 2, 0, 1).reshape(6, 3, -1)
-        runs = _runs(strengths, zone.laminate.plies.constants)
+        runs = _find_runs(strengths, zone.laminate.plies.constants)
         self.represent = Representatives.every(in_plane.shape[2])
         if outermost:
             faces = zone.laminate.plies.faces
             z = np.stack([faces[:-1], faces[1:]], axis=1).ravel()
             stiffness = in_plane[:3].reshape(9, -1)
             self.represent = Representatives.outermost(z, stiffness, runs)
-        self.runs = [self.represent.placed(run) for run in runs]
+        self.runs = [self.represent.evaluated_run(run) for run in runs]
         self.in_plane = in_plane[:, :, self.represent.states].copy()
-        # Components by states; at rest with those of the initial strain.
+        # (components, states): residual stresses; `at_rest` adds the stresses of the initial
+        # strain.
         self.has_residual = residual is not None and bool(residual.any())
         self.residual = np.zeros(self.in_plane.shape[1:])
         if residual is not None:
@@ -150,7 +153,8 @@ class ZoneCriteria:
         self.at_rest = self.residual
         if initial is not None:
             self.at_rest = self.residual + np.tensordot(initial, self.in_plane[:3], 1)
-        # Stresses by interfaces, plies beside, and tau_13, tau_23.
+        # (gradients, interfaces, adjacent plies, tau): tau_13 and tau_23 per derivative of the
+        # strains.
         self.interfaces = zone.plies - 1
         tau = zone.interlaminar[:-1, 2].reshape(self.interfaces, 2, 12)
         angles = np.deg2rad(zone.laminate.plies.angles)
@@ -158,24 +162,24 @@ class ZoneCriteria:
         turn = np.array([[c, s], [-s, c]]).transpose(2, 0, 1)
         beside = np.stack([turn[:-1], turn[1:]], axis=1)
         self.shear = np.einsum("ibct,itg->gibc", beside, tau)
-        # (interfaces, 2): the weaker s13 and s23 of both plies; NaN where one is not known.
-        own = np.array(
-            [(np.nan, np.nan) if one is None else (one.s13, one.s23) for one in strengths]
+        # (interfaces, 2): the smaller s13 and s23 of the adjacent plies; NaN if one is unknown.
+        shear_strengths = np.array(
+            [(np.nan, np.nan) if ply is None else (ply.s13, ply.s23) for ply in strengths]
         )
-        self.weaker = np.minimum(own[:-1], own[1:])
+        self.weaker = np.minimum(shear_strengths[:-1], shear_strengths[1:])
 
     def with_residual(
         self, residual: Floats | None, strengths: Sequence[failure.Strengths | None] | None = None
     ) -> ZoneCriteria:
-        """Return criteria with other residual stresses and strengths, at every state.
+        """Return criteria for every state with other residual stresses and strengths.
 
-        `residual` is (plies, 2, 3).  The strengths stay if none are passed.
+        `residual` is (plies, 2, 3).  The strengths stay if `strengths` is None.
         """
-        own = self.strengths if strengths is None else strengths
-        return ZoneCriteria(self._zone, self.points, own, self._initial, residual)
+        new_strengths = self.strengths if strengths is None else strengths
+        return ZoneCriteria(self._zone, self.points, new_strengths, self._initial, residual)
 
     def between_plies(self, gradients: Floats) -> Floats:
-        """Exposures of the interfaces, (elements, interfaces), of derivatives of the strains."""
+        """Return the exposures of interfaces, (elements, interfaces), under strain gradients."""
         shear = gradients.reshape(-1, 12) @ self.shear.reshape(12, -1)
         shear = shear.reshape(len(gradients), self.interfaces, 2, 2)
         s13, s23 = self.weaker.T[:, :, None]
@@ -184,18 +188,19 @@ class ZoneCriteria:
 
 
 class Around(NamedTuple):
-    """The circle around the load on which exposures are evaluated too."""
+    """Circle around the load on which exposures are evaluated in addition."""
 
     circle: CircleStresses
     centre: tuple[float, float]
-    # (elements,): r / R of the elements next to the circle, by which interlaminar stresses, which
-    # fall as 1 / r, are larger on the circle than at the centre of the element; 0 of the others.
+    # (elements,): r / R of elements next to the circle, 0 for other elements.  Interlaminar
+    # stresses fall as 1 / r, so that they are larger on the circle than at the element's centre by
+    # r / R.
     factor: Floats
     coarseness: float  # longest side of the elements on the circle over R
 
 
 class FailureMonitor:
-    """Evaluates the failure criteria of all plies.
+    """Evaluator of the failure criteria of all plies.
 
     Parameters
     ----------
@@ -204,7 +209,7 @@ class FailureMonitor:
     strengths : AllStrengths
         Strengths of the plies.
     criteria : sequence of OwnCriterion
-        Criteria of users, after the known ones.
+        User-defined criteria, which follow the built-in criteria.
     counts : ndarray of bool (elements, points), optional
         Points whose exposures count among the largest; by default all.
     far : ndarray of bool (elements,), optional
@@ -213,7 +218,7 @@ class FailureMonitor:
         Exposures on the circle around the load.
     """
 
-    represents: ClassVar[bool] = False  # whether it evaluates representatives where it can
+    represents: ClassVar[bool] = False  # whether the class evaluates representatives if possible
 
     def __init__(
         self,
@@ -225,7 +230,7 @@ class FailureMonitor:
         around: Around | None = None,
     ) -> None:
         self.stresses = stresses
-        # By name, those of users last, and the modes that their codes mean.
+        # Criteria by name, user-defined ones last, and the modes of failure by code.
         self.criteria, self.modes = with_own(criteria)
         elements, points, _ = stresses.shape
         self.counts = np.ones((elements, points), dtype=bool) if counts is None else counts
@@ -235,16 +240,20 @@ class FailureMonitor:
         self.circle: FailureMonitor | None = None
         if around is not None:
             self.circle = type(self)(around.circle, strengths, criteria)
-        # Users' criteria may not be proportional to the stresses.
+        # User-defined criteria may not be proportional to the stresses.
         outermost = self.represents and not stresses.stretches and not criteria
         self.zones: list[ZoneCriteria] = []
         for number, zone in enumerate(stresses.zones):
             rows = zone.rows
-            own = strengths[number] if isinstance(strengths, Sequence) else [strengths] * zone.plies
+            zone_strengths = (
+                strengths[number] if isinstance(strengths, Sequence) else [strengths] * zone.plies
+            )
             if not isinstance(rows, slice):
                 rows = (rows[:, None] * points + np.arange(points)).ravel()
-            made = ZoneCriteria(zone, rows, own, stresses.initial, outermost=outermost)
-            self.zones.append(made)
+            zone_criteria = ZoneCriteria(
+                zone, rows, zone_strengths, stresses.initial, outermost=outermost
+            )
+            self.zones.append(zone_criteria)
         self._zone_of = np.zeros(elements, dtype=np.intp)
         for number, zone in enumerate(stresses.zones):
             self._zone_of[zone.rows] = number
@@ -256,7 +265,7 @@ class FailureMonitor:
 
     @property
     def states(self) -> int:
-        """Number of evaluated states of a point, of the zone with the most of them."""
+        """Number of evaluated states per point, in the zone with the most states."""
         return max(len(zone.represent.states) for zone in self.zones)
 
     def with_residual(
@@ -266,14 +275,14 @@ class FailureMonitor:
     ) -> Self:
         """Return the same criteria with other residual stresses and strengths of the plies.
 
-        The residual stresses of each laminate are (plies, 2, 3), in the axes of the plies; None if
-        there are none.  The interlaminar criterion does not depend on them.  The strengths stay if
-        none are passed.
+        The residual stresses of each laminate are (plies, 2, 3), in the axes of the plies; None
+        means no residual stresses.  The interlaminar criterion does not depend on them.  The
+        strengths stay if `strengths` is None.
         """
-        made, count = copy(self), len(self.zones)
-        made.zones = [
-            zone.with_residual(stresses, own)
-            for zone, stresses, own in zip(
+        monitor, count = copy(self), len(self.zones)
+        monitor.zones = [
+            zone.with_residual(stresses, zone_strengths)
+            for zone, stresses, zone_strengths in zip(
                 self.zones,
                 [None] * count if residual is None else residual,
                 [None] * count if strengths is None else strengths,
@@ -281,26 +290,26 @@ class FailureMonitor:
             )
         ]
         if self.circle is not None:
-            made.circle = self.circle.with_residual(residual, strengths)
-        return made
+            monitor.circle = self.circle.with_residual(residual, strengths)
+        return monitor
 
     def start(self) -> FailureEnvelope:
-        """No exposure yet."""
+        """Return the envelope without any exposure yet."""
         elements, points, plies = self.stresses.shape
         states = Maxima.none(len(self.criteria), elements * points * self.states)
         interfaces = Maxima.none(elements, max(plies - 1, 0))
-        known = np.zeros((len(self.criteria), elements * points, self.states), dtype=bool)
+        is_known = np.zeros((len(self.criteria), elements * points, self.states), dtype=bool)
         for zone in self.zones:
             for run in zone.runs:
                 for number, name in enumerate(self.criteria):
-                    known[number, zone.points, run.states] = run.is_evaluated(name)
-            unknown = np.ones(interfaces.exposure.shape[1], dtype=bool)
-            unknown[: zone.interfaces] = np.isnan(zone.weaker).any(axis=1)
-            interfaces.exposure[zone.elements] = np.where(unknown, np.nan, 0.0)
+                    is_known[number, zone.points, run.states] = run.is_evaluated(name)
+            is_unknown = np.ones(interfaces.exposure.shape[1], dtype=bool)
+            is_unknown[: zone.interfaces] = np.isnan(zone.weaker).any(axis=1)
+            interfaces.exposure[zone.elements] = np.where(is_unknown, np.nan, 0.0)
         for family, complete in self.stresses.families:
             if not complete:
                 interfaces.exposure[family.rows] = np.nan
-        states.exposure[~known.reshape(len(self.criteria), -1)] = UNKNOWN
+        states.exposure[~is_known.reshape(len(self.criteria), -1)] = UNKNOWN
         envelope = FailureEnvelope(states, interfaces, Largest.none(len(self.criteria) + 1))
         envelope.find_largest(self.counts, self.far)
         if self.circle is not None:
@@ -310,9 +319,9 @@ class FailureMonitor:
     def update(
         self, envelope: FailureEnvelope, fields: Floats, times: Sequence[float]
     ) -> Evaluations:
-        """Raise the exposures to those of displacement fields, (fields, numnp, 5), at their times.
+        """Raise the exposures to the exposures of fields, (fields, numnp, 5), at their times.
 
-        Returns the largest ones that count after each.
+        Returns the largest exposures that count after each field.
         """
         rows = []
         for displacement, time in zip(fields, times, strict=True):
@@ -323,10 +332,10 @@ class FailureMonitor:
         return Evaluations.of(rows)
 
     def largest(self, envelope: FailureEnvelope) -> Largest:
-        """Largest exposures so far, those on the circle included.
+        """Return the largest exposures so far, including the exposures on the circle.
 
-        Numbers of states on the circle follow the others: of plies by their numbers on the circle,
-        of interfaces by those of the elements next to it.
+        States on the circle are numbered after the states of the elements.  A ply on the circle
+        has its number on the circle, an interface the number of the element next to the circle.
         """
         largest = deepcopy(envelope.largest)
         on_circle = self._on_circle(envelope)
@@ -339,25 +348,28 @@ class FailureMonitor:
         return largest
 
     def _on_circle(self, envelope: FailureEnvelope) -> Largest | None:
-        """Largest exposures on the circle, numbered as by :meth:`largest`; None without one."""
+        """Return the largest exposures on the circle, numbered as in :meth:`largest`, if any."""
         if envelope.circle is None or self.around is None:
             return None
         on_circle = deepcopy(envelope.circle.largest)
-        between = envelope.interfaces.exposure
+        of_interfaces = envelope.interfaces.exposure
         on_circle.state[:-1] += np.where(on_circle.state[:-1] == NOWHERE, 0, self._all_states)
-        scaled = np.where(np.isfinite(between), between, -1.0) * self.around.factor[:, None]
+        scaled = (
+            np.where(np.isfinite(of_interfaces), of_interfaces, -1.0) * self.around.factor[:, None]
+        )
         number = int(first_of_largest(scaled.ravel())) if scaled.size else NOWHERE
         on_circle.exposure[-1], on_circle.state[-1] = np.nan, NOWHERE
         if number != NOWHERE and scaled.flat[number] > 0.0:
             on_circle.exposure[-1] = scaled.flat[number]
-            on_circle.state[-1] = between.size + number
+            on_circle.state[-1] = of_interfaces.size + number
             on_circle.mode[-1] = envelope.interfaces.mode.flat[number]
         return on_circle
 
     def circle_columns(self, envelope: FailureEnvelope, places: PlyPoints) -> dict[str, Array]:
-        """Largest exposures on the circle, (criteria,) each; empty without a circle.
+        """Return columns of the largest exposures on the circle, (criteria,) each.
 
-        With their times, and the number of points of the circle that have them.
+        The columns include the times, and the number of points of the circle that reach the largest
+        exposure.  The dictionary is empty without a circle.
         """
         on_circle = self._on_circle(envelope)
         if on_circle is None or envelope.circle is None or self.circle is None:
@@ -370,28 +382,30 @@ class FailureMonitor:
         for number, state in enumerate(on_circle.state.tolist()):
             if state == NOWHERE:
                 continue
-            tied = on_circle.exposure[number] * (1.0 - TIE)
+            threshold = on_circle.exposure[number] * (1.0 - TIE)
             if number == count - 1:
                 times[-1] = interfaces.time.flat[state - interfaces.exposure.size]
                 factor = self._factors[:, None]
-                points[-1] = np.count_nonzero((interfaces.exposure * factor >= tied).any(axis=1))
+                points[-1] = np.count_nonzero(
+                    (interfaces.exposure * factor >= threshold).any(axis=1)
+                )
             else:
                 times[number] = plies.time[number, state - self._all_states]
-                of_points = plies.exposure[number].reshape(-1, self.circle.states)
-                points[number] = np.count_nonzero((of_points >= tied).any(axis=1))
+                by_point = plies.exposure[number].reshape(-1, self.circle.states)
+                points[number] = np.count_nonzero((by_point >= threshold).any(axis=1))
         order = self._order
         return columns | {"time": times[order], "points": points[order]}
 
     @property
     def _factors(self) -> Floats:
-        """Factors of elements next to the circle, (elements,); 0 without one."""
+        """Factors of the elements next to the circle, (elements,); 0 without a circle."""
         return np.zeros(len(self.far)) if self.around is None else self.around.factor
 
     @property
     def _order(self) -> list[int]:
-        """Criteria as columns have them: the interlaminar one before those of users."""
-        known, count = len(failure.CRITERIA), len(self.criteria) + 1
-        return [*range(known), count - 1, *range(known, count - 1)]
+        """Order of the criteria in columns: the interlaminar one precedes user-defined ones."""
+        built_in, count = len(failure.CRITERIA), len(self.criteria) + 1
+        return [*range(built_in), count - 1, *range(built_in, count - 1)]
 
     @property
     def _all_states(self) -> int:
@@ -399,7 +413,7 @@ class FailureMonitor:
         return self.counts.size * self.states
 
     def _evaluate(self, envelope: FailureEnvelope, displacement: Floats, time: float) -> None:
-        """Raise the exposures to those of a displacement field."""
+        """Raise the exposures to the exposures of a displacement field."""
         strains, gradients = self.stresses.strains(displacement)
         every = range(len(self.criteria))
         self._raise_plies(every, envelope.plies, strains, time)
@@ -408,53 +422,55 @@ class FailureMonitor:
         envelope.find_largest(self.counts, self.far, strains)
 
     def every_state(self, envelope: FailureEnvelope) -> Maxima:
-        """Largest exposures of all states, (criteria, states).
+        """Return the largest exposures of all states, (criteria, states).
 
-        States are elements, points, plies and faces; UNKNOWN of plies without strengths or that an
-        element lacks, and of plies that a criterion is not evaluated for.
+        States are ordered by element, point, ply and face.  They are UNKNOWN for plies without
+        strengths, for plies that an element lacks, and for plies that a criterion is not evaluated
+        for.
         """
         elements, points, plies = self.stresses.shape
         evaluated, count = envelope.plies, len(self.criteria)
         if all(len(zone.represent.states) == len(zone.represent.of) for zone in self.zones):
             return evaluated
-        found = Maxima.none(count, elements * points * plies * 2)
-        found.exposure[...] = UNKNOWN
-        every, own = (
-            [values.reshape(count, elements * points, -1) for values in vars(one).values()]
-            for one in (found, evaluated)
+        expanded = Maxima.none(count, elements * points * plies * 2)
+        expanded.exposure[...] = UNKNOWN
+        targets, sources = (
+            [values.reshape(count, elements * points, -1) for values in vars(maxima).values()]
+            for maxima in (expanded, evaluated)
         )
         for zone in self.zones:
             _, of, share = zone.represent
             factors = share, share > 0.0, share > 0.0  # no time and mode at the midplane
-            known = own[0][:, zone.points][:, :, of] >= 0.0
-            for values, given, factor in zip(every, own, factors, strict=True):
-                of_states = given[:, zone.points][:, :, of]
-                values[:, zone.points, : len(of)] = np.where(known, of_states * factor, of_states)
-        return found
+            is_known = sources[0][:, zone.points][:, :, of] >= 0.0
+            for target, source, factor in zip(targets, sources, factors, strict=True):
+                of_states = source[:, zone.points][:, :, of]
+                scaled = np.where(is_known, of_states * factor, of_states)
+                target[:, zone.points, : len(of)] = scaled
+        return expanded
 
     @staticmethod
     def _raise_interfaces(
         zone: ZoneCriteria, interfaces: Maxima, gradients: Floats, time: float
     ) -> None:
-        """Raise the exposures of interfaces."""
-        place = (zone.elements, slice(zone.interfaces))
-        worst = zone.between_plies(gradients[zone.elements])
+        """Raise the exposures of the interfaces of a zone."""
+        zone_entries = (zone.elements, slice(zone.interfaces))
+        exposure = zone.between_plies(gradients[zone.elements])
         # Elements without nine nodes have no interlaminar stresses.
-        before = np.where(np.isnan(worst), np.nan, interfaces.exposure[place])
-        higher = worst > before * (1.0 + TIE)
-        interfaces.exposure[place] = np.where(higher, worst, before)
-        interfaces.time[place] = np.where(higher, time, interfaces.time[place])
+        before = np.where(np.isnan(exposure), np.nan, interfaces.exposure[zone_entries])
+        higher = exposure > before * (1.0 + TIE)
+        interfaces.exposure[zone_entries] = np.where(higher, exposure, before)
+        interfaces.time[zone_entries] = np.where(higher, time, interfaces.time[zone_entries])
         mode = failure.MODES.index("interlaminar shear")
-        interfaces.mode[place] = np.where(higher, mode, interfaces.mode[place])
+        interfaces.mode[zone_entries] = np.where(higher, mode, interfaces.mode[zone_entries])
 
-    def located(self, found: Evaluations, places: PlyPoints) -> dict[str, Array]:
-        """Columns of evaluations with the plies and places of the largest exposures.
+    def located(self, evaluations: Evaluations, places: PlyPoints) -> dict[str, Array]:
+        """Return columns of evaluations with the plies and places of the largest exposures.
 
-        The ply of an interface is the one above it, its place the centre of its element, or the
-        point of the circle towards that centre.  The interlaminar criterion comes before those of
-        users.
+        The ply of an interface is the ply above it.  The place of an interface is the centre of its
+        element, or the point of the circle towards this centre.  The interlaminar criterion
+        precedes user-defined criteria.
         """
-        state = found.state
+        state = evaluations.state
         ply, x, y = (np.zeros(state.shape) for _ in range(3))
         ply[:, :-1], points = self._plies_of(state[:, :-1] % self._all_states)
         x[:, :-1], y[:, :-1] = places.x.ravel()[points], places.y.ravel()[points]
@@ -467,26 +483,26 @@ class FailureMonitor:
             number = np.where(on_circle, state[:, :-1] - self._all_states, 0)
             plies, points = self.circle._plies_of(number)
             ply[:, :-1] = np.where(on_circle, plies, ply[:, :-1])
-            for values, at in zip((x, y), self.around.circle.points.T, strict=True):
-                values[:, :-1] = np.where(on_circle, at[points], values[:, :-1])
-            near = state[:, -1] >= len(self.far) * interfaces
-            factor = np.where(near, self.around.factor[element], 1.0)
+            for values, coordinates in zip((x, y), self.around.circle.points.T, strict=True):
+                values[:, :-1] = np.where(on_circle, coordinates[points], values[:, :-1])
+            is_next_to_circle = state[:, -1] >= len(self.far) * interfaces
+            factor = np.where(is_next_to_circle, self.around.factor[element], 1.0)
             for values, origin in zip((x, y), self.around.centre, strict=True):
                 towards = origin + (values[:, -1] - origin) / factor
-                values[:, -1] = np.where(near, towards, values[:, -1])
+                values[:, -1] = np.where(is_next_to_circle, towards, values[:, -1])
         nowhere = state == NOWHERE
         columns = {
-            "mode": np.where(nowhere, 0, found.mode),
+            "mode": np.where(nowhere, 0, evaluations.mode),
             "ply": np.where(nowhere, 0, ply).astype(np.int64),
             **{
                 name: np.where(nowhere, np.nan, values)
-                for name, values in {"exposure": found.exposure, "x": x, "y": y}.items()
+                for name, values in {"exposure": evaluations.exposure, "x": x, "y": y}.items()
             },
         }
         return {name: values[:, self._order] for name, values in columns.items()}
 
     def _plies_of(self, state: Array) -> tuple[Array, Indices]:
-        """Plies, from 1, and rows of the points of states."""
+        """Return the plies, from 1, and the rows of the points of states."""
         points, number = np.divmod(np.maximum(state, 0), self.states)
         plies = np.zeros((len(self.zones), self.states), dtype=np.intp)
         for row, zone in zip(plies, self.zones, strict=True):
@@ -494,9 +510,10 @@ class FailureMonitor:
         return plies[self._zone_of[points // self.stresses.shape[1]], number], points
 
     def load_factors(self, envelope: FailureEnvelope) -> dict[str, float]:
-        """Factors on the stresses less those at rest at which the largest exposures are 1.
+        """Return the factors on the added stresses at which the largest exposures are 1.
 
-        NaN where no exposure was found.
+        The added stresses are the stresses minus the stresses at rest.  A factor is NaN if no
+        exposure was found.
         """
         factors = dict.fromkeys(self.criteria, np.nan)
         largest = self.largest(envelope)
@@ -506,7 +523,7 @@ class FailureMonitor:
             if state == NOWHERE:
                 continue
             monitor = self if state < self._all_states else self.circle
-            assert monitor is not None  # only a monitor with a circle has states beyond its own
+            assert monitor is not None  # only a monitor with a circle has such a state
             zone, number = monitor._state(state % self._all_states)
             strengths = zone.strengths[zone.represent.states[number] // 2]
             added = strain @ zone.in_plane[:, :, number]
@@ -517,19 +534,19 @@ class FailureMonitor:
         return factors
 
     def _state(self, state: int) -> tuple[ZoneCriteria, int]:
-        """The zone of a state, and its number among the states of its point."""
+        """Return the zone of a state, and the number of the state at its point."""
         point, number = divmod(state, self.states)
         return self.zones[self._zone_of[point // self.stresses.shape[1]]], number
 
     def _raise_plies(
         self, numbers: Sequence[int], plies: Maxima, strains: Floats, time: float
     ) -> None:
-        """Raise exposures of some criteria to those of strains, (elements, points, 6)."""
+        """Raise the exposures of the criteria `numbers` under strains, (elements, points, 6)."""
         for zone in self.zones:
             for run in zone.runs:
-                self._raise_by(numbers, zone, run, plies, strains.reshape(-1, 6), time)
+                self._raise_run(numbers, zone, run, plies, strains.reshape(-1, 6), time)
 
-    def _raise_by(
+    def _raise_run(
         self,
         numbers: Sequence[int],
         zone: ZoneCriteria,
@@ -538,7 +555,7 @@ class FailureMonitor:
         strains: Floats,
         time: float,
     ) -> None:
-        """Raise exposures of some criteria to those of strains, (elements * points, 6)."""
+        """Raise the exposures of a run of plies under strains, (elements * points, 6)."""
         criteria = list(self.criteria.values())
         names = list(self.criteria)
         evaluated = [number for number in numbers if run.is_evaluated(names[number])]
@@ -563,6 +580,8 @@ class FailureMonitor:
                 if not larger.any():
                     continue
                 point, state = np.nonzero(larger)
-                at = (number, block[point], run.states.start + state)
-                exposures[at], times[at] = exposure[larger], time
-                modes[at] = failure.largest_modes(candidates, np.flatnonzero(larger), self.modes)
+                entries = (number, block[point], run.states.start + state)
+                exposures[entries], times[entries] = exposure[larger], time
+                modes[entries] = failure.largest_modes(
+                    candidates, np.flatnonzero(larger), self.modes
+                )

@@ -1,9 +1,9 @@
 """Indentation modulus of a laminate from its elastic constants.
 
-The laminate is replaced by a homogeneous half-space of its effective stiffness; its indentation
-modulus, which takes the place of E_t in equation 3-2, follows from the Barnett-Lothe tensor
-(Vlassak and Nix 1994).  Axis 3 is the normal of the plate; strains are in the order 11, 22, 33, 23,
-13, 12.
+The laminate is replaced by a homogeneous half-space of its effective stiffness.  The indentation
+modulus of the half-space replaces E_t in equation 3-2.  It follows from the Barnett-Lothe tensor
+(Vlassak and Nix 1994).  Axis 3 is the normal of the plate.  Strains are in the order 11, 22, 33,
+23, 13, 12.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.mechanics.laminate import PlyConstants, is_fabric
 
-# Directions in the surface, and around each of them.
+# Number of directions in the surface, and of angles around each direction.
 SURFACE = 72
 AROUND = 180
-ACROSS = 2.0  # E2/E1 above which the fibres are along direction 2
+ACROSS = 2.0  # if E2/E1 is larger, the fibres are along direction 2
 # In-plane and out-of-plane components.
 _A = [0, 1, 5]
 _B = [2, 4, 3]
@@ -27,14 +27,14 @@ _VOIGT = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 
 
 class PlyError(FecmError, ValueError):
-    """A ply is a fabric, or its constants belong to no solid."""
+    """A ply is a fabric, or no solid has its constants."""
 
 
 def ply_stiffness(ply: PlyConstants, nu23: float) -> Floats:
-    """Three-dimensional stiffness of a transversely isotropic ply in its own axes, (6, 6).
+    """Return the 3-D stiffness of a transversely isotropic ply in its own axes, (6, 6).
 
-    A fabric, fibres along direction 2, or a compliance that is not positive definite are a
-    PlyError.
+    Raises PlyError for a fabric, for fibres along direction 2, or if the compliance is not positive
+    definite.
     """
     nu12, e1, e2 = ply.nu12, ply.e1, ply.e2
     if e2 > ACROSS * e1:
@@ -60,8 +60,8 @@ def ply_stiffness(ply: PlyConstants, nu23: float) -> Floats:
     return np.asarray(np.linalg.inv(compliance), dtype=float)
 
 
-def _turned(stiffness: Floats, angle: float) -> Floats:
-    """Stiffness seen from axes to which the fibres lie at an angle, in degrees."""
+def _rotate(stiffness: Floats, angle: float) -> Floats:
+    """Return the stiffness in axes from which the fibres are turned by an angle (degrees)."""
     c, s = np.cos(np.deg2rad(angle)), np.sin(np.deg2rad(angle))
     R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
     tensor = stiffness[_VOIGT[:, :, None, None], _VOIGT]
@@ -76,36 +76,36 @@ def effective_stiffness(
     thicknesses: Sequence[float],
     nu23: float | Sequence[float],
 ) -> Floats:
-    """Stiffness of the homogeneous solid with the laminate's averages, (6, 6).
+    """Return the stiffness of the homogeneous solid with the laminate's averages, (6, 6).
 
-    The constants are those of all plies, or of each.  In-plane strains and out-of-plane stresses
-    are those of all plies.
+    `ply` and `nu23` hold for all plies, or are sequences with an entry per ply.  All plies share
+    the in-plane strains and the out-of-plane stresses.
     """
     share = np.array(thicknesses) / np.sum(thicknesses)
     plies = ply if isinstance(ply, Sequence) else [ply] * len(angles)
     ratios = nu23 if isinstance(nu23, Sequence) else [nu23] * len(angles)
     layers = zip(plies, ratios, angles, strict=True)
-    C = np.array([_turned(ply_stiffness(own, ratio), angle) for own, ratio, angle in layers])
+    C = np.array([_rotate(ply_stiffness(p, ratio), angle) for p, ratio, angle in layers])
     aa, ab, bb = (C[:, rows][:, :, columns] for rows, columns in ((_A, _A), (_A, _B), (_B, _B)))
     R = np.linalg.inv(bb)
     Q = ab @ R
     P = aa - Q @ ab.swapaxes(1, 2)
     P, Q, R = (np.einsum("n,nij->ij", share, part) for part in (P, Q, R))
     bb = np.linalg.inv(R)
-    whole = np.empty((6, 6))
-    whole[np.ix_(_A, _A)] = P + Q @ bb @ Q.T
-    whole[np.ix_(_A, _B)] = Q @ bb
-    whole[np.ix_(_B, _A)] = (Q @ bb).T
-    whole[np.ix_(_B, _B)] = bb
-    return whole
+    stiffness = np.empty((6, 6))
+    stiffness[np.ix_(_A, _A)] = P + Q @ bb @ Q.T
+    stiffness[np.ix_(_A, _B)] = Q @ bb
+    stiffness[np.ix_(_B, _A)] = (Q @ bb).T
+    stiffness[np.ix_(_B, _B)] = bb
+    return stiffness
 
 
 def indentation_modulus(stiffness: Floats) -> float:
-    """Indentation modulus M of a half-space whose surface normal is axis 3 (force/area).
+    """Return the indentation modulus M of a half-space with surface normal 3 (force/area).
 
-    1/M is pi times the mean over the directions t of the surface of (B(t)^-1)_33/(8 pi^2), with
-    the Barnett-Lothe tensor B(t) = 1/(8 pi^2) times the integral over phi of
-    (mm) - (mn)(nn)^-1(nm), (ab)_jk = a_i C_ijkl b_l, where m and n turn in the plane normal to t.
+    1/M is pi times the mean of (B(t)^-1)_33/(8 pi^2) over the directions t in the surface.  The
+    Barnett-Lothe tensor B(t) is 1/(8 pi^2) times the integral over phi of (mm) - (mn)(nn)^-1(nm),
+    with (ab)_jk = a_i C_ijkl b_l.  The vectors m and n turn in the plane normal to t.
     """
     C = stiffness[_VOIGT[:, :, None, None], _VOIGT]
     phi = (np.arange(AROUND) + 0.5) * (2.0 * np.pi / AROUND)

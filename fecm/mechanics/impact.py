@@ -1,10 +1,12 @@
 """The coupled step of plate, projectile and contact law, report section 4.3.
 
-Equations 4-14 (plate) and 4-25 (projectile) with the contact force F of 3-1, 3-3 and 3-11.  The
-plate moves by v += dt M^-1 (P - K u), u += dt v under the last step's contact force.  Then the
-projectile's implicit step and the contact law are iterated on the tip's acceleration, at most five
-times.  Signs: w is positive along the push and the projectile's motion away from the plate, so that
-the indentation is -u_tip - w.
+Equations 4-14 (plate) and 4-25 (projectile) are coupled by the contact force F of 3-1, 3-3 and
+3-11.  The plate moves by v += dt M^-1 (P - K u), u += dt v under the contact force of the last
+step.  Then the projectile's implicit step and the contact law are iterated on the tip's
+acceleration, at most five times.
+
+Signs: w is positive along the push; the projectile's motion is positive away from the plate.  The
+indentation is therefore -u_tip - w.
 """
 
 from __future__ import annotations
@@ -19,7 +21,7 @@ from fecm.mechanics.contact_law import ContactPoint, Law, Number, any_case, sele
 from fecm.mechanics.plate_motion import AppliedForce, DivergenceError, Load, PlateMotion, PlateState
 from fecm.mechanics.projectile import Projectile, RodIntegrator, TipStep, WilsonStep, rigid_approach
 
-# The listing's contact iteration; the number of passes affects the results.
+# The listing's contact iteration.  The number of passes affects the results.
 PASSES = 5
 TOLERANCE = 1.0e-6
 
@@ -29,7 +31,7 @@ class ContactState(Generic[Number]):
     """State of projectile and contact after a step: floats, or arrays with an entry per case."""
 
     rod: Any  # the projectile: RodState, or a sweep's motion of the tips
-    memory: Any  # memory of the contact law, of a type of its own
+    memory: Any  # memory of the contact law, whose type only the law knows
     contact: ContactPoint[Number]  # accepted indentation and contact force
     plate_w: Number  # the plate's displacement in the contact law
     contact_work: Number  # work stored or dissipated by the indentation
@@ -78,7 +80,10 @@ class ImpactSystem:
         self.first_dt: float | None = None  # time step of the rod's constants
 
     def start(self, plate: PlateState | None = None) -> ImpactState:
-        """State before the first step: projectile and plate, by default at rest, just touch."""
+        """Return the state before the first step, in which projectile and plate just touch.
+
+        The plate is at rest by default.
+        """
         contact, state = self.contact, self.motion.start() if plate is None else plate
         rod = rigid_approach(
             self.rod, contact.velocity, derivatives_too=contact.strains_start_moving
@@ -94,17 +99,17 @@ class ImpactSystem:
         )
 
     def applied(self, state: ImpactState, force: float | None = None) -> AppliedForce:
-        """Force on the plate: the contact force unless another is passed."""
+        """Return the force on the plate: the contact force, or `force` if it is not None."""
         value = state.contact.force if force is None else force
         return AppliedForce(self.contact.load, self.contact.share * value)
 
     def advance(
         self, state: ImpactState, dt: float, factor: float = 1.0, force: float | None = None
     ) -> None:
-        """Take one step with the load factor of FORC's values; changes the state.
+        """Take one step and change the state; `factor` is the load factor of FORC's values.
 
-        A `force` replaces the contact force on the plate.  Raises
-        DivergenceError if indentation or force is no longer finite.
+        A `force` replaces the contact force on the plate.  Raises DivergenceError if the
+        indentation or the force is no longer finite.
         """
         self.motion.advance(state.plate, dt, factor, self.applied(state, force))
         step = state.plate.step
@@ -116,7 +121,7 @@ class ImpactSystem:
             raise DivergenceError(step, "the motion is no longer finite")
 
     def rod_step(self, dt: float) -> RodIntegrator:
-        """Linear map of the rod for a time step, computed when the step changes."""
+        """Return the linear map of the rod for a time step, computed when the step changes."""
         if self._step is None or self._step.dt != dt:
             if not self.contact.keeps_first_step or self.first_dt is None:
                 self.first_dt = dt
@@ -131,8 +136,8 @@ class ImpactSystem:
         couple_step(self.rod_step(dt), self.law, state, w)
 
 
-def _kept(iterating: Any, tried: Any, memory: Any) -> Any:
-    """Memory of a law after a trial; with one object per case, of the iterating cases alone."""
+def _update_memory(iterating: Any, tried: Any, memory: Any) -> Any:
+    """Return the memory after a trial; with one object per case, only iterating cases change."""
     if isinstance(iterating, np.ndarray) and isinstance(tried, np.ndarray):
         return np.where(iterating, tried, memory)
     return tried
@@ -141,18 +146,18 @@ def _kept(iterating: Any, tried: Any, memory: Any) -> Any:
 def couple_step(
     step: TipStep[Any, Number], law: Law[Number], state: ContactState[Number], w: Number
 ) -> None:
-    """Iterate contact force and tip acceleration for the plate's w; change the state."""
+    """Iterate contact force and tip acceleration for the plate's w, and change the state."""
     last = state.contact
     motion, base, drift, acceleration = step.begin(state.rod)
     carried = (1.0 - step.theta) * last.force
     memory, tip = state.memory, drift + step.weight * acceleration
     force = last.force
-    # The force of a case is kept once its iteration has converged.
+    # A case keeps its force once its iteration has converged.
     iterating = np.ones(len(w), dtype=bool) if isinstance(w, np.ndarray) else True
     for _ in range(PASSES):
         trial, tried = law.trial(memory, last, -tip - w)
         force = select(iterating, trial, force)
-        memory = _kept(iterating, tried, memory)
+        memory = _update_memory(iterating, tried, memory)
         before, tip = tip, drift + step.weight * (base + step.gain * (carried + step.theta * force))
         iterating = iterating & ((abs(tip - before) < TOLERANCE * abs(tip)) ^ True)
         if not any_case(iterating):

@@ -1,8 +1,8 @@
 """Many impact steps in one call of the compiled kernels.
 
-In: a state of :mod:`fecm.mechanics.impact` and a number of steps.  Out: the state after them, and
-the records of each step, :class:`Burst`.  The projectile moves in its natural modes
-(:mod:`~fecm.mechanics.rod_modes`), of which the first is the rigid motion.
+In: a state of :mod:`fecm.mechanics.impact` and a number of steps.  Out: the state after the steps,
+and the records of each step, :class:`Burst`.  The projectile moves in its natural modes
+(:mod:`~fecm.mechanics.rod_modes`); the first mode is the rigid motion.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from fecm.mechanics.rod_modes import ProjectileModes
 # Records of a step, in the order of structures.h.
 COLUMNS = (
     "time",
-    # Inner products of the plate's state: d M d, d f, u f, and f with s, of the internal force f.
+    # Inner products of the plate's state, with the internal force f: d M d, d f, u f and f s.
     "inertia",
     "power",
     "strain",
@@ -55,26 +55,26 @@ COLUMNS = (
     "station",  # deformation of the projectile at the dof of :class:`ImpactSteps`
 )
 
-FIELDS = 4_000_000  # numbers of the displacement fields that one call of the kernels stores
+FIELDS = 4_000_000  # numbers in the displacement fields that one call of the kernels stores
 
 
 class Pace(NamedTuple):
-    """How many steps are taken until the observers of a run are called."""
+    """Number of steps between two calls of a run's observers."""
 
     most: int  # steps
     work: int  # steps times equations
 
     def interval(self, neq: int) -> int:
-        """Steps between two calls, of a plate with a number of equations."""
+        """Return the number of steps between two calls for a plate with `neq` equations."""
         return max(1, min(self.most, self.work // neq))
 
 
-SINGLY = Pace(most=64, work=100_000)  # where each step is a call of Python
-TOGETHER = Pace(most=4096, work=20_000_000)  # where the kernels take many
+SINGLY = Pace(most=64, work=100_000)  # for steps in Python
+TOGETHER = Pace(most=4096, work=20_000_000)  # for the kernels, which take many steps in a call
 
 
 class LawKind(IntEnum):
-    """Permanent indentation of a contact law."""
+    """Kind of permanent indentation of a contact law."""
 
     LINEAR = 0  # equation 3-8
     YANG_SUN = 1  # equation 3-7
@@ -113,13 +113,13 @@ class PointStruct(Structure):
 
 
 class RodStruct(Structure):
-    """Projectile, and its step as in :class:`~fecm.mechanics.projectile.RodIntegrator`.
+    """Projectile and its step, as in :class:`~fecm.mechanics.projectile.RodIntegrator`.
 
     The arrays:
 
     ============  ============  ===============================================================
-    `T`           (9, modes)    new displacement, velocity and acceleration from the last ones
-    `h`           (3, modes)    the same per force on the tip
+    `T`           (9, modes)    new displacement, velocity and acceleration per old ones
+    `h`           (3, modes)    new displacement, velocity and acceleration per force on the tip
     `stiffness`   (modes,)      squares of the angular frequencies
     `tip_shape`   (modes,)      displacement of the tip
     `station`     (modes,)      deformation at the station
@@ -148,7 +148,7 @@ class RodStruct(Structure):
 class ImpactStruct(Structure):
     """Contact, projectile, load, gages, and records of the steps.
 
-    The arrays, with those that the kernel writes last:
+    The arrays; the kernel writes the last four:
 
     ==============  ====================  =====================================================
     `entry`         (loaded,)             entries of the plate's vectors under the force
@@ -166,11 +166,11 @@ class ImpactStruct(Structure):
 
     _fields_ = (
         ("law", LawStruct),
-        # State before the steps, and after them.
+        # State before and after the steps.
         ("memory", HistoryStruct),
         ("contact", PointStruct),
         ("plate_w", c_double),  # the plate's displacement in the contact law
-        ("work", c_double),  # of the contact force on the indentation
+        ("work", c_double),  # work of the contact force on the indentation
         ("time", c_double),
         ("unconverged", c_int64),  # steps whose contact iteration did not converge
         ("rod", RodStruct),
@@ -202,12 +202,15 @@ class Written(NamedTuple):
 
 
 def knows(constants: ContactParameters[Number]) -> bool:
-    """Whether the kernels have a law with these constants; one of a subclass is another law."""
+    """Return whether the kernels have a law with these constants.
+
+    Constants of a subclass belong to another law.
+    """
     return type(constants) in (LinearPermanent, YangSunPermanent)
 
 
 def kernel_law(constants: ContactParameters[Number]) -> KernelLaw[Number]:
-    """Permanent indentation of a law that the kernels have; see :func:`knows`."""
+    """Return the permanent indentation of a law that the kernels have; see :func:`knows`."""
     match constants:
         case LinearPermanent():
             return KernelLaw(LawKind.LINEAR, constants.alpha_p, constants.s_p)
@@ -220,12 +223,12 @@ class Burst(NamedTuple):
     """Records of consecutive steps."""
 
     columns: dict[str, Floats]  # (steps,) each
-    strains: Floats  # (steps, gages): weighted sums of the gages, see `GageArray`
+    strains: Floats  # (steps, gages): weighted sums of dofs, see `GageArray`
     fields: Floats  # (rows, numnp, 5): displacement fields of the stored steps
 
 
 def can_step(system: ImpactSystem) -> bool:
-    """Whether the kernels can take the steps of a system."""
+    """Return whether the kernels can take the steps of a system."""
     motion, contact, law = system.motion, system.contact, system.law
     return (
         isinstance(motion.product, CompiledProduct)
@@ -239,7 +242,7 @@ def can_step(system: ImpactSystem) -> bool:
 
 
 class ImpactSteps:
-    """Bursts of steps of a system that :func:`can_step` accepts.
+    """Stepper of a system that :func:`can_step` accepts.  It takes many steps at a time.
 
     `station` is the dof of the projectile whose deformation is recorded.
     """
@@ -268,9 +271,10 @@ class ImpactSteps:
             self._gage_entry, self._gage_weights = product.entries(gages.dof_indices, gages.weights)
 
     def take(self, state: ImpactState, dt: float, steps: int, stored: Indices) -> Burst:
-        """Take steps of size dt, like the last one; store the displacements after some, from 0.
+        """Take steps of size dt, which is also the size of the last step.
 
-        Raises DivergenceError if the motion is no longer finite.
+        The displacements are stored after the steps `stored`, counted from 0.  Raises
+        DivergenceError if the motion is no longer finite.
         """
         plate = state.plate
         written = Written(
@@ -279,35 +283,35 @@ class ImpactSteps:
             strains=np.empty((steps, len(self._gage_entry))),
             fields=np.empty((len(stored), len(self._plate.u))),
         )
-        impact = self._impact(state, dt, stored, written)
-        self._enter(plate, dt)
-        taken = LIBRARY.fecm_impact_steps(
+        impact = self._impact_structure(state, dt, stored, written)
+        self._load_plate(plate, dt)
+        steps_taken = LIBRARY.fecm_impact_steps(
             ctypes.byref(self._plate.structure), ctypes.byref(impact), steps, self._threads
         )
-        if taken < 0:
+        if steps_taken < 0:
             raise MemoryError
-        if taken < steps:
-            raise DivergenceError(plate.step + taken + 1, "the motion is no longer finite")
+        if steps_taken < steps:
+            raise DivergenceError(plate.step + steps_taken + 1, "the motion is no longer finite")
         columns = dict(zip(COLUMNS, written.records.T, strict=True))
         tips = columns["displacement"]
         moved = float(tips[-1] - (tips[-2] if steps > 1 else state.rod.tip))
         state.rod = self._modes.state(written.motion, impact.rod.tip, moved)
-        self._leave(state, impact)
+        self._store_state(state, impact)
         names = ("inertia", "power", "strain", "internal", "quadratic")
         inertia, power, strain, internal, quadratic = (columns[name][-1].item() for name in names)
         plate.sums = Sums(inertia, power, strain, internal, 0.0, 0.0, quadratic)
         plate.step += steps
         columns["step"] = np.arange(plate.step - steps + 1, plate.step + 1, dtype=float)
-        columns["plate_kinetic"] = self._kinetic(columns, plate.dt2)
+        columns["plate_kinetic"] = self._kinetic_energy(columns, plate.dt2)
         columns["plate_strain"] = 0.5 * (columns["strain"] - columns["quadratic"])
         return Burst(columns, written.strains, self._product.fields(written.fields))
 
-    def _impact(
+    def _impact_structure(
         self, state: ImpactState, dt: float, stored: Indices, written: Written
     ) -> ImpactStruct:
-        """What the kernel needs besides the plate, and where it writes."""
+        """Return the kernel's input besides the plate, and the arrays that it writes."""
         law = self._system.law
-        assert isinstance(law, HystereticLaw)  # as `can_step` has found
+        assert isinstance(law, HystereticLaw)  # `can_step` has checked this
         integrator = self._system.rod_step(dt)
         T, h = self._modes.step(integrator)
         rod = RodStruct(
@@ -354,8 +358,8 @@ class ImpactSteps:
             fields=written.fields,
         )
 
-    def _enter(self, state: PlateState, dt: float) -> None:
-        """Copy a state into the vectors of the kernels."""
+    def _load_plate(self, state: PlateState, dt: float) -> None:
+        """Copy a plate's state into the vectors of the kernels."""
         plate = self._plate
         plate.u[plate.position] = state.displacement
         plate.d[plate.position] = state.increment
@@ -363,7 +367,7 @@ class ImpactSteps:
         plate.set_scale(state.dt2)
         plate.structure.damping = 0.5 * self._system.motion.damping * dt
 
-    def _leave(self, state: ImpactState, impact: ImpactStruct) -> None:
+    def _store_state(self, state: ImpactState, impact: ImpactStruct) -> None:
         """Copy the contact and the vectors of the kernels into a state."""
         memory = impact.memory
         state.memory = LoadingHistory(
@@ -381,9 +385,9 @@ class ImpactSteps:
         state.contact_work = impact.work
         state.unconverged_steps = impact.unconverged
         state.plate.time = impact.time
-        self._leave_plate(state.plate)
+        self._store_plate(state.plate)
 
-    def _leave_plate(self, state: PlateState) -> None:
+    def _store_plate(self, state: PlateState) -> None:
         """Copy the vectors of the kernels into a plate's state."""
         plate, count = self._plate, len(state.increment)
         state.displacement[...] = plate.u[plate.position]
@@ -392,11 +396,11 @@ class ImpactSteps:
         if len(state.padded) > count + 1:
             np.negative(state.displacement, out=state.padded[count:-1])
 
-    def _kinetic(self, at: dict[str, Floats], dt2: float) -> Floats:
-        """Kinetic energy of the plate; see :meth:`PlateMotion.kinetic_energy`."""
+    def _kinetic_energy(self, columns: dict[str, Floats], dt2: float) -> Floats:
+        """Return the kinetic energy of the plate; see :meth:`PlateMotion.kinetic_energy`."""
         inverse = self._system.contact.load.inverse_mass * dt2
-        F = at["force"]
-        work = F * at["load_d"] - at["power"]
-        force = at["internal"] + F * (F * inverse - 2.0 * at["load_s"])
+        F = columns["force"]
+        work = F * columns["load_d"] - columns["power"]
+        force = columns["internal"] + F * (F * inverse - 2.0 * columns["load_s"])
         damped = 1.0 + 0.5 * self._system.motion.damping * np.sqrt(dt2)
-        return np.asarray(0.5 * (at["inertia"] / dt2 + work + 0.25 * force) / damped**2)
+        return np.asarray(0.5 * (columns["inertia"] / dt2 + work + 0.25 * force) / damped**2)

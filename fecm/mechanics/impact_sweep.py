@@ -1,7 +1,8 @@
 """Many impacts on one plate by the compiled kernels.
 
-In: the plate's response to a unit force, a projectile in its modes, and the values :class:`Given`
-of each case.  Out: the contact force of every step, and the values :class:`ResultRow` of each case.
+In: the plate's response to a unit force, a projectile in its modes, and the rows :class:`Given`
+with a value per case.  Out: the contact force at every step, and the rows :class:`ResultRow` with a
+value per case.
 """
 
 from __future__ import annotations
@@ -18,29 +19,29 @@ from fecm.mechanics.rod_modes import ProjectileModes
 
 
 class Given(IntEnum):
-    """Rows of what is given of each case."""
+    """Rows of the input, one value per case."""
 
     K = 0  # contact coefficient, force/length^1.5
     Q = 1  # power of the unloading curve
     CRITICAL = 2  # critical indentation, length
     SLOPE = 3  # s_p of equation 3-8
     VELOCITY = 4  # approach velocity
-    FACTOR = 5  # mass and stiffness over those of the projectile
+    FACTOR = 5  # mass and stiffness over the mass and stiffness of the projectile
 
 
 class ResultRow(IntEnum):
-    """Rows of what is found of each case."""
+    """Rows of the results, one value per case."""
 
     DEEPEST = 0  # largest indentation
-    INDENTATION = 1  # the last one
-    PERMANENT = 2  # after unloading from the last point
+    INDENTATION = 1  # last indentation
+    PERMANENT = 2  # permanent indentation after unloading from the last point
     HIGHEST = 3  # largest displacement of the plate under the load
-    W = 4  # the last one
-    LARGEST_DDW = 5  # largest second difference of it
-    LOST = 6  # largest difference of the energies from the initial one
+    W = 4  # last displacement of the plate under the load
+    LARGEST_DDW = 5  # largest second difference of the displacement
+    LOST = 6  # largest difference of the energy from the initial energy
     INITIAL = 7  # kinetic energy of the approach
     UNCONVERGED = 8  # steps whose contact iteration did not converge
-    LARGEST_DW = 9  # largest difference of the displacement in a step
+    LARGEST_DW = 9  # largest change of the displacement in a step
     PLATE_WORK = 10  # work of the contact force on the plate
     COMPLIANCE = 11  # largest w^2/(2 E) of the plate; see :data:`~fecm.results.end.LEAST_WORK`
 
@@ -48,17 +49,17 @@ class ResultRow(IntEnum):
 class SweepStruct(Structure):
     """Impacts of `cases` cases by one kind of projectile.
 
-    The arrays, of which the last two are written:
+    The arrays; the kernel writes the last two:
 
     ============  ===================  ========================================================
     `T`           (9, modes)           step of the modes; see ``impact_steps.RodStruct``
-    `h`           (3, modes)           the same per force on the tip
+    `h`           (3, modes)           new motion per force on the tip
     `stiffness`   (modes,)             squares of the angular frequencies
     `tip_shape`   (modes,)             displacement of the tip
     `plate`       (steps,)             the plate's displacement per force 1, 2, ... steps ago
-    `given`       (given, stride)      :class:`Given`, of which the first `cases` columns
+    `given`       (given, stride)      rows of :class:`Given`; the first `cases` columns count
     `force`       (cases, steps)       contact force
-    `found`       (found, stride)      :class:`ResultRow`, likewise
+    `found`       (found, stride)      rows of :class:`ResultRow`; the first `cases` columns count
     ============  ===================  ========================================================
     """
 
@@ -69,7 +70,7 @@ class SweepStruct(Structure):
         ("modes", c_int64),
         ("law", c_int64),  # a LawKind
         ("dt", c_double),
-        ("theta", c_double),  # as in Rod
+        ("theta", c_double),  # as in ``impact_steps.RodStruct``
         ("weight_before", c_double),
         ("weight", c_double),
         ("T", Doubles),
@@ -92,10 +93,10 @@ def sweep_impacts(
     force: Floats,
     found: Floats,
 ) -> None:
-    """Compute the impacts of cases by a projectile; write `force` (cases, steps) and `found`.
+    """Compute the impacts of many cases by a projectile; write `force` and `found`.
 
-    `given` (given, cases) and `found` (found, cases) may be columns of larger arrays, `response` is
-    (steps,).  Raises MemoryError.
+    `response` is (steps,), `force` is (cases, steps).  `given` (given, cases) and `found`
+    (found, cases) may be columns of larger arrays.  Raises MemoryError.
     """
     T, h = modes.step(step)
     before, after = step.weights

@@ -17,7 +17,7 @@ from fecm.mechanics.mesh import ElementBlock
 # Degrees of freedom of a node: u, v, w, theta_x, theta_y.
 NDOF = 5
 W = 2  # dof of the deflection; the rotations follow
-# Determinants of Jacobians that rounding may have changed, over the square of the coordinates.
+# Rounding may flip the sign of smaller Jacobian determinants, relative to the coordinates squared.
 DOUBTFUL = 1.0e-10
 
 
@@ -30,7 +30,7 @@ class Interpolation(NamedTuple):
 
 
 def local_shape_functions(family: ElementBlock, rule: Quadrature) -> tuple[Floats, Floats]:
-    """Shape functions of the nodes present: values (npt, nn), d/dxi and d/deta (npt, 2, nn)."""
+    """Return values (npt, nn), d/dxi and d/deta (npt, 2, nn) of the present nodes' functions."""
     return _shape_functions_at(family.shape, rule, tuple(family.present.tolist()))
 
 
@@ -38,18 +38,18 @@ def local_shape_functions(family: ElementBlock, rule: Quadrature) -> tuple[Float
 def _shape_functions_at(
     shape: ElementShape, rule: Quadrature, present: tuple[bool, ...]
 ) -> tuple[Floats, Floats]:
-    given = np.array(present)
-    values, local = shape.shape_functions(rule.xi, rule.eta, given)
-    values, local = values[:, given], local[:, :, given]
+    is_present = np.array(present)
+    values, local = shape.shape_functions(rule.xi, rule.eta, is_present)
+    values, local = values[:, is_present], local[:, :, is_present]
     values.flags.writeable = local.flags.writeable = False  # shared by all callers
     return values, local
 
 
 def jacobian(family: ElementBlock, local: Floats) -> Floats:
-    """Jacobian of derivatives by xi and eta, (npt, 2, nn): dx_i/dxi_a, (ne, npt, a, i)."""
+    """Return the Jacobian dx_i/dxi_a, (ne, npt, a, i), from derivatives by xi, eta (npt, 2, nn)."""
     slopes = local.transpose(2, 0, 1)[..., None, None]
     places = np.ascontiguousarray(family.coordinates.transpose(1, 2, 0))
-    # Node by node, as einsum would sum, at a quarter of its cost.
+    # Sum node by node, in the order of einsum, at a quarter of its cost.
     total = slopes[0] * places[0]
     for slope, place in zip(slopes[1:], places[1:], strict=True):
         total += slope * place
@@ -57,9 +57,9 @@ def jacobian(family: ElementBlock, local: Floats) -> Floats:
 
 
 def mapping_slopes(family: ElementBlock, local: Floats) -> Floats:
-    """The Jacobian, dx_i/dxi_a, in another layout, (ne, i, a, npt).
+    """Return the Jacobian dx_i/dxi_a in the layout (ne, i, a, npt).
 
-    That of :func:`jacobian` but for rounding, by one product of matrices, at a fifth of the cost.
+    Same as :func:`jacobian` up to rounding, computed by one matrix product at a fifth of the cost.
     """
     ne, nn = family.nodes.shape
     places = family.coordinates.swapaxes(1, 2).reshape(2 * ne, nn)
@@ -70,10 +70,10 @@ def mapping_slopes(family: ElementBlock, local: Floats) -> Floats:
 def inverse_jacobian(
     family: ElementBlock, local: Floats, *, transposed_jacobian: bool = False
 ) -> tuple[Floats, Floats]:
-    """Inverse (ne, npt, 2, 2) and determinant (ne, npt) of the Jacobian.
+    """Return inverse (ne, npt, 2, 2) and determinant (ne, npt) of the Jacobian.
 
-    `local` has the derivatives of the shape functions by xi and eta, (npt, 2, nn).  The inverse has
-    dxi_a/dx_i in row i and column a; `transposed_jacobian` transposes it.
+    `local` contains the derivatives of the shape functions by xi and eta, (npt, 2, nn).  The
+    inverse has dxi_a/dx_i in row i and column a; `transposed_jacobian` transposes it.
     """
     J: Array = jacobian(family, local)
     inverse = np.linalg.inv(J)
@@ -83,13 +83,13 @@ def inverse_jacobian(
 
 
 def jacobian_determinants(family: ElementBlock, rule: Quadrature) -> Floats:
-    """Determinant of the Jacobian at the points of a rule, (ne, npt), length squared."""
+    """Return the Jacobian determinant at the points of a rule, (ne, npt), length squared."""
     _, local = local_shape_functions(family, rule)
     return np.asarray(np.linalg.det(jacobian(family, local)))
 
 
 def has_positive_jacobians(family: ElementBlock, rule: Quadrature) -> Bools:
-    """Whether the determinant of the Jacobian is positive at all points of a rule, (ne,)."""
+    """Return whether the Jacobian determinant is positive at all points of a rule, (ne,)."""
     _, local = local_shape_functions(family, rule)
     (x_xi, x_eta), (y_xi, y_eta) = mapping_slopes(family, local).transpose(1, 2, 0, 3)
     determinants = x_xi * y_eta - x_eta * y_xi

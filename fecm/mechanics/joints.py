@@ -1,6 +1,6 @@
-"""Where elements meet: nodes in the same place, and nodes that one of two neighbours lacks.
+"""Joints of elements: nodes in the same place, and nodes that one of two neighbours lacks.
 
-Elements fit together if their common side has the same nodes in both.
+Two elements fit together if both have the same nodes on their common side.
 """
 
 from __future__ import annotations
@@ -17,22 +17,22 @@ from fecm.mechanics.mesh import ElementBlock, Ints, distinct
 
 AnyInts = NDArray[np.integer[Any]]
 
-SAME = 1e-4  # distance of nodes in the same place, over the shortest side
-ON_SIDE = 1e-3  # distance of a node from a side that it lies on, over the length of the side
+SAME = 1e-4  # largest distance of nodes in the same place, over the shortest side
+ON_SIDE = 1e-3  # largest distance of a node from a side that it lies on, over the side's length
 SLANT = np.array([1.0, 2.0**-0.5])  # a direction in which no usual mesh has rows of nodes
-STRETCH = float(np.hypot(*SLANT))  # distance along it over the distance, at most
-PAIRS = 1_000_000  # compared at a time
+STRETCH = float(np.hypot(*SLANT))  # largest distance along SLANT over the distance in the plane
+PAIRS = 1_000_000  # pairs compared at a time
 
 
 class ElementSides(NamedTuple):
-    """Sides of elements, each once for every element that has it.
+    """Sides of elements.  A common side occurs once for each of its elements.
 
     Attributes
     ----------
     ends : ndarray of int, shape (n, 2)
-        Rows of the corners at the ends.
+        Rows of the two corners.
     between : ndarray of int, shape (n, k)
-        Rows of the nodes between them; -1 where there is none.
+        Rows of the nodes between the corners; -1 for an absent node.
     elements : ndarray of int, shape (n,)
         Row of the element.
     """
@@ -42,17 +42,17 @@ class ElementSides(NamedTuple):
     elements: Indices
 
     def take(self, members: Bools) -> ElementSides:
-        """Select some sides."""
+        """Select sides by a mask."""
         return ElementSides(self.ends[members], self.between[members], self.elements[members])
 
     @property
     def nodes(self) -> AnyInts:
-        """Rows of all nodes, -1 where there is none, (n, 2 + k)."""
+        """Rows of all nodes, (n, 2 + k); -1 for an absent node."""
         return np.hstack([self.ends, self.between])
 
 
 def sides_of_cells(cells: Indices, corners: int) -> ElementSides:
-    """Sides of cells, (m, k), of rows of corners and perhaps of the middles of their sides."""
+    """Return the sides of cells, (m, k): rows of corners, optionally followed by mid-sides."""
     ends = np.stack([cells[:, :corners], np.roll(cells[:, :corners], -1, axis=1)], axis=2)
     between = cells[:, corners : 2 * corners]
     if not between.shape[1]:
@@ -62,15 +62,15 @@ def sides_of_cells(cells: Indices, corners: int) -> ElementSides:
 
 
 def sides_of(blocks: Sequence[ElementBlock], elements: Ints) -> ElementSides:
-    """Sides of the elements of a deck, (numel, nen), whose node numbers count from 1."""
+    """Return the sides of a deck's elements, (numel, nen), whose node numbers start at 1."""
     ends, between, rows = [], [], []
     for block in blocks:
         corners, nodes = block.shape.corners, elements[block.rows]
         for side in range(corners):
-            places = [4 + side]
-            if block.shape is CUBIC:  # the later ones precede their corner
-                places.append(8 + (side + 1) % corners)
-            inner = [nodes[:, n] if n < nodes.shape[1] else 0 * nodes[:, 0] for n in places]
+            positions = [4 + side]
+            if block.shape is CUBIC:  # nodes 9 to 12 precede their corners
+                positions.append(8 + (side + 1) % corners)
+            inner = [nodes[:, n] if n < nodes.shape[1] else 0 * nodes[:, 0] for n in positions]
             ends.append(nodes[:, [side, (side + 1) % corners]])
             between.append(np.column_stack([*inner, *[0 * nodes[:, 0]] * (2 - len(inner))]))
             rows.append(block.rows)
@@ -78,31 +78,34 @@ def sides_of(blocks: Sequence[ElementBlock], elements: Ints) -> ElementSides:
 
 
 def representatives(count: int, pairs: Indices) -> Indices:
-    """Row that stands for each of the nodes in the same place, (count,)."""
-    kept = np.arange(count)
+    """Return the lowest row among the nodes in the place of each node, (count,)."""
+    lowest = np.arange(count)
     low, high = np.sort(pairs, axis=1).T
-    np.minimum.at(kept, high, low)
-    return kept
+    np.minimum.at(lowest, high, low)
+    return lowest
 
 
 def merged(sides: ElementSides, pairs: Indices) -> ElementSides:
-    """Sides with one node for those in the same place."""
+    """Merge nodes in the same place into one node."""
     if not len(pairs):
         return sides
-    kept = representatives(int(sides.nodes.max()) + 1, pairs)
-    kept = np.append(kept, -1)  # of nodes that are absent
-    return ElementSides(kept[sides.ends], kept[sides.between], sides.elements)
+    rows = representatives(int(sides.nodes.max()) + 1, pairs)
+    rows = np.append(rows, -1)  # for absent nodes
+    return ElementSides(rows[sides.ends], rows[sides.between], sides.elements)
 
 
 def _shortest(sides: ElementSides, places: Floats) -> float:
-    """Length of the shortest side that has one."""
+    """Return the length of the shortest side, ignoring sides of length 0."""
     x, y = (places[sides.ends[:, 1]] - places[sides.ends[:, 0]]).T
     lengths = np.hypot(x, y)
     return float(lengths[lengths > 0.0].min(initial=np.inf))
 
 
 def coincident(places: Floats, sides: ElementSides) -> Indices:
-    """Pairs of rows of nodes that are no distance apart beside the shortest side, (m, 2)."""
+    """Find pairs of nodes in the same place, (m, 2) rows.
+
+    The distance of such a pair is at most SAME times the shortest side.
+    """
     distance = SAME * _shortest(sides, places)
     along = places @ SLANT
     order = np.argsort(along)
@@ -111,18 +114,18 @@ def coincident(places: Floats, sides: ElementSides) -> Indices:
     if not (np.diff(sorted_along) <= reach).any():
         return np.zeros((0, 2), np.intp)
     last = np.searchsorted(sorted_along, sorted_along + reach, side="right")
-    found = [np.zeros((0, 2), np.intp)]
+    matches = [np.zeros((0, 2), np.intp)]
     for first, second in _pairs(np.arange(1, len(places) + 1), last):
         pairs = np.column_stack([order[first], order[second]])
         x, y = (places[pairs[:, 1]] - places[pairs[:, 0]]).T
-        found.append(pairs[np.hypot(x, y) <= distance])
-    return np.concatenate(found)
+        matches.append(pairs[np.hypot(x, y) <= distance])
+    return np.concatenate(matches)
 
 
 def hanging_nodes(sides: ElementSides, places: Floats) -> tuple[Indices, Indices]:
-    """Nodes inside a side of an element that lacks them.
+    """Find nodes that lie inside a side of an element without belonging to the element.
 
-    Returns rows of nodes and of these elements, one of each for every side.
+    Returns rows of nodes and rows of elements, one of each per node and side.
     """
     rim = sides.take(_is_unmatched(sides, len(places)))
     nodes = distinct(rim.nodes[rim.nodes >= 0])
@@ -133,57 +136,60 @@ def hanging_nodes(sides: ElementSides, places: Floats) -> tuple[Indices, Indices
     bulge = np.where(rim.between[:, 0] >= 0, 0.5, 0.0) * (reach[:, 1] - reach[:, 0])
     first = np.searchsorted(along, reach[:, 0] - slack - bulge, side="left")
     last = np.searchsorted(along, reach[:, 1] + slack + bulge, side="right")
-    found_nodes, found_elements = [nodes[:0]], [rim.elements[:0]]
-    for side, place in _pairs(first, last):
-        inside = _is_inside(rim, side, nodes[place], places)
-        found_nodes.append(nodes[place][inside])
-        found_elements.append(rim.elements[side][inside])
-    return np.concatenate(found_nodes), np.concatenate(found_elements)
+    hanging, elements = [nodes[:0]], [rim.elements[:0]]
+    for side, row in _pairs(first, last):
+        inside = _is_inside(rim, side, nodes[row], places)
+        hanging.append(nodes[row][inside])
+        elements.append(rim.elements[side][inside])
+    return np.concatenate(hanging), np.concatenate(elements)
 
 
 def _is_unmatched(sides: ElementSides, count: int) -> Bools:
-    """Which sides no other element has with the same nodes."""
+    """Return a mask of the sides that no other element has with the same nodes."""
     ends, between = np.sort(sides.ends, axis=1), np.sort(sides.between, axis=1) + 1
     keys = ends[:, 0].astype(np.int64) * count + ends[:, 1]
     inner = between @ np.array([count + 1, 1][-between.shape[1] :], dtype=np.int64)
     order = np.argsort(keys, kind="stable")
-    same = keys[order][1:] == keys[order][:-1]
-    same &= inner[order][1:] == inner[order][:-1]
+    is_repeated = keys[order][1:] == keys[order][:-1]
+    is_repeated &= inner[order][1:] == inner[order][:-1]
     unmatched = np.ones(len(keys), dtype=bool)
-    unmatched[order[1:][same]] = unmatched[order[:-1][same]] = False
+    unmatched[order[1:][is_repeated]] = unmatched[order[:-1][is_repeated]] = False
     return unmatched
 
 
 def _is_inside(rim: ElementSides, side: Indices, node: Indices, places: Floats) -> Bools:
-    """Whether nodes lie inside sides that do not have them; a mid-side node may curve a side."""
+    """Return whether nodes lie inside sides without belonging to them.
+
+    A mid-side node may curve a side.
+    """
     start, end = places[rim.ends[side, 0]], places[rim.ends[side, 1]]
     place, chord = places[node], end - start
     with np.errstate(all="ignore"):
         length = np.hypot(*chord.T)
         share = ((place - start) * chord).sum(axis=1) / length**2
         middle = rim.between[side, 0]
-        one = (middle >= 0) & (rim.between[side, 1:] < 0).all(axis=1)
+        has_middle = (middle >= 0) & (rim.between[side, 1:] < 0).all(axis=1)
         bulge = places[middle] - (start + end) / 2.0
-        way = 4.0 * share * (1.0 - share) * one
-        on_side = start + share[:, None] * chord + way[:, None] * bulge
+        parabola = 4.0 * share * (1.0 - share) * has_middle
+        on_side = start + share[:, None] * chord + parabola[:, None] * bulge
         inside = (share > ON_SIDE) & (share < 1.0 - ON_SIDE)
         inside &= np.hypot(*(place - on_side).T) < ON_SIDE * length
-        for other in rim.nodes.T:  # its nodes, and those in their places
-            apart = np.hypot(*(place - places[other[side]]).T) > ON_SIDE * length
-            inside &= apart | (other[side] < 0)
+        for own_node in rim.nodes.T:  # leave out the side's own nodes, and nodes in their places
+            apart = np.hypot(*(place - places[own_node[side]]).T) > ON_SIDE * length
+            inside &= apart | (own_node[side] < 0)
     return np.asarray(inside)
 
 
 def _pairs(first: Indices, last: Indices) -> Iterator[tuple[Indices, Indices]]:
-    """Pairs of every row with the numbers from its first to its last, some at a time."""
+    """Yield pairs (row, n) with first[row] <= n < last[row], in batches."""
     counts = np.maximum(last - first, 0)
     ends = np.cumsum(counts)
     start = 0
     while start < len(counts):
         done = ends[start - 1] if start else 0
         stop = max(start + 1, int(np.searchsorted(ends, done + PAIRS, side="right")))
-        own = counts[start:stop]
-        rows = np.repeat(np.arange(start, stop), own)
-        offsets = np.arange(len(rows)) - np.repeat(np.cumsum(own) - own, own)
+        batch = counts[start:stop]
+        rows = np.repeat(np.arange(start, stop), batch)
+        offsets = np.arange(len(rows)) - np.repeat(np.cumsum(batch) - batch, batch)
         yield rows, first[rows] + offsets
         start = stop

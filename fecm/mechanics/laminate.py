@@ -1,8 +1,8 @@
 """Laminate stiffness: classical lamination with transverse shear, report section 2.1.
 
-Conventions: layer 1 is the struck face at z = -h/2, the last layer lies at z = +h/2; fibre angles
+Conventions: layer 1 is the struck face at z = -h/2, the last layer lies at z = +h/2.  Fibre angles
 are counter-clockwise from the x-axis.  In-plane components are in the order xx, yy, xy (engineering
-shear), transverse shear in the order xz, yz.  No shear correction factor is applied.
+shear), transverse shear components in the order xz, yz.  No shear correction factor is applied.
 """
 
 from __future__ import annotations
@@ -17,17 +17,14 @@ import numpy as np
 
 from fecm._typing import Floats
 
-# `without_small_entries` sets entries of A, B and D below the first limit to 0, except
-# rounding errors below the second one, relative to A h^n.
-LEAST_ENTRY = 1.0e-6
-SOFT_CORE = 1.0 / 50.0  # G13 of a sandwich's core over that of its faces, at most
-ROUNDING = 1.0e-12
-# Of a fabric: least E2/E1, which is 0.8 to 1.2, and largest G12/E2.
-FABRIC_MODULI = 0.5
-FABRIC_SHEAR = 0.25
+LEAST_ENTRY = 1.0e-6  # `without_small_entries` sets smaller entries of A, B and D to 0
+SOFT_CORE = 1.0 / 50.0  # largest G13 of a sandwich's core over G13 of its faces
+ROUNDING = 1.0e-12  # rounding errors of A, B and D, relative to A h^n
+FABRIC_MODULI = 0.5  # least E2/E1 of a fabric; usual fabrics have 0.8 to 1.2
+FABRIC_SHEAR = 0.25  # largest G12/E2 of a fabric
 
 
-# Attributes that need not be assignable, without methods, whose definition takes 0.4 ms.
+# Frozen, so that read-only attributes match; without generated methods, which take 0.4 ms.
 @dataclass(frozen=True, init=False, eq=False, repr=False, match_args=False)
 class PlyConstants(Protocol):
     """Density (mass/volume), Poisson's ratio and moduli (force/area) of a ply."""
@@ -42,19 +39,19 @@ class PlyConstants(Protocol):
 
 
 def is_fabric(ply: PlyConstants) -> bool:
-    """Whether a ply has fibres in both directions: E2 near E1, G12 far below."""
+    """Return whether a ply has fibres in both directions: E2 near E1, G12 far below."""
     return ply.e2 > FABRIC_MODULI * ply.e1 and ply.g12 < FABRIC_SHEAR * ply.e2
 
 
 def are_cores(plies: Sequence[PlyConstants]) -> list[bool]:
-    """Which plies are so soft in shear that the others are the faces of a sandwich."""
+    """Return which plies are soft in shear, so that the other plies are faces of a sandwich."""
     stiffest = max(ply.g13 for ply in plies)
     return [ply.g13 < SOFT_CORE * stiffest for ply in plies]
 
 
 @dataclass(frozen=True)
 class PlyStack:
-    """Plies of a laminate, from z = -h/2 on."""
+    """Plies of a laminate, starting at z = -h/2."""
 
     angles: Floats  # (n,): fibre angles in degrees
     faces: Floats  # (n + 1,): z of the faces, length
@@ -71,7 +68,7 @@ class PlyStack:
 
 
 class EngineeringConstants(NamedTuple):
-    """Elastic constants of the homogeneous plate that has the thickness and these compliances."""
+    """Elastic constants of the homogeneous plate of the same thickness and compliance."""
 
     ex: float  # Young's moduli, force/area
     ey: float
@@ -93,26 +90,26 @@ class LaminateSection:
     shear: Floats
     mass: float  # P of equation 2-24: integral of the density through the thickness
     rotary_inertia: float  # I of equation 2-24: integral of density times z squared
-    # Integral of density times z, mass/length: it couples u and theta_x, and is left out.
+    # Integral of density times z, mass/length.  It couples u and theta_x; the plate ignores it.
     coupling_inertia: float
     thickness: float  # total thickness
     plies: PlyStack
 
     @property
     def unlike_interfaces(self) -> int:
-        """Number of interfaces which can delaminate: of another fibre angle or material."""
+        """Number of interfaces that can delaminate: fibre angle or material changes there."""
         turns = np.diff(self.plies.angles) % 180.0
-        changes = [one != other for one, other in pairwise(self.plies.constants)]
+        changes = [lower != upper for lower, upper in pairwise(self.plies.constants)]
         return int(np.count_nonzero((turns != 0.0) | np.array(changes, dtype=bool)))
 
     @property
     def has_core(self) -> bool:
-        """Whether a ply is so soft in shear that the others are the faces of a sandwich."""
+        """Whether a ply is soft in shear, so that the other plies are faces of a sandwich."""
         return any(are_cores(self.plies.constants))
 
     @property
     def struck_thickness(self) -> float:
-        """Thickness of the struck face of a sandwich, from its first ply to the core, or of all."""
+        """Thickness of a sandwich's struck face, from the first ply to the core; else of all."""
         if not self.has_core:
             return self.thickness
         core = are_cores(self.plies.constants).index(True)
@@ -149,14 +146,14 @@ class LaminateSection:
 
 
 def _constants(stiffness: Floats) -> EngineeringConstants:
-    """Engineering constants of a plane-stress stiffness, (3, 3)."""
+    """Return the engineering constants of a plane-stress stiffness, (3, 3)."""
     compliance = np.linalg.inv(stiffness)
     ex, ey, gxy = (1.0 / np.diag(compliance)).tolist()
     return EngineeringConstants(ex, ey, gxy, float(-compliance[0, 1] / compliance[0, 0]))
 
 
 def reduced_stiffness(ply: PlyConstants) -> Floats:
-    """Plane-stress stiffness Q of a ply in its own axes, equation 2-3, (3, 3)."""
+    """Return the plane-stress stiffness Q of a ply in its own axes, equation 2-3, (3, 3)."""
     e1, e2, nu12 = ply.e1, ply.e2, ply.nu12
     full = 1.0 - nu12**2 * e2 / e1
     q12 = nu12 * e2 / full
@@ -230,9 +227,9 @@ def laminate(
 
 
 def _mean_densities(plies: Sequence[PlyConstants], faces: Floats) -> tuple[float, float, float]:
-    """Densities whose plate of one material has the same integrals of 1 and z squared.
+    """Return the densities of homogeneous plates of the same mass and of the same rotary inertia.
 
-    The third is the integral of density times z over the thickness squared.
+    The third result is the integral of density times z over the thickness squared.
     """
     density = np.array([ply.density for ply in plies])
     if (density == density[0]).all():
@@ -244,21 +241,23 @@ def _mean_densities(plies: Sequence[PlyConstants], faces: Floats) -> tuple[float
     return float(mean), float(second), float(first)
 
 
-# Delamination threshold of a small-mass impact over the static one (Olsson, Donadon, Falzon 2006).
+# Delamination threshold of small-mass impact over the static threshold (Olsson, Donadon, Falzon
+# 2006).
 SMALL_MASS = 1.213
 
 
 def effective_rigidity(laminate: LaminateSection) -> float:
-    """Bending stiffness D* of the isotropic plate of equal response to a point force.
+    """Return the bending stiffness D* of the isotropic plate with the same point response.
 
     D* = [mean over theta of D(theta)^(-1/2)]^(-2), force*length, where D(theta) is D11 in axes
-    turned by theta; a coupled laminate has D - B A^-1 B for D.  It is that of the infinite plate
-    whose point moves at the same velocity under the same force, and does not depend on the axes.
+    turned by theta.  For a coupled laminate D - B A^-1 B replaces D.  An infinite isotropic plate
+    of stiffness D* moves at the same velocity under the same point force.  D* does not depend on
+    the axes.
 
     With t = tan(theta) the mean is the integral of 1/(pi sqrt(q)) over all t, where q(t) is a
-    quartic with two pairs of conjugate roots.  This elliptic integral is an arithmetic-geometric
-    mean of two lengths made of the roots.  For orthotropic axes the geometric mean of the same two
-    gives Olsson's sqrt(D11 D22 (eta + 1)/2), 1992, with eta = (D12 + 2 D66)/sqrt(D11 D22).
+    quartic with two pairs of conjugate roots.  This elliptic integral is the arithmetic-geometric
+    mean of two lengths computed from the roots.  For orthotropic axes the geometric mean of the two
+    lengths gives Olsson's sqrt(D11 D22 (eta + 1)/2), 1992, with eta = (D12 + 2 D66)/sqrt(D11 D22).
 
     NaN if the stiffness is not finite.
     """
@@ -266,27 +265,27 @@ def effective_rigidity(laminate: LaminateSection) -> float:
     if laminate.is_coupled:
         D = D - B @ np.linalg.solve(A, B)
     mean, scale = np.sqrt(D[0, 0] * D[1, 1]), (D[0, 0] / D[1, 1]) ** 0.25
-    # q(scale t)/D11, whose roots have a product of 1.
+    # q(scale t)/D11; the product of its roots is 1.
     twist = 2.0 * (D[0, 1] + 2.0 * D[2, 2]) / mean
     quartic = [1.0, 4.0 * D[1, 2] * scale / mean, twist, 4.0 * D[0, 2] / scale / mean, 1.0]
     if not np.isfinite(quartic).all():
         return math.nan
-    one, other = sorted(np.roots(quartic), key=lambda root: root.imag)[2:]
-    distance = abs(one - other.conjugate()) / 2.0
-    return float(mean) * _agm(distance, math.sqrt(one.imag * other.imag)) ** 2
+    first, second = sorted(np.roots(quartic), key=lambda root: root.imag)[2:]
+    distance = abs(first - second.conjugate()) / 2.0
+    return float(mean) * _agm(distance, math.sqrt(first.imag * second.imag)) ** 2
 
 
 def _agm(a: float, b: float) -> float:
-    """Arithmetic-geometric mean of two positive numbers."""
+    """Return the arithmetic-geometric mean of two positive numbers."""
     while abs(a - b) > 1e-15 * a:
         a, b = (a + b) / 2.0, math.sqrt(a * b)
     return a
 
 
 def threshold_force(rigidity: float, toughness: float, delaminations: int = 1) -> float:
-    """Force at which n circular delaminations grow, pi sqrt(32 D* G_IIc/(n + 2)).
+    """Return the force at which n circular delaminations grow, pi sqrt(32 D* G_IIc/(n + 2)).
 
     The rigidity D* is force*length, the toughness G_IIc force/length.  One delamination: Davies and
-    Robinson 1992; n of them: Suemasu and Majima 1996, Olsson 2001.
+    Robinson 1992.  Several delaminations: Suemasu and Majima 1996, Olsson 2001.
     """
     return math.pi * math.sqrt(32.0 * rigidity * toughness / (delaminations + 2.0))

@@ -1,27 +1,27 @@
-"""Stretching of a plate that bends: the membrane strains of von Karman, tied.
+"""Stretching of a plate that bends: tied membrane strains of von Karman.
 
 A plate whose midplane slopes are not small stretches by eps_q = (w,x^2/2, w,y^2/2, w,x w,y).  The
 membrane force is N = N0 + A (eps_l + eps_q) + B kappa, where eps_l is the linear strain of u and v,
-and of w/R in a curved plate (:mod:`~fecm.mechanics.strains`).
-The internal force f is the gradient of the strain energy
+and of w/R in a curved plate (:mod:`~fecm.mechanics.strains`).  The internal force f is the gradient
+of the strain energy
 
     U = 1/2 int (eps A eps + 2 eps B kappa + kappa D kappa + gamma S gamma) dA
         + 1/2 int (N0_x w,x^2 + N0_y w,y^2 + 2 N0_xy w,x w,y) dA,   eps = eps_l + eps_q.
 
-Signs, axes and the order of strains are those of :mod:`~fecm.mechanics.element_matrices`.  Moderate
-rotations: the error of the strains is about the square of the slope.
+Signs, axes and the order of strains follow :mod:`~fecm.mechanics.element_matrices`.  Rotations are
+moderate: the error of the strains is about the square of the slope.
 
-Membrane locking.  In an element w,x^2 is quadratic in x and eps_l only linear, so that a plate that
-bends without stretching would be too stiff.  The quadratic strains are therefore taken at the tying
-points of the assumed shear strains (:mod:`~fecm.mechanics.strains`) and interpolated between
-them.  Their components are covariant, along the base vectors x,xi and x,eta of the element's
-centre: e_11 = w,1^2/2, e_22 = w,2^2/2, e_12 = w,1 w,2, with w,a the slope along base vector a.
-e_11 is taken at xi = +-1/sqrt(3), eta = 0, +-sqrt(3/5), e_22 the other way round, e_12 at
-+-1/sqrt(3) in both directions.  With the base vectors of the centre a patch of constant membrane
-force is exact on distorted meshes; with those of the tying points it is not (Bucalem and Bathe
-1993; Wisniewski and Panasz 2013).
+Membrane locking.  In an element w,x^2 is quadratic in x but eps_l only linear.  A plate that bends
+without stretching would therefore be too stiff.  To avoid this, the quadratic strains are evaluated
+at the tying points of the assumed shear strains (:mod:`~fecm.mechanics.strains`) and interpolated
+between them.  Their components are covariant, along the base vectors x,xi and x,eta of the
+element's centre: e_11 = w,1^2/2, e_22 = w,2^2/2, e_12 = w,1 w,2, where w,a is the slope along base
+vector a.  The tying points of e_11 are xi = +-1/sqrt(3), eta = 0, +-sqrt(3/5); e_22 swaps xi and
+eta; e_12 has +-1/sqrt(3) in both directions.  With the base vectors of the centre a patch of
+constant membrane force is exact on distorted meshes; with the base vectors of the tying points it
+is not (Bucalem and Bathe 1993; Wisniewski and Panasz 2013).
 
-Arrays over elements have them last here: (..., points, ne).
+In this module the element is the last axis of an array: (..., points, ne).
 """
 
 from __future__ import annotations
@@ -46,19 +46,19 @@ from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.strains import StrainField, strain_of_deflection
 
-# Elements of a block: their arrays fit the cache.
+# Elements per block: their arrays fit the cache.
 BLOCK = 256
-# Tying points of e_11 or e_22; those of e_12 follow in every array of slopes.
+# Number of tying points of e_11 or e_22.  The tying points of e_12 follow in arrays of slopes.
 TYING = 6
 
 
 def has_tied_membrane(family: ElementBlock) -> bool:
-    """Whether the elements of a block have tied membrane strains: those with nine nodes."""
+    """Return whether a block's elements have tied membrane strains, as 9-node elements do."""
     return family.shape.nodes == 9 and family.nodes.shape[1] == 9
 
 
 def covariant_to_global(base: Floats) -> Floats:
-    """Strains xx, yy, xy per covariant e_11, e_22, e_12, (ne, 3, 3).
+    """Return strains xx, yy, xy per covariant e_11, e_22, e_12, (ne, 3, 3).
 
     `base` (ne, 2, 2) are the base vectors x,xi and x,eta.
     """
@@ -78,11 +78,11 @@ class QuadraticStrains:
         _, at_centre = local_shape_functions(family, gauss(1))
         centre = jacobian(family, at_centre)[:, 0]  # (ne, a, i): base vectors of the centre
         points = [_with_corners(assumed_shear.tying_points(9, axis)) for axis in (0, 1)]
-        # Slope along base vector a per slope in xi and in eta, (2, points, ne), and their table.
+        # Slopes along base vector a per slope in xi and in eta, (2, points, ne), and their tables.
         self.metric: list[Floats] = []
         self.tables: list[Floats] = []
-        for axis, at in enumerate(points):
-            _, local = local_shape_functions(family, at)
+        for axis, tying_points in enumerate(points):
+            _, local = local_shape_functions(family, tying_points)
             inverse, _ = inverse_jacobian(family, local)
             along = np.einsum("ei,etib->bte", centre[:, axis], inverse)
             self.metric.append(np.ascontiguousarray(along))
@@ -96,72 +96,74 @@ class QuadraticStrains:
         self.to_global = covariant_to_global(centre).transpose(1, 2, 0)
 
     def slopes(self, w: Floats) -> tuple[Floats, Floats]:
-        """Slopes w,1 and w,2 of nodal values (9, ne) at their tying points, (10, ne) each."""
-        one, two = (
+        """Return w,1 and w,2 of nodal values (9, ne) at their tying points, (10, ne) each."""
+        along_one, along_two = (
             (metric * (table @ w).reshape(metric.shape)).sum(axis=0)
             for metric, table in zip(self.metric, self.tables, strict=True)
         )
-        return one, two
+        return along_one, along_two
 
     def of(self, w: Floats) -> Floats:
-        """Strains at the points of the rule, (3, points, ne), of nodal values of w, (9, ne)."""
+        """Return strains at the points of the rule, (3, points, ne), of nodal w, (9, ne)."""
         return self.at_points(tied_components(*self.slopes(w)))
 
     def slope_matrices(self) -> tuple[Floats, Floats]:
-        """Matrices of the slopes w,1 and w,2, (10, 9, ne) each."""
-        one, two = (
+        """Return the matrices of the slopes w,1 and w,2, (10, 9, ne) each."""
+        along_one, along_two = (
             np.einsum("bte,btn->tne", metric, table.reshape(2, -1, 9))
             for metric, table in zip(self.metric, self.tables, strict=True)
         )
-        return one, two
+        return along_one, along_two
 
     def at_points(self, tied: tuple[Floats, Floats, Floats]) -> Floats:
-        """Strains xx, yy, xy at the points of the rule, (3, points, ne), of tied components.
+        """Return strains xx, yy, xy at the points of the rule, (3, points, ne).
 
-        These are e_11, e_22 (6, ..., ne) and e_12 (4, ..., ne); other axes may stand between.
+        The tied components are e_11, e_22 (6, ..., ne) and e_12 (4, ..., ne).  Other axes may stand
+        between the points and the elements.
         """
         parts = [np.tensordot(H, e, 1) for H, e in zip(self.weights, tied, strict=True)]
         shape = (3, 3, *[1] * (parts[0].ndim - 1), self.to_global.shape[2])
         return np.asarray((self.to_global.reshape(shape) * np.stack(parts)).sum(axis=1))
 
     def tied_forces(self, N: Floats) -> tuple[Floats, Floats, Floats]:
-        """Forces n_11, n_22, n_12 on the tied components, of membrane forces (3, points, ne).
+        """Return forces n_11, n_22, n_12 on the tied components.
 
-        These contain the weights of the points.
+        The membrane forces N, (3, points, ne), contain the weights of the points.
         """
         covariant = (self.to_global[:, :, None] * N[:, None]).sum(axis=0)
-        one, two, both = (H.T @ n for H, n in zip(self.weights, covariant, strict=True))
-        return one, two, both
+        n_11, n_22, n_12 = (H.T @ n for H, n in zip(self.weights, covariant, strict=True))
+        return n_11, n_22, n_12
 
     def nodal_forces(self, along_one: Floats, along_two: Floats) -> Floats:
-        """Forces on w of the nodes, (9, ne), of those on the slopes, (10, ne) each."""
-        one, two = (
+        """Return the forces on w of the nodes, (9, ne), from forces on the slopes, (10, ne)."""
+        of_one, of_two = (
             table.T @ (metric * force).reshape(-1, force.shape[1])
             for force, metric, table in zip(
                 (along_one, along_two), self.metric, self.tables, strict=True
             )
         )
-        return one + two
+        return of_one + of_two
 
 
-def tied_components(one: Floats, two: Floats) -> tuple[Floats, Floats, Floats]:
-    """e_11, e_22 and e_12 of slopes at their tying points."""
+def tied_components(along_one: Floats, along_two: Floats) -> tuple[Floats, Floats, Floats]:
+    """Return e_11, e_22 and e_12 from the slopes w,1 and w,2 at their tying points."""
     return (
-        0.5 * one[:TYING] * one[:TYING],
-        0.5 * two[:TYING] * two[:TYING],
-        one[TYING:] * two[TYING:],
+        0.5 * along_one[:TYING] * along_one[:TYING],
+        0.5 * along_two[:TYING] * along_two[:TYING],
+        along_one[TYING:] * along_two[TYING:],
     )
 
 
 def quadratic_strains(family: ElementBlock, rule: Quadrature, field: Floats) -> Floats:
-    """Tied eps_q of a displacement field (numnp, 5) at the points of a rule, (3, points, ne)."""
+    """Return tied eps_q of a displacement field (numnp, 5) at a rule's points, (3, points, ne)."""
     return QuadraticStrains(family, rule).of(field[family.nodes, 2].T)
 
 
 def strains_of_deflection(plate: PlateModel, points: StrainField, field: Floats) -> Floats | None:
-    """Midplane strains of w in a displacement field (numnp, 5) at points, (3, numel, npt).
+    """Return the midplane strains of w in a displacement field (numnp, 5), (3, numel, npt).
 
-    w/R of a curved plate, and the tied eps_q of a nonlinear one; None of any other.
+    They are w/R of a curved plate plus the tied eps_q of a nonlinear plate.  Returns None for a
+    plate that is neither.
     """
     strains = quadratic_strains_at(points, field) if plate.nonlinear else None
     if plate.is_curved:
@@ -172,7 +174,7 @@ def strains_of_deflection(plate: PlateModel, points: StrainField, field: Floats)
 
 
 def quadratic_strains_at(points: StrainField, field: Floats) -> Floats:
-    """Tied eps_q of a displacement field (numnp, 5) at points of every element, (3, numel, npt)."""
+    """Return tied eps_q of a displacement field (numnp, 5) in all elements, (3, numel, npt)."""
     strains = np.empty((3, *points.shape))
     for family in points.families:
         strains[:, family.rows] = quadratic_strains(family, points.rule, field).swapaxes(1, 2)
@@ -180,7 +182,7 @@ def quadratic_strains_at(points: StrainField, field: Floats) -> Floats:
 
 
 class _Elements(NamedTuple):
-    """Some elements, and what their forces need."""
+    """Elements of a block with the arrays that their forces need."""
 
     nodes: Indices  # (9, ne)
     weight: Floats  # (points, ne): Jacobian determinant times weight
@@ -194,8 +196,8 @@ class _Elements(NamedTuple):
 class MembraneForces:
     """Internal forces of the quadratic strains: f(u) - K u.
 
-    `weights` (numel,) are numbers of elements that each represents, 1 by default; those of weight 0
-    are left out.
+    `weights` (numel,) is the number of elements that each element represents, 1 by default.
+    Elements of weight 0 are left out.
     """
 
     def __init__(self, plate: PlateModel, weights: Floats | None = None) -> None:
@@ -205,9 +207,9 @@ class MembraneForces:
         rule = plate.rules.bending
         for family in plate.families:
             of_family = np.ones(len(family.rows)) if weights is None else weights[family.rows]
-            kept = np.flatnonzero(of_family)
-            for start in range(0, len(kept), BLOCK):
-                members = kept[start : start + BLOCK]
+            represented = np.flatnonzero(of_family)
+            for start in range(0, len(represented), BLOCK):
+                members = represented[start : start + BLOCK]
                 block = family.take(members)
                 values, local = local_shape_functions(block, rule)
                 inverse, determinant = inverse_jacobian(block, local)
@@ -225,27 +227,27 @@ class MembraneForces:
                 )
 
     def forces(self, field: Floats) -> tuple[Floats, float]:
-        """Forces f(u) - K u of a displacement field, (numnp, 5), and the quadratic work.
+        """Return the forces f(u) - K u of a displacement field, (numnp, 5), and the quadratic work.
 
-        The quadratic work is the integral of (N - N0) eps_q.  With it the strain energy is
+        The quadratic work is the integral of (N - N0) eps_q.  The strain energy is
         U = (u f - quadratic work)/2, because eps_q doubles under the variation u.
         """
         numnp = len(field)
         total = np.zeros((NDOF, numnp))
         work = 0.0
         for part in self._elements:
-            forces, of_part = self._forces(part, field[part.nodes].transpose(2, 0, 1))
-            work += of_part
+            forces, work_of_part = self._forces(part, field[part.nodes].transpose(2, 0, 1))
+            work += work_of_part
             for dof, force in forces.items():
                 total[dof] += np.bincount(part.nodes.ravel(), force.ravel(), numnp)
         return total.T, work
 
     def _forces(self, part: _Elements, q: Floats) -> tuple[dict[int, Floats], float]:
-        """Forces (9, ne) on the dofs of some elements, and the quadratic work."""
+        """Return the forces (9, ne) by dof of some elements, and the quadratic work."""
         A, B, tied = part.laminate.A, part.laminate.B, part.tied
         coupled = part.laminate.is_coupled
-        one, two = tied.slopes(q[2])
-        components = tied_components(one, two)
+        w_1, w_2 = tied.slopes(q[2])
+        components = tied_components(w_1, w_2)
         quadratic = tied.at_points(components)
         stretched = part.weight * np.tensordot(A, quadratic, 1)
         strains = _strains(part, q[:2])
@@ -255,21 +257,21 @@ class MembraneForces:
         if coupled:
             N -= part.weight * np.tensordot(B, _strains(part, q[3:]), 1)
         n11, n22, n12 = tied.tied_forces(N)
-        along_one = np.concatenate([one[:TYING] * n11, two[TYING:] * n12])
-        along_two = np.concatenate([two[:TYING] * n22, one[TYING:] * n12])
+        along_one = np.concatenate([w_1[:TYING] * n11, w_2[TYING:] * n12])
+        along_two = np.concatenate([w_2[:TYING] * n22, w_1[TYING:] * n12])
         forces = {2: tied.nodal_forces(along_one, along_two)}
-        forces[0], forces[1] = _of_stresses(part, stretched)
+        forces[0], forces[1] = _stress_forces(part, stretched)
         if self._curved is not None:
             forces[2] += part.values.T @ np.tensordot(self._curved, stretched, 1)
         if coupled:
             moments = -part.weight * np.tensordot(B, quadratic, 1)
-            forces[3], forces[4] = _of_stresses(part, moments)
+            forces[3], forces[4] = _stress_forces(part, moments)
         work = sum(float((n * e).sum()) for n, e in zip((n11, n22, n12), components, strict=True))
         return forces, work
 
 
 def _strains(part: _Elements, q: Floats) -> Floats:
-    """Strains xx, yy, xy at the points of quadrature, (3, points, ne), of u and v, (2, 9, ne)."""
+    """Return xx, yy, xy at the points of quadrature, (3, points, ne), of u and v, (2, 9, ne)."""
     (u_x, u_y), (v_x, v_y) = (
         (part.inverse * (part.table @ values).reshape(part.inverse.shape[1:])).sum(axis=1)
         for values in q
@@ -277,8 +279,8 @@ def _strains(part: _Elements, q: Floats) -> Floats:
     return np.stack([u_x, v_y, u_y + v_x])
 
 
-def _of_stresses(part: _Elements, N: Floats) -> tuple[Floats, Floats]:
-    """Forces on u and v of the nodes, (9, ne) each, of weighted stresses (3, points, ne)."""
+def _stress_forces(part: _Elements, N: Floats) -> tuple[Floats, Floats]:
+    """Return the forces on u and v, (9, ne) each, of weighted stresses (3, points, ne)."""
     x, y = (
         part.table.T
         @ (part.inverse[0] * N[along] + part.inverse[1] * N[across]).reshape(-1, N.shape[2])
@@ -288,38 +290,38 @@ def _of_stresses(part: _Elements, N: Floats) -> tuple[Floats, Floats]:
 
 
 def tangent(plate: PlateModel, family: ElementBlock, field: Floats) -> Floats:
-    """Difference of tangent stiffness and K of a block's elements at a field, (ne, 45, 45).
+    """Return tangent stiffness minus K of a block's elements at a field, (ne, 45, 45).
 
-    The second derivative of the strain energy; exactly symmetric.
+    The tangent stiffness is the second derivative of the strain energy; it is exactly symmetric.
     """
     rule, laminate = plate.rules.bending, plate.laminate_of(family)
     ne, nn = family.nodes.shape
-    at = interpolate(family, rule)
-    linear = membrane_and_bending(at, plate.curvature)
+    shapes = interpolate(family, rule)
+    linear = membrane_and_bending(shapes, plate.curvature)
     tied = QuadraticStrains(family, rule)
     q = field[family.nodes].transpose(2, 1, 0)
-    one, two = tied.slopes(q[2])
+    w_1, w_2 = tied.slopes(q[2])
     G1, G2 = tied.slope_matrices()
     # Variation of eps_q, (3, points, 9, ne), per w of the nodes.
     varied = tied.at_points(
         (
-            one[:TYING, None] * G1[:TYING],
-            two[:TYING, None] * G2[:TYING],
-            one[TYING:, None] * G2[TYING:] + two[TYING:, None] * G1[TYING:],
+            w_1[:TYING, None] * G1[:TYING],
+            w_2[:TYING, None] * G2[:TYING],
+            w_1[TYING:, None] * G2[TYING:] + w_2[TYING:, None] * G1[TYING:],
         )
     )
     quadratic = np.zeros_like(linear)
     quadratic.reshape(ne, -1, 6, nn, NDOF)[:, :, :3, :, 2] = varied.transpose(3, 1, 0, 2)
     ABD = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
-    C = at.jxw[:, :, None, None] * ABD
+    C = shapes.jxw[:, :, None, None] * ABD
     mixed = np.einsum("epik,epij,epjl->ekl", linear, C, quadratic, optimize=True)
     square = np.einsum("epik,epij,epjl->ekl", quadratic, C, quadratic, optimize=True)
     strains = np.einsum("epik,ek->epi", linear, q.transpose(2, 1, 0).reshape(ne, -1))
-    stretch = tied.at_points(tied_components(one, two)).transpose(2, 1, 0)
+    stretch = tied.at_points(tied_components(w_1, w_2)).transpose(2, 1, 0)
     N = strains @ ABD[:3].T + stretch @ laminate.A.T
-    n11, n22, n12 = tied.tied_forces((at.jxw[:, :, None] * N).transpose(2, 1, 0))
-    both = np.einsum("te,tie,tje->eij", n12, G1[TYING:], G2[TYING:], optimize=True)
-    stress = both + both.swapaxes(1, 2)
+    n11, n22, n12 = tied.tied_forces((shapes.jxw[:, :, None] * N).transpose(2, 1, 0))
+    mixed_stress = np.einsum("te,tie,tje->eij", n12, G1[TYING:], G2[TYING:], optimize=True)
+    stress = mixed_stress + mixed_stress.swapaxes(1, 2)
     for n, G in ((n11, G1), (n22, G2)):
         stress += np.einsum("te,tie,tje->eij", n, G[:TYING], G[:TYING], optimize=True)
     K = 2.0 * mixed + square
@@ -332,7 +334,7 @@ _CORNERS = gauss(2)
 
 
 def _with_corners(points: Quadrature) -> Quadrature:
-    """Tying points of e_11 or e_22, and those of e_12."""
+    """Append the tying points of e_12 to the tying points of e_11 or e_22."""
     xi, eta, weights = (
         np.concatenate([getattr(points, name), getattr(_CORNERS, name)])
         for name in ("xi", "eta", "weights")
@@ -341,7 +343,7 @@ def _with_corners(points: Quadrature) -> Quadrature:
 
 
 def _corner_weights(rule: Quadrature) -> Floats:
-    """Bilinear functions between the tying points of e_12, at the points of a rule, (points, 4)."""
+    """Return bilinear weights of the tying points of e_12 at a rule's points, (points, 4)."""
     return np.asarray(
         (1.0 + 3.0 * np.outer(rule.xi, _CORNERS.xi))
         * (1.0 + 3.0 * np.outer(rule.eta, _CORNERS.eta))

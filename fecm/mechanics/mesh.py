@@ -1,8 +1,8 @@
-"""Mesh and equation numbers; blocks of elements, and groups of congruent ones.
+"""Mesh, equation numbers, blocks of elements, and groups of congruent elements.
 
-A block has elements of one laminate where these matter.
+The elements of a block have the same nodes present, and one laminate where laminates matter.
 
-Nodes, elements and equations are numbered from 1 as on the cards; row n - 1 of an array belongs to
+Nodes, elements and equations are numbered from 1 as on the cards.  Row n - 1 of an array belongs to
 node or element n.  An absent node of an element and the equation of a restrained dof are 0.
 """
 
@@ -25,9 +25,9 @@ Ints = NDArray[np.int32]
 SHAPES = (TRIANGLE, QUADRILATERAL, CUBIC)
 # Number of nodes of the largest element.
 MOST_NODES = SHAPES[-1].nodes
-# Tolerance of the relative node positions of congruent elements, relative to the largest element.
+# Tolerance of the node positions of congruent elements, relative to the largest element.
 TOLERANCE = 1.0e-9
-PARALLEL = 1.0e-2  # sides whose directions differ by less form no corner
+PARALLEL = 1.0e-2  # two sides form no corner if their directions differ by less
 
 
 @dataclass(frozen=True)
@@ -60,27 +60,27 @@ class MeshArrays:
 
 
 def equation_numbers(codes: Ints) -> Ints:
-    """Number the dofs without a restraint code from 1, node by node; the others get 0."""
+    """Assign numbers from 1 to dofs without a restraint code, node by node; others get 0."""
     free = codes.ravel() == 0
     return np.where(free, np.cumsum(free), 0).astype(np.int32).reshape(codes.shape)
 
 
 def rigid_deflections(mesh: MeshArrays) -> Floats:
-    """Orthonormal basis of w, (numnp, n), of the rigid motions that the supports allow."""
+    """Return an orthonormal basis of w, (numnp, n), of the rigid motions that supports allow."""
     used = mesh.used
     place = mesh.coordinates[used, :2] - mesh.coordinates[used, :2].mean(axis=0)
     w = np.column_stack([np.ones(len(place)), place / np.abs(place).max()])
     slopes = np.broadcast_to(np.eye(3)[1:], (len(place), 2, 3))
     motions = np.concatenate([w[:, None], slopes], axis=1)  # of w, theta_x, theta_y
-    held = motions[mesh.equations[used, 2:] == 0]
-    resistance, combined = np.linalg.eigh(held.T @ held)
+    restrained = motions[mesh.equations[used, 2:] == 0]
+    resistance, combined = np.linalg.eigh(restrained.T @ restrained)
     basis = np.zeros((len(used), 3))
     basis[used] = w
     return np.linalg.qr(basis @ combined[:, resistance < 1e-9 * len(place)])[0]
 
 
 def holds_the_plane(codes: Ints) -> bool:
-    """Whether restraint codes, (numnp, 5), restrain u and v of every node."""
+    """Return whether restraint codes, (numnp, 5), restrain u and v of every node."""
     return bool((codes[:, :2] != 0).all())
 
 
@@ -100,7 +100,7 @@ class ElementBlock:
     coordinates: Floats  # (ne, nn, 2): length
     present: Bools  # (shape.nodes,) of bool: which nodes of the shape are present
     shape: ElementShape  # triangle, quadrilateral or cubic quadrilateral
-    laminate: int = 0  # number from 0 of its laminate
+    laminate: int = 0  # number of the laminate, from 0
 
     def blocks(self, size: int) -> Iterator[ElementBlock]:
         """Split into blocks of at most `size` elements."""
@@ -114,11 +114,10 @@ class ElementBlock:
 
     @cached_property
     def congruence(self) -> Congruence:
-        """The congruent elements.
+        """Groups of congruent elements.
 
         Positions are compared on a grid of :data:`TOLERANCE` times the largest element's size.
-        Congruent elements that rounding separates form two groups, which costs time but no
-        accuracy.
+        Rounding may split congruent elements into two groups, which costs time but no accuracy.
         """
         places = self.coordinates[:, 1:] - self.coordinates[:, :1]
         flat = places.reshape(len(places), -1)
@@ -129,7 +128,7 @@ class ElementBlock:
         spans = cells.max(axis=0) - low
         group = np.zeros(len(cells), dtype=np.intp)
         representatives = group[:1]
-        for i in np.flatnonzero(spans):  # in lexicographic order, until all differ
+        for i in np.flatnonzero(spans):  # refine the groups until all elements differ
             keys = group * (spans[i] + 1) + cells[:, i] - low[i]
             _, representatives, group = np.unique(keys, return_index=True, return_inverse=True)
             if len(representatives) == len(cells):
@@ -140,37 +139,44 @@ class ElementBlock:
 def element_blocks(
     elements: Ints, coordinates: Floats, laminates: Indices | None = None
 ) -> list[ElementBlock]:
-    """Sort elements, (numel, nen), node numbers from 1 or 0, into blocks with the same nodes.
+    """Sort elements, (numel, nen), into blocks with the same nodes present.
 
-    With `laminates` (numel,), numbers from 0, a block has one laminate.
+    Node numbers start at 1; 0 marks an absent node.  With `laminates`, (numel,) numbers from 0, a
+    block has one laminate.
 
-    Raises ValueError if a corner is missing: three for a triangle, four for the others.
+    Raises ValueError if one of the three corners of a triangle, or of the four corners of another
+    element, is missing.
     """
     nodes = np.zeros((len(elements), max(MOST_NODES, elements.shape[1])), dtype=np.intp)
     nodes[:, : elements.shape[1]] = elements
-    found: list[ElementBlock] = []
-    given = nodes > 0
+    blocks: list[ElementBlock] = []
+    is_present = nodes > 0
     # Patterns in the order of their bits, first node first.
-    codes = np.zeros(len(given), dtype=np.intp)
-    for column in given.T:
+    codes = np.zeros(len(is_present), dtype=np.intp)
+    for column in is_present.T:
         codes = 2 * codes + column
     for code in distinct(codes):
         rows = np.flatnonzero(codes == code)
-        present = given[rows[0]]
+        present = is_present[rows[0]]
         shape = shape_of(present)
         if not present[: shape.corners].all():
             raise ValueError(
                 f"element {rows[0] + 1} lacks one of the {shape.corners} corners of a {shape.name}"
             )
         for number in (0,) if laminates is None else distinct(laminates[rows]).tolist():
-            own = rows if laminates is None else rows[laminates[rows] == number]
-            members, places = nodes[own][:, present] - 1, present[: shape.nodes]
-            found.append(ElementBlock(own, members, coordinates[members], places, shape, number))
-    return found
+            rows_of_laminate = rows if laminates is None else rows[laminates[rows] == number]
+            members, places = nodes[rows_of_laminate][:, present] - 1, present[: shape.nodes]
+            blocks.append(
+                ElementBlock(rows_of_laminate, members, coordinates[members], places, shape, number)
+            )
+    return blocks
 
 
 def shape_of(present: Bools) -> ElementShape:
-    """Shape of an element by its last node present (NEL of the listing); ValueError beyond 12."""
+    """Return the shape of an element by its last present node (NEL of the listing).
+
+    Raises ValueError if the last node is beyond 12.
+    """
     last = int(np.flatnonzero(present).max(initial=-1)) + 1
     for shape in SHAPES:
         if last <= shape.nodes:
@@ -179,7 +185,7 @@ def shape_of(present: Bools) -> ElementShape:
 
 
 def element_centres(elements: Ints, coordinates: Floats) -> Floats:
-    """Mean of the corners of every element, (numel, 2)."""
+    """Return the mean of the corners of every element, (numel, 2)."""
     centres = np.empty((len(elements), 2))
     for block in element_blocks(elements, coordinates):
         centres[block.rows] = block.coordinates[:, : block.shape.corners].mean(axis=1)
@@ -187,7 +193,7 @@ def element_centres(elements: Ints, coordinates: Floats) -> Floats:
 
 
 def longest_sides(elements: Ints, coordinates: Floats) -> Floats:
-    """Longest side of every element, corner to corner, (numel,)."""
+    """Return the longest side of every element, corner to corner, (numel,)."""
     longest = np.empty(len(elements))
     for block in element_blocks(elements, coordinates):
         corners = block.coordinates[:, : block.shape.corners]
@@ -197,7 +203,7 @@ def longest_sides(elements: Ints, coordinates: Floats) -> Floats:
 
 
 def inner_corners(blocks: Sequence[ElementBlock], coordinates: Floats, held: Bools) -> Floats:
-    """Corners inside the plate of lines whose nodes are held, (n, 2).
+    """Find the corners, inside the plate, of lines of held nodes, (n, 2).
 
     Parameters
     ----------
@@ -220,23 +226,25 @@ def inner_corners(blocks: Sequence[ElementBlock], coordinates: Floats, held: Boo
     sides = np.column_stack(np.divmod(keys, len(coordinates)))
     rim = distinct(sides[counts == 1])
     sides = sides[held[sides].all(axis=1)]
-    way = coordinates[sides[:, 1]] - coordinates[sides[:, 0]]
-    double = 2.0 * np.arctan2(way[:, 1], way[:, 0])  # the same for both senses of a direction
-    total, number = np.zeros((len(coordinates), 2)), np.zeros(len(coordinates))
+    direction = coordinates[sides[:, 1]] - coordinates[sides[:, 0]]
+    twice_the_angle = 2.0 * np.arctan2(
+        direction[:, 1], direction[:, 0]
+    )  # the same for both senses of a direction
+    total, count = np.zeros((len(coordinates), 2)), np.zeros(len(coordinates))
     for end in sides.T:
-        np.add.at(total, end, np.column_stack([np.cos(double), np.sin(double)]))
-        np.add.at(number, end, 1.0)
-    is_corner = np.hypot(*total.T) < (1.0 - PARALLEL) * number
+        np.add.at(total, end, np.column_stack([np.cos(twice_the_angle), np.sin(twice_the_angle)]))
+        np.add.at(count, end, 1.0)
+    is_corner = np.hypot(*total.T) < (1.0 - PARALLEL) * count
     is_corner[rim] = False
     return np.asarray(coordinates[is_corner])
 
 
 def extent(places: Floats) -> tuple[Floats, Floats]:
-    """Lowest and highest coordinates of places, (n, 2)."""
-    x, y = places.T  # each alone: along both at once NumPy takes ten times as long
+    """Return the lowest and highest coordinates of places, (n, 2)."""
+    x, y = places.T  # reducing one axis at a time is ten times as fast
     return np.array([x.min(), y.min()]), np.array([x.max(), y.max()])
 
 
 def distinct(values: ArrayLike) -> NDArray[Any]:
-    """Sorted distinct values; without an index np.unique would import numpy.ma."""
+    """Return the sorted distinct values; without an index np.unique would import numpy.ma."""
     return np.unique(values, return_index=True)[0]

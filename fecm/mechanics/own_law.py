@@ -1,6 +1,6 @@
-"""Contact laws that users define: a check of their methods, and of every value they return.
+"""Contact laws of users, with checks of their methods and of every value that they return.
 
-Such a law is one of single cases.  :class:`CaseByCase` applies it to many.
+A user's law handles a single case.  :class:`CaseByCase` applies it to many cases.
 """
 
 from __future__ import annotations
@@ -19,65 +19,65 @@ from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, Law
 from fecm.mechanics.impact_steps import knows
 
 METHODS = ("start", "trial", "accept", "permanent")
-# Indentations beyond this, in any unit, are those of a diverging motion: no fault of the law.
+# An indentation beyond this, in any unit, belongs to a diverging motion and is no fault of the law.
 FAR = 1e30
 
 
 class LawError(FecmError, ValueError):
-    """A contact law by a user lacks a method, raises an exception, or returns no number."""
+    """A user's contact law lacks a method, raises an exception, or does not return a number."""
 
 
 class OwnLaw(NamedTuple):
-    """A law by a user whose values are checked; :class:`LawError` names the indentation.
+    """A user's law with checked values.  :class:`LawError` names the indentation.
 
-    Where the indentation is no longer finite, the force is not either, and the law is not asked.
+    The law is not called for an indentation that is no longer finite; the force is not finite then.
     """
 
     law: Law
     name: str
 
     def start(self) -> Any:
-        """Memory before the first contact."""
-        return self._ask("start", 0.0)
+        """Return the memory before the first contact."""
+        return self._call("start", 0.0)
 
     def trial(self, memory: Any, last: ContactPoint, indentation: float) -> tuple[float, Any]:
-        """Contact force at a trial indentation, and the memory after the trial."""
+        """Return the contact force at a trial indentation, and the memory after the trial."""
         if not math.isfinite(indentation):
             return indentation, memory
-        found = self._ask("trial", indentation, memory, last, indentation)
+        result = self._call("trial", indentation, memory, last, indentation)
         try:
-            force, memory = found
+            force, memory = result
         except (TypeError, ValueError):
-            text = f"trial returned {found!r}, not a pair of force and memory"
+            text = f"trial returned {result!r}, not a pair of force and memory"
             raise self._error(text, indentation) from None
         if type(force) is not float or not math.isfinite(force):
-            force = self._number("force", force, indentation)
+            force = self._check_number("force", force, indentation)
         return force, memory
 
     def accept(self, memory: Any, last: ContactPoint, indentation: float) -> Any:
-        """Memory after a step that ends at an indentation."""
+        """Return the memory after a step that ends at an indentation."""
         if not math.isfinite(indentation):
             return memory
-        return self._ask("accept", indentation, memory, last, indentation)
+        return self._call("accept", indentation, memory, last, indentation)
 
     def permanent(self, memory: Any, last: ContactPoint) -> float:
-        """Permanent indentation after unloading from the last point (length)."""
+        """Return the permanent indentation after unloading from the last point (length)."""
         a = last.indentation
-        found = self._ask("permanent", a, memory, last)
-        return self._number("permanent indentation", found, a)
+        result = self._call("permanent", a, memory, last)
+        return self._check_number("permanent indentation", result, a)
 
-    def _ask(self, method: str, indentation: float, *arguments: Any) -> Any:
+    def _call(self, method: str, indentation: float, *arguments: Any) -> Any:
         """Call a method of the law."""
         try:
             return getattr(self.law, method)(*arguments)
         except Exception as error:
             if isinstance(error, OverflowError) and abs(indentation) > FAR:
-                raise  # which the run reports as its divergence
+                raise  # the run reports this as its divergence
             text = f"{method} failed with {type(error).__name__}: {error}"
             raise self._error(text, indentation) from error
 
-    def _number(self, what: str, value: object, indentation: float) -> float:
-        """A number that the law has returned."""
+    def _check_number(self, what: str, value: object, indentation: float) -> float:
+        """Return a value of the law as a float; raise LawError if it is not a finite number."""
         if isinstance(value, np.ndarray) and not value.ndim:
             value = value.item()
         if not isinstance(value, Real):
@@ -99,37 +99,41 @@ class OwnLaw(NamedTuple):
         return LawError(f"contact law {self.name}: {fault} {where}")
 
 
-def own_law(given: Law | str | None) -> Law | None:
-    """The law that a user gives, as an object or by the name of an entry point.
+def own_law(user_law: Law | str | None) -> Law | None:
+    """Return the user's law, passed as an object or as the name of an entry point.
 
-    A law of the report with its own constants stays as it is.  Raises LawError if the object is no
-    law, ExtensionError if no package has the name.
+    A law of the report with known constants is returned as it is.  Raises LawError if the object is
+    not a law, ExtensionError if no package has the name.
     """
-    if given is None:
+    if user_law is None:
         return None
-    law: Any = given
-    name = type(given).__name__
-    if isinstance(given, str):
-        name, law = given, installed(EntryPoints.LAWS, given)
+    law: Any = user_law
+    name = type(user_law).__name__
+    if isinstance(user_law, str):
+        name, law = user_law, installed(EntryPoints.LAWS, user_law)
         if isinstance(law, type) or not hasattr(law, "trial"):
-            law = _made(name, law)
-    elif isinstance(given, OwnLaw) or (isinstance(given, HystereticLaw) and knows(given.constants)):
-        return given
-    elif isinstance(given, type):
-        own = given.__name__
-        raise LawError(f"contact law {own} is a class; pass an object of it: law={own}()")
+            law = _create_law(name, law)
+    elif isinstance(user_law, OwnLaw) or (
+        isinstance(user_law, HystereticLaw) and knows(user_law.constants)
+    ):
+        return user_law
+    elif isinstance(user_law, type):
+        class_name = user_law.__name__
+        raise LawError(
+            f"contact law {class_name} is a class; pass an object of it: law={class_name}()"
+        )
     missing = [method for method in METHODS if not callable(getattr(law, method, None))]
     if missing:
         raise LawError(
             f"contact law {name} has no method {', '.join(missing)}; a law has {', '.join(METHODS)}"
         )
-    made = OwnLaw(law, name)
-    made.trial(made.start(), ContactPoint(0.0, 0.0), 0.0)
-    return made
+    checked_law = OwnLaw(law, name)
+    checked_law.trial(checked_law.start(), ContactPoint(0.0, 0.0), 0.0)
+    return checked_law
 
 
-def _made(name: str, factory: Any) -> object:
-    """The law that a class or function of an entry point makes without arguments."""
+def _create_law(name: str, factory: Any) -> object:
+    """Create a law with a class or function of an entry point, called without arguments."""
     try:
         return factory()
     except Exception as error:
@@ -141,39 +145,39 @@ def _made(name: str, factory: Any) -> object:
 
 
 def law_name(law: Law) -> str:
-    """Name of a law that a user has given, for messages and results."""
+    """Return the name of a user's law, for messages and results."""
     return law.name if isinstance(law, OwnLaw) else type(law).__name__
 
 
 class CaseByCase(NamedTuple):
-    """A law of single cases for many cases, one after the other.
+    """A law of single cases, applied to many cases one after another.
 
-    The memories are an array of objects.  Where the law fails, the force is NaN.
+    The memories are an array of objects.  The force is NaN where the law fails.
     """
 
     law: Law
     cases: int
 
     def start(self) -> NDArray[np.object_]:
-        """Memories before the first contact."""
+        """Return the memories before the first contact."""
         return _objects([self.law.start() for _ in range(self.cases)])
 
     def trial(
         self, memory: NDArray[np.object_], last: ContactPoint[Floats], indentation: Floats
     ) -> tuple[Floats, NDArray[np.object_]]:
-        """Contact forces at trial indentations, and the memories after the trials."""
+        """Return the contact forces at trial indentations, and the memories after the trials."""
         force, memories = np.full(self.cases, np.nan), list(memory)
         for case, (point, a) in enumerate(_points(last, indentation)):
             try:
                 force[case], memories[case] = self.law.trial(memory[case], point, a)
             except (LawError, OverflowError):
-                continue  # the case is run again alone, which tells why
+                continue  # a single run of the case reports the reason
         return force, _objects(memories)
 
     def accept(
         self, memory: NDArray[np.object_], last: ContactPoint[Floats], indentation: Floats
     ) -> NDArray[np.object_]:
-        """Memories after a step that ends at these indentations."""
+        """Return the memories after a step that ends at these indentations."""
         memories = list(memory)
         for case, (point, a) in enumerate(_points(last, indentation)):
             try:
@@ -183,25 +187,25 @@ class CaseByCase(NamedTuple):
         return _objects(memories)
 
     def permanent(self, memory: NDArray[np.object_], last: ContactPoint[Floats]) -> Floats:
-        """Permanent indentations after unloading from the last points (length)."""
-        found = np.full(self.cases, np.nan)
+        """Return the permanent indentations after unloading from the last points (length)."""
+        permanent = np.full(self.cases, np.nan)
         for case, (point, _) in enumerate(_points(last, last.indentation)):
             try:
-                found[case] = self.law.permanent(memory[case], point)
+                permanent[case] = self.law.permanent(memory[case], point)
             except (LawError, OverflowError):
                 continue
-        return found
+        return permanent
 
 
 def _points(last: ContactPoint[Floats], indentation: Floats) -> list[tuple[ContactPoint, float]]:
-    """The last point and an indentation of each case."""
+    """Pair the last point and an indentation of each case."""
     points = map(ContactPoint, last.indentation.tolist(), last.force.tolist())
     return list(zip(points, indentation.tolist(), strict=True))
 
 
 def _objects(values: list[Any]) -> NDArray[np.object_]:
-    """An array of objects, whatever their types are."""
-    found = np.empty(len(values), dtype=object)
+    """Return an array of objects of any type."""
+    array = np.empty(len(values), dtype=object)
     for place, value in enumerate(values):
-        found[place] = value
-    return found
+        array[place] = value
+    return array

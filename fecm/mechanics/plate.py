@@ -40,7 +40,7 @@ MatricesOf = Callable[[ElementBlock], Floats]
 
 
 class UnsoundPlateError(FecmError, ArithmeticError):
-    """The plate's stiffness is not finite or has no largest frequency."""
+    """The plate's stiffness is not finite, or no largest frequency is found."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class PlateModel:
     preload: tuple[float, float, float] = UNLOADED
     nonlinear: bool = False  # whether stretching follows from bending, see membrane.py
     others: tuple[LaminateSection, ...] = ()  # laminates beside the first
-    # (numel,): number from 0 of the laminate of every element; without it, all have the first.
+    # (numel,): laminate number of every element, from 0; None if all have the first laminate.
     laminate_numbers: Indices | None = None
     curvature: Curvature = FLAT  # 1/R_x, 1/R_y, 1/R_xy of a shallow panel, 1/length
 
@@ -65,25 +65,25 @@ class PlateModel:
 
     @property
     def laminates(self) -> tuple[LaminateSection, ...]:
-        """The laminates, in the order of their numbers."""
+        """Laminates in the order of their numbers."""
         return (self.laminate, *self.others)
 
     @property
     def rows_by_laminate(self) -> list[tuple[LaminateSection, Rows]]:
-        """The laminates with the rows of their elements; all rows of a single one."""
+        """Laminates with the rows of their elements; a single laminate has all rows."""
         numbers = self.laminate_numbers
         if numbers is None:
             return [(self.laminate, slice(None))]
-        return [(one, np.flatnonzero(numbers == n)) for n, one in enumerate(self.laminates)]
+        return [(section, np.flatnonzero(numbers == n)) for n, section in enumerate(self.laminates)]
 
     @property
     def thicknesses(self) -> Floats:
-        """Thickness of every element, (numel, 1); of a single laminate (1, 1)."""
+        """Thickness of every element, (numel, 1); (1, 1) for a single laminate."""
         thickness = np.array([[laminate.thickness] for laminate in self.laminates])
         return thickness if self.laminate_numbers is None else thickness[self.laminate_numbers]
 
     def laminate_of(self, family: ElementBlock) -> LaminateSection:
-        """Laminate of the elements of a block."""
+        """Return the laminate of a block's elements."""
         return self.laminates[family.laminate]
 
     @property
@@ -116,9 +116,9 @@ class PlateModel:
 
     @property
     def preload_strain(self) -> Floats:
-        """Midplane strain A^-1 N0 of the preload, (3,), where B is zero; NaN of a singular A.
+        """Midplane strain A^-1 N0 of the preload, (3,), if B is zero; NaN if A is singular.
 
-        A is that of all elements' laminates.
+        The laminates of all elements have the same A.
         """
         laminate = self.laminate_of(self.families[0]) if self.others else self.laminate
         try:
@@ -132,7 +132,7 @@ class PlateModel:
 
     @cached_property
     def _numbers(self) -> Indices:
-        """Number of every dof from 0: equations first, then restrained dofs."""
+        """Number of every dof, from 0: equations first, then restrained dofs."""
         numbers = self.mesh.equations.astype(np.intp) - 1
         restrained = numbers < 0
         numbers[restrained] = self.neq + np.arange(np.count_nonzero(restrained))
@@ -140,14 +140,14 @@ class PlateModel:
 
     @cached_property
     def families(self) -> list[ElementBlock]:
-        """The elements, in blocks with the same nodes present and the same laminate."""
+        """Elements in blocks with the same nodes present and the same laminate."""
         mesh = self.mesh
         return element_blocks(mesh.elements, mesh.coordinates, self.laminate_numbers)
 
     def stiffness_of(self, family: ElementBlock) -> Floats:
-        """Element stiffness matrices, (ne, 5 nn, 5 nn), with K_sigma of the preload.
+        """Return the element stiffness matrices, (ne, 5 nn, 5 nn), with K_sigma of the preload.
 
-        ``replace(plate, preload=UNLOADED)`` is the plate without it.
+        ``replace(plate, preload=UNLOADED)`` is the plate without the preload.
         """
         K = element_matrices.stiffness(family, self.laminate_of(family), self.rules, self.curvature)
         if self.is_preloaded:
@@ -160,21 +160,22 @@ class PlateModel:
     def _element_matrices(
         self, matrices_of: MatricesOf, *, congruent: bool = True
     ) -> Iterator[tuple[Indices, Floats]]:
-        """Dofs (ne, n) and matrices (ne, n, n) of all elements, block by block.
+        """Yield dofs (ne, n) and matrices (ne, n, n) of all elements, block by block.
 
-        Congruent elements have the same matrix unless that depends on the displacement.
+        With `congruent`, congruent elements share a matrix.  A matrix that depends on the
+        displacement can't be shared.
         """
         for family in self.families:
             if not congruent:
                 for part in family.blocks(BLOCK):
                     yield self._dofs(part), matrices_of(part)
                 continue
-            same = family.congruence
+            congruence = family.congruence
             for start in range(0, len(family.rows), BLOCK):
                 block = np.arange(start, min(start + BLOCK, len(family.rows)))
-                wanted, which = np.unique(same.group[block], return_inverse=True)
-                matrices = matrices_of(family.take(same.representatives[wanted]))
-                yield self._dofs(family.take(block)), matrices[which.ravel()]
+                groups, group_of_element = np.unique(congruence.group[block], return_inverse=True)
+                matrices = matrices_of(family.take(congruence.representatives[groups]))
+                yield self._dofs(family.take(block)), matrices[group_of_element.ravel()]
 
     @property
     def entries(self) -> int:
@@ -182,9 +183,9 @@ class PlateModel:
         return sum(len(f.nodes) * (NDOF * f.nodes.shape[1]) ** 2 for f in self.families)
 
     def assembled(self, matrices_of: MatricesOf, *, congruent: bool = True) -> sparse.csr_array:
-        """Assembled matrix (neq, neq + restrained); columns of restrained dofs come last.
+        """Assemble a matrix (neq, neq + restrained); columns of restrained dofs come last.
 
-        Congruent elements have the same matrix unless it is said that they have not.
+        Congruent elements share a matrix if `congruent` is true.
         """
         from scipy import sparse  # 0.16 s, which most runs don't need
 
@@ -194,8 +195,8 @@ class PlateModel:
         for dofs, matrices in self._element_matrices(matrices_of, congruent=congruent):
             rows = np.broadcast_to(dofs[:, :, None], matrices.shape)
             columns = np.broadcast_to(dofs[:, None, :], matrices.shape)
-            wanted = (rows < neq) & (matrices != 0.0)
-            entries = matrices[wanted], (rows[wanted], columns[wanted])
+            stored = (rows < neq) & (matrices != 0.0)
+            entries = matrices[stored], (rows[stored], columns[stored])
             total = total + sparse.coo_array(entries, shape=(neq, ndof))
         total = total.tocsr()
         total.sort_indices()
@@ -232,8 +233,8 @@ class PlateModel:
         for family, determinants in zip(self.families, self._determinants, strict=True):
             laminate, rule = self.laminate_of(family), self.rules.bending
             for number, part in enumerate(family.blocks(BLOCK)):
-                own = determinants[number * BLOCK : (number + 1) * BLOCK]
-                lumped = element_matrices.lumped_mass(part, laminate, rule, own)
+                determinants_of_part = determinants[number * BLOCK : (number + 1) * BLOCK]
+                lumped = element_matrices.lumped_mass(part, laminate, rule, determinants_of_part)
                 np.add.at(mass, self._dofs(part).ravel(), lumped.ravel())
         return mass[: self.neq]
 
@@ -241,10 +242,10 @@ class PlateModel:
     def consistent_mass(self) -> sparse.csr_array:
         """Consistent M, sparse (neq, neq), with the bending rule; assembled on first access."""
         rule = self.rules.bending
-        made = self.assembled(
+        with_supports = self.assembled(
             lambda f: element_matrices.consistent_mass(f, self.laminate_of(f), rule)
         )
-        return made[:, : self.neq].tocsr()
+        return with_supports[:, : self.neq].tocsr()
 
     @cached_property
     def _areas(self) -> list[float]:
@@ -253,29 +254,29 @@ class PlateModel:
         return [float((determinants @ weights).sum()) for determinants in self._determinants]
 
     def area(self) -> float:
-        """Area of the plate, length squared."""
+        """Return the area of the plate, length squared."""
         return sum(self._areas)
 
     def total_mass(self) -> float:
-        """Mass of the plate."""
+        """Return the mass of the plate."""
         if not self.others:
             return self.area() * self.laminate.mass
         masses = (self.laminate_of(family).mass for family in self.families)
         return sum(a * m for a, m in zip(self._areas, masses, strict=True))
 
     def profile(self) -> int:
-        """Number of entries of K from the first of each column: the listing's JDIAG(NEQ)."""
+        """Count the entries of K from the first one of each column: the listing's JDIAG(NEQ)."""
         first = np.arange(self.neq)
         for family in self.families:
             dofs = self._dofs(family)
             lowest = np.where(dofs < self.neq, dofs, self.neq).min(axis=1)
             for column in dofs.T:
-                held = column < self.neq
-                np.minimum.at(first, column[held], lowest[held])
+                free = column < self.neq
+                np.minimum.at(first, column[free], lowest[free])
         return int((np.arange(self.neq) - first + 1).sum())
 
     def internal_forces(self, field: Floats) -> Floats:
-        """Internal forces of all dofs under a displacement field, (numnp, 5)."""
+        """Return the internal forces of all dofs under a displacement field, (numnp, 5)."""
         order = np.empty(self._numbers.size)
         order[self._numbers.ravel()] = field.ravel()
         forces = np.zeros(self._numbers.size)
@@ -294,13 +295,13 @@ class PlateModel:
         return np.asarray(loads)
 
     def field(self, displacement: Floats, scale: float = 1.0) -> Floats:
-        """All dofs, (numnp, 5): the free ones, (neq,), and `scale` times the prescribed ones."""
+        """Return all dofs, (numnp, 5): free dofs, (neq,), and `scale` times prescribed dofs."""
         full = scale * self.mesh.forces
         full[self._free] = displacement
         return full
 
     def rigid_mobility(self, share: Floats) -> float:
-        """Velocity under a load of the plate's rigid motion per impulse, 1/mass; 0 if it is held.
+        """Return the rigid-body velocity under a load per impulse, 1/mass; 0 if the plate is held.
 
         `share` (numnp,) is the distribution of the unit force over w of the nodes.
         """
@@ -314,7 +315,7 @@ class PlateModel:
     def strain_field(
         self, points: Quadrature, kind: type[StrainField] = StrainField
     ) -> StrainField:
-        """Strains at points of every element."""
+        """Return the strains at points of every element."""
         mesh, rules = self.mesh, self.rules
         return kind(
             mesh.elements,
@@ -325,7 +326,7 @@ class PlateModel:
         )
 
 
-# The product K u, whose result is processed in pieces that fit the cache --------------------------
+# Product K u, processed in pieces that fit the cache ----------------------------------------------
 
 R = TypeVar("R")
 
@@ -334,15 +335,15 @@ PIECE = 8192
 
 
 def pieces(neq: int) -> list[slice]:
-    """Slices of the equations."""
+    """Return slices of the equations."""
     return [slice(i, min(i + PIECE, neq)) for i in range(0, neq, PIECE)]
 
 
 class StiffnessOperator(ABC):
-    """The internal forces of a displacement."""
+    """Operator that computes the internal forces of a displacement."""
 
     size: int  # entries of a padded vector
-    # Integral of (N - N0) eps_q at the last displacement, see membrane.py; 0 of a linear plate.
+    # Integral of (N - N0) eps_q at the last displacement, see membrane.py; 0 for a linear plate.
     quadratic_work: float = 0.0
 
     @abstractmethod
@@ -353,7 +354,7 @@ class StiffnessOperator(ABC):
         """
 
     def __call__(self, displacement: Floats) -> Floats:
-        """K u, (neq,)."""
+        """Return K u, (neq,)."""
         padded = np.zeros(self.size)
         padded[: len(displacement)] = displacement
         return np.concatenate(self.each(padded, lambda _, forces: forces.copy()))

@@ -1,20 +1,21 @@
 """Explicit motion of the plate: M a = P - f(u), report section 4.3.1.
 
-The internal force f is K u, or that of a plate that stretches as it bends (membrane.py).
+The internal force f is K u; for a plate that stretches as it bends see membrane.py.
 
 Central differences in increments: d = u - u_last is dt times the velocity in the middle of the last
 step, and d + dt^2 M^-1 (P - f) is the next increment.  Vectors are over equations and are
 processed in pieces that fit the cache.
 
-With damping C = a M the velocity is the mean of both middles, so that the mass stays diagonal and
-the order 2:
+With damping C = a M the velocity is the mean of the velocities in the middles of two steps.  The
+mass then stays diagonal, and the order stays 2:
 
     (1 + b) d_next = (1 - b) d + dt^2 M^-1 (P - f),  b = a dt/2
 
 The critical time step does not change.  A mode of frequency w has
 (1 + b) z^2 - (2 - w^2 dt^2) z + (1 - b) = 0.  With b > 0 both roots are inside the unit circle if
 |2 - w^2 dt^2| < (1 + b) + (1 - b) = 2 (Jury), that is for w dt < 2, as without damping.  A rigid
-body slows down by (1 - b)/(1 + b) a step: the rate a is off by the factor 1 + (a dt)^2/12.
+body slows down by (1 - b)/(1 + b) per step, so that the rate a is off by the factor
+1 + (a dt)^2/12.
 """
 
 from __future__ import annotations
@@ -38,9 +39,10 @@ from fecm.mechanics.stiffness_product import (
 )
 from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 
-# Length of a product for which BLAS uses one thread, whatever the number of threads.
+# Largest length of a product that BLAS computes in one thread.
 SERIAL = 8192
-# Equations are taken as a slice if it is at most so long, or so many times longer: that is faster.
+# A slice is faster than an index array if it has at most SHORT entries, or at most NEAR entries per
+# equation.
 SHORT = 2048
 NEAR = 8
 
@@ -98,8 +100,8 @@ class PlateState:
     def strain_energy(self) -> float:
         """Strain energy (force*length).
 
-        Half the product of displacement and internal force, less the quadratic strains' part, which
-        grows with the fourth power of the deflection.
+        It is half the product of displacement and internal force minus the part of the quadratic
+        strains, which grows with the fourth power of the deflection.
         """
         return 0.5 * (self.sums.strain - self.sums.quadratic)
 
@@ -107,14 +109,14 @@ class PlateState:
 class Sums(NamedTuple):
     """Inner products that give the energies."""
 
-    # Of increment d, displacement u, nodal loads P and scaled internal force s.
+    # Products of increment d, displacement u, nodal loads P and scaled internal force s.
     inertia: float  # d M d
     power: float  # d f
     strain: float  # u f
     force: float  # f s
     load: float  # P d
     load_force: float  # P s
-    quadratic: float = 0.0  # of a nonlinear plate: integral of (N - N0) eps_q
+    quadratic: float = 0.0  # integral of (N - N0) eps_q of a nonlinear plate
 
 
 class PointLoad(NamedTuple):
@@ -125,7 +127,7 @@ class PointLoad(NamedTuple):
     nodal_load: float  # nodal load of the equation at a load factor of 1
 
     def dot(self, vector: Floats) -> float:
-        """Product with a vector over equations, which may be padded."""
+        """Return the product with a vector over equations, which may be padded."""
         return vector.item(self.equation)
 
     def subtract(self, force: float, dt2: float, internal: Floats) -> None:
@@ -143,7 +145,7 @@ class DistributedLoad(NamedTuple):
     nodal_load: float  # g M^-1 P over g M^-1 g, with the nodal loads P at a load factor of 1
 
     def dot(self, vector: Floats) -> float:
-        """Product with a vector over equations, which may be padded."""
+        """Return the product with a vector over equations, which may be padded."""
         if len(self.weights) > SERIAL:
             return float((self.weights * vector[self.equations]).sum())
         return float(self.weights.dot(vector[self.equations]))
@@ -176,7 +178,7 @@ class DofSums(NamedTuple):
     prescribed: Floats  # (n,): contribution of the prescribed displacements at a load factor of 1
 
     def evaluate(self, state: PlateState, factor: float) -> Floats:
-        """Values of the sums, (n,), under a load factor."""
+        """Return the values of the sums, (n,), under a load factor."""
         values = np.einsum("gi,gi->g", state.padded.take(self.dof_indices), self.weights)
         return np.asarray(values + factor * self.prescribed)
 
@@ -184,8 +186,8 @@ class DofSums(NamedTuple):
 class PlateMotion:
     """Time integration of a plate with the damping matrix C = a M.
 
-    Solver and workers are those of :func:`~fecm.mechanics.stiffness_product.stiffness_operator`.
-    All dofs are independent by default, and with the sparse matrix.
+    Solver and workers are passed to :func:`~fecm.mechanics.stiffness_product.stiffness_operator`.
+    All dofs are independent by default, and always with the sparse matrix.
     """
 
     def __init__(
@@ -197,21 +199,23 @@ class PlateMotion:
         damping: float = 0.0,
     ) -> None:
         self.plate, self.damping, self.solver = plate, damping, resolved(solver)
-        self._reduction = kept = unreduced(plate) if reduced is None or solver == CSR else reduced
-        self.product = internal_force_operator(plate, solver, kept, workers)
-        self.mass = kept.gather(kept.sign * plate.field(plate.mass, 0.0))
-        self._dof_indices = kept.dof_indices
+        self._reduction = reduction = (
+            unreduced(plate) if reduced is None or solver == CSR else reduced
+        )
+        self.product = internal_force_operator(plate, solver, reduction, workers)
+        self.mass = reduction.gather(reduction.sign * plate.field(plate.mass, 0.0))
+        self._dof_indices = reduction.dof_indices
         self._inverse_mass = 1.0 / self.mass
-        self._scale, self._scaled_for = np.zeros(kept.count), 0.0  # M^-1 times the state's dt2
-        work = np.empty(kept.count)
-        loads = kept.gather(plate.field(plate.nodal_loads, 0.0))
+        self._scale, self._scaled_for = np.zeros(reduction.count), 0.0  # M^-1 times the state's dt2
+        work = np.empty(reduction.count)
+        loads = reduction.gather(plate.field(plate.nodal_loads, 0.0))
         self._loads = loads if loads.any() else None
         self._loads_square = float(loads @ (loads * self._inverse_mass))
-        self._prescribed = np.where(kept.sign == 0.0, plate.mesh.forces, 0.0)
+        self._prescribed = np.where(reduction.sign == 0.0, plate.mesh.forces, 0.0)
         self._prescribes = bool(self._prescribed.any())
         self._views = [
             (self._scale[p], self.mass[p], work[p], None if self._loads is None else loads[p])
-            for p in pieces(kept.count)
+            for p in pieces(reduction.count)
         ]
 
     @property
@@ -221,54 +225,57 @@ class PlateMotion:
 
     @property
     def moves_in_plane(self) -> bool:
-        """Whether u and v may be other than 0 somewhere."""
+        """Whether u or v may be nonzero somewhere."""
         return bool(self._reduction.sign[:, :2].any() or self._prescribed[:, :2].any())
 
     def start(self) -> PlateState:
-        """State of the plate at rest."""
+        """Return the state of the plate at rest."""
         count = len(self.mass)
         return PlateState(np.zeros(self.product.size), np.zeros(count), np.zeros(count))
 
     def load(self, distribution: Floats) -> Load:
-        """Prepare a unit force with shares of all dofs, (numnp, 5); ValueError if all are held."""
+        """Prepare a unit force with shares of all dofs, (numnp, 5).
+
+        Raises ValueError if all dofs with a share are restrained.
+        """
         shares = self._reduction.gather(distribution)
         (equations,) = np.nonzero(shares)
         if not len(equations):
             raise ValueError("the force acts on restrained dofs only")
         first, stop = int(equations[0]), int(equations[-1]) + 1
-        near = stop - first <= max(SHORT, NEAR * len(equations))
-        chosen = slice(first, stop) if near else equations
-        weights, inverse = shares[chosen], self._inverse_mass[chosen]
-        loads = np.zeros_like(weights) if self._loads is None else self._loads[chosen]
+        is_compact = stop - first <= max(SHORT, NEAR * len(equations))
+        selection = slice(first, stop) if is_compact else equations
+        weights, inverse = shares[selection], self._inverse_mass[selection]
+        loads = np.zeros_like(weights) if self._loads is None else self._loads[selection]
         if len(equations) == 1:
             return PointLoad(first, float(inverse[0]), float(loads[0]))
         mobility = weights * inverse
         square = float((mobility * weights).sum())
         nodal = float((mobility * loads).sum()) / square
-        return DistributedLoad(chosen, weights, mobility, square, nodal)
+        return DistributedLoad(selection, weights, mobility, square, nodal)
 
     def field(self, state: PlateState, factor: float) -> Floats:
-        """All dofs of all nodes, (numnp, 5), with a load factor of the prescribed ones."""
+        """Return all dofs of all nodes, (numnp, 5); `factor` scales the prescribed dofs."""
         full = state.padded.take(self._dof_indices)
         full += factor * self._prescribed if self._prescribes else 0.0  # no negative zeros
         return full
 
     def dof_sums(self, dof_indices: Indices, weights: Floats) -> DofSums:
-        """Prepare sums of dofs of a flattened field, indices and weights (n, m)."""
+        """Prepare sums over dofs of a flattened field, with indices and weights (n, m)."""
         prescribed = (weights * self._prescribed.ravel()[dof_indices]).sum(axis=1)
         return DofSums(self._dof_indices.ravel()[dof_indices], weights, prescribed)
 
     def displace(self, state: PlateState, change: Floats) -> None:
-        """Add to the displacement of a state, (n,), without a time step.
+        """Add a change, (n,), to the displacement of a state without a time step.
 
-        The prescribed displacements are those of the last :meth:`unbalanced` or step.
+        The prescribed displacements stay as the last :meth:`unbalanced` or step has set them.
         """
         state.padded[: len(change)] += change
-        self.prescribe(state, state.prescribed)  # a resumed run may begin here
+        self.prescribe(state, state.prescribed)  # a resumed run may start here
         self._update_forces(state)
 
     def _update_forces(self, state: PlateState) -> None:
-        """Compute internal force and inner products from the displacement."""
+        """Compute the internal force and the inner products from the displacement."""
         self._scale_for(state.dt2)
         sums = self.product.each(state.padded, partial(self._piece_sums, state))
         state.sums = sums[0] if len(sums) == 1 else Sums(*map(sum, zip(*sums, strict=True)))
@@ -276,9 +283,10 @@ class PlateMotion:
             state.sums = state.sums._replace(quadratic=self.product.quadratic_work)
 
     def prescribe(self, state: PlateState, factor: float) -> bool:
-        """Prescribe displacements with a load factor; whether the internal force changes by it.
+        """Prescribe displacements with a load factor; return whether the internal force changes.
 
-        That of a linear plate does not: there the prescribed displacements are loads.
+        The internal force of a linear plate does not change: there the prescribed displacements are
+        loads.
         """
         if not (self._prescribes and isinstance(self.product, NonlinearProduct)):
             return False
@@ -294,7 +302,7 @@ class PlateMotion:
             self._scaled_for = dt2
 
     def _piece_sums(self, state: PlateState, number: int, internal: Floats) -> Sums:
-        """Scaled internal force and inner products of one piece, from its internal force."""
+        """Scale the internal force of one piece, and return its inner products."""
         u, d, force = state.views[number]
         scale, mass, work, loads = self._views[number]
         np.multiply(internal, scale, out=force)
@@ -309,7 +317,7 @@ class PlateMotion:
         )
 
     def unbalanced(self, state: PlateState, factor: float) -> Floats:
-        """Load minus internal force of every equation, with a load factor of the nodal forces."""
+        """Return load minus internal force of every equation; `factor` scales the nodal forces."""
         self.prescribe(state, factor)
         force = -self.product(state.displacement)
         if self._loads is not None:
@@ -327,8 +335,8 @@ class PlateMotion:
     ) -> None:
         """Take one step: v += velocity_dt (M^-1 (P - f) - a v), u += dt v; changes the state.
 
-        `factor` scales the nodal forces; `velocity_dt` is the time between the middles of the last
-        step and of this one, `dt` by default.
+        `factor` scales the nodal forces.  `velocity_dt` is the time from the middle of the last
+        step to the middle of this step, `dt` by default.
         """
         dt_v = dt if velocity_dt is None else velocity_dt
         dt2, b = dt * dt_v, 0.5 * self.damping * dt_v
@@ -358,12 +366,12 @@ class PlateMotion:
     def kinetic_energy(
         self, state: PlateState, factor: float, applied: AppliedForce | None = None
     ) -> float:
-        """Kinetic energy at the time of the displacement (force*length).
+        """Return the kinetic energy at the time of the displacement (force*length).
 
-        The stored velocity is half a step old: the energy is that of v + dt/2 a, with
-        a = M^-1 (P - f), and `factor` that of the nodal forces.  Its square is expanded into the
-        inner products of :class:`Sums`.  With damping the mean of the velocities before and after
-        is that, divided by 1 + b.
+        The stored velocity v is half a step old.  The energy is computed with v + dt/2 a, where a =
+        M^-1 (P - f); `factor` scales the nodal forces.  The square of v + dt/2 a is expanded into
+        the inner products of :class:`Sums`.  With damping the mean velocity of two steps is v +
+        dt/2 a divided by 1 + b.
         """
         dt2 = state.dt**2
         if not dt2:
@@ -386,6 +394,6 @@ class PlateMotion:
 
     def central_difference(self, state: PlateState, dt: float, factor: float) -> None:
         """Take one step of the central differences, from rest or from the last step."""
-        # The velocity belongs to the middle of a step: the first step from rest accelerates for
-        # half a step, and a change of the time step for the mean of both.
+        # The velocity belongs to the middle of a step.  The first step from rest therefore
+        # accelerates for half a step, and a changed time step for the mean of both steps.
         self.advance(state, dt, factor, velocity_dt=0.5 * (state.dt + dt))

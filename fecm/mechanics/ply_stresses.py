@@ -1,23 +1,20 @@
 """Stresses ply by ply, residual stresses, and the transverse shear stiffness from equilibrium.
 
-Stresses ply by ply, and the transverse shear stiffness from equilibrium.
-
 z runs from the struck face, -h/2, to h/2; ply 1 is at the struck face.  Stresses of a ply are in
 its own axes; interlaminar shear stresses are in the axes of the plate.  Both are linear in the
 midplane strains eps and the curvatures kappa, eps(z) = eps + z kappa, or in their derivatives.
 An initial membrane force N0 adds the constant strain A^-1 N0.
 
-Residual stresses of plies that cannot expand freely: cure and moisture.
-
-A ply that changes its temperature by dT and its moisture by dC would strain by
+Residual stresses arise because plies cannot expand freely during cure or when they take up
+moisture.  A ply whose temperature changes by dT and whose moisture changes by dC would strain by
 e = (alpha_1, alpha_2, 0) dT + (beta_1, beta_2, 0) dC in its own axes.  The cured laminate is free:
 
     [N; M] = sum over plies of int Qbar e (1, z) dz,
     (eps0, kappa) = [A B; B D]^-1 [N; M],
     sigma_r = T Qbar (eps0 + z kappa - e)
 
-(Hahn and Pagano 1975; Tsai and Hahn 1980, chapter 8).  The stresses sigma_r have no resultants, so
-that they change neither the motion nor the force of an impact.
+(Hahn and Pagano 1975; Tsai and Hahn 1980, chapter 8).  The stresses sigma_r have no resultants.
+They change neither the motion nor the force of an impact.
 """
 
 from __future__ import annotations
@@ -39,10 +36,10 @@ from fecm.mechanics.strains import FLAT, Curvature, Rows, strain_of_deflection
 
 
 def in_plane_stresses(laminate: LaminateSection) -> Floats:
-    """Stresses sigma_1, sigma_2, tau_12 of every ply, T Qbar (eps + z kappa), (plies, 2, 3, 6).
+    """Return sigma_1, sigma_2, tau_12 of every ply, T Qbar (eps + z kappa), (plies, 2, 3, 6).
 
-    At the lower and the upper z of each ply, per unit of eps_xx, eps_yy, gamma_xy (force/area) and
-    kappa_x, kappa_y, kappa_xy (force/length).
+    The stresses are at the lower and the upper z of each ply, per unit of eps_xx, eps_yy, gamma_xy
+    (force/area) and kappa_x, kappa_y, kappa_xy (force/length).
     """
     plies = laminate.plies
     m, n = np.cos(np.deg2rad(plies.angles)), np.sin(np.deg2rad(plies.angles))
@@ -60,34 +57,34 @@ def in_plane_stresses(laminate: LaminateSection) -> Floats:
 
 
 def _moments(laminate: LaminateSection, z: Floats) -> Floats:
-    """Integrals of Qbar and Qbar zeta from the struck face to z, (2, n, 3, 3)."""
+    """Integrate Qbar and Qbar zeta from the struck face to z, (2, n, 3, 3)."""
     plies = laminate.plies
 
     def integrals(lower: Floats, upper: Floats, stiffness: Floats) -> Floats:
         powers = np.stack([upper - lower, (upper**2 - lower**2) / 2.0])
         return np.asarray(powers[:, :, None, None] * stiffness)
 
-    # The sum over the plies below, and the part of the ply at z.
-    whole = integrals(plies.faces[:-1], plies.faces[1:], plies.stiffness)
-    below = np.zeros_like(whole)
-    np.cumsum(whole[:, :-1], axis=1, out=below[:, 1:])
-    at = np.clip(np.searchsorted(plies.faces, z, side="right") - 1, 0, len(plies.angles) - 1)
-    return below[:, at] + integrals(plies.faces[at], z, plies.stiffness[at])
+    # Sum the whole plies below, and add the part of the ply at z.
+    of_plies = integrals(plies.faces[:-1], plies.faces[1:], plies.stiffness)
+    below = np.zeros_like(of_plies)
+    np.cumsum(of_plies[:, :-1], axis=1, out=below[:, 1:])
+    ply = np.clip(np.searchsorted(plies.faces, z, side="right") - 1, 0, len(plies.angles) - 1)
+    return below[:, ply] + integrals(plies.faces[ply], z, plies.stiffness[ply])
 
 
 def interlaminar_stresses(laminate: LaminateSection) -> tuple[Floats, Floats]:
-    """Shear stresses tau_xz, tau_yz from the equilibrium of the plies, without inertia.
+    """Return the shear stresses tau_xz, tau_yz from the equilibrium of the plies, without inertia.
 
-    Integrated from the struck face: tau_xz,z = -sigma_x,x - tau_xy,y and
-    tau_yz,z = -sigma_y,y - tau_xy,x.  What is left at z = h/2 is removed linearly in z.
+    tau_xz,z = -sigma_x,x - tau_xy,y and tau_yz,z = -sigma_y,y - tau_xy,x are integrated from the
+    struck face.  The residual at z = h/2 is removed linearly in z.
 
     Returns
     -------
     stresses : ndarray (plies, 3, 2, 2, 6)
-        At the lower, middle and upper z of each ply; tau_xz and tau_yz per unit of the derivatives
-        with respect to x and y of the strains eps and kappa.
+        tau_xz and tau_yz at the lower, middle and upper z of each ply, per unit of the derivatives
+        of the strains eps and kappa with respect to x and y.
     residual : ndarray (2, 2, 6)
-        The stress removed at z = h/2.
+        Stress removed at z = h/2.
     """
     faces, z = laminate.plies.faces, laminate.plies.z
 
@@ -102,16 +99,17 @@ def interlaminar_stresses(laminate: LaminateSection) -> tuple[Floats, Floats]:
 
 
 def equilibrium_shear_stiffness(laminate: LaminateSection) -> Floats:
-    """Transverse shear stiffness of equal energy under the stresses of equilibrium, force/length.
+    """Return the transverse shear stiffness H from equilibrium, (2, 2), force/length.
 
-    (2, 2), order xz, yz.  In cylindrical bending in x and in y without membrane forces H^-1 is the
-    integral of F2' G^-1 F2, where F2 gives tau_xz and tau_yz per unit of Q_x and Q_y.  Bending is
-    along the plate's axes: of an angle-ply laminate the result depends on these.
+    H stores the same energy as the stresses of equilibrium; its order is xz, yz.  In cylindrical
+    bending in x and in y without membrane forces, H^-1 is the integral of F2' G^-1 F2, where F2
+    gives tau_xz and tau_yz per unit of Q_x and Q_y.  Bending is along the plate's axes, so that H
+    of an angle-ply laminate depends on the axes.
     """
     plies = laminate.plies
     inverse_A = np.linalg.inv(laminate.A)
     bending = np.linalg.inv(laminate.D - laminate.B @ inverse_A @ laminate.B)
-    points, weights = np.polynomial.legendre.leggauss(3)  # exact: quartic in each ply
+    points, weights = np.polynomial.legendre.leggauss(3)  # exact, as the integrand is quartic
     half = np.diff(plies.faces)[:, None] / 2.0
     z = (plies.faces[:-1, None] + half * (1.0 + points)).ravel()
     A, B = _moments(laminate, z)
@@ -133,7 +131,7 @@ _CURVED = np.array(
 
 
 def second_derivatives(family: ElementBlock) -> Floats:
-    """d2N/dx2, d2N/dy2 and d2N/dxdy at the centre of 9-node elements, (ne, 3, 9)."""
+    """Return d2N/dx2, d2N/dy2 and d2N/dxdy at the centre of 9-node elements, (ne, 3, 9)."""
     _, local = local_shape_functions(family, gauss(1))
     inverse, _ = inverse_jacobian(family, local)
     xi, eta = np.linalg.inv(inverse[:, 0]).swapaxes(0, 1)  # x and y by xi, by eta: (ne, 2)
@@ -154,17 +152,17 @@ Zones = Sequence[tuple[LaminateSection, Rows]]
 
 @dataclass(frozen=True)
 class ElementZone:
-    """Stresses per strain of the plies of some elements."""
+    """Stresses per strain in the plies of a laminate's elements."""
 
     laminate: LaminateSection
-    rows: Rows  # of its elements among those of the stresses
+    rows: Rows  # rows of the elements in the arrays of stresses
     in_plane: Floats
     interlaminar: Floats
     residual: Floats
 
     @classmethod
     def of(cls, laminate: LaminateSection, rows: Rows) -> Self:
-        """Those of a laminate."""
+        """Build the zone of a laminate."""
         return cls(laminate, rows, in_plane_stresses(laminate), *interlaminar_stresses(laminate))
 
     @property
@@ -174,16 +172,16 @@ class ElementZone:
 
 
 class PlyStresses:
-    """Stresses of the plies of some elements: rows of the mesh, ascending; all by default.
+    """Stresses in the plies of elements.
 
-    The rule has the points of the in-plane stresses; the interlaminar ones belong to the element's
-    centre.  `initial` is a uniform midplane strain of the undeformed plate, (3,).  The midplane
-    strains of a plate with a `curvature` contain w/R, those of a `nonlinear` one eps_q; the
-    elements of both have nine nodes.  A plate that never `stretches` has none: u and v of all its
-    fields are 0.
+    `members` are rows of the mesh, ascending; all elements by default.  In-plane stresses are
+    evaluated at the points of `rule`, interlaminar stresses at the element's centre.  `initial` is
+    a uniform midplane strain of the undeformed plate, (3,).  The midplane strains contain w/R for a
+    plate with a `curvature`, and eps_q for a `nonlinear` plate; the elements of both have nine
+    nodes.  If `stretches` is false, u and v of all fields are 0 and the midplane has no strains.
 
-    Arrays have as many plies as the laminate with the most of them; they are NaN at those that an
-    element lacks.
+    The arrays have as many plies as the laminate with the most plies.  Plies that an element lacks
+    are NaN.
     """
 
     def __init__(
@@ -202,17 +200,19 @@ class PlyStresses:
         self.members = np.arange(len(mesh.elements)) if members is None else members
         elements = mesh.elements[self.members]
         zones = [(laminate, slice(None))] if isinstance(laminate, LaminateSection) else laminate
-        self.zones = [ElementZone.of(one, _among(self.members, rows)) for one, rows in zones]
-        most = max(zone.plies for zone in self.zones)
+        self.zones = [
+            ElementZone.of(section, _positions(self.members, rows)) for section, rows in zones
+        ]
+        most_plies = max(zone.plies for zone in self.zones)
         # Numbers of elements, points of an element, and plies.
-        self.shape = (len(elements), len(rule.xi), most)
+        self.shape = (len(elements), len(rule.xi), most_plies)
         self.rule, self.curvature, self.nonlinear = rule, curvature, nonlinear
         self.stretches = stretches
         self._mesh = elements, mesh.coordinates
 
     @cached_property
     def families(self) -> list[tuple[ElementBlock, bool]]:
-        """The elements, in blocks with the same nodes present, and whether these are all nine."""
+        """Elements in blocks with the same nodes present, and whether a block has all nine."""
         elements, coordinates = self._mesh
         return [
             (family, bool(is_complete(elements[family.rows]).all()))
@@ -223,7 +223,7 @@ class PlyStresses:
     def _interpolations(
         self,
     ) -> list[tuple[ElementBlock, Floats, Floats | None, _OfDeflection | None]]:
-        """Slopes and second derivatives of the shape functions, and the strains of w."""
+        """Slopes and second derivatives of the shape functions, and the strains of w, by block."""
         rule, stretches = self.rule, self.nonlinear or self.curvature != FLAT
         return [
             (
@@ -238,12 +238,12 @@ class PlyStresses:
         ]
 
     def strains(self, field: Floats) -> tuple[Floats, Floats]:
-        """Strains of a displacement field, (numnp, 5), and their derivatives.
+        """Return the strains of a displacement field, (numnp, 5), and their derivatives.
 
         Returns
         -------
         strains : ndarray (elements, points, 6)
-            eps_xx, eps_yy, gamma_xy with the initial strain; kappa_x, kappa_y, kappa_xy.
+            eps_xx, eps_yy, gamma_xy including the initial strain; kappa_x, kappa_y, kappa_xy.
         gradients : ndarray (elements, 2, 6)
             Derivatives with respect to x and y at the centre; NaN in elements without 9 nodes.
         """
@@ -251,10 +251,10 @@ class PlyStresses:
         strains, gradients = np.empty((count, points, 6)), np.full((count, 2, 6), np.nan)
         for family, slopes, second, of_deflection in self._interpolations:
             q = field[family.nodes][:, :, [0, 1, 3, 4]]
-            q[:, :, 2:] *= -1.0  # curvatures are the strains of the rotations' negatives
+            q[:, :, 2:] *= -1.0  # curvatures are the strains of the negative rotations
             strains[family.rows] = strains_of(slopes @ q[:, None])
             if second is not None:
-                # By x, y of the derivatives by x, y: xx, xy; xy, yy.
+                # Rows: d/dx, d/dy.  Their derivatives by x, y are xx, xy and xy, yy.
                 gradients[family.rows] = strains_of((second @ q)[:, [[0, 2], [2, 1]]])
             if of_deflection is not None:
                 w = field[family.nodes, 2]
@@ -266,7 +266,7 @@ class PlyStresses:
         return strains, gradients
 
     def evaluate(self, field: Floats) -> dict[str, Floats]:
-        """Stresses of a displacement field, (numnp, 5).
+        """Compute the stresses of a displacement field, (numnp, 5).
 
         Returns
         -------
@@ -280,26 +280,26 @@ class PlyStresses:
         shear = np.full((2, elements, plies, 3), np.nan)
         residual = np.empty((elements, 2))
         for zone in self.zones:
-            own, slopes = strains[zone.rows], gradients[zone.rows]
-            in_plane = np.einsum("lfcs,eps->ceplf", zone.in_plane, own)
+            zone_strains, zone_gradients = strains[zone.rows], gradients[zone.rows]
+            in_plane = np.einsum("lfcs,eps->ceplf", zone.in_plane, zone_strains)
             stress[:, zone.rows, :, : zone.plies] = in_plane
-            interlaminar = np.einsum("lptds,eds->telp", zone.interlaminar, slopes)
+            interlaminar = np.einsum("lptds,eds->telp", zone.interlaminar, zone_gradients)
             shear[:, zone.rows, : zone.plies] = interlaminar
-            residual[zone.rows] = np.einsum("tds,eds->et", zone.residual, slopes)
+            residual[zone.rows] = np.einsum("tds,eds->et", zone.residual, zone_gradients)
         names = ("sigma_1", "sigma_2", "tau_12")
-        found = dict(zip(names, stress, strict=True))
-        found["tau_xz"], found["tau_yz"] = shear
-        found["residual"] = residual
-        return found
+        result = dict(zip(names, stress, strict=True))
+        result["tau_xz"], result["tau_yz"] = shear
+        result["residual"] = residual
+        return result
 
 
-def _among(members: Indices, rows: Rows) -> Rows:
-    """Positions among some elements of those in rows of the mesh."""
+def _positions(members: Indices, rows: Rows) -> Rows:
+    """Return the positions in `members` of the elements in rows of the mesh."""
     return rows if isinstance(rows, slice) else np.flatnonzero(np.isin(members, rows))
 
 
 class _OfDeflection:
-    """Midplane strains of w of a block's elements: w/R, and eps_q of a nonlinear plate."""
+    """Midplane strains of w in a block: w/R, and eps_q of a nonlinear plate."""
 
     def __init__(
         self, family: ElementBlock, rule: Quadrature, curvature: Curvature, *, nonlinear: bool
@@ -310,14 +310,17 @@ class _OfDeflection:
         self._tied = QuadraticStrains(family, rule) if nonlinear else None
 
     def strains(self, w: Floats) -> Floats:
-        """Strains at the points, (ne, points, 3), of nodal values (ne, nn); tied quadratic ones."""
+        """Return strains at the points, (ne, points, 3), of nodal w (ne, nn); eps_q is tied."""
         strains = (w @ self._values.T)[:, :, None] * self._curved
         if self._tied is not None:
             strains += self._tied.of(w.T).transpose(2, 1, 0)
         return np.asarray(strains)
 
     def gradients(self, w: Floats, second: Floats) -> Floats:
-        """Derivatives by x and y at the centre, (ne, 2, 3), with those of `second_derivatives`."""
+        """Return the derivatives by x and y at the centre, (ne, 2, 3).
+
+        `second` are the shape functions' `second_derivatives`.
+        """
         x, y = np.einsum("ein,en->ie", self._slopes_at_centre, w)
         gradients = np.stack([x, y], axis=1)[:, :, None] * self._curved
         if self._tied is not None:
@@ -329,26 +332,26 @@ class _OfDeflection:
 
 
 def strains_of(slopes: Floats) -> Floats:
-    """Strains (..., 6) from d/dx and d/dy (..., 2, 4) of u, v and the rotations' negatives."""
+    """Return strains (..., 6) from d/dx, d/dy (..., 2, 4) of u, v and the negative rotations."""
     x, y = slopes[..., 0, :], slopes[..., 1, :]
     parts = [(x[..., i], y[..., i + 1], y[..., i] + x[..., i + 1]) for i in (0, 2)]
     return np.stack([*parts[0], *parts[1]], axis=-1)
 
 
 def is_complete(elements: Ints) -> Bools:
-    """Whether elements, (ne, nen), are quadrilaterals with all of their nine nodes."""
+    """Return whether elements, (ne, nen), are quadrilaterals with all nine nodes."""
     nodes = np.zeros((len(elements), 12), dtype=bool)
     nodes[:, : elements.shape[1]] = elements > 0
     return np.asarray(nodes[:, :9].all(axis=1) & ~nodes[:, 9:].any(axis=1))
 
 
 def uniform_stresses(laminate: LaminateSection, strain: Floats) -> Floats:
-    """Stresses of the plies, (plies, 2, 3), under a uniform midplane strain, (3,)."""
+    """Return the stresses of the plies, (plies, 2, 3), under a uniform midplane strain, (3,)."""
     return np.asarray(in_plane_stresses(laminate)[..., :3] @ strain)
 
 
 class Residual(NamedTuple):
-    """Free laminate after a change of temperature and moisture."""
+    """State of a free laminate after a change of temperature and moisture."""
 
     stresses: Floats  # (plies, 2, 3): sigma_1, sigma_2, tau_12 at both faces of each ply
     strain: Floats  # (3,): midplane strain eps_xx, eps_yy, gamma_xy
@@ -358,9 +361,10 @@ class Residual(NamedTuple):
 def free_strains(
     laminate: LaminateSection, along: Floats | float, across: Floats | float
 ) -> Floats:
-    """Free strains xx, yy, xy of the plies in the laminate's axes, (plies, 3).
+    """Return the free strains xx, yy, xy of the plies in the laminate's axes, (plies, 3).
 
-    `along` and `across` the fibres, of all plies or (plies,).
+    `along` and `across` are the free strains along and across the fibres, for all plies or
+    (plies,).
     """
     angles = np.deg2rad(laminate.plies.angles)
     m, n = np.cos(angles), np.sin(angles)
@@ -377,15 +381,15 @@ def free_strains(
 def residual_stresses(
     laminate: LaminateSection, along: Floats | float, across: Floats | float
 ) -> Residual:
-    """Residual stresses of a free laminate whose plies would strain by `along` and `across`.
+    """Return residual stresses of a free laminate whose plies would strain by `along` and `across`.
 
-    NaN of a laminate without stiffness.
+    The result is NaN for a laminate without stiffness.
 
     Parameters
     ----------
     laminate : Laminate
     along, across : float or ndarray (plies,)
-        Free strains alpha dT + beta dC along and across the fibres, of all plies or of each.
+        Free strains alpha dT + beta dC along and across the fibres, for all plies or for each.
 
     Examples
     --------
@@ -409,7 +413,7 @@ def residual_stresses(
         mean = np.linalg.solve(ABD, np.concatenate([N, M]))
     except np.linalg.LinAlgError:
         mean = np.full(6, np.nan)
-    # T Qbar (eps0 + z kappa) of the laminate, less T Qbar e of the ply.
+    # T Qbar (eps0 + z kappa) of the laminate minus T Qbar e of the ply.
     per_strain = in_plane_stresses(laminate)
     total = per_strain @ mean - np.einsum("pfij,pj->pfi", per_strain[..., :3], free)
     return Residual(total, mean[:3], mean[3:])

@@ -1,4 +1,4 @@
-"""Points of the plate: the elements that contain them, contact patches and strain gages."""
+"""Points of the plate: containing elements, contact patches and strain gages."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ PASSES = 50
 def containing_elements(family: ElementBlock, points: Floats) -> tuple[Indices, Indices, Floats]:
     """Find every element of a block that contains one of the points, (n, 2), edges included.
 
-    Positions of the elements in the block (k,), their points (k,), and the points' local
-    coordinates in the elements (k, 2).
+    Returns positions of elements in the block (k,), the point of each (k,), and the local
+    coordinates of the point in the element (k, 2).
     """
     low, high = family.coordinates.min(axis=1), family.coordinates.max(axis=1)
     size = _larger(high - low)
@@ -40,25 +40,28 @@ def containing_elements(family: ElementBlock, points: Floats) -> tuple[Indices, 
     )
     x, y = points.T
     (x_low, y_low), (x_high, y_high) = low[close].T[..., None], high[close].T[..., None]
-    near = (x_low <= x) & (x <= x_high) & (y_low <= y) & (y <= y_high)
-    members, which = np.nonzero(near)
+    is_in_box = (x_low <= x) & (x <= x_high) & (y_low <= y) & (y <= y_high)
+    members, point_numbers = np.nonzero(is_in_box)
     members = close[members]
-    xi, distance = _local(family, family.coordinates[members], points[which])
+    xi, distance = _local_coordinates(family, family.coordinates[members], points[point_numbers])
     inside = (_larger(np.abs(xi)) <= 1.0 + MARGIN) & (distance <= MARGIN * size[members])
-    return members[inside], which[inside], xi[inside]
+    return members[inside], point_numbers[inside], xi[inside]
 
 
 def _larger(pairs: Floats) -> Floats:
-    """The larger of the two numbers of every row; (n,)."""
-    # Along so short an axis, `max` would take ten times as long.
+    """Return the larger number of every pair, (n,)."""
+    # `max` takes ten times as long along such a short axis.
     return np.asarray(np.maximum(pairs[:, 0], pairs[:, 1]))
 
 
-def _local(family: ElementBlock, nodes: Floats, points: Floats) -> tuple[Floats, Floats]:
-    """Local coordinates (n, 2) of one point per element, by Newton's method, and what is left.
+def _local_coordinates(
+    family: ElementBlock, nodes: Floats, points: Floats
+) -> tuple[Floats, Floats]:
+    """Find the local coordinates (n, 2) of one point per element by Newton's method.
 
-    `nodes`, (n, nn, 2), are those of the elements; what is left is the larger distance, in x
-    or y, of the point and the place at the local coordinates.
+    `nodes`, (n, nn, 2), are the coordinates of the elements' nodes.  The second result, (n,), is
+    the remaining distance in x or y, the larger of the two, from the point to the place at the
+    local coordinates.
     """
     xi = np.zeros_like(points)
     highest = np.array([2.0, INSIDE if family.shape.corners == 3 else 2.0])
@@ -75,19 +78,19 @@ def _local(family: ElementBlock, nodes: Floats, points: Floats) -> tuple[Floats,
 
 
 def _functions(family: ElementBlock, xi: Floats) -> Floats:
-    """Values, d/dxi and d/deta of the nodes present at n points, (3, nn, n)."""
+    """Evaluate the present nodes' functions, d/dxi and d/deta at n points, (3, nn, n)."""
     return family.shape.functions(xi[:, 0], xi[:, 1], family.present)[:, family.present]
 
 
 def _places(functions: Floats, nodes: Floats) -> Floats:
-    """Place of one point per element, (n, 2), in elements with the nodes (n, nn, 2)."""
+    """Return the place of one point per element, (n, 2), in elements with nodes (n, nn, 2)."""
     return np.asarray((functions[0].T.copy()[:, None] @ nodes)[:, 0])
 
 
 def _jacobians(functions: Floats, nodes: Floats) -> Floats:
-    """Jacobian at one point per element, dx_i/dxi_a, (n, i, a)."""
+    """Return the Jacobian dx_i/dxi_a at one point per element, (n, i, a)."""
     slopes, places = functions[1:].swapaxes(0, 1), nodes.transpose(1, 2, 0).copy()[:, :, None]
-    # Node by node, as einsum would sum, at a fraction of its cost.
+    # Sum node by node, in the order of einsum, at a fraction of its cost.
     total = slopes[0] * places[0]
     for slope, place in zip(slopes[1:], places[1:], strict=True):
         total += slope * place
@@ -97,41 +100,43 @@ def _jacobians(functions: Floats, nodes: Floats) -> Floats:
 # Contact force over a finite area: a pressure on a circle of the midplane -------------------------
 
 # A unit pressure of radius c about (x, y) is uniform, p = 1/(pi c^2), or Hertz's,
-# p = 3/(2 pi c^2) sqrt(1 - r^2/c^2).  Its nodal weights g_i, the integral of N_i p, distribute the
-# contact force, F g, and average the displacement in the contact law, W = g w.
+# p = 3/(2 pi c^2) sqrt(1 - r^2/c^2).  The nodal weights g_i are the integral of N_i p.  They
+# distribute the contact force, F g, and average the displacement in the contact law, W = g w.
 
 DISC = "DISC"
 HERTZ = "HERT"
-# Radius, over the thickness, whose midplane deflection is that of a plate pressed on one face over
-# a contact small against the thickness (Westergaard; three-dimensional elasticity, nu = 0.3).
+# Equivalent patch radius over the thickness.  With this radius the midplane deflects like a plate
+# whose face is pressed over a contact that is small against the thickness (Westergaard;
+# three-dimensional elasticity, nu = 0.3).
 RADIUS_PER_THICKNESS = {DISC: 0.327, HERTZ: 0.377}
 
-# Gauss points along the radius and equal angles, for a radius c of up to SIDES times the shortest
-# side a of an element under the patch.  For c = n SIDES a there are sqrt(n) times as many of both,
-# rounded up: the deflection under the patch is then right to 1e-6 up to c = 25 a, 3e-5 otherwise.
+# Number of Gauss points along the radius, and of equal angles, for a radius c of up to SIDES times
+# the shortest side a of an element under the patch.  For c = n SIDES a both numbers are multiplied
+# by sqrt(n), rounded up.  The relative error of the deflection under the patch is then 1e-6 up to
+# c = 25 a, and 3e-5 beyond.
 RADII = 24
 ANGLES = 48
 SIDES = 4.0
 
 
 class PatchError(FecmError, ValueError):
-    """The patch is not entirely on the plate."""
+    """A part of the patch is not on the plate."""
 
 
 def patch_weights(mesh: MeshArrays, shape: str, radius: float, x: float, y: float) -> Floats:
-    """Nodal weights of w, (numnp,), of a unit pressure on a circle; their sum is 1.
+    """Return nodal weights of w, (numnp,), of a unit pressure on a circle; their sum is 1.
 
     Raises PatchError if a part of the circle is not on the plate.
     """
     families = element_blocks(mesh.elements, mesh.coordinates)
-    weights, side = _summed(families, len(mesh.coordinates), shape, radius, (x, y), 1)
+    weights, side = _sum_weights(families, len(mesh.coordinates), shape, radius, (x, y), 1)
     if radius > SIDES * side * (1.0 + MARGIN):
         times = math.ceil(math.sqrt(radius / (SIDES * side)))
-        weights, _ = _summed(families, len(mesh.coordinates), shape, radius, (x, y), times)
+        weights, _ = _sum_weights(families, len(mesh.coordinates), shape, radius, (x, y), times)
     return np.asarray(weights / weights.sum())
 
 
-def _summed(
+def _sum_weights(
     families: Sequence[ElementBlock],
     nodes: int,
     shape: str,
@@ -139,16 +144,17 @@ def _summed(
     centre: tuple[float, float],
     times: int,
 ) -> tuple[Floats, float]:
-    """Nodal weights of w, not yet scaled, and the shortest side of an element under the patch.
+    """Return unscaled nodal weights of w, and the shortest side of an element under the patch.
 
-    By `times` RADII points along the radius and `times` ANGLES angles.
+    The sum has `times` RADII points along the radius and `times` ANGLES angles.
     """
     t, dt = _legendre(times * RADII)
-    # Shares by r^2/c^2 = t; for Hertz's pressure by t^2 = 1 - r^2/c^2: both exact for polynomials.
+    # Substitute t = r^2/c^2, or t^2 = 1 - r^2/c^2 for Hertz's pressure.  Both are exact for
+    # polynomials.
     inner, shares = (1.0 - t * t, 3.0 * t * t * dt) if shape == HERTZ else (t, dt)
     count = times * ANGLES
     angles = (np.arange(count) + 0.5) * (2.0 * np.pi / count)
-    # The rim has no weight, and must be on the plate.
+    # The rim has no weight, but must be on the plate.
     r = radius * np.sqrt(np.append(inner, 1.0))[:, None]
     shares = np.repeat(np.append(shares, 0.0) / count, ANGLES)
     x, y = centre
@@ -156,32 +162,36 @@ def _summed(
     side = math.inf
     for sector in np.split(angles, times):
         points = np.stack([x + r * np.cos(sector), y + r * np.sin(sector)], axis=-1).reshape(-1, 2)
-        found = np.zeros(len(points), dtype=bool)
+        is_on_plate = np.zeros(len(points), dtype=bool)
         for family in families:
-            members, which, xi = containing_elements(family, points)
+            members, point_numbers, xi = containing_elements(family, points)
             # A point on a common edge counts once.
-            which, first = np.unique(which, return_index=True)
-            fresh = ~found[which]
-            members, which, xi = members[first][fresh], which[fresh], xi[first][fresh]
-            found[which] = True
+            point_numbers, first = np.unique(point_numbers, return_index=True)
+            is_new = ~is_on_plate[point_numbers]
+            members, point_numbers, xi = (
+                members[first][is_new],
+                point_numbers[is_new],
+                xi[first][is_new],
+            )
+            is_on_plate[point_numbers] = True
             values = _functions(family, xi)[0].T
-            np.add.at(weights, family.nodes[members], shares[which, None] * values)
+            np.add.at(weights, family.nodes[members], shares[point_numbers, None] * values)
             side = min(side, shortest_side(family.take(np.unique(members))))
-        if not found.all():
-            at = ", ".join(f"{value:.6g}" for value in points[~found][0])
-            raise PatchError(f"the patch is not on the plate at ({at})")
+        if not is_on_plate.all():
+            place = ", ".join(f"{value:.6g}" for value in points[~is_on_plate][0])
+            raise PatchError(f"the patch is not on the plate at ({place})")
     return weights, side
 
 
 @cache
 def _legendre(points: int) -> tuple[Floats, Floats]:
-    """Points and weights of the Gauss-Legendre rule on 0 <= t <= 1."""
+    """Return points and weights of the Gauss-Legendre rule on 0 <= t <= 1."""
     t, dt = np.polynomial.legendre.leggauss(points)
     return (t + 1.0) / 2.0, dt / 2.0
 
 
 def shortest_side(elements: ElementBlock) -> float:
-    """Shortest distance of two corners that follow each other; infinite without elements."""
+    """Return the shortest distance of two consecutive corners; infinite without elements."""
     corners = elements.coordinates[:, : elements.shape.corners]
     sides = np.roll(corners, -1, axis=1) - corners
     return float(np.hypot(sides[..., 0], sides[..., 1]).min(initial=math.inf))
@@ -192,15 +202,15 @@ def shortest_side(elements: ElementBlock) -> float:
 # z runs from the midplane towards the face away from the projectile.  Normals stay straight,
 # u(z) = u - z theta, so that the strain at z is the midplane strain plus z times the curvature.
 # Strains are discontinuous between elements: a gage on a common edge or node reads the mean of the
-# adjacent elements.  A curved plate adds w/R in the gage's direction, and a plate that stretches as
-# it bends (dw/ds)^2/2, of the mean slope.
+# adjacent elements.  A curved plate adds w/R in the gage's direction.  A plate that stretches as it
+# bends adds (dw/ds)^2/2 of the mean slope.
 
 
 class OutsideError(FecmError, ValueError):
     """A point is not on the plate."""
 
 
-# Attributes that need not be assignable, without methods, whose definition takes 0.4 ms.
+# Frozen, so that read-only attributes match; without generated methods, which take 0.4 ms.
 @dataclass(frozen=True, init=False, eq=False, repr=False, match_args=False)
 class GagePlace(Protocol):
     """Number, position (length) and direction (degrees from the x-axis) of a gage."""
@@ -213,10 +223,10 @@ class GagePlace(Protocol):
 
 
 class GageArray(NamedTuple):
-    """Strains of gages by weighted sums of dofs.
+    """Gages, as weighted sums of dofs that give their strains.
 
-    The first rows are the linear strains of the gages; those of a nonlinear plate are followed by
-    the slopes dw/ds.
+    The first rows are the linear strains of the gages.  For a nonlinear plate the slopes dw/ds
+    follow.
     """
 
     numbers: NDArray[np.int32]  # (gages,)
@@ -224,7 +234,7 @@ class GageArray(NamedTuple):
     weights: Floats  # (rows, m): strain or slope per unit of the dof
 
     def strains(self, sums: Floats) -> Floats:
-        """Strains (..., gages) of the weighted sums, (..., rows)."""
+        """Return the strains (..., gages) from the weighted sums, (..., rows)."""
         linear, slopes = np.split(sums, [len(self.numbers)], axis=-1)
         return linear + 0.5 * slopes**2 if slopes.size else linear
 
@@ -237,22 +247,22 @@ def gages(
     curvature: Curvature = FLAT,
     nonlinear: bool = False,
 ) -> GageArray:
-    """Express the gages' strains by dofs; raises OutsideError if one is not on the plate."""
+    """Express the strains of gages by dofs; raises OutsideError for a gage outside the plate."""
     families = element_blocks(mesh.elements, mesh.coordinates)
-    found = [_functional(families, record, transposed_jacobian, curvature) for record in records]
-    rows = [linear for linear, _ in found]
+    sums = [_functional(families, record, transposed_jacobian, curvature) for record in records]
+    rows = [linear for linear, _ in sums]
     if nonlinear:
-        rows += [slope for _, slope in found]
-    most = max(len(indices) for indices, _ in rows)
-    dof_indices = np.zeros((len(rows), most), dtype=np.intp)
-    weights = np.zeros((len(rows), most))
+        rows += [slope for _, slope in sums]
+    most_dofs = max(len(indices) for indices, _ in rows)
+    dof_indices = np.zeros((len(rows), most_dofs), dtype=np.intp)
+    weights = np.zeros((len(rows), most_dofs))
     for number, (indices, values) in enumerate(rows):
         dof_indices[number, : len(indices)], weights[number, : len(values)] = indices, values
     numbers = np.array([record.number for record in records], np.int32)
     return GageArray(numbers, dof_indices, weights)
 
 
-# Dofs and weights of a sum.
+# Dof indices and weights of a sum.
 _Functional = tuple[Indices, Floats]
 
 
@@ -262,31 +272,33 @@ def _functional(
     transposed_jacobian: bool,
     curvature: Curvature,
 ) -> tuple[_Functional, _Functional]:
-    """A gage's linear strain, and the slope dw/ds in its direction."""
+    """Return a gage's linear strain, and the slope dw/ds in its direction."""
     point = np.array([[gage.x, gage.y]])
-    found = [
-        (family.take(np.array([member])), Quadrature(at[:1], at[1:], np.ones(1)))
+    elements = [
+        (family.take(np.array([member])), Quadrature(xi[:1], xi[1:], np.ones(1)))
         for family in families
-        for member, _, at in zip(*containing_elements(family, point), strict=True)
+        for member, _, xi in zip(*containing_elements(family, point), strict=True)
     ]
-    if not found:
+    if not elements:
         raise OutsideError(f"gage {gage.number} at ({gage.x:g}, {gage.y:g}) is not on the plate")
     c, s = np.cos(np.deg2rad(gage.direction)), np.sin(np.deg2rad(gage.direction))
     strain: list[_Functional] = []
     slope: list[_Functional] = []
     stretch = float(np.array([c * c, s * s, c * s]) @ strain_of_deflection(curvature))
-    for element, rule in found:
-        at = interpolate(element, rule, transposed_jacobian=transposed_jacobian)
-        along = c * at.dN[0, 0, 0] + s * at.dN[0, 0, 1]  # derivative in the gage's direction
+    for element, rule in elements:
+        shapes = interpolate(element, rule, transposed_jacobian=transposed_jacobian)
+        along = (
+            c * shapes.dN[0, 0, 0] + s * shapes.dN[0, 0, 1]
+        )  # derivative in the gage's direction
         for dof, factor in ((0, c), (1, s), (3, -gage.z * c), (4, -gage.z * s)):
-            strain.append((element.nodes[0] * NDOF + dof, factor * along / len(found)))
+            strain.append((element.nodes[0] * NDOF + dof, factor * along / len(elements)))
         if stretch:
-            strain.append((element.nodes[0] * NDOF + 2, stretch * at.N[0] / len(found)))
-        slope.append((element.nodes[0] * NDOF + 2, along / len(found)))
+            strain.append((element.nodes[0] * NDOF + 2, stretch * shapes.N[0] / len(elements)))
+        slope.append((element.nodes[0] * NDOF + 2, along / len(elements)))
     return _joined(strain), _joined(slope)
 
 
 def _joined(parts: Sequence[_Functional]) -> _Functional:
-    """The sum of some sums."""
+    """Join sums into one sum."""
     dof_indices, weights = (np.concatenate(part) for part in zip(*parts, strict=True))
     return dof_indices, weights

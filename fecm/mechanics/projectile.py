@@ -1,8 +1,9 @@
-"""The projectile: a rigid mass, an elastic rod with implicit steps, or matrices of the user.
+"""The projectile: a rigid mass, an elastic rod with implicit steps, or a user's matrices.
 
-Conventions: the dofs of a node are u and du/dx, node by node; x runs from the impacted end (node 1)
-into the rod.  Displacement, velocity and acceleration are positive away from the plate: an approach
-is negative, and the contact force acts on u of node 1 in the positive direction.
+Conventions: the dofs are ordered node by node; each node has u and du/dx.  x runs from the impacted
+end (node 1) into the rod.  Displacement, velocity and acceleration are positive away from the
+plate.  An approach is therefore negative, and the contact force acts on u of node 1 in the positive
+direction.
 """
 
 from __future__ import annotations
@@ -18,22 +19,23 @@ from fecm._typing import Floats
 from fecm.mechanics.contact_law import Number
 
 SYMMETRY = 1e-9  # difference of a matrix from its transpose, over its largest entry
-# Force of a rigid motion, and smallest stiffness of the other motions, over the largest stiffness.
+# Largest force of a rigid motion, and smallest eigenvalue of other motions, over the largest
+# stiffness.
 RIGID = 1e-12
 
 
 class ProjectileError(FecmError, ValueError):
-    """The matrices of a user's projectile are not those of one free elastic body."""
+    """The matrices of a user's projectile do not describe one free elastic body."""
 
 
 @runtime_checkable
 class LinearProjectile(Protocol):
-    """A free, linear projectile, by its matrices.
+    """A free, linear projectile, defined by its matrices.
 
-    Its dofs are displacements along the line of the impact.  The first is that of the end which
-    touches the plate: the contact force acts there, and the contact law takes its motion.  All
+    The dofs are displacements along the line of the impact.  The first dof is the end that touches
+    the plate: the contact force acts there, and the contact law takes its motion.  All dofs
     approach the plate with the velocity of ROD.  Nothing holds the projectile, so that a rigid
-    motion has no force.
+    motion causes no force.
 
     Examples
     --------
@@ -47,26 +49,30 @@ class LinearProjectile(Protocol):
     """
 
     def mass(self) -> Any:
-        """Masses of the dofs, (n,), or mass matrix, (n, n), positive definite."""
+        """Return the masses of the dofs, (n,), or a positive definite mass matrix, (n, n)."""
 
     def stiffness(self) -> Any:
-        """Stiffness matrix (force/length), (n, n), symmetric; only a rigid motion has no force."""
+        """Return the symmetric stiffness matrix (force/length), (n, n).
+
+        Only a rigid motion causes no force.
+        """
 
 
 class OwnProjectile:
-    """A user's projectile with checked matrices, as :class:`~fecm.mechanics.projectile.Rod` is.
+    """A user's projectile with checked matrices and the interface of :class:`Rod`.
 
-    Raises ProjectileError if they are not those of one free body.
+    Raises ProjectileError if the matrices do not describe one free body.
     """
 
-    def __init__(self, given: LinearProjectile) -> None:
-        self.name: str = type(given).__name__
-        if isinstance(given, type):
+    def __init__(self, projectile: LinearProjectile) -> None:
+        self.name: str = type(projectile).__name__
+        if isinstance(projectile, type):
             raise ProjectileError(
-                f"projectile {given.__name__} is a class; pass an object of it: "
-                f"projectile={given.__name__}()"
+                f"projectile {projectile.__name__} is a class; pass an object of it: "
+                f"projectile={projectile.__name__}()"
             )
-        self._mass, self._stiffness = self._array(given, "mass"), self._array(given, "stiffness")
+        self._mass = self._read_matrix(projectile, "mass")
+        self._stiffness = self._read_matrix(projectile, "stiffness")
         if self._mass.ndim not in (1, 2) or not self._mass.size:
             raise self._error(f"mass has the shape {self._mass.shape}, not (n,) or (n, n)")
         M, K = np.diag(self._mass) if self._mass.ndim == 1 else self._mass, self._stiffness
@@ -84,13 +90,13 @@ class OwnProjectile:
         self.total_mass: float = float(self.rigid @ M @ self.rigid)
 
     def _check_free(self, K: Floats) -> None:
-        """Raise ProjectileError unless only the rigid motion has no force."""
+        """Raise ProjectileError unless the rigid motion is the only motion without a force."""
         largest = float(np.abs(K).max())
-        held = np.abs(K @ self.rigid)
-        if (held > RIGID * largest).any():
-            dof = int(held.argmax()) + 1
+        force = np.abs(K @ self.rigid)
+        if (force > RIGID * largest).any():
+            dof = int(force.argmax()) + 1
             raise self._error(
-                f"a rigid motion has the force {held.max():.4g} per displacement at dof {dof}: "
+                f"a rigid motion has the force {force.max():.4g} per displacement at dof {dof}: "
                 "something holds it, and a projectile flies freely"
             )
         values = np.linalg.eigvalsh(K)
@@ -99,50 +105,50 @@ class OwnProjectile:
         if len(K) > 1 and not values[1] > RIGID * largest:
             raise self._error("stiffness leaves two of its parts unconnected")
 
-    def _array(self, given: LinearProjectile, method: str) -> Floats:
-        """What a method of the user's object returns, as numbers."""
-        function = getattr(given, method, None)
+    def _read_matrix(self, projectile: LinearProjectile, method: str) -> Floats:
+        """Call a method of the user's object and return its result as an array of numbers."""
+        function = getattr(projectile, method, None)
         if not callable(function):
             raise self._error(f"it has no method {method}; it needs mass and stiffness")
         try:
-            found = np.array(function(), dtype=float)
+            matrix = np.array(function(), dtype=float)
         except Exception as error:
             text = f"{type(error).__name__}: {error}"
             raise self._error(f"{method} failed with {text}") from error
-        if not np.isfinite(found).all():
+        if not np.isfinite(matrix).all():
             raise self._error(f"{method} has an entry that is not finite")
-        return found
+        return matrix
 
     def _error(self, fault: str) -> ProjectileError:
         return ProjectileError(f"projectile {self.name}: {fault}")
 
     def with_mass(self, mass: str) -> OwnProjectile:
-        """The same projectile, whose mass matrix is the user's."""
+        """Return the same projectile; the user's mass matrix is kept."""
         return self
 
     def stiffness(self) -> Floats:
-        """Stiffness matrix, (n, n)."""
+        """Return the stiffness matrix, (n, n)."""
         return self._stiffness
 
     def mass(self) -> Floats:
-        """Masses, (n,), or mass matrix, (n, n)."""
+        """Return the masses, (n,), or the mass matrix, (n, n)."""
         return self._mass
 
     def kinetic_energy(self, velocity: Floats) -> Floats:
-        """Kinetic energy of velocities (rows, n) (force*length)."""
+        """Return the kinetic energy of velocities (rows, n) (force*length)."""
         return _quadratic_energy(self._inertia, velocity)
 
     def strain_energy(self, deformation: Floats) -> Floats:
-        """Strain energy of displacements (rows, n) relative to the tip (force*length)."""
+        """Return the strain energy of displacements (rows, n) from the tip (force*length)."""
         return _quadratic_energy(self._stiffness, deformation)
 
 
 def _quadratic_energy(matrix: Floats, x: Floats) -> Floats:
-    """X' A x / 2 for each row of x (rows, n)."""
+    """Return x' A x / 2 for each row of x (rows, n)."""
     return np.asarray(0.5 * np.einsum("ri,ij,rj->r", x, matrix, x))
 
 
-# The report's steel rod, in lb, in and s: a spherical cap of five steps, then the cylinder.
+# The report's steel rod in lb, in and s: a spherical cap of five steps, then the cylinder.
 REPORT_CAP = (0.22, 0.36, 0.43, 0.48, 0.50)
 REPORT_DIAMETER = 0.625
 REPORT_ELEMENTS = 20
@@ -163,15 +169,18 @@ INTEGRATORS = (WILSON, AVERAGE)
 
 @dataclass(frozen=True)
 class RodMethod:
-    """Mass matrix and integrator, the report program's by default; OptionsError if unknown."""
+    """Mass matrix and integrator of a rod, by default the report program's.
+
+    Raises OptionsError if a name is unknown.
+    """
 
     mass: str = LUMPED  # one of `MASSES`
     integrator: str = WILSON  # one of `INTEGRATORS`
 
     def __post_init__(self) -> None:
-        for name, known in (("mass", MASSES), ("integrator", INTEGRATORS)):
-            if (value := getattr(self, name)) not in known:
-                raise OptionsError(f"unknown rod {name} {value!r}; known are {', '.join(known)}")
+        for name, choices in (("mass", MASSES), ("integrator", INTEGRATORS)):
+            if (value := getattr(self, name)) not in choices:
+                raise OptionsError(f"unknown rod {name} {value!r}; known are {', '.join(choices)}")
 
     @property
     def attributes(self) -> dict[str, str]:
@@ -197,7 +206,7 @@ class Rod:
     diameters: tuple[float, ...]  # diameter of each element, starting at the impacted end
     modulus: float  # Young's modulus, force/area
     density: float  # mass per volume
-    # Use the consistent mass matrix, equation 4-24, instead of the lumped one.
+    # Whether the mass matrix is the consistent one, equation 4-24, instead of the lumped one.
     consistent: bool = False
 
     def __post_init__(self) -> None:
@@ -207,7 +216,7 @@ class Rod:
     def cylinder(
         cls, length: float, diameter: float, modulus: float, density: float, elements: int = 20
     ) -> Rod:
-        """Rod of one diameter."""
+        """Create a rod of one diameter."""
         _check_numbers("Rod", diameter=diameter)
         return cls(length, (float(diameter),) * elements, modulus, density)
 
@@ -241,29 +250,29 @@ class Rod:
 
     @property
     def rigid(self) -> Floats:
-        """Dofs of a unit rigid displacement, (n,): 1 of u and 0 of du/dx."""
+        """Dofs of a unit rigid displacement, (n,): 1 for u and 0 for du/dx."""
         return rigid_dofs(2 * self.elements + 2)
 
     def stiffness(self) -> Floats:
-        """Stiffness matrix, equation 4-23: (n, n)."""
+        """Return the stiffness matrix, equation 4-23, (n, n)."""
         ratios = [[36, 3, -36, 3], [3, 4, -3, -1], [-36, -3, 36, -3], [3, -1, -3, 4]]
         return self._assemble(self.modulus * self.areas / (30.0 * self.element_length), ratios)
 
     def with_mass(self, mass: str) -> Rod:
-        """The same rod with another mass matrix, ``"lumped"`` or ``"consistent"``."""
+        """Return the rod with another mass matrix, ``"lumped"`` or ``"consistent"``."""
         return replace(self, consistent=mass == CONSISTENT)
 
     def mass(self) -> Floats:
-        """Lumped mass, (n,), or consistent mass, (n, n)."""
+        """Return the lumped mass, (n,), or the consistent mass, (n, n)."""
         return self.consistent_mass() if self.consistent else self.lumped_mass()
 
     def consistent_mass(self) -> Floats:
-        """Consistent mass matrix, equation 4-24: (n, n)."""
+        """Return the consistent mass matrix, equation 4-24, (n, n)."""
         ratios = [[156, 22, 54, -13], [22, 4, 13, -3], [54, 13, 156, -22], [-13, -3, -22, 4]]
         return self._assemble(self.density * self.areas * self.element_length / 420.0, ratios)
 
     def _assemble(self, factors: Floats, ratios: list[list[int]]) -> Floats:
-        """Sum of the element matrices; dofs du/dx add a factor of the element's length."""
+        """Sum the element matrices; each dof du/dx adds a factor of the element's length."""
         L = self.element_length
         shape = ratios * np.tile([[1.0, L], [L, L**2]], (2, 2))
         matrix = np.zeros((2 * self.elements + 2, 2 * self.elements + 2))
@@ -273,7 +282,7 @@ class Rod:
         return matrix
 
     def lumped_mass(self) -> Floats:
-        """Lumped mass of each dof, (n,): rho A L/2 for u and rho A L^3/420 for du/dx (listing)."""
+        """Return the listing's lumped mass, (n,): rho A L/2 for u and rho A L^3/420 for du/dx."""
         L = self.element_length
         shares = (self.density * self.areas * L)[:, None] * [0.5, L**2 / 420.0]
         m = np.zeros((self.elements + 1, 2))
@@ -282,19 +291,19 @@ class Rod:
         return m.ravel()
 
     def kinetic_energy(self, velocity: Floats) -> Floats:
-        """Kinetic energy of velocities (rows, n) (force*length)."""
+        """Return the kinetic energy of velocities (rows, n) (force*length)."""
         return _energy(self.mass(), velocity)
 
     def strain_energy(self, deformation: Floats) -> Floats:
-        """Strain energy of displacements (rows, n) relative to the tip (force*length)."""
+        """Return the strain energy of displacements (rows, n) from the tip (force*length)."""
         return _energy(self.stiffness(), deformation)
 
 
 def _energy(matrix: Floats, x: Floats) -> Floats:
-    """X' A x / 2 for each row of x (rows, n); A is diagonal, (n,), or the rod's band matrix."""
+    """Return x' A x / 2 for each row of x (rows, n); A is diagonal, (n,), or a band matrix."""
     band = matrix.ndim == 2
     energy = 0.5 * np.einsum("ri,ri,i->r", x, x, np.diagonal(matrix) if band else matrix)
-    for off in range(1, 4 if band else 1):  # in a fixed order of summation
+    for off in range(1, 4 if band else 1):  # the order of summation is fixed
         energy += np.einsum("ri,ri,i->r", x[:, :-off], x[:, off:], np.diagonal(matrix, off))
     return np.asarray(energy)
 
@@ -309,7 +318,7 @@ class RigidMass:
         _check_numbers("RigidMass", total_mass=self.total_mass)
 
     def with_mass(self, mass: str) -> RigidMass:
-        """The same projectile: lumped and consistent mass are equal."""
+        """Return the same projectile: lumped and consistent mass are equal."""
         return self
 
     @property
@@ -318,47 +327,47 @@ class RigidMass:
         return np.ones(1)
 
     def stiffness(self) -> Floats:
-        """Stiffness matrix, (1, 1): zero."""
+        """Return the stiffness matrix, (1, 1): zero."""
         return np.zeros((1, 1))
 
     def mass(self) -> Floats:
-        """Mass of the dof, (1,)."""
+        """Return the mass of the dof, (1,)."""
         return np.array([self.total_mass])
 
     def kinetic_energy(self, velocity: Floats) -> Floats:
-        """Kinetic energy of velocities (rows, 1) (force*length)."""
+        """Return the kinetic energy of velocities (rows, 1) (force*length)."""
         return np.asarray(0.5 * self.total_mass * velocity[:, 0] ** 2)
 
     def strain_energy(self, deformation: Floats) -> Floats:
-        """Strain energy of displacements (rows, 1) relative to the tip: zero."""
+        """Return the strain energy of displacements (rows, 1) relative to the tip: zero."""
         return np.zeros(len(deformation))
 
 
-DeckProjectile = Rod | RigidMass  # that PROJ can describe
+DeckProjectile = Rod | RigidMass  # projectiles that PROJ can describe
 Projectile = DeckProjectile | OwnProjectile
 
 
-def own_projectile(given: Projectile | LinearProjectile | None) -> Projectile | None:
-    """The projectile that a user gives, checked; ProjectileError says what it lacks."""
-    if given is None or isinstance(given, Projectile):
-        return given
-    return OwnProjectile(given)
+def own_projectile(projectile: Projectile | LinearProjectile | None) -> Projectile | None:
+    """Return a user's projectile with checked matrices; raises ProjectileError if one is wrong."""
+    if projectile is None or isinstance(projectile, Projectile):
+        return projectile
+    return OwnProjectile(projectile)
 
 
 def projectile_name(projectile: Projectile) -> str:
-    """Name of the class of a projectile that a user has given, for messages and results."""
+    """Return the class name of a user's projectile, for messages and results."""
     return projectile.name if isinstance(projectile, OwnProjectile) else type(projectile).__name__
 
 
 class Transducer(NamedTuple):
-    """Node and sign of the force that the transducer measures."""
+    """Node and sign of the force measured by the transducer."""
 
     node: int  # node of the rod, from 1; 0 for the contact force itself
     sign: float = -1.0  # -1 for a force positive in compression, +1 for one positive in tension
 
     @property
     def dof(self) -> int:
-        """Dof du/dx of the node, from 0; that of a rigid mass without a node."""
+        """Dof du/dx of the node, from 0; 0, the dof of a rigid mass, without a node."""
         return max(0, 2 * self.node - 1)
 
 
@@ -367,16 +376,19 @@ State = TypeVar("State")
 
 @dataclass(slots=True)
 class RodState:
-    """State of a rod; displacements relative to the tip keep the strains of a long flight."""
+    """State of a rod.
 
-    # (3, n): displacement relative to the tip, velocity and acceleration of every dof; the
-    # first displacement is the tip's increment of the last step.
+    Displacements are relative to the tip, so that strains stay accurate in a long flight.
+    """
+
+    # (3, n): displacement relative to the tip, velocity and acceleration of every dof.  The first
+    # displacement is the tip's increment in the last step.
     motion: Floats
     tip: float = 0.0  # displacement of the tip
 
     @classmethod
     def of(cls, displacement: Floats, velocity: Floats, acceleration: Floats) -> RodState:
-        """State with the displacement, velocity and acceleration of every dof."""
+        """Create a state from the displacement, velocity and acceleration of every dof."""
         motion = np.array([displacement, velocity, acceleration])
         motion[0, ::2] -= displacement[0]
         return cls(motion, displacement[0])
@@ -400,9 +412,9 @@ class RodState:
 
 
 class TipStep(Protocol[State, Number]):
-    """Interface of a projectile's step to the contact iteration; see :class:`RodIntegrator`.
+    """Step of a projectile as the contact iteration uses it; see :class:`RodIntegrator`.
 
-    For one case, whose numbers are floats, or for many, whose numbers are arrays.
+    The numbers are floats for one case, and arrays for many cases.
     """
 
     gain: Number  # tip acceleration per force
@@ -413,26 +425,26 @@ class TipStep(Protocol[State, Number]):
         """Time of equilibrium, as a fraction of the step."""
 
     def begin(self, state: State) -> tuple[Floats, Number, Number, Number]:
-        """Free motion, and the tip's acceleration in it, drift and last acceleration."""
+        """Return the free motion, and the tip's acceleration in it, drift and last acceleration."""
 
     def end(self, state: State, motion: Floats, force: Number) -> State:
-        """State after the step."""
+        """Return the state after the step."""
 
 
 class RodIntegrator:
     r"""One step of an implicit method as a linear map, for a rod and a time step.
 
     Equilibrium (equation 4-25) is satisfied at :math:`t + \theta \Delta t`, with the acceleration
-    linear from :math:`a` to :math:`a'` over the step [1]_.  Displacements are those of Newmark's
-    method,
-    :math:`u' = u + \Delta t v + \Delta t^2 ((1/2 - \beta) a + \beta a')`, velocities
+    linear from :math:`a` to :math:`a'` over the step [1]_.  Displacements and velocities follow
+    Newmark's method,
+    :math:`u' = u + \Delta t v + \Delta t^2 ((1/2 - \beta) a + \beta a')` and
     :math:`v' = v + \Delta t (a + a') / 2`.  With :math:`y` the motion of :class:`RodState` and
     :math:`f` the force on the tip at :math:`t + \theta \Delta t`, the new motion is
     :math:`y' = T y + h f`.
 
-    `K` is the stiffness, `m` the lumped mass (n,) or a mass matrix (n, n); `constants_dt` is the
-    time step of the method's constants if that is not `dt`.  `rigid` has the
-    dofs of a unit rigid displacement, (n,), by default those of a rod.
+    `K` is the stiffness, `m` the lumped mass (n,) or a mass matrix (n, n).  `constants_dt` is the
+    time step of the method's constants, `dt` by default.  `rigid` contains the dofs of a unit rigid
+    displacement, (n,); a rod's by default.
 
     References
     ----------
@@ -453,13 +465,13 @@ class RodIntegrator:
         theta, tau, r = self.theta, dt if constants_dt is None else constants_dt, self.inverse_beta
         self.dt = dt
         self.n = n = len(m)
-        begin = 2.0 * r / (r - 2.0)  # 1/begin = 1/2 - beta
+        divisor = 2.0 * r / (r - 2.0)  # 1/divisor = 1/2 - beta
         # Tip displacement per acceleration at the start and at the end of the step.
-        self.weights = (dt**2 / begin, dt**2 / r)
+        self.weights = (dt**2 / divisor, dt**2 / r)
         self.weight = self.weights[1]
         a0, a2 = r / (theta * tau) ** 2, r / (theta * tau)
         a4 = a0 / theta
-        one, none = np.eye(n), np.zeros((n, n))
+        identity, zeros = np.eye(n), np.zeros((n, n))
         lumped = m.ndim == 1
         try:
             effective = np.linalg.inv(K + a0 * (np.diag(m) if lumped else m))
@@ -472,28 +484,31 @@ class RodIntegrator:
             weighed = factor * effective
             return np.asarray(weighed * m if lumped else weighed @ m)
 
-        # In terms of the increment from u, to avoid cancellation with the rigid motion.
-        of_velocity = on_mass(a4 * a2) - a2 / theta * one
-        of_acceleration = on_mass((r / 2.0 - 1.0) * a4) + (1.0 - r / 2.0 / theta) * one
+        # Work with the increment from u, to avoid cancellation with the rigid motion.
+        of_velocity = on_mass(a4 * a2) - a2 / theta * identity
+        of_acceleration = on_mass((r / 2.0 - 1.0) * a4) + (1.0 - r / 2.0 / theta) * identity
         acceleration = np.hstack([-a4 * effective @ K, of_velocity, of_acceleration])
         # Rigid displacements cause no force; displacements are relative to the tip.
         acceleration[:, 0] = 0.0
-        kept, relative = one.copy(), one.copy()
-        kept[0, 0] = 0.0
+        without_tip, relative = identity.copy(), identity.copy()
+        without_tip[0, 0] = 0.0
         relative[1:, 0] -= (rigid_dofs(n) if rigid is None else rigid)[1:]
-        velocity = np.hstack([none, one, tau / 2.0 * one]) + tau / 2.0 * acceleration
-        moved = np.hstack([none, dt * one, tau**2 / begin * one]) + tau**2 / r * acceleration
-        displacement = np.hstack([kept, none, none]) + relative @ moved
+        velocity = np.hstack([zeros, identity, tau / 2.0 * identity]) + tau / 2.0 * acceleration
+        moved = (
+            np.hstack([zeros, dt * identity, tau**2 / divisor * identity])
+            + tau**2 / r * acceleration
+        )
+        displacement = np.hstack([without_tip, zeros, zeros]) + relative @ moved
         self.T = np.vstack([displacement, velocity, acceleration])
         gain = a4 * effective[:, 0]
         self.h = np.concatenate([tau**2 / r * relative @ gain, tau / 2.0 * gain, gain])
         self.gain = float(gain[0])  # tip acceleration per force
 
     def begin(self, state: RodState) -> tuple[Floats, float, float, float]:
-        """New motion without a force on the tip, (3 n,), and three values of the tip.
+        """Return the new motion without a force on the tip, (3 n,), and three values of the tip.
 
-        These are its acceleration in that motion, its new displacement without `weight` times the
-        new acceleration, and its last acceleration.
+        The values are the tip's acceleration in the new motion, the tip's new displacement without
+        `weight` times the new acceleration, and the tip's last acceleration.
         """
         motion = np.dot(self.T, state.motion.reshape(3 * self.n))
         _, v, a = state.motion[:, 0].tolist()
@@ -505,12 +520,12 @@ class RodIntegrator:
         return RodState(motion.reshape(3, self.n), state.tip + motion.item(0))
 
     def advance(self, state: RodState, force: float = 0.0) -> RodState:
-        """State after a step under a force on the tip at t + theta dt."""
+        """Return the state after a step under a force on the tip at t + theta dt."""
         return self.end(state, self.begin(state)[0], force)
 
 
 class WilsonStep(RodIntegrator):
-    """Wilson's theta method, used by the report's program."""
+    """Wilson's theta method, which the report's program uses."""
 
     theta, inverse_beta = 1.4, 6.0
 
@@ -531,12 +546,15 @@ def report_rod(density: float = REPORT_DENSITY) -> Rod:
 
 
 def rigid_dofs(n: int) -> Floats:
-    """Dofs of a unit rigid displacement of a rod or rigid mass, (n,): 1 of u and 0 of du/dx."""
+    """Return the dofs of a unit rigid displacement, (n,): 1 for u and 0 for du/dx."""
     return np.arange(1.0, n + 1.0) % 2.0
 
 
 def rigid_approach(rod: Projectile, velocity: float, *, derivatives_too: bool = False) -> RodState:
-    """Initial state of a rigid approach; `derivatives_too` moves du/dx too (``rod-start``)."""
+    """Return the initial state of a rigid approach.
+
+    With `derivatives_too`, du/dx also start at the approach velocity (``rod-start``).
+    """
     motion = np.zeros((3, len(rod.mass())))
     motion[1, slice(None) if derivatives_too else rod.rigid > 0.0] = -velocity
     return RodState(motion)

@@ -1,19 +1,16 @@
 """Quick models of an impact without a mesh, and the static curve of a nonlinear plate.
 
-Static force over the deflection of a nonlinear plate under its contact load.
-
-Newton's method with a given deflection W of the plate under the load.  The force F is unknown; at a
-displacement u with the tangent K_T and the residual r = F P - f(u) a step (du, dF) solves
+The static curve is the force of a nonlinear plate over its deflection W under the contact load.
+Newton's method finds the force F for a prescribed W.  At a displacement u with the tangent K_T and
+the residual r = F P - f(u), a step (du, dF) solves
 
     K_T du = r + dF P,   P du = W - P u,
 
 where P are the nodal forces of a unit contact force, which also weigh the deflection.
 
-Quick models of an impact, without a mesh.
-
-Small mass (Zener 1941, Olsson 1992): the plate under the contact is a dashpot,
-a'' + 3/2 lambda sqrt(a) a' + a^1.5 = 0 in units of the contact.  Large mass: the kinetic energy is
-stored in the plate, by its static force over deflection, and in the indentation.
+Quick models.  Small mass (Zener 1941, Olsson 1992): the plate under the contact is a dashpot,
+a'' + 3/2 lambda sqrt(a) a' + a^1.5 = 0 in units of the contact.  Large mass: the plate, by its
+static curve, and the indentation store the kinetic energy.
 """
 
 from __future__ import annotations
@@ -32,26 +29,26 @@ from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.roots import root
 from fecm.mechanics.solutions import ConvergenceError, Tangent
 
-# Change relative to the displacement that ends the iterations.
+# The iterations end at this change, relative to the displacement.
 CLOSE = 1.0e-8
 MOST_ITERATIONS = 30
-# Change beyond which iterations do not converge; the first is the whole displacement.
+# The iterations fail beyond this relative change.  The first change is the whole displacement.
 MOST_CHANGE = 2.0
-# Change over the one before from which on a new tangent is worth its factors.
+# Ratio of two successive changes above which a new tangent is worth its factorisation.
 SLOW = 0.3
 MOST_STEPS = 200
-# Steps relative to the deflection; those near 0 are larger.
+# Steps relative to the deflection.  Steps near 0 are larger.
 LARGEST_STEP = 0.1
 SMALLEST_STEP = 1.0e-3
 
 
 class StaticCurve(NamedTuple):
-    """Force F and work of the force over the deflection W; cubic between the points.
+    """Force F and work of F over the deflection W, with a cubic between the points.
 
     Attributes
     ----------
     deflection, force, stiffness : ndarray (n,)
-        W (length) from 0 on, F (force), and dF/dW.
+        W (length) starting at 0, F (force), and dF/dW.
     work : ndarray (n,)
         Integral of F dW, force*length.
     """
@@ -62,24 +59,26 @@ class StaticCurve(NamedTuple):
     work: Floats
 
     def at(self, deflection: Floats | float) -> tuple[Floats, Floats]:
-        """Force and work at deflections up to the last."""
+        """Return force and work at deflections up to the last point."""
         W, F, slope = self.deflection, self.force, self.stiffness
         i = np.clip(np.searchsorted(W, deflection, side="right") - 1, 0, len(W) - 2)
         h = W[i + 1] - W[i]
         t = (deflection - W[i]) / h
-        begin, end = h * slope[i], h * slope[i + 1]
+        first_slope, last_slope = h * slope[i], h * slope[i + 1]
         rise = F[i + 1] - F[i]
         # F = F_i + c1 t + c2 t^2 + c3 t^3
-        c2, c3 = 3.0 * rise - 2.0 * begin - end, begin + end - 2.0 * rise
-        force = F[i] + t * (begin + t * (c2 + t * c3))
-        work = self.work[i] + h * t * (F[i] + t * (begin / 2.0 + t * (c2 / 3.0 + t * c3 / 4.0)))
+        c2, c3 = 3.0 * rise - 2.0 * first_slope - last_slope, first_slope + last_slope - 2.0 * rise
+        force = F[i] + t * (first_slope + t * (c2 + t * c3))
+        work = self.work[i] + h * t * (
+            F[i] + t * (first_slope / 2.0 + t * (c2 / 3.0 + t * c3 / 4.0))
+        )
         return force, work
 
 
 def static_curve(
     plate: PlateModel, contact: Floats, step: float, enough: Callable[[float, float, float], bool]
 ) -> StaticCurve:
-    """Follow the equilibria of a plate without other loads from rest.
+    """Compute the equilibria of a plate under its contact load, starting at rest.
 
     Parameters
     ----------
@@ -91,19 +90,19 @@ def static_curve(
     step : float
         First step of the deflection, length.  Steps grow with the deflection.
     enough : callable
-        Whether the curve may end at a deflection, its force and its work.
+        Whether the curve may end at a point, given deflection, force and work.
 
     Returns
     -------
     StaticCurve
-        Its last point is the first that is enough.
+        Curve that ends at the first point for which `enough` is true.
 
     Raises
     ------
     SingularStiffnessError
         If the supports do not hold the plate.
     ConvergenceError
-        If an equilibrium is not found, or none is enough.
+        If an equilibrium is not found, or `enough` is never true.
     """
     points: list[_Point] = []
     works = [0.0]
@@ -114,7 +113,7 @@ def static_curve(
             continue
         before = points[-2]
         h = point.deflection - before.deflection
-        # The integral of the cubic between both.
+        # Integral of the cubic between the two points.
         mean = (before.force + point.force) / 2.0
         bend = h * (before.stiffness - point.stiffness) / 12.0
         works.append(works[-1] + h * (mean + bend))
@@ -125,7 +124,7 @@ def static_curve(
 
 
 class _Point(NamedTuple):
-    """An equilibrium: a point of the curve."""
+    """Point of the static curve."""
 
     deflection: float
     force: float
@@ -133,21 +132,25 @@ class _Point(NamedTuple):
 
 
 def _equilibria(plate: PlateModel, load: Floats, step: float) -> Iterator[_Point]:
-    """Equilibria from rest on; they have no end."""
+    """Yield equilibria without end, starting at rest."""
     membrane = MembraneForces(plate)
     state = _State(np.zeros(plate.mesh.equations.shape), 0.0)
-    deflection, most = 0.0, step
+    deflection, step_size = 0.0, step
     while True:
         tangent = Tangent(plate, state.field)
         compliant = tangent.solve(load)
         stiffness = 1.0 / float(load @ compliant)
         yield _Point(deflection, state.force, stiffness)
-        most = max(most, LARGEST_STEP * deflection)
-        while (found := _moved(plate, membrane, load, state, tangent, deflection + most)) is None:
-            most /= 2.0
-            if most < SMALLEST_STEP * (step + deflection):
+        step_size = max(step_size, LARGEST_STEP * deflection)
+        while (
+            result := _find_equilibrium(
+                plate, membrane, load, state, tangent, deflection + step_size
+            )
+        ) is None:
+            step_size /= 2.0
+            if step_size < SMALLEST_STEP * (step + deflection):
                 raise ConvergenceError(f"no equilibrium beyond the deflection {deflection:.6g}")
-        state, deflection = found, deflection + most
+        state, deflection = result, deflection + step_size
 
 
 class _State(NamedTuple):
@@ -157,7 +160,7 @@ class _State(NamedTuple):
     force: float
 
 
-def _moved(
+def _find_equilibrium(
     plate: PlateModel,
     membrane: MembraneForces,
     load: Floats,
@@ -165,15 +168,15 @@ def _moved(
     tangent: Tangent,
     deflection: float,
 ) -> _State | None:
-    """Find the equilibrium at a deflection from a state and its tangent; None if that fails."""
+    """Find the equilibrium at a deflection from a state and its tangent; None on failure."""
     free = plate.mesh.equations > 0
     field, force = state.field.copy(), state.force
     compliant = tangent.solve(load)
-    last = math.inf
+    last_size = math.inf
     for _ in range(MOST_ITERATIONS):
         u = field[free]
         internal = plate.stiffness @ u + membrane.forces(field)[0][free]
-        # K_T^-1 (r + F P): with the load the right-hand side is larger than its rounding.
+        # K_T^-1 (r + F P): the load keeps the right-hand side above its rounding errors.
         change = tangent.solve(2.0 * force * load - internal)
         added = (deflection - float(load @ (u + change))) / float(load @ compliant)
         change += added * compliant
@@ -184,48 +187,50 @@ def _moved(
             return _State(field, force)
         if not size < MOST_CHANGE:
             return None
-        if size > SLOW * last:  # the tangent is too old
+        if size > SLOW * last_size:  # the tangent is too old
             tangent = Tangent(plate, field)
             compliant = tangent.solve(load)
-        last = size
+        last_size = size
     return None
 
 
-MIDPOINTS = 1000  # of the quadratures over the force and the deflection
-# Expansions of the motion on an infinite plate.
+MIDPOINTS = 1000  # number of midpoints in quadratures over force and deflection
+# Power series of the motion on an infinite plate.
 ORDER = 20
-ROUNDING = 1e-14  # of the last terms, relative to the first
-LONGEST = 1e6  # time of a contact
+ROUNDING = 1e-14  # size of the last terms relative to the first
+LONGEST = 1e6  # longest contact time
 
 
 class QuickImpact(NamedTuple):
     """Result of a quick model."""
 
-    peak: float  # contact force
-    time: float  # of the peak
-    duration: float  # of the contact
+    peak: float  # peak of the contact force
+    time: float  # time of the peak
+    duration: float  # duration of the contact
 
 
 def inelasticity(
     mass: float, velocity: float, k: float, plate_mass: float, rigidity: float
 ) -> float:
-    """Zener's parameter lambda = k^0.4 V^0.2 M^0.6/(8 sqrt(m D*)).
+    """Return Zener's parameter lambda = k^0.4 V^0.2 M^0.6/(8 sqrt(m D*)).
 
-    M and V are of the projectile, m is the plate's mass per area, k the contact coefficient in
-    force/length^1.5, and D* the effective bending stiffness in force*length.
+    M and V are mass and velocity of the projectile, m is the plate's mass per area, k the contact
+    coefficient in force/length^1.5, and D* the effective bending stiffness in force*length.
     """
     return float(k**0.4 * velocity**0.2 * mass**0.6) / (8.0 * math.sqrt(plate_mass * rigidity))
 
 
 def infinite_plate(mass: float, velocity: float, k: float, parameter: float) -> QuickImpact:
-    """Impact on an infinite plate with the parameter lambda.
+    """Compute the impact on an infinite plate with the parameter lambda.
 
-    F = a^1.5 M V/T with the time scale T = (M/(k sqrt(V)))^0.4.  The duration is infinite if the
-    contact lasts longer than 10^6 T.
+    The force is F = a^1.5 M V/T with the time scale T = (M/(k sqrt(V)))^0.4.  The duration is
+    infinite if the contact lasts longer than 10^6 T.
     """
     motions = _motion(parameter)
     turning = next(motion for motion in motions if motion.turns)
-    last = next(one for one in chain([turning], motions) if one.leaves or one.time[0] > LONGEST)
+    last = next(
+        motion for motion in chain([turning], motions) if motion.leaves or motion.time[0] > LONGEST
+    )
     peak, time = turning.peak()
     duration = last.end() if last.leaves else math.inf
     scale = _time_scale(mass, velocity, k)
@@ -233,7 +238,7 @@ def infinite_plate(mass: float, velocity: float, k: float, parameter: float) -> 
 
 
 def peak_on_infinite_plate(mass: float, velocity: float, k: float, parameter: float) -> float:
-    """Peak force of :func:`infinite_plate`, without the motion after it."""
+    """Return the peak force of :func:`infinite_plate` without computing the motion after it."""
     peak, _ = next(motion for motion in _motion(parameter) if motion.turns).peak()
     return peak * mass * velocity / _time_scale(mass, velocity, k)
 
@@ -243,7 +248,7 @@ def _time_scale(mass: float, velocity: float, k: float) -> float:
 
 
 class _Expansion(NamedTuple):
-    """Motion of the contact up to a step: coefficients of the powers of s, from 0 on.
+    """Motion of the contact within a step: coefficients of the powers of s, from s^0.
 
     With z = sqrt(a) and dt = 2 z ds the equation has no square roots: dz/ds = w, the velocity of
     the indentation, and dw/ds = -3 lambda z^2 w - 2 z^4.
@@ -256,7 +261,7 @@ class _Expansion(NamedTuple):
 
     @classmethod
     def of(cls, z: float, w: float, time: float, parameter: float) -> _Expansion:
-        """Expand the motion from a state on."""
+        """Expand the motion about a state."""
         zs, ws, times = [z], [w], [time]
         squares: list[float] = []  # z^2
         for k in range(ORDER):
@@ -266,7 +271,7 @@ class _Expansion(NamedTuple):
             times.append(2.0 * zs[k] / (k + 1))
             ws.append(-slowing / (k + 1))
         small = ROUNDING * (z or 1.0)
-        last = range(ORDER - 4, ORDER + 1)  # without damping, powers are missing
+        last = range(ORDER - 4, ORDER + 1)  # without damping, some powers are missing
         step = min((small / abs(zs[k])) ** (1.0 / k) for k in last if zs[k])
         return cls(zs, ws, times, step)
 
@@ -281,18 +286,18 @@ class _Expansion(NamedTuple):
         return _value(self.z, self.step) <= 0.0
 
     def peak(self) -> tuple[float, float]:
-        """Largest a^1.5, and its time."""
-        at = root(lambda s: _value(self.w, s), 0.0, self.step, ROUNDING * self.step)
-        return _value(self.z, at) ** 3, _value(self.time, at)
+        """Return the largest a^1.5, and its time."""
+        s_peak = root(lambda s: _value(self.w, s), 0.0, self.step, ROUNDING * self.step)
+        return _value(self.z, s_peak) ** 3, _value(self.time, s_peak)
 
     def end(self) -> float:
-        """Time at which the contact ends."""
-        at = root(lambda s: _value(self.z, s), 0.0, self.step, ROUNDING * self.step)
-        return _value(self.time, at)
+        """Return the time at which the contact ends."""
+        s_end = root(lambda s: _value(self.z, s), 0.0, self.step, ROUNDING * self.step)
+        return _value(self.time, s_end)
 
 
 def _motion(parameter: float) -> Iterator[_Expansion]:
-    """The motion from the first contact on, step by step; it has no end."""
+    """Yield the motion step by step from the first contact, without end."""
     z, w, time = 0.0, 1.0, 0.0
     while True:
         motion = _Expansion.of(z, w, time, parameter)
@@ -301,13 +306,13 @@ def _motion(parameter: float) -> Iterator[_Expansion]:
 
 
 def _product(first: list[float], second: list[float]) -> float:
-    """Last coefficient of the product of two series of the same length."""
+    """Return the last coefficient of the product of two series of the same length."""
     total: float = sum(map(operator.mul, first, reversed(second)))
     return total
 
 
 def _value(powers: list[float], s: float) -> float:
-    """Sum of a power series."""
+    """Evaluate a power series."""
     value = 0.0
     for coefficient in reversed(powers):
         value = value * s + coefficient
@@ -315,71 +320,73 @@ def _value(powers: list[float], s: float) -> float:
 
 
 def static_peak(mass: float, velocity: float, k: float, stiffness: float) -> float:
-    """Peak force of :func:`static_plate`."""
+    """Return the peak force of :func:`static_plate`."""
     energy = 0.5 * mass * velocity**2
-    most = velocity * math.sqrt(stiffness * mass)  # without indentation
+    limit = velocity * math.sqrt(stiffness * mass)  # peak without indentation
 
     def missing(force: float) -> float:
         return force**2 / (2.0 * stiffness) + 0.4 * math.cbrt(force**5 / k**2) - energy
 
-    return root(missing, 0.0, most, 1e-12 * most)
+    return root(missing, 0.0, limit, 1e-12 * limit)
 
 
 def static_plate(mass: float, velocity: float, k: float, stiffness: float) -> QuickImpact:
-    """Impact whose energy M V^2/2 is F^2/(2 k_b) in bending and (2/5) F^(5/3)/k^(2/3) in contact.
+    """Compute the impact on a plate without inertia.
 
-    k_b is the static stiffness of the plate under its patch, force/length.  Plate and contact are
-    springs in series.  The displacement of the mass at the force F is x = F/k_b + (F/k)^(2/3), and
-    the duration is 2 times the integral of dx/v up to the peak F_m; the variable s of
-    F = F_m (1 - s^2)^3 leaves no singularity.
+    The energy M V^2/2 is stored as F^2/(2 k_b) in bending and as (2/5) F^(5/3)/k^(2/3) in the
+    contact.  k_b is the static stiffness of the plate under its patch, force/length.  Plate and
+    contact are springs in series.  The displacement of the mass at the force F is
+    x = F/k_b + (F/k)^(2/3).  The duration is 2 times the integral of dx/v up to the peak F_m; the
+    substitution F = F_m (1 - s^2)^3 removes the singularity.
     """
     peak = static_peak(mass, velocity, k, stiffness)
     s = (np.arange(MIDPOINTS) + 0.5) / MIDPOINTS
     rest = 1.0 - s * s
     force = peak * rest**3
     stored = force**2 / (2.0 * stiffness) + 0.4 * np.cbrt(force**5 / k**2)
-    left = np.sqrt(velocity**2 - 2.0 * stored / mass)
+    speed = np.sqrt(velocity**2 - 2.0 * stored / mass)
     slope = 1.0 / stiffness + 2.0 / 3.0 / np.cbrt(force * k**2)
-    duration = 2.0 * float(np.mean(slope * 6.0 * peak * rest**2 * s / left))
+    duration = 2.0 * float(np.mean(slope * 6.0 * peak * rest**2 * s / speed))
     return QuickImpact(peak, duration / 2.0, duration)
 
 
 def curved_plate(mass: float, velocity: float, k: float, curve: StaticCurve) -> QuickImpact:
-    """Impact of :func:`static_plate` on a nonlinear plate, whose curve reaches the energy.
+    """Compute the impact of :func:`static_plate` on a nonlinear plate.
 
-    M V^2/2 is the integral of F dW in the plate, and (2/5) F^(5/3)/k^(2/3) in the contact.
+    The energy M V^2/2 is stored as the integral of F dW in the plate and as (2/5) F^(5/3)/k^(2/3)
+    in the contact.  The curve must reach this energy.
     """
     energy = 0.5 * mass * velocity**2
-    most = curve.deflection[-1]
-    deflection = root(lambda w: stored_at(curve, k, w)[1] - energy, 0.0, most, 1e-12 * most)
+    limit = curve.deflection[-1]
+    deflection = root(lambda w: stored_at(curve, k, w)[1] - energy, 0.0, limit, 1e-12 * limit)
     duration = contact_time_on_curve(mass, velocity, k, curve)
     return QuickImpact(stored_at(curve, k, deflection)[0], duration / 2.0, duration)
 
 
 def contact_time_on_curve(mass: float, velocity: float, k: float, curve: StaticCurve) -> float:
-    """Duration of the contact of :func:`curved_plate`, with the indentation.
+    """Return the duration of the contact of :func:`curved_plate`.
 
-    The time is 2 times the integral of dx/v over the displacement x = W + (F/k)^(2/3) of the mass,
-    by the midpoints of the variable s of W = W_m (1 - s^2)^3.  An infinite `k` leaves out the
-    indentation.
+    The duration is 2 times the integral of dx/v over the displacement x = W + (F/k)^(2/3) of the
+    mass.  The quadrature takes midpoints of s, with W = W_m (1 - s^2)^3.  An infinite `k` leaves
+    out the indentation.
     """
     energy = 0.5 * mass * velocity**2
 
     def stored(force: Floats, work: Floats) -> Floats:
         return np.asarray(work + 0.4 * np.cbrt(force**5 / k**2))
 
-    most = curve.deflection[-1]
-    turn = root(lambda w: float(stored(*curve.at(w))) - energy, 0.0, most, 1e-12 * most)
+    limit = curve.deflection[-1]
+    turn = root(lambda w: float(stored(*curve.at(w))) - energy, 0.0, limit, 1e-12 * limit)
     s = np.arange(2 * MIDPOINTS + 1) / (2 * MIDPOINTS)
     deflection = turn * (1.0 - s * s) ** 3
     force, work = curve.at(deflection)
-    force = np.maximum(force, 0.0)  # rounding at rest
+    force = np.maximum(force, 0.0)  # rounding may make it negative at rest
     x = deflection + np.cbrt((force / k) ** 2)
-    left = (energy - stored(force, work))[1::2]
-    return 2.0 * float((-np.diff(x[::2]) / np.sqrt(2.0 * left / mass)).sum())
+    kinetic = (energy - stored(force, work))[1::2]
+    return 2.0 * float((-np.diff(x[::2]) / np.sqrt(2.0 * kinetic / mass)).sum())
 
 
 def stored_at(curve: StaticCurve, k: float, deflection: float) -> tuple[float, float]:
-    """Force at a deflection, and the energy in the plate and in the contact."""
+    """Return the force at a deflection, and the energy of plate and contact together."""
     force, work = curve.at(np.array(deflection))
     return float(force), float(work + 0.4 * np.cbrt(force**5 / k**2))

@@ -1,10 +1,9 @@
 """A nonlinear plate in a few modes, and its motion under the contact forces of many impacts.
 
-A nonlinear plate in a few modes, for many impacts at one place.
-
-The deflection is a sum of bending modes q_i phi_i of the plate at rest.  The displacements u and v
-in the plane follow from s_ij = q_i q_j (A. A. Muravyov and S. A. Rizzi, Computers & Structures 81,
-2003, 1513), here by the element matrices and not by a fit:
+All impacts are at one place.  The deflection is a sum of bending modes q_i phi_i of the plate at
+rest.  The displacements u and v in the plane follow from s_ij = q_i q_j (A. A. Muravyov and S. A.
+Rizzi, Computers & Structures 81, 2003, 1513).  Here they are computed with the element matrices
+instead of a fit:
 
     u, v = U q + sum over i <= j of u_ij s_ij,    K_mm U = -K_mb phi,    K_mm u_ij = -r_ij,
     r_ij = int B_m' A eps_q(i, j),
@@ -18,30 +17,29 @@ belongs to s_ij.  The strain energy is
 with the membrane force N_i = A (B_m U_i + w_i/R) + B kappa_i of a bending mode; U and C are zero
 unless the laminate or a curvature couples bending and stretching.
 
-A static membrane has no inertia.  That matters where the edges are free in the plane: the lowest
-membrane modes psi_k are then hardly faster than the bending modes.  The few that the quadratic
-strains of the static deflection excite most are therefore coordinates as well.  With q_k of such a
-mode, C has the row psi_k' r, and Q the term sum over k of (psi_k' r)' (psi_k' r)/Omega_k^2 more,
-which is what their static displacement had taken away.
+A static membrane has no inertia.  This matters where the edges are free in the plane: the lowest
+membrane modes psi_k are then hardly faster than the bending modes.  The membrane modes that the
+quadratic strains of the static deflection excite most are therefore coordinates as well.  A
+coordinate q_k of such a mode adds the row psi_k' r to C, and the term
+(psi_k' r)' (psi_k' r)/Omega_k^2 to Q, which cancels the static displacement of the mode.
 
-The modes left out follow the contact force F statically, by what they add to the displacement under
+The modes left out follow the contact force F statically.  They add F/k_r to the displacement under
 the load:
 
     W = sum g_i q_i + F/k_r,    1/k_r = 1/k_b - sum g_i^2/omega_i^2,
 
 with the displacement g_i of a mode under the load and the static stiffness k_b of the linear plate
-there.  Each mode adds g_i^2/omega_i^2 to the static compliance: those that add most are kept.
+there.  Each mode adds g_i^2/omega_i^2 to the static compliance.  The modes that add most are kept.
 
-Motion of a reduced plate under the contact forces of many impacts, all cases together.
-
-Each coordinate q of frequency omega moves by
+The motion under the contact forces of many impacts is computed for all cases together.  Each
+coordinate q of frequency omega moves by
 
     q_(n+1) - 2 q_n + q_(n-1) = dt^2 psi (g F - dU/dq - a v),   psi = (sin(x)/x)^2,  x = omega dt/2,
 
 with the central difference v of the velocity.  Without psi these are the central differences of a
-full run.  With it free vibrations and constant forces are exact (W. Gautschi, Numerische Mathematik
-3, 1961, 381): only contact force and membrane limit the step.  Of a vibration the central
-difference is sin(omega dt)/(omega dt) times the velocity.
+full run.  With psi, free vibrations and constant forces are exact (W. Gautschi, Numerische
+Mathematik 3, 1961, 381), so that only the contact force and the membrane limit the step.  The
+central difference of a vibration is sin(omega dt)/(omega dt) times the velocity.
 """
 
 from __future__ import annotations
@@ -64,20 +62,20 @@ from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.solutions import SingularStiffnessError, Tangent, rigid_in_plane
 from fecm.mechanics.symmetry import with_codes
 
-# Residual of a mode relative to its eigenvalue; the error of the frequency is its square.
+# Residual of a converged mode relative to its eigenvalue; the error of the frequency is its square.
 CONVERGED = 1e-6
-# Vectors of the Krylov space per mode that is wanted, and in addition.
+# Largest size of the Krylov space: vectors per requested mode, plus a constant.
 VECTORS_PER_MODE, MORE_VECTORS = 12, 60
 # Steps between two solutions of the eigenvalue problem in the Krylov space.
 LOOK = 20
-# Relative difference of the squares of frequencies that are equal.
+# Squares of frequencies are equal if their relative difference is smaller.
 EQUAL = 1e-8
-# Size of a new vector relative to the last below which the Krylov space is complete.
+# The Krylov space is complete if a new vector is smaller relative to the last vector.
 EXHAUSTED = 1e-12
-# Share of a mode in the static compliance below which the load does not move it.
+# The load does not move a mode whose share in the static compliance is smaller.
 UNMOVED = 1e-10
-# Most membrane modes, their least share in the static compliance, and the largest of their
-# frequencies relative to that of the bending modes: a higher one would cost time steps.
+# Largest number of membrane modes, their least share in the static compliance, and their largest
+# frequency relative to the bending modes; a higher frequency would cost time steps.
 MEMBRANE_MODES, MEMBRANE_SHARE, MEMBRANE_FASTEST = 6, 0.01, 1.5
 
 
@@ -86,7 +84,7 @@ class ReductionError(FecmError, ArithmeticError):
 
 
 class ReducedModes(NamedTuple):
-    """Modes that a load moves, those of the largest share in the static compliance first."""
+    """Modes that a load moves, by descending share in the static compliance."""
 
     stiffness: Floats  # (m,): squares of the angular frequencies
     shapes: Floats  # (neq, m): unit modal mass
@@ -101,14 +99,14 @@ class ReducedModes(NamedTuple):
 
 @dataclass(frozen=True)
 class ReducedPlate:
-    """A plate in n coordinates, of which the first m are bending modes, the others membrane modes.
+    """A plate in n coordinates: m bending modes, followed by membrane modes.
 
-    Arrays over pairs are over the m (m + 1)/2 pairs i <= j of bending modes.
+    Arrays over pairs have an entry for each of the m (m + 1)/2 pairs i <= j of bending modes.
     """
 
     bending: int  # m
     stiffness: Floats  # (n,): squares of the angular frequencies
-    deflection: Floats  # (n,): displacement under the load; 0 of membrane modes
+    deflection: Floats  # (n,): displacement under the load; 0 for membrane modes
     flexibility: float  # 1/k_r: displacement of the modes left out per force
     cubic: Floats  # C, (n, pairs)
     quartic: Floats  # Q, (pairs, pairs)
@@ -121,19 +119,19 @@ class ReducedPlate:
 
     @cached_property
     def _pairs(self) -> tuple[Indices, Indices]:
-        """Modes i and j of the pairs."""
+        """Bending modes i and j of the pairs."""
         first, second = np.triu_indices(self.bending)
         return first, second
 
     @cached_property
     def _tables(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Q and C in one matrix, the transpose of C, and sums over the pairs of a mode i and j."""
+        """Q and C stacked, the transpose of C, and the sums over the pairs of each mode i and j."""
         modes = np.arange(self.bending)[:, None]
         of_first, of_second = ((index == modes).astype(float) for index in self._pairs)
         return np.vstack([self.quartic, self.cubic]), self.cubic.T.copy(), of_first, of_second
 
     def strain_energy(self, q: Floats) -> Floats:
-        """Strain energy of coordinates (n, cases): (cases,)."""
+        """Return the strain energy, (cases,), of coordinates (n, cases)."""
         first, second = self._pairs
         s = q[first] * q[second]
         of_coordinates = q * (0.5 * self.stiffness[:, None] * q + self.cubic @ s)
@@ -141,11 +139,11 @@ class ReducedPlate:
         return np.asarray(of_coordinates.sum(axis=0) + of_pairs.sum(axis=0))
 
     def internal_forces(self, q: Floats) -> Floats:
-        """Derivatives of the strain energy with respect to coordinates (n, cases)."""
+        """Return the derivatives of the strain energy with respect to coordinates (n, cases)."""
         of_pairs, of_coordinates, of_first, of_second = self._tables
         first, second = (q[index] for index in self._pairs)
-        both = of_pairs @ (first * second)
-        n, forces = both[: len(first)], both[len(first) :]
+        stacked = of_pairs @ (first * second)
+        n, forces = stacked[: len(first)], stacked[len(first) :]
         n += of_coordinates @ q
         forces += self.stiffness[:, None] * q
         second *= n
@@ -157,12 +155,12 @@ class ReducedPlate:
 def reduced_plate(
     plate: PlateModel, contact: Floats, count: int, damping: float = 0.0
 ) -> ReducedPlate:
-    """Reduce a plate to the bending modes that a load, (numnp, 5), moves most; at most `count`.
+    """Reduce a plate to the `count` bending modes, at most, that a load (numnp, 5) moves most.
 
     Raises ReductionError if the plate is not held, or if its modes do not converge.
     """
     bending = bending_modes(plate, contact, count)
-    plane = _in_plane(plate)
+    plane = _free_in_plane(plate)
     pairs = _integrated(plate, plane, bending.shapes)
     cubic, quartic = pairs.cubic, pairs.quartic
     stiffness, deflection = [bending.stiffness], [bending.deflection]
@@ -202,8 +200,8 @@ def reduced_plate(
 def bending_modes(plate: PlateModel, contact: Floats, count: int) -> ReducedModes:
     """Compute the modes with the largest shares in the displacement under a load, (numnp, 5).
 
-    The masses are lumped; those of u and v are left out, so that these follow statically.  Raises
-    ReductionError if the plate is not held.
+    The masses are lumped.  The masses of u and v are left out, so that u and v follow statically.
+    Raises ReductionError if the plate is not held.
     """
     free = plate.mesh.equations > 0
     mass = plate.field(plate.mass, 0.0)
@@ -224,14 +222,13 @@ def _moved_modes(
     stiffest: float = np.inf,
     rigid: Floats | None = None,
 ) -> ReducedModes:
-    """Modes with the largest shares in the displacement under a load, (neq,); at most `count`.
+    """Find up to `count` modes with the largest shares in the displacement under a load, (neq,).
 
-    Those with less than the share `least`, and those with a square of the angular frequency beyond
-    `stiffest`, are left out.  `rigid` (motions, neq) are motions without strain, on which the load
-    does no work.
+    Modes whose share is below `least`, or whose squared angular frequency exceeds `stiffest`, are
+    left out.  `rigid` (motions, neq) are motions without strain, on which the load does no work.
 
     Lanczos iteration with K^-1 M, starting from the static displacement, finds the modes in the
-    order of their shares, and of modes of equal frequency the one that moves.
+    order of their shares.  Among modes of equal frequency it finds the mode that the load moves.
     """
     static = tangent.solve(load)
     compliance = float(load @ static)
@@ -239,67 +236,88 @@ def _moved_modes(
     fixed = np.empty((0, len(mass)))
     if rigid is not None:
         fixed = np.linalg.qr((rigid * roots).T)[0].T / roots
-    few = len(fixed)
-    most = min(VECTORS_PER_MODE * count + MORE_VECTORS, int(np.count_nonzero(mass)) - few)
-    basis = np.concatenate([fixed, np.empty((most, len(mass)))])
-    inverse = np.zeros((most, most))  # K^-1 M in the basis
-    vector, _ = _made_orthogonal(static, fixed, mass)
+    rigid_count = len(fixed)
+    largest_size = min(
+        VECTORS_PER_MODE * count + MORE_VECTORS, int(np.count_nonzero(mass)) - rigid_count
+    )
+    basis = np.concatenate([fixed, np.empty((largest_size, len(mass)))])
+    inverse = np.zeros((largest_size, largest_size))  # K^-1 M in the basis
+    vector, _ = _orthogonalised(static, fixed, mass)
     before = np.empty(0)
-    for size in range(1, most + 1):
-        last, own = few + size - 1, basis[few : few + size]
+    for size in range(1, largest_size + 1):
+        last, krylov = rigid_count + size - 1, basis[rigid_count : rigid_count + size]
         basis[last] = vector / _norm(vector, mass)
         vector = tangent.solve(mass * basis[last])
-        whole = _norm(vector, mass)
-        vector, parts = _made_orthogonal(vector, basis[: last + 1], mass)
-        inverse[:size, size - 1] = parts[few:]
-        left = _norm(vector, mass)
-        exhausted = left <= EXHAUSTED * whole
-        if not exhausted and size < most and (size < count or size % LOOK):
+        norm_before = _norm(vector, mass)
+        vector, parts = _orthogonalised(vector, basis[: last + 1], mass)
+        inverse[:size, size - 1] = parts[rigid_count:]
+        norm_left = _norm(vector, mass)
+        is_exhausted = norm_left <= EXHAUSTED * norm_before
+        if not is_exhausted and size < largest_size and (size < count or size % LOOK):
             continue
-        values, vectors = _moved(inverse[:size, :size], own @ load)
-        moved = vectors.T @ (own @ load)
-        shares = moved**2 * values
-        error = left * np.abs(vectors[-1])
-        unknown = (error > CONVERGED * values) & (shares > UNMOVED * compliance)
-        known = int(unknown.argmax()) if unknown.any() else len(values)
-        shares[known:] = 0.0
+        values, vectors = _moved_eigenvectors(inverse[:size, :size], krylov @ load)
+        deflections = vectors.T @ (krylov @ load)
+        shares = deflections**2 * values
+        error = norm_left * np.abs(vectors[-1])
+        is_unconverged = (error > CONVERGED * values) & (shares > UNMOVED * compliance)
+        converged = int(is_unconverged.argmax()) if is_unconverged.any() else len(values)
+        shares[converged:] = 0.0
         shares[values * stiffest < 1.0] = 0.0
         order = np.argsort(-shares, kind="stable")[:count]
         order = order[shares[order] > least * compliance]
-        # Modes beyond the known frequencies: their shares are less than those of the chosen ones,
-        # together or if none moves more than a known one; or they are too stiff.
-        full = len(order) == count
-        together = compliance - shares.sum() <= (shares[order[-1]] if full else least * compliance)
-        alone = full and (moved[:known] ** 2).max() * values[known - 1] <= shares[order[-1]]
-        stiff = known < len(values) and (values[known] + error[known]) * stiffest < 1.0
-        same = len(before) == len(order) and np.allclose(before, values[order], CONVERGED, 0.0)
-        if exhausted or together or (same and (alone or stiff)):
-            signs = np.where(moved[order] < 0.0, -1.0, 1.0)
-            shapes = (signs * vectors[:, order]).T @ own
-            return ReducedModes(1.0 / values[order], shapes.T, np.abs(moved[order]), compliance)
+        # Modes beyond the converged ones can be ignored if all their shares together are smaller
+        # than the selected shares, if each is smaller (assuming that none moves more than a
+        # converged mode), or if they are too stiff.
+        is_full = len(order) == count
+        rest_is_small = compliance - shares.sum() <= (
+            shares[order[-1]] if is_full else least * compliance
+        )
+        others_are_smaller = (
+            is_full
+            and (deflections[:converged] ** 2).max() * values[converged - 1] <= shares[order[-1]]
+        )
+        others_are_stiffer = (
+            converged < len(values) and (values[converged] + error[converged]) * stiffest < 1.0
+        )
+        is_unchanged = len(before) == len(order) and np.allclose(
+            before, values[order], CONVERGED, 0.0
+        )
+        if (
+            is_exhausted
+            or rest_is_small
+            or (is_unchanged and (others_are_smaller or others_are_stiffer))
+        ):
+            signs = np.where(deflections[order] < 0.0, -1.0, 1.0)
+            shapes = (signs * vectors[:, order]).T @ krylov
+            return ReducedModes(
+                1.0 / values[order], shapes.T, np.abs(deflections[order]), compliance
+            )
         before = values[order]
     raise ReductionError(f"{count} modes did not converge; take fewer")
 
 
-def _moved(inverse: Floats, load: Floats) -> tuple[Floats, Floats]:
-    """Eigenvalues and vectors of K^-1 M in the basis, by ascending frequency.
+def _moved_eigenvectors(inverse: Floats, load: Floats) -> tuple[Floats, Floats]:
+    """Return eigenvalues and eigenvectors of K^-1 M in the basis, by ascending frequency.
 
-    Of modes of equal frequency only that which moves under the load, whose parts along the basis
-    are given, is left: rounding adds the others to the Krylov space.
+    `load` are the parts of the load along the basis.  Among modes of equal frequency only the mode
+    that the load moves is kept; rounding adds the other modes to the Krylov space.
     """
     values, vectors = np.linalg.eigh(inverse, UPLO="U")
     values, vectors = values[::-1], vectors[:, ::-1]
-    moved = vectors.T @ load
+    deflections = vectors.T @ load
     starts = np.flatnonzero(np.append(True, values[1:] < (1.0 - EQUAL) * values[:-1]))
-    combined = np.add.reduceat(moved * vectors, starts, axis=1)
-    size = np.sqrt(np.add.reduceat(moved**2, starts))
+    combined = np.add.reduceat(deflections * vectors, starts, axis=1)
+    size = np.sqrt(np.add.reduceat(deflections**2, starts))
     return values[starts], combined / np.where(size > 0.0, size, 1.0)
 
 
-def _made_orthogonal(vector: Floats, basis: Floats, mass: Floats) -> tuple[Floats, Floats]:
-    """Vector without its parts along an orthonormal basis (size, neq), and these parts, (size,)."""
+def _orthogonalised(vector: Floats, basis: Floats, mass: Floats) -> tuple[Floats, Floats]:
+    """Remove the parts of a vector along an orthonormal basis (size, neq).
+
+    Returns the remaining vector and the removed parts, (size,).
+    """
     total = np.zeros(len(basis))
-    for _ in range(2):  # Gram and Schmidt, twice for orthogonality to rounding
+    for _ in range(2):  # Gram-Schmidt, twice for orthogonality to rounding
         parts = basis @ (mass * vector)
         vector = vector - parts @ basis
         total += parts
@@ -314,29 +332,29 @@ def _norm(vector: Floats, mass: Floats) -> float:
 
 
 class Pairs(NamedTuple):
-    """Quadratic strains of the pairs of bending modes, integrated."""
+    """Integrals of the quadratic strains of the pairs of bending modes."""
 
     cubic: Floats  # (m, pairs): int N_i eps_q
     quartic: Floats  # (pairs, pairs): int eps_q A eps_q, u and v held
     loads: Floats  # (neq of the membrane, pairs): r
 
 
-def _in_plane(plate: PlateModel) -> PlateModel:
-    """The plate with only u and v free."""
+def _free_in_plane(plate: PlateModel) -> PlateModel:
+    """Return the plate with only u and v free."""
     codes = plate.mesh.codes.copy()
     codes[:, 2:] = 1
     return with_codes(plate, codes)
 
 
 def bytes_of_pairs(plate: PlateModel, neq: int, modes: int) -> int:
-    """Memory of the pairs: their loads and solutions, and the strains of some elements."""
+    """Estimate the memory of the pairs: loads, solutions, and the strains of a block."""
     count = modes * (modes + 1) // 2
     elements = min(BLOCK, max(len(family.rows) for family in plate.families))
     return 8 * count * (3 * neq + 4 * elements * 3 * len(plate.rules.bending.xi))
 
 
 def _integrated(plate: PlateModel, plane: PlateModel, shapes: Floats) -> Pairs:
-    """Integrals over the pairs of modes, (neq, m)."""
+    """Integrate the quadratic strains over all pairs of the modes, (neq, m)."""
     from scipy import sparse  # 0.16 s, which most runs don't need
 
     modes = shapes.shape[1]
@@ -349,59 +367,59 @@ def _integrated(plate: PlateModel, plane: PlateModel, shapes: Floats) -> Pairs:
         laminate = plate.laminate_of(family)
         for block in family.blocks(BLOCK):
             strains = _pair_strains(plate, block, fields[block.nodes, 2])
-            at = interpolate(block, plate.rules.bending)
-            linear = membrane_and_bending(at, plate.curvature)  # (ne, points, 6, 5 nodes)
+            basis = interpolate(block, plate.rules.bending)
+            linear = membrane_and_bending(basis, plate.curvature)  # (ne, points, 6, 5 nodes)
             ne, nodes = block.nodes.shape
-            weight = at.jxw[:, :, None, None]
+            weight = basis.jxw[:, :, None, None]
             stresses = _rows(weight * (laminate.A @ strains))
             quartic += _rows(strains).T @ stresses
             if laminate.is_coupled or plate.is_curved:
                 AB = np.hstack([laminate.A, laminate.B])
-                own = fields[block.nodes].reshape(ne, 1, nodes * NDOF, modes)
-                cubic += _rows(weight * (AB @ (linear @ own))).T @ _rows(strains)
+                mode_values = fields[block.nodes].reshape(ne, 1, nodes * NDOF, modes)
+                cubic += _rows(weight * (AB @ (linear @ mode_values))).T @ _rows(strains)
             B = linear.reshape(ne, -1, 6, nodes, NDOF)[:, :, :3, :, :2].reshape(ne, -1, 2 * nodes)
             forces = B.transpose(0, 2, 1) @ stresses.reshape(ne, -1, count)
             numbers = plane.mesh.equations[block.nodes][:, :, :2].ravel()
-            held = np.flatnonzero(numbers > 0)
-            places = (numbers[held] - 1, held)
-            sums = sparse.csr_array((np.ones(len(held)), places), (plane.neq, len(numbers)))
+            moving = np.flatnonzero(numbers > 0)
+            places = (numbers[moving] - 1, moving)
+            sums = sparse.csr_array((np.ones(len(moving)), places), (plane.neq, len(numbers)))
             loads += sums @ _rows(forces)
     return Pairs(cubic, quartic, loads)
 
 
 def _rows(values: Floats) -> Floats:
-    """All axes but the last in one."""
+    """Merge all axes but the last."""
     return values.reshape(-1, values.shape[-1])
 
 
 def _pair_strains(plate: PlateModel, block: ElementBlock, w: Floats) -> Floats:
-    """eps_q(i, j) of the pairs of deflections w (ne, nodes, m): (ne, points, 3, pairs).
+    """Return eps_q(i, j), (ne, points, 3, pairs), of deflections w (ne, nodes, m).
 
-    Their sum over all pairs, each times q_i q_j, is eps_q of the sum of q_i w_i.
+    The sum of q_i q_j eps_q(i, j) over all pairs is eps_q of the sum of q_i w_i.
     """
     tied = QuadraticStrains(block, plate.rules.bending)
-    slopes = [tied.slopes(own) for own in w.transpose(2, 1, 0)]
-    one, two = (np.stack(along, axis=1) for along in zip(*slopes, strict=True))  # (10, m, ne)
+    slopes = [tied.slopes(mode_w) for mode_w in w.transpose(2, 1, 0)]
+    w_1, w_2 = (np.stack(along, axis=1) for along in zip(*slopes, strict=True))  # (10, m, ne)
     i, j = np.triu_indices(w.shape[2])
-    times = np.where(i == j, 0.5, 1.0)[:, None]
-    both = one[TYING:, i] * two[TYING:, j] + two[TYING:, i] * one[TYING:, j]
+    factor = np.where(i == j, 0.5, 1.0)[:, None]
+    mixed = w_1[TYING:, i] * w_2[TYING:, j] + w_2[TYING:, i] * w_1[TYING:, j]
     tied_components = (
-        times * one[:TYING, i] * one[:TYING, j],
-        times * two[:TYING, i] * two[:TYING, j],
-        times * both,
+        factor * w_1[:TYING, i] * w_1[:TYING, j],
+        factor * w_2[:TYING, i] * w_2[:TYING, j],
+        factor * mixed,
     )
     return np.ascontiguousarray(tied.at_points(tied_components).transpose(3, 1, 0, 2))
 
 
-# Cases of every matrix product: no case depends on the others, and the products fit the cache.
+# Cases per matrix product.  No case depends on other cases, and the products fit the cache.
 TILE = 32
-# Evaluations of the law in a trial, at most, and the error of its indentation.
+# Largest number of evaluations of the law in a trial, and the relative error of the indentation.
 EVALUATIONS = 40
 TOLERANCE = 1e-9
 
 
 class ReducedMotion:
-    """Motion of a reduced plate from rest in a number of cases, with one time step."""
+    """Motion of a reduced plate from rest, in many cases with one time step."""
 
     def __init__(self, plate: ReducedPlate, dt: float, cases: int) -> None:
         self.plate, self.dt, self._cases = plate, dt, cases
@@ -412,7 +430,7 @@ class ReducedMotion:
         self._inertia = dt * dt * np.sinc(phase / (2.0 * np.pi)) ** 2  # dt^2 psi
         self._of_velocity = 1.0 / np.sinc(phase / np.pi)
         self._damping = 0.5 * plate.damping * self._inertia / dt
-        self._damped = np.zeros((shape[0], TILE))  # what it has taken, up to half a step
+        self._damped = np.zeros((shape[0], TILE))  # energy lost by damping up to half a step ago
 
     def advance(self, force: Floats) -> Floats:
         """Take a step under the contact forces at its start, (cases,).
@@ -429,22 +447,22 @@ class ReducedMotion:
         return np.asarray(moved.ravel()[: self._cases])
 
     def energy(self, force: Floats) -> Floats:
-        """Energy after the last step, under the forces there, with what the damping has taken.
+        """Return the energy after the last step, (cases,), under the contact forces then.
 
-        Kinetic and strain energy, (cases,).
+        It is kinetic plus strain energy, plus the energy lost by damping.
         """
         square = self._square_of_velocity(self._next_increment(force))
         strain = np.array([self.plate.strain_energy(q) for q in self._q])
         damped = self._damped + 0.5 * self.plate.damping * self.dt * square
         return np.asarray((0.5 * square + strain + damped).ravel()[: self._cases])
 
-    def _square_of_velocity(self, other: Floats) -> Floats:
-        """Sum of the squares of the velocities between the last increments and others."""
-        velocity = self._of_velocity * (self._increment + other) / (2.0 * self.dt)
+    def _square_of_velocity(self, increment: Floats) -> Floats:
+        """Return the sum of squared velocities between the last increments and other increments."""
+        velocity = self._of_velocity * (self._increment + increment) / (2.0 * self.dt)
         return np.asarray((velocity * velocity).sum(axis=1))
 
     def _next_increment(self, force: Floats) -> Floats:
-        """Increments of the coordinates in the next step."""
+        """Return the increments of the coordinates in the next step."""
         self._force.reshape(-1)[: self._cases] = force
         pull = self.plate.deflection[:, None] * self._force - self._internal
         b = self._damping
@@ -454,69 +472,74 @@ class ReducedMotion:
 class SeriesLaw(NamedTuple):
     """A contact law in series with a linear spring, for many cases: the approach is a + F(a)/k_r.
 
-    The spring is what the modes left out of a reduced plate yield under the present force, so that
-    the contact iteration takes the approach for the indentation.  As a part of the plate's
-    displacement in that iteration it would not converge where the contact is stiffer than k_r.
+    The spring is the flexibility of the modes that a reduced plate leaves out.  The contact
+    iteration takes the approach for the indentation.  If the spring were a part of the plate's
+    displacement instead, the iteration would not converge where the contact is stiffer than k_r.
     """
 
-    law: Law[Floats]  # whose trials leave its memory as it is
+    law: Law[Floats]  # a law whose trials do not change its memory
     flexibility: float  # 1/k_r, length/force
 
     def start(self) -> Any:
-        """Memory before the first contact."""
+        """Return the memory before the first contact."""
         return self.law.start()
 
     def of_law(self, point: ContactPoint[Floats]) -> ContactPoint[Floats]:
-        """The law's own indentation at a point whose indentation is the approach."""
+        """Return the point of the law, given a point with the approach as indentation."""
         return ContactPoint(point.indentation - self.flexibility * point.force, point.force)
 
     def trial(
         self, memory: Any, last: ContactPoint[Floats], indentation: Floats
     ) -> tuple[Floats, Any]:
-        """Contact force at a trial approach."""
-        return self._solved(memory, last, indentation).force, memory
+        """Return the contact force at a trial approach, and the unchanged memory."""
+        return self._solve(memory, last, indentation).force, memory
 
     def accept(self, memory: Any, last: ContactPoint[Floats], indentation: Floats) -> Any:
-        """Memory after a step that ends at an approach."""
-        own = self._solved(memory, last, indentation).indentation
-        return self.law.accept(memory, self.of_law(last), own)
+        """Return the memory after a step that ends at an approach."""
+        law_indentation = self._solve(memory, last, indentation).indentation
+        return self.law.accept(memory, self.of_law(last), law_indentation)
 
     def permanent(self, memory: Any, last: ContactPoint[Floats]) -> Floats:
-        """Permanent indentation after unloading from the last point (length)."""
+        """Return the permanent indentation after unloading from the last point (length)."""
         return self.law.permanent(memory, self.of_law(last))
 
-    def _solved(
+    def _solve(
         self, memory: Any, last: ContactPoint[Floats], approach: Floats
     ) -> ContactPoint[Floats]:
-        """The law's own indentation at an approach, and its force.
+        """Find the law's indentation and force at an approach.
 
         The excess e = a + F(a)/k_r - approach grows with a.  Its zero lies between the last
-        indentation and that moved as far as the approach, and there beyond a - e of each a:
-        secants between ends on both sides of it, of which the one that stays is weighed less (N.
-        Anderson and A. Bjorck, BIT 13, 1973, 253).
+        indentation and the last indentation moved as far as the approach; it also lies beyond
+        a - e of each a.  The method takes secants between ends on both sides of the zero, and
+        reduces the weight of an end that stays (N. Anderson and A. Bjorck, BIT 13, 1973, 253).
         """
-        own = self.of_law(last)
+        last_point = self.of_law(last)
 
-        def tried(a: Floats) -> tuple[Floats, Floats]:
-            force, _ = self.law.trial(memory, own, a)
+        def evaluate(a: Floats) -> tuple[Floats, Floats]:
+            force, _ = self.law.trial(memory, last_point, a)
             return a + self.flexibility * force - approach, force
 
-        other = approach - self.flexibility * last.force
-        beyond, _ = tried(other)
-        low, high = np.minimum(own.indentation, other), np.maximum(own.indentation, other)
-        a = np.clip(other - beyond, low, high)
-        excess, force = tried(a)
+        far_end = approach - self.flexibility * last.force
+        far_excess, _ = evaluate(far_end)
+        low, high = (
+            np.minimum(last_point.indentation, far_end),
+            np.maximum(last_point.indentation, far_end),
+        )
+        a = np.clip(far_end - far_excess, low, high)
+        excess, force = evaluate(a)
         for _ in range(EVALUATIONS):
             solved = np.abs(excess) <= TOLERANCE * np.abs(approach)
             if solved.all():
                 break
-            width = np.where(solved, 1.0, excess - beyond)
-            secant = np.where(solved, a, a - excess * (a - other) / width)
-            before, at = excess, a
+            width = np.where(solved, 1.0, excess - far_excess)
+            secant = np.where(solved, a, a - excess * (a - far_end) / width)
+            excess_before, a_before = excess, a
             a = secant
-            excess, force = tried(a)
-            between = excess * before <= 0.0
-            rest = 1.0 - excess / np.where(solved, 1.0, before)
-            beyond = np.where(between, before, beyond * np.where(rest > 0.0, rest, 0.5))
-            other = np.where(between, at, other)
+            excess, force = evaluate(a)
+            changes_sign = excess * excess_before <= 0.0
+            weight = 1.0 - excess / np.where(solved, 1.0, excess_before)
+            far_excess = np.where(
+                changes_sign, excess_before, far_excess * np.where(weight > 0.0, weight, 0.5)
+            )
+            far_end = np.where(changes_sign, a_before, far_end)
         return ContactPoint(a, force)

@@ -1,6 +1,6 @@
-"""A projectile in its natural modes, and one implicit step of each.
+"""A projectile in its natural modes, and one implicit step of each mode.
 
-The first mode is the rigid motion, whose displacement is left to the tip.
+The first mode is the rigid motion.  Its displacement is stored as the displacement of the tip.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ EQUAL = 1e-10
 
 
 class ProjectileModes(NamedTuple):
-    """Natural modes of a projectile, of unit modal mass; the first is its rigid motion."""
+    """Natural modes of a projectile, of unit modal mass.  The first is the rigid motion."""
 
     shapes: Floats  # (n, modes)
     stiffness: Floats  # (modes,): square of the angular frequency; 0 for the rigid motion
@@ -25,22 +25,25 @@ class ProjectileModes(NamedTuple):
 
     @classmethod
     def of(cls, K: Floats, m: Floats, rigid: Floats | None = None) -> ProjectileModes:
-        """Modes of a free projectile.
+        """Compute the modes of a free projectile.
 
-        `rigid` has the dofs of a unit rigid displacement, (n,), by default those of a rod.
+        `rigid` contains the dofs of a unit rigid displacement, (n,); a rod's by default.
         """
         M = np.diag(m) if m.ndim == 1 else m
         inverse = np.linalg.inv(np.linalg.cholesky(M))
         values, vectors = np.linalg.eigh(inverse @ K @ inverse.T)
-        # One Newton step in extended precision: the errors of a low mode are relative to the
-        # largest frequency (T. Ogita and K. Aishima, Iterative refinement for symmetric
-        # eigenvalue decomposition, 2018).  Modes of equal frequency are only made orthogonal.
+        # Refine by one Newton step in extended precision, because the errors of a low mode are
+        # relative to the largest frequency (T. Ogita and K. Aishima, Iterative refinement for
+        # symmetric eigenvalue decomposition, 2018).  Modes of equal frequency are only made
+        # orthogonal.
         V = (inverse.T @ vectors).astype(np.longdouble)
         overlap, S = np.eye(len(m)) - V.T @ M @ V, V.T @ K @ V
         exact = np.diagonal(S) / (1.0 - np.diagonal(overlap))
         gap = exact - exact[:, None]
-        far = abs(gap) > EQUAL * values[-1]
-        change = np.where(far, S + overlap * exact, overlap) / np.where(far, gap, 2.0)
+        is_separate = abs(gap) > EQUAL * values[-1]
+        change = np.where(is_separate, S + overlap * exact, overlap) / np.where(
+            is_separate, gap, 2.0
+        )
         shapes, values = (V + V @ change).astype(float), exact.astype(float)
         rigid = rigid_dofs(len(m)) if rigid is None else rigid
         shapes[:, 0] = rigid / np.sqrt(rigid @ M @ rigid)
@@ -48,36 +51,39 @@ class ProjectileModes(NamedTuple):
         return cls(shapes, values, M @ shapes)
 
     def motion(self, state: RodState) -> Floats:
-        """Motion of the modes, (3, modes), without the rigid displacement."""
+        """Return the motion of the modes, (3, modes), without the rigid displacement."""
         y = np.stack([state.deformation, state.velocity, state.acceleration])
         rigid = y @ self.weights[:, 0]
-        # Without it, its rounding does not reach the other modes.
+        # Subtract the rigid motion first, so that its rounding does not reach the other modes.
         modal = (y - rigid[:, None] * self.shapes[:, 0]) @ self.weights
         modal[:, 0] = rigid
         modal[0, 0] = 0.0
         return np.ascontiguousarray(modal)
 
     def state(self, motion: Floats, tip: float, moved: float) -> RodState:
-        """State with a motion of the modes and a displacement of the tip; `moved` in the step."""
+        """Return the state from the motion of the modes and the displacement of the tip.
+
+        `moved` is the displacement of the tip in the last step.
+        """
         y = motion @ self.shapes.T
         y[0] -= y[0, 0] * (self.shapes[:, 0] / self.shapes[0, 0])
         y[0, 0] = moved
         return RodState(y, tip)
 
     def step(self, integrator: RodIntegrator) -> tuple[Floats, Floats]:
-        """Matrices (9, modes) and motion per tip force (3, modes) of a step, as an integrator's."""
+        """Return T (9, modes) and h (3, modes) of a step; see :class:`RodIntegrator`."""
         theta, r, dt = integrator.theta, integrator.inverse_beta, integrator.dt
         a0, a2 = r / (theta * dt) ** 2, r / (theta * dt)
         a4 = a0 / theta
         effective = 1.0 / (self.stiffness + a0)
-        one, none = np.ones_like(effective), np.zeros_like(effective)
+        ones, zeros = np.ones_like(effective), np.zeros_like(effective)
         of_displacement = -a4 * effective * self.stiffness
         of_velocity = a4 * a2 * effective - a2 / theta
         of_acceleration = (r / 2.0 - 1.0) * a4 * effective + 1.0 - r / 2.0 / theta
         acceleration = np.stack([of_displacement, of_velocity, of_acceleration])
         gain = a4 * effective * self.shapes[0]
         before, after = integrator.weights
-        velocity = np.stack([none, one, dt / 2.0 * one]) + dt / 2.0 * acceleration
-        moved = np.stack([one, dt * one, before * one]) + after * acceleration
+        velocity = np.stack([zeros, ones, dt / 2.0 * ones]) + dt / 2.0 * acceleration
+        moved = np.stack([ones, dt * ones, before * ones]) + after * acceleration
         T = np.concatenate([moved, velocity, acceleration])
         return T, np.stack([after * gain, dt / 2.0 * gain, gain])

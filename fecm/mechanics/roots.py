@@ -1,4 +1,4 @@
-"""Roots of functions of one number, without SciPy's, whose import takes 0.2 s."""
+"""Roots of functions of one number.  Importing SciPy for this would take 0.2 s."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from collections.abc import Callable
 
 
 def root(function: Callable[[float], float], low: float, high: float, tolerance: float) -> float:
-    """Root of a continuous function between two places where its signs differ.
+    """Find the root of a continuous function between two places where its signs differ.
 
-    False position with the rule of Illinois: the value at an end that does not move is halved, so
-    that both ends come near the root, faster than linearly.
+    The method is false position with the Illinois rule: the value at an end that does not move is
+    halved.  Both ends then approach the root, faster than linearly.
 
     Parameters
     ----------
     function : callable
-        Number at a place.
+        Function of one number.
     low, high : float
         Ends of the interval.
     tolerance : float
-        Length of the last interval.
+        Length of the interval at which the search stops.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Solutions with the sparse matrices: static ones, support reactions, natural modes, buckling."""
+"""Static solutions, support reactions, natural modes and buckling with sparse matrices."""
 
 from __future__ import annotations
 
@@ -23,19 +23,19 @@ if TYPE_CHECKING:
     from scipy.sparse.linalg import SuperLU
 
 
-# Residual relative to the load above which the stiffness is considered singular.
+# The stiffness is considered singular if the residual relative to the load is larger.
 SINGULAR = 1.0e-6
-# Rounding error of the forces in balance, relative to the sum of their parts.
+# Rounding error of balanced forces, relative to the sum of their parts.
 ROUNDING = 1.0e-12
-# Modes of fewer equations are those of a dense problem.
+# Eigenvalue problems with fewer equations are solved with dense matrices.
 DENSE = 60
-# Shift of the spectrum relative to the largest eigenvalue, about half the digits of a double, which
+# Shift of the spectrum relative to the largest eigenvalue, about half the digits of a double.  It
 # makes the matrix of a plate without supports regular.
 SHIFT = 1.0e-9
-# Bytes of the factors of n equations without coupling, over n log2 n: an upper bound of what was
-# measured.
+# Bytes of the factors of n equations without coupling, over n log2 n: an upper bound of measured
+# sizes.
 FACTORS = 300
-# Eigenvalue of the supported rigid motions, relative to the largest, below which one is free.
+# A rigid motion is free if its eigenvalue, relative to the largest, is smaller.
 NOT_HELD = 1.0e-9
 
 
@@ -50,19 +50,19 @@ class ConvergenceError(FecmError, ArithmeticError):
 
 
 def tangent_stiffness(plate: PlateModel, field: Floats | None) -> sparse.csr_array:
-    """Stiffness about a displacement field, (numnp, 5), sparse (neq, neq); K at rest without one.
+    """Return the stiffness about a displacement field, (numnp, 5), sparse (neq, neq).
 
-    That of a linear plate is K everywhere.
+    The stiffness of a linear plate, and at rest (`field` is None), is K.
     """
     if field is None or not plate.nonlinear:
         return plate.stiffness
-    at = field
-    added = plate.assembled(lambda block: tangent(plate, block, at), congruent=False)
+    current = field
+    added = plate.assembled(lambda block: tangent(plate, block, current), congruent=False)
     return (plate.stiffness + added[:, : plate.neq]).tocsr()
 
 
 def _in_plane_motions(plate: PlateModel) -> Floats:
-    """Translations and rotation in the plane: u and v of the nodes, (numnp, 2, 3)."""
+    """Return translations and rotation in the plane: u and v of the nodes, (numnp, 2, 3)."""
     coordinates = plate.mesh.coordinates
     x, y = ((coordinates - coordinates.mean(axis=0)) / np.ptp(coordinates, axis=0).max()).T
     motions = np.zeros((len(coordinates), 2, 3))
@@ -72,10 +72,10 @@ def _in_plane_motions(plate: PlateModel) -> Floats:
 
 
 def rigid_in_plane(plate: PlateModel) -> Floats:
-    """Rigid motions in the plane that the supports leave free, (motions, neq)."""
+    """Return the rigid motions in the plane that supports leave free, (motions, neq)."""
     motions = _in_plane_motions(plate)
-    held = motions[plate.mesh.equations[:, :2] == 0]
-    values, vectors = np.linalg.eigh(held.T @ held)
+    restrained = motions[plate.mesh.equations[:, :2] == 0]
+    values, vectors = np.linalg.eigh(restrained.T @ restrained)
     fields = np.zeros((*plate.mesh.equations.shape, 3))
     fields[:, :2] = motions @ vectors
     free = values <= NOT_HELD * values[-1]
@@ -83,15 +83,15 @@ def rigid_in_plane(plate: PlateModel) -> Floats:
 
 
 def in_plane_pins(plate: PlateModel) -> list[int]:
-    """Equations, from 0, of as few dofs u and v as hold the plate in its plane.
+    """Return the equations, from 0, of the fewest dofs u and v that hold the plate in its plane.
 
-    Empty where its supports hold it.  A load without resultants in the plane has no reaction at the
-    pins: they choose the rigid motion, and change no strain.
+    The list is empty if the supports hold the plate.  A load without resultants in the plane causes
+    no reaction at the pins: they select the rigid motion and change no strain.
     """
     equations = plate.mesh.equations[:, :2]
     motions = _in_plane_motions(plate)
-    held = motions[equations == 0]
-    gram = held.T @ held
+    restrained = motions[equations == 0]
+    gram = restrained.T @ restrained
     pins: list[int] = []
     while True:
         values, vectors = np.linalg.eigh(gram)
@@ -104,13 +104,16 @@ def in_plane_pins(plate: PlateModel) -> list[int]:
 
 
 def factorised(matrix: sparse.csr_array) -> SuperLU:
-    """LU factors of a symmetric matrix; raises SingularStiffnessError if there are none."""
+    """Compute the LU factors of a symmetric matrix.
+
+    Raises SingularStiffnessError if the matrix is singular.
+    """
     from scipy.sparse.linalg import MatrixRankWarning, splu
 
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", MatrixRankWarning)
-            # K is positive definite; pivoting only costs fill, a factor of 40 on a plate of
+            # K is positive definite.  Pivoting would only cost fill: a factor of 40 on a plate of
             # 30 x 30 elements.
             return splu(
                 matrix.tocsc(),
@@ -123,50 +126,52 @@ def factorised(matrix: sparse.csr_array) -> SuperLU:
 
 
 class Tangent:
-    """The factorised stiffness about a field; raises SingularStiffnessError if that fails.
+    """Factorised stiffness about a field.
 
-    Rigid motions in the plane are pinned, so that they need no supports.
+    Rigid motions in the plane are pinned, so that they need no supports.  Raises
+    SingularStiffnessError if the stiffness is singular.
     """
 
     def __init__(self, plate: PlateModel, field: Floats | None = None) -> None:
         from scipy.sparse import diags_array  # 0.2 s, which most runs don't need
 
-        self._stiffness = held = tangent_stiffness(plate, field)
+        self._stiffness = pinned = tangent_stiffness(plate, field)
         self.pins = in_plane_pins(plate)  # equations, from 0, that hold the plate in its plane
         if self.pins:
             springs = np.zeros(plate.neq)
-            springs[self.pins] = held.diagonal()[self.pins]
-            held = held + diags_array(springs, format="csr")
-        self._factors = factorised(held)
+            springs[self.pins] = pinned.diagonal()[self.pins]
+            pinned = pinned + diags_array(springs, format="csr")
+        self._factors = factorised(pinned)
 
     def solve(self, residual: Floats, displacement: Floats | None = None) -> Floats:
-        """Displacement under a load, (neq,); SingularStiffnessError if they do not balance.
+        """Return the displacement under a load, (neq,).
 
-        With a present displacement the residual may be its forces' rounding error, which does not
-        balance.
+        Raises SingularStiffnessError if the internal forces do not balance the load.  Close to
+        equilibrium the load may be the rounding error of the forces of `displacement`, which need
+        not be balanced.
         """
         change = self._factors.solve(residual)
-        left = np.abs(self._stiffness @ change - residual).max()
+        imbalance = np.abs(self._stiffness @ change - residual).max()
         limit = SINGULAR * np.abs(residual).max()
         if displacement is not None:
             rounding = ROUNDING * (abs(self._stiffness) @ np.abs(displacement)).max()
             limit = max(limit, rounding)
-        if not left <= limit:
+        if not imbalance <= limit:
             raise SingularStiffnessError("the stiffness is singular")
         return np.asarray(change)
 
 
 def compliance(plate: PlateModel, load: Floats) -> float:
-    """Displacement under a load in its own direction, per unit of it.
+    """Return the displacement under a unit force in the direction of the force.
 
-    The load, (neq,), is that of a unit force.  Raises SingularStiffnessError for a plate that is
-    not held.
+    `load`, (neq,), are the nodal forces of the unit force.  Raises SingularStiffnessError for a
+    plate that is not held.
     """
     return float(load @ Tangent(plate).solve(load))
 
 
 def static_stiffness(plate: PlateModel, contact: Floats) -> float:
-    """Force per displacement under a load on the nodes (numnp, 5); NaN for a plate not held."""
+    """Return force per displacement under nodal loads (numnp, 5); NaN for a plate not held."""
     try:
         return 1.0 / compliance(plate, contact[plate.mesh.equations > 0])
     except SingularStiffnessError:
@@ -174,12 +179,12 @@ def static_stiffness(plate: PlateModel, contact: Floats) -> float:
 
 
 def static_support(plate: PlateModel, contact: Floats) -> tuple[float, float] | None:
-    """Stiffness under a static unit load on the nodes (numnp, 5), and how far its supports pull.
+    """Return the stiffness under a static unit load, (numnp, 5), and the pull of the supports.
 
-    The first is the force per displacement under the load, the second the sum of the forces that
-    hold the plate down.  Only nodes whose w is held and whose rotations are free count: a support
-    of this kind stands for a ring, a window or a knife edge, which can only push.  None for a plate
-    without such nodes, and for one that its supports do not hold.
+    The stiffness is the force per displacement under the load.  The pull is the sum of the forces
+    that hold the plate down.  Only nodes whose w is held and whose rotations are free count: such a
+    support stands for a ring, a window or a knife edge, which can only push.  Returns None for a
+    plate without such nodes, and for a plate that its supports do not hold.
     """
     free = plate.mesh.equations > 0
     rests = ~free[:, W] & free[:, W + 1 :].all(axis=1)
@@ -196,7 +201,10 @@ def static_support(plate: PlateModel, contact: Floats) -> tuple[float, float] | 
 
 
 def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:
-    """Internal minus applied forces, (numnp, 5): those of supports, and elsewhere the residual."""
+    """Return internal minus applied forces, (numnp, 5).
+
+    They are the forces of the supports at restrained dofs, and the residual elsewhere.
+    """
     internal = plate.internal_forces(field)
     if plate.nonlinear:
         internal += MembraneForces(plate).forces(field)[0]
@@ -208,14 +216,15 @@ def reactions(plate: PlateModel, field: Floats, factor: float) -> Floats:
 class Modes(NamedTuple):
     """The lowest modes of a plate, K x = omega^2 M x."""
 
-    angular_frequency: Floats  # (n,): ascending; rigid motions are 0 (1/time)
+    angular_frequency: Floats  # (n,): ascending, 1/time; 0 for rigid motions
     shapes: Floats  # (n, neq): unit modal mass; the largest entry is positive
 
 
 def modes(plate: PlateModel, count: int, *, consistent: bool, field: Floats | None = None) -> Modes:
-    """Compute the lowest modes, at most as many as equations, with the chosen mass matrix.
+    """Compute the lowest modes with the lumped or the consistent mass matrix.
 
-    Those of a nonlinear plate are small motions about a displacement field, (numnp, 5).
+    There are at most as many modes as equations.  The modes of a nonlinear plate are small motions
+    about a displacement field, (numnp, 5).
     """
     # 0.2 s, which most runs don't need.
     from scipy import linalg, sparse
@@ -236,33 +245,33 @@ def modes(plate: PlateModel, count: int, *, consistent: bool, field: Floats | No
     return Modes(np.sqrt(np.maximum(values, 0.0)), (vectors * np.sign(largest)).T)
 
 
-# Factors on the preload that are computed: from the least on, in strides, up to one that is far
-# away.
+# Factors on the preload are searched from LEAST to FAR; each try changes the shift by STRIDE.
 FAR = 64.0
 STRIDE = 4.0
 LEAST = 1.0e-9
 TOLERANCE = 1.0e-9  # relative error of a factor
-PRINCIPAL_FORCE_ROUNDING = 1.0e-9  # of a principal force, relative to the other one
+PRINCIPAL_FORCE_ROUNDING = 1.0e-9  # rounding of a principal force relative to the other one
 
 
 def buckling_factor(plate: PlateModel) -> float:
-    """Factor on the preload at which the plate buckles; infinite beyond FAR, NaN if unknown.
+    """Return the factor on the preload at which the plate buckles.
 
-    The smallest positive lambda of (K + lambda K_sigma) phi = 0 with the plate's supports: at 1 the
-    preload is the buckling load.  0 where the supports allow motion without strain.  A flat plate,
+    The factor is the smallest positive lambda of (K + lambda K_sigma) phi = 0 with the plate's
+    supports; at 1 the preload is the buckling load.  It is infinite beyond FAR, 0 where the
+    supports allow motion without strain, and NaN if the matrices are not finite.  A flat plate,
     whose laminate has B = 0, buckles without u and v.
 
-    Lanczos iteration for the largest mu of -K_sigma phi = mu (K + shift K_sigma) phi, which is
-    1/(lambda - shift).  Under tension in another direction other mu are large, negative, and keep
-    the iteration from the wanted one, unless the shift is near it.  K + lambda K_sigma is positive
-    definite below the smallest lambda, so that its factors bracket it: shift < lambda <= STRIDE
-    shift.  Raises NotEnoughMemoryError.
+    Lanczos iteration finds the largest mu of -K_sigma phi = mu (K + shift K_sigma) phi, which is
+    1/(lambda - shift).  Under tension in another direction, large negative values of mu keep the
+    iteration from the largest mu unless the shift is near lambda.  K + lambda K_sigma is positive
+    definite below the smallest lambda, so that trial factorisations bracket it:
+    shift < lambda <= STRIDE shift.  Raises NotEnoughMemoryError.
     """
     bending = _pinned(plate) if plate.is_curved else restrain_plane(plate)
     n = bending.neq
     if not plate.is_compressed or not n:
         return math.inf
-    # The factors, and a copy of which the pivots are taken.
+    # Memory of the factors, and of a copy from which the pivots are read.
     require_memory(int(2 * FACTORS * n * math.log2(n + 1)), "to find the buckling load")
     K = replace(bending, preload=UNLOADED).stiffness
     K_sigma = bending.assembled(
@@ -273,28 +282,28 @@ def buckling_factor(plate: PlateModel) -> float:
     if not K_sigma.nnz:  # w is held
         return math.inf
     if n < DENSE:
-        found = _dense_factor(K, K_sigma)
+        factor = _dense_factor(K, K_sigma)
     else:
-        found = _sparse_factor(K, K_sigma, FAR if _pulls(plate) else 0.0)
-    return math.inf if found > FAR else found
+        factor = _sparse_factor(K, K_sigma, FAR if _pulls(plate) else 0.0)
+    return math.inf if factor > FAR else factor
 
 
 def _pinned(plate: PlateModel) -> PlateModel:
-    """The plate without rigid motions in its plane."""
+    """Return the plate without rigid motions in its plane."""
     pins = np.array(in_plane_pins(plate), dtype=int) + 1
-    held = np.isin(plate.mesh.equations, pins)
-    return with_codes(plate, np.where(held, 1, plate.mesh.codes).astype(np.int32))
+    is_pinned = np.isin(plate.mesh.equations, pins)
+    return with_codes(plate, np.where(is_pinned, 1, plate.mesh.codes).astype(np.int32))
 
 
 def _pulls(plate: PlateModel) -> bool:
-    """Whether a principal value of the preload is positive, beyond rounding."""
+    """Return whether a principal value of the preload is positive beyond rounding."""
     n_x, n_y, n_xy = plate.preload
     least, largest = np.linalg.eigvalsh([[n_x, n_xy], [n_xy, n_y]])
     return bool(largest > PRINCIPAL_FORCE_ROUNDING * abs(least))
 
 
 def _dense_factor(K: sparse.csr_array, K_sigma: sparse.csr_array) -> float:
-    """Buckling factor by all eigenvalues of -K_sigma phi = phi K/lambda."""
+    """Compute the buckling factor from all eigenvalues of -K_sigma phi = phi K/lambda."""
     from scipy import linalg
 
     try:
@@ -305,7 +314,7 @@ def _dense_factor(K: sparse.csr_array, K_sigma: sparse.csr_array) -> float:
 
 
 def _sparse_factor(K: sparse.csr_array, K_sigma: sparse.csr_array, first: float) -> float:
-    """Buckling factor above a shift at which K + shift K_sigma is positive definite."""
+    """Compute the buckling factor above a shift at which K + shift K_sigma is positive definite."""
     from scipy.sparse.linalg import LinearOperator, eigsh
 
     shift = first
@@ -329,7 +338,7 @@ def _sparse_factor(K: sparse.csr_array, K_sigma: sparse.csr_array, first: float)
 
 
 def _factors_of_positive(matrix: sparse.csr_array) -> SuperLU | None:
-    """Factors of a symmetric matrix; None unless all pivots, on the diagonal, are positive."""
+    """Factorise a symmetric matrix; return None unless all diagonal pivots are positive."""
     try:
         factors = factorised(matrix)
     except SingularStiffnessError:

@@ -1,9 +1,9 @@
 """The product K u of stiffness and displacement, which dominates the cost of a time step.
 
-It is computed with scipy's CSR matrix, or element by element: congruent elements share one small
+It is computed with SciPy's CSR matrix, or element by element: congruent elements share one small
 matrix that stays in the cache, and the products run at the speed of BLAS.
 
-A vector q is padded to (q, 0), or to (q, -q, 0) where symmetry reverses the sign of some dofs; the
+A vector q is padded to (q, 0), or to (q, -q, 0) if symmetry reverses the sign of some dofs.  The
 zero is the value of every dof at rest.  The result is processed in pieces while they are in the
 cache.  The pieces and their order depend only on the plate, so that sums do not depend on the
 number of threads.
@@ -28,17 +28,17 @@ from fecm.mechanics.symmetry import SymmetryReduction, unreduced
 if TYPE_CHECKING:
     from scipy import sparse
 
-# The kernels where they are compiled, else NumPy; or always one of them, or the sparse matrix.
+# "auto" means the kernels if they are compiled, NumPy otherwise; "csr" is the sparse matrix.
 SOLVERS = AUTO, KERNELS, NUMPY, CSR = "auto", "kernels", "numpy", "csr"
 
-# Fraction of the critical time step used if the deck has no time step.
+# Fraction of the critical time step that is used if the deck has no time step.
 SAFE = 0.9
 
 T = TypeVar("T")
 
 
 class Workers:
-    """A pool of a number of threads that includes the caller's."""
+    """Pool of `count` threads, including the caller's thread."""
 
     def __init__(self, count: int = 1) -> None:
         self.count = count
@@ -49,25 +49,25 @@ class Workers:
             self._pool = ThreadPoolExecutor(count - 1)
 
     def map(self, function: Callable[[T], R], items: Sequence[T]) -> list[R]:
-        """Results of a function that releases the GIL; a thread takes consecutive items."""
+        """Apply a function that releases the GIL; each thread takes consecutive items."""
         if self._pool is None or len(items) < 2:
             return [function(item) for item in items]
         share = -(-len(items) // self.count)
         shares = [items[start : start + share] for start in range(0, len(items), share)]
-        others = [self._pool.submit(list, map(function, part)) for part in shares[1:]]
+        futures = [self._pool.submit(list, map(function, part)) for part in shares[1:]]
         results = [function(item) for item in shares[0]]
-        for other in others:
-            results += other.result()
+        for future in futures:
+            results += future.result()
         return results
 
 
-# Elements per matrix product: it fits the cache, and BLAS uses one thread.
+# Elements per matrix product: the product fits the cache, and BLAS uses one thread.
 BLOCK = 256
 # With fewer congruent elements, one matrix per element is as fast as a shared one.
 WORTH_GROUPING = 4
-# Nodal values per domain, which fit the cache.
+# Nodal values per domain: they fit the cache.
 BATCH = 65536
-# The number of domains of a large mesh is a multiple of this, for equal shares of the threads.
+# The number of domains of a large mesh is a multiple of this, so that threads get equal shares.
 SHARES = 4
 
 
@@ -91,15 +91,18 @@ Group = tuple[Floats, Indices]
 
 
 class _Domain:
-    """Some elements: gather, small matrix products, scatter."""
+    """Elements whose forces are computed by gather, small matrix products and scatter.
 
-    # Nodal values and forces are in `scratch`, (2, entries), which the domains of a thread share.
+    Nodal values and forces are stored in `scratch`, (2, entries), which the domains of a thread
+    share.
+    """
+
     def __init__(self, groups: Sequence[Group], count: int, size: int, scratch: Floats) -> None:
         moving: list[Group] = []
         for K, dof_indices in groups:
-            kept = (dof_indices < size - 1).any(axis=0)
-            matrices = np.ascontiguousarray(K[..., kept, :][..., kept])
-            moving.append((matrices, dof_indices[:, kept]))
+            moves = (dof_indices < size - 1).any(axis=0)
+            matrices = np.ascontiguousarray(K[..., moves, :][..., moves])
+            moving.append((matrices, dof_indices[:, moves]))
         self.dof_indices = np.concatenate([part.ravel() for _, part in moving])
         self._gathered, self.forces = scratch[:, : len(self.dof_indices)]
         # Product function, nodal values, matrix or matrices, forces.
@@ -140,15 +143,15 @@ class _Domain:
         )
 
     def sums(self, padded: Floats) -> Floats:
-        """Forces on the domain's :attr:`equations`."""
+        """Return the forces on the domain's :attr:`equations`."""
         self.multiply(padded)
         return np.asarray(self._sums @ self.forces)
 
 
 class ElementProduct(StiffnessOperator):
-    """K u element by element, domain by domain, which threads share.
+    """K u element by element.  The elements are split into domains, which threads share.
 
-    `count` is the number of independent dofs; `signed` says that the padded vector contains -q.
+    `count` is the number of independent dofs.  With `signed` the padded vector contains -q.
     """
 
     def __init__(
@@ -163,15 +166,15 @@ class ElementProduct(StiffnessOperator):
         self._workers = workers or Workers()
         self.size = (2 if signed else 1) * count + 1
         share = -(-len(domains) // self._workers.count)
-        most = max(sum(indices.size for _, indices in groups) for groups in domains)
-        scratches = [np.empty((2, most)) for _ in range(0, len(domains), share)]
+        most_values = max(sum(indices.size for _, indices in groups) for groups in domains)
+        scratches = [np.empty((2, most_values)) for _ in range(0, len(domains), share)]
         self._domains = [
             _Domain(groups, count, self.size, scratches[number // share])
             for number, groups in enumerate(domains)
         ]
         self._total = np.empty(count)
         self._pieces = pieces(count)
-        # np.bincount sums few forces faster, a sparse matrix many.
+        # np.bincount is faster for few forces, a sparse matrix for many.
         if len(self._domains) > 1:
             for domain in self._domains:
                 domain.prepare_sums()
@@ -205,40 +208,40 @@ class ElementProduct(StiffnessOperator):
 
 
 class NonlinearProduct(StiffnessOperator):
-    """Internal forces of a nonlinear plate: those of K u, and those of the quadratic strains.
+    """Internal forces of a nonlinear plate: K u plus the forces of the quadratic strains.
 
     `prescribed` (numnp, 5) are the displacements of the restrained dofs.  Their part of K u belongs
     to the loads, as for a linear plate.
     """
 
     def __init__(
-        self, plate: PlateModel, kept: SymmetryReduction, linear: StiffnessOperator
+        self, plate: PlateModel, reduction: SymmetryReduction, linear: StiffnessOperator
     ) -> None:
         self._linear = linear
-        self._kept = kept
-        self._membrane = MembraneForces(plate, kept.weights.astype(float))
-        self._pieces = pieces(kept.count)
+        self._kept = reduction
+        self._membrane = MembraneForces(plate, reduction.weights.astype(float))
+        self._pieces = pieces(reduction.count)
         self.size = linear.size
         self.prescribed: Floats | None = None
 
     def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
         """Compute the internal forces and apply a function to each piece."""
-        kept = self._kept
-        field = kept.sign * np.append(padded[: kept.count], 0.0)[kept.index]
+        reduction = self._kept
+        field = reduction.sign * np.append(padded[: reduction.count], 0.0)[reduction.index]
         if self.prescribed is not None:
             field += self.prescribed
         forces, self.quadratic_work = self._membrane.forces(field)
         if self.prescribed is not None:
-            # Work of the supports: the displacements of the other dofs alone are in u f.
+            # Subtract the work of the supports: u f contains only the independent dofs.
             self.quadratic_work -= float((forces * self.prescribed).sum())
-        quadratic = kept.gather(forces)
+        quadratic = reduction.gather(forces)
         return self._linear.each(
             padded, lambda number, linear: use(number, linear + quadratic[self._pieces[number]])
         )
 
 
 def resolved(solver: str) -> str:
-    """The solver itself instead of ``"auto"``."""
+    """Return the solver, with ``"auto"`` resolved."""
     if solver != AUTO:
         return solver
     return NUMPY if kernels.LIBRARY is None else KERNELS
@@ -250,55 +253,57 @@ def stiffness_operator(
     reduced: SymmetryReduction | None = None,
     workers: Workers | None = None,
 ) -> StiffnessOperator:
-    """Build the operator K u of a plate, for all dofs unless it is reduced.
+    """Build the operator K u of a plate, for all dofs or for the independent dofs of `reduced`.
 
-    K is the stiffness at rest, also of a nonlinear plate; see :func:`internal_force_operator`.
+    K is the stiffness at rest, even for a nonlinear plate; see :func:`internal_force_operator`.
 
-    The solver is one of `SOLVERS`: ``"csr"`` for the sparse matrix of all dofs; otherwise element
-    by element, with one matrix for elements that are congruent to enough others.
+    The solver is one of `SOLVERS`.  ``"csr"`` uses the sparse matrix of all dofs.  The others work
+    element by element, with one matrix for a large enough group of congruent elements.
     """
     solver = resolved(solver)
     if solver == CSR:
         return CsrProduct(plate.stiffness)
-    kept = reduced or unreduced(plate)
+    reduction = reduced or unreduced(plate)
     if solver == KERNELS:
-        return CompiledProduct(plate, kept, 1 if workers is None else workers.count)
+        return CompiledProduct(plate, reduction, 1 if workers is None else workers.count)
     domains: list[list[Group]] = []
     for family in plate.families:
-        weights = kept.weights[family.rows]
+        weights = reduction.weights[family.rows]
         members = np.flatnonzero(weights)
-        entries = len(members) * family.nodes.shape[1] * kept.dofs_per_node
+        entries = len(members) * family.nodes.shape[1] * reduction.dofs_per_node
         shares = 1 if entries <= BATCH else SHARES * -(-entries // (SHARES * BATCH))
-        same = family.congruence
-        # An element that is its own image counts once, the others twice.
-        common = weights == weights.max()
-        sizes = np.bincount(same.group[common], minlength=len(same.representatives))
-        shared = sizes >= WORTH_GROUPING
-        numbers = np.flatnonzero(shared)
-        stiffness = plate.stiffness_of(family.take(same.representatives[numbers]))
+        congruence = family.congruence
+        # An element that is its own image counts once, every other element twice.
+        has_common_weight = weights == weights.max()
+        sizes = np.bincount(
+            congruence.group[has_common_weight], minlength=len(congruence.representatives)
+        )
+        is_shared = sizes >= WORTH_GROUPING
+        numbers = np.flatnonzero(is_shared)
+        stiffness = plate.stiffness_of(family.take(congruence.representatives[numbers]))
         matrices = dict(zip(numbers.tolist(), weights.max() * stiffness, strict=True))
-        dof_indices = kept.dof_indices[family.nodes].reshape(len(family.rows), -1)
+        dof_indices = reduction.dof_indices[family.nodes].reshape(len(family.rows), -1)
         for share in np.array_split(members, shares):
             groups: list[Group] = []
-            grouped = common[share] & shared[same.group[share]]
-            for number in distinct(same.group[share[grouped]]):
-                inside = share[grouped & (same.group[share] == number)]
-                groups.append((matrices[int(number)], dof_indices[inside]))
-            alone = share[~grouped]
-            for start in range(0, len(alone), BLOCK):
-                rows = alone[start : start + BLOCK]
+            is_grouped = has_common_weight[share] & is_shared[congruence.group[share]]
+            for number in distinct(congruence.group[share[is_grouped]]):
+                in_group = share[is_grouped & (congruence.group[share] == number)]
+                groups.append((matrices[int(number)], dof_indices[in_group]))
+            single = share[~is_grouped]
+            for start in range(0, len(single), BLOCK):
+                rows = single[start : start + BLOCK]
                 K = plate.stiffness_of(family.take(rows))
                 groups.append((weights[rows, None, None] * K, dof_indices[rows]))
             domains.append(groups)
-    return ElementProduct(domains, kept.count, signed=kept.signed, workers=workers)
+    return ElementProduct(domains, reduction.count, signed=reduction.signed, workers=workers)
 
 
 def internal_force_operator(
     plate: PlateModel, solver: str, reduced: SymmetryReduction, workers: Workers | None = None
 ) -> StiffnessOperator:
-    """Build the operator of the internal forces, which are K u unless the plate is nonlinear.
+    """Build the operator of the internal forces; they are K u unless the plate is nonlinear.
 
-    The kernels have the membrane of a plate without prescribed displacements.
+    The kernels compute the membrane of a nonlinear plate without prescribed displacements.
     """
     if plate.nonlinear and resolved(solver) == KERNELS and membrane.has_kernel_membrane(plate):
         prescribed = plate.mesh.forces[reduced.sign == 0.0]

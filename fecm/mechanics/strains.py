@@ -1,22 +1,20 @@
 """Strains of plate elements: shallow curvature, assumed transverse shear, and fields over elements.
 
-Shallow curved panels: the midplane strains of the deflection (Donnell, Marguerre).
-
-The midplane z = -x^2/(2 R_x) - y^2/(2 R_y) - x y/R_xy of a shallow panel stretches as it deflects:
+Shallow curved panels (Marguerre 1938, Donnell 1933).  The midplane
+z = -x^2/(2 R_x) - y^2/(2 R_y) - x y/R_xy of a shallow panel stretches as it deflects:
 
     eps_x = u,x + w/R_x,  eps_y = v,y + w/R_y,  gamma_xy = u,y + v,x + 2 w/R_xy.
 
-Bending, transverse shear and inertia are those of the flat plate, and the strains remain linear.
-With a positive radius the centre of curvature is on the side of -w: a deflection w > 0 stretches
-the panel, and the struck face is the hollow one.  Marguerre (1938); Donnell (1933).
+Bending, transverse shear and inertia are the same as in a flat plate, and the strains remain
+linear.  With a positive radius the centre of curvature is on the side of -w: a deflection w > 0
+stretches the panel, and the struck face is concave.
 
-Assumed transverse shear strains: elements that neither lock nor hourglass.
-
-The covariant strains e_xi = w,xi - theta_x x,xi - theta_y y,xi and e_eta are taken from the
-displacements at tying points only and interpolated between them.  9-node elements: e_xi is linear
-in xi from +-1/sqrt(3) and quadratic in eta from 0 and +-sqrt(3/5), e_eta the other way round
-(Bucalem and Bathe 1993).  4-node elements: e_xi is constant in xi and linear
-in eta from +-1 (MITC4, Dvorkin and Bathe 1984).
+Assumed transverse shear strains, for elements that neither lock nor hourglass.  The covariant
+strains e_xi = w,xi - theta_x x,xi - theta_y y,xi and e_eta are evaluated only at tying points and
+interpolated between them.  In 9-node elements e_xi is linear in xi between +-1/sqrt(3) and
+quadratic in eta through 0 and +-sqrt(3/5); e_eta swaps xi and eta (Bucalem and Bathe 1993).  In
+4-node elements e_xi is constant in xi and linear in eta between +-1 (MITC4, Dvorkin and Bathe
+1984).
 """
 
 from __future__ import annotations
@@ -39,7 +37,7 @@ FLAT: Curvature = (0.0, 0.0, 0.0)
 
 
 def strain_of_deflection(curvature: Curvature) -> Floats:
-    """Midplane strains eps_xx, eps_yy, gamma_xy per unit of w, (3,), 1/length.
+    """Return the midplane strains eps_xx, eps_yy, gamma_xy per unit of w, (3,), 1/length.
 
     Examples
     --------
@@ -51,11 +49,13 @@ def strain_of_deflection(curvature: Curvature) -> Floats:
 
 
 def midplane_height(coordinates: Floats, curvature: Curvature) -> Floats:
-    """Height z of the midplane at points (n, 2), from that at the centre of their extent, (n,).
+    """Return the height z of the midplane, (n,), at points (n, 2).
+
+    z is 0 at the centre of the points' extent.
 
     Examples
     --------
-    >>> surface(np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]), (0.01, 0.0, 0.0))
+    >>> midplane_height(np.array([[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]), (0.01, 0.0, 0.0))
     array([-0.02, -0.  , -0.02])
     """
     low, high = np.nanmin(coordinates, axis=0), np.nanmax(coordinates, axis=0)
@@ -65,38 +65,38 @@ def midplane_height(coordinates: Floats, curvature: Curvature) -> Floats:
     return z
 
 
-# By number of nodes: tying points of e_xi along xi and along eta, and the order of the quadrature.
+# By number of nodes: tying points of e_xi along xi, along eta, and the order of the quadrature.
 _G = 3.0**-0.5
 _H = 0.6**0.5
 TYING = {4: ((0.0,), (-1.0, 1.0), 2), 9: ((-_G, _G), (-_H, 0.0, _H), 3)}
 
 
 def uses_assumed_shear(family: ElementBlock) -> bool:
-    """Whether the elements of a block have assumed shear strains."""
+    """Return whether the elements of a block have assumed shear strains."""
     return family.shape.nodes == 9 and family.nodes.shape[1] in TYING
 
 
 def quadrature(family: ElementBlock) -> Quadrature:
-    """Rule of the transverse shear energy."""
+    """Return the quadrature rule of the transverse shear energy."""
     return gauss(TYING[family.nodes.shape[1]][2])
 
 
 def tying_points(nodes: int, axis: int) -> Quadrature:
-    """Tying points of e_xi (axis 0) or e_eta (1) of an element with so many nodes."""
+    """Return the tying points of e_xi (axis 0) or e_eta (axis 1) in an element of `nodes` nodes."""
     a, b = (grid.ravel() for grid in np.meshgrid(*TYING[nodes][:2]))
     return Quadrature(b, a, 0.0 * a) if axis else Quadrature(a, b, 0.0 * a)
 
 
 def tying_weights(nodes: int, axis: int, rule: Quadrature) -> Floats:
-    """Functions that interpolate between tying points, at the points of a rule, (npt, tying)."""
+    """Return the interpolation from tying points to the points of a rule, (npt, tying)."""
     along, across, _ = TYING[nodes]
-    one, other = (rule.eta, rule.xi) if axis else (rule.xi, rule.eta)
-    product = _lagrange(across, other)[:, :, None] * _lagrange(along, one)[:, None, :]
+    t_along, t_across = (rule.eta, rule.xi) if axis else (rule.xi, rule.eta)
+    product = _lagrange(across, t_across)[:, :, None] * _lagrange(along, t_along)[:, None, :]
     return product.reshape(len(rule.xi), -1)
 
 
 def strain_matrix(family: ElementBlock, rule: Quadrature) -> Floats:
-    """B matrix of the assumed strains gamma_xz, gamma_yz, (ne, npt, 2, 5 nn)."""
+    """Return the B matrix of the assumed strains gamma_xz, gamma_yz, (ne, npt, 2, 5 nn)."""
     ne, nn = family.nodes.shape
     _, local = local_shape_functions(family, rule)
     inverse, _ = inverse_jacobian(family, local)
@@ -125,19 +125,25 @@ class TiedStrains:
             self._axes.append((table, slope, tying_weights(nn, axis, rule)))
 
     def covariant(self, q: Floats) -> tuple[Floats, Floats]:
-        """Strains e_xi, e_eta (fields, npt, ne) of w, theta_x, theta_y (fields, nn, 3 ne)."""
-        found: list[Floats] = []
+        """Return e_xi, e_eta (fields, npt, ne) of w, theta_x, theta_y (fields, nn, 3 ne)."""
+        result: list[Floats] = []
         for table, slope, weights in self._axes:
-            at = (table @ q).reshape(len(q), 2, len(table) // 2, 3, -1)
-            strain = at[:, 0, :, 0] - at[:, 1, :, 1] * slope[0] - at[:, 1, :, 2] * slope[1]
-            found.append(weights @ strain)
-        return found[0], found[1]
+            at_tying = (table @ q).reshape(len(q), 2, len(table) // 2, 3, -1)
+            strain = (
+                at_tying[:, 0, :, 0]
+                - at_tying[:, 1, :, 1] * slope[0]
+                - at_tying[:, 1, :, 2] * slope[1]
+            )
+            result.append(weights @ strain)
+        return result[0], result[1]
 
 
-def _lagrange(nodes: tuple[float, ...], at: Floats) -> Floats:
-    """Lagrange polynomials of the nodes at points, (npt, nodes)."""
+def _lagrange(nodes: tuple[float, ...], points: Floats) -> Floats:
+    """Evaluate the Lagrange polynomials of nodes at points, (npt, nodes)."""
     x = np.array(nodes)
-    factors = (at[:, None, None] - x) / np.where(np.eye(len(x), dtype=bool), 1.0, x[:, None] - x)
+    factors = (points[:, None, None] - x) / np.where(
+        np.eye(len(x), dtype=bool), 1.0, x[:, None] - x
+    )
     factors[:, np.eye(len(x), dtype=bool)] = 1.0
     return np.asarray(factors.prod(axis=2))
 
@@ -155,9 +161,9 @@ GENERALISED_STRAINS = (
 RESULTANTS = ("N_x", "N_y", "N_xy", "M_x", "M_y", "M_xy", "Q_x", "Q_y")
 STRAINS = ("kappa_x", "kappa_y", "kappa_xy", "gamma_yz", "gamma_xz")
 
-Rows = Indices | slice  # of elements
+Rows = Indices | slice  # rows of elements
 
-# Elements per product: so few that BLAS uses one thread.
+# Elements per product, small enough for BLAS to use one thread.
 STRAIN_BLOCK = 256
 
 
@@ -168,14 +174,14 @@ def strains_and_resultants(
     preload: tuple[float, float, float],
     of_deflection: Floats | None = None,
 ) -> dict[str, Floats]:
-    """Midplane strains, curvatures, transverse shear strains and resultants (equation 2-20).
+    """Return midplane strains, curvatures, transverse shear strains and resultants (equation 2-20).
 
-    Each is (numel, npt), by the names of :data:`GENERALISED_STRAINS` and :data:`RESULTANTS`, of a
-    displacement field (numnp, 5).  Each laminate has rows of elements.
+    The field is (numnp, 5), each result (numel, npt).  The keys are :data:`GENERALISED_STRAINS` and
+    :data:`RESULTANTS`.  `laminates` are laminates with the rows of their elements.
 
     The membrane forces include `preload`, N_x, N_y, N_xy of the undeformed plate; the strains do
-    not.  The midplane strains `of_deflection`, (3, numel, npt), of a curved or nonlinear plate are
-    added to those of u and v.
+    not.  `of_deflection`, (3, numel, npt), are midplane strains of w in a curved or nonlinear
+    plate; they are added to the strains of u and v.
     """
     bending = strains.evaluate(field)
     # The curvatures of the rotations (-u, -v) are the midplane strains of u and v.
@@ -217,7 +223,7 @@ class StrainField:
 
     @cached_property
     def families(self) -> list[ElementBlock]:
-        """The elements, in blocks with the same nodes present."""
+        """Elements in blocks with the same nodes present."""
         return element_blocks(*self._mesh)
 
     @cached_property
@@ -239,23 +245,23 @@ class StrainField:
         return blocks
 
     def places(self, coordinates: Floats) -> tuple[Floats, Floats]:
-        """Coordinates x and y of the points, (numel, npt)."""
+        """Return the coordinates x and y of the points, (numel, npt) each."""
         x, y = self.interpolated(coordinates)
         return x, y
 
     def interpolated(self, nodal: Floats) -> Floats:
-        """Values at the points, (n, numel, npt), of nodal values (numnp, n)."""
-        found = np.empty((nodal.shape[1], *self.shape))
+        """Interpolate nodal values (numnp, n) to the points, (n, numel, npt)."""
+        result = np.empty((nodal.shape[1], *self.shape))
         for family in self.families:
             values, _ = local_shape_functions(family, self.rule)
-            found[:, family.rows] = np.einsum("eni,pn->iep", nodal[family.nodes], values)
-        return found
+            result[:, family.rows] = np.einsum("eni,pn->iep", nodal[family.nodes], values)
+        return result
 
     def evaluate(self, displacement: Floats) -> Floats:
-        """Strains of a displacement field (numnp, 5), or of several (rows, numnp, 5).
+        """Return the strains of a displacement field (numnp, 5), or of fields (rows, numnp, 5).
 
-        kappa_x, kappa_y, kappa_xy (1/length), gamma_yz and gamma_xz: (5, numel, npt), or
-        (5, rows, numel, npt).
+        The strains are kappa_x, kappa_y, kappa_xy (1/length), gamma_yz and gamma_xz: (5, numel,
+        npt) for one field, (5, rows, numel, npt) for several.
         """
         leading = displacement.shape[:-2]
         fields = displacement.reshape(math.prod(leading), -1)
@@ -263,8 +269,8 @@ class StrainField:
         npt = self.shape[1]
         for rows, places, table, inverse, tied in self._blocks:
             q = fields.take(places, axis=1).reshape(len(fields), len(places), -1)
-            at = (table @ q).reshape(len(fields), 3, npt, 3, len(rows))
-            xi, eta, values = at.swapaxes(0, 1)  # each: field, point, dof, element
+            local = (table @ q).reshape(len(fields), 3, npt, 3, len(rows))
+            xi, eta, values = local.swapaxes(0, 1)  # each: field, point, dof, element
             dx = inverse[0, 0] * xi + inverse[0, 1] * eta
             dy = inverse[1, 0] * xi + inverse[1, 1] * eta
             gamma_xz, gamma_yz = dx[:, :, 0] - values[:, :, 1], dy[:, :, 0] - values[:, :, 2]

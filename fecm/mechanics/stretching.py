@@ -1,12 +1,12 @@
-"""What the midplane of a nonlinear plate carries: energies, slopes, strains and membrane forces.
+"""Energies, slopes, strains and membrane forces of the midplane of a nonlinear plate.
 
-The strain energy without the preload's part is
+The strain energy without the part of the preload is
 
     1/2 int n A^-1 n dA + 1/2 int (kappa (D - B A^-1 B) kappa + gamma S gamma) dA,
     n = A eps + B kappa,  eps = eps_l + eps_q,
 
-where eps_l contains the strains w/R of a curved plate.  The first part is that of the membrane: 1/2
-eps A eps if B is zero.  The membrane force is N0 + n.
+where eps_l contains the strains w/R of a curved plate.  The first integral is the energy of the
+membrane; it is 1/2 int eps A eps dA if B is zero.  The membrane force is N0 + n.
 """
 
 from __future__ import annotations
@@ -27,30 +27,30 @@ from fecm.mechanics.ply_stresses import strains_of
 from fecm.mechanics.points import containing_elements
 from fecm.mechanics.strains import strain_of_deflection
 
-# Elements of a block.
+# Elements per block.
 BLOCK = 1024
 
 
 class MidplaneField(NamedTuple):
     """Midplane of a plate in a displacement field.
 
-    The largest values are those at the points of quadrature.
+    The largest values are taken over the points of quadrature.
     """
 
-    energy: float  # of the membrane, force*length
-    strain_energy: float  # of the plate, force*length
+    energy: float  # energy of the membrane, force*length
+    strain_energy: float  # strain energy of the plate, force*length
     preload_energy: float  # 1/2 int N0_ij w,i w,j dA, force*length
     largest_slope: float  # |grad w|
-    # Principal strain of both faces, in size, away from the load; with that of the preload.
+    # Absolute principal strain of both faces away from the load, including the preload's strain.
     largest_strain: float
     largest_force: float  # principal membrane force, tension positive, force/length
-    # Principal membrane force and moment at the load, in size, force/length and force.
+    # Absolute principal membrane force (force/length) and moment (force) at the load.
     force_at_load: float
     moment_at_load: float
 
 
 class _Midplane(NamedTuple):
-    """Strains, curvatures and slopes of some elements, (ne, points, components)."""
+    """Strains, curvatures and slopes of a block, (ne, points, components)."""
 
     strains: Floats
     curvatures: Floats
@@ -58,48 +58,52 @@ class _Midplane(NamedTuple):
 
 
 class _Elements:
-    """Some elements at the points of a rule."""
+    """Elements of a block at the points of a rule."""
 
     def __init__(self, plate: PlateModel, block: ElementBlock, rule: Quadrature) -> None:
         self.laminate = plate.laminate_of(block)
         self.compliance = np.linalg.inv(self.laminate.A)
-        at = interpolate(block, rule)
-        self.area = at.jxw  # (ne, points): area that each point represents
-        self.x, self.y = np.einsum("pn,eni->iep", at.N, block.coordinates)
-        self._nodes, self._slopes = block.nodes, at.dN
+        shapes = interpolate(block, rule)
+        self.area = shapes.jxw  # (ne, points): area that each point represents
+        self.x, self.y = np.einsum("pn,eni->iep", shapes.N, block.coordinates)
+        self._nodes, self._slopes = block.nodes, shapes.dN
         self._tied = QuadraticStrains(block, rule)
-        self._values = at.N
+        self._values = shapes.N
         self._curved = strain_of_deflection(plate.curvature)
 
     def midplane(self, field: Floats) -> _Midplane:
-        """The midplane in a displacement field, (numnp, 5)."""
+        """Evaluate the midplane in a displacement field, (numnp, 5)."""
         q = field[self._nodes]
-        q[..., 3:] *= -1.0  # curvatures are the strains of the rotations' negatives
+        q[..., 3:] *= -1.0  # curvatures are the strains of the negative rotations
         slopes = self._slopes @ q[:, None]
         strains = strains_of(slopes[..., [0, 1, 3, 4]])
         stretch = self._tied.of(q[..., 2].T).transpose(2, 1, 0)
         stretch += (self._values @ q[..., 2:3]) * self._curved
         return _Midplane(strains[..., :3] + stretch, strains[..., 3:], slopes[..., 2])
 
-    def forces(self, at: _Midplane) -> Floats:
-        """Membrane forces n, (ne, points, 3)."""
-        return np.asarray(at.strains @ self.laminate.A + at.curvatures @ self.laminate.B)
+    def forces(self, midplane: _Midplane) -> Floats:
+        """Return the membrane forces n, (ne, points, 3)."""
+        return np.asarray(
+            midplane.strains @ self.laminate.A + midplane.curvatures @ self.laminate.B
+        )
 
-    def moments(self, at: _Midplane) -> Floats:
-        """Moments, (ne, points, 3)."""
-        return np.asarray(at.strains @ self.laminate.B + at.curvatures @ self.laminate.D)
+    def moments(self, midplane: _Midplane) -> Floats:
+        """Return the moments, (ne, points, 3)."""
+        return np.asarray(
+            midplane.strains @ self.laminate.B + midplane.curvatures @ self.laminate.D
+        )
 
 
 def nowhere(x: Floats, y: Floats) -> Bools:
-    """No point is near the load."""
+    """Return a mask in which no point is near the load."""
     return np.zeros(np.broadcast_shapes(x.shape, y.shape), dtype=bool)
 
 
 class Stretching:
-    """Evaluates displacement fields of a nonlinear plate.
+    """Evaluator of the midplane of a nonlinear plate.
 
-    `near` tells which points, x and y, are so near to the load that their strains don't count;
-    `load` is the place of the load.
+    `near` returns a mask of the points, x and y, that are too near to the load for their strains to
+    count.  `load` is the place of the load.
     """
 
     def __init__(
@@ -125,9 +129,9 @@ class Stretching:
         """Evaluate a displacement field, (numnp, 5)."""
         energies, largest = np.zeros(3), np.full(3, -np.inf)
         for part, near in self._parts:
-            at = part.midplane(field)
-            energies += self._energies(part, at)
-            largest = np.maximum(largest, self._largest(part, at, near))
+            midplane = part.midplane(field)
+            energies += self._energies(part, midplane)
+            largest = np.maximum(largest, self._largest(part, midplane, near))
         membrane, bending, preload = energies.tolist()
         slope, strain, force = largest.tolist()
         force_at_load, moment_at_load = self._under_load(field)
@@ -142,21 +146,23 @@ class Stretching:
             moment_at_load=moment_at_load,
         )
 
-    def _energies(self, part: _Elements, at: _Midplane) -> Floats:
-        """Energies of the membrane, of bending and of the preload."""
+    def _energies(self, part: _Elements, midplane: _Midplane) -> Floats:
+        """Return the energies of the membrane, of bending and of the preload."""
         A, B, D = part.laminate.A, part.laminate.B, part.laminate.D
-        n = part.forces(at)
-        x, y = np.moveaxis(at.slopes, -1, 0)
+        n = part.forces(midplane)
+        x, y = np.moveaxis(midplane.slopes, -1, 0)
         squares = np.stack([x * x, y * y, 2.0 * x * y], axis=-1)
         densities = [
             (n * (n @ part.compliance)).sum(axis=-1),
-            (at.curvatures * (at.curvatures @ (D - B @ np.linalg.solve(A, B)))).sum(axis=-1),
+            (midplane.curvatures * (midplane.curvatures @ (D - B @ np.linalg.solve(A, B)))).sum(
+                axis=-1
+            ),
             squares @ self._preload,
         ]
         return np.array([0.5 * (part.area * density).sum() for density in densities])
 
     def _shear_energy(self, field: Floats) -> float:
-        """Energy of the transverse shear."""
+        """Return the energy of the transverse shear."""
         energy = 0.0
         for strains, rows, area, shear in self._sheared:
             gamma = strains.evaluate(field)[[4, 3]][:, rows]
@@ -164,41 +170,47 @@ class Stretching:
             energy += 0.5 * float((area * density).sum())
         return energy
 
-    def _largest(self, part: _Elements, at: _Midplane, near: Bools) -> Floats:
-        """Largest slope, strain of a face away from the load, and membrane force."""
-        slope = np.hypot(at.slopes[..., 0], at.slopes[..., 1])
-        middle = at.strains + part.compliance @ self._preload
-        bent = 0.5 * part.laminate.thickness * at.curvatures
-        # The third component of strains is twice that of their tensor.
-        faces = [_size(strains * [1.0, 1.0, 0.5]) for strains in (middle - bent, middle + bent)]
+    def _largest(self, part: _Elements, midplane: _Midplane, near: Bools) -> Floats:
+        """Return the largest slope, strain of a face away from the load, and membrane force."""
+        slope = np.hypot(midplane.slopes[..., 0], midplane.slopes[..., 1])
+        middle = midplane.strains + part.compliance @ self._preload
+        bent = 0.5 * part.laminate.thickness * midplane.curvatures
+        # gamma_xy is twice the tensor component.
+        faces = [
+            _largest_principal(strains * [1.0, 1.0, 0.5])
+            for strains in (middle - bent, middle + bent)
+        ]
         strain = np.where(near, 0.0, np.maximum(*faces))
-        mean, radius = principal_values(self._preload + part.forces(at))
+        mean, radius = principal_values(self._preload + part.forces(midplane))
         return np.array([slope.max(), strain.max(), (mean + radius).max()])
 
     def _under_load(self, field: Floats) -> tuple[float, float]:
-        """Membrane force and moment at the load: means of the adjacent elements; 0 without it."""
+        """Return membrane force and moment at the load, averaged over the adjacent elements.
+
+        Both are 0 without a load.
+        """
         states = [(part, part.midplane(field)) for part in self._at_load]
         if not states:
             return 0.0, 0.0
-        force = np.mean([part.forces(at)[0, 0] for part, at in states], axis=0)
-        moment = np.mean([part.moments(at)[0, 0] for part, at in states], axis=0)
-        return float(_size(self._preload + force)), float(_size(moment))
+        force = np.mean([part.forces(midplane)[0, 0] for part, midplane in states], axis=0)
+        moment = np.mean([part.moments(midplane)[0, 0] for part, midplane in states], axis=0)
+        return float(_largest_principal(self._preload + force)), float(_largest_principal(moment))
 
 
 def principal_values(tensor: Floats) -> tuple[Floats, Floats]:
-    """Principal values of xx, yy, xy (..., 3): their mean, and half of their difference."""
+    """Return mean and half difference of the principal values of xx, yy, xy (..., 3)."""
     xx, yy, xy = np.moveaxis(tensor, -1, 0)
     return 0.5 * (xx + yy), np.hypot(0.5 * (xx - yy), xy)
 
 
-def _size(tensor: Floats) -> Floats:
-    """Principal value of xx, yy, xy (..., 3) that is the largest in size."""
+def _largest_principal(tensor: Floats) -> Floats:
+    """Return the largest absolute principal value of xx, yy, xy (..., 3)."""
     mean, radius = principal_values(tensor)
     return np.asarray(np.abs(mean) + radius)
 
 
 def _elements_at(plate: PlateModel, place: tuple[float, float]) -> list[_Elements]:
-    """The elements that contain a place, each at this place alone."""
+    """Return the elements that contain a place, each evaluated at this place only."""
     return [
         _Elements(plate, family.take(np.array([member])), Quadrature(xi[:1], xi[1:], np.ones(1)))
         for family in plate.families

@@ -1,10 +1,11 @@
 """Reduction of a plate to the dofs that move independently.
 
-In-plane dofs stay at rest if neither the laminate nor a curvature couples them to bending and no
-load acts in the plane.  If a half turn about the centre maps mesh, supports and loads onto
+In-plane dofs stay at rest if no load acts in the plane and neither the laminate nor a curvature
+couples them to bending.  If a half turn about the centre maps mesh, supports and loads onto
 themselves, the response to an impact at the centre has the same symmetry: w equals w of the image,
 the other dofs have the opposite sign, and half of the elements suffice.  Every laminate and every
-curvature is invariant under the half turn; an element and its image must have the same laminate.
+curvature is invariant under the half turn, but an element and its image must have the same
+laminate.
 """
 
 from __future__ import annotations
@@ -26,17 +27,18 @@ TOLERANCE = 1.0e-9
 
 @dataclass(frozen=True)
 class SymmetryReduction:
-    """Independent dofs, and the dependence of the others on them."""
+    """Independent dofs, and the dependence of all dofs on them."""
 
     count: int  # number of independent dofs
-    index: Indices  # (numnp, 5): independent dof that each dof follows; `count` if it is at rest
-    sign: Floats  # (numnp, 5): 1 or -1; 0 if it is at rest
-    # (numel,): number of elements that each represents: 1 itself, 2 itself and its image, or 0.
+    index: Indices  # (numnp, 5): independent dof that each dof follows; `count` for a dof at rest
+    sign: Floats  # (numnp, 5): 1 or -1; 0 for a dof at rest
+    # (numel,): number of elements that each element represents: 1 for itself, 2 with its image, or
+    # 0.
     weights: NDArray[np.int_]
 
     @property
     def signed(self) -> bool:
-        """Whether some dof has the opposite sign of the one that it follows."""
+        """Whether a dof has the opposite sign of the dof that it follows."""
         return bool((self.sign < 0.0).any())
 
     @property
@@ -48,7 +50,7 @@ class SymmetryReduction:
 
     @property
     def dofs_per_node(self) -> int:
-        """Largest number of moving dofs of a node."""
+        """Largest number of moving dofs at a node."""
         return int((self.sign != 0.0).sum(axis=1).max())
 
     def gather(self, values: Floats) -> Floats:
@@ -59,7 +61,7 @@ class SymmetryReduction:
 
 
 def unreduced(plate: PlateModel) -> SymmetryReduction:
-    """All dofs without restraint, each independent."""
+    """Return the reduction in which every free dof is independent."""
     equations = plate.mesh.equations
     index = equations.astype(np.intp) - 1
     index[index < 0] = plate.neq
@@ -68,23 +70,26 @@ def unreduced(plate: PlateModel) -> SymmetryReduction:
 
 
 def symmetry_reduction(plate: PlateModel, contact: Floats | None) -> SymmetryReduction:
-    """Independent dofs of a plate at rest under its loads and a contact force, (numnp, 5)."""
+    """Find the independent dofs of a plate under its loads and a contact force, (numnp, 5)."""
     resting = restrain_resting_dofs(plate, contact)
-    turned = _images(resting, contact)
-    return unreduced(resting) if turned is None else _reduction(resting, *turned)
+    image_rows = _images(resting, contact)
+    return unreduced(resting) if image_rows is None else _reduction(resting, *image_rows)
 
 
 def _reduction(plate: PlateModel, nodes: Indices, elements: Indices) -> SymmetryReduction:
-    """Number the independent dofs in the order of nodes and dofs, given the images."""
+    """Assign numbers to the independent dofs, in the order of nodes and dofs.
+
+    `nodes` and `elements` are the images under the half turn.
+    """
     sign = (plate.mesh.equations > 0).astype(float)
     dof_indices = np.arange(sign.size).reshape(sign.shape)
-    own, at = np.arange(len(elements)), np.arange(len(nodes))
-    weights = np.where(own < elements, 2, np.where(own == elements, 1, 0))
-    follows = nodes < at
+    element_rows, node_rows = np.arange(len(elements)), np.arange(len(nodes))
+    weights = np.where(element_rows < elements, 2, np.where(element_rows == elements, 1, 0))
+    follows = nodes < node_rows
     leaders = np.where(follows[:, None], dof_indices[nodes], dof_indices)
     sign[follows] *= TURNED
-    # A node at the centre is its own image: its dofs that change sign are at rest.
-    sign[nodes == at] *= TURNED > 0.0
+    # A node at the centre is its own image.  Its dofs that change sign are at rest.
+    sign[nodes == node_rows] *= TURNED > 0.0
     leads = (leaders == dof_indices) & (sign != 0.0)
     count = int(np.count_nonzero(leads))
     numbers = np.full(sign.size, count, dtype=np.intp)
@@ -93,22 +98,22 @@ def _reduction(plate: PlateModel, nodes: Indices, elements: Indices) -> Symmetry
 
 
 def half_turn_images(coordinates: Floats) -> Indices | None:
-    """Return the image of each node under the half turn about the centre; None if one has none."""
+    """Return each node's image under the half turn about the centre; None if one is missing."""
     return images(coordinates, (-1.0, -1.0))
 
 
 def images(coordinates: Floats, flip: tuple[float, float]) -> Indices | None:
-    """Return the image of each node if x and y from the centre are multiplied by 1 or -1.
+    """Return the image of each node when x and y from the centre are multiplied by 1 or -1.
 
-    None if a node has no image, or an ambiguous one.
+    Returns None if the image of a node is missing or ambiguous.
     """
     if np.isnan(coordinates).any():
         return None
     low, high = extent(coordinates)
     pitch = TOLERANCE * float((high - low).max())
     centred = (coordinates - (low + high) / 2.0) / pitch
-    # An uncommon offset keeps the positions away from the edges of the grid, of less than 2**31
-    # cells in each direction.
+    # An uncommon offset keeps the positions away from the edges of the grid.  The grid has fewer
+    # than 2**31 cells in each direction.
     cells = (np.floor(c + 1.0 / np.pi).astype(np.int64) for c in (centred, centred * flip))
     here, there = (x + 2**32 * y for x, y in (cell.T for cell in cells))
     order, turned = np.argsort(here, kind="stable"), np.argsort(there, kind="stable")
@@ -123,12 +128,12 @@ def images(coordinates: Floats, flip: tuple[float, float]) -> Indices | None:
 def restrain_resting_dofs(plate: PlateModel, contact: Floats | None) -> PlateModel:
     """Restrain the in-plane dofs of a plate if they stay at rest under a contact force, (numnp, 5).
 
-    Their modes are not excited, and their frequencies do not limit the time step.
+    The in-plane modes are then not excited, and their frequencies must not limit the time step.
     """
     mesh = plate.mesh
-    in_plane, others = mesh.equations[:, :2].any(), mesh.equations[:, 2:].any()
+    in_plane, bending = mesh.equations[:, :2].any(), mesh.equations[:, 2:].any()
     pulled = mesh.forces[:, :2].any() or (contact is not None and contact[:, :2].any())
-    if not (in_plane and others) or pulled or plate.moves_in_plane:
+    if not (in_plane and bending) or pulled or plate.moves_in_plane:
         return plate
     return restrain_plane(plate)
 
@@ -141,13 +146,16 @@ def restrain_plane(plate: PlateModel) -> PlateModel:
 
 
 def with_codes(plate: PlateModel, codes: Ints) -> PlateModel:
-    """The plate with other restraint codes, (numnp, 5)."""
+    """Return the plate with other restraint codes, (numnp, 5)."""
     mesh = replace(plate.mesh, codes=codes, equations=equation_numbers(codes))
     return replace(plate, mesh=mesh)
 
 
 def _images(plate: PlateModel, contact: Floats | None) -> tuple[Indices, Indices] | None:
-    """Images of nodes and elements under the half turn, if it maps the plate onto itself."""
+    """Find the images of nodes and elements under the half turn.
+
+    Returns None unless the half turn maps the plate onto itself.
+    """
     mesh, free = plate.mesh, plate.mesh.equations > 0
     nodes = half_turn_images(mesh.coordinates)
     if nodes is None:
@@ -170,7 +178,7 @@ def _images(plate: PlateModel, contact: Floats | None) -> tuple[Indices, Indices
 
 
 def opposite_nodes(family: ElementBlock) -> Indices | None:
-    """Position, among the element's nodes, of each node's image under the half turn."""
+    """Return the position of each node's image, under the half turn, among the element's nodes."""
     xi, eta = family.shape.xi[family.present], family.shape.eta[family.present]
-    found = (np.abs(xi + xi[:, None]) < 1e-12) & (np.abs(eta + eta[:, None]) < 1e-12)
-    return np.argmax(found, axis=1) if (found.sum(axis=1) == 1).all() else None
+    is_image = (np.abs(xi + xi[:, None]) < 1e-12) & (np.abs(eta + eta[:, None]) < 1e-12)
+    return np.argmax(is_image, axis=1) if (is_image.sum(axis=1) == 1).all() else None

@@ -1,19 +1,20 @@
 """Critical time step of the plate, and upper bounds of the frequencies of single elements.
 
-The five fields u, v, w, theta_x and theta_y of an element, scaled by the roots of their masses, get
-the same bound of their energies, p1 f,x^2 + p2 f,y^2 + q f^2 at a point, so that a matrix with a
-row for each node takes the place of one with five.
+The five fields u, v, w, theta_x and theta_y of an element are scaled by the roots of their masses.
+The energy of each field f at a point is bounded by the same expression, p1 f,x^2 + p2 f,y^2 +
+q f^2.  A matrix with one row per node therefore replaces a matrix with five rows per node.
 
 Membrane and bending: their energy is g' D g with the gradients g of u, v, theta_x and theta_y.  p1
-and p2 are such that g' D g <= p1 |g,x|^2 + p2 |g,y|^2.
+and p2 are chosen so that g' D g <= p1 |g,x|^2 + p2 |g,y|^2.
 
 Transverse shear: (w,x - theta_x)^2 <= (1 + s) w,x^2 + (1 + 1/s) theta_x^2 for any s > 0.  s is as
-large as p1 and p2 allow, of which w has no other need but the preload's.  Where shear has points of
-its own, its matrices of w and of the rotations are bounded one by one; at the best s of an element
-the whole has the larger eigenvalue of [[a + r, (r w)^(1/2)], [., w]] with the bounds r and w, and a
-of all else.
+large as p1 and p2 allow; besides shear, only the preload adds to the energy of w.  If shear has its
+own points, its matrices of w and of the rotations are bounded separately, by w and r.  With a the
+bound of everything else, the best s of an element gives the larger eigenvalue of
+[[a + r, (r w)^(1/2)], [., w]].
 
-Curvature: the strains w/R of a shallow panel are taken apart from those of u and v in the same way.
+Curvature: the strains w/R of a shallow panel are separated from the strains of u and v in the same
+way.
 """
 
 from __future__ import annotations
@@ -38,16 +39,17 @@ from fecm.mechanics.plate import PlateModel, UnsoundPlateError, pieces
 from fecm.mechanics.stiffness_product import SAFE, stiffness_operator
 from fecm.mechanics.strains import strain_of_deflection
 
-# Excess of p1 over the least possible one.  A smaller p1 needs a larger p2: what is better depends
-# on the elements' shapes.
+# Relative excess of p1 over its least value.  A smaller p1 needs a larger p2; the best value
+# depends on the elements' shapes.
 EXCESSES = 0.02, 0.05, 0.1, 0.2, 0.4, 0.8
-# 1 + s, at least.  A larger one needs larger p1 and p2: what is better depends on the thickness.
+# Least values of 1 + s.  A larger s needs larger p1 and p2; the best value depends on the
+# thickness.
 SHARES = 2.0, 4.0, 12.0
-SAMPLE = 64  # elements that decide on these
-ELEMENTS_AT_ONCE = 512  # elements whose matrices are computed at once, which fit the cache
-DOUBLINGS = 3  # of the exponent of a matrix, before the trace of its square
+SAMPLE = 64  # number of elements that decide on the best values
+ELEMENTS_AT_ONCE = 512  # number of elements whose matrices are computed at once; they fit the cache
+DOUBLINGS = 3  # doublings of a matrix's exponent before the trace of its square
 
-# Strains and curvatures of u,x v,x theta_x,x theta_y,x and of u,y v,y theta_x,y theta_y,y.
+# Strains and curvatures per u,x v,x theta_x,x theta_y,x and per u,y v,y theta_x,y theta_y,y.
 ALONG_X = np.zeros((6, 4))
 ALONG_X[[0, 2, 3, 5], [0, 1, 2, 3]] = 1.0, 1.0, -1.0, -1.0
 ALONG_Y = np.zeros((6, 4))
@@ -55,24 +57,23 @@ ALONG_Y[[2, 1, 5, 4], [0, 1, 2, 3]] = 1.0, 1.0, -1.0, -1.0
 
 
 class Majorant(NamedTuple):
-    """Numbers that bound the energies of all fields over their masses."""
+    """Coefficients that bound the energies of all fields over their masses."""
 
     along_x: float  # p1, length squared over time squared
-    along_y: float  # p2, the same
+    along_y: float  # p2, length squared over time squared
     value: float  # q, 1/time squared
 
 
 def eigenvalue_bounds(model: PlateModel, family: ElementBlock) -> Floats:
-    """Upper bounds of the largest eigenvalue of M^-1 K of elements, (ne,), 1/time squared.
+    """Return upper bounds of the largest eigenvalue of M^-1 K of elements, (ne,), 1/time squared.
 
-    M is the lumped mass.  A bound is infinite where numbers are out of range, and where an element
-    is folded.
+    M is the lumped mass.  A bound is infinite if numbers are out of range or the element is folded.
     """
     with np.errstate(all="ignore"):
         count = len(family.rows)
         sample = family.take(slice(0, count, -(-count // SAMPLE)))
         majorants = _majorants(model, model.laminate_of(family))
-        best = min(majorants, key=lambda one: _bounds(model, sample, one).max(), default=None)
+        best = min(majorants, key=lambda m: _bounds(model, sample, m).max(), default=None)
         if best is None:
             return np.full(count, np.inf)
         return np.concatenate(
@@ -81,26 +82,26 @@ def eigenvalue_bounds(model: PlateModel, family: ElementBlock) -> Floats:
 
 
 def _majorants(model: PlateModel, laminate: LaminateSection) -> list[Majorant]:
-    """Majorants of elements of a laminate, which differ in what p1 is and p2."""
+    """Return candidate majorants for elements of a laminate, with different p1 and p2."""
     inertia = np.array([laminate.mass, laminate.rotary_inertia])
     shear = np.zeros(2) if _has_own_points(model.rules) else _stiffest(laminate) / inertia
     tension = _largest_tension(model.preload) / inertia[0]
     strain = strain_of_deflection(model.curvature)
     rise = float(strain @ laminate.A @ strain) / inertia[0]
-    found: list[Majorant] = []
+    candidates: list[Majorant] = []
     for (excess, (along_x, along_y)), share in product(_of_gradients(laminate), SHARES):
         of_w = max(min(along_x, along_y), tension + share * shear[0])
-        spare = of_w - tension  # (1 + s) times the shear's part
+        spare = of_w - tension  # (1 + s) times the part of shear
         rotations = shear[1] * spare / (spare - shear[0]) if shear[0] > 0.0 else 0.0
         value = max(rotations, rise * (1.0 + 1.0 / excess))
         stretched = value / (value - rise) if rise > 0.0 else 1.0
         slopes = max(along_x * stretched, of_w), max(along_y * stretched, of_w)
-        found.append(Majorant(*slopes, value))
-    return found
+        candidates.append(Majorant(*slopes, value))
+    return candidates
 
 
 def _of_gradients(laminate: LaminateSection) -> list[tuple[float, tuple[float, float]]]:
-    """Pairs p1, p2 of membrane and bending, with the excess of p1."""
+    """Return pairs p1, p2 of membrane and bending, each with the excess of p1."""
     stiffness = np.block([[laminate.A, laminate.B], [laminate.B, laminate.D]])
     inertia = np.repeat([laminate.mass, laminate.rotary_inertia], 2)
     scale = 1.0 / np.sqrt(inertia[:, None] * inertia)
@@ -119,12 +120,12 @@ def _of_gradients(laminate: LaminateSection) -> list[tuple[float, tuple[float, f
 
 
 def _has_own_points(rules: IntegrationRules) -> bool:
-    """Whether transverse shear has other points than bending."""
+    """Return whether transverse shear has other points than bending."""
     return rules.assumes_shear or rules.shear is not rules.bending
 
 
 def _bounds(model: PlateModel, block: ElementBlock, majorant: Majorant) -> Floats:
-    """Bounds of the elements of a block, (ne,)."""
+    """Return the bounds of a block's elements, (ne,)."""
     rules = model.rules
     values, local = local_shape_functions(block, rules.bending)
     mapping = _mapping(block, local, transposed=rules.transposed_jacobian)
@@ -133,24 +134,27 @@ def _bounds(model: PlateModel, block: ElementBlock, majorant: Majorant) -> Float
     table = np.concatenate([_products(local[:, 0], local[:, 1]), _outer(values)])
     shares = lumped_shares(values, areas)
     roots = 1.0 / np.sqrt(shares)
-    matrices = _contracted(energies, table)
+    matrices = _contract(energies, table)
     matrices *= roots[:, :, None]
     matrices *= roots[:, None, :]
     bound = _largest_eigenvalues(matrices)
     if _has_own_points(rules):
-        of_w = bound if model.is_preloaded or model.is_curved else 0.0
+        slope_bound = bound if model.is_preloaded or model.is_curved else 0.0
         by_slopes, by_rotations = _shear_bounds(block, rules, shares, model.laminate_of(block))
-        bound = _largest_of_two(bound + by_rotations, of_w + by_slopes, by_slopes * by_rotations)
+        bound = _largest_of_two(
+            bound + by_rotations, slope_bound + by_slopes, by_slopes * by_rotations
+        )
     return np.where(np.isfinite(bound) & (areas > 0.0).all(axis=1), bound, np.inf)
 
 
 def _shear_bounds(
     block: ElementBlock, rules: IntegrationRules, shares: Floats, laminate: LaminateSection
 ) -> Floats:
-    """Bounds of the eigenvalues of the transverse shear of w and of the rotations, (2, ne).
+    """Bound the eigenvalues of the transverse shear of w and of the rotations, (2, ne).
 
-    Both are B' Q B with the covariant strains B at tying points, which are those of the rule unless
-    strains are assumed.  Q B M^-1 B', with two rows for a point, has their eigenvalues.
+    Both matrices are B' Q B with the covariant strains B at tying points; the tying points are the
+    points of the rule unless strains are assumed.  Q B M^-1 B', which has two rows for a point, has
+    the same eigenvalues.
     """
     nn = block.nodes.shape[1]
     if rules.assumes_shear:
@@ -168,25 +172,25 @@ def _shear_bounds(
     mapping = _mapping(block, local, transposed=transposed)
     half = len(at_xi)
     bases = np.concatenate([mapping[:, :, 0, :half], mapping[:, :, 1, half:]], axis=2)
-    of_w = _contracted(1.0 / shares, _outer(slopes.T)[0] / laminate.mass)
-    of_rotations = _contracted(1.0 / shares, _outer(values.T)[0] / laminate.rotary_inertia)
+    of_w = _contract(1.0 / shares, _outer(slopes.T)[0] / laminate.mass)
+    of_rotations = _contract(1.0 / shares, _outer(values.T)[0] / laminate.rotary_inertia)
     of_rotations *= bases.swapaxes(1, 2) @ bases
 
     _, local = local_shape_functions(block, rule)
     metric, _ = _metric(_mapping(block, local, transposed=transposed), rule, 1.0, 1.0)
-    none = np.zeros_like(weights[0])
-    tied = np.hstack([weights[0], none]), np.hstack([none, weights[1]])
-    stiffness = _contracted(metric, _products(*tied))
+    zeros = np.zeros_like(weights[0])
+    tied = np.hstack([weights[0], zeros]), np.hstack([zeros, weights[1]])
+    stiffness = _contract(metric, _products(*tied))
     return _stiffest(laminate) * _largest_eigenvalues(stiffness @ np.stack([of_w, of_rotations]))
 
 
 def _stiffest(laminate: LaminateSection) -> float:
-    """Upper bound of the largest transverse shear stiffness, force/length."""
+    """Return an upper bound of the largest transverse shear stiffness, force/length."""
     return float(np.abs(laminate.shear).sum(axis=1).max())
 
 
 def _mapping(block: ElementBlock, local: Floats, *, transposed: bool) -> Floats:
-    """Slopes dx_i/dxi_a at points, (ne, i, a, npt); `transposed` swaps i and a."""
+    """Return the slopes dx_i/dxi_a at points, (ne, i, a, npt); `transposed` swaps i and a."""
     slopes = mapping_slopes(block, local)
     return slopes.swapaxes(1, 2) if transposed else slopes
 
@@ -194,7 +198,7 @@ def _mapping(block: ElementBlock, local: Floats, *, transposed: bool) -> Floats:
 def _metric(
     mapping: Floats, rule: Quadrature, along_x: float, along_y: float
 ) -> tuple[Floats, Floats]:
-    """Coefficients of f,xi^2, 2 f,xi f,eta and f,eta^2, (ne, 3, npt), and areas, (ne, npt).
+    """Return coefficients of f,xi^2, 2 f,xi f,eta, f,eta^2, (ne, 3, npt), and areas, (ne, npt).
 
     The sum of all terms is the integral of p1 f,x^2 + p2 f,y^2.
     """
@@ -214,28 +218,29 @@ def _metric(
 
 
 def _outer(rows: Floats) -> Floats:
-    """Products of the entries of each row with one another, (1, rows, n, n)."""
+    """Return the outer product of each row with itself, (1, rows, n, n)."""
     return np.asarray(rows[None, :, :, None] * rows[None, :, None, :])
 
 
 def _products(along_xi: Floats, along_eta: Floats) -> Floats:
-    """Matrices of f,xi^2, 2 f,xi f,eta and f,eta^2 at points, (3, npt, n, n)."""
+    """Return the matrices of f,xi^2, 2 f,xi f,eta and f,eta^2 at points, (3, npt, n, n)."""
     mixed = along_xi[None, :, :, None] * along_eta[None, :, None, :]
-    both = mixed + mixed.swapaxes(2, 3)
-    return np.concatenate([_outer(along_xi), both, _outer(along_eta)])
+    symmetric = mixed + mixed.swapaxes(2, 3)
+    return np.concatenate([_outer(along_xi), symmetric, _outer(along_eta)])
 
 
-def _contracted(coefficients: Floats, table: Floats) -> Floats:
-    """Sums of the matrices of a table, (..., n, n), with coefficients, (ne, ...): (ne, n, n)."""
+def _contract(coefficients: Floats, table: Floats) -> Floats:
+    """Sum the matrices of a table, (..., n, n), with coefficients, (ne, ...): (ne, n, n)."""
     ne, n = len(coefficients), table.shape[-1]
     sums = coefficients.reshape(ne, -1) @ table.reshape(-1, n * n)
     return np.asarray(sums.reshape(ne, n, n))
 
 
 def _largest_eigenvalues(matrices: Floats) -> Floats:
-    """Upper bound of the largest eigenvalue, (..., ne), of matrices that have no negative one.
+    """Bound the largest eigenvalue, (..., ne), of matrices without negative eigenvalues.
 
-    Root of the trace of a power, per cent above it: the sum of the eigenvalues' powers.
+    The bound is a root of the trace of a power of the matrix: the trace is the sum of the powers of
+    all eigenvalues.  It is a few per cent above the largest eigenvalue.
     """
     scale = np.einsum("...ii->...", matrices)
     power = matrices / scale[..., None, None]
@@ -246,95 +251,103 @@ def _largest_eigenvalues(matrices: Floats) -> Floats:
 
 
 def _largest_of_two(first: Floats, second: Floats, square: Floats) -> Floats:
-    """Larger eigenvalue of symmetric matrices of two rows; `square` is that of the other entry."""
+    """Return the larger eigenvalue of symmetric 2 x 2 matrices.
+
+    `first` and `second` are the diagonal entries, `square` is the off-diagonal entry squared.
+    """
     return np.asarray((first + second + np.sqrt((first - second) ** 2 + 4.0 * square)) / 2.0)
 
 
 def _largest_tension(preload: tuple[float, float, float]) -> float:
-    """Largest principal value of the preload, force/length; 0 if both are compression."""
+    """Return the largest principal value of the preload, force/length; 0 if both are negative."""
     n_x, n_y, n_xy = preload
     return max(0.0, (n_x + n_y) / 2.0 + float(np.hypot((n_x - n_y) / 2.0, n_xy)))
 
 
-# Largest residual of the highest mode, relative to its eigenvalue; it bounds the error.
+# Largest residual of the highest mode relative to its eigenvalue; it bounds the error.
 TOLERANCE = 1.0e-4
-# The same after PATIENCE steps.  In a large plate of equal elements the highest frequencies are so
-# close together that the number of steps to TOLERANCE grows with the plate's size.
+# Tolerance after PATIENCE steps.  The highest frequencies of a large plate of equal elements are
+# close together, so that the number of steps to TOLERANCE grows with the plate's size.
 RELAXED = 1.0e-3
 PATIENCE = 100
-PART = 32  # elements whose highest frequencies are computed at once
+PART = 32  # number of elements whose highest frequencies are computed at once
 FEW = 20  # fewer equations are solved as a dense problem
-MOST_STEPS = 1000  # of the iteration
-ROUNDING = 1.0e-9  # of eigenvalues, at most
+MOST_STEPS = 1000  # largest number of steps of the iteration
+ROUNDING = 1.0e-9  # largest relative rounding error of eigenvalues
 BEYOND = "the stiffness is beyond the range of numbers"
 
 
 def safe_time_step(model: PlateModel) -> float:
-    """A lower bound of the critical time step, from the elements alone.
+    """Return a lower bound of the critical time step, computed from single elements.
 
-    The largest frequency of the plate is at most that of its unsupported elements (theorem of Irons
-    and Treharne).  The bound is a few per cent below the critical step for equal elements, and up
-    to 20 per cent for distorted ones.  Raises UnsoundPlateError if the stiffness of one of these
-    elements is not finite.
+    The largest frequency of the plate is at most the largest frequency of its unsupported elements
+    (theorem of Irons and Treharne).  The bound is a few per cent below the critical step for equal
+    elements, and up to 20 per cent below it for distorted elements.  Raises UnsoundPlateError if
+    the stiffness of one of these elements is not finite.
     """
     fastest = 0.0
     for family in model.families:
         unlike = family.take(family.congruence.representatives)
-        # For few elements, bounds would not pay.
-        many = len(unlike.rows) > PART
-        bounds = eigenvalue_bounds(model, unlike) if many else np.full(len(unlike.rows), np.inf)
+        # Bounds do not pay for few elements.
+        is_worth_bounding = len(unlike.rows) > PART
+        bounds = (
+            eigenvalue_bounds(model, unlike)
+            if is_worth_bounding
+            else np.full(len(unlike.rows), np.inf)
+        )
         highest_first = np.argsort(-bounds, kind="stable")
         for start in range(0, len(bounds), PART):
             members = highest_first[start : start + PART]
             members = members[bounds[members] >= (1.0 - ROUNDING) * fastest]
             if not len(members):
                 break
-            fastest = _fastest_of(model, unlike.take(members), fastest)
+            fastest = _largest_element_eigenvalue(model, unlike.take(members), fastest)
     return 2.0 / float(np.sqrt(fastest))
 
 
-def _fastest_of(model: PlateModel, block: ElementBlock, known: float) -> float:
-    """Largest eigenvalue of M^-1 K of the elements of a block, or `known` if that is larger."""
+def _largest_element_eigenvalue(model: PlateModel, block: ElementBlock, floor: float) -> float:
+    """Return the largest eigenvalue of M^-1 K in a block, or `floor` if that is larger."""
     mass = element_matrices.lumped_mass(block, model.laminate_of(block), model.rules.bending)
     scale = 1.0 / np.sqrt(mass.reshape(len(block.rows), -1))
     with np.errstate(all="ignore"):
         scaled = model.stiffness_of(block) * scale[:, :, None] * scale[:, None, :]
     if not np.isfinite(scaled).all():
         raise UnsoundPlateError(BEYOND)
-    if known > 0.0:
-        # A Cholesky factor, at a tenth of the cost, exists if all eigenvalues are smaller.
+    if floor > 0.0:
+        # A Cholesky factor exists if all eigenvalues are smaller; it takes a tenth of the time.
         with suppress(np.linalg.LinAlgError):
-            np.linalg.cholesky((1.0 - ROUNDING) * known * np.eye(scaled.shape[-1]) - scaled)
-            return known
-    return max(known, float(np.linalg.eigvalsh(scaled)[:, -1].max()))
+            np.linalg.cholesky((1.0 - ROUNDING) * floor * np.eye(scaled.shape[-1]) - scaled)
+            return floor
+    return max(floor, float(np.linalg.eigvalsh(scaled)[:, -1].max()))
 
 
 def taken_time_step(critical: float) -> float:
-    """Time step of DT 0: 0.9 of the critical one, rounded to three digits."""
+    """Return the time step of DT 0: 0.9 of the critical step, rounded to three digits."""
     return float(f"{SAFE * critical:.3g}")
 
 
 def rounded_time_step(critical: float) -> float:
-    """Time step of ``fecm new``: 0.9 of the critical one, rounded down to two digits."""
+    """Return the step of ``fecm new``: 0.9 of the critical step, rounded down to two digits."""
     limit = SAFE * critical
     unit = 10.0 ** (math.floor(math.log10(limit)) - 1)
     return float(f"{math.floor(limit / unit) * unit:.1e}")
 
 
 def critical_time_step(model: PlateModel, spring: tuple[Floats, float] | None = None) -> float:
-    """Critical time step of the central differences.
+    """Return the critical time step of the central differences.
 
-    Lanczos iteration, without assembling the stiffness.  The relative error is at most 5e-5, or
-    5e-4 where 100 steps do not suffice for that; the step is then too large rather than too small.
-    A spring to ground has weights, (neq,), and a stiffness (force/length).  Raises
-    UnsoundPlateError if the stiffness is not finite or the iteration fails.
+    The largest frequency is found by Lanczos iteration without assembling the stiffness.  The
+    relative error is at most 5e-5, or 5e-4 if 100 steps do not suffice; the result is then too
+    large rather than too small.  A spring to ground is a pair of weights, (neq,), and a stiffness
+    (force/length).  Raises UnsoundPlateError if the stiffness is not finite or the iteration fails.
     """
     with np.errstate(all="ignore"):
         plate_alone, mass, places = _accelerations(model)
         product = plate_alone if spring is None else _with_spring(plate_alone, spring, mass, places)
         scale = 1.0 / np.sqrt(model.mass)
 
-        # Fractions of multiples of the golden ratio: no mode of a plate is orthogonal to them.
+        # Start with fractions of multiples of the golden ratio: no mode of a plate is orthogonal
+        # to them.
         start = np.zeros(len(mass))
         start[places] = (np.arange(1.0, model.neq + 1.0) * 0.6180339887498949 % 1.0 - 0.5) * scale
         if not np.isfinite(product(start)).all():
@@ -345,9 +358,10 @@ def critical_time_step(model: PlateModel, spring: tuple[Floats, float] | None = 
 
 
 def _accelerations(model: PlateModel) -> tuple[Callable[[Floats], Floats], Floats, Indices]:
-    """The product M^-1 K u in the solver's order, the masses, and the places of the equations.
+    """Return the product M^-1 K u in the solver's order, the masses, and the equations' places.
 
-    Entries without an equation have no mass and stay 0.  The next call overwrites the result.
+    Entries without an equation have no mass and stay 0.  The next call of the product overwrites
+    its result.
     """
     operator = stiffness_operator(model)
     if not isinstance(operator, CompiledProduct):
@@ -364,14 +378,14 @@ def _with_spring(
     mass: Floats,
     places: Indices,
 ) -> Callable[[Floats], Floats]:
-    """The product with the accelerations by a spring to ground."""
-    held = np.flatnonzero(spring[0])
-    at, weights = places[held], spring[0][held]
-    share = spring[1] * weights / mass[at]
+    """Add the accelerations of a spring to ground to a product."""
+    equations = np.flatnonzero(spring[0])
+    entries, weights = places[equations], spring[0][equations]
+    share = spring[1] * weights / mass[entries]
 
     def with_spring(u: Floats) -> Floats:
         acceleration = product(u)
-        acceleration[at] += float((weights * u[at]).sum()) * share
+        acceleration[entries] += float((weights * u[entries]).sum()) * share
         return acceleration
 
     return with_spring
@@ -380,7 +394,7 @@ def _with_spring(
 def _largest_of_few(
     product: Callable[[Floats], Floats], scale: Floats, places: Indices, size: int
 ) -> float:
-    """Largest eigenvalue of a product with few equations; `scale` is 1 over the root of M."""
+    """Return the largest eigenvalue of a product with few equations; `scale` is M^(-1/2)."""
     columns: list[Floats] = []
     for place, factor in zip(places.tolist(), scale.tolist(), strict=True):
         unit = np.zeros(size)
@@ -390,8 +404,8 @@ def _largest_of_few(
 
 
 def _largest_eigenvalue(product: Callable[[Floats], Floats], mass: Floats, start: Floats) -> float:
-    """Largest eigenvalue of M^-1 K by Lanczos iteration in the inner product of the masses."""
-    # Without reorthogonalisation, whose lack only repeats converged eigenvalues.
+    """Find the largest eigenvalue of M^-1 K by Lanczos iteration in the inner product of M."""
+    # Without reorthogonalisation, converged eigenvalues are only repeated.
     last, before, beta = start / math.sqrt(float((mass * start * start).sum())), 0.0 * start, 0.0
     diagonal: list[float] = []
     beside: list[float] = []
@@ -413,18 +427,18 @@ def _largest_eigenvalue(product: Callable[[Floats], Floats], mass: Floats, start
 
 
 def _orthogonalise(
-    found: Floats, last: Floats, before: Floats, beta: float, mass: Floats
+    product: Floats, last: Floats, before: Floats, beta: float, mass: Floats
 ) -> tuple[float, float]:
-    """Overwrite `before` by `found` - beta `before` - alpha `last`; alpha, and the norm of that.
+    """Overwrite `before` by `product` - beta `before` - alpha `last`; return alpha and its norm.
 
-    The sums go over pieces that fit the cache, and are the same for any number of threads.
+    The sums run over pieces that fit the cache, and are the same for any number of threads.
     """
     alpha, square = 0.0, 0.0
     cuts = pieces(len(mass))
     for piece in cuts:
         rest = before[piece]
         rest *= -beta
-        rest += found[piece]
+        rest += product[piece]
         alpha += float((mass[piece] * last[piece]) @ rest)
     for piece in cuts:
         rest = before[piece]

@@ -1,6 +1,6 @@
-"""Compiled kernels, where the installation has them; :data:`LIBRARY` is None otherwise.
+"""Compiled kernels, if the installation has them; :data:`LIBRARY` is None otherwise.
 
-Each kernel has one Python file, with its structures, what goes in and what comes out:
+Each kernel has one Python file, which defines its structures, its input and its output:
 
 - K u: :mod:`~fecm.mechanics.kernels.plate`, with :mod:`~fecm.mechanics.kernels.element_groups`
   and :mod:`~fecm.mechanics.kernels.membrane`;
@@ -10,7 +10,7 @@ Each kernel has one Python file, with its structures, what goes in and what come
 - exposures of plies: :mod:`~fecm.mechanics.kernels.failure`, from the strains of
   :mod:`~fecm.mechanics.kernels.strains`.
 
-This one finds and loads the library.
+This file finds and loads the library.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from fecm._typing import Floats
 if TYPE_CHECKING:
     from ctypes import _Pointer
 
-# Kinds of the fields of structures that point to arrays.
+# Types of structure fields that point to arrays.
 Doubles = POINTER(c_double)
 Integers = POINTER(c_int32)
 Longs = POINTER(c_int64)
@@ -45,7 +45,7 @@ POINTERS = {
     )
 }
 
-# Result and arguments of the functions of the library; structures are passed by reference.
+# Result and arguments of the library's functions.  Structures are passed by reference.
 FUNCTIONS = {
     "fecm_stamp": (c_int, []),
     "fecm_has_avx2": (c_int, []),
@@ -56,40 +56,40 @@ FUNCTIONS = {
     "fecm_failure": (None, [c_void_p, c_int64, c_int64, Doubles, Doubles, Doubles, Longs, Codes]),
 }
 
-# Library that the build puts beside this file; it knows nothing of Python.
+# Library that the build puts beside this file.  It does not depend on Python.
 PATH = Path(__file__).with_name(
     "libfecm" + {"win32": ".dll", "darwin": ".dylib"}.get(sys.platform, ".so")
 )
 
 
 def _load() -> ctypes.CDLL | None:
-    """Compiled library of these sources, None without one.
+    """Load the library compiled from these sources; return None if there is no such library.
 
-    A library that is there and can't be used is a warning: NumPy takes its place, and is slower.
+    Warns if a library exists but can't be used.  NumPy, which is slower, then replaces it.
     """
     if not PATH.exists():
         return None
     try:
         library = ctypes.CDLL(str(PATH))
         if library.fecm_stamp() == stamp(Path(__file__).parent):
-            return _with_types(library)
-        why = "it was compiled from other sources"
+            return _declare_types(library)
+        reason = "it was compiled from other sources"
     except OSError:
-        why = "this system can't load it"
+        reason = "this system can't load it"
     except AttributeError:
-        why = "it is another library"
+        reason = "it is another library"
     from multiprocessing import current_process  # 5 ms, only for the warning
 
     if current_process().name == "MainProcess":  # not in each worker of a sweep
         warn(
-            f"the compiled kernels {PATH} are not used, as {why}; NumPy is used instead and is "
+            f"the compiled kernels {PATH} are not used, as {reason}; NumPy is used instead and is "
             "slower.  Install fecm again, from its sources with `pip install -e .`"
         )
     return None
 
 
-def _with_types(library: ctypes.CDLL) -> ctypes.CDLL:
-    """The library, its functions with the types of their results and arguments."""
+def _declare_types(library: ctypes.CDLL) -> ctypes.CDLL:
+    """Declare the types of the results and arguments of the library's functions."""
     for name, (result, arguments) in FUNCTIONS.items():
         function = getattr(library, name)
         function.restype, function.argtypes = result, arguments
@@ -97,36 +97,37 @@ def _with_types(library: ctypes.CDLL) -> ctypes.CDLL:
 
 
 def stamp(folder: Path) -> int:
-    """Checksum of the sources in a folder, which the compiled library carries."""
+    """Return the checksum of the sources in a folder; the compiled library contains it."""
     return zlib.crc32(b"".join(path.read_bytes() for path in sorted(folder.glob("*.[ch]")))) >> 1
 
 
-# Any, as the functions of a library have no types, and callers that need one have asked before
-# whether there is one.
+# Any, because the functions of a library have no types, and callers check beforehand that the
+# library is not None.
 LIBRARY: Any = _load()
 
 
 def description() -> str:
-    """Which kernels are in use, in words."""
+    """Describe which kernels are in use."""
     if LIBRARY is None:
         return "not compiled; NumPy is used"
     return f"compiled, {'AVX2' if LIBRARY.fecm_has_avx2() else 'portable'}"
 
 
 class Structure(ctypes.Structure):
-    """A structure of structures.h, filled by the names of its fields.
+    """A structure of structures.h, filled by keyword arguments.
 
-    Pointers are given as arrays, in C order and of the field's type; they live as long as the
-    structure.  An array in another order needs a pointer of :func:`floats`, and must be kept alive.
+    Pass pointers as arrays, in C order and of the field's type; the structure keeps the arrays
+    alive.  For an array in another order pass a pointer of :func:`floats`, and keep the array
+    alive.
     """
 
     def __init__(self, **values: Any) -> None:
         self.held = values
-        super().__init__(**{name: _passed(value) for name, value in values.items()})
+        super().__init__(**{name: _as_field(value) for name, value in values.items()})
 
 
-def _passed(value: Any) -> Any:
-    """An array as a pointer, anything else as it is."""
+def _as_field(value: Any) -> Any:
+    """Convert an array to a pointer; return anything else unchanged."""
     if not isinstance(value, np.ndarray):
         return value
     if not value.flags.c_contiguous:
@@ -135,13 +136,13 @@ def _passed(value: Any) -> Any:
 
 
 def floats(array: Floats) -> _Pointer[c_double]:
-    """Pointer to the first number of an array, which the caller keeps alive."""
+    """Return a pointer to the first number of an array; the caller keeps the array alive."""
     return array.ctypes.data_as(Doubles)
 
 
 def filled(array: Floats) -> Floats:
-    """An array in C order whose last axis is filled up to fours with zeros."""
+    """Return an array in C order whose last axis is zero-padded to a multiple of four."""
     *leading, count = array.shape
-    whole = np.zeros((*leading, -(-count // 4) * 4))
-    whole[..., :count] = array
-    return whole
+    padded = np.zeros((*leading, -(-count // 4) * 4))
+    padded[..., :count] = array
+    return padded

@@ -1,4 +1,4 @@
-"""Groups of elements for the compiled kernels: those that share one matrix, or the same tables."""
+"""Groups of elements for the compiled kernels, which share one matrix or the same tables."""
 
 from __future__ import annotations
 
@@ -20,33 +20,33 @@ from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.strains import FLAT
 from fecm.mechanics.symmetry import TURNED, opposite_nodes
 
-# With fewer congruent elements a shared matrix fills too few lanes.
+# A shared matrix of fewer congruent elements would leave too many lanes empty.
 WORTH_GROUPING = 8
 # Largest coupling of even and odd motions of an element, relative to its largest stiffness.
 SYMMETRIC = 1e-14
 
 
-# Value, twice the slope, and second derivative at 0 of a quadratic function by its values at -1, 0
-# and 1.
+# Value, twice the slope, and second derivative at 0 of a quadratic function, from its values at
+# -1, 0 and 1.
 QUADRATIC = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 1.0], [1.0, -2.0, 1.0]])
-# Fields of a Group by their names.
+# Fields of a GroupStruct by name.
 Fields = dict[str, int | Floats | NDArray[np.int32]]
 
 
 class ElementKind(IntEnum):
     """How the kernels compute K u of a group."""
 
-    ONE_MATRIX = 0  # a matrix for all elements
-    TWO_MATRICES = 1  # one for the even and one for the odd motions under half a turn
+    ONE_MATRIX = 0  # one matrix for all elements
+    TWO_MATRICES = 1  # one matrix for motions even under a half turn, one for odd motions
     FACTORIZED = 2  # quadrature of 9-node elements, along xi and then along eta
     TABULATED = 3  # quadrature with tables of the shape functions
 
 
 class GroupStruct(Structure):
-    """Elements with the same nodes present and the same laminate, and either a matrix or none.
+    """Elements with the same nodes present and the same laminate, with or without a matrix.
 
     Arrays that a kind does not use are not set.  n is the number of dofs of an element, `nodes`
-    times nd; (points) are those of bending, of shear or of tying.
+    times nd.  The dimensions `bending`, `shear` and `tying` are numbers of points.
 
     ================  ============================  ==========================================
     Field             Shape                         Meaning
@@ -55,26 +55,26 @@ class GroupStruct(Structure):
     `matrix`          (n, n)                        stiffness, dof by dof and then node by node
     TWO_MATRICES:
     `pairs`           number                        node i < `pairs` and i + `pairs` are images
-    `matrix`          (even, even) and (odd, odd)   stiffness of both motions, in a row
+    `matrix`          (even, even) and (odd, odd)   stiffness of even, then of odd motions
     FACTORIZED:
-    `bending`         number                        points in a direction, also `shear`
-    `rotations`       (bending,)                    these points, ascending
+    `bending`         number                        points in a direction; likewise `shear`
+    `rotations`       (bending,)                    points of bending, ascending
     `rotations_t`     (bending, bending)            weights of the points of bending
     `deflection`      (shear,)                      points of shear, ascending
     `deflection_t`    (shear, shear)                weights of the points of shear
-    `tying`           number                        whether the shear strains are assumed ones
+    `tying`           number                        whether shear strains are assumed
     TABULATED:
-    `bending`         number                        points, also `shear`
+    `bending`         number                        points; likewise `shear`
     `tying`           number                        tying points of each strain, or 0
     `rotations`       (2 bending + values, nodes)   slopes in xi, in eta, and values
     `deflection`      (slopes, nodes)               slopes in xi and in eta
-    `rotations_t`     transposed                    also `deflection_t`
-    `in_plane_t`      (nodes, 2 bending)            the slopes at the points of bending
+    `rotations_t`     transposed                    likewise `deflection_t`
+    `in_plane_t`      (nodes, 2 bending)            slopes at the points of bending
     `tied`            (2, shear, tying)             weights between the tying points
     `tied_t`          (2, tying, shear)             transposed
     Nonlinear plate:
-    `parallelograms`  number                        whether the elements are, in a flat plate
-    `curved`          number                        whether the plate is
+    `parallelograms`  number                        whether all are, in a flat plate
+    `curved`          number                        whether the plate is curved
     `grid`            (9,)                          places of the nodes in rows of eta
     All:
     `stiffness`       (6, 6)                        of midplane strains and negative curvatures
@@ -82,8 +82,8 @@ class GroupStruct(Structure):
     `coupled`         number                        whether B is not 0
     ================  ============================  ==========================================
 
-    With a preload `deflection` has the slopes at the points of bending last, and after them with a
-    curvature the values there.
+    With a preload, the slopes at the points of bending are appended to `deflection`.  With a
+    curvature, the values at these points are appended after them.
     """
 
     _fields_ = (
@@ -111,10 +111,11 @@ class GroupStruct(Structure):
 
 
 class ElementGroup:
-    """Elements of a family, `plate.families` or a part of one, that share a matrix or have none.
+    """Elements of a family that share a matrix, or that have no matrix.
 
-    `columns` are the dofs of a node that move, `weights` the number of elements that each
-    represents.  `order` are the nodes of an element as the arrays have them.
+    `family` is one of `plate.families`, or a part of one.  `columns` are the moving dofs of a node.
+    `weights` is the number of elements that each element represents.  `order` is the order of the
+    nodes of an element in the arrays.
     """
 
     def __init__(
@@ -127,7 +128,7 @@ class ElementGroup:
         congruent: bool,
         nonlinear: bool = False,
     ) -> None:
-        # The strains w/R of a nonlinear plate are those of its membrane.
+        # The membrane of a nonlinear plate contains the strains w/R.
         self._plate = replace(plate, curvature=FLAT) if nonlinear else plate
         self._curvature = plate.curvature
         self._columns = columns
@@ -172,16 +173,16 @@ class ElementGroup:
 
     @property
     def has_matrix(self) -> bool:
-        """Whether the elements have a matrix in common."""
+        """Whether the elements share a matrix."""
         return self.kind in (ElementKind.ONE_MATRIX, ElementKind.TWO_MATRICES)
 
     @property
     def needs_data(self) -> bool:
-        """Whether the kernels need numbers at the points of quadrature."""
+        """Whether the kernels need data at the points of quadrature."""
         return not self.has_matrix or (self._nonlinear and not self.parallelograms)
 
     def _is_factorized(self) -> bool:
-        """Whether the kernels have sums along xi and eta for elements without a matrix."""
+        """Return whether the kernels sum along xi, then eta, for elements without a matrix."""
         plate, family, rules = self._plate, self.family, self._plate.rules
         return family.nodes.shape[1] == family.shape.nodes == 9 and not (
             self._nonlinear
@@ -190,12 +191,12 @@ class ElementGroup:
             or (rules.assumes_shear and rules.transposed_jacobian)
         )
 
-    def _differing(self, members: Indices) -> Indices:
-        """The first element in all lanes of a block instead of congruent ones."""
+    def _distinct_members(self, members: Indices) -> Indices:
+        """Replace congruent elements by the first element in all lanes of one block."""
         return np.zeros(LANES, dtype=np.intp) if self.has_matrix else members
 
     def _matrices(self, weight: float) -> tuple[ElementKind, Fields]:
-        """The common matrix, or those of the even and odd motions; sets the order."""
+        """Return the shared matrix, or the matrices of even and odd motions; set the order."""
         nn = self.family.nodes.shape[1]
         columns = self._columns
         K = weight * self._plate.stiffness_of(self.family.take(np.array([0])))[0]
@@ -212,32 +213,32 @@ class ElementGroup:
         return ElementKind.ONE_MATRIX, {"matrix": K.reshape(nn * len(columns), -1).copy()}
 
     def _halves(self, K: Floats, pairs: int) -> Floats | None:
-        """Matrices of the even and the odd motions, in a row; None if they are coupled."""
+        """Return the matrices of even and odd motions, flattened; None if they are coupled."""
         nd, nn = K.shape[:2]
         even: list[Floats] = []
         odd: list[Floats] = []
         unit = np.eye(nd * nn).reshape(nd, nn, -1)
         for dof, column in enumerate(self._columns):
-            one = unit[dof, :pairs]
-            other = unit[dof, pairs : 2 * pairs]
+            first = unit[dof, :pairs]
+            image = unit[dof, pairs : 2 * pairs]
             centre = unit[dof, 2 * pairs :]
             if TURNED[column] > 0.0:
-                even += [*(one + other), *centre]
-                odd += list(one - other)
+                even += [*(first + image), *centre]
+                odd += list(first - image)
             else:
-                even += list(one - other)
-                odd += [*(one + other), *centre]
+                even += list(first - image)
+                odd += [*(first + image), *centre]
         T = np.array(even + odd)
         scale = 1.0 / (T**2).sum(axis=1)
-        turned = scale[:, None] * (T @ K.reshape(nd * nn, -1) @ T.T) * scale
+        transformed = scale[:, None] * (T @ K.reshape(nd * nn, -1) @ T.T) * scale
         n = len(even)
-        coupled = max(abs(turned[:n, n:]).max(), abs(turned[n:, :n]).max())
-        if coupled > SYMMETRIC * abs(turned).max():
+        coupled = max(abs(transformed[:n, n:]).max(), abs(transformed[n:, :n]).max())
+        if coupled > SYMMETRIC * abs(transformed).max():
             return None
-        return np.concatenate([turned[:n, :n].ravel(), turned[n:, n:].ravel()])
+        return np.concatenate([transformed[:n, :n].ravel(), transformed[n:, n:].ravel()])
 
     def _factors(self) -> Fields:
-        """Points of a direction, and weights of the points in the order of eta and then xi."""
+        """Return the points of a direction, and the points' weights in rows of eta."""
         bending, shear = self._rules
         of_bending = distinct(bending.xi)
         of_shear = distinct(shear.xi)
@@ -252,7 +253,7 @@ class ElementGroup:
         }
 
     def _tables(self) -> Fields:
-        """Values and slopes of the shape functions at the points of quadrature."""
+        """Return values and slopes of the shape functions at the points of quadrature."""
         family = self.family
         bending, shear = self._rules
         nn = family.nodes.shape[1]
@@ -286,18 +287,18 @@ class ElementGroup:
         }
 
     def data(self, members: Indices) -> Floats:
-        """Numbers of elements without a matrix, (blocks, numbers, 8); one block if congruent.
+        """Return the data of elements without a matrix, (blocks, numbers, 8).
 
-        FACTORIZED: a factor, and coefficients of x and of y, (1 + 8 + 8); TABULATED: inverse
-        Jacobian with its determinant times the weight, (points, 5), and slopes of the mapping at
-        the tying points, (2 tying, 2).
+        FACTORIZED elements have a factor, and coefficients of x and of y, (1 + 8 + 8).  TABULATED
+        elements have the inverse Jacobian with its determinant times the weight, (points, 5), and
+        slopes of the mapping at the tying points, (2 tying, 2).  Congruent elements have one block.
         """
-        members = self._differing(members)
+        members = self._distinct_members(members)
         if self.kind == ElementKind.FACTORIZED:
             return _in_lanes(self._coefficients(members))
         family = self.family.take(members)
         assumed, swaps = self._plate.rules.assumes_shear, self._plate.rules.transposed_jacobian
-        # Assumed shear strains have the right Jacobian.
+        # Assumed shear strains never use the transposed Jacobian.
         transposed_of = (swaps, swaps and not assumed)
         parts = [
             self._at_points(rule, family, members, transposed=transposed)
@@ -308,8 +309,8 @@ class ElementGroup:
         return _in_lanes(np.concatenate([part.reshape(len(members), -1) for part in parts], axis=1))
 
     def membrane(self, members: Indices) -> Floats:
-        """Numbers of the membrane of elements, (blocks, numbers, 8); one block if congruent."""
-        members = self._differing(members)
+        """Return the membrane data, (blocks, numbers, 8); congruent elements have one block."""
+        members = self._distinct_members(members)
         family, weights = self.family.take(members), self._weights[members]
         return _in_lanes(
             membrane.numbers(
@@ -322,7 +323,7 @@ class ElementGroup:
         )
 
     def _coefficients(self, members: Indices) -> Floats:
-        """A quarter of the weights, and coefficients of the coordinates but the constant ones."""
+        """Return a quarter of the weights, and the coordinates' coefficients except constants."""
         places = np.ascontiguousarray(self.family.coordinates.swapaxes(1, 2))
         places -= places[:, :, self.order[4], None]  # the centre
         table = np.kron(QUADRATIC, QUADRATIC)[1:, np.argsort(self.order)]
@@ -333,7 +334,7 @@ class ElementGroup:
     def _at_points(
         self, rule: Quadrature, family: ElementBlock, members: Indices, *, transposed: bool
     ) -> Floats:
-        """Inverse Jacobian, and its determinant times the weight, (ne, npt, 5)."""
+        """Return the inverse Jacobian, and its determinant times the weight, (ne, npt, 5)."""
         _, local = local_shape_functions(family, rule)
         inverse, determinant = jacobians(family, local, transposed)
         jxw = determinant * rule.weights * self._weights[members, None]
@@ -343,52 +344,52 @@ class ElementGroup:
 def grouped(
     family: ElementBlock, weights: Floats, *, nonlinear: bool = False
 ) -> list[tuple[Indices, bool]]:
-    """Groups of a family's elements that move, and whether they are congruent.
+    """Group a family's elements, and return whether each group is congruent.
 
-    Elements of weight 0 are left out: they are images of others.  Of a nonlinear plate, groups are
-    either of parallelograms or of other elements.
+    Elements of weight 0 are images of other elements and are left out.  For a nonlinear plate a
+    group contains either parallelograms or other elements.
     """
-    same = family.congruence
-    (stepped,) = np.nonzero(weights)
-    key = 3 * same.group[stepped] + weights[stepped].astype(int)
+    congruence = family.congruence
+    (members,) = np.nonzero(weights)
+    key = 3 * congruence.group[members] + weights[members].astype(int)
     _, group, counts = np.unique(key, return_inverse=True, return_counts=True)
-    many = np.flatnonzero(counts >= WORTH_GROUPING)
-    found = [(stepped[group == one], True) for one in many.tolist()]
-    alone = stepped[counts[group] < WORTH_GROUPING]
-    parts = [alone]
+    shared = np.flatnonzero(counts >= WORTH_GROUPING)
+    groups = [(members[group == number], True) for number in shared.tolist()]
+    single = members[counts[group] < WORTH_GROUPING]
+    parts = [single]
     if nonlinear:
-        flat = membrane.are_parallelograms(family.take(alone))
-        parts = [alone[flat], alone[~flat]]
-    return [*found, *((part, False) for part in parts if len(part))]
+        flat = membrane.are_parallelograms(family.take(single))
+        parts = [single[flat], single[~flat]]
+    return [*groups, *((part, False) for part in parts if len(part))]
 
 
 def _in_lanes(values: Floats) -> Floats:
-    """Numbers of elements, (ne, numbers), eight elements at a time, (blocks, numbers, 8)."""
+    """Arrange data of elements, (ne, numbers), in lanes, (blocks, numbers, 8)."""
     return np.ascontiguousarray(values.reshape(-1, LANES, values.shape[1]).swapaxes(1, 2))
 
 
 def _in_rows(rule: Quadrature) -> Floats:
-    """Weights of the points, along xi first."""
+    """Return the weights of the points, along xi first."""
     return np.asarray(rule.weights[np.lexsort((rule.eta, rule.xi))])
 
 
 def _slopes(local: Floats) -> Floats:
-    """Slopes in xi at all points, then in eta, (2 npt, nn), of (npt, 2, nn)."""
+    """Return slopes in xi at all points, then in eta, (2 npt, nn), from (npt, 2, nn)."""
     return local.transpose(1, 0, 2).reshape(-1, local.shape[2])
 
 
 def slopes_of_mapping(family: ElementBlock) -> list[Floats]:
-    """Slopes x,xi and y,xi at the tying points along xi, and those in eta; (ne, tying, 2) each."""
+    """Return x,xi and y,xi at the tying points of e_xi; likewise for eta; (ne, tying, 2) each."""
     nn = family.nodes.shape[1]
-    found: list[Floats] = []
+    slopes: list[Floats] = []
     for axis in (0, 1):
         _, local = local_shape_functions(family, strains.tying_points(nn, axis))
-        found.append(np.einsum("tn,eni->eti", local[:, axis], family.coordinates))
-    return found
+        slopes.append(np.einsum("tn,eni->eti", local[:, axis], family.coordinates))
+    return slopes
 
 
 def jacobians(family: ElementBlock, local: Floats, transposed: bool) -> tuple[Floats, Floats]:
-    """Inverse Jacobian (ne, npt, 4) and its determinant (ne, npt), in closed form.
+    """Return the inverse Jacobian (ne, npt, 4) and the determinant (ne, npt), in closed form.
 
     See :func:`fecm.mechanics.interpolation.inverse_jacobian`.
     """

@@ -1,9 +1,9 @@
 """Largest exposures of the plies by the compiled kernels.
 
-In: displacement fields at their times, whose strains midplane.h computes.  Out: the exposures of
-the states of stress that :class:`~fecm.mechanics.failure_monitor.FailureMonitor` evaluates at the
-points, and of the interfaces, raised in place with their times and modes; and the largest of them
-after each field.
+In: displacement fields at their times; midplane.h computes their strains.  Out: exposures with
+times and modes, raised in place, of the interfaces and of the states of stress that
+:class:`~fecm.mechanics.failure_monitor.FailureMonitor` evaluates at the points; also the largest
+exposures after each field.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from fecm.mechanics.kernels.strains import MidplaneStruct, midplanes
 class PlyStruct(Structure):
     """Strengths, force/area, and slopes of a ply; see :class:`~fecm.mechanics.failure.Strengths`.
 
-    The last two are Puck's, of :func:`~fecm.mechanics.failure.puck_limits`.
+    The last two fields are the results of :func:`~fecm.mechanics.failure.puck_limits`.
     """
 
     _fields_ = (
@@ -50,7 +50,7 @@ class PliesStruct(Structure):
     The arrays:
 
     ==============  ======================  ====================================================
-    `row`           (points,)               rows of the points; not set if these are all
+    `row`           (points,)               rows of the points; not set for all points
     `stress`        (strains, 3, width)     stresses per strain
     `residual`      (3, width)              stresses without strain
     ==============  ======================  ====================================================
@@ -59,8 +59,8 @@ class PliesStruct(Structure):
     _fields_ = (
         ("points", c_int64),
         ("states", c_int64),
-        ("width", c_int64),  # number of states, filled up to fours
-        ("first", c_int64),  # of these states among those of a point
+        ("width", c_int64),  # number of states, padded to a multiple of four
+        ("first", c_int64),  # number of the first of these states at a point
         ("row", Longs),
         ("stress", Doubles),
         ("residual", Doubles),
@@ -76,7 +76,7 @@ class InterfacesStruct(Structure):
     The arrays:
 
     ===========  =======================  ======================================================
-    `row`        (elements,)              rows of the elements; not set if these are all
+    `row`        (elements,)              rows of the elements; not set for all elements
     `shear`      (2, strains, 4, width)   tau_13 and tau_23 over their strengths, of the plies above
                                           and below, per derivative of the strains
     ===========  =======================  ======================================================
@@ -85,10 +85,10 @@ class InterfacesStruct(Structure):
     _fields_ = (
         ("elements", c_int64),
         ("interfaces", c_int64),
-        ("width", c_int64),  # number of interfaces, filled up to fours
+        ("width", c_int64),  # number of interfaces, padded to a multiple of four
         ("row", Longs),
         ("shear", Doubles),
-        ("code", c_int64),  # of the mode of failure
+        ("code", c_int64),  # code of the mode of failure
     )
 
 
@@ -105,16 +105,16 @@ class LargestStruct(Structure):
 
 
 class ExposuresStruct(Structure):
-    """Exposures of a plate, and what they are found from.
+    """Exposures of a plate, and the data that they are computed from.
 
-    The arrays; the last two are those of the displacement in work:
+    The arrays; the last two belong to the current displacement:
 
     ==============  ======================  ====================================================
     `family`        (families,)             elements with the same nodes present
     `run`           (runs,)                 plies of the same strengths
     `zone`          (zones,)                interfaces of the elements of a laminate
     `counts`        (points,)               whether the exposures of a point count
-    `far`           (elements,)             whether those of the interfaces of an element do
+    `far`           (elements,)             whether exposures of an element's interfaces count
     `strain`        (points, strains)       midplane strains and curvatures
     `gradient`      (elements, 2, strains)  their derivatives
     ==============  ======================  ====================================================
@@ -122,11 +122,11 @@ class ExposuresStruct(Structure):
 
     _fields_ = (
         ("elements", c_int64),
-        ("points", c_int64),  # of all elements
-        ("states", c_int64),  # of a point in the arrays of `plies`
-        ("interfaces", c_int64),  # of an element in the arrays of `between`
-        ("strains", c_int64),  # of a point: 3 midplane strains and 3 curvatures, or these alone
-        ("criteria", c_int64),  # in the arrays of `largest`; the interlaminar one is the last
+        ("points", c_int64),  # points of all elements
+        ("states", c_int64),  # states per point in the arrays of `plies`
+        ("interfaces", c_int64),  # interfaces per element in the arrays of `between`
+        ("strains", c_int64),  # per point: 3 midplane strains and 3 curvatures, or 3 curvatures
+        ("criteria", c_int64),  # criteria in the arrays of `largest`; the interlaminar one is last
         ("families", c_int64),
         ("runs", c_int64),
         ("zones", c_int64),
@@ -143,14 +143,14 @@ class ExposuresStruct(Structure):
     )
 
 
-# Largest ratio of strengths in tension and compression, and largest F12*, for which rounding
-# changes an exposure by less than this: the sum in Tsai and Wu's root cancels beyond.
+# Pruning needs exposures whose rounding errors are below TIE.  Beyond this ratio of strengths in
+# tension and compression, or beyond this F12*, the sum in Tsai and Wu's root cancels.
 LARGEST_RATIO = 1e4
 LARGEST_F12 = 0.999
 
 
 def _ply(p: Strengths) -> PlyStruct:
-    """Strengths for the kernels."""
+    """Return the structure of a ply's strengths."""
     resistance, critical = puck_limits(p)
     return PlyStruct(
         xt=p.xt,
@@ -167,23 +167,23 @@ def _ply(p: Strengths) -> PlyStruct:
 
 
 def _prunes(p: Strengths) -> bool:
-    """Whether rounding of exposures is far below the share that the kernels take for equal."""
+    """Return whether rounding of exposures is far below the kernels' tolerance of ties."""
     ratio = max(p.xt / p.xc, p.xc / p.xt, p.yt / p.yc, p.yc / p.yt)
     return ratio <= LARGEST_RATIO and abs(p.f12) <= LARGEST_F12
 
 
 @dataclass
 class _Kept:
-    """What the kernels need to find the exposures of an envelope."""
+    """Arrays and structures with which the kernels raise an envelope."""
 
     monitor: CompiledMonitor
     structure: ExposuresStruct
-    strain: Floats  # (elements, points, strains): of the last displacement
-    held: list[Structure]  # of the arrays of structures, which must live as long
+    strain: Floats  # (elements, points, strains): strains of the last displacement
+    held: list[Structure]  # structures in the arrays of structures, which must live as long
 
 
 class CompiledMonitor(FailureMonitor):
-    """The same exposures."""
+    """Monitor whose exposures the compiled kernels evaluate."""
 
     represents: ClassVar[bool] = True
 
@@ -193,15 +193,15 @@ class CompiledMonitor(FailureMonitor):
         """Raise the exposures; see :meth:`FailureMonitor.update`."""
         if len(self.criteria) > len(CRITERIA) or self.circle is not None:
             return super().update(envelope, fields, times)
-        return self._known(envelope, fields, times)
+        return self._update_built_in(envelope, fields, times)
 
     def _evaluate(self, envelope: FailureEnvelope, displacement: Floats, time: float) -> None:
-        """Raise the exposures, and after the criteria that the kernel has those of users."""
-        if not self.has_interfaces:  # on the circle, which the kernel does not know
+        """Raise the exposures, first with the kernel's criteria, then with user-defined ones."""
+        if not self.has_interfaces:  # the kernel can't compute the strains on the circle
             strains, _ = self.stresses.strains(displacement)
             kept = self._kept(envelope).strain
             kept[...] = strains[..., 6 - kept.shape[2] :]
-        self._known(envelope, displacement[None], [time])
+        self._update_built_in(envelope, displacement[None], [time])
         if len(self.criteria) == len(CRITERIA):
             return
         strains = self._kept(envelope).strain
@@ -210,32 +210,32 @@ class CompiledMonitor(FailureMonitor):
         self._raise_plies(range(len(CRITERIA), len(self.criteria)), envelope.plies, strains, time)
         envelope.find_largest(self.counts, self.far, strains)
 
-    def _known(
+    def _update_built_in(
         self, envelope: FailureEnvelope, fields: Floats, times: Sequence[float]
     ) -> Evaluations:
-        """Raise the exposures of the criteria that the kernel has."""
-        u, at = np.ascontiguousarray(fields), np.array(times, dtype=np.float64)
+        """Raise the exposures of the kernel's criteria."""
+        u, field_times = np.ascontiguousarray(fields), np.array(times, dtype=np.float64)
         shape = len(u), len(envelope.largest.exposure)
-        found = Evaluations(np.empty(shape), np.empty(shape, np.int64), np.empty(shape, np.int8))
+        largest = Evaluations(np.empty(shape), np.empty(shape, np.int64), np.empty(shape, np.int8))
         LIBRARY.fecm_failure(
             ctypes.byref(self._kept(envelope).structure),
             *(len(u), u[0].size),
             floats(u),
-            floats(at),
-            floats(found.exposure),
-            found.state.ctypes.data_as(Longs),
-            found.mode.ctypes.data_as(Codes),
+            floats(field_times),
+            floats(largest.exposure),
+            largest.state.ctypes.data_as(Longs),
+            largest.mode.ctypes.data_as(Codes),
         )
-        return found
+        return largest
 
     def _kept(self, envelope: FailureEnvelope) -> _Kept:
-        """What the kernels need for an envelope, whatever its exposures are."""
+        """Return the arrays and structures of an envelope; create them on first use."""
         kept = envelope.kept
         if not isinstance(kept, _Kept) or kept.monitor is not self:
-            envelope.kept = kept = self._work(envelope)
+            envelope.kept = kept = self._create_structures(envelope)
         return kept
 
-    def _work(self, envelope: FailureEnvelope) -> _Kept:
+    def _create_structures(self, envelope: FailureEnvelope) -> _Kept:
         elements, points, _ = self.stresses.shape
         count = 6 if self.stresses.stretches else 3
         families = midplanes(self.stresses)
@@ -270,7 +270,7 @@ class CompiledMonitor(FailureMonitor):
         return _Kept(self, structure, strain, [*families, *runs, *zones])
 
     def _run(self, zone: ZoneCriteria, run: PlyRun, strains: int) -> PliesStruct:
-        """The structure of plies of the same strengths."""
+        """Return the structure of a run of plies."""
         stress = filled(zone.in_plane[6 - strains :, :, run.states])
         rows = None if isinstance(zone.points, slice) else zone.points
         return PliesStruct(
@@ -287,7 +287,7 @@ class CompiledMonitor(FailureMonitor):
         )
 
     def _interfaces(self, zone: ZoneCriteria, strains: int) -> InterfacesStruct:
-        """The structure of the interfaces of a zone."""
+        """Return the structure of the interfaces of a zone."""
         rows = None if isinstance(zone.elements, slice) else zone.elements
         shear = zone.shear / zone.weaker[:, None]  # (12, interfaces, plies, tau)
         shear = shear.reshape(2, 6, zone.interfaces, 4)[:, 6 - strains :].swapaxes(2, 3)

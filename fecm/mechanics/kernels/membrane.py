@@ -1,4 +1,4 @@
-"""Numbers of the membrane of a nonlinear plate for the compiled kernels; see membrane.h."""
+"""Membrane data of a nonlinear plate for the compiled kernels; see membrane.h."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from fecm.mechanics.mesh import TOLERANCE, ElementBlock
 from fecm.mechanics.plate import PlateModel
 from fecm.mechanics.strains import FLAT, Curvature, strain_of_deflection
 
-# Upper half of a symmetric (3, 3).
+# Upper triangle of a symmetric matrix (3, 3).
 _UPPER = np.triu_indices(3)
 
 
 def has_kernel_membrane(plate: PlateModel) -> bool:
-    """Whether the kernels have the membrane of a plate: of 9-node elements with 3 x 3 points."""
+    """Return whether the kernels have the membrane: for 9-node elements with 3 x 3 points."""
     rules = plate.rules
     return (
         rules.assumes_shear
@@ -27,12 +27,12 @@ def has_kernel_membrane(plate: PlateModel) -> bool:
 
 
 def node_grid(family: ElementBlock) -> Indices:
-    """Places of the nodes of a 9-node element in rows of eta, xi ascending, (9,)."""
+    """Return the nodes of a 9-node element in rows of eta, xi ascending, (9,)."""
     return np.lexsort((family.shape.xi, family.shape.eta))
 
 
 def are_parallelograms(family: ElementBlock) -> Bools:
-    """Whether elements are parallelograms, with their inner nodes in the middle, (ne,).
+    """Return whether elements are parallelograms with their inner nodes in the middle, (ne,).
 
     Positions are compared as for :attr:`~fecm.mechanics.mesh.ElementBlock.congruence`.
     """
@@ -40,8 +40,8 @@ def are_parallelograms(family: ElementBlock) -> Bools:
     middle = np.flatnonzero((shape.xi == 0.0) & (shape.eta == 0.0))
     places = family.coordinates - family.coordinates[:, middle]
     local = np.stack([shape.xi, shape.eta], axis=1)
-    apart = abs(places - local @ _centre(family)).max(axis=(1, 2))
-    return np.asarray(apart <= TOLERANCE * abs(places).max(axis=(1, 2)))
+    deviation = abs(places - local @ _centre(family)).max(axis=(1, 2))
+    return np.asarray(deviation <= TOLERANCE * abs(places).max(axis=(1, 2)))
 
 
 def numbers(
@@ -52,14 +52,17 @@ def numbers(
     *,
     parallelograms: bool,
 ) -> Floats:
-    """Numbers of elements, (ne, 16) for parallelograms and (ne, 56) or (ne, 59) for others.
+    """Return the data of elements: (ne, 16) for parallelograms, (ne, 56) or (ne, 59) otherwise.
 
-    All have halves of the base vectors x,xi and x,eta of the centre, (2, 2), and the upper halves
-    of A and -B for covariant strains, (6,) each.  For parallelograms the latter are multiplied by
-    the Jacobian determinant and by `weights`, the number of elements that each represents.  Others
-    have derivatives along half a base vector, per derivative in xi and in eta: along the first one
-    at the tying points of e_11, (6, 2), along the second one at those of e_22, (6, 2), and along
-    both at those of e_12, (4, 2, 2); and with a curvature the covariant strains per w, (3,).
+    The data of every element start with halves of the base vectors x,xi and x,eta of the centre,
+    (2, 2), and with the upper triangles of A and -B for covariant strains, (6,) each.  For
+    parallelograms A and B are multiplied by the Jacobian determinant and by `weights`, the number
+    of elements that each element represents.
+
+    Other elements also have derivatives along half a base vector, per derivative in xi and in eta:
+    along the first vector at the tying points of e_11, (6, 2), along the second vector at the tying
+    points of e_22, (6, 2), and along both vectors at the tying points of e_12, (4, 2, 2).  With a
+    curvature the covariant strains per w follow, (3,).
     """
     centre, laminate = _centre(family), plate.laminate_of(family)
     to_global = membrane.covariant_to_global(centre)
@@ -84,18 +87,18 @@ def numbers(
 
 
 def in_rows(rule: Quadrature) -> Quadrature:
-    """The points of a rule in rows of eta, xi ascending."""
+    """Sort the points of a rule into rows of eta, xi ascending."""
     rows = np.lexsort((rule.xi, rule.eta))
     return Quadrature(rule.xi[rows], rule.eta[rows], rule.weights[rows])
 
 
 def _centre(family: ElementBlock) -> Floats:
-    """Base vectors x,xi and x,eta of the elements' centres, (ne, 2, 2)."""
+    """Return the base vectors x,xi and x,eta of the elements' centres, (ne, 2, 2)."""
     _, local = local_shape_functions(family, gauss(1))
     return jacobian(family, local)[:, 0]
 
 
 def _product(xi: tuple[float, ...], eta: tuple[float, ...]) -> Quadrature:
-    """Points of a tensor product in rows of eta, without weights."""
+    """Return the points of a tensor product in rows of eta, without weights."""
     y, x = (grid.ravel() for grid in np.meshgrid(eta, xi, indexing="ij"))
     return Quadrature(x, y, np.zeros_like(x))

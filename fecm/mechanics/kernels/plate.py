@@ -1,10 +1,11 @@
 """A plate for the compiled kernels: its vectors, and its elements eight at a time.
 
-In: displacement, increment and scaled internal force of the independent dofs.  Out: the same after
-a product or a burst of steps.  :class:`CompiledPlate` puts them into the layout of the kernels.
+In: displacement, increment and scaled internal force of the independent dofs.  Out: the same
+vectors after a product or a burst of steps.  :class:`CompiledPlate` puts the vectors into the
+layout of the kernels.
 
 Chunks.  The plate is cut into chunks of at most 1024 near elements, whose forces stay in the cache.
-A vector has a part for each chunk, and a last one for the nodes that chunks share::
+A vector has a part for each chunk, and a last part for the nodes that chunks share::
 
     u:  | chunk 0      | chunk 1      | ... | chunk n - 1  | shared nodes |
         | (nd, nodes)  | (nd, nodes)  |     | (nd, nodes)  | (nd, nodes)  |
@@ -13,19 +14,23 @@ A vector has a part for each chunk, and a last one for the nodes that chunks sha
     a part:  u_0 u_1 u_2 ... u_(nodes - 1) | v_0 v_1 ...     | w_0 ...       | theta_x, theta_y
              one dof of all nodes            the next dof
 
-nd is 3 where u and v are at rest in a flat plate.  Of a nonlinear plate it is 5: the groups of
+nd is 3 if u and v are at rest in a flat plate.  For a nonlinear plate nd is 5: the groups of
 elements have matrices or tables of the last three dofs, and the membrane adds the rest.
 
-A chunk has places for all nodes of its elements: nodes of its own, which it moves; copies of shared
-nodes, which it fills from the last part before its blocks are computed, and whose forces it hands
-over afterwards; a spare place; and unused ones up to a multiple of eight.  Shared are nodes of
-several chunks, nodes that others follow by symmetry, and those that follow.  Entries that the chunk
-doesn't move have a mass of 0.
+A chunk has places for all nodes of its elements:
+
+- its own nodes, which the chunk moves;
+- copies of shared nodes, which the chunk fills from the last part before it computes its blocks,
+  and whose forces it hands over afterwards;
+- a spare place, and unused places up to a multiple of eight.
+
+A node is shared if several chunks have it, if it follows another node by symmetry, or if another
+node follows it.  Entries that the chunk doesn't move have a mass of 0.
 
 Blocks and lanes.  A block is eight elements of one group in one chunk, one in each lane.  Elements
 of a strip share sides, and places are numbered along strips, so that the first nodes of eight
-elements often have eight places in a row.  In a strip of 4-node elements, with node 1 of lane 0 at
-the place i and its node 4 at j::
+elements often have eight consecutive places.  In a strip of 4-node elements, with node 1 of lane 0
+at place i and node 4 of lane 0 at place j::
 
     places:   j    j+1  j+2  j+3  ...  j+8          node 4 of the lanes: j, j+1, ..., j+7
               +----+----+----+-- ... --+            node 3 of the lanes: j+1, ..., j+8
@@ -33,9 +38,10 @@ the place i and its node 4 at j::
               +----+----+----+-- ... --+            node 2 of the lanes: i+1, ..., i+8
     places:   i    i+1  i+2  i+3  ...  i+8          node 1 of the lanes: i, i+1, ..., i+7
 
-Place.  A block has one number for each node.  If it is not negative, it is the place of lane 0 and
-the other lanes follow.  If it is -1 - r, the eight places are row r of the table `lane`: at the end
-of a strip, and where elements are alone.  Lanes without an element have the spare place.
+Place.  A block has one number for each node.  A number that is not negative is the place of lane 0,
+and the other lanes follow.  The number -1 - r refers to row r of the table `lane`, which has the
+eight places.  This happens at the end of a strip, and for single elements.  Lanes without an
+element have the spare place.
 
 Sums and threads: see kernels.c.
 """
@@ -68,25 +74,28 @@ class BlockStruct(Structure):
     _fields_ = (
         ("group", POINTER(GroupStruct)),
         ("place", Integers),  # (nodes,): see the head of this module
-        ("data", Doubles),  # (numbers, 8): see ElementGroup.data; not set for those with a matrix
+        (
+            "data",
+            Doubles,
+        ),  # (numbers, 8): see ElementGroup.data; not set for elements with a matrix
         ("membrane", Doubles),  # (numbers, 8) of a nonlinear plate: see ElementGroup.membrane
     )
 
 
-# The same as an array's type: blocks are filled in by group, many at a time.
+# BlockStruct as the type of an array: the blocks of a group are filled together.
 BLOCK = np.dtype([(name, np.uint64) for name, _ in BlockStruct._fields_])
 
 
 class ChunkStruct(Structure):
-    """Blocks of near elements, and their nodes; the last chunk has only the shared nodes.
+    """Blocks of near elements, and their nodes.  The last chunk has only the shared nodes.
 
     The arrays:
 
     =========  ================  ==============================================================
     `shares`   (shared,)         places of the shared nodes in the last chunk
-    `copies`   (shared,)         places of their copies in this one
+    `copies`   (shared,)         places of their copies in this chunk
     `at_rest`  (fixed,)          entries of a vector (nd, nodes) that the chunk doesn't move
-    `signs`    (shared, nd)      copy over original: -1 for dofs that half a turn reverses
+    `signs`    (shared, nd)      copy over original: -1 for dofs that a half turn reverses
     `force`    (shared, nd)      forces on the copies, for the originals
     =========  ================  ==============================================================
     """
@@ -94,8 +103,8 @@ class ChunkStruct(Structure):
     _fields_ = (
         ("blocks", c_int64),
         ("block", POINTER(BlockStruct)),
-        ("first", c_int64),  # nodes of the chunks before
-        ("nodes", c_int64),  # a multiple of eight
+        ("first", c_int64),  # number of nodes in the chunks before
+        ("nodes", c_int64),  # number of nodes, a multiple of eight
         ("shared", c_int64),
         ("fixed", c_int64),
         ("shares", Integers),
@@ -113,15 +122,15 @@ class PlateStruct(Structure):
 
     ===========  =========================  ===================================================
     `lane`       (rows, 8)                  places of the lanes where they don't follow
-    `preload`    (3,)                       initial membrane force; not set without
-    `curvature`  (3,)                       strains per w of a curved plate; not set without, and
-                                            of a nonlinear plate, whose groups have it
+    `preload`    (3,)                       initial membrane force; not set without a preload
+    `curvature`  (3,)                       strains per w; not set for a flat plate, or for a
+                                            nonlinear plate, whose groups have them
     `mass`       (nodes,) or (nd, nodes)    lumped mass, part by part, divided by `ratio`
-    `inverse`    as `mass`                  1 over it, 0 where it is 0
-    `ratio`      (nd,)                      mass of each dof over that of the first
-    `rate`       (nd,)                      dt^2 over `ratio`; without it, s is K u itself
+    `inverse`    as `mass`                  1 over `mass`; 0 where the mass is 0
+    `ratio`      (nd,)                      mass of each dof over the mass of the first dof
+    `rate`       (nd,)                      dt^2 over `ratio`; if not set, s is K u itself
     `u`          (nd nodes,)                displacement
-    `d`          (nd nodes,)                its increment of a step
+    `d`          (nd nodes,)                increment of the displacement in a step
     `s`          (nd nodes,)                dt^2 M^-1 K u
     `shared`     (nd, nodes of the last)    forces on the shared nodes, 0 between products
     ===========  =========================  ===================================================
@@ -129,15 +138,15 @@ class PlateStruct(Structure):
 
     _fields_ = (
         ("nd", c_int64),  # dofs of a node, 3 or 5
-        ("chunks", c_int64),  # without the last one
-        ("nodes", c_int64),  # of all chunks
-        ("most", c_int64),  # of the largest chunk
+        ("chunks", c_int64),  # number of chunks without the last one
+        ("nodes", c_int64),  # number of nodes of all chunks
+        ("most", c_int64),  # number of nodes of the largest chunk
         ("chunk", POINTER(ChunkStruct)),
         ("lane", Integers),
         ("preload", Doubles),
         ("curvature", Doubles),
         ("nonlinear", c_int64),  # whether stretching follows from bending
-        ("transposed", c_int64),  # whether the inverse Jacobian is
+        ("transposed", c_int64),  # whether the inverse Jacobian is transposed
         ("planes", c_int64),  # first dimension of `mass`: 1, or nd
         ("mass", Doubles),
         ("inverse", Doubles),
@@ -154,50 +163,50 @@ class PlateStruct(Structure):
 class CompiledPlate:
     """A plate in the layout of the kernels.
 
-    Vectors have a part (nd, nodes) for each chunk, and a last one for the nodes that chunks share;
-    `position` (count,) are the places of the independent dofs in them.  With `nonlinear` the
-    internal force is that of a plate that stretches as it bends, :mod:`~fecm.mechanics.membrane`.
+    Vectors have a part (nd, nodes) for each chunk, and a last part for the nodes that chunks share.
+    `position` (count,) are the places of the independent dofs in the vectors.  With `nonlinear` the
+    plate stretches as it bends, see :mod:`~fecm.mechanics.membrane`.
     """
 
     def __init__(
-        self, plate: PlateModel, kept: SymmetryReduction, *, nonlinear: bool = False
+        self, plate: PlateModel, reduction: SymmetryReduction, *, nonlinear: bool = False
     ) -> None:
-        moves = kept.sign != 0.0
+        moves = reduction.sign != 0.0
         in_plane = nonlinear or plate.is_curved or moves[:, :2].any()
         self.columns = columns = np.arange(0 if in_plane else 2, NDOF)
         self._nonlinear = nonlinear
-        self._held: list[object] = []  # what the structures point to by addresses
+        self._held: list[object] = []  # objects that the structures point to by addresses
         groups = [
             ElementGroup(
                 plate,
-                family.take(chosen),
+                family.take(members),
                 columns[-3:] if nonlinear else columns,
-                weights[chosen],
+                weights[members],
                 congruent=congruent,
                 nonlinear=nonlinear,
             )
             for family in plate.families
-            for weights in [kept.weights[family.rows].astype(float)]
-            for chosen, congruent in grouped(family, weights, nonlinear=nonlinear)
+            for weights in [reduction.weights[family.rows].astype(float)]
+            for members, congruent in grouped(family, weights, nonlinear=nonlinear)
         ]
         families = [group.family for group in groups]
-        leader = _leaders(kept)
+        leader = _leaders(reduction)
         layout = kernel_layout(families)
         places = places_of(layout, families, leader)
         nd, count = len(columns), int(places.sizes.sum())
 
         chunk, place = places.home
         first, size = places.firsts[chunk], places.sizes[chunk]
-        leads = kept.index[plate.mesh.equations > 0]
-        masses = np.bincount(leads, plate.mass, kept.count + 1)
-        self.position = np.empty(kept.count, dtype=np.intp)
+        leads = reduction.index[plate.mesh.equations > 0]
+        masses = np.bincount(leads, plate.mass, reduction.count + 1)
+        self.position = np.empty(reduction.count, dtype=np.intp)
         mass = np.zeros((nd, count))
         for row, column in enumerate(columns):
             # A dof that follows another has a node without a home.
             (nodes,) = np.nonzero(moves[:, column] & (chunk >= 0))
-            index, at = kept.index[nodes, column], (first + place)[nodes]
-            self.position[index] = at + ((nd - 1) * first + row * size)[nodes]
-            mass[row, at] = masses[index]
+            index, entry = reduction.index[nodes, column], (first + place)[nodes]
+            self.position[index] = entry + ((nd - 1) * first + row * size)[nodes]
+            mass[row, entry] = masses[index]
 
         parts = [
             mass[:, begin : begin + n]
@@ -240,7 +249,7 @@ class CompiledPlate:
     def _chunks(
         self, masses: list[Floats], places: NodePlaces, leader: Indices
     ) -> ctypes.Array[ChunkStruct]:
-        """Chunks without their blocks, with the masses (nd, nodes) of their entries."""
+        """Create the chunks without blocks; `masses` (nd, nodes) belong to their entries."""
         chunk, place = places.home
         cuts = (ChunkStruct * len(masses))()
         for number, mass in enumerate(masses):
@@ -250,7 +259,7 @@ class CompiledPlate:
             follows = copied != here[copies]
             signs = np.where(follows[:, None], TURNED[self.columns], 1.0)
             at_rest = np.flatnonzero(mass <= 0.0)
-            made = ChunkStruct(
+            structure = ChunkStruct(
                 first=int(places.firsts[number]),
                 nodes=mass.shape[1],
                 shared=len(copies),
@@ -261,8 +270,8 @@ class CompiledPlate:
                 signs=signs,
                 force=np.zeros(signs.shape),
             )
-            self._held.append(made)
-            cuts[number] = made
+            self._held.append(structure)
+            cuts[number] = structure
         return cuts
 
     def _blocks(
@@ -272,8 +281,8 @@ class CompiledPlate:
         groups: list[ElementGroup],
         places: NodePlaces,
     ) -> Indices:
-        """Give the chunks their blocks; returns places of lanes that don't follow one another."""
-        counts, left = np.diff(places.starts), places.at
+        """Add the blocks to the chunks; return the places of lanes that don't follow."""
+        counts, rest = np.diff(places.starts), places.at
         table = np.zeros(len(layout.group), dtype=BLOCK)
         self._held.append(table)
         lanes: list[Indices] = []
@@ -282,18 +291,22 @@ class CompiledPlate:
             (rows,) = np.nonzero(layout.group == number)
             member = layout.element[rows] - elements_before
             elements_before += len(group.family.rows)
-            own, left = np.split(left, [group.family.nodes.size])
-            at = own.reshape(group.family.nodes.shape)[:, group.order][member].swapaxes(1, 2)
-            # Behind the nodes is a place for lanes without an element.
-            at = np.where(layout.filled[rows, None], at, counts[layout.chunk[rows], None, None])
-            apart = (np.diff(at, axis=2) != 1).any(axis=2)
-            lanes.append(at[apart])
-            begins = at[:, :, 0].copy()
-            begins[apart] = -1 - rows_before - np.arange(len(lanes[-1]))
+            of_group, rest = np.split(rest, [group.family.nodes.size])
+            lane_places = of_group.reshape(group.family.nodes.shape)[:, group.order][
+                member
+            ].swapaxes(1, 2)
+            # Lanes without an element get the spare place behind the nodes.
+            lane_places = np.where(
+                layout.filled[rows, None], lane_places, counts[layout.chunk[rows], None, None]
+            )
+            is_scattered = (np.diff(lane_places, axis=2) != 1).any(axis=2)
+            lanes.append(lane_places[is_scattered])
+            first_places = lane_places[:, :, 0].copy()
+            first_places[is_scattered] = -1 - rows_before - np.arange(len(lanes[-1]))
             rows_before += len(lanes[-1])
             self._held.append(group.structure)
             table["group"][rows] = ctypes.addressof(group.structure)
-            table["place"][rows] = self._addresses(begins.astype(np.int32))
+            table["place"][rows] = self._addresses(first_places.astype(np.int32))
             if group.needs_data:
                 table["data"][rows] = self._addresses(group.data(member.ravel()))
             if self._nonlinear:
@@ -306,20 +319,20 @@ class CompiledPlate:
         return np.concatenate(lanes)
 
     def _addresses(self, array: Array) -> NDArray[np.uint64]:
-        """Addresses of the parts of an array along its first axis."""
+        """Return the addresses of an array's rows along its first axis."""
         held = np.ascontiguousarray(array)
         self._held.append(held)
         step = np.uint64(held.strides[0])
         return np.uint64(held.ctypes.data) + np.arange(len(held), dtype=np.uint64) * step
 
     def set_scale(self, dt2: float | None) -> None:
-        """Make the kernels scale K u by dt2 and the inverse mass; by 1 without dt2."""
+        """Make the kernels scale K u by dt2 times the inverse mass, or not at all for None."""
         if dt2 is not None:
             np.divide(dt2, self._ratio, out=self._rate)
         self.structure.rate = None if dt2 is None else floats(self._rate)
 
     def internal_force(self, threads: int = 1) -> float:
-        """Compute `s`, the internal force times `scale`; returns the quadratic work."""
+        """Compute `s`, the scaled internal force, and return the quadratic work."""
         work = c_double()
         structure = ctypes.byref(self.structure)
         if not LIBRARY.fecm_internal_force(structure, threads, ctypes.byref(work)):
@@ -327,7 +340,7 @@ class CompiledPlate:
         return work.value
 
     def accelerations(self, u: Floats) -> Floats:
-        """M^-1 K u of a vector with a place for each entry; the next call overwrites it."""
+        """Return M^-1 K u of a vector in the kernels' layout; the next call overwrites it."""
         self.u[:] = u
         self.set_scale(1.0)
         self.internal_force()
@@ -337,26 +350,26 @@ class CompiledPlate:
 class CompiledProduct(StiffnessOperator):
     """K u by the compiled kernels, or with `nonlinear` the internal force of a nonlinear plate.
 
-    Padded vectors are those of the reduction.
+    Padded vectors are over the independent dofs of the reduction.
     """
 
     def __init__(
         self,
         plate: PlateModel,
-        kept: SymmetryReduction,
+        reduction: SymmetryReduction,
         threads: int = 1,
         *,
         nonlinear: bool = False,
     ) -> None:
-        self.plate = CompiledPlate(plate, kept, nonlinear=nonlinear)
-        self._count = kept.count
-        self._signed = kept.signed
+        self.plate = CompiledPlate(plate, reduction, nonlinear=nonlinear)
+        self._count = reduction.count
+        self._signed = reduction.signed
         self._threads = threads
-        self.size = (2 if kept.signed else 1) * kept.count + 1
-        self._pieces = pieces(kept.count)
-        rests = kept.sign == 0.0
-        self._field = self.plate.position[np.where(rests, 0, kept.index)]
-        self._sign = kept.sign
+        self.size = (2 if reduction.signed else 1) * reduction.count + 1
+        self._pieces = pieces(reduction.count)
+        is_at_rest = reduction.sign == 0.0
+        self._field = self.plate.position[np.where(is_at_rest, 0, reduction.index)]
+        self._sign = reduction.sign
 
     def each(self, padded: Floats, use: Callable[[int, Floats], R]) -> list[R]:
         """Compute K u and apply a function to each piece."""
@@ -370,26 +383,26 @@ class CompiledProduct(StiffnessOperator):
         return [use(number, forces[piece]) for number, piece in enumerate(self._pieces)]
 
     def fields(self, stored: Floats) -> Floats:
-        """Fields (rows, numnp, 5) of stored vectors (rows, entries)."""
+        """Return the fields (rows, numnp, 5) of stored vectors (rows, entries)."""
         fields = stored.take(self._field, axis=1)
         fields *= self._sign
         fields += 0.0  # no negative zeros
         return fields
 
     def entries(self, indices: Indices, weights: Floats) -> tuple[NDArray[np.int64], Floats]:
-        """Places in the vectors, and weights, of sums over padded vectors."""
-        turned = (indices >= self._count) & (indices < self.size - 1)
-        rest = indices == self.size - 1
-        dofs = np.where(rest, 0, np.where(turned, indices - self._count, indices))
-        signed = np.where(rest, 0.0, np.where(turned, -weights, weights))
+        """Convert sums over padded vectors to places in the kernels' vectors, and weights."""
+        is_negative = (indices >= self._count) & (indices < self.size - 1)
+        is_at_rest = indices == self.size - 1
+        dofs = np.where(is_at_rest, 0, np.where(is_negative, indices - self._count, indices))
+        signed = np.where(is_at_rest, 0.0, np.where(is_negative, -weights, weights))
         return self.plate.position[dofs].astype(np.int64), np.ascontiguousarray(signed)
 
 
-def _leaders(kept: SymmetryReduction) -> Indices:
-    """Node that each node follows, (numnp,): itself if it moves independently."""
-    leader = np.arange(len(kept.index))
-    first = np.empty(kept.count, dtype=np.intp)
-    for column, moves in zip(kept.index.T, (kept.sign != 0.0).T, strict=True):
+def _leaders(reduction: SymmetryReduction) -> Indices:
+    """Return the node that each node follows, (numnp,): itself if it moves independently."""
+    leader = np.arange(len(reduction.index))
+    first = np.empty(reduction.count, dtype=np.intp)
+    for column, moves in zip(reduction.index.T, (reduction.sign != 0.0).T, strict=True):
         (nodes,) = np.nonzero(moves)
         index = column[nodes]
         first[index[::-1]] = nodes[::-1]  # the lowest is assigned last
@@ -398,13 +411,14 @@ def _leaders(kept: SymmetryReduction) -> Indices:
 
 
 def _factors(mass: Floats) -> tuple[Floats, Floats | None]:
-    """Ratio of the masses of a node's dofs, (nd,), and factors of nodes; None if it differs.
+    """Return the ratio of the masses of a node's dofs, (nd,), and a factor per node.
 
-    The ratio is that of the laminate, but for supports, where masses are 0.
+    The ratio follows from the laminate, except at supports, where masses are 0.  The factors are
+    None if the nodes have different ratios.
     """
-    whole = np.flatnonzero((mass > 0.0).all(axis=0))
-    if len(whole):
-        ratio = mass[:, whole[:1]] / mass[0, whole[0]]
+    is_unsupported = np.flatnonzero((mass > 0.0).all(axis=0))
+    if len(is_unsupported):
+        ratio = mass[:, is_unsupported[:1]] / mass[0, is_unsupported[0]]
         factor = (mass / ratio).max(axis=0)
         if ((abs(factor * ratio - mass) <= EQUAL * mass) | (mass <= 0.0)).all():
             return ratio[:, 0].copy(), factor
@@ -412,5 +426,5 @@ def _factors(mass: Floats) -> tuple[Floats, Floats | None]:
 
 
 def _integers(array: Indices) -> NDArray[np.int32]:
-    """Copy of places, as the kernels have them."""
+    """Convert places to the integers of the kernels."""
     return np.ascontiguousarray(array, dtype=np.int32)

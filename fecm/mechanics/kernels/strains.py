@@ -1,17 +1,15 @@
 """Strains and curvatures of elements by the compiled kernels.
 
-Midplane strains, curvatures and their derivatives by the compiled kernels.
+Midplane strains, curvatures and their derivatives.  In: a displacement field, (numnp, 5).  Out:
+strains (elements, points, 6) and gradients (elements, 2, 6), as in
+:meth:`~fecm.mechanics.ply_stresses.PlyStresses.strains`.  If the midplane does not stretch, only
+the curvatures are computed, (elements, points, 3) and (elements, 2, 3).
 
-In: a displacement field, (numnp, 5).  Out: strains (elements, points, 6) and gradients (elements,
-2, 6), as :meth:`~fecm.mechanics.ply_stresses.PlyStresses.strains` has them; the curvatures alone,
-(elements, points, 3) and (elements, 2, 3), where the midplane does not stretch.  Four points of an
-element are computed at once; tables are filled up to fours of points with zeros.
+Strain fields.  In: displacement fields (fields, numnp, 5).  Out: strains (5, fields, numel,
+points), as in :class:`~fecm.mechanics.strains.StrainField`.
 
-Strains by the compiled kernels.
-
-In: displacement fields (fields, numnp, 5).  Out: strains (5, fields, numel, points), as
-:class:`~fecm.mechanics.strains.StrainField` has them.  Four points of an element are computed at
-once; tables are filled up to fours of points with zeros.
+Both compute four points of an element at once.  Tables are zero-padded to a multiple of four
+points.
 """
 
 from __future__ import annotations
@@ -34,13 +32,13 @@ from fecm.mechanics.mesh import ElementBlock
 from fecm.mechanics.ply_stresses import PlyStresses, second_derivatives
 from fecm.mechanics.strains import FLAT, STRAINS, StrainField, strain_of_deflection
 
-TYING = 12  # tying points of w,1 and of w,2 in fours; structures.h has it too
+TYING = 12  # tying points of w,1 or w,2, padded to a multiple of four; also in structures.h
 
 
 class MidplaneStruct(Structure):
     """Elements with the same nodes present, `elements` of `nodes` nodes, and their points.
 
-    The arrays; the last four are those of a nonlinear plate, and are not set otherwise:
+    The arrays; the last four are set only for a nonlinear plate:
 
     ==============  =======================  ===================================================
     `row`           (elements,)              number of the element in the result
@@ -49,7 +47,7 @@ class MidplaneStruct(Structure):
     `table`         (nodes, 3, width)        slopes in xi and eta, and value, of the shape functions
     `metric`        (shapes, 4, width)       inverse Jacobian, 1/length
     `initial`       (3,)                     midplane strains of the undeformed plate
-    `curved`        (3,)                     midplane strains per w; not set of a flat plate
+    `curved`        (3,)                     midplane strains per w; not set for a flat plate
     `centre`        (shapes, 5, nodes)       derivatives of the shape functions at the centre, xx,
                                              yy, xy, x, y; not set without nine nodes
     `tying`         (nodes, 2, 2, TYING)     slopes in xi and eta at the tying points of w,1 and w,2
@@ -63,7 +61,7 @@ class MidplaneStruct(Structure):
         ("elements", c_int64),
         ("nodes", c_int64),
         ("points", c_int64),
-        ("width", c_int64),  # number of points, filled up to fours
+        ("width", c_int64),  # number of points, padded to a multiple of four
         ("row", Longs),
         ("node", Longs),
         ("shape", Longs),
@@ -80,15 +78,15 @@ class MidplaneStruct(Structure):
 
 
 def midplanes(stresses: PlyStresses) -> list[MidplaneStruct]:
-    """The elements of some ply stresses, for the kernels."""
+    """Return the structures of the elements whose ply stresses are computed."""
     return [_structure(stresses, family, complete) for family, complete in stresses.families]
 
 
 def _structure(stresses: PlyStresses, family: ElementBlock, complete: bool) -> MidplaneStruct:
-    """The structure of a family."""
+    """Return the structure of a family."""
     rule = stresses.rule
-    same = family.congruence
-    shapes = family.take(same.representatives)
+    congruence = family.congruence
+    shapes = family.take(congruence.representatives)
     values, local = local_shape_functions(family, rule)
     inverse, _ = jacobians(shapes, local, transposed=False)
     table = filled(np.stack([*local.transpose(1, 2, 0), values.T], axis=1))
@@ -105,7 +103,7 @@ def _structure(stresses: PlyStresses, family: ElementBlock, complete: bool) -> M
         width=table.shape[2],
         row=np.ascontiguousarray(family.rows, dtype=np.int64),
         node=np.ascontiguousarray(family.nodes, dtype=np.int64),
-        shape=np.ascontiguousarray(same.group, dtype=np.int64),
+        shape=np.ascontiguousarray(congruence.group, dtype=np.int64),
         table=table,
         metric=filled(inverse.swapaxes(1, 2)),
         initial=initial,
@@ -116,7 +114,7 @@ def _structure(stresses: PlyStresses, family: ElementBlock, complete: bool) -> M
 
 
 def _quadratic(tied: QuadraticStrains) -> dict[str, Floats]:
-    """Arrays of the quadratic strains of a nonlinear plate."""
+    """Return the arrays of the quadratic strains of a nonlinear plate."""
     slopes = [table.reshape(2, -1, table.shape[1]) for table in tied.tables]  # (2, tying, nodes)
     return {
         "tying": filled(np.stack(slopes).transpose(3, 0, 1, 2)),
@@ -148,7 +146,7 @@ class StrainsStruct(Structure):
         ("elements", c_int64),
         ("nodes", c_int64),
         ("points", c_int64),
-        ("width", c_int64),  # number of points, filled up to fours
+        ("width", c_int64),  # number of points, padded to a multiple of four
         ("tying", c_int64),  # tying points of both assumed shear strains, e_xi first; or 0
         ("row", Longs),
         ("node", Longs),
@@ -162,17 +160,19 @@ class StrainsStruct(Structure):
 
 
 class CompiledStrains(StrainField):
-    """The same strains."""
+    """Strain field that the compiled kernels evaluate."""
 
     @cached_property
     def _structures(self) -> list[StrainsStruct]:
-        """A structure of each family."""
+        """Structure of each family."""
         return [self._structure(family) for family in self.families]
 
     def _structure(self, family: ElementBlock) -> StrainsStruct:
-        same = family.congruence
+        congruence = family.congruence
         values, local = local_shape_functions(family, self.rule)
-        inverse, _ = jacobians(family.take(same.representatives), local, self.transposed_jacobian)
+        inverse, _ = jacobians(
+            family.take(congruence.representatives), local, self.transposed_jacobian
+        )
         nodes = family.nodes.shape[1]
         points = self.shape[1]
         width = -(-points // 4) * 4
@@ -181,7 +181,9 @@ class CompiledStrains(StrainField):
         table[:, 2, :points] = values.T
         metric = np.zeros((len(inverse), 4, width))
         metric[:, :, :points] = inverse.swapaxes(1, 2)
-        tied = self._tied(family.take(same.representatives), width) if self.assumes_shear else {}
+        tied = (
+            self._tied(family.take(congruence.representatives), width) if self.assumes_shear else {}
+        )
         return StrainsStruct(
             elements=len(family.rows),
             nodes=nodes,
@@ -189,14 +191,14 @@ class CompiledStrains(StrainField):
             width=width,
             row=np.ascontiguousarray(family.rows, dtype=np.int64),
             node=np.ascontiguousarray(family.nodes, dtype=np.int64),
-            shape=np.ascontiguousarray(same.group, dtype=np.int64),
+            shape=np.ascontiguousarray(congruence.group, dtype=np.int64),
             table=table,
             metric=metric,
             **tied,
         )
 
     def _tied(self, shapes: ElementBlock, width: int) -> dict[str, int | Floats]:
-        """Fields of assumed shear strains, for an element of each shape."""
+        """Return the fields of assumed shear strains, for an element of each shape."""
         nodes, points = shapes.nodes.shape[1], self.shape[1]
         tables: list[Floats] = []
         weights: list[Floats] = []
@@ -217,7 +219,7 @@ class CompiledStrains(StrainField):
         }
 
     def evaluate(self, displacement: Floats) -> Floats:
-        """Strains of fields; see :meth:`StrainField.evaluate`."""
+        """Return the strains of fields; see :meth:`StrainField.evaluate`."""
         *leading, numnp, _ = displacement.shape
         fields = np.ascontiguousarray(displacement)
         count = math.prod(leading)
