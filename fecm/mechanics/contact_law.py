@@ -309,7 +309,7 @@ class HystereticLaw(MeasuredLaw[Number]):
         """Return the contact force at a trial indentation, and the unchanged history."""
         if not isinstance(indentation, np.ndarray):
             return branch_force(self.accept(memory, last, indentation), indentation), memory
-        cases, new = self._cases_leaving_branch(memory, last, indentation)
+        cases, new = self._find_turning_cases(memory, last, indentation)
         force = branch_force(memory, indentation)
         if new is not None:
             force[cases] = branch_force(new, indentation[cases])
@@ -321,7 +321,7 @@ class HystereticLaw(MeasuredLaw[Number]):
         """Return the loading history after a step that ends at an indentation."""
         m, a = memory, indentation
         if isinstance(a, np.ndarray):
-            cases, new = self._cases_leaving_branch(m, last, a)
+            cases, new = self._find_turning_cases(m, last, a)
             if new is None:
                 return m
             updated = LoadingHistory(*(x.copy() for x in m))
@@ -335,7 +335,7 @@ class HystereticLaw(MeasuredLaw[Number]):
             return m
         return self._leave_branch(m, last, a)
 
-    def _cases_leaving_branch(
+    def _find_turning_cases(
         self: HystereticLaw[Floats],
         m: LoadingHistory[Floats],
         last: ContactPoint[Floats],

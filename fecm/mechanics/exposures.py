@@ -125,7 +125,7 @@ def _largest_interface(exposure: Floats, far: Bools) -> int:
 
 
 def first_of_largest(exposures: Floats) -> Indices:
-    """Return the first position along the last axis of the largest exposure, up to a tie."""
+    """Return the first position along the last axis whose exposure ties with the largest."""
     largest = exposures.max(axis=-1, keepdims=True)
     return np.asarray((exposures >= largest - TIE * np.abs(largest)).argmax(axis=-1))
 

@@ -368,10 +368,10 @@ class PlateMotion:
     ) -> float:
         """Return the kinetic energy at the time of the displacement (force*length).
 
-        The stored velocity v is half a step old.  The energy is computed with v + dt/2 a, where a =
-        M^-1 (P - f); `factor` scales the nodal forces.  The square of v + dt/2 a is expanded into
-        the inner products of :class:`Sums`.  With damping the mean velocity of two steps is v +
-        dt/2 a divided by 1 + b.
+        The stored velocity v is half a step old.  The energy is computed with v + dt/2 a, where
+        a = M^-1 (P - f); `factor` scales the nodal forces.  The square of v + dt/2 a is expanded
+        into the inner products of :class:`Sums`.  With damping, the mean velocity of two steps is
+        v + dt/2 a divided by 1 + b.
         """
         dt2 = state.dt**2
         if not dt2:

@@ -149,14 +149,12 @@ class Stretching:
     def _energies(self, part: _Elements, midplane: _Midplane) -> Floats:
         """Return the energies of the membrane, of bending and of the preload."""
         A, B, D = part.laminate.A, part.laminate.B, part.laminate.D
-        n = part.forces(midplane)
+        n, kappa = part.forces(midplane), midplane.curvatures
         x, y = np.moveaxis(midplane.slopes, -1, 0)
         squares = np.stack([x * x, y * y, 2.0 * x * y], axis=-1)
         densities = [
             (n * (n @ part.compliance)).sum(axis=-1),
-            (midplane.curvatures * (midplane.curvatures @ (D - B @ np.linalg.solve(A, B)))).sum(
-                axis=-1
-            ),
+            (kappa * (kappa @ (D - B @ np.linalg.solve(A, B)))).sum(axis=-1),
             squares @ self._preload,
         ]
         return np.array([0.5 * (part.area * density).sum() for density in densities])

@@ -1,8 +1,8 @@
 """Critical time step of the plate, and upper bounds of the frequencies of single elements.
 
 The five fields u, v, w, theta_x and theta_y of an element are scaled by the roots of their masses.
-The energy of each field f at a point is bounded by the same expression, p1 f,x^2 + p2 f,y^2 +
-q f^2.  A matrix with one row per node therefore replaces a matrix with five rows per node.
+The energy of each field f at a point gets the same bound, p1 f,x^2 + p2 f,y^2 + q f^2.  A matrix
+with one row per node therefore replaces a matrix with five rows per node.
 
 Membrane and bending: their energy is g' D g with the gradients g of u, v, theta_x and theta_y.  p1
 and p2 are chosen so that g' D g <= p1 |g,x|^2 + p2 |g,y|^2.
