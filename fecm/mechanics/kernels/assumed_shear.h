@@ -1,16 +1,16 @@
-/* Assumed transverse shear strains of biquadratic elements by sum factorization; included by plate.h, once for
+/* Assumed transverse shear strains of biquadratic elements, by sum factorization; included by plate.h once for
  * each instruction set.
  *
- * The covariant strain e_a = w,a - theta_x x,a - theta_y y,a of an axis, xi or eta, is taken from tying points:
- * two along the axis, at +-1/sqrt(3), by three across it, at 0 and +-sqrt(3/5), and is linear along the axis
- * between them.  The points across are those of the quadrature, 3 x 3.
+ ** The covariant strain e_a = w,a - theta_x x,a - theta_y y,a of an axis, xi or eta, is evaluated at tying
+ * points: two along the axis, at +-1/sqrt(3), by three across the axis, at 0 and +-sqrt(3/5).  Between them the
+ * strain is linear along the axis.  The points across the axis are points of the 3 x 3 quadrature.
  *
- * Coefficients are those of plate.h, and so slopes and strains are twice what they should be.  Arrays over
- * tying points are (along, across), of points of quadrature (xi, eta).  Four elements at a time; each function
- * is followed by its transpose.
+ * The coefficients of plate.h make slopes and strains twice as large.  Arrays over tying points are (along,
+ * across), arrays over points of quadrature (xi, eta).  Four elements are computed at a time.  Each function is
+ * followed by its transpose.
  */
 
-/* Values of a linear function at -sqrt(3/5), 0, sqrt(3/5) from those at +-1/sqrt(3). */
+/* Values of a linear function at -sqrt(3/5), 0, sqrt(3/5) from its values at +-1/sqrt(3). */
 INLINE void NAME(spread)(half low, half high, half *v, int step) {
     const half middle = 0.5 * (low + high), odd = SPREAD * (high - low);
     v[0] = middle - odd, v[step] = middle, v[2 * step] = middle + odd;
@@ -21,7 +21,7 @@ INLINE void NAME(gather)(const half *v, int step, half *low, half *high) {
     *low = middle - odd, *high = middle + odd;
 }
 
-/* Values of a biquadratic at the tying points of an axis, or its slopes along it; the transpose adds. */
+/* Values of a biquadratic at the tying points of an axis, or slopes along the axis; the transpose adds. */
 INLINE void NAME(at_tying)(int axis, int slope, const half *c, half (*at)[3]) {
     const int along = axis ? 3 : 1, across = axis ? 1 : 3;
     half line[3][2];
@@ -44,8 +44,8 @@ INLINE void NAME(sum_at_tying)(int axis, int slope, half (*at)[3], half *c) {
             NAME(sum_values)(2, ALONG, line[b], 1, c, c + along, c + 2 * along);
 }
 
-/* Strains of an axis at the points, of the coefficients of w, theta_x, theta_y, x and y; the transpose adds
- * forces on the first three.  `mapping` are twice the slopes of x and y at the tying points. */
+/* Strains of an axis at the points, from the coefficients of w, theta_x, theta_y, x and y.  The transpose adds
+ * forces on the first three.  `mapping` is twice the slopes of x and y at the tying points. */
 INLINE void NAME(assume)(int axis, half (*c)[9], half (*mapping)[2][3], half (*e)[3]) {
     half w[2][3], rotation[2][2][3];
     NAME(at_tying)(axis, 1, c[0], w);

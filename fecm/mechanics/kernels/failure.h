@@ -1,21 +1,21 @@
 /* Largest exposures of plies and interfaces; included once for each instruction set.
  *
- * Layout.  A state of stress is a ply at one of its faces; four states are computed at once, from the
- * strains of a point, (strains,), a table of stresses per strain, (strains, 3, width), and the stresses
- * without strain, (3, width), whose `width` is the number of states in fours.  The last four overlap those
- * before them where the number is no multiple of four; of less than four, lanes beyond the last compute
- * zeros and are not stored.  Which states there are is decided in Python: where exposures are proportional
- * to z, one for many.
+ ** Layout.  A state of stress is a face of a ply.  Four states are computed at once, from the strains of a
+ * point, (strains,), a table of stresses per strain, (strains, 3, width), and the stresses without strain,
+ * (3, width); `width` is the number of states padded to a multiple of four.  If the number is not a multiple of
+ * four, the last four states overlap the four before.  With fewer than four states, the other lanes compute
+ * zeros and are not stored.  Python decides which states there are: where exposures are proportional to z, one
+ * state represents many.
  *
- * Sums run over the strains in their order, after the stress without strain.  Of equal exposures of one
- * criterion the first mode stays, of equal exposures in time the first time, and of the largest ones of
- * the plate that with the lowest number.  A call is one thread's.
+ * Sums run over the strains in their order, after the stress without strain.  Ties between modes of a criterion
+ * go to the first mode, ties in time to the first time, and ties between the largest exposures of the plate to
+ * the lowest number.  A call runs in one thread.
  *
- * What cannot rise is not evaluated: `may_rise` compares four states, without roots and quotients, with
- * KEEP times the exposures stored, which is so little less that rounding changes no decision.
+ * States that cannot rise are not evaluated.  `may_rise` compares four states, without roots and quotients,
+ * with KEEP times the stored exposures.  The margin of KEEP is so large that rounding changes no decision.
  */
 
-/* Candidates of four states of stress: exposures, and for Hashin's criterion their squares. */
+/* Candidates of four states of stress: exposures, or squares of exposures for Hashin's criterion. */
 INLINE void NAME(candidates)(const Limits *p, half s1, half s2, half tau, half *v) {
     const half zero = {0}, one = zero + 1.0;
     const mask pulled = s1 >= 0.0, open = s2 >= 0.0, pressed = s2 < 0.0;
@@ -40,14 +40,14 @@ INLINE void NAME(candidates)(const Limits *p, half s1, half s2, half tau, half *
     v[14] = NAME(choose)(steep, c, zero);
 }
 
-/* Where an exposure of four states of stress may be above a limit F, (CRITERIA,). */
+/* Mask of the states whose exposure may be above a limit F, (CRITERIA,). */
 INLINE mask NAME(may_rise)(const Limits *p, half s1, half s2, half tau, const half *F) {
     const half zero = {0}, one = zero + 1.0;
     const half fibre = s1 * p->xt, crushed = s1 * p->xc, along = LARGER(fibre, crushed);
     const half across = LARGER(s2 * p->yt, s2 * p->yc), t = NAME(size)(tau), ratio = t * p->s12;
     const half largest = LARGER(LARGER(along, across), ratio), shear = ratio * ratio;
     mask found = (largest > F[0]) | ((F[0] < TINY) & (largest > 0.0));
-    /* f is above F if f^2 - l f - q, whose root it is, is negative at F. */
+    /* f is a root of f^2 - l f - q; f is above F if the polynomial is negative at F. */
     const half q = s1 * (s1 * p->xx + p->xy * s2) + s2 * s2 * p->yy + shear, linear = s1 * p->x + s2 * p->y;
     found |= q + linear * F[1] > F[1] * F[1];
     const half pulled = LARGER(fibre, across);
@@ -60,7 +60,7 @@ INLINE mask NAME(may_rise)(const Limits *p, half s1, half s2, half tau, const ha
     return found | (along > F[3]) | (steep & c) | (~steep & ab);
 }
 
-/* Largest candidate of each criterion, and its exposure. */
+/* Largest candidate of each criterion, and the exposure. */
 INLINE void NAME(exposures)(const half *v, half *candidate, half *exposure) {
     const half zero = {0};
 #pragma GCC unroll 4
@@ -72,8 +72,8 @@ INLINE void NAME(exposures)(const half *v, half *candidate, half *exposure) {
     }
 }
 
-/* `count` stored exposures in four lanes, the others so large that nothing is above them; 0 of a criterion that is
- * not evaluated. */
+/* `count` stored exposures in four lanes; the other lanes are infinite.  `count` is 0 for a criterion that is not
+ * evaluated. */
 INLINE half NAME(stored)(const double *exposure, int count) {
     if (count == 4) return NAME(load)(exposure);
     half found = {HUGE_VAL, HUGE_VAL, HUGE_VAL, HUGE_VAL};
@@ -81,12 +81,12 @@ INLINE half NAME(stored)(const double *exposure, int count) {
     return found;
 }
 
-/* Where four states of `count` begin that are to begin at `first`, so that none is beyond the last. */
+/* Start of four states at `first`, or earlier so that no state is beyond the last of `count`. */
 INLINE int64_t NAME(first_of_four)(int64_t first, int64_t count) {
     return first + 4 > count && count >= 4 ? count - 4 : first;
 }
 
-/* Make an exposure the largest of a criterion if it is that, or ties with it and has a lower number. */
+/* Make an exposure the largest of a criterion if it is larger, or if it ties and has a lower number. */
 INLINE void NAME(follow)(const Largest *largest, int64_t criterion, double exposure, int64_t state, int8_t mode, const double *strain, int64_t strains) {
     const double before = largest->exposure[criterion];
     const int higher = !(exposure <= before * (1.0 + TIE));
@@ -97,7 +97,7 @@ INLINE void NAME(follow)(const Largest *largest, int64_t criterion, double expos
     if (strain) memcpy(largest->strain + 6 * criterion + 6 - strains, strain, sizeof(double) * strains);
 }
 
-/* Store exposures of a criterion that are `higher` than before, with the time and the first mode of equals. */
+/* Store the exposures of a criterion that are `higher` than before, with the time and the first of tied modes. */
 INLINE void NAME(raise)(const Maxima *m, int64_t at, int higher, int criterion, const half *v, half candidate, half exposure, double now) {
     mask mode = {0};
 #pragma GCC unroll 5
@@ -118,7 +118,7 @@ INLINE void NAME(raise)(const Maxima *m, int64_t at, int higher, int criterion, 
     }
 }
 
-/* Four states of stress of a point, of which the arrays have `count`: raise their exposures. */
+/* Raise the exposures of four states of stress at a point; the arrays have `count` of them. */
 INLINE void NAME(four_states)(const Exposures *m, const Limits *limits, int prunes, int pucks, int64_t point, int64_t state, int count, half s1, half s2, half tau, double now) {
     const int64_t all = m->points * m->states, at = point * m->states + state;
     const Maxima *plies = &m->plies;
@@ -167,7 +167,7 @@ INLINE void NAME(plies)(const Exposures *m, const Plies *f, int strains, double 
     }
 }
 
-/* Raise the interlaminar exposures; NaN where the gradients or a strength are not known. */
+/* Raise the interlaminar exposures; they are NaN where the gradients or a strength are unknown. */
 INLINE void NAME(interfaces)(const Exposures *m, const Interfaces *f, int strains, double now) {
     const Maxima *between = &m->between;
     const int count = f->interfaces < 4 ? (int)f->interfaces : 4;
@@ -206,7 +206,7 @@ INLINE void NAME(evaluate)(const Exposures *m, const double *u, int strains, dou
     for (int64_t i = 0; i < m->zones; i++) NAME(interfaces)(m, m->zone + i, strains, now);
 }
 
-/* Raise the exposures to those of a displacement field, (numnp, 5). */
+/* Raise the exposures to the exposures of a displacement field, (numnp, 5). */
 TARGET void NAME(failure)(const Exposures *m, const double *u, double now) {
     if (m->strains == 6)
         NAME(evaluate)(m, u, 6, now);

@@ -1,14 +1,14 @@
-/* The coupled step of plate, projectile and contact law, of one case; included once.
+/* Coupled step of plate, projectile and contact law, for one case; included once.
  *
- * The same arithmetic as couple_step of impact.py and HystereticLaw of contact_law.py, in floats.
+ * The arithmetic is the same as in couple_step of impact.py and in HystereticLaw of contact_law.py, in floats.
  *
- * Layout.  The projectile moves in its natural modes, (modes,), of unit modal mass; the first is the
- * rigid motion, whose displacement is kept in `tip` alone.  `motion` has the rows displacement,
- * velocity and acceleration; T and h give the rows of the next step from these and from the tip's
- * force.  Signs: w is positive along the push, the motion of the projectile away from the plate, so
- * that the indentation is -tip - w.
+ * Layout.  The projectile moves in its natural modes, (modes,), of unit modal mass.  The first mode is the
+ * rigid motion; only `tip` has its displacement.  `motion` has the rows displacement, velocity and
+ * acceleration.  T and h give the rows of the next step, from the rows of the last step and from the force on
+ * the tip.  Signs: w is positive along the push, the motion of the projectile is positive away from the plate.
+ * The indentation is therefore -tip - w.
  *
- * Sums run over the modes in ascending order.  Thread 0 alone calls these functions.
+ * Sums run over the modes in ascending order.  Only thread 0 calls these functions.
  */
 
 static double power(double x, double p) {
@@ -95,7 +95,7 @@ TARGET void move_projectile(Impact *x, double w) {
         a[i] = T[6 * n + i] * q0 + T[7 * n + i] * v0 + T[8 * n + i] * a0 + h[2 * n + i] * applied;
         moved += shape[i] * a[i];
     }
-    q[0] = 0.0; /* the rigid displacement is that of the tip */
+    q[0] = 0.0; /* `tip` has the rigid displacement */
     rod->tip = drift + rod->weight * moved;
     const double indentation = -rod->tip - w;
     x->memory = accepted(&x->law, &x->memory, &last, indentation);

@@ -2,7 +2,7 @@
  *
  * Loaded with ctypes by __init__.py.  The files, all compiled as this one:
  *
- *   structures.h  what Python passes
+ **   structures.h  data that Python passes
  *   impact.h      contact law, projectile and contact iteration of one case
  *   plate.h       K u, the plate's update, and strains; twice, with AVX2 and without
  *   assumed_shear.h  assumed shear strains of factorized elements; twice
@@ -11,32 +11,31 @@
  *   midplane.h    strains of the midplane and curvatures for the exposures; twice
  *   failure.h     exposures of plies, four states of stress at a time; twice
  *
- * and here the steps, their threads, and the functions that Python calls.
+ ** This file has the steps, their threads, and the functions that Python calls.
  *
- * Layout.  A plate's vectors u, d and s are cut into chunks of near elements; structures.h has the
+ ** Layout.  A plate's vectors u, d and s are cut into chunks of near elements; structures.h has the
  * order of the entries.  nd is 3, for w, theta_x, theta_y, or 5, for u, v, w, theta_x, theta_y.
- * Restrained dofs are among them, with a mass of 0.
+ * The vectors contain restrained dofs, with a mass of 0.
  *
- * A step.  The displacement of a step is known when it begins.
+ * Step.  The displacement of a step is known when the step starts.
  *
  *   thread 0      begin_step: contact force and projectile for this displacement, records
- *   all threads   run_chunk: K u of chunks that they take; d and u of the next step without the contact force
+ **   all threads   run_chunk: K u of the chunks that a thread takes; d and u of the next step without contact
  *   thread 0      finish: forces on shared nodes, their update, the sums of all chunks
  *                 end_step: the pull of the contact force on d and u, records
  *
- * The last step of a burst leaves d and u as they are and stores s, with which the next burst moves
- * them.
+ ** The last step of a burst leaves d and u unchanged and stores s, with which the next burst moves them.
  *
- * Threads.  All threads take chunks from one counter, which thread 0 sets to 0 when the contact of a
- * step is known; each has a buffer of forces for the chunk in work.  A thread that the system does not
- * run takes none, so that the others compute its part.  When no chunk is left, thread 0 waits until all
- * are computed, and the others for the next step: busily for some microseconds, as a step takes no
- * more, and then asleep, as the processor may be needed by another.
+ * Threads.  All threads take chunks from one counter, which thread 0 sets to 0 when the contact of a step is
+ * known.  Each thread has a buffer of forces for its current chunk.  If the system does not run a thread, the
+ * other threads compute its chunks.  When no chunk is left, thread 0 waits until all chunks are computed, and the
+ * other threads wait for the next step.  They spin for some microseconds, because a step takes no longer, and
+ * then sleep, because another process may need the processor.
  *
  * Sums.  The force on a node is the sum over the blocks of a chunk in their order, and for shared
  * nodes the sum over the chunks in their order.  Energies are summed per chunk in four lanes, then
- * over the chunks in their order, then over the lanes.  Chunks do not depend on the threads, and so
- * neither do the results.  Compilers may contract a*b + c, but not reorder sums.
+ * over the chunks in their order, then over the lanes.  Chunks do not depend on the number of threads, and
+ * therefore the results do not either.  Compilers may contract a*b + c, but not reorder sums.
  */
 #if defined __FAST_MATH__ || (defined __FINITE_MATH_ONLY__ && __FINITE_MATH_ONLY__)
 #error "divergence is found by isfinite(), and sums have a fixed order: compile without -ffast-math"
@@ -55,12 +54,12 @@
 #include <immintrin.h>
 #endif
 
-#define APART __attribute__((noinline)) /* loops that need all registers, which compilers find only there */
+#define APART __attribute__((noinline)) /* for loops that need all registers: compilers assign them only there */
 #define TIE 1.0e-9 /* see fecm/mechanics/exposures.py */
 #define LEAST_WORK 1.0e-3 /* see fecm/results/end.py */
 #define TOLERANCE 1.0e-6
 #define MOST_THREADS 64
-#define MOST_SPINS 2000 /* of a waiting thread, before it sleeps: some ten microseconds, as waking takes */
+#define MOST_SPINS 2000 /* spins of a waiting thread before it sleeps: some ten microseconds, the time of waking */
 #if defined __x86_64__ || defined __i386__
 #define PAUSE() __builtin_ia32_pause()
 #else
@@ -70,7 +69,7 @@
 typedef double half __attribute__((vector_size(32), aligned(8), may_alias));
 typedef struct {
     half a, b;
-} lanes; /* a value of each of eight elements */
+} lanes; /* a value for each of eight elements */
 #define ALIGNED __attribute__((aligned(64)))
 #define HALF(value) (*((half *)&(value) + side))
 
@@ -81,21 +80,21 @@ typedef int64_t mask __attribute__((vector_size(32)));
 /* Sizes of a sweep. */
 enum {
     WIDTH = 4,  /* lanes of a half */
-    GROUPS = 2, /* of so many cases, computed together */
+    GROUPS = 2, /* groups of WIDTH cases that are computed together */
     CASES = WIDTH * GROUPS,
     CHECKED = 64, /* steps from one check of the energies to the next */
     FAR = 128     /* steps whose forces act on later blocks of steps by Fourier transforms */
 };
 
-/* Responses of plate and tip to a unit force, and memory for their sums over forces. */
+/* Responses of plate and tip to a unit force, and work arrays for the sums over forces. */
 typedef struct {
-    double *response, unit, gain; /* (steps, 2), the tip's over `unit`; its acceleration at once */
-    double *power, *reach; /* (modes, 3, 3), (modes, CHECKED, 3): a block of steps, a force in each */
-    double *turn, *filter; /* (FAR, 2): cos and sin; spectra (2 FAR, spaced, 2) */
-    half *work, *spectra;  /* (GROUPS, 2 FAR, 2); spectra (2 FAR, spaced, GROUPS, 2) */
+    double *response, unit, gain; /* (steps, 2), tip divided by `unit`; immediate acceleration of the tip per force */
+    double *power, *reach; /* (modes, 3, 3), (modes, CHECKED, 3): motion after CHECKED steps, per motion and per force */
+    double *turn, *filter; /* (FAR, 2): cos and sin; (2 FAR, spaced, 2): spectra of the responses */
+    half *work, *spectra;  /* (GROUPS, 2 FAR, 2); (2 FAR, spaced, GROUPS, 2): spectra of the forces */
     half *force, *motion;  /* (FAR, GROUPS), (modes, GROUPS, 3) */
-    int64_t *used;         /* (blocks,): those whose forces are not all 0 */
-    int64_t spaced;        /* blocks, or one more: a power of two would share few sets of the cache */
+    int64_t *used;         /* (blocks,): blocks whose forces are not all 0 */
+    int64_t spaced;        /* blocks, or one more: an odd stride uses all sets of the cache */
 } Response;
 
 /* Loading histories of four cases; see History. */
@@ -105,7 +104,7 @@ typedef struct {
 
 /* Four cases of a sweep after a step. */
 typedef struct {
-    int64_t at[WIDTH]; /* their columns */
+    int64_t at[WIDTH]; /* columns of the cases */
     Law law[WIDTH];
     Histories history;
     half scale, gain; /* factor of mass and stiffness; acceleration of the tip per force */
@@ -115,16 +114,16 @@ typedef struct {
     half fastest, compliance; /* see FOUND_LARGEST_DW and so on */
 } Cases;
 
-/* Inner products of a state: d M d, d f, u f, f s with the internal force f = K u; and the work of the
- * membrane force on the quadratic strains of a nonlinear plate. */
+/* Inner products of a state, d M d, d f, u f, f s with the internal force f = K u, and the work of the membrane
+ * force on the quadratic strains of a nonlinear plate. */
 typedef struct {
     double inertia, power, strain, force, quadratic;
 } Sums;
 
-enum { SUMS = 5 }; /* their number, a half of each for every chunk */
+enum { SUMS = 5 }; /* number of sums; every chunk has a half for each */
 
-/* Membrane of nonlinear plates, see membrane.h.  Tying points along and across the direction of a strain,
- * of which the latter are those of the quadrature too; and half of their ratio. */
+/* Membrane of nonlinear plates, see membrane.h: tying points along and across the direction of a strain, and half
+ * of their ratio.  The points across are points of the quadrature too. */
 static const double ALONG[] = {-0.57735026918962576, 0.57735026918962576};
 static const double ACROSS[] = {-0.77459666924148338, 0.0, 0.77459666924148338};
 static const double SPREAD = 0.67082039324993691;
@@ -133,9 +132,9 @@ static const double SPREAD = 0.67082039324993691;
 enum { MODES = 8 };
 static const double NORMS[] = {4.0, 1.0 / 3.0, 1.0 / 3.0, 4.0 / 9.0, 4.0 / 45.0, 16.0 / 135.0, 4.0 / 45.0, 16.0 / 135.0};
 
-/* Weights of values at tying points in modes.  Along the direction of e_11 or e_22 a mode has the sum of two
- * values or their difference, and across it a mean, of three such, a slope or a bend.  Of e_12: mean, slope,
- * twist. */
+/* Weights of values at tying points in modes.  Along the direction of e_11 or e_22 a mode takes the sum or the
+ * difference of two values; across the direction it takes the mean, the slope or the bend of three of these.
+ * e_12 has mean, slope and twist. */
 enum { MIDDLE, SIDES, STRAIGHT, BENT };
 static const double OF_SUM[] = {2.0 / 9.0, 5.0 / 36.0, 0.64549722436790281, 5.0 / 6.0};
 static const double OF_DIFFERENCE[] = {0.76980035891950105, 0.48112522432468813, 0.55901699437494745, 0.72168783648703216};
@@ -143,9 +142,9 @@ static const double OF_CORNERS[] = {1.0 / 4.0, 0.86602540378443865, 3.0 / 4.0};
 
 /* Constants of the failure criteria. */
 typedef struct {
-    double xt, xc, yt, yc, s12; /* reciprocals; those of compression are negative */
+    double xt, xc, yt, yc, s12; /* reciprocals; negative for compression */
     double xx, xy, yy, x, y;    /* Tsai and Wu: coefficients of the quadratic and of the linear terms */
-    /* Puck: coefficients of s2 outside and in the root, for tension and for compression; of mode C. */
+    /* Puck: coefficients of s2 outside and inside the root, for tension and for compression; coefficients of mode C. */
     double pull, pull_root, press, shear, across;
     double resistance, critical;
 } Limits;
@@ -163,14 +162,14 @@ static Limits limits_of(const Ply *p) {
     };
 }
 
-/* Candidates of all criteria: codes of their modes (indices of MODES), and where those of each begin. */
+/* Candidates of all criteria: codes of their modes (indices of MODES), and the first candidate of each criterion. */
 enum { CANDIDATES = 15, HASHIN = 2, PUCK = 3 };
 static const int64_t CODES[CANDIDATES] = {1, 2, 3, 4, 5, 6, 1, 2, 3, 4, 1, 2, 7, 8, 9};
 static const int BEGIN[CRITERIA + 1] = {0, 5, 6, 10, 15};
 
-/* Exposures whose squares may be too small for a number. */
+/* Squares of smaller exposures may underflow. */
 #define TINY 1e-100
-/* Exposures below this share of those stored are not evaluated: far more than rounding. */
+/* Exposures below this share of the stored ones are not evaluated; the margin is far above rounding. */
 #define KEEP (1.0 - 1e-9)
 
 #define TARGET static
@@ -178,7 +177,7 @@ static const int BEGIN[CRITERIA + 1] = {0, 5, 6, 10, 15};
 #undef TARGET
 
 #ifdef HAS_AVX2_CODE
-/* Whether processor and system know AVX2 and FMA. */
+/* Whether processor and system support AVX2 and FMA. */
 static int with_avx2;
 
 __attribute__((constructor)) static void ask_processor(void) {
@@ -221,7 +220,7 @@ __attribute__((constructor)) static void ask_processor(void) {
 #define SIGNS(where) (int)(((where)[0] & 1) | ((where)[1] & 2) | ((where)[2] & 4) | ((where)[3] & 8))
 #ifdef HAS_AVX2_CODE
 #pragma GCC push_options
-#pragma GCC optimize("O1") /* for few processors; more takes GCC as long as all the rest */
+#pragma GCC optimize("O1") /* few processors need this code; O3 would double the time of compilation */
 #endif
 #include "plate.h"
 #include "sweep.h"
@@ -231,18 +230,18 @@ __attribute__((constructor)) static void ask_processor(void) {
 #pragma GCC pop_options
 #endif
 
-/* Work that threads share: products K u, each followed by what one of them does alone. */
+/* Work that threads share: products K u, each followed by work of thread 0. */
 typedef struct {
     const Plate *plate;
     Impact *impact;
     int64_t steps, taken, threads;
     half *sums;     /* (chunks, SUMS) */
-    double *forces; /* (threads, nd, most): of the chunk in work, zero between chunks */
+    double *forces; /* (threads, nd, most): forces of the current chunk, zero between chunks */
     Sums result;
-    int stop, moves;            /* moves: whether chunks move d and u on to a next step */
-    atomic_llong chunk, done;   /* the next to be taken; number of those computed */
+    int stop, moves;            /* moves: whether chunks advance d and u to the next step */
+    atomic_llong chunk, done;   /* next chunk to take; number of computed chunks */
     atomic_int over, asleep;    /* no more steps; threads asleep */
-    pthread_mutex_t lock;       /* of the sleep */
+    pthread_mutex_t lock;       /* protects sleep */
     pthread_cond_t begun, ended;
 } Job;
 
@@ -250,8 +249,8 @@ static int has_work(Job *job) { return atomic_load(&job->chunk) < job->plate->ch
 
 static int is_computed(Job *job) { return atomic_load(&job->done) == job->plate->chunks; }
 
-/* Wait for a state of the job; who brings it about calls wake.  Either that sees the sleeper, or the
- * sleeper sees the state, as both write before they read. */
+/* Wait for a state of the job.  The thread that brings the state about calls wake.  Either wake sees the sleeper,
+ * or the sleeper sees the state, because both write before they read. */
 static void wait_for(Job *job, int (*state)(Job *), pthread_cond_t *signal) {
     for (int spins = 0; spins < MOST_SPINS; spins++) {
         if (state(job)) return;
@@ -271,7 +270,7 @@ static void wake(Job *job, pthread_cond_t *signal) {
     pthread_mutex_unlock(&job->lock);
 }
 
-/* Compute chunks while there are any. */
+/* Compute chunks until none is left. */
 static void take_chunks(Job *job, int64_t thread) {
     const Plate *p = job->plate;
     double *forces = job->forces + thread * p->nd * p->most;
@@ -283,7 +282,7 @@ static void take_chunks(Job *job, int64_t thread) {
     }
 }
 
-/* Take the step of the plate without K u: the displacement under the last internal force. */
+/* Move the plate by the last internal force, without computing K u. */
 static void displace(const Plate *p) {
     const int64_t count = p->nd * p->nodes;
     const double keep = 1.0 - p->damping, share = 1.0 / (1.0 + p->damping);
@@ -293,7 +292,7 @@ static void displace(const Plate *p) {
     }
 }
 
-/* Contact, projectile and records of a step whose displacement is known. */
+/* Compute contact, projectile and records of a step whose displacement is known. */
 static void begin_step(Job *job, int64_t number) {
     const Plate *p = job->plate;
     Impact *x = job->impact;
@@ -335,7 +334,7 @@ static void begin_step(Job *job, int64_t number) {
     job->stop = !isfinite(x->contact.indentation + x->contact.force);
 }
 
-/* Inner products of a step; the contact force pulls the displacement of the next one. */
+/* Record the inner products of a step, and add the contact force to the displacement of the next step. */
 static void end_step(Job *job, int64_t number, int next) {
     const Plate *p = job->plate;
     Impact *x = job->impact;
@@ -386,7 +385,7 @@ static void *thread_main(void *given) {
     return NULL;
 }
 
-/* Carry out a job on its threads, on fewer if the system has no more. */
+/* Run a job on its threads, or on fewer threads if the system can't create them. */
 static void carry_out(Job *job) {
     pthread_t others[MOST_THREADS];
     Share shares[MOST_THREADS];
@@ -409,7 +408,7 @@ static void carry_out(Job *job) {
     pthread_mutex_destroy(&job->lock);
 }
 
-/* Allocate the memory of a job and carry it out; returns 0 if there is not enough memory. */
+/* Allocate the memory of a job and run it; returns 0 if there is not enough memory. */
 static int with_memory(Job *job) {
     const Plate *p = job->plate;
     if (job->threads > MOST_THREADS) job->threads = MOST_THREADS;
@@ -429,7 +428,7 @@ static int with_memory(Job *job) {
 #define EXPORT __attribute__((visibility("default")))
 #endif
 
-/* s = scale f(u), and the work of the membrane force on the quadratic strains. */
+/* Compute s = scale f(u), and the work of the membrane force on the quadratic strains. */
 EXPORT int fecm_internal_force(const Plate *plate, int64_t threads, double *quadratic) {
     Job job = {.plate = plate, .steps = 1, .threads = threads};
     if (!with_memory(&job)) return 0;
@@ -437,7 +436,7 @@ EXPORT int fecm_internal_force(const Plate *plate, int64_t threads, double *quad
     return 1;
 }
 
-/* Take impact steps; returns their number, which is smaller if the motion is no longer finite. */
+/* Take impact steps; returns the number of steps taken, which is smaller if the motion is no longer finite. */
 EXPORT int64_t fecm_impact_steps(const Plate *plate, Impact *impact, int64_t steps, int64_t threads) {
     Job job = {.plate = plate, .impact = impact, .steps = steps, .threads = threads};
     for (int64_t i = 0; i < impact->loaded; i++)
@@ -446,9 +445,9 @@ EXPORT int64_t fecm_impact_steps(const Plate *plate, Impact *impact, int64_t ste
     return with_memory(&job) ? job.taken : -1;
 }
 
-/* Add the responses of four modes of the projectile, a lane each, of which `count` are modes. */
+/* Add the responses of `count` modes of the projectile, at most four, one per lane. */
 static void respond_modes(const Sweep *x, Response *r, int64_t first, int count) {
-    half T[3][3], y[4][3] = {{{0}}}, shape; /* columns of y: motion after a unit of each motion; after a unit force */
+    half T[3][3], y[4][3] = {{{0}}}, shape; /* columns of y: motion after unit motions, then after a unit force */
     for (int lane = 0; lane < WIDTH; lane++) {
         const int64_t n = x->modes, i = first + (lane < count ? lane : 0);
         for (int row = 0; row < 3; row++) {
@@ -476,7 +475,7 @@ static void respond_modes(const Sweep *x, Response *r, int64_t first, int count)
     }
 }
 
-/* Fill in the responses of the tip, and tables of sines. */
+/* Compute the responses of the tip, and tables of sines. */
 static void respond(const Sweep *x, Response *r) {
     const int64_t n = x->modes;
     double largest[2] = {0.0, 0.0}, now = 0.0;
@@ -485,12 +484,12 @@ static void respond(const Sweep *x, Response *r) {
     for (int64_t i = 0; i < n; i++) r->gain += x->tip_shape[i] * x->h[2 * n + i];
     for (int64_t step = 0; step < x->steps; step++) {
         double *at = r->response + 2 * step;
-        const double before = step ? now : 0.0; /* the force of a step is that at t + theta dt */
+        const double before = step ? now : 0.0; /* the force of a step acts at t + theta dt */
         now = at[1];
         at[0] = x->plate[step], at[1] = x->theta * now + (1.0 - x->theta) * before;
         for (int part = 0; part < 2; part++) largest[part] = fmax(largest[part], fabs(at[part]));
     }
-    /* Of the order of the plate's, so that neither loses digits in their common transforms. */
+    /* Scale the tip's response to the order of the plate's, so that neither loses digits in the common transforms. */
     const double ratio = largest[1] / largest[0];
     r->unit = ratio > 0.0 && isfinite(ratio) ? ldexp(1.0, ilogb(ratio)) : 1.0;
     for (int64_t step = 0; step < x->steps; step++) r->response[2 * step + 1] /= r->unit;
@@ -528,8 +527,8 @@ EXPORT void fecm_strains(const Strains *family, int64_t fields, int64_t numnp, i
     CHOSEN(strains)(family, fields, numnp, numel, u, strains);
 }
 
-/* Raise the exposures to those of displacement fields, (rows, numbers), at their times; the largest that
- * count after each, their states and modes, (rows, criteria). */
+/* Raise the exposures to the exposures of displacement fields, (rows, numbers), at their times.  Store the largest
+ * exposures that count after each field, with their states and modes, (rows, criteria). */
 EXPORT void fecm_failure(const Exposures *m, int64_t rows, int64_t numbers, const double *u, const double *time, double *exposure, int64_t *state, int8_t *mode) {
     for (int64_t row = 0; row < rows; row++) {
         CHOSEN(failure)(m, u + numbers * row, time[row]);
@@ -539,7 +538,7 @@ EXPORT void fecm_failure(const Exposures *m, int64_t rows, int64_t numbers, cons
     }
 }
 
-/* Checksum of the sources, given by the build. */
+/* Checksum of the sources, defined by the build. */
 EXPORT int fecm_stamp(void) { return FECM_STAMP; }
 
 EXPORT int fecm_has_avx2(void) { return CHOSEN(run_chunk) != run_chunk_any; }

@@ -5,52 +5,53 @@
  *
  *   N = N0 + A eps + B kappa,   M = B eps + D kappa.
  *
- * D kappa, transverse shear, and N0 on the slopes are linear in w, theta_x and theta_y: they are the work
- * of the four kinds of plate.h, with the last three dofs.  The rest is done here: the forces of
- * A eps + B kappa on u, v and w, and those of B eps on the rotations.
+ ** D kappa, transverse shear, and N0 on the slopes are linear in w, theta_x and theta_y.  The four kinds of
+ * plate.h compute them with the last three dofs.  This file computes the rest: the forces of A eps + B kappa on
+ * u, v and w, and the forces of B eps on the rotations.
  *
- * Frame.  Base vectors of an element are x_1 = x,xi and x_2 = x,eta at its centre.  U_a = x_a (u, v) and
- * T_a = x_a (theta_x, theta_y) are displacements and rotations along them, and D_a = R_ab d/dxi_b is the
- * derivative along x_a, with R = J_c J^-1 of the Jacobians at the centre and at a point.  Covariant strains:
+ ** Frame.  The base vectors of an element are x_1 = x,xi and x_2 = x,eta at its centre.  U_a = x_a (u, v) and
+ * T_a = x_a (theta_x, theta_y) are displacements and rotations along them.  D_a = R_ab d/dxi_b is the
+ * derivative along x_a, with R = J_c J^-1 from the Jacobians at the centre and at a point.  Covariant strains:
  *
- *   e_11 = D_1 U_1,   e_22 = D_2 U_2,   e_12 = D_1 U_2 + D_2 U_1,   curvatures the same of -T.
+ **   e_11 = D_1 U_1,   e_22 = D_2 U_2,   e_12 = D_1 U_2 + D_2 U_1,   curvatures likewise from -T.
  *
- * They have the stiffnesses A_c = T' A T and B_c = T' B T, with T from covariant strains to those in x and
- * y.  On parallelograms R = 1.
+ * Their stiffnesses are A_c = T' A T and B_c = T' B T, where T maps covariant strains to strains in x and y.  On
+ * parallelograms R = 1.
  *
- * Tying.  With w,a = D_a w, the quadratic part of e_11 is w,1^2/2 at xi = +-1/sqrt(3), eta = 0, +-sqrt(3/5),
- * that of e_22 is w,2^2/2 at the points with xi and eta exchanged, and that of e_12 is w,1 w,2 at
- * xi, eta = +-1/sqrt(3).  Between these points they are interpolated.  With eps_q of every point a plate
- * that bends without stretching would be too stiff (Bucalem and Bathe 1993); with the base vectors of
- * the tying points a constant membrane force would not be exact (Wisniewski and Panasz 2013).
+ * Tying.  With w,a = D_a w, the quadratic part of e_11 is w,1^2/2 at xi = +-1/sqrt(3), eta = 0, +-sqrt(3/5).
+ * The quadratic part of e_22 is w,2^2/2 at the points with xi and eta exchanged.  The quadratic part of e_12 is
+ * w,1 w,2 at xi, eta = +-1/sqrt(3).  Between these points the strains are interpolated.  With eps_q of every
+ * point, a plate that bends without stretching would be too stiff (Bucalem and Bathe 1993).  With the base
+ * vectors of the tying points, a constant membrane force would not be exact (Wisniewski and Panasz 2013).
  *
- * Parallelograms.  There e_11, linear and tied, is linear in xi and quadratic in eta, e_22 the other way
- * round, and e_12 a sum of both: each has some of eight orthogonal modes,
+ * Parallelograms.  e_11, linear and tied, is linear in xi and quadratic in eta; e_22 is linear in eta and
+ * quadratic in xi; e_12 is a sum of both forms.  Each strain is a sum of some of eight orthogonal modes,
  *
  *   0: 1   1: xi/2   2: eta/2   3: xi eta   4: p(xi)/2   5: p(xi) eta   6: p(eta)/2   7: p(eta) xi,
  *
  * with p(x) = x^2 - 1/3; e_11 has no 4 and 5, e_22 no 6 and 7.  The 3 x 3 points integrate their products
- * exactly, so that the energy is a sum over the modes, and only the slopes of w are computed at points.
+ ** exactly.  The energy is therefore a sum over the modes, and only the slopes of w are computed at points.
  *
- * Other elements.  Slopes along xi and eta at the 9 points and at the tying points, by sums along xi and then
- * along eta as of FACTORIZED elements, and there the strains with R.
+ * Other elements.  Slopes along xi and eta are computed at the 9 points and at the tying points, by sums along
+ * xi and then along eta as in FACTORIZED elements.  The strains there follow with R.
  *
- * Numbers of a block.  `membrane`: x_1/2 and x_2/2 (4), as `slopes` gives twice the slopes; the upper halves
- * of A_c and -B_c (6 + 6), for parallelograms times determinant and weight.  For others: R_1/2 at the
- * points of e_11 (6, 2), R_2/2 at those of e_22 (6, 2), both at those of e_12 (4, 4); and `data` as
- * TABULATED elements have it, with the points in rows of eta.
+ * Data of a block.  `membrane` starts with x_1/2 and x_2/2 (4), because `slopes` gives twice the slopes, and
+ * with the upper triangles of A_c and -B_c (6 + 6), which for parallelograms are multiplied by determinant and
+ * weight.  Other elements also have R_1/2 at the tying points of e_11 (6, 2), R_2/2 at the tying points of e_22
+ * (6, 2), and both at the tying points of e_12 (4, 4); their `data` is as in TABULATED elements, with the
+ * points in rows of eta.
  *
- * Curved plate.  Its covariant strains contain w/R at the points, with 1/R the last numbers (3) of all
- * elements: none are taken as parallelograms, for these modes are not those of w.
+ * Curved plate.  The covariant strains contain w/R at the points; 1/R are the last numbers (3) of every
+ * element.  No element is treated as a parallelogram, because the modes do not contain w.
  *
- * Functions compute four elements, and are followed by their transposes.  Coefficients c, and forces on them,
- * are of U_1, U_2, w, T_1, T_2; slopes are twice those.
+ * Functions compute four elements at a time and are followed by their transposes.  Coefficients c, and forces
+ * on them, belong to U_1, U_2, w, T_1, T_2.  Slopes are doubled.
  */
 
 #define AT(i) NAME(load)(data + LANES * (i))
 
-/* n = C e with the upper half of C (3, 3); without `first` or `second`, e_1 or e_2 is 0 and n_1 or n_2 is of
- * no use. */
+/* n = C e with the upper triangle of C (3, 3).  Without `first` or `second`, e_1 or e_2 is 0 and n_1 or n_2 is
+ * not computed. */
 INLINE void NAME(stresses)(int first, int second, const half *C, const half *e, half *n) {
     if (first && second) {
         n[0] = C[0] * e[0] + C[1] * e[1] + C[2] * e[2];
@@ -95,7 +96,7 @@ INLINE void NAME(sum_strain_modes)(half (*n)[MODES], half (*force)[9]) {
     NAME(sum_slope_modes)(n[2], n[1], force[1]);
 }
 
-/* Add e_11 (axis 0) or e_22 (axis 1) of its tying points, along and across the axis, to its modes. */
+/* Add e_11 (axis 0) or e_22 (axis 1) at its tying points, along and across the axis, to its modes. */
 INLINE void NAME(tie)(int axis, double scale, half (*f)[3], half *e) {
     const int one = axis ? 1 : 2, two = axis ? 4 : 6, along = axis ? 2 : 1, both = axis ? 5 : 7;
     const double *a = OF_SUM, *b = OF_DIFFERENCE;
@@ -121,7 +122,7 @@ INLINE void NAME(untie)(int axis, double scale, const half *n, half (*f)[3]) {
     for (int k = 0; k < 3; k++) f[1][k] = sum[k] + odd[k], f[0][k] = sum[k] - odd[k];
 }
 
-/* Slopes along an axis at the tying points of e_11 or e_22, and at those of e_12; along and across. */
+/* Slopes along an axis at the tying points of e_11 or e_22, and of e_12; indices along and across the axis. */
 INLINE void NAME(tied_slopes)(int axis, const half *c, half (*at)[3], half (*corner)[2]) {
     const int along = axis ? 3 : 1, across = axis ? 1 : 3;
     half d[3][2];
@@ -158,7 +159,7 @@ INLINE void NAME(mode_stresses)(const half *C, half (*e)[MODES], half (*n)[MODES
     }
 }
 
-/* Add e_12 of its tying points (xi, eta) to its modes. */
+/* Add e_12 at its tying points (xi, eta) to its modes. */
 INLINE void NAME(tie_corners)(double scale, half (*f)[2], half *e) {
     const half low = f[0][1] + f[0][0], high = f[1][1] + f[1][0];
     const half left = f[0][1] - f[0][0], right = f[1][1] - f[1][0];
@@ -267,7 +268,7 @@ INLINE void NAME(sum_strains)(half (*R)[4], half (*n)[9], half (*force)[9]) {
     for (int i = 0; i < 2; i++) NAME(sum_gradient)(3, ACROSS, 3, ACROSS, a[i], b[i], force[i]);
 }
 
-/* Slopes along x_1 and x_2 at the tying points of e_11, of e_22, and of e_12. */
+/* Slopes along x_1 at the tying points of e_11, along x_2 at those of e_22, and along both at those of e_12. */
 typedef struct {
     half one[6], two[6], both[2][4];
 } NAME(Tied);
@@ -321,7 +322,7 @@ INLINE void NAME(sum_tied_strains)(const double *data, const NAME(Tied) *tied, h
     NAME(sum_gradient)(2, ALONG, 2, ALONG, xi, eta, force);
 }
 
-/* Strains w/R of a curved plate, added to those at the 9 points. */
+/* Add the strains w/R of a curved plate to the strains at the 9 points. */
 INLINE void NAME(add_curved)(const double *data, const half *c, half (*e)[9]) {
     half v[3][3], w[9];
     for (int b = 0; b < 3; b++) NAME(values)(3, ACROSS, c[3 * b], c[3 * b + 1], c[3 * b + 2], v[b], 1);
@@ -337,8 +338,8 @@ INLINE void NAME(sum_curved)(const double *data, half (*n)[9], half *force) {
     for (int b = 0; b < 3; b++) NAME(sum_values)(3, ACROSS, v[b], 1, force + 3 * b, force + 3 * b + 1, force + 3 * b + 2);
 }
 
-/* Forces on the coefficients of an element that is not a parallelogram, or of a curved plate: those of w/R,
- * which are linear in w, are `lifting`. */
+/* Forces on the coefficients of an element that is not a parallelogram, or belongs to a curved plate.  The
+ * forces of w/R, which are linear in w, are stored in `lifting`. */
 INLINE void NAME(of_points)(int coupled, int curved, const double *data, const double *points, half (*c)[9], half (*force)[9],
                             half *lifting) {
     half e[3][9], linear[3][9], bent[3][9], moment[3][9], R[9][4], A[6], B[6];
@@ -376,7 +377,7 @@ INLINE void NAME(of_points)(int coupled, int curved, const double *data, const d
     if (curved) NAME(sum_curved)(data, e, lifting);
 }
 
-/* Components along the base vectors, from those in x and y. */
+/* Components along the base vectors, from components in x and y. */
 INLINE void NAME(covariant)(const double *data, half *a, half *b) {
     const half xx = AT(0), xy = AT(1), yx = AT(2), yy = AT(3);
     for (int i = 0; i < 9; i++) {
@@ -411,7 +412,7 @@ INLINE void NAME(stretch)(int coupled, int modes, int curved, const Plate *p, co
             NAME(of_modes)(coupled, data, c, force);
         else
             NAME(of_points)(coupled, curved, data, b->data + 4 * side, c, force, lifting);
-        /* w f_w is twice that work, as eps_q is of the second order. */
+        /* w f_w is twice this work, because eps_q is of second order. */
         half sum = 0.5 * c[2][1] * force[2][1];
         for (int i = 2; i < 9; i++) sum += 0.5 * c[2][i] * force[2][i];
         *work += sum;

@@ -1,7 +1,7 @@
-/* Midplane strains, curvatures and their derivatives, as PlyStresses evaluates them; included once for each
+/* Midplane strains, curvatures and their derivatives, as in PlyStresses; included once for each
  * instruction set.
  *
- * Of 6 `strains` the first three are those of the midplane; of 3 there are the curvatures alone.  Four points of
+ ** 6 `strains` are three midplane strains and three curvatures; 3 `strains` are the curvatures.  Four points of
  * an element are computed at once.  Sums run over the nodes in their order. */
 
 /* Components e_11 (6), e_22 (6) and e_12 (4) of the quadratic strains at their tying points. */
@@ -22,9 +22,9 @@ INLINE void NAME(tied_components)(const Midplane *g, const int64_t *node, const 
     for (int t = 0; t < 4; t++) e[12 + t] = slope[0][6 + t] * slope[1][6 + t];
 }
 
-/* Derivatives by x and y at the centre, (2, strains); `d` has those of the shape functions. */
+/* Derivatives by x and y at the centre, (2, strains); `d` has the derivatives of the shape functions. */
 INLINE void NAME(gradients)(const Midplane *g, const int64_t *node, const double *d, const double *u, int strains, double *out) {
-    half xx = {0}, yy = {0}, xy = {0}; /* of u, v, theta_x, theta_y */
+    half xx = {0}, yy = {0}, xy = {0}; /* derivatives of u, v, theta_x, theta_y */
     double w[5] = {0.0};
     const int64_t n = g->nodes;
     const int of_w = g->curved || g->tying;
@@ -46,7 +46,7 @@ INLINE void NAME(gradients)(const Midplane *g, const int64_t *node, const double
     out[6] += x * w[2], out[7] += y * w[1], out[8] += w[2] * y + x * w[1];
 }
 
-/* Derivatives by x and y at four points, of u, v, theta_x and theta_y, or of the last two, from `first` on. */
+/* Derivatives by x and y at four points of u, v, theta_x, theta_y, starting with dof `first`. */
 INLINE void NAME(derivatives)(const Midplane *g, const int64_t *node, int64_t shape, int64_t point, int first, const double *u, half *x, half *y) {
     static const int dofs[4] = {0, 1, 3, 4};
     half xi[4] = {{0}}, eta[4] = {{0}};
@@ -95,7 +95,7 @@ INLINE void NAME(midplane)(const Midplane *g, const double *u, int strains, doub
             half x[4], y[4], found[6];
             NAME(derivatives)(g, node, shape, point, strains == 6 ? 0 : 2, u, x, y);
             if (strains == 6) NAME(stretching)(g, node, shape, point, u, tied, x, y, found);
-            /* Curvatures are the strains of the rotations' negatives. */
+            /* Curvatures are the strains of the negative rotations. */
             found[3] = 0.0 - x[2], found[4] = 0.0 - y[3], found[5] = 0.0 - y[2] - x[3];
             for (int i = 0; i < 4 && point + i < g->points; i++)
                 for (int k = 6 - strains; k < 6; k++) *out++ = found[k][i];

@@ -1,37 +1,38 @@
 /* K u of a plate, and strains; included once for each instruction set.
  *
- * Layout.  Eight elements of a group are computed at once: `lanes` has a value of each.  A block takes
- * the entries of its nodes from the vector u of its chunk, (nodes, nd) or (nd, nodes) of lanes, forms
- * y = K x by one of four kinds, and gives y to the chunk's vector of forces:
+ ** Layout.  Eight elements of a group are computed at once: `lanes` has a value for each.  A block takes
+ * the entries of its nodes from the vector u of its chunk, (nodes, nd) or (nd, nodes) of lanes, computes
+ * y = K x in one of four ways, and adds y to the chunk's vector of forces:
  *
- *   ONE_MATRIX     y = K x with the one matrix of congruent elements
- *   TWO_MATRICES   the same with the even and the odd motions under half a turn apart: half the work
- *   FACTORIZED     quadrature of 9-node elements, sums along xi and then along eta; with `tying`
- *                  the shear strains are assumed ones, see assumed_shear.h
+ **   ONE_MATRIX     product with the single matrix of congruent elements
+ *   TWO_MATRICES   products with one matrix for motions even under a half turn and one for odd motions: half
+ *                  the work
+ *   FACTORIZED     quadrature of 9-node elements, with sums along xi and then along eta; with `tying` the shear
+ *                  strains are assumed, see assumed_shear.h
  *   TABULATED      quadrature with tables of shape functions, for all other elements
  *
- * Of a nonlinear plate K is that of w, theta_x and theta_y alone, and membrane.h adds the rest.
+ * For a nonlinear plate K contains only w, theta_x and theta_y, and membrane.h adds the rest.
  *
- * Where the eight places of a node follow one another, they are two loads of four; elsewhere they are
- * eight numbers of `lane`.  A lane without an element takes and gives at a spare place of the chunk.
+ * If the eight places of a node are consecutive, they are loaded as two times four numbers.  Otherwise `lane`
+ * has the eight places.  A lane without an element uses a spare place of the chunk.
  *
- * A chunk: its copies of shared nodes are taken from the last part of u; its blocks add forces, in
- * their order; the forces on copies are put aside in `force`, and the entries of nodes that are its
- * own are updated at once, while they are in the cache.  `finish` adds the forces put aside, chunk by
- * chunk, and updates the shared nodes.
+ * A chunk takes its copies of shared nodes from the last part of u.  Its blocks add forces, in their order.  The
+ * chunk stores the forces on copies in `force`, and updates the entries of its own nodes at once, while they are
+ * in the cache.  `finish` adds the stored forces, chunk by chunk, and updates the shared nodes.
  *
- * Sums.  In matrix products a register sums over the columns in ascending order.  `update` sums each
- * energy in two registers of four lanes, even and odd fours of nodes, for all dofs; a chunk returns
- * them added, (4 energies, 4 lanes).  The fifth sum is that of the blocks of a nonlinear plate.  Every order is fixed by the layout alone.
+ * Sums.  In matrix products a register sums over the columns in ascending order.  `update` sums each energy over
+ * all dofs in two registers of four lanes, for even and odd fours of nodes.  A chunk returns their sum,
+ * (4 energies, 4 lanes).  The fifth sum is the work of the blocks of a nonlinear plate.  Only the layout fixes
+ * the order of all sums.
  *
- * Threads.  run_chunk writes the entries of its chunk, its `force`, its `sums` and the buffer of its
- * thread, and reads shared nodes, which only `finish` writes.
+ * Threads.  run_chunk writes the entries of its chunk, its `force`, its `sums` and the buffer of its thread.  It
+ * reads shared nodes, which only `finish` writes.
  */
 
 INLINE half NAME(load)(const double *x) { return *(const half *)x; }
 INLINE void NAME(store)(double *x, half value) { *(half *)x = value; }
 
-/* y = A x for `rows` rows of A (rows, n), x and y a value in each lane; the sums stay in registers. */
+/* y = A x for `rows` rows of A (rows, n); x and y have a value in each lane, and the sums stay in registers. */
 INLINE void NAME(rows)(int rows, const double *A, int n, const lanes *x, lanes *y) {
     half a[5] = {{0}}, b[5] = {{0}};
     for (int c = 0; c < n; c++) {
@@ -43,7 +44,7 @@ INLINE void NAME(rows)(int rows, const double *A, int n, const lanes *x, lanes *
     for (int r = 0; r < rows; r++) y[r] = (lanes){a[r], b[r]};
 }
 
-/* y = A x, A (m, n), by at most five rows at a time. */
+/* y = A x with A (m, n), at most five rows at a time. */
 TARGET void NAME(product)(const double *A, int m, int n, const lanes *x, lanes *y) {
     for (int r = 0; r < m;) {
         const int left = m - r, times = (left + 4) / 5, rows = (left + times - 1) / times;
@@ -58,7 +59,7 @@ TARGET void NAME(product)(const double *A, int m, int n, const lanes *x, lanes *
     }
 }
 
-/* Entries of eight nodes of a chunk, (nd, nodes), and y (nd,) added to them; see Block for `at`. */
+/* Take the entries of eight nodes from a chunk, (nd, nodes); `give` adds y (nd,).  See Block for `at`. */
 INLINE void NAME(take)(int nd, const Plate *p, const Chunk *c, int32_t at, const double *u, lanes *x, int step) {
     if (at >= 0)
         for (int dof = 0; dof < nd; dof++, u += c->nodes) x[dof * step] = (lanes){NAME(load)(u + at), NAME(load)(u + at + 4)};
@@ -93,8 +94,8 @@ INLINE void NAME(one_matrix)(int nd, int nodes, const Plate *p, const Chunk *c, 
     for (int node = 0; node < nodes; node++) NAME(give)(nd, p, c, b->place[node], y + node, nodes, f);
 }
 
-/* Elements with one matrix for even motions and one for odd ones: under half a turn w keeps its sign,
- * the other dofs change it.  Each has its dofs in order, (pairs,) or (pairs + 1,) with the centre. */
+/* Elements with one matrix for even motions and one for odd motions.  Under a half turn w keeps its sign, and the
+ * other dofs change sign.  Each motion has its dofs in order, (pairs,) or (pairs + 1,) with the centre. */
 INLINE void NAME(two_matrices)(int nd, int pairs, int centre, const Plate *p, const Chunk *c, const Block *b, const double *u, double *f) {
     const int w = nd == 5 ? 2 : 0, even = nd * pairs + centre, odd = nd * (pairs + centre) - centre;
     const double *matrix = b->group->matrix;
@@ -132,8 +133,8 @@ INLINE void NAME(two_matrices)(int nd, int pairs, int centre, const Plate *p, co
     }
 }
 
-/* Strains at the points of quadrature from values and slopes in xi and eta, stresses, and back.  The values
- * of w at the points of bending are those of w/R in a curved plate. */
+/* Quadrature: strains at the points from values and slopes in xi and eta, stresses, and back to forces.  A
+ * curved plate uses the values of w at the points of bending for w/R. */
 INLINE void NAME(tabulated)(int nd, int nodes, const Plate *p, const Chunk *c, const Block *b, const double *u, double *f) {
     const Group *g = b->group;
     const double *data = b->data;
@@ -150,7 +151,7 @@ INLINE void NAME(tabulated)(int nd, int nodes, const Plate *p, const Chunk *c, c
         NAME(product)(g->rotations, 2 * nb + values, nodes, w + (1 + i) * nodes, at_r[i]);
         if (nd == 5) NAME(product)(g->rotations, 2 * nb, nodes, x + i * nodes, at_u[i]);
     }
-    /* x_xi and the like at the tying points, behind the points' data. */
+    /* Slopes of x and y at the tying points follow the data of the points. */
     const double *slope = data + (nb + ns) * 5 * LANES;
     const half zero = {0};
     for (int side = 0; side < 2; side++) { /* four lanes at a time */
@@ -255,9 +256,9 @@ INLINE void NAME(tabulated)(int nd, int nodes, const Plate *p, const Chunk *c, c
 
 /* Biquadratic elements with the points of a tensor product, by sum factorization.
  *
- * A quadratic a, b, c at -1, 0, 1 has the coefficients c0 = b, c1 = c - a, c2 = a - 2 b + c: its value
- * is c0 + c1 x/2 + c2 x^2/2, and twice its slope c1 + 2 c2 x.  Points are ascending and symmetric, so
- * that even and odd parts give those at x and -x at once.  Four elements at a time. */
+ ** A quadratic with the values a, b, c at -1, 0, 1 has the coefficients c0 = b, c1 = c - a, c2 = a - 2 b + c.
+ * Its value is c0 + c1 x/2 + c2 x^2/2, and twice its slope is c1 + 2 c2 x.  Points are ascending and symmetric,
+ * so that even and odd parts give the values at x and -x at once.  Four elements are computed at a time. */
 INLINE void NAME(values)(int n, const double *x, half c0, half c1, half c2, half *v, int step) {
     for (int k = 0; k < n / 2; k++) {
         const double at = x[n - 1 - k];
@@ -314,14 +315,14 @@ INLINE void NAME(nodal)(half *f) {
 
 #include "assumed_shear.h"
 
-/* Forces on the coefficients of the dofs from strains at n x n points: those of membrane and bending
- * strains, which are stored, of transverse shear strains, which are added, or of both, stored, if they have
- * the same points.  If `tied`, `assumed` are twice the covariant shear strains at the points, (2, xi, eta),
- * and become forces on them.
+/* Forces on the coefficients of the dofs from strains at n x n points.  Forces of membrane and bending strains
+ * are stored, forces of transverse shear strains are added; if both have the same points, their sum is stored.
+ * If `tied`, `assumed` is twice the covariant shear strains at the points, (2, xi, eta), and is replaced by the
+ * forces on them.
  *
- * Coefficients of x and y follow those of the dofs; `weight` are those of the points, and `factor`
- * that of the element.  With twice the slopes J of x and y, d their determinant and g twice the slopes
- * of a field, strains are adj(J) g/d and the area of a point is its weight times d/4. */
+ * The coefficients of x and y follow the coefficients of the dofs.  `weight` are the weights of the points,
+ * `factor` is the factor of the element.  With twice the slopes J of x and y, their determinant d and twice the
+ * slopes g of a field, strains are adj(J) g/d and the area of a point is its weight times d/4. */
 INLINE void NAME(points)(int nd, int tied, int n, int bends, int shears, const Plate *p, const Group *g, const double *x,
                          const double *weight, half factor, half (*c)[9], half (*assumed)[3][3], half (*force)[9]) {
     const int w = nd - 3, fields = nd + 2, free = shears && !tied;
@@ -419,13 +420,13 @@ INLINE void NAME(factorized)(int nd, int tied, const Plate *p, const Chunk *chun
             for (int node = 0; node < 9; node++) c[dof][node] = HALF(x[dof][node]);
             NAME(coefficients)(c[dof]);
         }
-        c[nd][0] = c[nd + 1][0] = factor; /* of no effect on slopes */
+        c[nd][0] = c[nd + 1][0] = factor; /* has no effect on slopes */
         for (int i = 1; i < 9; i++)
             for (int axis = 0; axis < 2; axis++) c[nd + axis][i] = NAME(load)(b->data + LANES * (8 * axis + i) + 4 * side);
         half assumed[2][3][3] ALIGNED, mapping[2][2][2][3] ALIGNED;
         if (tied)
             for (int axis = 0; axis < 2; axis++) NAME(assume)(axis, c + nd - 3, mapping[axis], assumed[axis]);
-        if (nb == 3 && ns == 3) /* the usual numbers, for which loops are unrolled */
+        if (nb == 3 && ns == 3) /* the usual numbers of points, for which loops are unrolled */
             NAME(points)(nd, tied, 3, 1, 1, p, g, tied ? ACROSS : xb, wb, factor, c, assumed, force);
         else {
             NAME(points)(nd, tied, nb, 1, 0, p, g, xb, wb, factor, c, assumed, force);
@@ -451,7 +452,7 @@ TARGET void NAME(tied)(int nd, const Plate *p, const Chunk *chunk, const Block *
 
 #include "membrane.h"
 
-/* Scale the internal forces of a chunk's nodes, add to the sums, and take the next step if asked to. */
+/* Scale the internal forces of a chunk's nodes and add to the sums; take the next step if `next` is set. */
 INLINE void NAME(update)(int nd, const Plate *p, const Chunk *c, double *force, int next, half *sums) {
     const int64_t n = c->nodes;
     const double keep = 1.0 - p->damping, share = 1.0 / (1.0 + p->damping);
@@ -489,7 +490,7 @@ INLINE void NAME(update)(int nd, const Plate *p, const Chunk *c, double *force, 
     sums[2] = strain[0] + strain[1], sums[3] = internal[0] + internal[1];
 }
 
-/* Forces of a chunk, and the update of the nodes that are its own. */
+/* Compute the forces of a chunk, and update the chunk's own nodes. */
 INLINE void NAME(chunk)(int nd, int nonlinear, const Plate *p, const Chunk *c, int next, double *force, half *sums) {
     const Chunk *common = p->chunk + p->chunks;
     const int last = nonlinear ? 3 : nd;
@@ -527,7 +528,7 @@ INLINE void NAME(chunk)(int nd, int nonlinear, const Plate *p, const Chunk *c, i
     NAME(update)(nd, p, c, force, next, sums);
 }
 
-/* `force` is (nd, most) and zero, before and after. */
+/* `force` is (nd, most); it is zero before and after. */
 TARGET void NAME(run_linear)(const Plate *p, const Chunk *c, int next, double *force, half *sums) {
     if (p->nd == 3)
         NAME(chunk)(3, 0, p, c, next, force, sums);
@@ -544,7 +545,7 @@ TARGET void NAME(run_chunk)(const Plate *p, int64_t number, int next, double *fo
     (p->nonlinear ? NAME(run_nonlinear) : NAME(run_linear))(p, p->chunk + number, next, force, sums);
 }
 
-/* Add up what the chunks share, update it, and add up the sums of all, (chunks, SUMS). */
+/* Add up the forces on shared nodes, update these nodes, and add up the sums of all chunks, (chunks, SUMS). */
 TARGET Sums NAME(finish)(const Plate *p, int next, half *sums) {
     const int64_t nd = p->nd;
     const Chunk *common = p->chunk + p->chunks;
@@ -611,7 +612,7 @@ TARGET void NAME(strains)(const Strains *g, int64_t fields, int64_t numnp, int64
                         of_xi += tied[i] * NAME(load)(one), of_eta += tied[each + i] * NAME(load)(other);
                     xz = xx * of_xi + xe * of_eta, yz = yx * of_xi + ye * of_eta;
                 }
-                /* 0 - a, as -a would give negative zeros of a plate at rest. */
+                /* 0 - a avoids the negative zeros of a plate at rest. */
                 const half found[5] = {
                     0.0 - (xx * a[0] + xe * a[1]), 0.0 - (yx * b[0] + ye * b[1]),
                     0.0 - (yx * a[0] + ye * a[1]) - (xx * b[0] + xe * b[1]), yz, xz};

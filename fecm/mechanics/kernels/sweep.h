@@ -1,23 +1,23 @@
 /* Many impacts on one plate, eight cases at a time; included once for each instruction set.
  *
- * Plate and projectile are linear.  The displacement w of the plate and the acceleration of the tip
- * are sums over the earlier contact forces of a case with `response`, the answers to a unit force:
+ ** Plate and projectile are linear.  The displacement w of the plate and the acceleration of the tip
+ * are convolutions of the earlier contact forces of a case with `response`, the responses to a unit force:
  * w_n = sum over m < n of g_(n-m) F_m.  The force of a step follows from w by the contact iteration.
  *
- * Layout.  Cases are computed in GROUPS of four, a lane each, whose chains of divisions and roots
- * overlap, and which share what they load; lanes beyond the last case repeat it.  Response and spectra
- * interleave plate and tip, (.., 2), so that both sums are one complex transform: the plate is the
- * real part, the tip the imaginary one, divided by `unit` to be of the same size.
+ * Layout.  Cases are computed in GROUPS of four, one case per lane.  The groups' chains of divisions and roots
+ * overlap, and the groups share the numbers that they load.  Lanes beyond the last case repeat it.  Response and
+ * spectra interleave plate and tip, (.., 2), so that both sums are one complex transform: the plate is the real
+ * part, the tip the imaginary part, divided by `unit` to have the same size.
  *
  * Sums.  Steps are cut into blocks of FAR.  Forces of earlier blocks act by Fourier transforms of
- * 2 FAR numbers, once per block (far_sums); blocks without a force are left out.  Forces of this block
- * act one by one (near_sums).  Both run over the past in a fixed order, and no lane reads another, so
- * that a case has the same bytes in any company.
+ * 2 FAR numbers, once per block (far_sums); blocks without a force are left out.  Forces of the current block
+ * act one by one (near_sums).  Both sums run over the past in a fixed order, and no lane reads another lane, so
+ * that the result of a case does not depend on the other cases, to the last bit.
  *
- * Every CHECKED steps the modes of the projectile are moved on, by a power of the step's matrix and
- * the forces since, and the energies are compared: the largest error is that of a case.
+ * After every CHECKED steps the modes of the projectile are advanced, by a power of the step's matrix and
+ * the forces since, and the energies are compared.  The result of a case is its largest error.
  *
- * Threads.  None: a call computes its cases alone, and several processes share a sweep.
+ * Threads.  A call runs in one thread; several processes share a sweep.
  */
 
 INLINE half NAME(choose)(mask where, half a, half b) { return (half)((where & (mask)a) | (~where & (mask)b)); }
@@ -30,7 +30,7 @@ INLINE int NAME(any)(const mask *where) {
     return ANY(found);
 }
 
-/* A butterfly of a Fourier transform: u + v, and u - v turned back. */
+/* Butterfly of a Fourier transform: u + v, and u - v turned back. */
 INLINE void NAME(part)(half *u, half *v, const double *turn) {
     const double c = turn[0], s = turn[1];
     const half re = u[0] - v[0], im = u[1] - v[1];
@@ -38,7 +38,7 @@ INLINE void NAME(part)(half *u, half *v, const double *turn) {
     v[0] = c * re + s * im, v[1] = c * im - s * re;
 }
 
-/* The inverse of `part`, times 2. */
+/* Inverse of `part`, times 2. */
 INLINE void NAME(join)(half *u, half *v, const double *turn) {
     const double c = turn[0], s = turn[1];
     const half re = c * v[0] - s * v[1], im = c * v[1] + s * v[0];
@@ -46,8 +46,8 @@ INLINE void NAME(join)(half *u, half *v, const double *turn) {
     u[0] += re, u[1] += im;
 }
 
-/* Fourier transform of `count` numbers (re, im), a power of two up to 2 FAR; frequencies are in bit-reversed
- * order.  Two stages at a time, so that numbers are loaded and stored half as often. */
+/* Fourier transform of `count` numbers (re, im); `count` is a power of two up to 2 FAR.  Frequencies are in
+ * bit-reversed order.  Two stages at a time halve the number of loads and stores. */
 TARGET void NAME(transform)(half *z, int count, const double *turn) {
     int width = count / 2, step = 2 * FAR / count;
     for (; width > 1; width /= 4, step *= 4)
@@ -65,22 +65,22 @@ TARGET void NAME(transform)(half *z, int count, const double *turn) {
         for (half *first = z; first < z + 2 * count; first += 4) NAME(part)(first, first + 2, turn);
 }
 
-/* The same for 2 FAR real numbers, at half of the places: for n <= i < 2 n, n a power of two, place
- * 3 n - 1 - i has the opposite frequency of place i, and only the smaller of both is computed. */
+/* Fourier transform of 2 FAR real numbers, at half of the places: for n <= i < 2 n, with n a power of two, place
+ * 3 n - 1 - i has the opposite frequency of place i, and only the smaller place is computed. */
 TARGET void NAME(transform_real)(half *z, const double *turn) {
     for (int width = FAR, step = 1; width > 1; width /= 2, step *= 2) {
         for (int i = 0; i < width / 2; i++) {
             half *u = z + 2 * i, *v = u + width, *w = v + width, *x = w + width;
             NAME(part)(u, w, turn + 2 * i * step);
             NAME(part)(v, x, turn + 2 * (i + width / 2) * step);
-            w[0] += x[0], w[1] += x[1]; /* the next stage; w - x leads to the other half */
+            w[0] += x[0], w[1] += x[1]; /* the next stage; w - x would give the other half */
         }
         NAME(transform)(z + 2 * width, width / 2, turn);
     }
     NAME(part)(z, z + 2, turn);
 }
 
-/* The first FAR numbers of the inverse of a transform, times 2 FAR. */
+/* First FAR numbers of the inverse transform, times 2 FAR. */
 TARGET void NAME(restore)(half *z, const double *turn) {
     for (int width = 1, step = FAR; width < FAR; width *= 4, step /= 4)
         for (half *first = z; first < z + 4 * FAR; first += 8 * width)
@@ -95,7 +95,7 @@ TARGET void NAME(restore)(half *z, const double *turn) {
             }
 }
 
-/* Spectra (2 FAR, blocks - 1, 2) of the responses that a block of forces meets 1, 2, ... blocks later. */
+/* Spectra (2 FAR, blocks - 1, 2) of the responses 1, 2, ... blocks after a block of forces. */
 TARGET void NAME(filters)(const Sweep *x, const Response *r) {
     const int64_t count = (x->steps - 1) / FAR;
     for (int64_t first = 0; first < count; first += WIDTH) {
@@ -115,7 +115,8 @@ TARGET void NAME(filters)(const Sweep *x, const Response *r) {
     }
 }
 
-/* Spectrum of the sums over earlier blocks at two places of opposite frequencies, or at one that is its own. */
+/* Spectrum of the sums over earlier blocks at two places of opposite frequencies, or at a place that is its own
+ * opposite. */
 INLINE void NAME(far_places)(const Response *r, int64_t block, int64_t used, int place, int other) {
     const int64_t row = 2 * GROUPS * r->spaced;
     const double *filter = r->filter + 2 * place * r->spaced, *opposite_filter = r->filter + 2 * other * r->spaced;
@@ -124,8 +125,8 @@ INLINE void NAME(far_places)(const Response *r, int64_t block, int64_t used, int
         const int64_t lag = 2 * (block - 1 - r->used[k]);
         const double *at = filter + lag, *to = opposite_filter + lag;
         const half *f = r->spectra + place * row + 2 * GROUPS * r->used[k];
-        __builtin_prefetch(f + row), __builtin_prefetch(f + row + 2); /* those of the next place */
-        for (int g = 0; g < GROUPS; g++, f += 2) { /* the spectrum of real numbers: f* at the other place */
+        __builtin_prefetch(f + row), __builtin_prefetch(f + row + 2); /* spectra of the next place */
+        for (int g = 0; g < GROUPS; g++, f += 2) { /* the spectrum of real numbers is conjugate at the opposite place */
             const half re = f[0], im = f[1];
             half *u = sum[g], *v = opposite[g];
             u[0] += at[0] * re, u[1] += at[1] * re, v[0] += to[0] * re, v[1] += to[1] * re;
@@ -145,7 +146,7 @@ INLINE void NAME(keep)(const Response *r, const half *z, int place, int64_t bloc
     to[0] = z[2 * place], to[1] = z[2 * place + 1];
 }
 
-/* Sums over the forces of earlier blocks, (GROUPS, FAR, 2), in `work`; `used` of them have forces other than 0. */
+/* Sums over the forces of earlier blocks, (GROUPS, FAR, 2), in `work`; `used` blocks have forces other than 0. */
 APART TARGET void NAME(far_sums)(const Response *r, int64_t block, int64_t used) {
     if (used && r->used[used - 1] == block - 1)
         for (int g = 0; g < GROUPS; g++) {
@@ -163,10 +164,10 @@ APART TARGET void NAME(far_sums)(const Response *r, int64_t block, int64_t used)
     for (int g = 0; g < GROUPS; g++) NAME(restore)(r->work + 4 * FAR * g, r->turn);
 }
 
-/* Sums over the forces of this block before an even row, for it and for the next one. */
+/* Sums over the forces of this block before an even row, for this row and for the next. */
 APART TARGET void NAME(near_sums)(const Response *r, int row, half near[GROUPS][2][2]) {
     memset(near, 0, sizeof(half) * GROUPS * 4);
-    for (int odd = 0; odd < 2; odd++) { /* even and odd forces are summed apart, and in registers */
+    for (int odd = 0; odd < 2; odd++) { /* even and odd forces are summed separately, in registers */
         half sum[GROUPS][4] = {{{0}}};
         for (int past = odd; past < row; past += 2) {
             const double *at = r->response + 2 * (row - past - 1);
@@ -179,7 +180,7 @@ APART TARGET void NAME(near_sums)(const Response *r, int row, half near[GROUPS][
     }
 }
 
-/* Cases whose indentation may leave the branch. */
+/* Mask of the cases whose indentation may leave the branch. */
 INLINE mask NAME(turns)(const Cases *c, half a) {
     const Histories *m = &c->history;
     const half last = c->indentation;
@@ -219,7 +220,7 @@ INLINE void NAME(curves)(const Cases *cases, const half *a, half *force) {
     for (int g = 0; g < GROUPS; g++) force[g] = NAME(choose)(on[g], cases[g].history.f * force[g], none);
 }
 
-/* Motion of a mode of the projectiles after some steps under forces on the tip, step by step. */
+/* Move a mode of the projectiles step by step under forces on the tip. */
 INLINE void NAME(move_mode)(const Sweep *x, int64_t mode, const half *applied, int steps, half motion[GROUPS][3]) {
     const int64_t n = x->modes;
     const double *T = x->T + mode, *h = x->h + mode;
@@ -233,7 +234,7 @@ INLINE void NAME(move_mode)(const Sweep *x, int64_t mode, const half *applied, i
         }
 }
 
-/* Sums over two of four forces for the motion after CHECKED steps. */
+/* Sums over two of every four forces, for the motion after CHECKED steps. */
 INLINE void NAME(reach_sums)(const double *reach, const half *applied, half total[GROUPS][3]) {
     half sum[2][GROUPS][3] = {{{{0}}}};
     for (int step = 0; step < CHECKED; step += 4, reach += 12, applied += 4 * GROUPS)
@@ -245,7 +246,7 @@ INLINE void NAME(reach_sums)(const double *reach, const half *applied, half tota
         for (int row = 0; row < 3; row++) total[g][row] = sum[0][g][row] + sum[1][g][row];
 }
 
-/* The same after CHECKED steps at once. */
+/* Move a mode by CHECKED steps at once. */
 INLINE void NAME(leap_mode)(const Response *r, int64_t mode, const half *applied, int pushed, half motion[GROUPS][3]) {
     const double *P = r->power + 9 * mode, *reach = r->reach + 3 * CHECKED * mode;
     half sum[2][GROUPS][3] = {{{{0}}}};
@@ -261,7 +262,7 @@ INLINE void NAME(leap_mode)(const Response *r, int64_t mode, const half *applied
     }
 }
 
-/* Motion of all modes after some steps. */
+/* Move all modes by a number of steps. */
 APART TARGET void NAME(move_modes)(const Sweep *x, const Response *r, const half *applied, int steps) {
     int pushed = 0;
     for (int i = 0; i < GROUPS * steps && !pushed; i++) pushed = ANY(applied[i] != 0.0);
@@ -274,7 +275,7 @@ APART TARGET void NAME(move_modes)(const Sweep *x, const Response *r, const half
     }
 }
 
-/* Cases before their impacts; those beyond the last repeat it. */
+/* Initialise cases before their impacts; cases beyond the last repeat it. */
 INLINE void NAME(begin)(const Sweep *x, const Response *r, int64_t first, Cases *c) {
     const half none = {0};
     half given[GIVEN];
@@ -293,7 +294,7 @@ INLINE void NAME(begin)(const Sweep *x, const Response *r, int64_t first, Cases 
     c->plate_work = c->contact_work = none;
 }
 
-/* Records of a step that ends at a displacement of the plate, a force and an indentation. */
+/* Record a step that ends at a displacement of the plate, a force and an indentation. */
 INLINE void NAME(record)(Cases *c, half w, half force, half indentation) {
     const half mean = 0.5 * (c->force + force), before = c->dw;
     c->contact_work += mean * (indentation - c->indentation);
@@ -369,7 +370,7 @@ INLINE void NAME(couple)(const Sweep *x, Cases *cases, const half *w, const half
     for (int g = 0; g < GROUPS; g++) NAME(record)(cases + g, w[g], force[g], a[g]);
 }
 
-/* Compare the energies of cases. */
+/* Compare the energies of the cases with the initial energies. */
 INLINE void NAME(balance)(const Sweep *x, const half *motion, Cases *c) {
     half energy = {0};
     for (int64_t i = 0; i < x->modes; i++, motion += 3 * GROUPS)
@@ -378,7 +379,7 @@ INLINE void NAME(balance)(const Sweep *x, const half *motion, Cases *c) {
     c->lost = NAME(choose)(~(error <= c->lost), error, c->lost);
 }
 
-/* Store what is found of cases. */
+/* Store the results of the cases. */
 INLINE void NAME(store_found)(const Sweep *x, const Cases *c) {
     const Histories *m = &c->history;
     for (int lane = 0; lane < WIDTH; lane++) {
@@ -402,7 +403,7 @@ INLINE void NAME(store_found)(const Sweep *x, const Cases *c) {
     }
 }
 
-/* The impacts of eight cases. */
+/* Compute the impacts of eight cases. */
 TARGET void NAME(run_cases)(const Sweep *x, const Response *r, int64_t first) {
     Cases cases[GROUPS];
     half applied[GROUPS * CHECKED], near[GROUPS][2][2] = {{{{0}}}};
