@@ -227,12 +227,11 @@ def inner_corners(blocks: Sequence[ElementBlock], coordinates: Floats, held: Boo
     rim = distinct(sides[counts == 1])
     sides = sides[held[sides].all(axis=1)]
     direction = coordinates[sides[:, 1]] - coordinates[sides[:, 0]]
-    twice_the_angle = 2.0 * np.arctan2(
-        direction[:, 1], direction[:, 0]
-    )  # the same for both senses of a direction
+    # The doubled angle is the same for both senses of a direction.
+    double = 2.0 * np.arctan2(direction[:, 1], direction[:, 0])
     total, count = np.zeros((len(coordinates), 2)), np.zeros(len(coordinates))
     for end in sides.T:
-        np.add.at(total, end, np.column_stack([np.cos(twice_the_angle), np.sin(twice_the_angle)]))
+        np.add.at(total, end, np.column_stack([np.cos(double), np.sin(double)]))
         np.add.at(count, end, 1.0)
     is_corner = np.hypot(*total.T) < (1.0 - PARALLEL) * count
     is_corner[rim] = False

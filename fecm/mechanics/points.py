@@ -164,18 +164,14 @@ def _sum_weights(
         points = np.stack([x + r * np.cos(sector), y + r * np.sin(sector)], axis=-1).reshape(-1, 2)
         is_on_plate = np.zeros(len(points), dtype=bool)
         for family in families:
-            members, point_numbers, xi = containing_elements(family, points)
+            members, numbers, xi = containing_elements(family, points)
             # A point on a common edge counts once.
-            point_numbers, first = np.unique(point_numbers, return_index=True)
-            is_new = ~is_on_plate[point_numbers]
-            members, point_numbers, xi = (
-                members[first][is_new],
-                point_numbers[is_new],
-                xi[first][is_new],
-            )
-            is_on_plate[point_numbers] = True
+            numbers, first = np.unique(numbers, return_index=True)
+            is_new = ~is_on_plate[numbers]
+            members, numbers, xi = members[first][is_new], numbers[is_new], xi[first][is_new]
+            is_on_plate[numbers] = True
             values = _functions(family, xi)[0].T
-            np.add.at(weights, family.nodes[members], shares[point_numbers, None] * values)
+            np.add.at(weights, family.nodes[members], shares[numbers, None] * values)
             side = min(side, shortest_side(family.take(np.unique(members))))
         if not is_on_plate.all():
             place = ", ".join(f"{value:.6g}" for value in points[~is_on_plate][0])
@@ -287,9 +283,8 @@ def _functional(
     stretch = float(np.array([c * c, s * s, c * s]) @ strain_of_deflection(curvature))
     for element, rule in elements:
         shapes = interpolate(element, rule, transposed_jacobian=transposed_jacobian)
-        along = (
-            c * shapes.dN[0, 0, 0] + s * shapes.dN[0, 0, 1]
-        )  # derivative in the gage's direction
+        # Derivative in the gage's direction.
+        along = c * shapes.dN[0, 0, 0] + s * shapes.dN[0, 0, 1]
         for dof, factor in ((0, c), (1, s), (3, -gage.z * c), (4, -gage.z * s)):
             strain.append((element.nodes[0] * NDOF + dof, factor * along / len(elements)))
         if stretch:

@@ -521,10 +521,8 @@ class SeriesLaw(NamedTuple):
 
         far_end = approach - self.flexibility * last.force
         far_excess, _ = evaluate(far_end)
-        low, high = (
-            np.minimum(last_point.indentation, far_end),
-            np.maximum(last_point.indentation, far_end),
-        )
+        ends = last_point.indentation, far_end
+        low, high = np.minimum(*ends), np.maximum(*ends)
         a = np.clip(far_end - far_excess, low, high)
         excess, force = evaluate(a)
         for _ in range(EVALUATIONS):

@@ -32,7 +32,7 @@ class Layout(NamedTuple):
     chunk: Indices  # (blocks,): chunk of each block
     element: Indices  # (blocks, 8): number of the element, counted over all groups
     filled: Bools  # (blocks, 8): whether the lane has an element of its own
-    at: Indices  # (elements,): chunk of each element
+    chunk_of_element: Indices  # (elements,)
     piece: Indices  # (elements,): piece of a strip with the element, ascending with the chunks
     place: Indices  # (elements,): place in the piece
     axis: int  # axis along which the elements of a strip follow one another
@@ -42,7 +42,7 @@ class NodePlaces(NamedTuple):
     """Places of nodes in the vectors of the kernels."""
 
     node: Indices  # (places,): node at each place, chunk by chunk
-    at: Indices  # place in its chunk of each node of each element, element by element
+    place_of_node: Indices  # place in its chunk of each node of each element, element by element
     starts: Indices  # (chunks + 2,): start of each chunk in `node`; the last chunk is in `home`
     # (chunks + 1,): number of the vectors' nodes before each chunk, and of the chunk's nodes with a
     # spare place.
@@ -157,15 +157,15 @@ def places_of(layout: Layout, families: list[ElementBlock], leader: Indices) -> 
     for family, before in zip(families, _starts(families), strict=True):
         members = slice(before, before + len(family.rows))
         levels = [
-            np.unique(place_of_node[family.present], return_index=True, return_inverse=True)[2]
-            for place_of_node in (family.shape.xi, family.shape.eta)
+            np.unique(coordinate[family.present], return_index=True, return_inverse=True)[2]
+            for coordinate in (family.shape.xi, family.shape.eta)
         ]
         along, across = levels[layout.axis], levels[1 - layout.axis]
         last = along == along.max()  # these nodes are the first of the next element
         line = layout.piece[members, None] * len(along) + across
         key = (line * len(along) + np.where(last, 0, along)) * (PIECE + 1)
         keys.append((key + layout.place[members, None] + last).ravel())
-        pairs.append((layout.at[members, None] * numnp + family.nodes).ravel())
+        pairs.append((layout.chunk_of_element[members, None] * numnp + family.nodes).ravel())
     order = np.argsort(np.concatenate(keys), kind="stable")
     pair_keys, first, inverse = np.unique(
         np.concatenate(pairs)[order], return_index=True, return_inverse=True

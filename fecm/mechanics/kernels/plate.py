@@ -74,10 +74,7 @@ class BlockStruct(Structure):
     _fields_ = (
         ("group", POINTER(GroupStruct)),
         ("place", Integers),  # (nodes,): see the head of this module
-        (
-            "data",
-            Doubles,
-        ),  # (numbers, 8): see ElementGroup.data; not set for elements with a matrix
+        ("data", Doubles),  # (numbers, 8): see ElementGroup.data; not set with a matrix
         ("membrane", Doubles),  # (numbers, 8) of a nonlinear plate: see ElementGroup.membrane
     )
 
@@ -282,7 +279,7 @@ class CompiledPlate:
         places: NodePlaces,
     ) -> Indices:
         """Add the blocks to the chunks; return the places of lanes that don't follow."""
-        counts, rest = np.diff(places.starts), places.at
+        counts, rest = np.diff(places.starts), places.place_of_node
         table = np.zeros(len(layout.group), dtype=BLOCK)
         self._held.append(table)
         lanes: list[Indices] = []
@@ -292,9 +289,8 @@ class CompiledPlate:
             member = layout.element[rows] - elements_before
             elements_before += len(group.family.rows)
             of_group, rest = np.split(rest, [group.family.nodes.size])
-            lane_places = of_group.reshape(group.family.nodes.shape)[:, group.order][
-                member
-            ].swapaxes(1, 2)
+            node_places = of_group.reshape(group.family.nodes.shape)[:, group.order]
+            lane_places = node_places[member].swapaxes(1, 2)
             # Lanes without an element get the spare place behind the nodes.
             lane_places = np.where(
                 layout.filled[rows, None], lane_places, counts[layout.chunk[rows], None, None]
@@ -416,9 +412,9 @@ def _factors(mass: Floats) -> tuple[Floats, Floats | None]:
     The ratio follows from the laminate, except at supports, where masses are 0.  The factors are
     None if the nodes have different ratios.
     """
-    is_unsupported = np.flatnonzero((mass > 0.0).all(axis=0))
-    if len(is_unsupported):
-        ratio = mass[:, is_unsupported[:1]] / mass[0, is_unsupported[0]]
+    unsupported = np.flatnonzero((mass > 0.0).all(axis=0))
+    if len(unsupported):
+        ratio = mass[:, unsupported[:1]] / mass[0, unsupported[0]]
         factor = (mass / ratio).max(axis=0)
         if ((abs(factor * ratio - mass) <= EQUAL * mass) | (mass <= 0.0)).all():
             return ratio[:, 0].copy(), factor

@@ -170,9 +170,8 @@ class CompiledStrains(StrainField):
     def _structure(self, family: ElementBlock) -> StrainsStruct:
         congruence = family.congruence
         values, local = local_shape_functions(family, self.rule)
-        inverse, _ = jacobians(
-            family.take(congruence.representatives), local, self.transposed_jacobian
-        )
+        shapes = family.take(congruence.representatives)
+        inverse, _ = jacobians(shapes, local, self.transposed_jacobian)
         nodes = family.nodes.shape[1]
         points = self.shape[1]
         width = -(-points // 4) * 4
@@ -181,9 +180,7 @@ class CompiledStrains(StrainField):
         table[:, 2, :points] = values.T
         metric = np.zeros((len(inverse), 4, width))
         metric[:, :, :points] = inverse.swapaxes(1, 2)
-        tied = (
-            self._tied(family.take(congruence.representatives), width) if self.assumes_shear else {}
-        )
+        tied = self._tied(shapes, width) if self.assumes_shear else {}
         return StrainsStruct(
             elements=len(family.rows),
             nodes=nodes,
