@@ -79,7 +79,7 @@ class Impact(NamedTuple):
 
 
 def deck_of(case: Case) -> fecm.Deck:
-    """The impact as a deck of fecm; a plate that stretches slides on the window."""
+    """Return the impact as a deck of fecm; a plate that stretches slides on the window."""
     return fecm.impact(
         fecm.Plate.on_fixture("D7136", MESH),
         fecm.Laminate([float(angle) for angle in case.angles], PLY, case.ply_thickness),
@@ -137,7 +137,7 @@ class Shells:
         return text + self.laminate() + f"*BOUNDARY\nWINDOW,3,3\n{self.middle},1,2\n"
 
     def laminate(self) -> str:
-        """The ply as an orthotropic solid, and the layers with their axes."""
+        """Return the ply as an orthotropic solid, and the layers with their axes."""
         ply = PLY.constants("mm-N-s")
         e1, e2, nu12 = ply["E1"], ply["E2"], ply["nu12"]
         g12, g13, g23 = ply["G12"], ply["G13"], ply["G23"]

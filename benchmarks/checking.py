@@ -38,7 +38,7 @@ T = TypeVar("T")
 
 
 def written(deck: Deck) -> str:
-    """The text of a deck with a short program."""
+    """Return the text of a deck with a short program."""
     mesh = deck.to_text().partition("MACR\n")[0]
     program = "LOOP,,20\nTIME\nRODP,,20\nNEXT\nEND\nSTOP\n"
     return f"{mesh}MACR\nLMAS\nDT,,{time_step(deck):.6E}\n{program}"

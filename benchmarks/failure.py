@@ -27,25 +27,25 @@ STRENGTHS = "ALLO\n200000,200000,7000,28000,13000\n\nEXPE\n"
 
 
 def without_fail(text: str) -> str:
-    """A deck without FAIL."""
+    """Return a deck without FAIL."""
     return "".join(line for line in text.splitlines(keepends=True) if not line.startswith("FAIL"))
 
 
 def with_fail(text: str, every: int = 20) -> str:
-    """A deck with FAIL at every so many passes of its loop."""
+    """Return a deck with FAIL at every `every`-th pass of its loop."""
     plain = without_fail(text)
     (output,) = (line for line in plain.splitlines(keepends=True) if line.startswith("DISP"))
     return plain.replace(output, f"{output}FAIL,,{every}\n")
 
 
 def report() -> str:
-    """The report's plate with strengths."""
+    """Return the report's plate with strengths."""
     text = (HERE / "decks" / "impact-115.inp").read_text()
     return text.replace("EXPE\n", STRENGTHS)
 
 
 def drop_weight() -> str:
-    """The drop-weight test of the examples."""
+    """Return the drop-weight test of the examples."""
     return (HERE / "fecm" / "examples" / "drop-weight.inp").read_text()
 
 

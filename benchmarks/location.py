@@ -111,7 +111,7 @@ def models() -> None:
 def located(
     deck: fecm.Deck, strains: tuple[Floats, Floats], noise: float, **others: Any
 ) -> fecm.Location:
-    """The impact that the strains show; its notes are not of interest here."""
+    """Locate the impact from the strains, without notes."""
     with warnings.catch_warnings(action="ignore", category=fecm.FecmWarning):
         return fecm.locate(deck, strains, noise=noise, **others)
 
@@ -138,7 +138,7 @@ def seeds(number: int) -> None:
 
 
 def small_panel(nx: int, ny: int) -> fecm.Deck:
-    """A panel of 100 x 80 mm that a ball of 2 g hits at 2 m/s."""
+    """Return a panel of 100 x 80 mm that a ball of 2 g hits at 2 m/s."""
     gages = [(22.0, 18.0, 0.72, 0.0), (80.0, 24.0, 0.72, 45.0), (26.0, 64.0, 0.72, 90.0)]
     deck = fecm.impact(
         fecm.Plate.rectangle((100.0, 80.0), (nx, ny), support="simple"),

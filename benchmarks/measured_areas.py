@@ -53,7 +53,7 @@ def groups() -> list[Group]:
 
 
 def deck_of(group: Group) -> fecm.Deck:
-    """The group's impact, on a plate of its mean thickness."""
+    """Return the group's impact, on a plate of its mean thickness."""
     return fecm.impact(
         fecm.Plate.on_fixture(TEST),
         fecm.Laminate(group.layup, PLY, group.thickness / group.plies),
@@ -86,7 +86,7 @@ def thresholds(measured: list[Group]) -> dict[str, float]:
 
 
 def by_layup(measured: list[Group]) -> dict[str, list[Group]]:
-    """Groups of each layup, the lowest energy first."""
+    """Return the groups of each layup, the lowest energy first."""
     names = dict.fromkeys(group.layup for group in measured)
     return {name: [group for group in measured if group.layup == name] for name in names}
 

@@ -55,7 +55,7 @@ def peaks(deck: Deck, dt: float) -> tuple[float, float]:
 
 
 def study() -> dict[tuple[str, str], list[tuple[int, float, float]]]:
-    """Number of elements and peaks of each mesh and kind of load."""
+    """Return the number of elements and the peaks of each mesh and kind of load."""
     rows: dict[tuple[str, str], list[tuple[int, float, float]]] = {}
     for mesh, grid in GRIDS.items():
         deck, dt = plate(grid), 2e-7

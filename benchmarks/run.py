@@ -71,7 +71,7 @@ DT = 2.0e-7
 
 
 def report() -> Deck:
-    """The report's plate over 800 microseconds."""
+    """Return the report's plate over 800 microseconds."""
     deck = fecm.read_deck(HERE.parent / "decks" / "impact-115.inp")
     if not isinstance(deck, Deck):
         raise TypeError("the deck holds several problems")
@@ -79,7 +79,7 @@ def report() -> Deck:
 
 
 def refined(times: int, aside: int = 0) -> Deck:
-    """The report's plate with every element cut `times` times in each direction.
+    """Return the report's plate with every element cut `times` times in each direction.
 
     The impact is `aside` nodes beside the middle.
     """
@@ -97,12 +97,12 @@ def refined(times: int, aside: int = 0) -> Deck:
 
 
 def even(count: int) -> Deck:
-    """The report's plate of equal elements, so many in each direction."""
+    """Return the report's plate of equal elements, `count` in each direction."""
     return on_grid(ElementGrid([GridSection(0.0, 6.0, count)], [GridSection(0.0, 4.0, count)]))
 
 
 def on_grid(grid: ElementGrid, aside: int = 0) -> Deck:
-    """The report's plate with another mesh; the impact is `aside` nodes beside the middle."""
+    """Return the report's plate with another mesh, hit `aside` nodes beside the middle."""
     deck = report()
     boundary = grid.boundary((1, 1, 0, 0, 0), {})
     hit = Impact(grid.nearest(3.0, 2.0)[0] + aside, 3, 115.0)
@@ -115,7 +115,7 @@ def on_grid(grid: ElementGrid, aside: int = 0) -> Deck:
 
 
 def moved(deck: Deck, move: Callable[[np.ndarray], np.ndarray]) -> Deck:
-    """The deck of a grid with its corners moved, (rows, columns, 2), and straight sides."""
+    """Return the deck of a grid with moved corners, (rows, columns, 2), and straight sides."""
     flat = generate(deck).coordinates
     places = flat.reshape(-1, int(np.argmax(np.diff(flat[:, 1]) > 0.0)) + 1, 2).copy()
     places[::2, ::2] = move(places[::2, ::2])
@@ -130,7 +130,7 @@ def moved(deck: Deck, move: Callable[[np.ndarray], np.ndarray]) -> Deck:
 
 
 def distorted(deck: Deck, most: float) -> Deck:
-    """The deck with its inner corners moved by up to a length."""
+    """Return the deck with its inner corners moved by up to a length."""
 
     def shift(corners: np.ndarray) -> np.ndarray:
         shifts = np.random.default_rng(0).uniform(-most, most, corners.shape)
@@ -141,7 +141,7 @@ def distorted(deck: Deck, most: float) -> Deck:
 
 
 def graded(times: int) -> Deck:
-    """The mesh with sides that fall towards the middle, each row and column of another width."""
+    """Return the mesh with rows and columns that become narrower towards the middle."""
     middle = np.array([3.0, 2.0])
     return moved(
         refined(times), lambda at: at + 0.08 * np.sin(np.pi * (at - middle) / middle) * middle
@@ -149,7 +149,7 @@ def graded(times: int) -> Deck:
 
 
 def coupled(deck: Deck) -> Deck:
-    """The deck with half of the plies turned by a right angle: B is not 0, and u and v move."""
+    """Return the deck with half of the plies turned by 90 degrees: B is not 0, u and v move."""
     material = deck.require(Material)
     half = len(material.layers) // 2
     turned = [replace(layer, angle=90.0) for layer in material.layers[half:]]
@@ -163,24 +163,24 @@ def coupled(deck: Deck) -> Deck:
 
 
 def patched() -> Deck:
-    """The report's deck with a contact patch."""
+    """Return the report's deck with a contact patch."""
     deck = report()
     return replace(deck, segments=(*deck.segments, Patch()), text="")
 
 
 def tied(deck: Deck) -> Deck:
-    """The deck with assumed shear strains."""
+    """Return the deck with assumed shear strains."""
     return replace(deck, segments=(*deck.segments, Shear(assumed=True)), text="")
 
 
 def stretched(deck: Deck) -> Deck:
-    """The deck with NONL and assumed shear strains, u and v free."""
+    """Return the deck with NONL and assumed shear strains, u and v free."""
     segments = [s for s in deck.segments if not isinstance(s, Boundary)]
     return tied(replace(deck, segments=(*segments, Nonlinear()), text=""))
 
 
 def linear(deck: Deck) -> Deck:
-    """The deck without NONL."""
+    """Return the deck without NONL."""
     segments = tuple(s for s in deck.segments if not isinstance(s, Nonlinear))
     return replace(deck, segments=segments, text="")
 
@@ -207,13 +207,13 @@ CASES: dict[str, Callable[[], Deck]] = {
 
 
 def time_step(deck: Deck) -> float:
-    """The report's time step, finer on finer meshes, where u and v may move too."""
+    """Return the report's time step, smaller on finer meshes, where u and v may move too."""
     elements = deck.control.numel
     return DT if elements == 140 else float(DT / 2.0 / np.sqrt(elements / 140))
 
 
 def checked(deck: Deck, steps: int) -> Problem:
-    """A problem of so many steps, which stores a row of each kind at every twentieth."""
+    """Return a problem of `steps` steps, which stores a row of each kind at every twentieth."""
     values = {"LOOP": float(steps), "DT": time_step(deck)}
     macros = tuple(replace(m, value=values.get(m.word, m.value)) for m in deck.macros)
     cut = replace(deck, macros=macros)

@@ -56,7 +56,7 @@ class Struck(NamedTuple):
 
 
 def struck(case: Case, energy: float, *, nonlinear: bool) -> Struck:
-    """An impact of an energy in mJ."""
+    """Return an impact of an energy in mJ."""
     plate, support, in_plane = case
     size, laminate, k = PLATES[plate]
     deck = fecm.impact(

@@ -72,7 +72,7 @@ def process(output: Path, *options: str, vary: tuple[str, ...] = VARY) -> float:
 
 
 def full(case: Case) -> tuple[fecm.Result, float]:
-    """A case's full run, and its seconds."""
+    """Run a case in full, and return its seconds."""
     begin = time.perf_counter()
     result = fecm.run(apply_case(report(), case))
     if not isinstance(result, fecm.Result):

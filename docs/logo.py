@@ -25,7 +25,7 @@ def deflected(x: float) -> float:
 
 
 def ply(number: int, colour: str) -> str:
-    """A ply as a line."""
+    """Draw a ply as a line."""
     stations = [2 + 4 * n for n in range(16)]
     middle = TOP + PLY * number + PLY / 2
     points = " ".join(f"{x},{middle + deflected(x):.2f}" for x in stations)
@@ -36,7 +36,7 @@ def ply(number: int, colour: str) -> str:
 
 
 def picture() -> str:
-    """The ball and the plies as SVG."""
+    """Return the ball and the plies as SVG."""
     touching = TOP + deflected(SIDE / 2) + 0.75 - BALL
     ball = f'<circle cx="{SIDE / 2}" cy="{touching:.2f}" r="{BALL}" fill="{STEEL}"/>'
     plies = [ply(number, colour) for number, colour in enumerate(PLIES)]

@@ -35,7 +35,7 @@ def files_of(room: str) -> list[Path]:
 
 
 def imports_of(room: str, rooms: list[str]) -> Counter[str]:
-    """Number of names that a room imports from each other room."""
+    """Count the names that a room imports from each other room."""
     count: Counter[str] = Counter()
     for path in files_of(room):
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
@@ -47,7 +47,7 @@ def imports_of(room: str, rooms: list[str]) -> Counter[str]:
 
 
 def drawing() -> str:
-    """The picture as SVG."""
+    """Return the picture as SVG."""
     rows = layers()
     rooms = [room for row in rows for room in row]
     place = {

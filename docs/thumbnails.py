@@ -27,7 +27,7 @@ def curves(ax: Any, *pairs: Any) -> None:
 
 
 def as_drawn(ax: Any, own: Any) -> None:
-    """The lines and bars of a picture of the script, without its texts."""
+    """Draw the lines and bars of a picture of the script, without its texts."""
     for line, colour in zip(own.lines, COLOURS, strict=False):
         style = {"lw": STROKE, "ls": line.get_linestyle()}
         if line.get_linestyle() == "None":
@@ -67,7 +67,7 @@ def loops(ax: Any, *results: Any) -> None:
 
 
 def overlay(ax: Any, names: Names) -> None:
-    """A measured force over a computed one."""
+    """Draw a measured force over a computed one."""
     result = names["result"]
     time, force = np.loadtxt(names["measured"], delimiter=",", skiprows=3, unpack=True)
     curves(ax, (result.time, result.force))
@@ -104,7 +104,7 @@ def bars(ax: Any, *sizes: Any) -> None:
 
 
 def map_of(ax: Any, names: Names) -> None:
-    """A cell for each case."""
+    """Draw a cell for each case."""
     found = names["found"]
     rows = len(set(found["velocity"]))
     ax.imshow(found["peak_force"].reshape(rows, -1).T, aspect="auto", origin="lower")
@@ -124,7 +124,7 @@ def exposures(ax: Any, names: Names) -> None:
 
 
 def points(ax: Any, names: Names) -> None:
-    """The layups that were tried, coloured by the deflection."""
+    """Draw the layups that were tried, coloured by the deflection."""
     a, b, w = zip(*names["tried"], strict=True)
     ax.scatter(a, b, c=w, s=40 * STROKE)
 
@@ -135,7 +135,7 @@ def density(ax: Any, names: Names) -> None:
 
 
 def place(ax: Any, names: Names) -> None:
-    """The misfit at the candidates, and the place found."""
+    """Draw the misfit at the candidates, and the located place."""
     found = names["found"]
     ax.tricontourf(*found.candidates.T, np.log(found.candidate_misfit), 12)
     ax.plot(*found.gage_places.T, "ko", ms=2 * STROKE)
@@ -167,13 +167,13 @@ OWN: dict[str, Callable[[Any, Names], None]] = {
 
 
 def fitted(ax: Any, found: Any) -> None:
-    """A fitted force through the measured points."""
+    """Draw a fitted force through the measured points."""
     ax.plot(found.time, found.force, "o", color=COLOURS[0], ms=STROKE)
     ax.plot(found.time, found.model, color=COLOURS[1], lw=STROKE / 2)
 
 
 def impact(ax: Any, result: Any) -> None:
-    """The contact force, and the delamination threshold if there is one."""
+    """Draw the contact force, and the delamination threshold if there is one."""
     curves(ax, (result.time, result.force))
     if "threshold_force" in result.metrics:
         ax.axhline(result.metrics["threshold_force"], color=COLOURS[1], lw=STROKE)

@@ -9,7 +9,7 @@ import fecm
 
 
 def deck_of(case):
-    """A plate of n x n elements under a disc of 6 mm radius."""
+    """Return a plate of n x n elements under a disc of 6 mm radius."""
     n = round(case["elements"])
     return fecm.impact(
         fecm.Plate.rectangle((60, 60), (n, n), support="simple"),

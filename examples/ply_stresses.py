@@ -20,7 +20,7 @@ away = ~plies.under_load  # plate theory does not hold under the load
 
 
 def at_largest(stress):
-    """The stress through the thickness, where and when it is largest."""
+    """Return the stress through the thickness, where and when it is largest."""
     stress = stress[:, away]
     row, *place = np.unravel_index(abs(stress).argmax(), stress.shape)
     print(f"{abs(stress).max():.1f} MPa at {1e3 * plies.time[row]:.3f} ms")
