@@ -26,7 +26,7 @@ NO_WAIT = getattr(os, "O_NONBLOCK", 0)
 # Windows neither removes nor renames an open file.
 OPEN_FILES_STAY = os.name == "nt"
 
-# Errors of os.link on file systems without hard links; the last one is that of Windows.
+# Errors of os.link on file systems without hard links; the last one occurs on Windows.
 NO_LINKS = {
     errno.EPERM, errno.ENOTSUP, errno.EOPNOTSUPP, errno.ENOSYS, errno.EMLINK, errno.EINVAL,
 }  # fmt: skip

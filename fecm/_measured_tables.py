@@ -58,7 +58,7 @@ UNITS = {
     "voltage": {"V": 1.0, "mV": 1e-3, "uV": 1e-6, "volt": 1.0, "volts": 1.0},
 }  # fmt: skip
 _MICRO = str.maketrans("µμε", "uue")  # both letters for micro are in use
-# Names of columns in the tables of test rigs, by the quantity; the first is that of fecm.
+# Names of columns in the tables of test rigs, by quantity; the first is fecm's own.
 WORDS = {
     "time": ("time", "zeit", "temps", "tempo", "tiempo", "t", "x_value", "x-axis"),
     "force": (

@@ -1,4 +1,4 @@
-"""The version, alone in a file so that asking for it imports nothing else.
+"""The version, in its own file so that reading it imports nothing else.
 
 The build writes it from the tag; a checkout that was never built has that of the last release.
 """

@@ -159,7 +159,7 @@ class Contact(Indentation):
         Raises
         ------
         ValueError
-            If there is none of this name.
+            If no law has this name.
         """
         if name not in CONTACTS:
             raise ObjectError(f"{name!r} is not a named contact: {', '.join(CONTACTS)}")

@@ -42,7 +42,7 @@ class Impacts:
     kinds: list[DeckProjectile]  # of projectiles; all rigid masses are a unit mass
     kind: Indices  # places in them
     mass: Floats
-    scale: Floats  # mass and stiffness over those of the kind
+    scale: Floats  # of mass and stiffness, relative to the kind
     toughness: Floats  # G_IIc, force/length; NaN without a DELA segment
     own_law: Law | None  # a user's contact law instead of the constants
     cards: Callable[[int], Strike]  # the impact of a row as cards

@@ -55,7 +55,7 @@ STIFFNESS = {"A": "force/length", "B": "force", "D": "force*length"}
 ENTRIES = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
 
 AnyPly = str | Ply | NamedPly
-# Angle, name of the material and thickness of a ply; what is left out is that of the laminate.
+# Angle, name of the material and thickness of a ply; missing ones come from the laminate.
 Entry = float | tuple[float, str] | tuple[float, str, float]
 Layup = str | Sequence[Entry]
 
@@ -270,7 +270,7 @@ class Bound(NamedTuple):
 
 
 class DeckPlies(NamedTuple):
-    """Laminates in the units of a deck: the laminate of the plate, and those of its zones."""
+    """Laminates in the units of a deck: of the plate and of its zones."""
 
     layups: tuple[tuple[Layer, ...], ...]
     materials: tuple[Bound, ...]  # number 1 is the first
@@ -449,7 +449,7 @@ def _own_thickness(named: NamedPly | None, system: str | None) -> float:
     """Return the thickness of a named ply."""
     thickness = None if named is None or system is None else named.value("thickness", system)
     if thickness is None:
-        unknown = f": that of {named.name} is not known" if named else ""
+        unknown = f": {named.name} has no known one" if named else ""
         raise ObjectError(f"`ply_thickness` is missing{unknown}")
     return thickness
 

@@ -24,8 +24,8 @@ from fecm.results.validity import IN_PLANE_WORDS, LIMITS, InPlane
 
 ROWS = 200  # default number of stored rows of strains and displacements
 
-# Elements whose ply stresses are stored with `damage`: those nearer to the load than so many times
-# the distance within which plate theory does not hold, and at least so many.
+# `damage` stores ply stresses of the elements within this multiple of the distance within which
+# plate theory does not hold, and of at least this number of elements.
 AROUND_LOAD = 3.0
 FEWEST_ELEMENTS = 24
 

@@ -121,8 +121,8 @@ def _with_properties(deck: model.Deck, plies: DeckPlies) -> model.Deck:
                     segments.append(segment)
     except ObjectError as error:
         raise ObjectError(
-            "`laminate` has other plies, of which the deck needs strengths, toughness or "
-            f"expansions as it has of its own: {error}"
+            "`laminate` has other plies; the deck needs their strengths, toughness or "
+            f"expansions in place of its own: {error}"
         ) from None
     return replace(deck, segments=tuple(segments))
 

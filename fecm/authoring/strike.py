@@ -33,7 +33,7 @@ _S = TypeVar("_S", bound=model.Segment)
 class Strike(NamedTuple):
     """Velocity, contact law, projectile and toughness of a case."""
 
-    plate: model.Deck  # deck whose plate is struck; its own strike is not that of the case
+    plate: model.Deck  # deck whose plate is struck; its own strike does not count
     impact: model.Impact | None
     indentation: model.Indentation | None
     card: model.Projectile | None  # None if the deck has the report's rod

@@ -52,7 +52,7 @@ class SweepValue(Generic[_Setter]):
 
     name: str
     changes: Changes
-    dimension: str  # that of its unit; empty for a pure number or a text
+    dimension: str  # of its unit; empty for a pure number or a text
     setter: _Setter
     kind: ValueKind = ValueKind.NUMBER
     meaning: str = ""  # Markdown of docs/sweeps.md
@@ -191,7 +191,7 @@ EXCLUDING = (  # names of which only one can vary
     ("at", "y0"),
     ("laminate_thickness", "ply_thickness", "thickness"),
 )
-# Names of results, which are no names of cases or of measured columns.
+# Names of results, which cases and measured columns can't have.
 RESERVED = ("case", "step", "steps", "force", "unsettled_steps", *VERDICTS, *COLUMNS)
 
 

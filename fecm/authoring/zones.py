@@ -30,7 +30,7 @@ class ElementLaminates(NamedTuple):
     """Laminates of the elements of a plate."""
 
     struck: int  # number of the laminate under the load
-    card: model.Zones | None  # None if all elements have that of the plate
+    card: model.Zones | None  # None if all elements have the plate's laminate
 
 
 def laminates_of(laminate: Laminate, zones: Sequence[Zone]) -> list[Laminate]:
@@ -77,7 +77,7 @@ def _group(mesh: AnyMesh, name: str) -> Indices:
     if name not in surfaces:
         existing = f"its groups of elements are {', '.join(sorted(surfaces))}"
         raise ObjectError(
-            f"`zone` {name!r} is no rectangle x0,y0,x1,y1 and no group of the mesh; "
+            f"`zone` {name!r} is neither a rectangle x0,y0,x1,y1 nor a group of the mesh; "
             f"{existing if surfaces else 'it has no groups of elements'}"
         )
     return surfaces[name]

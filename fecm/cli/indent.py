@@ -242,7 +242,7 @@ def _rigidities(options: CurveOptions) -> None:
     problem, card = _law(options.deck)
     slope, critical = _permanent(problem, card, options)
     if slope.q != contact_law.ACR_POWER:
-        units = f"s of 3-9 is force/length^{slope.q:g} here, that of 3-7 force/length^2.5"
+        units = f"s of 3-9 is force/length^{slope.q:g} here, s of 3-7 is force/length^2.5"
         if targets.picture:
             raise RefusedError(f"{units}: they can't share axes; --q 2.5 makes them comparable")
         note(f"{units}: --q 2.5 makes them comparable")
@@ -410,7 +410,7 @@ def estimate_k_command(
     """Estimate k of a laminate from its elastic constants, and print its EXPE card.
 
     By the indentation modulus M of the laminate's effective solid, and by its E2 for comparison.
-    Measured coefficients may be larger: that of the report's plate under the 0.5 in indenter is
+    Measured coefficients may be larger: the report's plate under the 0.5 in indenter has
     1.330e6 lb/in^1.5, where M gives 1.084e6 and E2 0.741e6.  By default the law is elastic.
     """
     layup, thickness = laminate.angles, laminate.thickness

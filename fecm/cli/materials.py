@@ -32,7 +32,7 @@ LINES = (
 )
 @FORMAT_OPTION
 def materials_command(plies: dict[str, NamedPly] | None, units: str | None, form: Format) -> None:
-    """List the named plies of `fecm new`, or those of a file, with their sources.
+    """List the named plies of `fecm new`, or of a file, with their sources.
 
     With --format json, each ply is a JSON object on a line, null where a constant is not known.
     """

@@ -41,7 +41,7 @@ def contact(text: str) -> NamedContact | Sphere:
     if word == "estimate":
         return Sphere(*(list_of(ESTIMATE, POSITIVE, [1, 3])(values) if values else ()))
     if text not in CONTACTS:
-        raise ValueError(f"{text!r} is none of {', '.join(CONTACTS)}, {ESTIMATE}")
+        raise ValueError(f"{text!r} is not one of {', '.join(CONTACTS)}, {ESTIMATE}")
     return CONTACTS[text]
 
 

@@ -318,7 +318,7 @@ def _bound(rows: float) -> None:
 
 
 def _note_names(waves: Waves) -> None:
-    """Note where the dominant component of a front is not that of its name."""
+    """Note where another component than the name's dominates a front."""
     for front, runs in waves.surfaces.misnamed().items():
         places = ", ".join(f"{first:g} to {last:g}" for first, last in runs)
         note(f"at normals {places} deg, another component dominates the front named {front}")

@@ -102,7 +102,7 @@ class Projectile(Segment, keyword="PROJ"):
     elements: int  # number of the rod's elements; 0 for a rigid mass
     # Node at which its force is measured, from 1 at the impacted end; 0 for the middle.
     transducer: int
-    size: float  # length of the rod; the mass where there are no elements
+    size: float  # length of the rod; the mass of a projectile without elements
     # Young's modulus, and mass per volume, of a rod.
     modulus: float = 0.0
     density: float = 0.0

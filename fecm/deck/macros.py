@@ -377,7 +377,7 @@ PLY_ROWS = 20  # rows of ply stresses where their number is not given: they are 
 
 # Steps between stored rows: a number, True for a default, False for no rows.
 Rows = int | bool
-# The same, or the number and that of the elements nearest to the load.
+# The same, or the number and a count of the elements nearest to the load.
 RowsOfPlies = Rows | tuple[int, int]
 
 

@@ -167,7 +167,7 @@ class Deck(Record):
 
     @property
     def plies(self) -> dict[int, Ply]:
-        """Constants of the materials by number: 1 is MATE's, the others are those of MATS.
+        """Constants of the materials by number: 1 comes from MATE, the others from MATS.
 
         Raises LookupError without a MATE segment.
         """
@@ -177,7 +177,7 @@ class Deck(Record):
 
     @property
     def layers(self) -> dict[int, tuple[Layer, ...]]:
-        """Layers of the laminates by number: 1 is MATE's, the others are those of LAMS.
+        """Layers of the laminates by number: 1 comes from MATE, the others from LAMS.
 
         Without ZONE all elements have the first. Raises LookupError without a MATE segment.
         """

@@ -129,7 +129,7 @@ class ParsedProblem:
 
 
 class Reader:
-    """Reads the cards of a file, problem by problem; the options are those of the card stream.
+    """Reader of the cards of a file, problem by problem, with the options of the card stream.
 
     Attributes
     ----------

@@ -34,7 +34,7 @@ class NumberedPly(NamedTuple):
 
 @dataclass(frozen=True)
 class Materials(Segment, keyword="MATS"):
-    """MATS: materials beside that of MATE, a pair of cards each: (I5) and (7F10.0)."""
+    """MATS: materials in addition to MATE's, a pair of cards each: (I5) and (7F10.0)."""
 
     plies: tuple[NumberedPly, ...]
 
@@ -85,7 +85,7 @@ class NumberedLaminate(NamedTuple):
 
 @dataclass(frozen=True)
 class Laminates(Segment, keyword="LAMS"):
-    """LAMS: laminates beside that of MATE, (2I5) and the layer cards of each."""
+    """LAMS: laminates in addition to MATE's, (2I5) and the layer cards of each."""
 
     laminates: tuple[NumberedLaminate, ...]
 
@@ -155,4 +155,4 @@ class Zone(Record):
 
 @dataclass(frozen=True)
 class Zones(NumberedSegment[Zone], keyword="ZONE", record=Zone):
-    """ZONE: laminates of elements; those without a zone have that of MATE."""
+    """ZONE: laminates of elements; elements without a zone have MATE's."""

@@ -37,7 +37,7 @@ SHARE = 0.1  # share of a parameter in a singular vector above which the vector 
 SETTLED = 0.01  # share of a standard error: the fit ends with a step below it
 MOST_EVALUATIONS = 60  # of a fit
 FIRST_EVALUATIONS = 6  # of each start of the delay
-MOST_FITS = 4  # with fewer points each: those of the run of the deck depend on the delay
+MOST_FITS = 4  # with fewer points each, as the points of the deck's run depend on the delay
 
 
 def fitted(deck: Deck, values: Mapping[str, float]) -> Strike:

@@ -86,7 +86,7 @@ def identify(
         Deck with a single problem.
     time, force : array_like (points,)
         Measured contact force, positive in compression, at increasing times, in the deck's units.
-        Time 0 is that of the deck: the projectile touches the plate.
+        At time 0 the projectile touches the plate, as in the deck.
     free : str or sequence of str
         Parameters to fit: ``"velocity"``, ``"energy"``, ``"k"``, ``"alpha_p"``, ``"s_p"``, ``"q"``,
         ``"mass"``, ``"rod_length"``, ``"rod_modulus"``, ``"rod_density"``; and of the
@@ -97,7 +97,7 @@ def identify(
         ``"moving-average:RISE"``, ``"butterworth:ORDER,FREQUENCY[,zero-phase]"`` in Hz, or
         ``"cfc:CLASS"``.
     law : Law or str, optional
-        Contact law instead of that of EXPE, as in :func:`run`; the constants of EXPE can't be
+        Contact law instead of EXPE, as in :func:`run`; the constants of EXPE can't be
         fitted then.
 
     Returns

@@ -35,7 +35,7 @@ UNDESCRIBED = 0.05
 CERTAIN = 5.0  # standard errors from 0, beyond which a delay or an offset is not noise
 LIKELY = 4.0  # the same of a filter, for a note
 HALF = 0.5  # of the systematic part of the residual, which a proposal must remove
-QUIET = 1e-3  # share of the peak up to which there is no contact
+QUIET = 1e-3  # share of the peak below which a force means no contact
 LEAST_QUIET = 10  # fewest points without contact
 SMALL = 5e-3  # share of the peak up to which an offset without contact is not reported
 # Relative change of a property of the plate that gives the derivatives.  Vibrations shift in phase,

@@ -55,19 +55,19 @@ def locate(
         acts; without it the force acts on a point.  What it says of projectile, contact and
         program is not used, except the time step.
     strains : str, Path, tuple, mapping or DataFrame
-        Measured strains: a CSV file with the columns time and those of gages, which are matched by
+        Measured strains: a CSV file with the column time and columns of gages, which are matched by
         their numbers (``gage 1``) or else taken in the order of the deck; times and strains
         (points, gages); or columns by name.  Times are in the deck's unit.
     region : sequence of float, optional
         Rectangle that contains the place: x0, y0, x1, y1; the plate by default.
     grid : float, optional
-        Distance of the candidate places; by default that of about 126 in the region.
+        Distance of the candidate places; by default the region has about 126.
     basis : float, optional
         Time between the peaks of two hats of the force.  By default about 1/40 of the record in the
         search; place and force are then fitted with hats half as wide if there are strains enough,
         and with narrower ones that describe the strains significantly better.
     noise : float, optional
-        Standard deviation of the strains' errors; by default that of the residual.
+        Standard deviation of the strains' errors; by default taken from the residual.
     shift : bool
         Fit the time at which the force may begin, for a record that begins after the impact.
     gains : bool

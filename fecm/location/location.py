@@ -54,7 +54,7 @@ PATHS = {
     "fitted": "locate/strains/fitted",
 }
 BY_TIME = ("strains", "fitted")  # arrays with the gages first
-# Physical dimensions of the attributes; those of pure numbers are not here.
+# Physical dimensions of the attributes; pure numbers have no entry.
 DIMENSIONS = {
     **{name: schema.LOCATION_DATASETS[path].dimension for name, path in PATHS.items()},
     **dict.fromkeys(("x", "y", "sd_x", "sd_y", "mesh_error"), "length"),
@@ -128,15 +128,15 @@ class Location:
     candidates : ndarray (k, 2)
         Places that were tried first.
     candidate_misfit : ndarray (k,)
-        Their misfits over that of the place found.
+        Their misfits over the least misfit.
     second : Candidate or None
         The second-best place, away from the first; None if no other candidate is a minimum.
     noise : float
-        Standard deviation of a strain: the given one, or that of the residual.
+        Standard deviation of a strain: the given one, or estimated from the residual.
     noise_given : bool
         Whether it was given.
     misfit : float
-        Standard deviation of the residual over `noise`; 1 if this is that of the residual.
+        Standard deviation of the residual over `noise`; 1 if `noise` is estimated from it.
     gages : ndarray (gages,)
         Numbers of the gages.
     gage_places : ndarray (gages, 2)

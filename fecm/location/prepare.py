@@ -113,7 +113,7 @@ def _elements(mesh: MeshArrays, numbers: Indices, nodes: Indices | None) -> Floa
 
 
 def _unturned(plate: PlateModel) -> bool:
-    """Return whether laminates, preload and curvature are those of reversed angles."""
+    """Return whether reversed angles leave laminates, preload and curvature unchanged."""
     for laminate in plate.laminates:
         for matrix in (laminate.A, laminate.B, laminate.D):
             scale = SAME * np.abs(laminate.A if matrix is laminate.B else matrix).max()
@@ -134,7 +134,7 @@ MOST_HATS = 400
 SAMPLES = 8  # fewest between the peaks of two hats
 UNIFORM = 1e-3  # deviation of times from equal intervals, over these, that is rounding
 LATE = 0.5  # largest first time over the length of the record
-# Widths of the hats over those of the responses: hats are sums of narrower ones.
+# Widths of the hats over the widths of the responses: hats are sums of narrower hats.
 SEARCHED, GIVEN = 4, 2
 
 

@@ -17,7 +17,7 @@ from fecm.mechanics.mesh import MeshArrays, longest_sides
 CANDIDATES = 126  # by default, about
 MOST_CANDIDATES = 10_000
 STARTS = 4  # least minima of the grid that are refined
-APART = 0.5  # distance of two minima, over that of the candidates, below which they are one
+APART = 0.5  # least distance of two minima, over the distance of the candidates
 EDGE = 1e-6  # rounding of places on the edge of the region, over its side
 ONSET = 0.1  # share of the peak that a force passes at its beginning
 BEGINNINGS = 33  # times that are tried around it

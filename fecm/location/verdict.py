@@ -27,7 +27,7 @@ from fecm.location.location import Location
 from fecm.location.search import Region
 
 BETTER = 1.5  # fall of the misfit by which a cause is named
-SLIGHT = 1.1  # fall by which a gain is named that is far from those of the other gages
+SLIGHT = 1.1  # least fall of the misfit for a gain that is far from the other gains
 DISTINCT = 1.15  # such a gain over the others, or its inverse
 REFINED = 3  # causes, with the least shares at the candidates, for which a place is searched
 PLACES = 6  # candidates, with the least squares of coefficients of any sign, for forces

@@ -74,7 +74,7 @@ class DrawnExposures(NamedTuple):
 
     @property
     def title(self) -> str:
-        """The largest exposure, and that of the interfaces or of the plies below it."""
+        """The largest exposure, and the largest of the interfaces or plies below it."""
         between = self.worst.criterion == BETWEEN
         of_other_kind = [
             exposure for exposure in self.largest if (exposure.criterion == BETWEEN) != between

@@ -65,7 +65,7 @@ def location(results: Mapping[str, Location]) -> Picture:
     if isinstance(layout := figure.get_layout_engine(), ConstrainedLayoutEngine):
         layout.set(h_pad=ROOM)
     grid = axes[0].get_gridspec()
-    assert grid is not None  # that of the panels
+    assert grid is not None  # of the panels
     for unused in (*axes[2:4], *axes[4 + shown :]):
         unused.remove()
 

@@ -397,7 +397,7 @@ def draw_points(graph: Graph, contents: MapContents) -> None:
 
 
 def runs_in_order(x: DrawnVariable, texts: DrawnVariable | None) -> list[Indices]:
-    """Return cases in the order of x: those of each text, or all."""
+    """Return cases in the order of x: the cases of each text, or all."""
     order = np.argsort(x.values, kind="stable")
     if texts is None:
         return [order]

@@ -213,7 +213,7 @@ def draw_results(
     if kind not in list(PictureKind) and any(
         isinstance(result, Container) and kind in result for result in results.values()
     ):
-        raise PlotError(f"{kind} is no kind of picture but a quantity: give quantity={kind!r}")
+        raise PlotError(f"{kind} is a quantity, not a kind of picture: give quantity={kind!r}")
     if path is not None:
         if ax is not None:
             raise PlotError("give path or ax, not both: ax.figure.savefig writes your own figure")

@@ -204,7 +204,7 @@ def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Arr
 
 
 def largest_absolute(*arrays: Array) -> float:
-    """Return the largest finite absolute value of arrays; 0 if there is none."""
+    """Return the largest finite absolute value of arrays; 0 without finite values."""
     finite = (np.abs(array[np.isfinite(array)]) for array in arrays)
     return max((float(values.max(initial=0.0)) for values in finite), default=0.0)
 

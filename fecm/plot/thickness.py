@@ -35,7 +35,7 @@ class Stress(NamedTuple):
     label: str
     z: Array  # (plies, n), from the midplane
     values: Array  # (plies, n)
-    residual: Array | None = None  # of CURE, of the same shape; None where there is none
+    residual: Array | None = None  # of CURE, of the same shape; None without CURE
 
 
 def thickness(

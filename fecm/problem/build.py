@@ -54,7 +54,7 @@ WORTH_SHARING = 100_000  # number of equations above which threads save more tha
 
 @dataclass(frozen=True)
 class RunOptions:
-    """Options of a run; the defaults are those of the report.
+    """Options of a run; the defaults follow the report.
 
     Raises OptionsError if a value is not valid.
     """

@@ -95,7 +95,7 @@ _NUMBER = re.compile(r"([+-]?(?:[0-9]+\.?[0-9]*|\.[0-9]+))(?:[EeDd]?([+-]?[0-9]+
 _INCLUDE = re.compile(r"\s*INCLUDE\s*(['\"]?)(.+?)\1\s*", re.IGNORECASE)
 _BULK = re.compile(r"\s*BEGIN\b", re.IGNORECASE)
 _SYSTEM = re.compile(r"CORD([12])([RCS])")
-# Cards that begin with C and are no elements.
+# Cards that start with C but are not elements.
 _OTHERS = re.compile(r"C(AERO|LOAD|OMPOSIT|ONV|ORD|REEP|SET|SSCHD|SUP|YAX|YJOIN|YSUP|YSYM)")
 _LINES = ("CBAR", "CBEAM", "CROD")
 _OF_LINES = re.compile(r"PB(AR|EAM)L?|PBCOMP|PROD")  # properties

@@ -119,7 +119,7 @@ def outside_supports(mesh: MeshArrays) -> Bools:
     of_side = part[sides.elements]
     has_free_outline[of_side[sides.is_outline & ~sides.is_held]] = True
     has_held_outline[of_side[sides.is_outline & sides.is_held]] = True
-    # Elements whose nodes are all held, such as those on a boss, are no part of the plate's span.
+    # Elements whose nodes are all held, such as on a boss, do not count for the plate's span.
     nodes_held = np.concatenate([[True], held])[mesh.elements].all(axis=1)
     moves = np.zeros(count, dtype=bool)
     moves[part[~nodes_held]] = True

@@ -38,7 +38,7 @@ from fecm.mechanics.joints import (
 from fecm.problem.mesh_readers import NastranError, physical_groups, read_nastran
 
 Integers = NDArray[np.int_]
-# Kinds of cells by their number of nodes: meshio's name, which is that of the corners' number too.
+# meshio's names of cells by their number of nodes, and by their number of corners.
 KINDS = {3: "triangle", 4: "quad", 6: "triangle6", 8: "quad8", 9: "quad9"}
 CORNERS = {3: 3, 4: 4, 6: 3, 8: 4, 9: 4}  # by the number of nodes
 DIMENSIONS = {"vertex": 0, "line": 1, "line3": 1}  # of the cells of groups of nodes
@@ -70,8 +70,8 @@ ABAQUS_GENERATE = re.compile(
     rb"^\*(?:n|el)set\b[^\n]*\bgenerate\b[^\n]*\n((?:[^*\n][^\n]*\n?)*)",
     re.IGNORECASE | re.MULTILINE,
 )
-SAME = 1e-9  # difference of coordinates, over the size of the mesh, that is none
-NO_AREA = 1e-12  # area over the square of the size that is none
+SAME = 1e-9  # difference of equal coordinates, at most, over the size of the mesh
+NO_AREA = 1e-12  # area of a degenerate element, at most, over the square of the size
 NAMED = 8  # most elements named in a message
 
 
@@ -181,7 +181,7 @@ class PlateMesh:
         if name in self.groups or name != BOUNDARY:
             return self.groups[name]
         sides, number, _ = _sides(self.cells)
-        # A seam, where nodes are in the same place, is no boundary.
+        # A seam, where nodes are in the same place, is not a boundary.
         pairs = coincident(self.points, sides_of_cells(self.cells, min(self.most_nodes, 4)))
         joined = representatives(self.nodes, pairs)[self.cells]
         _, of_joined, counts = _sides(joined)
@@ -314,9 +314,7 @@ def _why_unreadable(path: Path, text: bytes, error: BaseException, printed: str)
         for line in _lines_with(text, rb"\s*[0-9]+\s*(,[^,\n]*)*,\s*,[^\n]*[0-9]"):
             return f"{path}:{line}: a coordinate is blank; write 0."
         for line in _lines_with(text, rb"\s*[0-9]+\s*(,[^,\n]+){2,3},\s*$"):
-            return (
-                f"{path}:{line}: a comma is behind the last coordinate; delete those of all nodes"
-            )
+            return f"{path}:{line}: a comma follows the last coordinate; delete it in all nodes"
     if lines := _lines_with(text, rb"\$ParametricNodes\b"):
         return (
             f"{path}:{lines[0]}: meshio does not read $ParametricNodes; save the mesh without "
@@ -534,7 +532,7 @@ def _quadrilaterals(
         new = len(sides)
         for name, group in groups.items():
             middles = np.flatnonzero(_inside(sides, counts, group))
-            groups[name] = np.concatenate([group, len(places) + middles])  # those of its sides
+            groups[name] = np.concatenate([group, len(places) + middles])  # with middles
         nodes = np.hstack([nodes, len(places) + number])
         places = np.vstack([places, places[sides].mean(axis=1)])
     # The element's own shape functions at its centre.

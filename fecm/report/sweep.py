@@ -37,7 +37,7 @@ from fecm.sweeps.summary import MAIN, chance, sweep_verdict
 
 FOUND = "found_velocity"
 PEAK = "peak_force"
-# Reasons for which results are those of an elastic plate; others are outside the model.
+# Reasons that make results elastic predictions; with other reasons they are outside the model.
 ELASTIC = (Reason.BROKEN, Reason.DELAMINATED, Reason.OTHER)
 MOST_NAMED = 4  # values that name a case
 MOST_VALUES = 8  # different values of a name that are listed one by one

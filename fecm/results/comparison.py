@@ -39,7 +39,7 @@ class Measurement:
     def corrected(self, delay: float, offset: float) -> Measurement:
         """Return the measurement without a delay of its times and an offset of its force.
 
-        The signs are those of ``fecm identify``: `delay` is the measured time at which the
+        The signs are as in ``fecm identify``: `delay` is the measured time at which the
         projectile touches the plate, `offset` is the measured force without a contact. Raises
         StudyError if one is not finite.
 

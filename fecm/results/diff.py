@@ -35,7 +35,7 @@ from fecm.results.result import Result
 from fecm.results.schema import DATASETS, SCALES, Form, dataset_of
 from fecm.results.stored import row_blocks
 
-# Those of a resultant or strain that is zero in bending, and those of its bending counterpart.
+# A resultant or strain that is zero in bending, and its bending counterpart.
 RESULTANTS = ("N_x", "N_y", "N_xy")
 COUPLES = ("M_x", "M_y", "M_xy")
 STRAINS = ("eps_xx", "eps_yy", "gamma_xy")

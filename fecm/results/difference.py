@@ -136,7 +136,7 @@ class DatasetDifference:
     differing : int
         Number of differences beyond the tolerance.
     first : Position or None
-        First row with one; None if the rows are no instants.
+        First row with a difference; None if the rows are not instants.
     """
 
     name: str
@@ -241,7 +241,7 @@ class Listed(NamedTuple):
     name : str
         Its name: ``title``, ``energy:initial``, ``tape3/w:unit``, ``deck``.
     a, b : object
-        Values in A and B, the first different lines of texts; None if there is none.
+        Values in A and B, the first different lines of texts; None without a difference.
     line : int or None
         Number of the first different line of a text.
     """

@@ -29,7 +29,7 @@ FEWEST = 20  # evaluations of FAIL during contact below which maxima may be miss
 # Longest side of the elements on the circle around the load, over the radius R of the circle.
 COARSENESS = "coarseness"  # attribute of the group circle
 RESOLVED = 2.6  # up to which the errors of the largest exposures were measured to be within a band
-# Share by which largest exposures are below those of the finest mesh at a coarseness, of four
+# Share by which largest exposures are below the finest mesh's at a coarseness, of four
 # plates on up to eight meshes; beyond the last it is not known.
 COARSE = (RESOLVED, 3.8, 7.5, 15.0)
 TOO_LOW = {"plies": (0.015, 0.08, 0.25, 0.44), INTERLAMINAR: (0.12, 0.23, 0.37, 0.55)}
@@ -296,7 +296,7 @@ class FirstFailure:
     criterion, mode : str
         Names of the criterion and of its mode.
     ply : int
-        Its number from 1 at the struck face; of an interface that of the ply above it.
+        Its number from 1 at the struck face; an interface has the number of the ply above it.
     x, y : float
         Place.
     time : float

@@ -44,7 +44,7 @@ class Result(Stored, schema.ContactRows):
     texts : mapping of str to str
         Texts by path.
     groups : mapping of str to mapping
-        Attributes of the groups; those of the result itself under ``""``.
+        Attributes of the groups; ``""`` has the attributes of the result itself.
 
     Attributes
     ----------

@@ -149,7 +149,7 @@ def _range(contents: FileContents, path: str) -> tuple[float | None, float | Non
     return (minimum, maximum, not_finite) if minimum <= maximum else (None, None, not_finite)
 
 
-NEAR = 0.05  # of the time of the peak, up to which a row is that of the peak
+NEAR = 0.05  # distance of a row from the peak, over its time, that counts as the peak
 LISTED = 6  # most contacts and frequencies listed individually
 # Parts by the caller of the run: attribute, name, and the segment of the deck that they replace.
 OWN_PARTS = (("law", "contact law", "EXPE"), ("projectile", "projectile", "PROJ"))

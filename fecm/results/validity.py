@@ -19,7 +19,7 @@ from fecm._typing import Array, Bools, Floats
 from fecm.results.end import End, Texts
 
 TOO_SOFT = "a linear plate, without membrane stiffening, is too soft"
-# The errors are those of plates without preload.
+# The errors hold for plates without preload.
 PRELOADED = "compressive preload increases this error, tensile preload reduces it"
 REMEDY = "NONL includes the stiffening (fecm new --nonlinear)"
 UNSAFE = "threshold energies are therefore too high (unsafe)"
@@ -51,7 +51,7 @@ LIMITS = {
     InPlane.UNKNOWN: 0.3,
 }
 # Least and largest error of the peak force, in percent, at deflections of the linear plate over the
-# thickness.  They are those of nonlinear impacts of the same energy on isotropic, quasi-isotropic
+# thickness.  They come from nonlinear impacts of the same energy on isotropic, quasi-isotropic
 # and cross-ply plates, clamped and simply supported.
 DEFLECTIONS = (0.0, 0.25, 0.5, 1.0, 1.5, 2.5, 5.0)
 FREE_LEAST = (0, 1, 2, 8, 14, 24, 41)
@@ -146,7 +146,7 @@ class Reason(StrEnum):
     SOFT = "indentation > h/4"
     BROKEN = "exposure > 1"
     DELAMINATED = "peak force > threshold"
-    OTHER = "other"  # those of other versions
+    OTHER = "other"  # in files of other versions
 
 
 # Reasons by the supports of the edges; unknown ones have the limit of held ones.

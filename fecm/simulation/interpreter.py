@@ -9,7 +9,7 @@ from fecm.deck.macros import Body, Loop
 from fecm.deck.model import Macro
 
 Action = Callable[[], "bool | None"]  # carries out a macro; True leaves the innermost loop
-# Carries out complete passes of a loop at their begin; False if there are none to carry out so.
+# Runs complete passes of a loop from their start; False if it ran none.
 Passes = Callable[[], bool]
 Position = Sequence[tuple[int, int]]  # index of the next item and pass of every open loop
 

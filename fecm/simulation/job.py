@@ -193,7 +193,7 @@ class Run:
     )
     projectile: DeckProjectile | LinearProjectile | None = option(
         None,
-        "Projectile instead of that of PROJ, by its mass and stiffness matrices, at the velocity "
+        "Projectile instead of PROJ's, by its mass and stiffness matrices, at the velocity "
         "of ROD: a LinearProjectile, Rod or RigidMass.",
     )
     criteria: Iterable[FailureCriterion | str] = option(

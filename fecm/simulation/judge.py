@@ -101,7 +101,7 @@ def _deflections(simulation: Simulation, result: Result) -> Iterator[RunPeak]:
     x, y = problem.mesh.coordinates[:, :2].T
     place = problem.load_place
     by_step = place is not None and not free.size and "history/plate_w" in result
-    # Under the load the deflection is that of the summary, the mean over the patch.
+    # Under the load the deflection is the mean over the patch, as in the summary.
     under = problem.under_load(x, y) & by_step
     for times, (w,) in _blocks(result, "tape3", ["w"]):
         bent = np.abs(w - (w @ free) @ free.T)
@@ -218,7 +218,7 @@ def _time_step(simulation: Simulation, result: Result) -> Iterator[str]:
     if (2.0 / problem.safe_time_step) ** 2 + growth <= NEAR**2 * allowed:
         return
     linear = (2.0 / problem.critical_time_step) ** 2
-    # A time step that is as near to that of the linear plate was chosen so.
+    # A time step that is as near to the linear plate's limit was chosen on purpose.
     limit = allowed * (NEAR**2 if linear < NEAR**2 * allowed else 1.0)
     if linear + growth > limit:
         force = quantity(largest.value, unit_of("force/length", result.units))
@@ -261,13 +261,13 @@ PULL = 0.1
 STATIC = 0.5
 STANDARD_GRAVITY = 9.80665  # m/s^2
 HEAVY = 0.02  # share of the peak force that gravity adds, above which a note says so
-LATER = 1.1  # peak of a later contact over that of the first, above which a note says so
+LATER = 1.1  # least ratio of a later contact's peak to the first's for a note
 
 
 class RunVerdict(NamedTuple):
     """Reasons to doubt a result, and its largest values."""
 
-    notes: list[str]  # sentences; empty if there is no doubt
+    notes: list[str]  # sentences; empty without a doubt
     validity: str  # ``"ok"`` or reasons; empty without impact steps
 
 

@@ -69,7 +69,7 @@ def _of_one_plate(task: Task) -> list[Outcome]:
     return parts
 
 
-@lru_cache(maxsize=2)  # for runs in full beside those of the reduced model
+@lru_cache(maxsize=2)  # full runs and the reduced model alternate
 def _plate(
     deck: Deck,
     of_plate: tuple[tuple[str, Value], ...],

@@ -234,7 +234,7 @@ def check_sweep_memory(
 ) -> None:
     """Raise NotEnoughMemoryError for a sweep that needs more memory than is free.
 
-    The parameters are those of :func:`sweep_memory`.
+    See :func:`sweep_memory` for the parameters.
     """
     memory = sweep_memory(checked, definition, workers, streamed=streamed)
 

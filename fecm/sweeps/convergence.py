@@ -25,10 +25,10 @@ from fecm.sweeps.outcome import Column
 
 ASSUMED_ORDER = 2.0  # of two factors, which observe none
 LOWEST_ORDER = 0.5  # that gives a limit
-# Order of the scheme in time, and in space of all elements but those of nine nodes; and theirs.
+# Order of the scheme in time and space, and in space for elements with nine nodes.
 SCHEME_ORDER = 2.0
 NINE_NODE_ORDER = 4.0
-NEAR = 0.5  # how far an observed order may be from those of the scheme
+NEAR = 0.5  # largest distance of an observed order from an order of the scheme
 # Safety factors of the error band.
 OBSERVED = 1.25
 UNCONFIRMED = 3.0
@@ -40,7 +40,7 @@ UNKNOWN = math.nan
 class Convergence:
     """Limit of a quantity for fine meshes and small time steps."""
 
-    order: float  # observed order; NaN if there is none
+    order: float  # observed order; NaN if it can't be computed
     # Richardson extrapolation from the last values with the observed order, or with the highest of
     # the scheme if that is lower; NaN if there is none.
     limit: float

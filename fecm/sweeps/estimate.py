@@ -42,7 +42,7 @@ class ModelEstimate:
     threshold : float
         Delamination threshold that the model reaches, force; NaN without DELA.
     velocity, energy : float
-        Of the projectile at the threshold; NaN without DELA.
+        Impact velocity and energy that reach the threshold; NaN without DELA.
     applies : bool
         Whether the impact is in the range of the model.
     """
@@ -66,7 +66,7 @@ class Estimate:
     response : str
         Class of the response by the mass ratio.
     mass_ratio : float
-        Mass of the projectile over that of the plate.
+        Mass of the projectile over the mass of the plate.
     inelasticity : float
         Zener's parameter lambda.
     stiffness : float
@@ -133,7 +133,7 @@ class Estimate:
         """Return the row of a model."""
         cells = [name if model.applies else f"{name} (out of range)"]
         for column, dimension in COLUMNS.items():
-            # Force and duration of a model are known, those of the run only if its contact ends.
+            # Force and duration of a run are open unless its contact ends.
             missing = "open" if column in ("peak_force", "duration") else "-"
             cells.append(self._text(getattr(model, column), dimension, missing))
         return tuple(cells)

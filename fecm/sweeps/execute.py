@@ -218,7 +218,7 @@ def _client(scheduler: Any) -> Any:
     try:
         if not is_cluster:
             _check_address(address)
-        # A client of its own: get_client of a cluster may return that of the caller.
+        # A new client: get_client of a cluster may return the caller's.
         where = scheduler if is_cluster else address
         return module.Client(where, timeout=PATIENCE, set_as_default=False)
     except (OSError, ValueError, RuntimeError, TimeoutError) as error:
@@ -226,7 +226,7 @@ def _client(scheduler: Any) -> Any:
 
 
 def on_dask(tasks: Sequence[Task], scheduler: Any, done: Done, idle: Idle) -> None:
-    """Run tasks on Dask, by address, client or cluster; it reruns those of a dead worker."""
+    """Run tasks on Dask, by address, client or cluster; it reruns tasks of a dead worker."""
     with _client(scheduler) as client:
         if getattr(client, "status", "running") != "running":
             raise SchedulerError(f"the Dask client is {client.status}; make a new one")

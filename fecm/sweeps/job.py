@@ -178,14 +178,14 @@ class Sweep:
     exceed: Mapping[str, float | str | Sequence[float]] | Named | None = option(
         None,
         "Probability that a quantity of the summary exceeds a value; of peak_force also "
-        "threshold, that of DELA.",
+        "threshold, DELA's.",
         python="Or a mapping of quantities to values.",
         group="Random values",
     )
     until: float | Literal["threshold"] | Mapping[str, float | str] | None = option(
         None,
         "Search in every case for the velocity at which a quantity is reached: peak_force=NUMBER, "
-        "peak_force=threshold (that of DELA), or exposure=NUMBER, the largest of FAIL outside the "
+        "peak_force=threshold (DELA's), or exposure=NUMBER, the largest of FAIL outside the "
         "load, by full runs.",
         python="A number or 'threshold' for the peak force, or a mapping of one name.",
         group="Search",

@@ -81,7 +81,7 @@ def mesh_error(
     mode : str
         ``"report"`` or ``"listing"``.
     progress : callable, optional
-        Called now and then with the number of steps taken and that of all steps of both runs.
+        Called now and then with the numbers of completed and of all steps of both runs.
 
     Returns
     -------

@@ -65,7 +65,7 @@ class PartialResults:
         self, result: Path, fingerprint: str, *, restart: bool = False, resume: bool = True
     ) -> None:
         self.folder = parts_of(result)
-        self.tasks: Sequence[Task] = ()  # those of all cases, once they are known
+        self.tasks: Sequence[Task] = ()  # tasks of all cases, once they are known
         self._fingerprint = fingerprint
         make_folder(self.folder)
         mark = self.folder / "sweep.json"

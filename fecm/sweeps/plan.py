@@ -70,7 +70,7 @@ MEASURES = tuple(one.value for one in Measure)
 class Settings:
     """What the cases of a sweep have in common."""
 
-    deck: Deck  # that is varied; with `build` that of one of the cases
+    deck: Deck  # that is varied; with `build` the deck of a case
     history: bool = False  # whether contact forces are stored
     clock: Clock | None = None  # None if the time step of the deck applies to every plate
     search: Search | None = None  # for the velocity of every case

@@ -171,7 +171,7 @@ def largest_time_step(plate: ReducedPlate, strike: Strike) -> float:
 
 RunTasks = Callable[[Sequence[Task]], list[tuple[Task, Outcome]]]
 GROUP = "reduced"
-LIMIT = 0.02  # largest difference of the peaks, relative to that of the full run
+LIMIT = 0.02  # largest difference of the peaks, relative to the full run
 TRIAL_COLUMNS = tuple(d.name for d in SWEEP_DATASETS.values() if d.group == GROUP)
 
 

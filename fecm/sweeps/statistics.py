@@ -92,7 +92,7 @@ def indices(values: Floats, seed: int) -> Indices:
         varies = np.ptp(flat[:, : 2 * n], axis=1) > ROUNDING * np.abs(flat).max(axis=1)
     centred = values - values[:, :2].mean(axis=(1, 2), keepdims=True)
     f_a, f_b, f_ab = centred[:, :1], centred[:, 1:2], centred[:, 2:]
-    # Means of these columns make the indices: those of f, f^2, and the products, (m, 2 + 2 d, n).
+    # The indices follow from means of f, f^2, and the products, (m, 2 + 2 d, n).
     means = (f_a + f_b) / 2.0, (f_a**2 + f_b**2) / 2.0
     columns = np.concatenate([*means, f_b * (f_ab - f_a), (f_a - f_ab) ** 2 / 2.0], axis=1)
     columns[~varies] = np.nan

@@ -30,7 +30,7 @@ SIDES = (6.0, 4.0)  # of rectangles (in)
 FREE = "11000 00000 00000 00000 00000"
 SUPPORTED = "11000 11101 11110 11101 11110"
 # The same of a quarter whose left and bottom edges are lines of symmetry.  The first restrains u
-# and v everywhere; the others are those of Navier's solutions for antisymmetric laminates.
+# and v everywhere; the others belong to Navier's solutions for antisymmetric laminates.
 BENDING = "11000 00010 00001 00101 00110"
 CROSS_PLY = "00000 10010 01001 01101 10110"
 ANGLE_PLY = "00000 01010 10001 10101 01110"

@@ -176,7 +176,7 @@ def _rod_waves() -> Sequence[Value]:
         mass = rod.mass()
         matrix = np.diag(mass) if mass.ndim == 1 else mass
         squares = eigh(rod.stiffness(), matrix, eigvals_only=True)
-        frequencies.append(math.sqrt(float(squares[1])))  # the first is that of the rigid motion
+        frequencies.append(math.sqrt(float(squares[1])))  # the first belongs to the rigid motion
     return [speed, result.forces[:, 1].max(), *frequencies]
 
 

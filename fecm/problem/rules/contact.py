@@ -21,7 +21,7 @@ GREATEST_POWER = 5.0
 SMALLEST_SLOPE = 0.02
 USUAL_SLOPES = (0.03, 0.5)
 # Radii of a rigid sphere whose k the law has: in m where UNIT tells, otherwise over the thickness
-# and over the longer side of the plate.  The report's laws, and those of isotropic plates, give
+# and over the longer side of the plate.  The report's laws and isotropic plates give
 # radii from a third to 25 times that of the indenter.
 LEAST_RADIUS = 3e-5
 GREATEST_RADIUS = 5.0
@@ -129,7 +129,7 @@ def sphere_radius(deck: model.Deck) -> float:
 
 @rule("W476", Subject.IMPACT)
 def doubtful_coefficient(problem: Problem) -> Reports:
-    """K is that of a sphere of an impossible radius.
+    """K belongs to a sphere of an impossible radius.
 
     By equation 3-2 with E2 it is smaller than 0.03 mm or larger than 5 m (without UNIT: than 0.006
     of the thickness, or 100 plates).

@@ -38,7 +38,7 @@ def missing_expansion(card: model.Cure) -> Reports:
             message = f"Material {expansion.material} has a second card of expansions."
             yield Report(message, expansion.place("material"), "remove one of them")
     if (free := card.expansion(MATERIAL)) is None:
-        yield Report(f"CURE has no card for material {MATERIAL}, that of MATE.", card.place(), hint)
+        yield Report(f"CURE has no card for material {MATERIAL}, MATE's.", card.place(), hint)
         return
     for change, value, names in (
         ("temperature", card.delta_t, model.Expansion.THERMAL),
@@ -105,7 +105,7 @@ def heated_since_the_cure(problem: Problem) -> Reports:
     The plies have been heated since they were free of stress. After a cure the change is negative,
     and residual stresses of the wrong sign hide the first failure.
 
-    Remedy: The temperature of use minus that of the cure: -155 from 177 to 22.
+    Remedy: The temperature of use minus the temperature of the cure: -155 from 177 to 22.
     """
     card = problem.deck.last(model.Cure)
     if card is not None and card.delta_t > 0.0:

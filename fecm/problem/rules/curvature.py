@@ -12,7 +12,7 @@ from fecm.problem.problem import Problem
 from fecm.problem.rules.cards import report_elements
 from fecm.problem.rules.nonlinear import ORDER, not_nine_nodes
 
-# Slope of the midplane at an edge: that of an arc is four times its rise over its side.
+# Slope of the midplane at an edge: an arc has four times its rise over its side.
 SHALLOW = 0.5
 STEEP = 1.0
 THIN = 20.0  # radius over thickness, from which on the shell is thin
@@ -97,7 +97,7 @@ def hardly_shallow(problem: Problem) -> Reports:
 def thick_panel(problem: Problem) -> Reports:
     """A radius of CURV is less than 20 times the thickness.
 
-    Strains vary over the thickness of a thick shell as those of a thin one do not.
+    Strains of a thick shell vary over its thickness, which the theory of thin shells neglects.
 
     Remedy: The unit of the radius, the deck's of length.
     """

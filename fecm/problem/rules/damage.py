@@ -33,7 +33,7 @@ SHARES = (
     ("S23", "G23", 0.02),
 )
 FIBROUS = 2.0  # E1/E2 above which a ply has fibres in one direction
-# Of fibrous plies only those of boron are stronger in compression than in tension.
+# Only boron plies are stronger in compression than in tension.
 BORON_ANISOTROPY = 5.0  # least E1/E2 of boron plies
 BORON_SHEAR = 0.35  # greatest G12/E2 of boron plies
 NEARLY = 1.1  # XC/XT that scatter of tests explains
@@ -374,7 +374,7 @@ def preload_beyond_strength(problem: Problem) -> Reports:
 def threshold_of_a_sandwich(problem: Problem) -> Reports:
     """DELA is of no use: the plate is a sandwich.
 
-    The threshold is that of a solid laminate. The faces of a sandwich delaminate, or leave the
+    The threshold holds for a solid laminate. The faces of a sandwich delaminate, or leave the
     core, at a small part of it. No threshold is computed.
 
     Remedy: Remove DELA; FAIL has the exposures of faces and core.
@@ -392,7 +392,7 @@ def threshold_of_a_sandwich(problem: Problem) -> Reports:
 def puck_of_a_fabric(problem: Problem) -> Reports:
     """FAIL leaves out Puck's criterion for the plies of a fabric.
 
-    The criterion is that of unidirectional plies. E2 is near E1, and G12 far below.
+    The criterion is for unidirectional plies. E2 is near E1, and G12 far below.
 
     Remedy: The other criteria are evaluated; none of them is made for fabrics either.
     """

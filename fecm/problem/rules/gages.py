@@ -22,7 +22,7 @@ SHALLOW = 0.01  # distance from the mid-plane over the thickness that no gage ha
 
 @reports("E012")
 def too_many_gages(problem: Problem) -> Reports:
-    """Find so many gages that their search would take too long."""
+    """Report more gages than can be located in reasonable time."""
     segment, elements = problem.deck.require(model.Gages), len(problem.mesh.elements)
     count = len(segment.records)
     if count > MOST_GAGES or count * elements > MOST_GAGE_PAIRS:

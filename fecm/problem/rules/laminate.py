@@ -210,7 +210,7 @@ def doubtful_poissons_ratio(problem: Problem) -> Reports:
             hint = "NU12 is the contraction across the fibres under a stress along them"
             yield Report(message, place, hint)
         else:
-            message = f"Poisson's ratio NU12 = {nu:g} is unlike that of any ply of parallel fibres."
+            message = f"Poisson's ratio NU12 = {nu:g} is unlike any ply of parallel fibres."
             yield Report(message, place, "NU12 of fibre composites is 0.2 to 0.4")
 
 

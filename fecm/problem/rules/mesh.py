@@ -17,7 +17,7 @@ from fecm.problem.problem import Problem
 from fecm.problem.rules.cards import describe_elements, describe_nodes, report_elements
 
 CORNERS = TRIANGLE.corners
-FEW_SUPPORTS = 2  # nodes that hold w up to which they are no support
+FEW_SUPPORTS = 2  # nodes that hold w; a support needs more
 # Distance of a mid-side node from its place along the side, over the side's length.
 OFF_PLACE = 0.05
 SHOWN = 3  # hanging nodes that have a finding of their own

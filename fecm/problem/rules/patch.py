@@ -18,7 +18,7 @@ from fecm.problem.problem import ContactPatch, Problem
 from fecm.problem.rules.contact import sphere_radius
 from fecm.results.exposures import RESOLVED
 
-LARGE = 2.0  # radius of a patch over the thickness, and over that of the contact
+LARGE = 2.0  # radius of a patch over the thickness, and over the radius of the contact
 
 
 @rule("E442", Subject.POINTS)
@@ -235,9 +235,9 @@ def _radius_hint(card: model.Patch) -> str:
 
 @rule("W475", Subject.POINTS)
 def large_patch(problem: Problem) -> Reports:
-    """The radius of the patch looks like that of the indenter.
+    """The radius of the patch looks like the radius of the indenter.
 
-    It is more than twice the thickness, and more than twice that of the contact.
+    It is more than twice the thickness, and more than twice the radius of the contact.
 
     Remedy: The radius of the contact, or blank for 0.327 h.
     """

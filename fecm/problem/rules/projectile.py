@@ -20,7 +20,7 @@ from fecm.problem.rules.units import looks_like
 MOST_ROD_ELEMENTS = 500
 # One inch, pound and second in m, N and s.
 REPORT_UNITS = [KNOWN["length"]["in"], KNOWN["force"]["lbf"], KNOWN["time"]["s"]]
-# Mass of the projectile over that of the plate.
+# Mass of the projectile over the mass of the plate.
 LIGHTEST = 1.0e-4
 HEAVIEST = 2.0e3
 USUAL_MASS_RATIO = 10.0
@@ -124,7 +124,7 @@ def rod_out_of_range(card: model.Projectile, diameters: Floats) -> Reports:
 def doubtful_mass(problem: Problem) -> Reports:
     """The projectile is far too light, or too heavy, for the plate.
 
-    Its mass over that of the plate is outside 10⁻⁴ to 2000.
+    Its mass over the mass of the plate is outside 10⁻⁴ to 2000.
 
     Remedy: Mass in force·time²/length: t in mm, N and s; pounds over 386.09 in in, lbf and s.
     """
@@ -151,7 +151,7 @@ def doubtful_mass(problem: Problem) -> Reports:
 
 @rule("W439", Subject.IMPACT)
 def doubtful_rod(problem: Problem) -> Reports:
-    """The wave speed in the rod does not suit that along the fibres.
+    """The wave speed in the rod does not suit the wave speed along the fibres.
 
     Their ratio is outside 1/30 to 30.
 

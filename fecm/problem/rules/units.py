@@ -65,7 +65,7 @@ REAL = {
     "velocity": Range(VELOCITY, 0.01, 1000.0, 5.0, "m/s"),
     "contact coefficient": Range(COEFFICIENT, 1e6, 1e12, 1e9, "N/m^1.5"),
 }
-# Names that are no units of length, force or time.
+# Names that are not units of length, force or time.
 OTHERS = {
     "mass": (*MASSES, "ton", "lbm", "slug"),
     "stress": ("Pa", "kPa", "MPa", "GPa", "psi", "ksi"),

@@ -27,7 +27,7 @@ def _laminates(deck: model.Deck) -> tuple[model.NumberedLaminate, ...]:
 
 
 def unknown_material(number: int, known_numbers: set[int], place: CardPlace | None) -> Report:
-    """Report a material that is not among those of the deck."""
+    """Report a material that the deck does not have."""
     numbers = ", ".join(map(str, sorted(known_numbers)))
     return Report(f"The deck has no material {number}.", place, f"its materials are {numbers}")
 
@@ -50,7 +50,7 @@ def number_taken(deck: model.Deck) -> Reports:
         seen: set[int] = set()
         for item in numbered:
             if item.number <= MATERIAL or item.number in seen:
-                why = "taken" if item.number in seen else "that of MATE or less"
+                why = "taken" if item.number in seen else "MATE's or less"
                 message = f"The number {item.number} of a {kind} is {why}."
                 yield Report(message, item.head.place(kind), f"a {kind} has a number from 2")
             seen.add(item.number)
@@ -68,7 +68,7 @@ def _in_layers(deck: model.Deck) -> Iterator[model.Layer]:
 def missing_material(deck: model.Deck) -> Reports:
     """A card has a material that the deck does not have, or a laminate no layers.
 
-    Materials are that of MATE, number 1, and those of MATS.
+    Materials are MATE's, number 1, and those on MATS.
 
     Remedy: The material's cards on MATS, or another number.
     """
@@ -86,7 +86,7 @@ def missing_material(deck: model.Deck) -> Reports:
 def invalid_zone(deck: model.Deck) -> Reports:
     """A zone has an element or a laminate that the deck does not have.
 
-    Remedy: Elements up to NUMEL; laminate 1 is that of MATE, the others are those of LAMS.
+    Remedy: Elements up to NUMEL; laminate 1 is MATE's, the others are on LAMS.
     """
     card, count = deck.last(model.Zones), deck.control.numel
     laminate_numbers = {MATERIAL, *(laminate.number for laminate in _laminates(deck))}
@@ -174,8 +174,8 @@ def soft_core(problem: Problem) -> Reports:
         if laminate.has_core:
             ratio = max(moduli) / min(moduli)
             message = (
-                f"Laminate {number} has a core whose G13 is {ratio:.3g} times below that of the "
-                "faces: the plate is too stiff in shear."
+                f"Laminate {number} has a core whose G13 is {ratio:.3g} times below the "
+                "faces' G13: the plate is too stiff in shear."
             )
             yield Report(message, shear.place() or _place(deck, number), "use SHEA EQUI")
 

@@ -345,7 +345,7 @@ def fit_permanent_line(
 ) -> PermanentLine | None:
     """Fit alpha_0 = max(0, s_p (alpha_m - alpha_p)); None if fewer than two cycles exceed alpha_p.
 
-    The covariance, regular, is that of all peaks alpha_m, then all permanent indentations alpha_0.
+    The covariance, regular, has all peaks alpha_m, then all permanent indentations alpha_0.
     """
     order = np.argsort(peaks)
     fits: list[tuple[float, PermanentLine]] = []
@@ -402,7 +402,7 @@ class Critical(NamedTuple):
     """Permanent indentation by equation 3-7, with the critical indentation alpha_cr."""
 
     alpha_cr: FittedValue
-    scatter: float  # as that of a line
+    scatter: float  # as in `PermanentLine`
 
 
 def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:

@@ -136,7 +136,7 @@ class Division(NamedTuple):
         return [n for n, corner in enumerate(self.corners) if corner.is_peak]
 
     def rows(self, kind: StretchKind, cycle: int | None = None) -> Rows:
-        """Return the points of all stretches of a kind, or of those of a cycle."""
+        """Return the points of all stretches of a kind, or only of a cycle."""
         stretches = [s for s in self.stretches if s.kind == kind]
         parts = [s.rows for s in stretches if cycle is None or s.cycle == cycle]
         return np.concatenate([np.empty(0, dtype=np.int64), *parts])
@@ -253,7 +253,7 @@ def read_test(
 
 
 def _system(length: str, force: str) -> tuple[str, str]:
-    """Return units of length and force of the same system as those of the file."""
+    """Return units of length and force of the same system as the file's."""
     if {length.casefold(), force.casefold()} <= IMPERIAL:
         return "in", "lbf"
     return ("m" if length == "m" else "mm"), "N"
