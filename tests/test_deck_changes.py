@@ -127,7 +127,7 @@ def test_a_ply_with_other_constants_brings_its_strengths_or_is_refused() -> None
     strengths = DECK.with_(laminate=COUPLED).require(Allowables)
     assert strengths == fecm.impact(PLATE, COUPLED, MASS, FIRM, **DAMAGED).require(Allowables)
     assert strengths != DECK.require(Allowables)
-    with pytest.raises(ValueError, match="`laminate` has other plies, of which the deck needs"):
+    with pytest.raises(ValueError, match="`laminate` has other plies; the deck needs their"):
         DECK.with_(laminate=fecm.Laminate("[0]8", CONSTANTS, 0.25))
     bare = fecm.impact(PLATE, PLIES, MASS, FIRM, **QUICK)
     assert bare.with_(laminate=fecm.Laminate("[0]8", CONSTANTS, 0.25)).plies == {1: CONSTANTS}

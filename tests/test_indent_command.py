@@ -232,7 +232,7 @@ def test_a_fit_states_the_units_of_its_card(tmp_path: Path) -> None:
     assert "units           in, lbf (the test: mm, kN)\nEXPE\n 1330000.0" in told
     plain = written(tmp_path / "plain.csv", *make_test())
     told = call("indent", "fit", plain).stdout
-    assert "units           the test's own units, which it does not name\nEXPE\n" in told
+    assert "units           not named in the test\nEXPE\n" in told
 
 
 @pytest.mark.parametrize("columns", ["3,2", "way,push", "WAY,2"])

@@ -311,7 +311,7 @@ SQUARE = "1, 0., 0.\n2, 1., 0.\n3, 1., 1.\n4, 0., 1.\n"
         (f"*Node\n{SQUARE}*Element, type=S4\n1, 1, 2, 3, 4\n*Nset, nset=a, generate\n1, 4\n",
          ":8: GENERATE has `1, 4`"),
         ("*Node\n1, 0., 0., 0.,\n2, 1., 0., 0.,\n*Element, type=S4\n1, 1, 2, 2, 1\n",
-         ":2: a comma is behind the last coordinate"),
+         ":2: a comma follows the last coordinate"),
     ],
 )  # fmt: skip
 def test_what_meshio_leaves_out_of_abaqus_is_refused_with_line_and_remedy(

@@ -247,7 +247,7 @@ def test_a_named_ply_has_its_own_thickness_in_the_decks_units() -> None:
     assert thinner == 0.1
     unknown = new(*options, "--material", "T700/2510")
     assert_unusable(unknown)
-    assert "--ply-thickness is missing: that of T700/2510 is not known" in unknown.stderr
+    assert "--ply-thickness is missing: T700/2510 has no known one" in unknown.stderr
 
 
 def test_a_ply_thickness_in_another_unit_is_named_against_the_plates_side() -> None:

@@ -595,7 +595,7 @@ def test_the_preload_changes_an_impact_on_few_elements_as_it_does_exactly() -> N
 
 
 def test_errors_of_the_linear_plate_are_said_to_be_those_without_preload() -> None:
-    said = "without PREL, whose compression makes it more"
+    said = "compressive preload increases this error"
     hard = {"velocity": [6000.0]}
     assert said in " ".join(fecm.sweep(preloaded("-300."), hard).notes)
     assert said not in " ".join(fecm.sweep(base(), hard).notes)
@@ -605,7 +605,7 @@ def test_an_estimate_says_which_models_neglect_the_preload(tmp_path: Path) -> No
     (tmp_path / "plate.inp").write_text(preloaded("-300."))
     told = call("estimate", tmp_path / "plate.inp")
     assert "preload     in the static plate and the run" in told.stdout
-    assert "without PREL, whose compression makes it more" in told.stderr
+    assert "compressive preload increases this error" in told.stderr
 
 
 def test_cases_under_a_preload_equal_their_full_runs() -> None:

@@ -496,7 +496,7 @@ def test_data_frames_have_the_units_of_their_columns() -> None:
         (fecm.run, None, "a deck is a path, a text, an open file or a Deck, not None"),
         (fecm.load, 3, "a result file is a path or an open file, not 3"),
         (fecm.load, io.BytesIO(), "<file> has no bytes to read"),
-        (fecm.load, io.StringIO("x"), '<file> is open as text; open it anew with the mode "rb"'),
+        (fecm.load, io.StringIO("x"), '<file> is open as text; open it again with the mode "rb"'),
         (fecm.load, io.BytesIO(small().encode()), "<file> is a deck, not a result"),
         (fecm.load, io.BytesIO(b"0" * 100), "<file>: not a readable HDF5 file"),
         (fecm.read_one, io.BytesIO(HDF5), "<text> is an HDF5 file, not a deck"),

@@ -35,7 +35,7 @@ def short() -> fecm.Deck:
     [("velocity", [1.0, 3.0, 5.0], "velocity = 1: .*looks like m/s"),
      ("mass", [5.5], "mass = 5.5: .*looks like kg"),
      ("e1", [1.7e11], "e1 = 1.7e.11: .*looks like Pa"),
-     ("thickness", [3.0], "that of one ply is ply_thickness"),
+     ("thickness", [3.0], "ply_thickness is the thickness of a ply"),
      ("laminate_thickness", [0.15, 0.2], "laminate_thickness = 0.15 is less than two plies")],
 )  # fmt: skip
 def test_a_swept_value_in_another_unit_is_told_once(

@@ -271,7 +271,7 @@ class NewOptions:
 )
 @option(
     "--support",
-    type=click.Choice(SUPPORTS),
+    type=click.Choice(tuple(SUPPORTS)),
     default="free",
     show_default=True,
     help="Support of all edges: simple holds w and the rotation along the edge (a hard support).",

@@ -25,7 +25,6 @@ from fecm.deck.mesh_cards import (
 # Significant digits of coordinates, relative to the plate's size, so that they fit their columns.
 DIGITS = 6
 LEAST_BESIDE = 2  # least number of elements between a window and an edge
-SUPPORTS = ("free", "simple", "pinned", "clamped")
 
 
 class EdgeCodes(NamedTuple):
@@ -41,8 +40,12 @@ class EdgeCodes(NamedTuple):
 
 # Codes of w, theta_x and theta_y.  The rotation along an edge is theta_x along x, theta_y along y.
 W_HELD = (1, 0, 0)
-SIMPLE = EdgeCodes(along_x=(1, 1, 0), along_y=(1, 0, 1))
-CLAMPED = (1, 1, 1)
+SUPPORTS = {
+    "free": EdgeCodes(along_x=(0, 0, 0), along_y=(0, 0, 0)),
+    "simple": EdgeCodes(along_x=(1, 1, 0), along_y=(1, 0, 1)),
+    "pinned": EdgeCodes(along_x=(1, 1, 0), along_y=(1, 0, 1)),
+    "clamped": EdgeCodes(along_x=(1, 1, 1), along_y=(1, 1, 1)),
+}
 # Codes of u and v.
 IN_PLANE = {
     "held": EdgeCodes(along_x=(1, 1), along_y=(1, 1)),
@@ -253,9 +256,8 @@ class ElementGrid:
         codes: dict[str, tuple[int, ...]] = {}
         for edge, support in supports.items():
             if support != "free":
-                out_of_plane = CLAMPED if support == "clamped" else SIMPLE.of(edge)
                 held = IN_PLANE[held_in_plane(support, in_plane)]
-                codes[edge] = (*held.of(edge), *out_of_plane)
+                codes[edge] = (*held.of(edge), *SUPPORTS[support].of(edge))
         return self.boundary(everywhere, codes, window, in_plane=in_plane)
 
     def boundary(

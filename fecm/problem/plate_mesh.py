@@ -18,11 +18,8 @@ from fecm._errors import FecmError
 from fecm._inputs import read_input
 from fecm._typing import Bools, Floats
 from fecm.deck.grid import (
-    CLAMPED,
     IN_PLANE,
-    SIMPLE,
     SUPPORTS,
-    W_HELD,
     boundary_cards,
     held_in_plane,
     round_to,
@@ -154,16 +151,15 @@ class PlateMesh:
             along = np.ptp(self.points[sides], axis=1) <= SAME * np.ptp(self.points)
             straight = len(sides) > 0 and bool(along.any(axis=1).all())
             lines = [np.unique(sides[along[:, axis]]) for axis in (1, 0)]  # along x, along y
-            if support == "clamped":
-                codes[rows, 2:] = CLAMPED
-            elif straight:
-                # The rotation along the sides, if all of them run along x or y.
-                for on, code in zip(lines, SIMPLE, strict=True):
+            bending = SUPPORTS[support]
+            everywhere_held = np.minimum(*bending)  # whatever the direction of the side
+            if straight:
+                for on, code in zip(lines, bending, strict=True):
                     codes[on, 2:] = np.maximum(codes[on, 2:], code)
-            else:
+            elif bending.along_x != bending.along_y:
                 # Three nodes in a line, on a polygon for a curve, would hold its rotation too.
                 rows = np.setdiff1d(rows, self.middles)
-            codes[rows, 2:] = np.maximum(codes[rows, 2:], W_HELD)
+            codes[rows, 2:] = np.maximum(codes[rows, 2:], everywhere_held)
             held = held_in_plane(support, in_plane)
             if held == "held":
                 codes[rows, :2] = 1
