@@ -173,7 +173,7 @@ def test_k_of_a_sandwich_is_doubted() -> None:
         (("--layup", "[0]", *HYBRID[2:]), "a ply without a material"),
         ((*HYBRID, "--material", "C=T300/914"), "C is given twice"),
         ((*HYBRID, "--zone", "1,1,1,2:[0C]"), "--zone 1,1,1,2 is empty"),
-        ((*HYBRID, "--zone", "pad:[0C]"), "no group of the mesh"),
+        ((*HYBRID, "--zone", "pad:[0C]"), "nor a group of the mesh"),
         ((*HYBRID, "--zone", "[0C]"), "is not X0,Y0,X1,Y1:LAYUP"),
         ((*SANDWICH[:6], "--core", "balza:5"), "'balza' is not a named ply"),
     ],
