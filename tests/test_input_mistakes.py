@@ -63,7 +63,7 @@ MISTAKES: dict[str, tuple[Edit, str, str]] = {  # change, code, and what the tex
     "PATC with a blank field": (
         with_card("PATC", "DISC,,1.,50.,50."), "W474", "the card is `DISC,1.,50.,50.`"),
     "NU12 a tenth": (
-        replaced(r"^(   1.57E-9      )0.32", r"\g<1>.008"), "W434", "unlike that of any ply"),
+        replaced(r"^(   1.57E-9      )0.32", r"\g<1>.008"), "W434", "unlike any ply"),
     "patch away from ROD's node": (
         with_card("PATC", "DISC,1.,20.,50."), "N473", "30 from node"),
     "radius of the indenter for the patch": (

@@ -17,12 +17,12 @@ import fecm
 from fecm import Deck, read_deck
 from fecm.deck import (
     Card,
+    CardTable,
     Control,
     FieldKind,
     Fields,
     Findings,
     Reader,
-    Table,
     TableReader,
     format_deck,
     format_real,
@@ -201,7 +201,7 @@ def test_sound_lines_are_not_read_card_by_card(free: bool, monkeypatch: pytest.M
 def test_a_table_behaves_as_the_tuple_of_its_records() -> None:
     made = distorted(5).require(Coordinates).records
     records = tuple(made)
-    assert isinstance(made, Table)
+    assert isinstance(made, CardTable)
     assert len(made) == 25
     assert isinstance(made[3].node, int)
     assert made == records
@@ -230,7 +230,7 @@ def test_records_of_a_table_know_their_cards_after_a_pickle() -> None:
 def test_blocks_are_written_as_single_cards() -> None:
     deck = distorted(20)
     records = deck.require(Coordinates).records
-    assert isinstance(records, Table)
+    assert isinstance(records, CardTable)
     written = list(write_rows(records))
     assert written == [record.to_card(records.fields) for record in records]
     assert len({"," in line for line in written}) == 2

@@ -84,7 +84,7 @@ from fecm.deck.rules import Rule as Rule
 from fecm.deck.rules import Subject as Subject
 from fecm.deck.rules import declare as declare
 from fecm.deck.segment import Segment as Segment
-from fecm.deck.table import Table as Table
+from fecm.deck.table import CardTable as CardTable
 from fecm.deck.table import TableReader as TableReader
 from fecm.deck.table import write_rows as write_rows
 from fecm.deck.units import COEFFICIENT as COEFFICIENT

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Generic, Self, TypeVar, cast
 from fecm._inputs import lines_of
 from fecm.deck.card import Card, CardSource, Control, Fields, Record, Value
 from fecm.deck.findings import Findings
-from fecm.deck.table import Table, TableReader, write_rows
+from fecm.deck.table import CardTable, TableReader, write_rows
 from fecm.deck.values import read_values
 
 if TYPE_CHECKING:
@@ -151,7 +151,7 @@ class CardStream:
 
     def table(
         self, head: Card, kind: type[_R], fields: Fields, is_last: Callable[[_R], bool]
-    ) -> Table[_R]:
+    ) -> CardTable[_R]:
         """Return the records of cards of numbers up to a blank card, or up to a last one."""
         reader = TableReader(fields)
         self._take_table(reader)
@@ -161,7 +161,7 @@ class CardStream:
             else:
                 reader.add((card.line, card.text), [float(value) for value in row[0]])
             self._take_table(reader)
-        table = Table(kind, fields, reader.values, reader.lines)
+        table = CardTable(kind, fields, reader.values, reader.lines)
         if not (table and is_last(table[-1])):
             self.end(head, card)
         return table
@@ -225,7 +225,9 @@ class NumberedSegment(Segment, Generic[_R]):
     def of(cls, control: Control, cards: NDArray[Any]) -> Self:
         """Return the segment with the values of its cards, (cards, fields)."""
         kind = cast("type[_R]", cls.record)
-        return cls(Table(kind, cls.card_fields(control), array("d", cards.astype(float).tobytes())))
+        return cls(
+            CardTable(kind, cls.card_fields(control), array("d", cards.astype(float).tobytes()))
+        )
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
@@ -244,13 +246,13 @@ class NumberedSegment(Segment, Generic[_R]):
         fields = cls.card_fields(control)
         records = cards.table(head, cls.record, fields, lambda r: cls.is_last(r, control))
         # No class variable can have the type of the class's parameter.
-        return cls(cast("Table[_R]", records), source=CardSource(head))
+        return cls(cast("CardTable[_R]", records), source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
         """Return the text of the segment's cards."""
         fields = self.card_fields(control)
         yield self.keyword
-        if isinstance(self.records, Table) and self.records.fields == fields:
+        if isinstance(self.records, CardTable) and self.records.fields == fields:
             yield from write_rows(self.records)
         else:
             for record in self.records:

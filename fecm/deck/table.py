@@ -34,7 +34,7 @@ _INTEGER = "[+-]?[0-9]{1,9}"
 _REAL = r"[+-]?(?:[0-9]{1,20}(?:\.[0-9]{0,30})?|\.[0-9]{1,30})(?:[Ee][+-]?[0-9]{1,2})?"
 
 
-class Table(Sequence[_R]):
+class CardTable(Sequence[_R]):
     """Records of cards of numbers, in one array; a record is created when it is accessed.
 
     The table compares, hashes and prints as the tuple of its records.
@@ -84,9 +84,9 @@ class Table(Sequence[_R]):
         return self.kind.from_row(row, source)
 
     def __eq__(self, other: object) -> bool:
-        if isinstance(other, Table) and (self.kind, self.width) == (other.kind, other.width):
+        if isinstance(other, CardTable) and (self.kind, self.width) == (other.kind, other.width):
             return self.values == other.values
-        if isinstance(other, Table | tuple):
+        if isinstance(other, CardTable | tuple):
             return tuple(self) == tuple(other)
         return NotImplemented
 
@@ -209,7 +209,7 @@ def _number(field: Field) -> str:
 # Writing ------------------------------------------------------------------------------------------
 
 
-def write_rows(table: Table[_R]) -> Iterator[str]:
+def write_rows(table: CardTable[_R]) -> Iterator[str]:
     """Write the cards of a table as :func:`fecm.deck.card.write_card` writes each."""
     template = ""
     column = 0
