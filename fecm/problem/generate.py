@@ -25,7 +25,7 @@ from fecm.deck.model import (
     Projectile,
     Record,
 )
-from fecm.deck.table import Table
+from fecm.deck.table import CardTable
 from fecm.mechanics.mesh import Ints, MeshArrays, equation_numbers
 
 # Nodes that cards may generate or reset.
@@ -135,7 +135,7 @@ class _Cards(NamedTuple):
 def _cards(records: Sequence[_R], number: str, values: str) -> _Cards:
     """Return arrays of records; `number` and `values` are the names of their attributes."""
     kind = "f8" if values == "values" else "i4"
-    if isinstance(records, Table):
+    if isinstance(records, CardTable):
         table = np.frombuffer(records.values).reshape(-1, records.width)
         packed = records.kind.packed
         numbers, increments = np.delete(table, packed, axis=1).astype(np.intp).T
