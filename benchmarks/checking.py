@@ -63,7 +63,7 @@ def parts_of_check(path: str) -> dict[str, float]:
         return call
 
     Reader.__init__ = timed("reading", Reader.__init__)  # type: ignore[method-assign]
-    Reader._problem = timed("reading", Reader._problem)  # type: ignore[method-assign]
+    Reader._read_problem = timed("reading", Reader._read_problem)  # type: ignore[method-assign]
     names = vars(problem)
     names["critical_time_step"] = timed("critical", names["critical_time_step"])
     names["safe_time_step"] = timed("bound", names["safe_time_step"])

@@ -30,7 +30,7 @@ from fecm.deck import (
     read_values,
     write_rows,
 )
-from fecm.deck.card import _formatted
+from fecm.deck.card import _format_numeral
 from fecm.deck.mesh_cards import Boundary, Coordinates, Elements, Forces
 from fecm.deck.segment import NumberedSegment
 from fecm.problem.generate import generate
@@ -242,7 +242,7 @@ def test_short_numerals_are_written_as_the_first_form_that_fits() -> None:
     for _ in range(3000):
         value = round(chance.uniform(-1, 1) * 10 ** chance.randint(-12, 18), chance.randint(0, 12))
         for width in (5, 10, 15):
-            assert format_real(value, width) == _formatted(repr(value), width), value
+            assert format_real(value, width) == _format_numeral(repr(value), width), value
 
 
 def test_a_table_generates_the_mesh_of_its_records() -> None:

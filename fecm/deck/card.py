@@ -1,7 +1,7 @@
-"""Cards: one line of a deck cut into fields, its numbers as Fortran writes them, and typed records.
+"""Cards: the lines of a deck, their fields, numbers in Fortran's forms, and typed records.
 
-Columns are counted from 1 and both ends of a field belong to it. A card with a comma is read as
-values separated by commas, in the same order. Everything from ``!`` on is a comment.
+Columns are counted from 1. A field includes its first and its last column. A card with a comma
+holds its values in the same order, separated by commas. Everything from ``!`` on is a comment.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 from fecm.deck.findings import CardPlace
 
 LONGEST = 100  # characters of the longest number that is read
-WITHOUT_LETTER = 10  # least columns of a field whose exponent may be written without its letter
+WITHOUT_LETTER = 10  # smallest width of a field that may have an exponent without its letter
 # No two parts of a pattern match the same characters, so that a mismatch takes linear time.
 _INTEGER = re.compile(r"[+-]?[0-9]+")
 _REAL = re.compile(
@@ -30,22 +30,23 @@ _REAL = re.compile(
 def capitals(word: str) -> str:
     """Return a word in capitals, without the blanks around it.
 
-    Letters beyond ASCII stay as they are: the capitals of some are two letters, and the word would
-    outgrow its field.
+    Letters beyond ASCII stay as they are. Some of them have capitals of two letters, and the word
+    would outgrow its field.
     """
     return "".join(c.upper() if c.isascii() else c for c in word.strip())
 
 
 def parse_integer(text: str) -> int | None:
-    """Read an integer without blanks, or None; the caller limits its length."""
+    """Read an integer without blanks; None if it is not one. The caller limits its length."""
     return int(text) if _INTEGER.fullmatch(text) else None
 
 
 def parse_real(text: str) -> float | None:
     """Read an F field without blanks; None if it is not a number.
 
-    All Fortran forms are read: ``45.``, ``.2E-6``, ``1.5D+3``, ``1.5-3``. A number beyond the range
-    of double precision is infinite. The caller limits the length to :data:`LONGEST` characters.
+    The field may have any Fortran form: ``45.``, ``.2E-6``, ``1.5D+3``, ``1.5-3``. A number beyond
+    the range of double precision is infinite. The caller limits the length to :data:`LONGEST`
+    characters.
     """
     if (match := _REAL.fullmatch(text)) is None:
         return None
@@ -54,10 +55,10 @@ def parse_real(text: str) -> float | None:
 
 
 def format_real(value: float, width: int) -> str | None:
-    """Write a finite number into `width` columns so that reading it gives the same number again.
+    """Format a finite number in at most `width` columns, so that it reads back exactly.
 
-    Returns the most readable form that fits, without padding, or None if none fits. Only fields of
-    ten columns or more get an exponent without its letter: 2.5E-7 as ``25-8`` is hard to read.
+    Returns the most readable form that fits, without padding, or None if no form fits. Only fields
+    of ten columns or more get an exponent without its letter: ``25-8`` for 2.5E-7 is hard to read.
     """
     numeral = repr(value)
     mantissa, has_exponent, _ = numeral.partition("e")
@@ -67,28 +68,28 @@ def format_real(value: float, width: int) -> str | None:
     digits = mantissa.lstrip("-").replace(".", "").strip("0")
     if is_finite and len(digits) > width:
         return None
-    return _formatted(numeral, width)
+    return _format_numeral(numeral, width)
 
 
 @lru_cache(4096)
-def _formatted(numeral: str, width: int) -> str | None:
-    """Write a number, given as a numeral of Python, into `width` columns (cached)."""
+def _format_numeral(numeral: str, width: int) -> str | None:
+    """Format a number, the `repr` of a float, in at most `width` columns (cached)."""
     for letter in ("E", "") if width >= WITHOUT_LETTER else ("E",):
-        forms = list(_forms(numeral, letter))
-        for room in (width - 1, width):  # with a blank between two numbers if it fits
+        forms = list(_possible_forms(numeral, letter))
+        for room in (width - 1, width):  # leave a blank before the number if it fits
             for text in forms:
                 if len(text) <= room:
                     return text
     return None
 
 
-def _forms(numeral: str, letter: str) -> Iterator[str]:
-    """Return the forms of a number, the most readable first, with `letter` before an exponent."""
-    from decimal import Decimal  # 0.8 ms, and only what writes decks needs it
+def _possible_forms(numeral: str, letter: str) -> Iterator[str]:
+    """Yield the forms of a number, the most readable first, with `letter` before an exponent."""
+    from decimal import Decimal  # takes 0.8 ms; only writing a deck needs it
 
     number = Decimal(numeral).normalize()
     sign, numerals, exponent = number.as_tuple()
-    if not isinstance(exponent, int):  # infinite or no number
+    if not isinstance(exponent, int):  # infinite or NaN
         raise ValueError(f"{numeral} can't be written on a card")
     if not number:
         exponent = 0
@@ -123,8 +124,8 @@ class FieldKind(StrEnum):
 class Field(NamedTuple):
     """Field of a card: name, kind, columns, and a label for rulers.
 
-    A blank number is 0. With `has_default` a blank is read as :data:`BLANK` and the record has its
-    default.
+    A blank number is 0. With `has_default` a blank is read as :data:`BLANK`, and the record takes
+    its default.
     """
 
     name: str
@@ -147,8 +148,9 @@ Fields = tuple[Field, ...]
 def layout(*descriptors: str) -> Fields:
     """Lay out fields from column 1.
 
-    Each field is ``"I5 node"``, ``"A4 word"``, ``"X1"`` for a skipped column, with a label for
-    rulers ``"F10 x-coordinate|x"``, or ``"F10? radius"`` where a blank is not 0.
+    A descriptor is a Fortran format and a name: ``"I5 node"``, ``"A4 word"``. ``"X1"`` skips a
+    column. ``"F10 x-coordinate|x"`` adds a label for rulers. ``"F10? radius"`` is a field in which
+    a blank is not 0.
     """
     fields: list[Field] = []
     column = 1
@@ -165,7 +167,7 @@ def layout(*descriptors: str) -> Fields:
     return tuple(fields)
 
 
-@dataclass(frozen=True, slots=True)  # a large deck has many
+@dataclass(frozen=True, slots=True)  # a large deck has many cards
 class Card:
     """One line of a deck."""
 
@@ -189,7 +191,7 @@ class Card:
 
     @property
     def keyword(self) -> str:
-        """The first four columns, in capitals, without trailing blanks: the significant part."""
+        """The first four columns, in capitals, without trailing blanks; the rest has no meaning."""
         return self.data[:4].upper().rstrip()
 
     @property
@@ -208,10 +210,10 @@ class Card:
         return CardPlace(self.line, 1, max(1, len(self.data)), self.text)
 
     def cut(self, fields: Fields) -> list[tuple[int, str]]:
-        """Return first column and text of every field, in fixed or in free format.
+        """Return the first column and the text of every field, in fixed or in free format.
 
-        Free format gives the values without the blanks around them, as many as the card has, and as
-        a last piece everything after the fields.
+        In free format the result has the values of the card without the blanks around them, and
+        then everything after the fields as one last piece.
         """
         data = self.data
         if not self.is_free:
@@ -226,7 +228,7 @@ class Card:
 
 
 class CardSource(NamedTuple):
-    """Source of a record: its card and the fields of the card."""
+    """Source of a record: the card and its fields."""
 
     card: Card
     fields: Fields = ()
@@ -242,7 +244,7 @@ class CardSource(NamedTuple):
 
 
 def write_card(fields: Fields, values: Sequence[Value]) -> str:
-    """Write values as a card, in free format if a value does not fit its columns.
+    """Format values as a card, in free format if a value does not fit its columns.
 
     Raises ValueError if a number is not finite.
     """
@@ -258,15 +260,15 @@ def write_card(fields: Fields, values: Sequence[Value]) -> str:
 
 
 def in_free_format(values: Sequence[Value]) -> str:
-    """Write values separated by commas."""
-    texts = [_free(value) for value in values]
+    """Format values as a card in free format, separated by commas."""
+    texts = [_format_free(value) for value in values]
     if len(texts) == 1:
         texts.append("")  # a comma makes the format free
     return (", " if all(texts) else ",").join(texts)
 
 
-def _free(value: Value) -> str:
-    """Return a value's text in free format; NumPy's numbers as Python's."""
+def _format_free(value: Value) -> str:
+    """Format a value in free format; NumPy's numbers look like Python's."""
     if not isinstance(value, float):
         return str(value)
     if not math.isfinite(value):
@@ -285,7 +287,7 @@ class Record:
     )
     fields: ClassVar[Fields]
     packed: ClassVar[slice | None] = None  # values of the card that one attribute holds as a tuple
-    optional: ClassVar[int] = 0  # number of last values that are not written where they are 0
+    optional: ClassVar[int] = 0  # number of trailing values that are left out where they are 0
 
     @classmethod
     def from_row(cls, values: Sequence[Value], source: CardSource | None) -> Self:
@@ -311,7 +313,7 @@ class Record:
         return row
 
     def to_card(self, fields: Fields | None = None) -> str:
-        """Return the text of the card; `fields` where they depend on the control card."""
+        """Return the text of the card; pass `fields` if they depend on the control card."""
         written = fields or self.fields
         values = self.row()[: len(written)]
         least = len(written) - self.optional
@@ -320,7 +322,7 @@ class Record:
         return write_card(written[: len(values)], values)
 
     def place(self, name: str = "") -> CardPlace | None:
-        """Return the position of the field `name` in the deck; without a name, of the card."""
+        """Return the position of the field `name`, or of the entire card without a name."""
         return self.source.place(name) if self.source else None
 
 

@@ -1,4 +1,4 @@
-"""Named plies, and named contacts: measured constants of EXPE for an indenter on a laminate.
+"""Named plies and named contacts. A contact has measured constants of EXPE.
 
 The report gives k for two indenters and two groups of specimens (Table 3.1), alpha_p and s_p for
 all specimens (section 3.2.2 and the input listing), and q for each indenter.
@@ -31,14 +31,14 @@ from fecm.deck.units import (
     units_of,
 )
 
-# Units of the test standards, and the constants of steel in them.
+# Units of the test standards, and the elastic constants of steel in these units.
 STANDARD = "mm-N-s"
 STEEL_MODULUS = 207e3
 STEEL_POISSON = 0.3
 
 
 def system_of(deck: Deck) -> str | None:
-    """Return the system of units of a deck; None if it names none, or unknown units."""
+    """Return the system of units of a deck; None if it has no units or unknown ones."""
     try:
         return system_named("-".join(unit_names(deck).values()))
     except UnitsError:
@@ -72,10 +72,10 @@ TEXTS = ("source", "assumed", "units")
 SLOPES = ("p_plus", "p_minus")  # of Puck's criterion
 EXPANSIONS = Expansion.THERMAL
 STRENGTHS = ("XT", "XC", "YT", "YC", "S12")
-SYSTEM_OF_FILES = "mm-N-s"  # system of units of a file that names none
-# Smallest E1 of a ply, and largest density of a core, in Pa and kg/m^3.
+SYSTEM_OF_FILES = "mm-N-s"  # system of units of a file without `units`
+# Smallest E1 of a ply in Pa, and largest density of a core in kg/m^3.
 SOFT, LIGHT = 1e9, 800.0
-NU23 = 0.4  # of a ply whose nu23 is not known
+NU23 = 0.4  # default of nu23
 
 
 class NamedPly(NamedTuple):
@@ -86,13 +86,13 @@ class NamedPly(NamedTuple):
     name : str
         Name of the ply.
     values : dict of str to float
-        The constants that are known, as in `fecm materials`, in the units of `system`.
+        The known constants, named as in `fecm materials`, in the units of `system`.
     system : str
         Units of length, force and time, as in ``"mm-N-s"``.
     source : str
         Publication of the constants.
     assumed : str
-        What the source does not give.
+        Assumptions about constants that the source does not give.
     """
 
     name: str
@@ -112,7 +112,7 @@ class NamedPly(NamedTuple):
         return self.values.get("nu23", NU23)
 
     def value(self, key: str, system: str) -> float | None:
-        """Return a constant of `values` in a system of units; None if it is not known.
+        """Return a constant in a system of units; None if it is not known.
 
         Examples
         --------
@@ -125,14 +125,14 @@ class NamedPly(NamedTuple):
         return convert(value, dimension, self.system, system)
 
     def constants(self, system: str) -> dict[str, float]:
-        """Return the known constants, and G13 and G23, in a system of units."""
+        """Return the known constants in a system of units; G13 and G23 are always there."""
         ply = self.converted(system)
         stated = {key: self.value(key, system) for key in self.values}
         all_constants = {"G13": ply.g13, "G23": ply.g23, **stated}
         return {key: value for key, value in all_constants.items() if value is not None}
 
     def to_dict(self, system: str) -> dict[str, object]:
-        """Return name, units, all constants by :data:`KEYS`, and source; None where not known."""
+        """Return name, units, a value or None for each of the :data:`KEYS`, and source."""
         constants = self.constants(system)
         return {
             "name": self.name,
@@ -143,9 +143,9 @@ class NamedPly(NamedTuple):
         }
 
     def converted(self, system: str) -> Ply:
-        """Return elastic constants in a system of units; unchanged in their own.
+        """Return the elastic constants in a system of units.
 
-        Where they are not known, G13 is G12 and G23 is E2/(2 (1 + nu23)).
+        An unknown G13 is G12; an unknown G23 is E2/(2 (1 + nu23)).
         """
         density, nu12, e1, e2, g12 = (self.value(key, system) or 0.0 for key in ELASTIC)
         g13 = self.value("G13", system) or g12
@@ -153,9 +153,9 @@ class NamedPly(NamedTuple):
         return Ply(density, nu12, e1, e2, g12, g13, g23)
 
     def allowables(self, system: str) -> Allowables | None:
-        """Return the strengths in a system of units; None if one is not known.
+        """Return the strengths in a system of units; None if one of :data:`STRENGTHS` is missing.
 
-        :data:`STRENGTHS` has their names.
+        An unknown S13 is S12; an unknown S23 is S13.
         """
         xt, xc, yt, yc, s12 = (self.value(key, system) for key in STRENGTHS)
         if xt is None or xc is None or yt is None or yc is None or s12 is None:
@@ -185,14 +185,14 @@ class NamedPly(NamedTuple):
 def read_plies(text: str) -> dict[str, NamedPly]:
     """Read the plies of a TOML file, by name.
 
-    Each table is a ply: numbers by :data:`KEYS`, and the texts `source` and `assumed`. `units`, of
-    the file or of a ply, is a system of units, by default mm-N-s. Raises ValueError if a name,
-    value or unit is implausible, or the file is not TOML.
+    Each table is a ply with numbers, named as in :data:`KEYS`, and the texts `source` and
+    `assumed`. A file or a ply may give its system of units as `units`; the default is mm-N-s.
+    Raises ValueError if a name is unknown, a value or unit is implausible, or the file is not TOML.
     """
     try:
         tables = parsed_toml(text)
     except ValueError:
-        if form := _other_form(text):
+        if form := _detect_format(text):
             raise ValueError(
                 f"this is {form}, not TOML; begin each ply with a line such as "
                 '["its name"], and write E1 = 140e3 and so on below'
@@ -205,40 +205,40 @@ def read_plies(text: str) -> dict[str, NamedPly]:
             raise ValueError(message)
     if not tables:
         raise ValueError('no plies; begin each with ["its name"]')
-    return {name: _ply(name, {"units": units, **table}) for name, table in tables.items()}
+    return {name: _parse_ply(name, {"units": units, **table}) for name, table in tables.items()}
 
 
-def _other_form(text: str) -> str:
+def _detect_format(text: str) -> str:
     """Name the format of a text that is not TOML; empty if it looks like TOML with a mistake."""
-    import json  # 2 ms, only after a mistake
+    import json  # takes 2 ms; only a mistake needs it
 
-    begin = text.lstrip()[:1]
-    if begin in ("<", "{"):
-        return {"<": "XML", "{": "JSON"}[begin]
+    first_letter = text.lstrip()[:1]
+    if first_letter in ("<", "{"):
+        return {"<": "XML", "{": "JSON"}[first_letter]
     try:
         json.loads(text)
     except ValueError:
         first = next((line for line in lines_of(text) if line.strip() and line[0] != "#"), "")
-        is_table = "=" not in first and begin != "[" and re.search("[,;\t]", first)
+        is_table = "=" not in first and first_letter != "[" and re.search("[,;\t]", first)
         return "a table (CSV)" if is_table else ""
     return "JSON"
 
 
-def _doubt(ply: NamedPly) -> None:
-    """Warn if the modulus along the fibres looks like GPa in a system with another unit."""
+def _warn_if_soft(ply: NamedPly) -> None:
+    """Warn if E1 is so small that it may be in GPa instead of the unit of the system."""
     units = units_of(ply.system)
-    factors = in_si(MODULUS, units), in_si(DENSITY, units)
-    if factors[0] is None or factors[1] is None:
+    modulus_unit, density_unit = in_si(MODULUS, units), in_si(DENSITY, units)
+    if modulus_unit is None or density_unit is None:
         return
-    e1, is_core = ply.values["E1"], ply.values["density"] * factors[1] < LIGHT
-    if e1 * factors[0] < SOFT and not is_core:
+    e1, is_core = ply.values["E1"], ply.values["density"] * density_unit < LIGHT
+    if e1 * modulus_unit < SOFT and not is_core:
         warn(
-            f"[{ply.name}] E1 {e1:g} is {e1 * factors[0] / 1e9:.3g} GPa in {ply.system}, too soft "
-            'for a ply; if the moduli are in GPa, write units = "mm-kN-ms", or multiply them'
+            f"[{ply.name}] E1 {e1:g} is {e1 * modulus_unit / 1e9:.3g} GPa in {ply.system}, too "
+            'soft for a ply; if the moduli are in GPa, write units = "mm-kN-ms", or multiply them'
         )
 
 
-def _ply(name: str, table: Mapping[str, object]) -> NamedPly:
+def _parse_ply(name: str, table: Mapping[str, object]) -> NamedPly:
     numbers: dict[str, float] = {}
     texts: dict[str, str] = {}
     for key, value in table.items():
@@ -247,7 +247,7 @@ def _ply(name: str, table: Mapping[str, object]) -> NamedPly:
                 raise ValueError(f"[{name}] {key}: {value!r} is not a text in quotes")
             texts[key] = value
         elif key in KEYS:
-            numbers[key] = _constant(name, key, value)
+            numbers[key] = _check_constant(name, key, value)
         else:
             message = f"[{name}] {key} is unknown; the keys are {', '.join((*KEYS, *TEXTS))}"
             raise ValueError(message)
@@ -264,12 +264,12 @@ def _ply(name: str, table: Mapping[str, object]) -> NamedPly:
         )
     values = {key: numbers[key] for key in KEYS if key in numbers}
     ply = NamedPly(name, values, system, texts.get("source", ""), texts.get("assumed", ""))
-    _doubt(ply)
+    _warn_if_soft(ply)
     return ply
 
 
-def _constant(name: str, key: str, value: object) -> float:
-    """Return a number of a ply's table; ValueError if it is implausible."""
+def _check_constant(name: str, key: str, value: object) -> float:
+    """Return a constant of a ply as a float; raise ValueError if it is implausible."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise ValueError(f"[{name}] {key}: {value!r} is not a number")
     if not math.isfinite(value) or (KEYS[key] and value <= 0.0):
@@ -282,32 +282,33 @@ def _constant(name: str, key: str, value: object) -> float:
     return float(value)
 
 
-def _text(file: str) -> str:
+def _read_resource(file: str) -> str:
     return (resources.files("fecm.deck") / file).read_text("utf-8")
 
 
-MATERIALS = read_plies(_text("materials.toml"))
+MATERIALS = read_plies(_read_resource("materials.toml"))
 
 
 def named_ply(ply: Ply, system: str | None) -> NamedPly | None:
-    """Return the named ply with these constants in a system of units, or None."""
+    """Return the named ply with these constants in a system of units; None if there is no such."""
     return None if system is None else _by_constants(system).get(ply)
 
 
 @cache
 def _by_constants(system: str) -> dict[Ply, NamedPly]:
-    """Return named plies by their constants; the first of equal plies."""
+    """Return the named plies by their constants; the first name of equal plies wins."""
     return {named.converted(system): named for named in reversed(MATERIALS.values())}
 
 
 def material_names(deck: Deck) -> dict[int, str]:
     """Return the names of the materials of a deck, by number.
 
-    A material has the name of the named ply with the same constants.
+    A material takes the name of the named ply with the same constants; otherwise it is
+    ``material N``.
     """
     system = system_of(deck)
     named = {number: named_ply(ply, system) for number, ply in deck.plies.items()}
-    return {n: f"material {n}" if one is None else one.name for n, one in named.items()}
+    return {n: f"material {n}" if ply is None else ply.name for n, ply in named.items()}
 
 
 def materials(file: str | Path | None = None) -> dict[str, NamedPly]:
@@ -316,7 +317,7 @@ def materials(file: str | Path | None = None) -> dict[str, NamedPly]:
     Parameters
     ----------
     file : str or Path, optional
-        TOML file of own plies; the catalogue of the package by default.
+        TOML file of plies; the catalogue of the package by default.
 
     Returns
     -------
@@ -326,7 +327,7 @@ def materials(file: str | Path | None = None) -> dict[str, NamedPly]:
     Raises
     ------
     ValueError
-        If a name, a value or a unit of the file cannot be meant, or it is not TOML.
+        If a name is unknown, a value or unit is implausible, or the file is not TOML.
     OSError
         If the file can't be read.
 
@@ -342,7 +343,7 @@ def materials(file: str | Path | None = None) -> dict[str, NamedPly]:
 
 
 SYSTEM = "in-lbf-s"  # system of units of the report
-# Constants of the report that are not the indenter's, in its units.
+# Constants of the report that do not depend on the indenter, in the units of the report.
 ALPHA_P = 6.564e-4  # critical indentation
 S_P = 0.094  # slope of the permanent over the maximum indentation
 ALPHA_CR = 3.16e-3  # critical indentation of equation 3-7, from reference 14
@@ -373,7 +374,7 @@ class NamedContact(NamedTuple):
 
 CONTACTS = {
     name: NamedContact(name, Indentation(**table["law"]), table["source"])
-    for name, table in parsed_toml(_text("contacts.toml")).items()
+    for name, table in parsed_toml(_read_resource("contacts.toml")).items()
 }
 
 

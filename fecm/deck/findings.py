@@ -1,4 +1,4 @@
-"""Findings: errors, warnings and notes of a deck, with place and remedy.
+"""Findings: errors, warnings and notes about a deck, each with its place and a remedy.
 
 A finding has a stable code whose first letter is its severity: ``E`` for an error, ``W`` for a
 warning, ``N`` for a note.  Lines and columns are counted from 1.
@@ -14,10 +14,9 @@ from typing import Annotated, Literal, NamedTuple, TypedDict
 
 from fecm._errors import FecmError
 
-MOST = 1000  # largest number of errors, and of warnings, that are kept
-# Characters of a card, and of a message, that are shown.
-WIDEST = 200
-LONGEST = 600
+MOST = 1000  # largest number of errors to keep; the same limit holds for warnings
+WIDEST = 200  # characters of a card that are shown
+LONGEST = 600  # characters of a message that are shown
 
 
 class Severity(StrEnum):
@@ -48,7 +47,7 @@ SEVERITIES = {"E": Severity.ERROR, "W": Severity.WARNING, "N": Severity.NOTE}  #
 
 
 class CardPlace(NamedTuple):
-    """Place of a value: line, first and last column, and the card's text."""
+    """Place of a value: line, first and last column, and the text of the card."""
 
     line: int
     first: int
@@ -79,11 +78,11 @@ class Finding(NamedTuple):
 
     @property
     def severity(self) -> Severity:
-        """Severity that the first letter of the code means."""
+        """Severity, given by the first letter of the code."""
         return SEVERITIES[self.code[0]]
 
     def to_dict(self, source: str) -> FindingJson:
-        """Return the finding as plain values, for JSON; `source` is the name of the deck's file."""
+        """Return the finding as plain values for JSON; `source` is the name of the deck's file."""
         place = self.place
         return {
             "kind": "finding",
@@ -118,30 +117,30 @@ class Finding(NamedTuple):
 def _marked_card(place: CardPlace) -> list[str]:
     """Return the card with its line number, and a caret under the field."""
     card = place.text.rstrip()
-    begin, last = 0, place.last
-    if len(card) > WIDEST:  # the part around the place
-        begin = max(0, place.first - 1 - WIDEST // 2)
-        card = card[begin : begin + WIDEST]
-        last = min(last, begin + len(card))
+    start, last = 0, place.last
+    if len(card) > WIDEST:  # show the part around the place
+        start = max(0, place.first - 1 - WIDEST // 2)
+        card = card[start : start + WIDEST]
+        last = min(last, start + len(card))
     number = str(place.line)
     margin = " " * len(number)
-    mark = " " * (place.first - begin - 1) + "^" * max(1, last - place.first + 1)
+    mark = " " * (place.first - start - 1) + "^" * max(1, last - place.first + 1)
     return [f" {number} | {card}", f" {margin} | {mark} {place.field}".rstrip()]
 
 
-def _shortened(text: str) -> str:
-    """Return a long text without its middle."""
+def _shorten(text: str) -> str:
+    """Cut the middle out of a long text."""
     return text if len(text) <= LONGEST else f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
 
 
 class Findings:
-    """A list of findings that grows while a deck is read and checked."""
+    """List of findings that grows while a deck is read and checked."""
 
     def __init__(self) -> None:
         self._all: list[Finding] = []
-        self.counts: Counter[str] = Counter()  # findings by code, including those that are not kept
+        self.counts: Counter[str] = Counter()  # number of findings by code, kept or not
         self.error_count: int = 0
-        self.closed: bool = False  # whether no more findings are kept, so that reading can stop
+        self.closed: bool = False  # whether the list is full, so that reading can stop
 
     def add(self, code: str, message: str, place: CardPlace | None = None, hint: str = "") -> None:
         """Add a finding. After :data:`MOST` errors, report that there are more, and close."""
@@ -150,7 +149,7 @@ class Findings:
         self.error_count += is_error
         if self.closed or (not is_error and len(self) - self.error_count > MOST):
             return
-        self._all.append(Finding(code, _shortened(message), place, _shortened(hint)))
+        self._all.append(Finding(code, _shorten(message), place, _shorten(hint)))
         if self.error_count == MOST:
             self.closed = True
             message = f"There are {MOST} errors or more; the rest of the file is not checked."
@@ -181,7 +180,7 @@ class Findings:
 
 
 class DeckError(FecmError, ValueError):
-    """A deck can't be used; carries every finding, not just the first.
+    """Error of a deck that can't be used, with every finding about it.
 
     Attributes
     ----------

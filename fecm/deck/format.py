@@ -1,7 +1,7 @@
 """Formatter of decks: aligned columns and a ruler above each kind of card.
 
-Comments and blank cards stay where they are; the model does not change. Rulers start with ``!:``
-and are replaced each time.
+Comments and blank cards stay in their places. The model does not change. Rulers start with ``!:``;
+each run replaces them.
 """
 
 from __future__ import annotations
@@ -16,13 +16,14 @@ from fecm.deck.model import SEGMENTS, STOP
 from fecm.deck.reader import Reader
 
 COMMENT = "!"
-RULER = "!:"  # first letters of a comment that shows where the fields are
+RULER = "!:"  # start of a comment that shows the columns of the fields
 
 
 def format_deck(text: str, source: str = "<text>") -> str:
-    """Align a deck's columns; `source` is its name in messages.
+    """Align the columns of a deck; `source` is its name in messages.
 
-    A byte order mark stays, and line ends follow the first line. Raises DeckError.
+    A byte order mark stays. All lines end as the first one. Raises DeckError if the deck can't be
+    read.
     """
     reader = Reader(text, keeps_values=True)
     reader.problems()
@@ -30,7 +31,7 @@ def format_deck(text: str, source: str = "<text>") -> str:
         raise DeckError(list(reader.findings), source)
     lines = reader.cards.lines
     written: list[str] = []
-    above: Fields | None = None  # fields of the card before, which need no ruler of their own
+    above: Fields | None = None  # fields of the card above; the same fields need no second ruler
     for number, line in enumerate(lines, start=1):
         if line.startswith(RULER):
             continue
@@ -40,12 +41,12 @@ def format_deck(text: str, source: str = "<text>") -> str:
         card = Card(number, line)
         if number in reader.cards.read:
             fields, values = reader.cards.read[number]
-            aligned = _aligned(card, fields, values)
+            aligned = _align(card, fields, values)
             if fields != above and "," not in aligned and fields[0] != Macro.fields[0]:
                 written.append(ruler(fields))
             above = fields
         else:
-            aligned = _keyword(card)
+            aligned = _capitalize_keyword(card)
             above = None
         written.append(_with_comment(aligned, line))
         if card.keyword == STOP:
@@ -56,14 +57,14 @@ def format_deck(text: str, source: str = "<text>") -> str:
     return mark + end.join([*written, ""])
 
 
-def _keyword(card: Card) -> str:
-    """Return the text of a card without fields; a known keyword gets capitals."""
+def _capitalize_keyword(card: Card) -> str:
+    """Return the text of a card without fields, in capitals if it is a known keyword."""
     is_known = card.is_keyword and (card.keyword in SEGMENTS or card.keyword == STOP)
     return card.keyword if is_known and len(card.words) == 1 else card.data
 
 
 def ruler(fields: Fields) -> str:
-    """Return a comment with the fields' names over their columns."""
+    """Return a comment with the labels of the fields above their columns."""
     line = RULER
     for field in fields:
         room = field.last - len(line)
@@ -71,12 +72,12 @@ def ruler(fields: Fields) -> str:
     return line.rstrip()
 
 
-def _aligned(card: Card, fields: Fields, values: Sequence[Value]) -> str:
-    """Return a card's values in their columns, without trailing zeros that it left blank."""
+def _align(card: Card, fields: Fields, values: Sequence[Value]) -> str:
+    """Return the values of a card in their columns; trailing fields that are blank stay blank."""
     texts = [text for _, text in card.cut(fields)][: len(fields)]
     count = max([n for n, text in enumerate(texts, start=1) if text.strip()], default=0)
     kept: list[Value] = list(values[:count])
-    if fields is Macro.fields or fields is Macro.short_fields:  # comparing takes far longer
+    if fields is Macro.fields or fields is Macro.short_fields:  # `==` takes far longer
         kept[:1] = [capitals(str(v)) for v in kept[:1]]
         if fields is Macro.short_fields:
             kept[1:1] = [BLANK]

@@ -1,4 +1,4 @@
-"""Grids of 9-node elements over a rectangle, as lines of nodes and the cards that generate them."""
+"""Grids of 9-node elements on a rectangle: their lines of nodes, and the cards that define them."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ from fecm.deck.mesh_cards import (
     NodeValues,
 )
 
-# Significant digits of coordinates, relative to the plate's size, so that they fit their columns.
+# Digits of coordinates, relative to the size of the plate: they must fit their columns.
 DIGITS = 6
-LEAST_BESIDE = 2  # least number of elements between a window and an edge
+LEAST_BESIDE = 2  # smallest number of elements between a window and an edge
 
 
 class EdgeCodes(NamedTuple):
@@ -38,7 +38,7 @@ class EdgeCodes(NamedTuple):
         return self.along_y if edge in ("left", "right") else self.along_x
 
 
-# Codes of w, theta_x and theta_y.  The rotation along an edge is theta_x along x, theta_y along y.
+# Codes of w, theta_x and theta_y. A simple support holds theta_x along x, and theta_y along y.
 W_HELD = (1, 0, 0)
 SUPPORTS = {
     "free": EdgeCodes(along_x=(0, 0, 0), along_y=(0, 0, 0)),
@@ -57,24 +57,26 @@ EDGES = ("left", "right", "bottom", "top")
 
 
 def held_in_plane(support: str, in_plane: str) -> str:
-    """Return what a support does to u and v, a key of :data:`IN_PLANE`.
+    """Return how a support restrains u and v, as a key of :data:`IN_PLANE`.
 
-    ``"pinned"`` holds both. So does ``"clamped"`` where other supports hold the tangential one.
+    ``"pinned"`` holds both. ``"clamped"`` also does, if the other supports hold the tangential
+    displacement.
     """
     holds_both = support == "pinned" or (support == "clamped" and in_plane == "tangential")
     return "held" if holds_both else in_plane
 
 
 class GridSection(NamedTuple):
-    """A run of equally long elements in one direction."""
+    """Row of equally long elements in one direction."""
 
-    start: float  # coordinates of its ends (length)
+    # Coordinates of both ends (length).
+    start: float
     end: float
     elements: int  # number of elements
 
 
 def uniform_section(length: float, elements: int) -> list[GridSection]:
-    """Return one section of equal elements."""
+    """Return a single section of equal elements."""
     return [GridSection(0.0, length, elements)]
 
 
@@ -97,22 +99,22 @@ def listed_sections(text: str) -> list[GridSection]:
 
 
 def graded(length: float, elements: int, centre: float, ratio: float) -> list[GridSection]:
-    """Return elements that shrink towards `centre`, geometrically on each side.
+    """Return sections of one element each, geometrically smaller towards `centre`.
 
-    `centre` is a corner of elements. `ratio` is the ratio of the largest to the smallest element of
-    a side.
+    Two elements meet at `centre`. `ratio` is the length of the largest element of a side over the
+    length of the smallest.
     """
     if not 0.0 < centre < length or elements < 2:
         side = _series(length, elements, ratio)
         steps = side if centre <= 0.0 else side[::-1]
     else:
 
-        def unlike(n: int) -> float:
-            """Return the difference of the smallest elements of both sides, n on the left."""
+        def mismatch(n: int) -> float:
+            """Compare the smallest elements of both sides if n elements are on the left."""
             right = _series(length - centre, elements - n, ratio)
             return abs(math.log(_series(centre, n, ratio)[0] / right[0]))
 
-        on_left = min(range(1, elements), key=unlike)
+        on_left = min(range(1, elements), key=mismatch)
         steps = _series(centre, on_left, ratio)[::-1]
         steps += _series(length - centre, elements - on_left, ratio)
     inner = [round_to(total, length) for total in accumulate(steps[:-1])]
@@ -120,9 +122,9 @@ def graded(length: float, elements: int, centre: float, ratio: float) -> list[Gr
 
 
 def longest_at(sections: Sequence[GridSection], place: float) -> float:
-    """Return the length of the longest element at a place; 0 beside the sections."""
-    here = (s for s in sections if s.start <= place <= s.end)
-    return max(((s.end - s.start) / s.elements for s in here), default=0.0)
+    """Return the length of the longest element at a place; 0 outside the sections."""
+    touching = (s for s in sections if s.start <= place <= s.end)
+    return max(((s.end - s.start) / s.elements for s in touching), default=0.0)
 
 
 def refined_sections(
@@ -130,11 +132,12 @@ def refined_sections(
 ) -> list[GridSection]:
     """Return graded elements that are at most `side` long at `centre`.
 
-    There are `elements` of them, or as many more as needed. The ratio of the largest to the
-    smallest is at least the ratio of `elements` equal ones to `side`.
+    The result has `elements` elements, or more if it needs them. `ratio` is raised, if necessary,
+    to the length of `elements` equal elements over `side`.
     """
     ratio = max(ratio, length / elements / side)
-    # Geometric series that end at equal ones take R ln R/(R - 1) < 1 + ln R times as many.
+    # Compared with equal elements of the largest length, a geometric series of ratio R needs
+    # R ln R/(R - 1) < 1 + ln R times as many.
     counts = range(elements, int(elements * (1.0 + math.log(ratio))) + 8)
 
     def fits(count: int) -> bool:
@@ -144,7 +147,7 @@ def refined_sections(
 
 
 def framed(inner: Sequence[GridSection], length: float) -> list[GridSection]:
-    """Return elements of a centred window, with lines of nodes at its edges, and beside it."""
+    """Extend the sections of a centred window to the edges of a plate of a given length."""
     start = (length - inner[-1].end) / 2.0
     ends = [round_to(start + section.end, length) for section in inner]
     starts = [round_to(start, length), *ends]
@@ -155,19 +158,19 @@ def framed(inner: Sequence[GridSection], length: float) -> list[GridSection]:
 
 
 def _series(length: float, count: int, ratio: float) -> list[float]:
-    """Return sizes that grow geometrically by `ratio` in all, and add up to `length`."""
+    """Return sizes that add up to `length`; the last is `ratio` times the first."""
     growth = ratio ** (1.0 / (count - 1)) if count > 1 else 1.0
     sizes = [growth**n for n in range(count)]
     return [length * size / sum(sizes) for size in sizes]
 
 
 def round_to(value: float, scale: float) -> float:
-    """Return a coordinate with :data:`DIGITS` digits of the plate's size."""
+    """Round a coordinate to :data:`DIGITS` digits of the plate's size, `scale`."""
     return round(value, DIGITS - math.floor(math.log10(scale)))
 
 
 def grid_lines(sections: Sequence[GridSection]) -> list[float]:
-    """Return the coordinates of the lines of nodes: two per element, and the last."""
+    """Return the coordinates of the lines of nodes: two for each element, and the last one."""
     lines: list[float] = []
     for section in sections:
         count = 2 * section.elements
@@ -178,7 +181,7 @@ def grid_lines(sections: Sequence[GridSection]) -> list[float]:
 
 @dataclass(frozen=True)
 class ElementGrid:
-    """A grid of 9-node elements; node numbers run along x first."""
+    """Grid of 9-node elements; node numbers run along x first."""
 
     # Sections along x and along y.
     columns: list[GridSection]
@@ -187,12 +190,12 @@ class ElementGrid:
 
     @property
     def across(self) -> int:
-        """Nodes along x."""
+        """Number of nodes along x."""
         return 2 * sum(section.elements for section in self.columns) + 1
 
     @property
     def up(self) -> int:
-        """Nodes along y."""
+        """Number of nodes along y."""
         return 2 * sum(section.elements for section in self.rows) + 1
 
     @property
@@ -211,14 +214,14 @@ class ElementGrid:
         return (0.0, 0.0), (self.columns[-1].end, self.rows[-1].end)
 
     def nearest(self, x: float, y: float) -> tuple[int, float, float]:
-        """Return number and place of the node nearest to a point."""
+        """Return the number, x and y of the node nearest to a point."""
         xs, ys = grid_lines(self.columns), grid_lines(self.rows)
         i = min(range(len(xs)), key=lambda k: abs(xs[k] - x))
         j = min(range(len(ys)), key=lambda k: abs(ys[k] - y))
         return 1 + i + j * self.across, xs[i], ys[j]
 
     def coordinates(self) -> Coordinates:
-        """Return COOR cards: one for the start of every section in every line of nodes."""
+        """Return COOR cards: one for the start of each section in each line of nodes."""
         records: list[NodeValues] = []
         for line, y in enumerate(grid_lines(self.rows)):
             node = 1 + line * self.across
@@ -230,7 +233,7 @@ class ElementGrid:
         return Coordinates(tuple(records))
 
     def element_cards(self) -> Elements:
-        """Return ELEM cards: the first element of every row."""
+        """Return ELEM cards: one for the first element of each row."""
         a = self.across
         records: list[ElementNodes] = []
         for row in range(self.up // 2):
@@ -249,9 +252,10 @@ class ElementGrid:
         *,
         in_plane: str = "held",
     ) -> Boundary | None:
-        """Return BOUN cards of the supports of the edges; w is held along the edges of a window.
+        """Return BOUN cards for the supports of the edges.
 
-        `in_plane`, a key of :data:`IN_PLANE`, is what these supports do to u and v.
+        `in_plane`, a key of :data:`IN_PLANE`, tells how the supports restrain u and v. See
+        :meth:`boundary` for `everywhere` and `window`.
         """
         codes: dict[str, tuple[int, ...]] = {}
         for edge, support in supports.items():
@@ -268,11 +272,11 @@ class ElementGrid:
         *,
         in_plane: str = "held",
     ) -> Boundary | None:
-        """Return BOUN cards; None where nothing is restrained.
+        """Return BOUN cards; None if nothing is restrained.
 
-        The codes are given for every node, and for the nodes of each of the :data:`EDGES`. Along
-        the edges of a window in the middle of the plate, given by its sides, w is held, and u and v
-        by `in_plane`.
+        `everywhere` has the codes of all nodes, and `edges` further codes of the nodes on each of
+        the :data:`EDGES`. `window` has the sides of a window in the middle of the plate: its edges
+        hold w, and u and v as `in_plane` tells.
         """
         codes = np.tile(np.array(everywhere), (self.up, self.across, 1))
         parts = {"left": codes[:, 0], "right": codes[:, -1], "bottom": codes[0], "top": codes[-1]}
@@ -291,7 +295,7 @@ class ElementGrid:
 
 
 def _nearest_lines(sections: Sequence[GridSection], side: float) -> tuple[int, int]:
-    """Return the lines of nodes nearest to both ends of a side in the middle."""
+    """Return the two lines of nodes nearest to the edges of a centred window of a given side."""
     places = np.array(grid_lines(sections))
     ends = ((sections[-1].end + distance) / 2.0 for distance in (-side, side))
     first, last = (int(np.abs(places - end).argmin()) for end in ends)
@@ -299,14 +303,14 @@ def _nearest_lines(sections: Sequence[GridSection], side: float) -> tuple[int, i
 
 
 def boundary_cards(codes: NDArray[np.int_]) -> Boundary | None:
-    """Return BOUN cards of restraint codes (numnp, ndf); runs of equal codes are generated."""
+    """Return BOUN cards for restraint codes (numnp, ndf); a run of equal codes takes two cards."""
     starts = [0, *(np.flatnonzero((np.diff(codes, axis=0) != 0).any(axis=1)) + 1).tolist()]
     records: list[NodeCodes] = []
     for start, end in pairwise([*starts, len(codes)]):
         code = tuple(codes[start].tolist())
         if not any(code):
             continue
-        if end - start > 1:  # a negative code carries on up to the next card
+        if end - start > 1:  # a negative code extends to the next card
             records.append(NodeCodes(start + 1, 1, tuple(-c for c in code)))
         records.append(NodeCodes(end, 0, code))
     return Boundary(tuple(records)) if records else None

@@ -31,10 +31,10 @@ class Indentation(Segment, keyword="EXPE"):
     """
 
     k: float  # contact coefficient, force/length^1.5
-    # Critical indentation (length), beyond which an indentation remains; alpha_cr with ACR.
+    # Critical indentation (length): beyond it an indentation remains. It is alpha_cr with ACR.
     alpha_p: float
     s_p: float  # slope of the permanent over the maximum indentation; 0 with ACR
-    q: float  # power of the unloading curve; 5/2 or 0 (the same) with ACR
+    q: float  # power of the unloading curve; with ACR 5/2, or 0, which means the same
     word: str = ""  # the keyword card's second word: ``""`` for equation 3-8, ``"ACR"`` for 3-7
 
     ACR: ClassVar[str] = "ACR"
@@ -57,7 +57,7 @@ class Indentation(Segment, keyword="EXPE"):
 
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self | None:
-        """Read the card of the law that the keyword card names."""
+        """Read the constants of the law that the keyword card names."""
         word = " ".join(head.words[1:]).upper()
         if word not in cls.fields_of:
             message = f"`{word}` after EXPE is not read: the law is equation 3-8."
@@ -86,7 +86,7 @@ class Indentation(Segment, keyword="EXPE"):
 
 @dataclass(frozen=True)
 class RodDiameter(Record):
-    """PROJ card: (2I5,F10.0); an element's diameter (length), and the step to generated ones."""
+    """PROJ card: (2I5,F10.0); diameter of an element (length), and the step between elements."""
 
     element: int
     increment: int
@@ -100,13 +100,13 @@ class Projectile(Segment, keyword="PROJ"):
     """PROJ: (2I5,3F10.0) and, for a rod, its diameters; the projectile (not in the report)."""
 
     elements: int  # number of the rod's elements; 0 for a rigid mass
-    # Node at which its force is measured, from 1 at the impacted end; 0 for the middle.
+    # Node of the rod where the force is measured: 1 is the impacted end, 0 stands for the middle.
     transducer: int
-    size: float  # length of the rod; the mass of a projectile without elements
+    size: float  # length of the rod, or mass of a rigid projectile
     # Young's modulus, and mass per volume, of a rod.
     modulus: float = 0.0
     density: float = 0.0
-    # From the impacted end on; those between two cards are interpolated.
+    # From the impacted end on. Diameters between two cards are interpolated.
     diameters: tuple[RodDiameter, ...] = ()
 
     optional: ClassVar[int] = 2
@@ -140,9 +140,9 @@ class Patch(Segment, keyword="PATC"):
     """PATC: (A4,6X,4F10.0); the contact force acts on a circle (not in the report's program)."""
 
     shape: str = "DISC"  # ``"DISC"``, a uniform pressure, or ``"HERT"``, Hertz's
-    # Length; None takes :data:`~fecm.mechanics.points.RADIUS_PER_THICKNESS` times the thickness.
+    # Length. None is :data:`~fecm.mechanics.points.RADIUS_PER_THICKNESS` times the thickness.
     radius: float | None = None
-    # Centre, length; None takes the node of ROD.
+    # Centre, length. None is the node of ROD.
     x: float | None = None
     y: float | None = None
     load: float = 0.0  # static force on the patch, scaled by PROP

@@ -1,7 +1,6 @@
-"""Macro program: cards, words, loops, order of execution, and the rows that it stores.
+"""Macro program: its cards, words and loops, the order of execution, and the rows that it stores.
 
-A pass is the number of times that the innermost loop has been entered at its head, from 1. Outside
-any loop it is 1. LOOP 0 runs once.
+Passes of the innermost loop are counted from 1. Outside any loop the pass is 1. LOOP 0 runs once.
 """
 
 from __future__ import annotations
@@ -20,11 +19,11 @@ from fecm.deck.findings import Findings
 
 NESTING = 64  # deepest nesting of loops
 MOST_MACROS = 10**9  # a program of more macros would run for days
-EXACT = 2**53  # floats represent every integer below this number
+EXACT = 2**53  # a float can represent every integer below this number
 
 
 def without_points(values: Sequence[Value]) -> list[Value]:
-    """Return the values of a card, whole floats as integers, which have no decimal point."""
+    """Return the values of a card; whole floats become integers, without a decimal point."""
     return [
         int(v) if isinstance(v, float) and v.is_integer() and abs(v) < EXACT else v for v in values
     ]
@@ -36,20 +35,20 @@ class Macro(Record):
 
     word: str  # name, in capitals
     option: str = ""  # second word, in capitals; often blank
-    # The two numbers; 0 where blank.
+    # The two numbers; 0 if blank.
     value: float = 0.0
     second: float = 0.0
 
     fields: ClassVar[Fields] = layout(
         "A4 macro", "X1", "A4 second word", "X1", "F5 value", "F5 second value"
     )
-    # With commas the second word may be left out where the value follows: LOOP,794.
+    # With commas the card may leave out the second word before the value: LOOP,794.
     short_fields: ClassVar[Fields] = (fields[0], *fields[2:])
 
     optional: ClassVar[int] = 3
 
     def row(self) -> list[Value]:
-        """Return the values in the card's order; integers have no decimal point."""
+        """Return the values in the card's order, whole numbers as integers."""
         return without_points(super().row())
 
 
@@ -90,8 +89,8 @@ class MacroNumber(Enum):
     """Meaning of the number of a macro."""
 
     COUNT = auto()  # an integer, at least 0
-    EVERY = auto()  # the same, 0 or blank counting as 1
-    TIME_STEP = auto()  # positive, or 0: the time step is found
+    EVERY = auto()  # an integer, at least 0; 0 or blank means 1
+    TIME_STEP = auto()  # positive, or 0 for 0.9 of the critical time step
     TOLERANCE = auto()  # positive
 
 
@@ -101,7 +100,7 @@ class Word(NamedTuple):
     name: str  # up to four letters
     meaning: str  # its effect, in one sentence
     value: MacroNumber | None = None
-    # Words that must come before; of several in one tuple, one.
+    # Words that must come before. One word of each tuple is enough.
     needs: tuple[tuple[str, ...], ...] = ()
     inside: bool = False  # whether it belongs inside a loop
     second: bool = False  # whether it takes a second number, an integer of at least 0
@@ -109,7 +108,7 @@ class Word(NamedTuple):
 
 A_MASS = ("LMAS", "CMAS")
 A_SOLUTION = ("SOLV", "EXCD", "RODP")
-EXPLICIT = (("LMAS",), ("DT",))  # what a step of central differences needs
+EXPLICIT = (("LMAS",), ("DT",))  # needs of a step of central differences
 WORDS = {
     word.name: word
     for word in (
@@ -179,24 +178,24 @@ Body = tuple[Macro | Loop, ...]
 
 
 def every(macro: Macro) -> int:
-    """Return N of a macro that acts at every N-th step or pass; 1 if blank."""
+    """Return N of a macro that acts at every N-th step or pass; a blank means 1."""
     return max(1, int(macro.value))
 
 
 def macro_number(macro: Macro) -> float:
-    """Return the meaning of a macro's number: its N if it has one, or the number on the card."""
+    """Return the number that a macro works with: N of :func:`every`, or the number on the card."""
     return every(macro) if WORDS[macro.word].value is MacroNumber.EVERY else macro.value
 
 
 class _OpenLoop(NamedTuple):
-    """LOOP whose NEXT was not read yet."""
+    """LOOP without its NEXT so far."""
 
     head: Macro
-    outer: list[Macro | Loop]  # macros of the loop around it, up to this one
+    outer: list[Macro | Loop]  # items before it in the loop around it
 
 
 def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
-    """Nest a macro program's loops and check its words."""
+    """Nest the loops of a macro program and check its words; empty after an error in loops."""
     open_loops: list[_OpenLoop] = []
     body: list[Macro | Loop] = []
     done: set[str] = set()
@@ -205,7 +204,7 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
             return ()
         if (word := WORDS.get(macro.word)) is not None:
             _check_unused(word, macro, findings)
-        elif (word := _closest(macro, findings)) is None:
+        elif (word := _guess_word(macro, findings)) is None:
             continue
         _check_value(word, macro, findings)
         _check_needs(word, macro, done, findings)
@@ -240,7 +239,7 @@ def compile_program(macros: tuple[Macro, ...], findings: Findings) -> Body:
 
 
 def _check_needs(word: Word, macro: Macro, done: set[str], findings: Findings) -> None:
-    """Report each word that must come before and did not, once, and record this word."""
+    """Report each missing word that must come before, once, and record this word as done."""
     for choices in word.needs:
         if not done.intersection(choices):
             names = " or ".join(choices)
@@ -250,9 +249,9 @@ def _check_needs(word: Word, macro: Macro, done: set[str], findings: Findings) -
     done.add(word.name)
 
 
-def _closest(macro: Macro, findings: Findings) -> Word | None:
+def _guess_word(macro: Macro, findings: Findings) -> Word | None:
     """Report an unknown word; return the closest known one, so that loops stay complete."""
-    import difflib  # 1 ms, and only what is misspelt needs it
+    import difflib  # takes 1 ms; only a misspelt word needs it
 
     near = difflib.get_close_matches(macro.word, WORDS, 1, 0.5)
     hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(WORDS)}, END"
@@ -261,7 +260,7 @@ def _closest(macro: Macro, findings: Findings) -> Word | None:
 
 
 def _check_unused(word: Word, macro: Macro, findings: Findings) -> None:
-    """Report the first field that a word does not use although it is not blank."""
+    """Report the first filled field that a word does not use."""
     if macro.option:
         is_number = word.value and not macro.value and parse_real(macro.option) is not None
         hint = f"the number is in columns 11-15 or after a comma: {word.name},{macro.option}"
@@ -319,26 +318,27 @@ def hits(body: Body) -> bool:
 
 
 def moves_only(body: Body) -> bool:
-    """Return whether a program moves the plate from rest and has no static solution."""
+    """Return whether a program has no static solution, so that the plate moves from rest."""
     return all(macro.word not in ("TANG", "FORM", "SOLV") for macro in flat(body))
 
 
 class WorkEstimate(NamedTuple):
-    """Work and output of a program; an upper bound where CONV may leave loops early."""
+    """Work and output of a program; upper bounds if CONV may leave loops early."""
 
     macros: int  # executed macros; each pass of a loop executes its NEXT
     steps: int  # time steps, impact steps and central differences
-    contact_rows: int  # steps at which contact and strains are stored
-    passes: Counter[str]  # times that DISP, STRE, REAC and EIGE store something, by word
+    contact_rows: int  # steps that store contact and strains
+    passes: Counter[str]  # number of times that DISP, STRE, REAC and EIGE store something, by word
 
 
 def estimate_work(body: Body) -> WorkEstimate:
     """Count the work of a program without executing its loops.
 
-    The counts are exact, except that `contact_rows` is an upper bound where RODP cards differ in
-    their number or are mixed with EXCD.
+    The counts are exact, with one exception: `contact_rows` is an upper bound if RODP cards have
+    different numbers or are mixed with EXCD.
     """
-    macros, passes, steps = 0, Counter[str](), Counter[int]()  # steps by RODP's number, 0 for EXCD
+    macros, passes = 0, Counter[str]()
+    steps = Counter[int]()  # by the number of RODP; 0 for EXCD
     for macro, count, outer in _executed(body):
         macros += count * outer
         if macro.word in ("DISP", "STRE", "PLYS", "FAIL"):
@@ -357,9 +357,9 @@ def estimate_work(body: Body) -> WorkEstimate:
 
 
 def _executed(body: Body, count: int = 1, outer: int = 1) -> Iterator[tuple[Macro, int, int]]:
-    """Yield each macro, the passes of its loop, and how often that loop is executed.
+    """Yield each macro, the passes of its loop, and the number of executions of that loop.
 
-    LOOP comes after its body, where NEXT is.
+    LOOP comes after its body, in the place of NEXT.
     """
     for item in body:
         if isinstance(item, Loop):
@@ -373,11 +373,11 @@ HISTORY = "RODP"
 FIELDS = "DISP"
 PLIES = "PLYS"
 FAILURE = "FAIL"
-PLY_ROWS = 20  # rows of ply stresses where their number is not given: they are large
+PLY_ROWS = 20  # default number of rows of ply stresses; few, because a row is large
 
 # Steps between stored rows: a number, True for a default, False for no rows.
 Rows = int | bool
-# The same, or the number and a count of the elements nearest to the load.
+# `Rows`, or the steps between rows and the number of elements nearest to the load.
 RowsOfPlies = Rows | tuple[int, int]
 
 
@@ -390,16 +390,16 @@ class _Output(NamedTuple):
 
     word: str
     rows: Rows
-    nearest: int | None = None  # elements nearest to the load
+    nearest: int | None = None  # number of elements nearest to the load
 
-    def changed(self, old: Macro) -> Macro:
-        """Return a macro of the program with the new numbers."""
-        value = old.value if self.rows is True else float(self.rows)
-        second = old.second if self.nearest is None else float(self.nearest)
-        return replace(old, value=value, second=second, source=None)
+    def update(self, macro: Macro) -> Macro:
+        """Return an existing macro with the new numbers."""
+        value = macro.value if self.rows is True else float(self.rows)
+        second = macro.second if self.nearest is None else float(self.nearest)
+        return replace(macro, value=value, second=second, source=None)
 
-    def macro(self, passes: int, step: int) -> Macro:
-        """Return a new macro for a loop of `passes`, where RODP stores every `step` steps."""
+    def create(self, passes: int, step: int) -> Macro:
+        """Return a macro for a loop of `passes` passes in which RODP stores every `step` steps."""
         default = max(1, passes // PLY_ROWS) if self.word == PLIES else min(step, passes)
         value = default if self.rows is True else self.rows
         return Macro(self.word, value=float(value), second=float(self.nearest or 0))
@@ -412,45 +412,45 @@ def with_outputs(
     plies: RowsOfPlies | None = None,
     failure: Rows | None = None,
 ) -> tuple[Macro, ...]:
-    """Return the macros with other stored rows; None keeps them as they are.
+    """Return the macros of a program that stores other rows; None leaves rows as they are.
 
-    `every` is the number of RODP and DISP, `plies` the number of PLYS and `failure` the number of
-    FAIL. A missing macro is added at the end of each loop that takes steps, or at the end of a
-    program without such a loop. True stores failure with the rows of RODP, and about
-    :data:`PLY_ROWS` rows of ply stresses; an existing macro keeps its number. Raises RowsError if a
+    `every` is the number of RODP and DISP, `plies` the number of PLYS, and `failure` the number of
+    FAIL. A missing PLYS or FAIL is added at the end of each loop that takes steps, or at the end of
+    a program without such a loop. True keeps the number of an existing macro. A new FAIL then has
+    the number of RODP, and a new PLYS stores about :data:`PLY_ROWS` rows. Raises RowsError if a
     number is not positive and whole.
     """
     changed = list(macros)
     if every is not None:
-        rows = _count("every", every)
-        for new in (_Output(HISTORY, rows), _Output(FIELDS, rows)):
-            changed = [new.changed(macro) if macro.word == new.word else macro for macro in changed]
-    for output in (_of_failure(failure), _of_plies(plies)):
-        if output is not None:
-            changed = _with_output(changed, output)
+        rows = _check_count("every", every)
+        for output in (_Output(HISTORY, rows), _Output(FIELDS, rows)):
+            changed = [output.update(m) if m.word == output.word else m for m in changed]
+    for requested in (_failure_output(failure), _ply_output(plies)):
+        if requested is not None:
+            changed = _with_output(changed, requested)
     return tuple(changed)
 
 
-def _of_plies(rows: RowsOfPlies | None) -> _Output | None:
+def _ply_output(rows: RowsOfPlies | None) -> _Output | None:
     if rows is None:
         return None
     if not isinstance(rows, tuple):
-        return _Output(PLIES, _rows("plies", rows))
+        return _Output(PLIES, _check_rows("plies", rows))
     if len(rows) != 2:
         raise RowsError(f"`plies` is {rows!r}, not a number of steps and one of elements")
-    return _Output(PLIES, _rows("plies", rows[0]), _count("plies", rows[1]))
+    return _Output(PLIES, _check_rows("plies", rows[0]), _check_count("plies", rows[1]))
 
 
-def _of_failure(rows: Rows | None) -> _Output | None:
-    return None if rows is None else _Output(FAILURE, _rows("failure", rows))
+def _failure_output(rows: Rows | None) -> _Output | None:
+    return None if rows is None else _Output(FAILURE, _check_rows("failure", rows))
 
 
-def _rows(name: str, value: object) -> Rows:
-    return value if isinstance(value, bool) else _count(name, value)
+def _check_rows(name: str, value: object) -> Rows:
+    return value if isinstance(value, bool) else _check_count(name, value)
 
 
-def _count(name: str, value: object) -> int:
-    """Return a number of steps or elements."""
+def _check_count(name: str, value: object) -> int:
+    """Return a number of steps or elements; raise RowsError if it is not positive and whole."""
     if isinstance(value, Integral) and not isinstance(value, bool) and (count := int(value)) > 0:
         return count
     raise RowsError(f"`{name}` is {value!r}, not a whole number above 0")
@@ -461,11 +461,11 @@ def _with_output(macros: Sequence[Macro], output: _Output) -> list[Macro]:
     if output.rows is False:
         return [macro for macro in macros if macro.word != output.word]
     if any(macro.word == output.word for macro in macros):
-        return [output.changed(m) if m.word == output.word else m for m in macros]
+        return [output.update(m) if m.word == output.word else m for m in macros]
     step = next((every(macro) for macro in macros if macro.word == HISTORY), 1)
     changed: list[Macro] = []
-    loops: list[int] = []  # passes of the open ones
-    stepping: set[int] = set()  # depths of those that take steps
+    loops: list[int] = []  # passes of the open loops
+    stepping: set[int] = set()  # depths of open loops that take steps
     for macro in macros:
         depth = len(loops)
         if macro.word == "LOOP":
@@ -475,9 +475,9 @@ def _with_output(macros: Sequence[Macro], output: _Output) -> list[Macro]:
         elif macro.word == "NEXT" and loops:
             passes = loops.pop()
             if depth in stepping:
-                changed.append(output.macro(passes, step))
+                changed.append(output.create(passes, step))
             stepping.discard(depth)
         changed.append(macro)
     if len(changed) == len(macros):
-        changed.append(output.macro(1, 1))
+        changed.append(output.create(1, 1))
     return changed

@@ -20,7 +20,7 @@ from fecm.deck.card import (
 )
 from fecm.deck.segment import CardStream, Segment
 
-MATERIAL = 1  # number of the material and of the laminate of MATE
+MATERIAL = 1  # number of MATE's material, and of its laminate
 
 
 @dataclass(frozen=True)
@@ -72,9 +72,9 @@ class Ply(Record):
 
 @dataclass(frozen=True)
 class Layer(Record):
-    """Layer card of MATE: (I5,F5.0,F10.0,I5); the number is not used for placing.
+    """Layer card of MATE: (I5,F5.0,F10.0,I5). The order of the cards counts, not the number.
 
-    The material is not in the report's program.
+    The report's program has no material on this card.
     """
 
     number: int
@@ -92,7 +92,7 @@ class Layer(Record):
     plain: ClassVar[Fields] = fields[:-1]
 
     def to_card(self, fields: Fields | None = None) -> str:
-        """Return the text of the card; the material of MATE is not written."""
+        """Return the text of the card, without the material if it is MATE's."""
         written = self.plain if self.material == MATERIAL else self.fields
         return super().to_card(fields or written)
 
@@ -112,8 +112,7 @@ class Material(Segment, keyword="MATE"):
         ply = cards.single(head, Ply)
         layers = None
         if integration or ply:
-            said = "the control card says"
-            layers = read_layers(head, cards, cards.control.layers, said)
+            layers = read_layers(head, cards, cards.control.layers, "the control card says")
         if integration is None or ply is None or layers is None:
             return None
         return cls(integration, ply, layers, source=CardSource(head))
@@ -128,7 +127,10 @@ class Material(Segment, keyword="MATE"):
 def read_layers(
     head: Card, cards: CardStream, count: int, stated_by: str
 ) -> tuple[Layer, ...] | None:
-    """Read layer cards; None if one of the `stated_by` cards is missing or unreadable."""
+    """Read `count` layer cards; None if one is missing or unreadable.
+
+    `stated_by` tells in a message where the count comes from: "the control card says".
+    """
     layer_cards: list[Card] = []
     while (
         len(layer_cards) < count and (card := cards.take_data()) is not None and not card.is_blank
@@ -149,13 +151,13 @@ def read_layers(
 class Shear(Segment, keyword="SHEA"):
     """SHEA: (F10.0); treatment of transverse shear (not in the report's program)."""
 
-    # Shear correction factor: 1 in the report's program; its page on cut-off frequencies recommends
-    # pi^2/12.
+    # Shear correction factor: 1 in the report's program. The report recommends pi^2/12 where it
+    # discusses cut-off frequencies.
     factor: float = 1.0
-    # Assumed strains, ``MITC`` on the keyword card; otherwise quadrature of the order L2.
+    # True for assumed strains, ``MITC`` on the keyword card; False for quadrature of the order L2.
     assumed: bool = False
-    # Stiffness from the equilibrium of the plies, ``EQUI`` on the keyword card; otherwise their
-    # sum, equation 2-19.
+    # True for the stiffness from the equilibrium of the plies, ``EQUI`` on the keyword card; False
+    # for the sum over the plies, equation 2-19.
     equilibrium: bool = False
 
     fields: ClassVar[Fields] = layout("F10 shear correction factor|factor")
@@ -163,7 +165,7 @@ class Shear(Segment, keyword="SHEA"):
 
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self | None:
-        """Read the factor's card, which may be missing after a word."""
+        """Read the card of the factor; it may be missing after a word."""
         words = [word.upper() for word in head.words[1:]]
         for word in words:
             if word not in cls.WORDS:
@@ -173,8 +175,8 @@ class Shear(Segment, keyword="SHEA"):
         following = cards.peek()
         if words and (following is None or following.is_keyword or following.is_blank):
             return cls(assumed=assumed, equilibrium=equilibrium, source=CardSource(head))
-        found = cards.single(head, cls)
-        return found and replace(found, assumed=assumed, equilibrium=equilibrium)
+        shear = cards.single(head, cls)
+        return shear and replace(shear, assumed=assumed, equilibrium=equilibrium)
 
     def words(self) -> list[str]:
         """Return the words of the keyword card."""
@@ -183,7 +185,7 @@ class Shear(Segment, keyword="SHEA"):
     def cards(self, control: Control) -> Iterator[str]:
         """Return the text of the segment's cards.
 
-        The card of the factor is left out if a word is given and the factor is 1.
+        The card of the factor is left out if there is a word and the factor is 1.
         """
         words = self.words()
         yield " ".join([self.keyword, *words])
@@ -195,10 +197,10 @@ class Shear(Segment, keyword="SHEA"):
 class Allowables(Segment, keyword="ALLO"):
     """ALLO: (7F10.0,I5) and (3F10.0); strengths of plies (not in the report's program).
 
-    A pair of cards for each material; `others` are those after the first.
+    There is a pair of cards for each material; `others` has the pairs after the first.
     """
 
-    # Strengths along and across the fibres, in tension and compression: all positive, force/area.
+    # Strengths along and across the fibres, in tension and compression; all positive, force/area.
     xt: float
     xc: float
     yt: float
@@ -236,13 +238,13 @@ class Allowables(Segment, keyword="ALLO"):
         first = cls._read_pair(head, cards)
         others: list[Self] = []
         while (card := cards.peek()) is not None and not card.is_keyword and not card.is_blank:
-            if (one := cls._read_pair(head, cards)) is not None:
-                others.append(one)
+            if (strengths := cls._read_pair(head, cards)) is not None:
+                others.append(strengths)
         return first and replace(first, others=tuple(others))
 
     @classmethod
     def _read_pair(cls, head: Card, cards: CardStream) -> Self | None:
-        """Read the strengths of a material, and the constants, whose card may be missing."""
+        """Read the strengths and the constants of a material; the second card may be missing."""
         card = cards.peek()
         numbered = card is not None and any(
             text.strip() for _, text in card.cut(cls.numbered)[len(cls.fields) :][:1]
@@ -258,17 +260,17 @@ class Allowables(Segment, keyword="ALLO"):
             return None
         values, source = strengths
         count = len(cls.fields)
-        of_constants = [BLANK] * len(cls.constants) if constants is None else constants[0]
-        return cls.from_row([*values[:count], *of_constants, *values[count:]], source)
+        constant_values = [BLANK] * len(cls.constants) if constants is None else constants[0]
+        return cls.from_row([*values[:count], *constant_values, *values[count:]], source)
 
     def cards(self, control: Control) -> Iterator[str]:
         """Return the text of the segment's cards."""
         yield self.keyword
         for item in (self, *self.others):
-            yield from item._pair()
+            yield from item._write_pair()
 
-    def _pair(self) -> Iterator[str]:
-        """Return the text of the cards of this material."""
+    def _write_pair(self) -> Iterator[str]:
+        """Yield the text of the two cards of this material."""
         count = len(self.fields)
         values = self.row()
         is_plain = self.material == MATERIAL
@@ -277,7 +279,7 @@ class Allowables(Segment, keyword="ALLO"):
         yield write_card(self.constants, values[count : count + len(self.constants)])
 
     def of(self, material: int) -> Allowables | None:
-        """Return the strengths of a material; None if they are not given."""
+        """Return the strengths of a material; None if there is no card for it."""
         return next(
             (strengths for strengths in (self, *self.others) if strengths.material == material),
             None,
@@ -309,7 +311,7 @@ class Nonlinear(Segment, keyword="NONL"):
 
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self:
-        """Read the keyword card, which is all there is."""
+        """Read the keyword card, the only card of the segment."""
         return cls(source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
@@ -338,7 +340,7 @@ class Preload(Segment, keyword="PREL"):
 class Curvature(Segment, keyword="CURV"):
     """CURV: (3F10.0); radii of a shallow curved panel (not in the report's program)."""
 
-    # Length; 0 or blank is infinite.  Positive: the centre of curvature is on the side of -w.
+    # Length; 0 or blank is infinite. A radius is positive if its centre is on the side of -w.
     radius_x: float = 0.0
     radius_y: float = 0.0
     radius_xy: float = 0.0
@@ -347,7 +349,7 @@ class Curvature(Segment, keyword="CURV"):
 
     @property
     def curvatures(self) -> tuple[float, float, float]:
-        """1/Rx, 1/Ry and 1/Rxy, 1/length; 0 of an infinite radius."""
+        """1/Rx, 1/Ry and 1/Rxy, 1/length; 0 for an infinite radius."""
         radii = (self.radius_x, self.radius_y, self.radius_xy)
         x, y, xy = (1.0 / radius if radius else 0.0 for radius in radii)
         return x, y, xy
@@ -361,13 +363,13 @@ class Expansion(Record):
     # Per kelvin.
     alpha1: float = 0.0
     alpha2: float = 0.0
-    # Per per cent of weight of moisture.
+    # Per per cent (weight) of moisture.
     beta1: float = 0.0
     beta2: float = 0.0
 
     THERMAL: ClassVar[tuple[str, ...]] = ("alpha1", "alpha2")
     MOISTURE: ClassVar[tuple[str, ...]] = ("beta1", "beta2")
-    LARGEST: ClassVar[float] = 1e-3  # of alpha1 and alpha2 in size
+    LARGEST: ClassVar[float] = 1e-3  # limit of the size of alpha1 and alpha2
     optional: ClassVar[int] = 2
     fields: ClassVar[Fields] = layout(
         "I5? material|mat", "X5", "F10 alpha1", "F10 alpha2", "F10 beta1", "F10 beta2"
@@ -376,13 +378,13 @@ class Expansion(Record):
 
 @dataclass(frozen=True)
 class Cure(Segment, keyword="CURE"):
-    """CURE: (2F10.0) and expansions; changes since the plies were free of stress.
+    """CURE: (2F10.0) and expansions; changes since the stress-free state.
 
-    It is not in the report's program.
+    The report's program does not have this segment.
     """
 
     delta_t: float  # temperature of use minus stress-free temperature, K
-    delta_c: float = 0.0  # moisture taken up, per cent of weight
+    delta_c: float = 0.0  # absorbed moisture, per cent of weight
     expansions: tuple[Expansion, ...] = ()
 
     optional: ClassVar[int] = 1

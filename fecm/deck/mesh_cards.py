@@ -16,7 +16,7 @@ NODE = ("I5 node", "I5 increment|incr")  # first fields of a card of a node
 
 @dataclass(frozen=True)
 class NodeValues(Record):
-    """COOR or FORC card: values at a node, and the step to the next node generated from it."""
+    """COOR or FORC card: values at a node, and the step between nodes generated after it."""
 
     node: int
     increment: int
@@ -27,7 +27,7 @@ class NodeValues(Record):
 
 @dataclass(frozen=True)
 class NodeCodes(Record):
-    """BOUN card: restraint codes of a node; a negative code carries on to generated nodes."""
+    """BOUN card: restraint codes of a node; a negative code extends to generated nodes."""
 
     node: int
     increment: int
@@ -38,7 +38,7 @@ class NodeCodes(Record):
 
 @dataclass(frozen=True)
 class ElementNodes(Record):
-    """ELEM card: the nodes of an element (0 where absent) and the step for generated ones."""
+    """ELEM card: nodes of an element, 0 if absent, and the step for generated elements."""
 
     element: int
     nodes: tuple[int, ...]
@@ -49,7 +49,7 @@ class ElementNodes(Record):
 
 @dataclass(frozen=True)
 class Coordinates(NumberedSegment[NodeValues], keyword="COOR", record=NodeValues):
-    """COOR: (2I5,7F10.0); coordinates of the nodes (length), of which NDM are used."""
+    """COOR: (2I5,7F10.0); the NDM coordinates of the nodes (length)."""
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:
@@ -69,7 +69,7 @@ class Elements(NumberedSegment[ElementNodes], keyword="ELEM", record=ElementNode
 
     @classmethod
     def is_last(cls, record: Record, control: Control) -> bool:
-        """Return whether a card is the last element's, which needs no blank card after it."""
+        """Return whether a card defines the last element; no blank card must follow it."""
         return isinstance(record, ElementNodes) and record.element >= control.numel
 
 
@@ -85,7 +85,7 @@ class Boundary(NumberedSegment[NodeCodes], keyword="BOUN", record=NodeCodes):
 
 @dataclass(frozen=True)
 class Forces(NumberedSegment[NodeValues], keyword="FORC", record=NodeValues):
-    """FORC: (2I5,7F10.0); nodal forces, or displacements where the dof is restrained."""
+    """FORC: (2I5,7F10.0); nodal forces, or displacements of restrained dofs."""
 
     @classmethod
     def card_fields(cls, control: Control) -> Fields:

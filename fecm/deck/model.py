@@ -1,8 +1,8 @@
 """Model of a deck: plain typed objects without mechanics.
 
-A :class:`Deck` is one problem of a file: its control card, its segments in the deck's order, its
-macro program. It keeps the values of the cards; :mod:`fecm.problem.generate` generates the nodes
-and elements between them.
+A :class:`Deck` is one problem of a file: its control card, its segments in their order, and its
+macro program. It has the values of the cards only; :mod:`fecm.problem.generate` generates the
+nodes and elements between the cards.
 """
 
 from __future__ import annotations
@@ -119,7 +119,7 @@ class Deck(Record):
     tables : tuple of LoadTable
         Proportional loads, one for each PROP that reads one.
     text : str
-        The problem's cards as they were read, ended by STOP; empty for a deck built in Python.
+        Cards of the problem as written, ended by STOP; empty for a deck built in Python.
     """
 
     title: str
@@ -149,7 +149,7 @@ class Deck(Record):
         return [segment for segment in self.segments if isinstance(segment, kind)]
 
     def last(self, kind: type[_S]) -> _S | None:
-        """Return the last segment of one kind, which is the effective one; None without one."""
+        """Return the last segment of one kind, the effective one; None if the deck has none."""
         segments = self.all(kind)
         return segments[-1] if segments else None
 
@@ -159,7 +159,7 @@ class Deck(Record):
         Raises
         ------
         LookupError
-            If the deck has none.
+            If the deck has no such segment.
         """
         if (segment := self.last(kind)) is None:
             raise LookupError(f"the deck has no {kind.keyword} segment")
@@ -167,19 +167,19 @@ class Deck(Record):
 
     @property
     def plies(self) -> dict[int, Ply]:
-        """Constants of the materials by number: 1 comes from MATE, the others from MATS.
+        """Constants of the materials by number: 1 from MATE, the others from MATS.
 
-        Raises LookupError without a MATE segment.
+        Raises LookupError if there is no MATE segment.
         """
         card = self.last(Materials)
-        other_plies = {} if card is None else {one.number: one.ply for one in card.plies}
-        return other_plies | {MATERIAL: self.require(Material).ply}
+        mats_plies = {} if card is None else {item.number: item.ply for item in card.plies}
+        return mats_plies | {MATERIAL: self.require(Material).ply}
 
     @property
     def layers(self) -> dict[int, tuple[Layer, ...]]:
-        """Layers of the laminates by number: 1 comes from MATE, the others from LAMS.
+        """Layers of the laminates by number: 1 from MATE, the others from LAMS.
 
-        Without ZONE all elements have the first. Raises LookupError without a MATE segment.
+        Without ZONE, laminate 1 is the only one. Raises LookupError if there is no MATE segment.
         """
         layers = {MATERIAL: self.require(Material).layers}
         card = self.last(Laminates)
@@ -188,23 +188,27 @@ class Deck(Record):
         return layers
 
     def with_(self, **values: Unpack[Values]) -> Deck:
-        """Deck with other values, under the names that :func:`fecm.sweep` varies, or other parts.
+        """Return the deck with other values or parts. :func:`fecm.sweep` varies the same names.
 
-        Parts go first: a `plate`, which is struck in its middle or at `at`; a `laminate`, whose
-        named plies bring strengths, toughness and expansions where the deck has them; a
-        `projectile`, at the velocity of the deck unless `velocity` or `energy` is given; and a
-        `contact`, an estimated one for the new laminate.  ``nonlinear=False`` takes NONL out of the
-        deck.
+        Parts are replaced before values:
 
-        A time step of 0, or that which :func:`fecm.impact` takes for the deck's plate, follows a
-        new `plate` or `laminate`.  Any other is kept, also where values change the plate;
-        ``dt="auto"`` takes 0.9 of the critical one.
+        - A `plate` is struck in its middle, or at `at`.
+        - A `laminate` of named plies brings their strengths, toughness and expansions where the
+          deck has such cards.
+        - A `projectile` keeps the velocity of the deck, unless `velocity` or `energy` is given.
+        - A `contact` may be an estimate; it is then made for the new laminate.
+
+        ``nonlinear=False`` removes NONL.
+
+        A new `plate` or `laminate` changes the time step if it is 0, or the one that
+        :func:`fecm.impact` chooses for the old plate. Any other time step stays, also if values
+        change the plate. ``dt="auto"`` takes 0.9 of the critical time step.
 
         Parameters
         ----------
         **values : float or str or sequence or object
-            Values in the deck's units; energy, velocity, duration and preload also with a unit, as
-            in ``"10J"`` or a quantity of pint, if the deck names its units.
+            Values in the units of the deck. If the deck names its units, energy, velocity, duration
+            and preload may have another unit: ``"10J"``, or a quantity of pint.
 
         Raises
         ------
@@ -231,21 +235,21 @@ class Deck(Record):
         plies: int | bool | tuple[int, int] | None = None,
         failure: int | bool | None = None,
     ) -> Deck:
-        r"""Return the deck with another macro program, or one that stores other rows.
+        r"""Return the deck with another macro program, or with other stored rows.
 
         Parameters
         ----------
         macros : str or sequence of Macro, optional
-            The cards between MACR and END; the deck's own by default.  In a text END and the cards
-            of PROP's load tables may follow; without them the tables stay.
+            The cards between MACR and END; by default the program of the deck. In a text, END and
+            the load tables of PROP may follow. Without them, the tables of the deck stay.
         every : int, optional
             Steps between stored rows of contact, strains and displacements (RODP, DISP).
         plies : int or bool or tuple of int, optional
-            Steps between stored ply stresses (PLYS); with True about 20 rows, with False none.  A
-            second number takes so many elements nearest to the load instead of all.
+            Steps between stored ply stresses (PLYS). True stores about 20 rows, False none. The
+            second number of a pair stores only that many elements, those nearest to the load.
         failure : int or bool, optional
-            Steps between evaluations of the failure criteria (FAIL), which need strengths (ALLO);
-            with True those of RODP, with False none.
+            Steps between evaluations of the failure criteria (FAIL); they need strengths (ALLO).
+            True takes the number of RODP, False removes FAIL.
 
         Raises
         ------
@@ -269,7 +273,7 @@ class Deck(Record):
         return changed
 
     def to_text(self) -> str:
-        """Write the problem as cards, ended by STOP; reading them gives the same model.
+        """Return the problem as cards, ended by STOP. Reading them gives the same model.
 
         Raises
         ------

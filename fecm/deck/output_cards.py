@@ -14,8 +14,8 @@ from fecm.deck.segment import CardStream, NumberedSegment, Segment
 class Gage(Record):
     """GAGE card: (I5,5X,4F10.0); a strain gage."""
 
-    number: int  # its name in the result
-    # Its position; z from the mid-plane, positive on the face away from the projectile (length).
+    number: int  # name of the gage in the result
+    # Position (length). z is 0 at the mid-plane, and positive away from the projectile.
     x: float
     y: float
     z: float
@@ -75,7 +75,7 @@ class Units(Segment, keyword="UNIT"):
 
 @dataclass(frozen=True)
 class PrintOption(Segment, keyword="PRIN"):
-    """PRIN or NOPR: whether the data that follow are printed."""
+    """PRIN or NOPR: printing of the data that follow."""
 
     on: bool
 

@@ -1,4 +1,4 @@
-"""Card reader: reads the text of a deck into its models, and reports all errors."""
+"""Reader: turns the text of a deck into the models of its problems, and reports all errors."""
 
 from __future__ import annotations
 
@@ -21,42 +21,42 @@ from fecm.deck.model import END, MACROS, SEGMENTS, STOP, TITLE, Deck, Segment
 from fecm.deck.segment import CardStream
 
 LARGEST_FILE = 1_000_000_000  # no deck needs more bytes
-# Largest memory of a deck per byte of text and per line, measured at 10 MB.
+# Memory of a deck, per byte of text and per line: upper bounds, measured at 10 MB.
 BYTES_A_BYTE = 12
 BYTES_A_LINE = 1100
 FIRST = 4096  # number of bytes that identify a binary file
 HDF5 = b"\x89HDF\r\n\x1a\n"  # first bytes of an HDF5 file
-INLINE = "<text>"  # name of a deck that is given as text, or in a stream without a name
+INLINE = "<text>"  # name of a deck from a text, or from a stream without a name
 
 
 def load_text(path_or_text: str | Path | AnyFile) -> tuple[str, str]:
-    """Return text and name of a deck, see :func:`fecm.read_deck`.
+    """Return the text and the name of a deck; see :func:`fecm.read_deck`.
 
-    Raises OptionsError if it is neither a path, a text nor an open file.
+    Raises OptionsError if the argument is not a path, a text or an open file.
     """
     if isinstance(path_or_text, str) and ("\n" in path_or_text or not path_or_text.strip()):
         return path_or_text, INLINE
     if isinstance(path_or_text, str | Path):
         with Path(path_or_text).open("rb") as file:
-            return _text(file, str(path_or_text)), str(path_or_text)
+            return _read_text(file, str(path_or_text)), str(path_or_text)
     if not hasattr(path_or_text, "read"):
         raise OptionsError(
             f"a deck is a path, a text, an open file or a Deck, not {path_or_text!r}"
         )
     name = getattr(path_or_text, "name", None)
     name = name if isinstance(name, str) else INLINE
-    return _text(path_or_text, name), name
+    return _read_text(path_or_text, name), name
 
 
-def _text(file: AnyFile, path: str) -> str:
-    """Return the text of a deck, which may be an endless pipe; see :func:`decoded`."""
+def _read_text(file: AnyFile, path: str) -> str:
+    """Read the text of a deck from a file, or from a pipe, which may never end."""
     free = available_memory()
     most = LARGEST_FILE if free is None else min(LARGEST_FILE, free // BYTES_A_BYTE)
-    begin = _read(file, FIRST)
-    if begin.startswith(HDF5):
+    head = _read_bytes(file, FIRST)
+    if head.startswith(HDF5):
         raise InputError(f"{path} is an HDF5 file, not a deck; `fecm info {path}` shows a result")
-    decoded(begin, path)
-    data = begin + _read(file, max(0, most + 1 - len(begin)))
+    decoded(head, path)  # refuse a binary file before the rest is read
+    data = head + _read_bytes(file, max(0, most + 1 - len(head)))
     if len(data) > most:
         raise NotEnoughMemoryError(f"{path}: a deck of more than {format_bytes(most)} is not read")
     lines = data.count(b"\n") + data.count(b"\r") - data.count(b"\r\n")
@@ -64,31 +64,31 @@ def _text(file: AnyFile, path: str) -> str:
     return decoded(data, path)
 
 
-def _read(file: AnyFile, size: int) -> bytes:
-    """Read the bytes of a file that is open as bytes or as text."""
+def _read_bytes(file: AnyFile, size: int) -> bytes:
+    """Read from a file that is open as bytes or as text."""
     data = file.read(size)
     return data.encode("utf-8", "surrogateescape") if isinstance(data, str) else data
 
 
 CONTROL_CARD = "(6I5): NUMNP, NUMEL, LAYER, NDM, NDF, NEN"
-# Largest number of nodes or elements, and of layers; anything beyond is certainly a typo.
+# Largest number of nodes or elements, and of layers. More are certainly a typo.
 MOST = 1_000_000
 MOST_LAYERS = 10_000
-# Largest number of problems and segments of a file, and of cards of a macro program.
+# Largest number of problems and of segments in a file, and of cards in a macro program.
 MOST_PROBLEMS = 1000
 MOST_SEGMENTS = 20_000
 MOST_MACRO_CARDS = 100_000
 
 
 class OtherFile(NamedTuple):
-    """File of another program."""
+    """Input file of another program."""
 
-    lines: str  # pattern of one of its first lines, or of two
+    lines: str  # pattern of one or two of its first lines
     what: str
     hint: str
 
 
-FIRST_LINES = 20  # of a file, which tell its program
+FIRST_LINES = 20  # number of lines that identify the program of a file
 TAKES_A_MESH = "`fecm new DECK --mesh FILE`, or fecm.Plate.from_mesh, takes a mesh from it"
 OTHER_FILES = (
     OtherFile(
@@ -123,20 +123,20 @@ OTHER_FILES = (
 class ParsedProblem:
     """Readable part of a problem."""
 
-    deck: Deck | None  # the model; None where the control card could not be read
-    # Keywords of segments with unreadable cards, from which no conclusion can be drawn.
+    deck: Deck | None  # the model; None if the control card is unreadable
+    # Keywords of segments with unreadable cards. Checks that need these segments are skipped.
     unsound: set[str] = field(default_factory=set)
 
 
 class Reader:
-    """Reader of the cards of a file, problem by problem, with the options of the card stream.
+    """Reader of the cards of a file, problem by problem, with the options of :class:`CardStream`.
 
     Attributes
     ----------
     cards : CardStream
         The cards of the file.
     findings : Findings
-        What was found so far.
+        The findings so far.
     """
 
     def __init__(
@@ -148,7 +148,7 @@ class Reader:
         )
         self.findings = self.cards.findings
         self._segments = 0  # number of segments of the file
-        self._counted = Counter[str]()  # nodes and elements of its problems together
+        self._counted = Counter[str]()  # total number of nodes and elements of the problems
 
     def problems(self) -> list[ParsedProblem]:
         """Read every problem of the file."""
@@ -160,16 +160,18 @@ class Reader:
                 break
             if card.keyword == TITLE:
                 if len(problems) == MOST_PROBLEMS:
-                    self._end(f"The file contains more than {MOST_PROBLEMS} problems.", card)
+                    self._stop_at(f"The file contains more than {MOST_PROBLEMS} problems.", card)
                     break
-                problems.append(self._problem(card))
-            elif not (problems or self.findings) and (other := _other_file(self.cards.lines)):
-                message = f"This is {other.what}, not a deck."
-                self.findings.add("E013", message, card.place, other.hint)
+                problems.append(self._read_problem(card))
+            elif not (problems or self.findings) and (
+                program := _identify_program(self.cards.lines)
+            ):
+                message = f"This is {program.what}, not a deck."
+                self.findings.add("E013", message, card.place, program.hint)
                 self.findings.closed = True
                 break
             else:
-                self._stray(card, [TITLE, STOP])
+                self._report_stray(card, [TITLE, STOP])
 
         last = self.cards.last
         if not problems and not self.findings.errors:
@@ -179,21 +181,21 @@ class Reader:
             self.findings.add("W002", "The deck does not end with a STOP card.", last.place)
         return problems
 
-    def _end(self, message: str, card: Card) -> None:
-        """Report that a limit is exceeded, and stop reading."""
+    def _stop_at(self, message: str, card: Card) -> None:
+        """Report a limit that a card exceeds, and stop reading."""
         self.findings.add("E012", message, card.place, "write several files")
         self.findings.closed = True
 
-    def _problem(self, title: Card) -> ParsedProblem:
+    def _read_problem(self, title: Card) -> ParsedProblem:
         first = self.cards.position - 1
         unsound: set[str] = set()
         self.cards.unsound = unsound
-        control = self._control_card(title)
-        segments = self._mesh_and_data(title, control)
-        macros = [] if self.cards.at_end else self._program(title)
+        control = self._read_control_card(title)
+        segments = self._read_segments(title, control)
+        macros = [] if self.cards.at_end else self._read_program(title)
         if control is None:
             return ParsedProblem(None, unsound)
-        tables = self._tables(macros)
+        tables = self._read_tables(macros)
         deck = Deck(
             title=title.data[len(TITLE) :].strip(),
             control=control,
@@ -205,7 +207,7 @@ class Reader:
         )
         return ParsedProblem(deck, unsound)
 
-    def _control_card(self, title: Card) -> Control | None:
+    def _read_control_card(self, title: Card) -> Control | None:
         if (card := self.cards.take_data()) is None:
             place = (self.cards.peek() or title).place
             self.findings.add("E003", "The control card is missing.", place, CONTROL_CARD)
@@ -214,7 +216,7 @@ class Reader:
         return control if control is not None and self._is_possible(control) else None
 
     def _is_possible(self, control: Control) -> bool:
-        """Return whether the values of a control card are possible; report the others."""
+        """Return whether all values of a control card are possible; report those that are not."""
         if control.nen == 0:
             named = zip(Control.fields, control.row(), strict=True)
             missing = [field.name for field, value in named if not value]
@@ -249,7 +251,7 @@ class Reader:
                 self.findings.add("E201", message, control.place(name), hint)
         return len(self.findings) == before
 
-    def _mesh_and_data(self, title: Card, control: Control | None) -> list[Segment]:
+    def _read_segments(self, title: Card, control: Control | None) -> list[Segment]:
         cards = self.cards
         segments: list[Segment] = []
         if control is not None:
@@ -265,13 +267,13 @@ class Reader:
                 return segments
             kind = SEGMENTS.get(keyword)
             if kind is None or not card.is_keyword:
-                self._stray(card, [*SEGMENTS, END])
+                self._report_stray(card, [*SEGMENTS, END])
                 if not card.is_keyword:
                     cards.skip_data()
             elif control is None and not kind.is_worded:
                 cards.skip_data()  # without counts the cards are ambiguous
             elif self._segments == MOST_SEGMENTS:
-                self._end(f"The file has more than {MOST_SEGMENTS} segments.", card)
+                self._stop_at(f"The file has more than {MOST_SEGMENTS} segments.", card)
             else:
                 self._segments += 1
                 if (segment := kind.read(card, cards)) is None:
@@ -281,10 +283,10 @@ class Reader:
         self.findings.add("E004", "The mesh data are not ended by END.", title.place)
         return segments
 
-    def _stray(self, card: Card, keywords: list[str]) -> None:
+    def _report_stray(self, card: Card, keywords: list[str]) -> None:
         """Report a card in place of a keyword, once for all cards up to the next keyword."""
         if card.is_keyword:
-            near = _close(card.keyword, keywords)
+            near = _close_matches(card.keyword, keywords)
             self.cards.unsound.update(near)
             message = f"`{card.data.split()[0]}` is not a keyword here."
             hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(keywords)}"
@@ -292,7 +294,7 @@ class Reader:
             self.findings.add("E005", message, place, hint)
         elif card.data.lstrip()[:1].isalpha():
             word = card.data.split()[0]
-            self.cards.unsound.update(_close(word[:4].upper(), keywords))
+            self.cards.unsound.update(_close_matches(word[:4].upper(), keywords))
             message = f"The keyword `{word}` does not start in column 1."
             self.findings.add("E005", message, card.place, "move it to the left")
         else:
@@ -303,28 +305,28 @@ class Reader:
         if keywords != [MACROS]:
             self.cards.skip_data()
 
-    def _program(self, title: Card) -> list[Macro]:
+    def _read_program(self, title: Card) -> list[Macro]:
         cards = self.cards
         while (card := cards.take_filled()) is not None:
             if card.keyword == MACROS:
-                return self._macros(card)
+                return self._read_macros(card)
             if card.keyword in (TITLE, STOP):
                 cards.give_back()
                 break
-            if card.is_keyword and not _close(card.keyword, [MACROS]):
+            if card.is_keyword and not _close_matches(card.keyword, [MACROS]):
                 cards.give_back()
                 message = "The MACR card before the macro program is missing."
                 self.findings.add("E009", message, card.place)
-                return self._macros(card)
-            self._stray(card, [MACROS])
-            if card.is_keyword:  # misspelt MACR: the program follows nevertheless
-                return self._macros(card)
+                return self._read_macros(card)
+            self._report_stray(card, [MACROS])
+            if card.is_keyword:  # a misspelt MACR: the program follows nevertheless
+                return self._read_macros(card)
         message = "The problem has no macro program."
         self.findings.add("E009", message, title.place, "it starts with a MACR card")
         cards.unsound.add(MACROS)
         return []
 
-    def _macros(self, head: Card) -> list[Macro]:
+    def _read_macros(self, head: Card) -> list[Macro]:
         cards = self.cards
         macros: list[Macro] = []
         while (card := cards.take_filled()) is not None:
@@ -334,9 +336,9 @@ class Reader:
                 cards.give_back()
                 break
             if len(macros) == MOST_MACRO_CARDS:
-                self._end(f"The macro program has more than {MOST_MACRO_CARDS} cards.", card)
+                self._stop_at(f"The macro program has more than {MOST_MACRO_CARDS} cards.", card)
                 break
-            if (macro := self._macro(card)) is None:
+            if (macro := self._read_macro(card)) is None:
                 cards.unsound.add(MACROS)
                 continue
             if macro.word == END:  # not in column 1
@@ -349,8 +351,8 @@ class Reader:
         cards.unsound.add(MACROS)
         return macros
 
-    def _macro(self, card: Card) -> Macro | None:
-        # In free format a number may stand where the second word belongs.
+    def _read_macro(self, card: Card) -> Macro | None:
+        # In free format a number may stand in the place of the second word.
         is_short = card.data.partition(",")[2].lstrip()[:1] in tuple("0123456789.+-")
         row = self.cards.row(card, Macro.short_fields if is_short else Macro.fields)
         if row is None:
@@ -364,8 +366,8 @@ class Reader:
             source=source,
         )
 
-    def _tables(self, macros: list[Macro]) -> list[LoadTable]:
-        """Read the cards of proportional loads, one for each PROP with a number."""
+    def _read_tables(self, macros: list[Macro]) -> list[LoadTable]:
+        """Read the load tables, one for each PROP with a number."""
         tables: list[LoadTable] = []
         for macro in macros:
             if macro.word != "PROP" or macro.value <= 0:
@@ -383,17 +385,17 @@ class Reader:
         return tables
 
 
-def _other_file(lines: Sequence[str]) -> OtherFile | None:
-    """Return the other program whose files start with these lines, or None."""
+def _identify_program(lines: Sequence[str]) -> OtherFile | None:
+    """Identify the other program that a file belongs to by its first lines; None if unknown."""
     text = "\n".join(line.lstrip() for line in lines[:FIRST_LINES])
     if re.search(rf"^{TITLE}", text, re.MULTILINE):
         return None
-    matches = (o for o in OTHER_FILES if re.search(f"^(?:{o.lines})", text, re.I | re.M))
+    matches = (file for file in OTHER_FILES if re.search(f"^(?:{file.lines})", text, re.I | re.M))
     return next(matches, None)
 
 
-def _close(word: str, keywords: list[str]) -> list[str]:
-    import difflib  # 1 ms, and only what is misspelt needs it
+def _close_matches(word: str, keywords: list[str]) -> list[str]:
+    import difflib  # takes 1 ms; only a misspelt word needs it
 
     return difflib.get_close_matches(word, keywords, 1, 0.6)
 
@@ -404,18 +406,18 @@ def read_deck(path_or_text: str | Path | AnyFile) -> Deck | list[Deck]:
     Parameters
     ----------
     path_or_text : str, Path or file
-        A file's path; the deck's text, which has a line end in it; or a file that is open as text
-        or bytes, such as :class:`io.StringIO`.
+        Path of a file, text of a deck with at least one line end, or a file that is open as text or
+        bytes, such as :class:`io.StringIO`.
 
     Returns
     -------
     Deck or list of Deck
-        The problem, or a list if the file contains several.
+        The problem, or a list of the problems if the file has several.
 
     Raises
     ------
     DeckError
-        If the deck has errors; it carries all of them.
+        If the deck has errors. The exception has all of them.
     OSError
         If the file can't be read.
 

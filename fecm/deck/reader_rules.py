@@ -1,7 +1,7 @@
-"""Rules of reading cards: the frame of the file, numbers, counts, macros.
+"""Texts of the codes for faults in cards: frame of the file, numbers, counts, macros.
 
-The reader, the cards and the grammar of the macros report these codes. Only the modules that show
-their text import this one.
+The reader, the cards and the grammar of the macros report these codes. Only modules that show the
+texts import this module.
 """
 
 from __future__ import annotations

@@ -1,8 +1,8 @@
-"""Rules: the meaning of each code of a finding, beside the function that finds it.
+"""Rules: the codes of findings, their texts, and the functions that find the faults.
 
-Most rules are functions, decorated with :func:`rule`, that check a segment or a problem and yield a
-:class:`Report` for each fault. The docstring is the text of the rule. Faults in cards that are
-being read have no such function; ``reader_rules.py`` declares their codes.
+Most rules are functions with the decorator :func:`rule`. Such a function checks a segment or a
+problem and yields a :class:`Report` for each fault. Its docstring is the text of the rule. Faults
+that the reader itself finds have no such function; ``reader_rules.py`` declares their codes.
 ``fecm/problem/findings_page.py`` generates the page ``docs/findings.md`` from the declarations.
 """
 
@@ -18,7 +18,7 @@ P = ParamSpec("P")
 
 
 class Subject(StrEnum):
-    """Subjects of rules: the headings of the page, in its order."""
+    """Subjects of rules. They are the headings of the page of findings, in this order."""
 
     FRAME = "Frame of the file"
     NUMBERS = "Numbers"
@@ -43,7 +43,7 @@ class Rule(NamedTuple):
 
 
 class Report(NamedTuple):
-    """Fault found by a rule: the finding without its code."""
+    """Fault that a rule found: a finding without its code."""
 
     message: str
     place: CardPlace | None = None
@@ -51,21 +51,18 @@ class Report(NamedTuple):
 
 
 Reports: TypeAlias = Iterator[Report]
-RULES: dict[str, Rule] = {}  # rules of the modules that are imported, by code
+RULES: dict[str, Rule] = {}  # rules of all imported modules, by code
 
 
 def declare(code: str, subject: Subject, summary: str, *, remedy: str, cause: str = "") -> None:
-    """Declare the text of a code.
-
-    Raises ValueError if the code is taken.
-    """
+    """Declare the text of a code; raise ValueError if another rule has the code."""
     if code in RULES:
         raise ValueError(f"the code {code} is taken: {RULES[code].summary}")
     RULES[code] = Rule(code, subject, summary, remedy, cause)
 
 
 def reports(code: str) -> Callable[[Callable[P, Reports]], Callable[P, list[Finding]]]:
-    """Give the reports of a function a code that is declared elsewhere."""
+    """Decorate a function to return its reports as findings with a code declared elsewhere."""
 
     def decorate(function: Callable[P, Reports]) -> Callable[P, list[Finding]]:
         def find(*args: P.args, **kwargs: P.kwargs) -> list[Finding]:
@@ -80,10 +77,10 @@ def reports(code: str) -> Callable[[Callable[P, Reports]], Callable[P, list[Find
 def rule(
     code: str, subject: Subject
 ) -> Callable[[Callable[P, Reports]], Callable[P, list[Finding]]]:
-    """Declare a code by the docstring of a function, and give it to the function's reports.
+    """Decorate a function as the rule of a code, with its docstring as the text of the code.
 
-    The first paragraph of the docstring is the summary. The last one starts with "Remedy:". The
-    paragraphs between them are the cause.
+    The first paragraph of the docstring is the summary. The last paragraph starts with "Remedy:".
+    The paragraphs between them are the cause.
     """
 
     def decorate(function: Callable[P, Reports]) -> Callable[P, list[Finding]]:
@@ -104,7 +101,7 @@ def apply(
     *args: P.args,
     **kwargs: P.kwargs,
 ) -> bool:
-    """Apply rules one after the other; return whether they found no error."""
+    """Apply rules one after the other; return True if they find no error."""
     before = findings.error_count
     for rule_function in rules:
         findings.extend(rule_function(*args, **kwargs))
@@ -117,8 +114,8 @@ def apply_first(
     *args: P.args,
     **kwargs: P.kwargs,
 ) -> None:
-    """Apply rules up to the first with a finding; the others would repeat it."""
+    """Apply rules up to the first rule with a finding; later rules would only repeat it."""
     for rule_function in rules:
-        if has_findings := rule_function(*args, **kwargs):
-            findings.extend(has_findings)
+        if results := rule_function(*args, **kwargs):
+            findings.extend(results)
             return

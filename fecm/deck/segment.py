@@ -1,4 +1,4 @@
-"""Segments: a keyword card and the data that follow it, read from cards and written."""
+"""Segments: keyword cards with their data. This module reads and writes them as cards."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class CardStream:
     keywords : collection of str
         Keywords that end the data of a segment.
     blanks_are_zeros : bool
-        Whether blanks inside numbers are read as the zeros that they were on the report's machine.
+        Whether a blank inside a number is read as a zero, as on the report's machine.
     keeps_values : bool
         Whether :attr:`read` keeps the fields and values of every card.
     """
@@ -52,13 +52,13 @@ class CardStream:
         self.position: int = 0  # number of cards taken
         self.findings: Findings = Findings()
         self.read: dict[int, tuple[Fields, Sequence[Value]]] = {}  # by line number
-        self.control: Control  # of the problem that is read, once its control card was
-        # Keywords of the problem's segments with unreadable cards.
+        self.control: Control  # of the current problem, from its control card on
+        # Keywords of segments of the current problem that have unreadable cards.
         self.unsound: set[str] = set()
 
     @property
     def at_end(self) -> bool:
-        """Whether every card was taken."""
+        """Whether all cards have been taken."""
         return self.position == len(self._cards)
 
     @property
@@ -82,7 +82,7 @@ class CardStream:
         return Card(*self._cards[self.position - 1])
 
     def take_filled(self) -> Card | None:
-        """Return the next card that is not blank, or None as in :meth:`take`."""
+        """Return the next card that is not blank; None as in :meth:`take`."""
         while not self.at_end and not self._cards[self.position][1].strip():
             self.position += 1
         while (card := self.take()) is not None and card.is_blank:
@@ -94,13 +94,13 @@ class CardStream:
         self.position -= 1
 
     def peek(self) -> Card | None:
-        """Return the next card as in :meth:`take`; the card stays in the stream."""
+        """Return the next card as :meth:`take` does, but leave it in the stream."""
         if (card := self.take()) is not None:
             self.give_back()
         return card
 
     def take_data(self) -> Card | None:
-        """Return the next card; None for a keyword card, which stays, or as in :meth:`take`."""
+        """Return the next card; None as in :meth:`take`, or before a keyword card, which stays."""
         card = self.take()
         if card is None or not card.is_keyword:
             return card
@@ -113,7 +113,7 @@ class CardStream:
             pass
 
     def row(self, card: Card, fields: Fields) -> tuple[list[Value], CardSource] | None:
-        """Return the values of a card and their source; None after an error, which is reported."""
+        """Return the values of a card and their source; report an error and return None."""
         values = read_values(card, fields, self.findings, blanks_are_zeros=self._blanks_are_zeros)
         if values is None:
             return None
@@ -122,7 +122,7 @@ class CardStream:
         return values, CardSource(card, fields)
 
     def record(self, card: Card, kind: type[_R], fields: Fields | None = None) -> _R | None:
-        """Return the record of a card; None after an error, which is reported."""
+        """Return the record of a card; report an error and return None."""
         row = self.row(card, fields or kind.fields)
         return None if row is None else kind.from_row(*row)
 
@@ -139,7 +139,7 @@ class CardStream:
         return record
 
     def until_blank(self, head: Card, kind: type[_R]) -> tuple[_R, ...]:
-        """Return the records of a segment's cards up to a blank card."""
+        """Return the records of the cards of a segment up to a blank card."""
         records: list[_R] = []
         while (card := self.take_data()) is not None and not card.is_blank:
             if (record := self.record(card, kind)) is None:
@@ -152,22 +152,22 @@ class CardStream:
     def table(
         self, head: Card, kind: type[_R], fields: Fields, is_last: Callable[[_R], bool]
     ) -> CardTable[_R]:
-        """Return the records of cards of numbers up to a blank card, or up to a last one."""
+        """Return the records of cards of numbers, up to a blank card or after a last record."""
         reader = TableReader(fields)
-        self._take_table(reader)
+        self._take_block(reader)
         while (card := self.take_data()) is not None and not card.is_blank:
             if (row := self.row(card, fields)) is None:
                 self.unsound.add(head.keyword)
             else:
                 reader.add((card.line, card.text), [float(value) for value in row[0]])
-            self._take_table(reader)
+            self._take_block(reader)
         table = CardTable(kind, fields, reader.values, reader.lines)
         if not (table and is_last(table[-1])):
             self.end(head, card)
         return table
 
-    def _take_table(self, reader: TableReader) -> None:
-        """Take the cards that are read in a block, if any."""
+    def _take_block(self, reader: TableReader) -> None:
+        """Take the next cards that `reader` can read as a block, if any."""
         if self.findings.closed:
             return
         count = reader.take(self._cards, self.position)
@@ -176,7 +176,7 @@ class CardStream:
             self.read.update(reader.last_rows(count))
 
     def end(self, head: Card, card: Card | None) -> None:
-        """Report that no blank card ends a segment if `card`, which should be blank, is None."""
+        """Report a segment that does not end with a blank card: `card` is then None."""
         if card is None:
             following = self.peek()
             message = f"The {head.keyword} cards are not ended by a blank card."
@@ -186,10 +186,10 @@ class CardStream:
 
 @dataclass(frozen=True)
 class Segment(Record):
-    """Keyword card and the data that follow it: by default one card, the segment's own values."""
+    """Keyword card and its data: by default one card with the values of the segment."""
 
     keyword: ClassVar[str]
-    # Whether its card of data begins with a letter, as a keyword card does.
+    # Whether the card of data begins with a letter, as a keyword card does.
     is_worded: ClassVar[bool] = False
 
     def __init_subclass__(cls, keyword: str = "") -> None:
@@ -198,7 +198,7 @@ class Segment(Record):
 
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self | None:
-        """Read the cards after the keyword card `head`; None after an error, which is reported."""
+        """Read the cards after the keyword card `head`; report an error and return None."""
         return cards.single(head, cls)
 
     def cards(self, control: Control) -> Iterator[str]:
@@ -209,9 +209,9 @@ class Segment(Record):
 
 @dataclass(frozen=True)
 class NumberedSegment(Segment, Generic[_R]):
-    """Segment of any number of cards, ended by a blank one.
+    """Segment of any number of cards, ended by a blank card.
 
-    The records are a tuple, or a sequence that compares and hashes like one.
+    The records are a tuple, or a sequence that compares and hashes like a tuple.
     """
 
     records: Sequence[_R]
@@ -223,7 +223,7 @@ class NumberedSegment(Segment, Generic[_R]):
 
     @classmethod
     def of(cls, control: Control, cards: NDArray[Any]) -> Self:
-        """Return the segment with the values of its cards, (cards, fields)."""
+        """Build the segment from the values of its cards, (cards, fields)."""
         kind = cast("type[_R]", cls.record)
         return cls(
             CardTable(kind, cls.card_fields(control), array("d", cards.astype(float).tobytes()))
@@ -236,16 +236,16 @@ class NumberedSegment(Segment, Generic[_R]):
 
     @classmethod
     def is_last(cls, record: Record, control: Control) -> bool:
-        """Return whether a card ends the segment, so that no blank one must follow."""
+        """Return whether a card ends the segment without a blank card."""
         return False
 
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self | None:
-        """Read the cards up to a blank one; unreadable cards are reported and left out."""
+        """Read the cards up to a blank card; report and leave out unreadable cards."""
         control = cards.control
         fields = cls.card_fields(control)
         records = cards.table(head, cls.record, fields, lambda r: cls.is_last(r, control))
-        # No class variable can have the type of the class's parameter.
+        # A class variable can't have the type parameter of its class.
         return cls(cast("CardTable[_R]", records), source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:

@@ -1,7 +1,7 @@
-"""Cards of numbers by the thousand: read and written in blocks, and kept in one array.
+"""Tables: thousands of cards of numbers, read and written in blocks, and stored in one array.
 
-A line is read here only if :func:`fecm.deck.values.read_values` would read the same numbers from it
-and report nothing. Every other line is left to that function.
+This module reads a line only if :func:`fecm.deck.values.read_values` would read the same numbers
+from it without a finding. All other lines are left to that function.
 """
 
 from __future__ import annotations
@@ -29,13 +29,13 @@ _R = TypeVar("_R", bound=Record)
 Line = tuple[int, str]  # a line's number in the file, and its text
 Match = Callable[[str], re.Match[str] | None]
 
-# Numbers between commas, short enough to be finite and to fit their kind.
+# Numbers between commas. They are short enough to be finite and to fit their type.
 _INTEGER = "[+-]?[0-9]{1,9}"
 _REAL = r"[+-]?(?:[0-9]{1,20}(?:\.[0-9]{0,30})?|\.[0-9]{1,30})(?:[Ee][+-]?[0-9]{1,2})?"
 
 
 class CardTable(Sequence[_R]):
-    """Records of cards of numbers, in one array; a record is created when it is accessed.
+    """Records of cards of numbers, in one array; access to a record creates it.
 
     The table compares, hashes and prints as the tuple of its records.
 
@@ -44,9 +44,9 @@ class CardTable(Sequence[_R]):
     kind : type of Record
         Class of the records.
     fields : tuple of Field
-        Fields of a card, all of them numbers.
+        Fields of a card; all are numbers.
     values : array of float
-        Values of the cards, one after the other.  Integers of cards are exact in double precision.
+        Values of the cards, one card after the other. The integers are exact in double precision.
     lines : list of tuple, optional
         Number and text of each card's line; empty for records built in Python.
     """
@@ -65,7 +65,7 @@ class CardTable(Sequence[_R]):
         return len(self.fields)
 
     def rows(self) -> Iterator[list[float]]:
-        """Yield the values of each card, integers as such."""
+        """Yield the values of each card; integer fields give integers."""
         return _rows(self.fields, self.values)
 
     def __len__(self) -> int:
@@ -105,8 +105,8 @@ class CardTable(Sequence[_R]):
 
 def _rows(fields: Fields, values: array[float]) -> Iterator[list[float]]:
     whole = [i for i, field in enumerate(fields) if field.kind is FieldKind.INTEGER]
-    for begin in range(0, len(values), len(fields)):
-        row = values[begin : begin + len(fields)].tolist()
+    for start in range(0, len(values), len(fields)):
+        row = values[start : start + len(fields)].tolist()
         for i in whole:
             row[i] = int(row[i])
         yield row
@@ -116,14 +116,14 @@ def _rows(fields: Fields, values: array[float]) -> Iterator[list[float]]:
 
 
 class TableReader:
-    """Reader of lines that hold nothing but the numbers of some fields."""
+    """Reader of lines that have numbers in given fields and nothing else."""
 
     def __init__(self, fields: Fields) -> None:
         self.fields = fields
         self.values = array("d")
         self.lines: list[Line] = []
 
-    # Most decks need one of the two, which takes 1 ms.
+    # Compiling a pattern takes 1 ms, and most decks need only one of the two.
 
     @cached_property
     def _in_columns(self) -> Match:
@@ -133,11 +133,11 @@ class TableReader:
     def _with_commas(self) -> Match:
         return _with_commas(self.fields).fullmatch
 
-    def take(self, lines: Sequence[Line], begin: int) -> int:
-        """Read lines from `begin` on up to one that it can't read; return their number."""
+    def take(self, lines: Sequence[Line], start: int) -> int:
+        """Read lines from `start` on, up to the first unreadable one; return their number."""
         values = self.values
-        end = begin
-        for end in range(begin, len(lines)):
+        end = start
+        for end in range(start, len(lines)):
             line = lines[end][1]
             match = self._with_commas if "," in line else self._in_columns
             if (matched := match(line)) is None:
@@ -150,33 +150,33 @@ class TableReader:
                 break
         else:
             end = len(lines)
-        self.lines += lines[begin:end]
-        return end - begin
+        self.lines += lines[start:end]
+        return end - start
 
     def add(self, line: Line, row: Sequence[float]) -> None:
-        """Add a line that was read elsewhere."""
+        """Add a line that another reader has read."""
         self.values.extend(row)
         self.lines.append(line)
 
     def last_rows(self, count: int) -> Iterator[tuple[int, tuple[Fields, Sequence[Value]]]]:
-        """Yield line number, fields and values of the last lines."""
-        begin = len(self.values) - count * len(self.fields)
-        rows = _rows(self.fields, self.values[begin:])
+        """Yield line number, fields and values of the last `count` lines."""
+        start = len(self.values) - count * len(self.fields)
+        rows = _rows(self.fields, self.values[start:])
         lines = self.lines[len(self.lines) - count :]
         for (number, _), row in zip(lines, rows, strict=True):
             yield number, (self.fields, row)
 
 
-# Patterns of a line have a group for each field, without a match where the field is blank.  The
-# first field is not blank.
+# The pattern of a line has a group for each field. The group of a blank field has no match. The
+# first field is never blank.
 
 
 @cache
 def _in_columns(fields: Fields) -> re.Pattern[str]:
-    """Return the pattern of a line in columns.
+    """Return the pattern of a line in fixed columns.
 
-    A number ends with its field, so that a number that touches the one before it fills its field. A
-    match need not be a number; `float` decides.
+    A number ends in the last column of its field. If two numbers touch, the second therefore fills
+    its field. The pattern accepts some texts that are not numbers; `float` decides.
     """
     rest = ""
     for before, field in reversed(list(pairwise(fields))):
@@ -197,20 +197,22 @@ def _with_commas(fields: Fields) -> re.Pattern[str]:
 
 
 def _number(field: Field) -> str:
-    """Return the pattern of a field whose last column is not blank."""
+    """Return the pattern of a field with a number up to its last column."""
     width = field.width
     if field.kind is FieldKind.INTEGER:
         return f"[ 0-9+-]{{{width - 1}}}[0-9]"
-    begin = "[ 0-9.+-]"
-    exponents = f"{begin}{{{width - 4}}}[Ee][+-][0-9]{{2}}|{begin}{{{width - 3}}}[Ee][0-9+-][0-9]"
-    return f"{begin}{{{width - 1}}}[0-9.]|{exponents}|{begin}{{{width - 2}}}[Ee][0-9]"
+    mantissa = "[ 0-9.+-]"
+    two_digits = f"{mantissa}{{{width - 4}}}[Ee][+-][0-9]{{2}}"
+    two_characters = f"{mantissa}{{{width - 3}}}[Ee][0-9+-][0-9]"
+    one_digit = f"{mantissa}{{{width - 2}}}[Ee][0-9]"
+    return f"{mantissa}{{{width - 1}}}[0-9.]|{two_digits}|{two_characters}|{one_digit}"
 
 
 # Writing ------------------------------------------------------------------------------------------
 
 
 def write_rows(table: CardTable[_R]) -> Iterator[str]:
-    """Write the cards of a table as :func:`fecm.deck.card.write_card` writes each."""
+    """Yield the cards of a table, in the form that :func:`fecm.deck.card.write_card` gives."""
     template = ""
     column = 0
     for field in table.fields:

@@ -1,7 +1,7 @@
-"""Systems of units by names such as ``mm-N-s``, and names of units for output and axes.
+"""Systems of units with names such as ``mm-N-s``, and names of units for output and axes.
 
-Numbers are never converted, except that text and pictures show masses in g and energies in J where
-the deck's own units are powers of ten of these.
+The numbers of a deck are never converted. Text and pictures show masses in g and energies in J if
+the units of the deck differ from these by powers of ten.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from fecm._errors import FecmError
 from fecm._text import DIGITS, printable, significant
 from fecm.deck.model import Deck, Units
 
-# Units that are known by name, in m, N and s.
+# Known units, in m, N and s.
 KNOWN = {
     "length": {
         "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "µm": 1e-6,
@@ -28,7 +28,7 @@ KNOWN = {
     },
     "time": {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6},
 }  # fmt: skip
-# Units that take prefixes: base unit and power of ten.
+# Units that take prefixes, with their base unit and power of ten.
 PREFIXED = {
     "s": ("s", 0), "ms": ("s", -3), "us": ("s", -6), "µs": ("s", -6),
     "m": ("m", 0), "mm": ("m", -3), "N": ("N", 0), "kN": ("N", 3), "J": ("J", 0),
@@ -37,7 +37,6 @@ PREFIXED = {
     "N*ms^2/mm": ("g", 0), "kN*ms^2/mm": ("g", 3),
 }  # fmt: skip
 PREFIXES = {-12: "p", -9: "n", -6: "µ", -3: "m", 0: "", 3: "k", 6: "M", 9: "G"}
-# Units of products and quotients that have a name of their own, in m, N and s.
 # Dimensions.
 MASS = "force*time^2/length"
 MODULUS = "force/length^2"
@@ -45,7 +44,7 @@ TOUGHNESS = "force/length"
 DENSITY = "force*time^2/length^4"
 VELOCITY = "length/time"
 COEFFICIENT = "force/length^1.5"  # of Hertz's law
-# Named units of dimensions, in m, N and s.
+# Units of products and quotients that have their own names, in m, N and s.
 NAMED = {
     "force*length": {"J": 1.0, "mJ": 1e-3, "kJ": 1e3},
     MASS: {"kg": 1.0, "g": 1e-3, "t": 1e3},
@@ -55,16 +54,16 @@ NAMED = {
 
 
 def unit_names(deck: Deck) -> dict[str, str]:
-    """Return the names of the units of length, force and time; empty if the deck gives none.
+    """Return the names of the units of length, force and time; empty if the deck has no units.
 
-    Known units in capitals or small letters, such as MM, get their usual names.
+    A known unit gets its usual name, whatever its capitals: MM is mm.
     """
     units = deck.last(Units)
-    return {} if units is None else {n: _usual(n, getattr(units, n)) for n in Units.NAMES}
+    return {} if units is None else {n: _usual_name(n, getattr(units, n)) for n in Units.NAMES}
 
 
-def _usual(dimension: str, name: str) -> str:
-    """Return the usual name of a unit; the name itself if it is ambiguous without its capitals."""
+def _usual_name(dimension: str, name: str) -> str:
+    """Return the usual name of a unit; the name itself if only its capitals tell two apart."""
     alike = [unit for unit in KNOWN[dimension] if unit.casefold() == name.casefold()]
     return alike[0] if len(alike) == 1 and name not in KNOWN[dimension] else name
 
@@ -76,7 +75,7 @@ def declared_units(attributes: Mapping[str, Any]) -> dict[str, str]:
 
 
 def unit_of(dimension: str, names: dict[str, str]) -> str:
-    """Return the unit of a dimension: ``lbf/in`` of ``force/length``; empty without names."""
+    """Return the unit of a dimension: ``lbf/in`` for ``force/length``; empty without names."""
     if not names or not dimension:
         return ""
     return re.sub(r"length|force|time", lambda match: names[match[0]], dimension)
@@ -95,8 +94,8 @@ def short_name(unit: str) -> str:
 def in_si(dimension: str, names: dict[str, str]) -> float | None:
     """Return the size in m, N and s of one unit of a dimension such as ``force*time^2/length^4``.
 
-    The dimension has at most one division. Returns None where the deck names no units, or one that
-    is not in :data:`KNOWN`.
+    The dimension has at most one division. Returns None if a name is missing or not in
+    :data:`KNOWN`.
     """
     value = 1.0
     for sign, product in zip((1.0, -1.0), dimension.split("/"), strict=False):
@@ -123,12 +122,12 @@ def unit_in_si(unit: str, dimension: str) -> float | None:
 
 
 def thousands(value: float) -> int:
-    """Return the power of ten, a multiple of 3, that leaves 1 to 1000 of a positive value."""
+    """Return the power of ten, a multiple of 3, that scales a positive value to 1 to 1000."""
     return 3 * math.floor(math.log10(value) / 3.0)
 
 
 def with_prefix(unit: str, power: int) -> str:
-    """Return the name of 10^power of a unit, as kN of 10^3 N; empty if it has none."""
+    """Return the name of a unit times 10^power: kN for 10^3 N; empty if there is no name."""
     base, power_of_unit = PREFIXED.get(unit, ("", 0))
     if not base or power + power_of_unit not in PREFIXES:
         return ""
@@ -143,9 +142,9 @@ def quantity(value: float, unit: str, digits: int = DIGITS) -> str:
 
 
 def readable(value: float, unit: str, digits: int = DIGITS) -> tuple[int, str]:
-    """Return power of ten and name of the unit in which a mass or an energy has few digits.
+    """Return the power of ten and the name of a convenient unit for a mass or an energy.
 
-    Other values have 0 and `unit`.
+    For other quantities they are 0 and `unit`.
     """
     base, _ = PREFIXED.get(unit, ("", 0))
     if base in ("g", "J") and 0.0 < abs(value) < math.inf:
@@ -156,14 +155,14 @@ def readable(value: float, unit: str, digits: int = DIGITS) -> tuple[int, str]:
 
 
 def mass_in_si(mass: float, names: dict[str, str]) -> str:
-    """Format a mass in g, kg or t; empty if the deck's units are not known."""
+    """Format a mass in g, kg or t; empty if the units of the deck are not known."""
     unit = in_si(MASS, names)
     return "" if unit is None else quantity(mass * unit, "N*s^2/m")
 
 
-# Systems that help and completion name; any other of known units is accepted.
+# Systems in the help and the completion. Any other system of known units is accepted too.
 NAMES = ("in-lbf-s", "m-N-s", "mm-N-s", "mm-kN-ms", "mm-N-ms")
-# Units of mass in kg, from which the unit of force may follow.
+# Units of mass in kg. A system may name the mass instead of the force.
 MASSES = {"kg": 1.0, "g": 1e-3, "mg": 1e-6, "t": 1e3, "tonne": 1e3}
 FORM = "length, force and time, as in mm-N-s, or length, time and mass, as in mm-ms-kg"
 
@@ -174,7 +173,7 @@ class UnitsError(FecmError, ValueError):
 
 @lru_cache
 def system_named(name: str) -> str:
-    """Return the name of a system as length, force and time, given in any order.
+    """Return the name of a system as length, force and time; the argument may have any order.
 
     Raises
     ------
@@ -208,7 +207,7 @@ def system_named(name: str) -> str:
 def force_of(mass: str, length: str, time: str) -> str:
     """Return the unit of force that accelerates a unit of mass by length over time squared.
 
-    It is empty if it has no name, or a unit is unknown.
+    Returns an empty text if the force has no name or a unit is unknown.
     """
     if mass not in MASSES or length not in KNOWN["length"] or time not in KNOWN["time"]:
         return ""
@@ -222,9 +221,9 @@ def units_of(system: str) -> dict[str, str]:
     return dict(zip(Units.NAMES, system_named(system).split("-"), strict=True))
 
 
-def convert(value: float, dimension: str, system: str, other: str) -> float:
-    """Return a value in another system of units, with the digits of a card's field."""
-    before, after = in_si(dimension, units_of(system)), in_si(dimension, units_of(other))
+def convert(value: float, dimension: str, system: str, target: str) -> float:
+    """Convert a value to another system of units, with the digits of a field of a card."""
+    before, after = in_si(dimension, units_of(system)), in_si(dimension, units_of(target))
     if before is None or after is None:
         raise LookupError(f"no unit of {dimension}")
     return value if before == after else float(f"{value * (before / after):.6g}")

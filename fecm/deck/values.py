@@ -1,4 +1,4 @@
-"""Values of a card, or findings that say what is wrong with a value and how to write it."""
+"""Values of a card, and findings that explain what is wrong with a value and how to write it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from fecm.deck.card import (
 from fecm.deck.findings import CardPlace, Findings
 
 LARGEST_INTEGER = 2**31 - 1
-# Looking a member up in its enumeration would take a tenth of the time of reading a deck.
+# Looking up the members of the enumeration would take a tenth of the time of reading a deck.
 INTEGER = FieldKind.INTEGER
 WORD = FieldKind.WORD
 
@@ -30,10 +30,10 @@ WORD = FieldKind.WORD
 def read_values(
     card: Card, fields: Fields, findings: Findings, *, blanks_are_zeros: bool = False
 ) -> list[Value] | None:
-    """Read the values of a card, one per field; None after an error, which is reported.
+    """Read the values of a card, one per field; report an error and return None.
 
-    With `blanks_are_zeros` a blank inside a number is read as zero, as on the report's machine,
-    with a warning. Otherwise it is an error where it would change the value.
+    With `blanks_are_zeros` a blank inside a number is read as a zero, as on the report's machine,
+    with a warning. Otherwise such a blank is an error if it would change the value.
     """
     if "\t" in card.data:
         column = card.data.index("\t") + 1
@@ -43,7 +43,7 @@ def read_values(
         return None
     is_free = card.is_free
     if not is_free:
-        misplaced = _misplaced(card, fields, cut_is_meant=blanks_are_zeros)
+        misplaced = _find_misplaced(card, fields, cuts_numbers=blanks_are_zeros)
         if misplaced is not None:
             _report_misplaced(misplaced, card, fields, findings)
             return None
@@ -57,9 +57,9 @@ def read_values(
     value: Value | None
     for field, text in zip(fields, texts, strict=False):  # more texts than fields
         if field.kind is WORD:
-            value = _word(field, text, source, findings)
+            value = _read_word(field, text, source, findings)
         else:
-            value = _number(field, text, source, findings, blanks_are_zeros=zeros)
+            value = _read_number(field, text, source, findings, blanks_are_zeros=zeros)
         if value is not None:
             values.append(value)
         elif _hint_of_separators(card, fields):  # one cause, one finding
@@ -70,7 +70,7 @@ def read_values(
 def _ends_with_its_fields(card: Card, fields: Fields, findings: Findings) -> bool:
     """Return whether a card has no more values than fields.
 
-    More values in fixed columns are a warning only.
+    In fixed columns, more values cause only a warning.
     """
     if card.is_free:
         pieces = card.cut(fields)[len(fields) :]
@@ -91,8 +91,8 @@ def _ends_with_its_fields(card: Card, fields: Fields, findings: Findings) -> boo
     return True
 
 
-def _word(field: Field, text: str, source: CardSource, findings: Findings) -> str | None:
-    """Return the word of a field, or None after reporting that it is too long."""
+def _read_word(field: Field, text: str, source: CardSource, findings: Findings) -> str | None:
+    """Return the word of a field; report a word that is too long and return None."""
     word = text.rstrip()
     if len(word) <= field.width:
         return word
@@ -101,10 +101,13 @@ def _word(field: Field, text: str, source: CardSource, findings: Findings) -> st
     return None
 
 
-def _number(
+def _read_number(
     field: Field, text: str, source: CardSource, findings: Findings, *, blanks_are_zeros: bool
 ) -> Value | None:
-    """Return a field's number, :data:`BLANK` for a blank with a default, or None after an error."""
+    """Return the number of a field; report an error and return None.
+
+    A blank field is 0, or :data:`BLANK` if it has a default.
+    """
     is_integer = field.kind is INTEGER
     parse = parse_integer if is_integer else parse_real
     written = text.strip()
@@ -174,18 +177,22 @@ def _report_blank(
 
 
 class _Misplaced(NamedTuple):
-    """Text that is not within its field."""
+    """Text that is not inside its field."""
 
     code: str
     message: str
-    first: int  # its columns
+    # First and last column.
+    first: int
     last: int
-    width: int  # of the field that is meant
+    width: int  # width of the intended field
     hint: str = "right-justify each number in its own columns"
 
 
-def _misplaced(card: Card, fields: Fields, *, cut_is_meant: bool) -> _Misplaced | None:
-    """Return the first text that crosses the end of its field; numbers may with `cut_is_meant`."""
+def _find_misplaced(card: Card, fields: Fields, *, cuts_numbers: bool) -> _Misplaced | None:
+    """Return the first text that lies between fields or crosses the end of its field.
+
+    With `cuts_numbers` a number may cross the end of its field, which cuts it.
+    """
     data = card.data
     for field, following in pairwise(fields):
         gap = data[field.last : following.first - 1]
@@ -198,7 +205,7 @@ def _misplaced(card: Card, fields: Fields, *, cut_is_meant: bool) -> _Misplaced 
             message = f"Column {column} belongs to no field; it has `{data[column - 1]}`."
             hint = f"cols {target.first}-{target.last} are the next field: {target.name}"
             return _Misplaced("E108", message, first, last, target.width, hint)
-        if gap or cut_is_meant or following.kind is WORD:
+        if gap or cuts_numbers or following.kind is WORD:
             continue
         if not _is_joined(data, field.last):
             continue
@@ -207,11 +214,11 @@ def _misplaced(card: Card, fields: Fields, *, cut_is_meant: bool) -> _Misplaced 
             message = f"The number `{data[first - 1 : last]}` straddles two fields."
             width = max(field.width, following.width)
             return _Misplaced("E105", message, first, last, width)
-    return None if cut_is_meant else _misplaced_in_last(data, fields[-1])
+    return None if cuts_numbers else _find_cut_number(data, fields[-1])
 
 
-def _misplaced_in_last(data: str, field: Field) -> _Misplaced | None:
-    """Return a number that crosses the end of the last field and differs without its end."""
+def _find_cut_number(data: str, field: Field) -> _Misplaced | None:
+    """Return a number that crosses the end of the last field and has another value if cut there."""
     if not _is_joined(data, field.last):
         return None
     first, last = _run_around(data, field.last)
@@ -241,18 +248,18 @@ def _report_misplaced(
 
 
 def _is_joined(data: str, column: int) -> bool:
-    """Return whether no blank separates a column from the next."""
+    """Return whether a column and the next one are filled."""
     return len(data) > column and " " not in data[column - 1 : column + 1]
 
 
 def _run_around(data: str, column: int) -> tuple[int, int]:
-    """Return first and last column of the text without blanks around a column."""
+    """Return the first and the last column of the text without blanks around a column."""
     end = data.find(" ", column - 1)
     return data.rfind(" ", 0, column) + 2, len(data) if end < 0 else end
 
 
 def _hint_of_separators(card: Card, fields: Fields) -> str:
-    """Return a hint for a card with blanks between values, or decimal commas; else ""."""
+    """Return a hint for a card with blanks between values or with decimal commas; else ""."""
     if card.is_free:
         return _hint_of_points(card, fields)
     words = card.data.split()
@@ -268,7 +275,7 @@ def _hint_of_separators(card: Card, fields: Fields) -> str:
 
 
 def _hint_of_points(card: Card, fields: Fields) -> str:
-    """Return a hint for a card with commas, some of which are decimal points."""
+    """Return a hint for a card with decimal commas between commas that separate values; else ""."""
     pointed = re.sub("(?<=[0-9]),(?=[0-9])", ".", card.data)
     words = pointed.replace(",", " ").split()
     pieces = [text for _, text in card.cut(fields)]
@@ -283,17 +290,17 @@ def _hint_of_points(card: Card, fields: Fields) -> str:
 
 
 def _hint_of_length(card: Card, fields: Fields, length: int, width: int) -> str:
-    """Return a hint for a number that is longer than its field; empty for one that fits."""
+    """Return a hint for a number that is longer than its field; else ""."""
     if length <= width:
         return ""
     too_long = f"the number has {length} characters and its field {width} columns"
     runs = [(match.start() + 1, match[0]) for match in re.finditer(r"[^ ]+", card.data)]
     texts: list[str] = []
-    begin = 0
+    end = 0  # last column of the previous field
     for field in fields:
-        inside = [text for first, text in runs if begin < first <= field.last]
+        inside = [text for first, text in runs if end < first <= field.last]
         if len(inside) > 1:
             return f"{too_long}: separate the values by commas"
         texts += inside or [""]
-        begin = field.last
+        end = field.last
     return f"{too_long}: with commas the card is `{','.join(texts).rstrip(',')}`"

@@ -34,23 +34,23 @@ class NumberedPly(NamedTuple):
 
 @dataclass(frozen=True)
 class Materials(Segment, keyword="MATS"):
-    """MATS: materials in addition to MATE's, a pair of cards each: (I5) and (7F10.0)."""
+    """MATS: further materials after MATE, a pair of cards each: (I5) and (7F10.0)."""
 
     plies: tuple[NumberedPly, ...]
 
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self | None:
-        """Read the pairs of cards up to a blank one."""
-        found: list[NumberedPly] = []
+        """Read the pairs of cards up to a blank card."""
+        plies: list[NumberedPly] = []
         while (card := cards.take_data()) is not None and not card.is_blank:
             number = cards.record(card, MaterialNumber)
             ply = cards.single(head, Ply)
             if number is None or ply is None:
                 cards.unsound.add(head.keyword)
             else:
-                found.append(NumberedPly(number, ply))
+                plies.append(NumberedPly(number, ply))
         cards.end(head, card)
-        return cls(tuple(found), source=CardSource(head))
+        return cls(tuple(plies), source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
         """Return the text of the segment's cards."""
@@ -85,19 +85,19 @@ class NumberedLaminate(NamedTuple):
 
 @dataclass(frozen=True)
 class Laminates(Segment, keyword="LAMS"):
-    """LAMS: laminates in addition to MATE's, (2I5) and the layer cards of each."""
+    """LAMS: further laminates after MATE, each with (2I5) and its layer cards."""
 
     laminates: tuple[NumberedLaminate, ...]
 
     @classmethod
     def read(cls, head: Card, cards: CardStream) -> Self | None:
         """Read the laminates up to a blank card."""
-        found: list[NumberedLaminate] = []
+        laminates: list[NumberedLaminate] = []
         while (card := cards.take_data()) is not None and not card.is_blank:
-            if found and _is_layer(card):
-                last = found[-1]
-                said = f"the {last.head.layers} of laminate {last.number}"
-                message = f"{head.keyword} has more layer cards than {said}."
+            if laminates and _is_layer(card):
+                last = laminates[-1]
+                limit = f"the {last.head.layers} of laminate {last.number}"
+                message = f"{head.keyword} has more layer cards than {limit}."
                 cards.findings.add("E202", message, card.place)
                 cards.unsound.add(head.keyword)
                 cards.skip_data()
@@ -108,15 +108,14 @@ class Laminates(Segment, keyword="LAMS"):
                 message = f"Laminate {number.number} has {number.layers} layers."
                 cards.findings.add("E202", message, number.place("layers"))
             elif number is not None:
-                said = f"laminate {number.number} says"
-                layers = read_layers(head, cards, number.layers, said)
+                layers = read_layers(head, cards, number.layers, f"laminate {number.number} says")
             if number is None or layers is None:
                 cards.unsound.add(head.keyword)
-                cards.skip_data()  # where the next laminate begins is not known
+                cards.skip_data()  # nothing shows where the next laminate begins
                 return None
-            found.append(NumberedLaminate(number, layers))
+            laminates.append(NumberedLaminate(number, layers))
         cards.end(head, card)
-        return cls(tuple(found), source=CardSource(head))
+        return cls(tuple(laminates), source=CardSource(head))
 
     def cards(self, control: Control) -> Iterator[str]:
         """Return the text of the segment's cards."""
@@ -129,18 +128,18 @@ class Laminates(Segment, keyword="LAMS"):
 
 
 def _is_layer(card: Card) -> bool:
-    """Return whether a card in place of a laminate's first has a fibre angle and a thickness."""
+    """Return whether a card looks like a layer card instead of the first card of a laminate."""
     texts = [text.strip() for _, text in card.cut(Layer.fields)]
     return len(texts) > 2 and bool(texts[2]) and not texts[1].isdigit()
 
 
 @dataclass(frozen=True)
 class Zone(Record):
-    """A card of ZONE: (4I5); elements and their laminate."""
+    """ZONE card: (4I5); elements and their laminate."""
 
     first: int
-    last: int  # as first if 0
-    step: int  # 1 if 0
+    last: int  # 0 means `first`
+    step: int  # 0 means 1
     laminate: int
 
     fields: ClassVar[Fields] = layout(
@@ -149,10 +148,10 @@ class Zone(Record):
 
     @property
     def elements(self) -> range:
-        """Numbers of its elements."""
+        """Numbers of the elements."""
         return range(self.first, max(self.last, self.first) + 1, self.step or 1)
 
 
 @dataclass(frozen=True)
 class Zones(NumberedSegment[Zone], keyword="ZONE", record=Zone):
-    """ZONE: laminates of elements; elements without a zone have MATE's."""
+    """ZONE: laminates of elements; elements without a zone have the laminate of MATE."""
