@@ -19,7 +19,7 @@ from fecm.problem.rules.time_step import UNSTABLE
 Value = float | int | str
 Case = dict[str, Value]
 MOST_CASES = 1_000_000
-# Forms and separators of the names whose text is two numbers.
+# Names whose values are texts of two numbers, with the form of the text and its separators.
 PAIRS = {
     "at": ("({},{})", r"[,;\s]+"),
     "size": ("{}x{}", "[xX×]"),
@@ -31,10 +31,7 @@ class CasesError(FecmError, ValueError):
 
 
 def number_of_text(name: str, text: str) -> float:
-    """Return the finite number of a text.
-
-    Raises CasesError if the text is not a finite number.
-    """
+    """Parse a finite number; raise CasesError if the text is not one."""
     with suppress(ValueError):
         if math.isfinite(value := float(text)):
             return value
@@ -42,9 +39,9 @@ def number_of_text(name: str, text: str) -> float:
 
 
 def pair_of_text(name: str, text: str) -> tuple[float, float]:
-    """Return the two numbers of a text such as ``(3,2)`` or ``6x4``.
+    """Parse a text of two numbers, such as ``(3,2)`` or ``6x4``.
 
-    Raises CasesError if the text has no two numbers.
+    Raises CasesError if the text does not have two numbers.
     """
     form, separators = PAIRS[name]
     parts = re.split(separators, text.strip().removeprefix("(").removesuffix(")").strip())
@@ -54,13 +51,13 @@ def pair_of_text(name: str, text: str) -> tuple[float, float]:
 
 
 def normal_pair(name: str, text: str) -> str:
-    """Return the text of two numbers in its usual form."""
+    """Return a text of two numbers in its usual form."""
     form, _ = PAIRS[name]
     return form.format(*(repr(value).removesuffix(".0") for value in pair_of_text(name, text)))
 
 
 def check_count(count: int, cases: str = "") -> None:
-    """Raise CasesError if there are no cases or too many; `cases` names them."""
+    """Raise CasesError if there are no cases or too many; `cases` names them in the message."""
     if not count:
         raise CasesError("a sweep needs at least one case")
     if count > MOST_CASES:
@@ -68,10 +65,7 @@ def check_count(count: int, cases: str = "") -> None:
 
 
 def check_deck(deck: Deck) -> Problem:
-    """Check a complete deck.
-
-    Raises CasesError with the first error of the deck.
-    """
+    """Check a complete deck; raise CasesError with its first error."""
     findings = Findings()
     checked = check_problem(ParsedProblem(deck), findings)
     raise_first(findings)
@@ -80,14 +74,14 @@ def check_deck(deck: Deck) -> Problem:
 
 
 def raise_first(findings: Findings) -> None:
-    """Raise the first error as the error of a case."""
+    """Raise CasesError with the first error, if there is one."""
     if findings.errors:
         first = findings.errors[0]
         remedy = " Vary dt=auto, or take DT 0." if first.code == UNSTABLE else ""
         raise CasesError(f"{first.message}{remedy}")
 
 
-THRESHOLD = "threshold"  # instead of a number: the delamination threshold
+THRESHOLD = "threshold"  # the delamination threshold, in place of a number
 PEAK_FORCE = "peak_force"
 NO_THRESHOLD = (
     "the threshold needs a DELA segment and a plate without a core, which the deck does not have"
@@ -102,10 +96,7 @@ class Limit(NamedTuple):
 
 
 def parse_exceed(text: str) -> Limit:
-    """Parse ``QUANTITY=NUMBER`` or ``peak_force=threshold``.
-
-    Raises CasesError if the text is neither.
-    """
+    """Parse ``QUANTITY=NUMBER`` or ``peak_force=threshold``; raise CasesError for other texts."""
     name, _, value = (part.strip() for part in text.partition("="))
     if not name or not value or (value == THRESHOLD and name != PEAK_FORCE):
         raise CasesError(f"`{text}`: write QUANTITY=NUMBER or {PEAK_FORCE}={THRESHOLD}")

@@ -1,4 +1,4 @@
-"""Tables and grids of cases: a CSV file, mappings of Python, all combinations of values."""
+"""Tables and grids of cases: CSV files, mappings of Python, and combinations of values."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ from fecm.authoring.values import (
 def read_cases(path: Path, system: str | None = None) -> list[Case]:
     """Read a CSV table: a header of names and one row per case.
 
-    Values with a unit, their own or the unit of the header, are converted to a system of units.
-    Raises CasesError with the line of an error.
+    A value, or the header of its column, may have a unit. Such values are converted to the given
+    system of units. Raises CasesError with the line of an error.
     """
     try:
         table = read_table(path, MOST_CASES + 1)
@@ -69,7 +69,7 @@ def read_cases(path: Path, system: str | None = None) -> list[Case]:
 
 @runtime_checkable
 class CaseTable(Protocol):
-    """A table with named columns, such as a DataFrame."""
+    """Table with named columns, such as a DataFrame."""
 
     @property
     def columns(self) -> Any:
@@ -80,10 +80,7 @@ class CaseTable(Protocol):
 
 
 def _rows(table: CaseTable) -> list[dict[Any, Any]]:
-    """Return the rows of a table as mappings.
-
-    Raises CasesError if a name is repeated.
-    """
+    """Return the rows of a table as mappings; raise CasesError if a column is repeated."""
     names = list(table.columns)
     for name in names:
         if names.count(name) > 1:
@@ -99,11 +96,11 @@ def checked(
     free: bool = False,
     system: str | None = None,
 ) -> list[Case]:
-    """Validate cases given as mappings, which must all have the same names, or as a table.
+    """Validate cases from a table, or from mappings that all have the same names.
 
-    With `free`, any name is allowed except those of results, and a value is a number or a text.
-    Otherwise texts with a unit are converted to a system of units. Raises CasesError if a case is
-    invalid; the message states the source, or else the case's number.
+    With `free`, a name may be any name except names of results, and a value any number or text.
+    Otherwise a text with a unit is converted to the given system of units. Raises CasesError if a
+    case is invalid; the message starts with `source`, or with the number of the case.
     """
     check_name, read = (
         (check_free, free_value_of) if free else (check_known, partial(value_of, system=system))
@@ -134,8 +131,8 @@ def checked(
 def parse_vary(text: str, system: str | None = None) -> tuple[str, list[Value]]:
     """Parse ``NAME=FROM:TO:N`` (N values with both ends) or ``NAME=a,b,c``.
 
-    Values with a unit, as in ``energy=5J:30J:6``, are converted to a system of units. Raises
-    CasesError if the text has another form.
+    Values with a unit, as in ``energy=5J:30J:6``, are converted to the given system of units.
+    Raises CasesError if the text has another form.
     """
     name, equals, text_of_values = (part.strip() for part in text.partition("="))
     check_known(name, text)
@@ -151,22 +148,19 @@ def parse_vary(text: str, system: str | None = None) -> tuple[str, list[Value]]:
     parts = text_of_values.split(":")
     if len(parts) != 3 or not re.fullmatch(r"\d+", parts[2].strip()) or not int(parts[2]):
         raise CasesError(f"`{text}`: a range is FROM:TO:N with N of at least 1")
-    begin, end = (number_of_text(name, without_unit(name, part, system)) for part in parts[:2])
+    start, stop = (number_of_text(name, without_unit(name, part, system)) for part in parts[:2])
     count = int(parts[2])
     if count > MOST_CASES:
         raise CasesError(f"`{text}`: {count} values; at most {MOST_CASES} are allowed")
     with np.errstate(all="ignore"):
-        values = np.linspace(begin, end, count).tolist()
+        values = np.linspace(start, stop, count).tolist()
     if not all(map(math.isfinite, values)):
         raise CasesError(f"`{text}`: the range is beyond the range of numbers")
     return name, [parse_value(name, repr(v)) for v in values]
 
 
 def _points(numbers: Sequence[str]) -> list[str]:
-    """Return one point from two numbers.
-
-    Raises CasesError, with the brackets to write, if there are more.
-    """
+    """Join two numbers to a point; otherwise raise CasesError with the brackets to write."""
     if len(numbers) == 2:
         return [",".join(numbers)]
     pairs = [f"({','.join(numbers[n : n + 2])})" for n in range(0, len(numbers) - 1, 2)]
@@ -175,9 +169,9 @@ def _points(numbers: Sequence[str]) -> list[str]:
 
 
 def grid_cases(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
-    """Return every combination of the values, the last name fastest.
+    """Return every combination of the values; the last name varies fastest.
 
-    Raises CasesError if there are too many.
+    Raises CasesError if a name is repeated, or there are too many cases.
     """
     names = [name for name, _ in varied]
     for name in names:
@@ -192,10 +186,10 @@ def grid_cases(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
 def combined(
     vary: Mapping[str, Iterable[Any]], *, free: bool = False, system: str | None = None
 ) -> list[Case]:
-    """Return every combination of lists of values, given by name.
+    """Return every combination of the values in the lists of `vary`.
 
-    With `free` names and values are any. Texts with a unit are converted to a system of units.
-    Raises CasesError if a name is unknown, a value is invalid, or values are not in a list.
+    `free` and `system` are as in :func:`checked`. Raises CasesError if a name is unknown, a value
+    is invalid, or values are not in a list.
     """
     if not isinstance(vary, Mapping):
         raise CasesError(f'vary is {vary!r}; write a mapping such as {{"velocity": [50.0, 115.0]}}')

@@ -1,4 +1,4 @@
-"""Changes of a deck in Python: its values by the names of sweeps, and its parts as objects."""
+"""Changes of a deck in Python: values, named as in sweeps, and parts as objects."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ NONLINEAR = "nonlinear"
 
 
 class Values(TypedDict, total=False):
-    """Changes by :meth:`fecm.Deck.with_`: values by their names in sweeps, and whole objects."""
+    """Arguments of :meth:`fecm.Deck.with_`: parts as objects, and values named as in sweeps."""
 
     plate: Plate
     laminate: Laminate
@@ -97,26 +97,26 @@ def with_values(deck: Deck, values: Mapping[str, Any]) -> Deck:
         check_known(name, "with_", (*OBJECTS, NONLINEAR, *NAMES))
     if NONLINEAR in values:
         deck = _with_kinematics(deck, nonlinear=values[NONLINEAR])
-    objects_given = {name: value for name, value in values.items() if name in OBJECTS}
+    parts = {name: value for name, value in values.items() if name in OBJECTS}
     not_values = (*OBJECTS, NONLINEAR)
-    numbers = _converted(deck, {name: values[name] for name in values if name not in not_values})
+    numbers = _in_deck_units(deck, {n: value for n, value in values.items() if n not in not_values})
     (case,) = checked([numbers], "with_")
     objects = None
-    if objects_given:
-        from fecm.authoring.objects import Objects  # 30 ms, which other values need not
+    if parts:
+        from fecm.authoring.objects import Objects  # takes 30 ms; values do not need it
 
-        objects = Objects(**objects_given)
+        objects = Objects(**parts)
         objects.check()
     try:
         changed = apply_case(deck, case, objects)
-    except LookupError as error:  # a value of a segment that the deck lacks
+    except LookupError as error:  # the deck lacks the segment of a value
         raise CasesError(f"with_: {error}") from None
-    is_new = "plate" in objects_given or "laminate" in objects_given
-    return _on_the_clock(deck, changed, case) if is_new and "dt" not in case else changed
+    is_new = "plate" in parts or "laminate" in parts
+    return _update_time_step(deck, changed, case) if is_new and "dt" not in case else changed
 
 
-def _converted(deck: Deck, values: Mapping[str, Any]) -> dict[str, Any]:
-    """Return values in the units of the deck, where a text has a unit, as in ``10J``."""
+def _in_deck_units(deck: Deck, values: Mapping[str, Any]) -> dict[str, Any]:
+    """Convert texts with a unit, as in ``10J``, to the units of the deck."""
     system = system_of(deck)
     return {
         name: in_units(name, value, dimension_of(name), system)
@@ -127,7 +127,7 @@ def _converted(deck: Deck, values: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _with_kinematics(deck: Deck, *, nonlinear: object) -> Deck:
-    """Return the deck without NONL if it should be linear."""
+    """Return the deck without NONL if `nonlinear` is False; it must have NONL if True."""
     if not isinstance(nonlinear, bool):
         raise CasesError(f"with_: nonlinear is {nonlinear!r}, not True or False")
     if nonlinear and not deck.has(Nonlinear):
@@ -141,9 +141,9 @@ def _with_kinematics(deck: Deck, *, nonlinear: object) -> Deck:
     return replace(deck, segments=kept, text="")
 
 
-def _on_the_clock(deck: Deck, changed: Deck, case: Case) -> Deck:
-    """Return the new deck with the time step of its plate, if the old step follows a rule."""
-    with suppress(CasesError):  # a run states what is wrong with either deck
+def _update_time_step(deck: Deck, changed: Deck, case: Case) -> Deck:
+    """Give the changed deck the time step of its plate, if the old time step follows a rule."""
+    with suppress(CasesError):  # a run of either deck reports its errors
         if (clock := clock_of(check_deck(deck))) is not None:
             return with_clock(changed, clock, case).deck
     return changed
@@ -167,9 +167,9 @@ def with_program(
 
 
 def with_cards(deck: Deck, cards: str) -> Deck:
-    """Return the deck with the macro program of cards: those between MACR and END.
+    """Return the deck with another macro program: the cards between MACR and END.
 
-    The cards of PROP's load tables may follow after END; otherwise the deck's own stay. Raises
+    END and the load tables of PROP may follow. Without END the load tables of the deck stay. Raises
     DeckError if the cards are not a macro program.
     """
     lines = [TITLE, deck.control.to_card(), END, MACROS, *cards.rstrip("\n").split("\n")]
@@ -177,8 +177,8 @@ def with_cards(deck: Deck, cards: str) -> Deck:
         lines += [END, *(table.to_card() for table in deck.tables)]
     reader = Reader("\n".join([*lines, STOP, ""]))
     decks = [problem.deck for problem in reader.problems() if problem.deck is not None]
-    for read_deck in decks:
-        compile_program(read_deck.macros, reader.findings)
+    for parsed in decks:
+        compile_program(parsed.macros, reader.findings)
     if errors := reader.findings.errors:
         raise DeckError(errors, "<macros>")
     return replace(deck, macros=decks[0].macros, tables=decks[0].tables)

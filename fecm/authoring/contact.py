@@ -23,21 +23,22 @@ from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
 from fecm.mechanics.points import DISC, HERTZ
 from fecm.problem.rules.units import USED, likely_unit, needed_unit
 
-# Moduli of solid spheres, Pa: range without a doubt, and metals and ceramics.
+# Moduli of spheres, Pa. A modulus outside the first range is doubted. The second range has metals
+# and ceramics.
 SOFTEST, HARDEST = 1e9, 2e12
 SOLID = (5e10, 1e12)
 STEEL_IN_SI = 2e11
-ELASTIC_POWER = 1.5  # of unloading as of loading
-SOFT_TIP = 0.3  # modulus of a tip over E2, below which its contact is wide
+ELASTIC_POWER = 1.5  # power of unloading of an elastic law, the same as of loading
+SOFT_TIP = 0.3  # largest modulus of a soft tip over E2; the contact of a soft tip is wide
 # Shapes of the contact patch.
 PATCHES = {"disc": DISC, "hertz": HERTZ}
 
 
 @dataclass(frozen=True)
 class Sphere:
-    """Elastic contact of a sphere, its k estimated from the ply's constants."""
+    """Elastic contact of a sphere; k is estimated from the constants of the plies."""
 
-    radius: float | None = None  # length; None where a standard prescribes it
+    radius: float | None = None  # length; None for the radius of a standard
     # Elastic constants; None for steel.
     modulus: float | None = None
     poisson: float | None = None
@@ -48,7 +49,7 @@ class Sphere:
         return f"Contact.estimate({shown})"
 
     def law(self, plies: DeckPlies, layers: Sequence[Layer]) -> tuple[Indentation, str]:
-        """Return the contact law on layers, and comment lines that say how k was computed."""
+        """Return the contact law on layers, and comment lines that explain the estimate of k."""
         if self.radius is None:
             raise ObjectError("the `contact` estimate needs the sphere's radius")
         if self.modulus is None and plies.system is None:
@@ -82,7 +83,7 @@ class Sphere:
 
 
 def doubts_of_sphere(sphere: Sphere, system: str | None, test: DropWeight | None) -> list[str]:
-    """Yield doubts about a modulus in another unit, and a diameter in place of a radius."""
+    """Return doubts about a modulus in another unit, and a diameter instead of the radius."""
     doubts: list[str] = []
     names = units_of(system) if system else {}
     size, modulus = in_si(MODULUS, names), sphere.modulus
@@ -105,10 +106,10 @@ def doubts_of_sphere(sphere: Sphere, system: str | None, test: DropWeight | None
 def doubts_of_soft_tip(
     sphere: Sphere, radius: float, k: float, energy: float, modulus: float
 ) -> list[str]:
-    """Yield a doubt about the patch of a sphere softer than the plies across their fibres.
+    """Return a doubt about the patch if the sphere is far softer than the plies.
 
-    The contact circle of a sphere is (R alpha)^(1/2). The indentation alpha is at most the one of a
-    rigid plate, whose energy is (2/5) k alpha^(5/2).
+    The contact circle has the radius (R alpha)^(1/2). The indentation alpha is largest if the plate
+    is rigid. It then follows from the energy (2/5) k alpha^(5/2).
     """
     if sphere.radius is None or sphere.modulus is None or sphere.modulus > SOFT_TIP * modulus:
         return []
@@ -123,16 +124,17 @@ def doubts_of_soft_tip(
 
 @dataclass(frozen=True)
 class Contact(Indentation):
-    """Measured indentation law in the deck's units; :meth:`named` and :meth:`estimate` find one.
+    """Measured indentation law in the units of the deck.
 
-    With `k` alone the law is elastic: the force is k α^1.5 in loading and unloading.
+    :meth:`named` returns a published law, :meth:`estimate` an estimated one. With `k` only, the law
+    is elastic: the force is k α^1.5 in loading and unloading.
 
     Parameters
     ----------
     k : float
         Contact coefficient, force/length^1.5.
     alpha_p : float, optional
-        Critical indentation (length), beyond which an indentation remains.
+        Critical indentation (length). Beyond it an indentation remains.
     s_p : float, optional
         Slope of the permanent over the maximum indentation.
     q : float, optional
@@ -154,12 +156,14 @@ class Contact(Indentation):
 
     @staticmethod
     def named(name: str) -> NamedContact:
-        """Return a published law, which `fecm indent contacts` lists, in the deck's units.
+        """Return a published law from the list of `fecm indent contacts`.
+
+        A deck has the law in its own units.
 
         Raises
         ------
         ValueError
-            If no law has this name.
+            If the name is unknown.
         """
         if name not in CONTACTS:
             raise ObjectError(f"{name!r} is not a named contact: {', '.join(CONTACTS)}")
@@ -169,14 +173,14 @@ class Contact(Indentation):
     def estimate(
         radius: float | None = None, modulus: float | None = None, poisson: float | None = None
     ) -> Sphere:
-        """Return the elastic law of a sphere on the laminate, as `fecm indent estimate` has it.
+        """Return the elastic law of a sphere on the laminate, as `fecm indent estimate` does.
 
         Parameters
         ----------
         radius : float, optional
-            Length; a standard's where it is not given.
+            Length; by default the radius that the standard of a fixture prescribes.
         modulus, poisson : float, optional
-            Elastic constants of the sphere; steel's where they are not given.
+            Elastic constants of the sphere; by default steel.
 
         Examples
         --------
@@ -192,7 +196,7 @@ class Contact(Indentation):
 def parse_patch(text: str) -> Patch | None:
     """Parse a contact patch ``disc``, ``hertz``, ``disc:RADIUS`` or ``hertz:RADIUS``.
 
-    ``none`` is a point force, None. Raises ValueError for any other text.
+    Returns None for ``none``, a point force. Raises ValueError for any other text.
     """
     shape, colon, radius_text = text.partition(":")
     if text == "none":
@@ -212,7 +216,7 @@ AnyContact = Indentation | NamedContact | Sphere | str
 def indentation_law(
     contact: AnyContact | None, plies: DeckPlies, layers: Sequence[Layer]
 ) -> tuple[Indentation, str]:
-    """Return the contact law in the units of the deck, and comment lines about an estimated law."""
+    """Return the contact law in the units of the deck, and comment lines about an estimate."""
     match contact:
         case str():
             return indentation_law(Contact.named(contact), plies, layers)

@@ -1,4 +1,4 @@
-"""Energy of a new deck's projectile."""
+"""Energy of the projectile of a new deck."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from fecm.deck import model
 from fecm.deck.units import in_si, unit_of, units_of
 from fecm.problem.parts import build_projectile
 
-# Energy per thickness in J/mm below which a number without a unit is doubted.
+# Smallest plausible energy per thickness, J/mm, of an energy without a unit.
 LEAST_ENERGY = 0.02
 ENERGY_UNITS = {1.0: "J", 1e-3: "mJ"}
 
@@ -23,18 +23,18 @@ def energy_of(deck: model.Deck) -> float:
     return 0.5 * mass * velocity**2
 
 
-def said_energy(deck: model.Deck, plies: DeckPlies) -> str:
-    """Format the kinetic energy of the projectile, in joule where the units are known."""
+def format_energy(deck: model.Deck, plies: DeckPlies) -> str:
+    """Format the kinetic energy of the projectile, in joule if the units are known."""
     energy = energy_of(deck)
     joule = in_si("force*length", units_of(plies.system) if plies.system else {})
     return f"{energy * joule:.4g} J" if joule else f"{energy:.4g}"
 
 
 def energy_note(deck: model.Deck, plies: DeckPlies, *, per_thickness: bool) -> str:
-    """Format energy and velocity of the projectile."""
+    """Return a note with the energy and the velocity of the projectile."""
     energy, velocity = energy_of(deck), deck.require(model.Impact).velocity
     names = units_of(plies.system) if plies.system else {}
-    text = said_energy(deck, plies)
+    text = format_energy(deck, plies)
     if per_thickness:
         share = energy / plies.thickness
         text += f" ({share / 1e3:.3g} J per mm of thickness)"
@@ -45,12 +45,10 @@ def energy_note(deck: model.Deck, plies: DeckPlies, *, per_thickness: bool) -> s
 def doubts_of_energy(
     deck: model.Deck, fixture: Fixture | None, plies: DeckPlies, *, is_bare: bool
 ) -> list[str]:
-    """Yield doubts about an energy far below a standard's, or a small bare number.
+    """Return a doubt about an energy that is far too small.
 
-    Parameters
-    ----------
-    is_bare : bool
-        Whether the energy is asked for as a number without a unit.
+    The limit is the least energy of a standard. Without a standard, only an energy that was given
+    without a unit, `is_bare`, is doubted.
     """
     standard = fixture.test if fixture else None
     names = units_of(plies.system) if plies.system else {}
@@ -75,11 +73,11 @@ def doubts_of_energy(
 
 
 def with_energy(deck: model.Deck, energy: float) -> model.Deck:
-    """Return the deck with the velocity of an energy, in as many digits as its card has."""
+    """Return the deck with the velocity of an energy, rounded to the digits of a card."""
     mass = build_projectile(deck).total_mass
     velocity = math.sqrt(2.0 * energy / mass) if mass > 0.0 else math.inf
     if not 0.0 < velocity < math.inf:
         raise ObjectError(f"no velocity gives the energy {energy:g} to the mass {mass:g}")
-    old = deck.require(model.Impact)
-    new = replace(old, velocity=float(f"{velocity:.6g}"))
-    return replace(deck, segments=tuple(new if s is old else s for s in deck.segments))
+    impact = deck.require(model.Impact)
+    changed = replace(impact, velocity=float(f"{velocity:.6g}"))
+    return replace(deck, segments=tuple(changed if s is impact else s for s in deck.segments))

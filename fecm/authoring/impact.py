@@ -1,4 +1,4 @@
-"""Deck of an impact from plate, laminate, projectile and contact, with its title."""
+"""Deck of an impact, built from plate, laminate, projectile and contact."""
 
 from __future__ import annotations
 
@@ -14,29 +14,42 @@ from fecm.authoring.contact import (
     doubts_of_sphere,
     indentation_law,
 )
-from fecm.authoring.energy import doubts_of_energy, energy_note, energy_of, said_energy, with_energy
+from fecm.authoring.energy import (
+    doubts_of_energy,
+    energy_note,
+    energy_of,
+    format_energy,
+    with_energy,
+)
 from fecm.authoring.laminate import (
     DeckPlies,
     Laminate,
     Layup,
     check_thickness,
     cure_segment,
-    damages,
+    damage_segments,
     deck_plies,
     strengths_of,
     system_asked,
-    toughness,
+    toughness_segment,
 )
-from fecm.authoring.mesh import AnyMesh, InPlane, MembraneSupport, curvature_of, placed, supported
+from fecm.authoring.mesh import (
+    AnyMesh,
+    InPlane,
+    MembraneSupport,
+    curvature_of,
+    place_impact,
+    support_plate,
+)
 from fecm.authoring.numerics import (
     AUTO,
     AUTO_KINEMATICS,
     FULL,
     MITC,
-    Formed,
     Kinematics,
     Numerics,
     Quadrature,
+    SupportedDeck,
     kinematics_of,
     with_kinematics,
 )
@@ -56,17 +69,17 @@ from fecm.mechanics.projectile import RigidMass, Rod
 from fecm.problem.loading import load_deck
 from fecm.problem.parts import projectile_segment
 
-LONGEST_LAYUP = 60  # characters; a longer one is replaced by the number of plies
+LONGEST_LAYUP = 60  # characters; a title has the number of plies instead of a longer layup
 
 
 def default_title(plate: Plate, laminate: Laminate, deck: model.Deck, plies: DeckPlies) -> str:
     """Return a title such as ``D7136 [45/0/-45/90]3s IM7/8552, 10 J``."""
     names = dict.fromkeys(named.name for _, named in plies.named)
-    words = (_plate(plate), _layup(laminate), " + ".join(names))
-    return f"{' '.join(filter(None, words))}, {said_energy(deck, plies)}"
+    words = (_plate_name(plate), _layup_name(laminate), " + ".join(names))
+    return f"{' '.join(filter(None, words))}, {format_energy(deck, plies)}"
 
 
-def _plate(plate: Plate) -> str:
+def _plate_name(plate: Plate) -> str:
     if plate.fixture is not None:
         return plate.fixture.name
     if plate.size is None:
@@ -75,7 +88,7 @@ def _plate(plate: Plate) -> str:
     return f"plate {x:g}x{y:g}"
 
 
-def _layup(laminate: Laminate) -> str:
+def _layup_name(laminate: Laminate) -> str:
     """Return the layup as the literature writes it, ``[45/0/-45/90]3s``."""
     plies = [f"{ply.angle:g}{ply.name if len(ply.name) == 1 else ''}" for ply in laminate.plies]
     count, symmetric = len(plies), ""
@@ -87,14 +100,14 @@ def _layup(laminate: Laminate) -> str:
     return layup if len(layup) <= LONGEST_LAYUP else f"{len(plies)} plies"
 
 
-MOST_STEPS = 1e6  # steps of a run above which the unit of its duration is doubted
+MOST_STEPS = 1e6  # largest plausible number of steps; beyond it, `duration` may have a wrong unit
 AnyProjectile = Rod | RigidMass | model.Projectile
 GagePlace = tuple[float, float, float, float]  # x, y, z and degrees
 
 
 @dataclass(frozen=True)
 class ImpactParameters:
-    """Projectile, its velocity and its position."""
+    """Projectile, contact law, velocity or energy, and impact point."""
 
     projectile: AnyProjectile | None = None
     contact: AnyContact | None = None
@@ -104,7 +117,7 @@ class ImpactParameters:
 
 
 class Request(NamedTuple):
-    """Arguments of :func:`impact` and options of ``fecm new``; see there."""
+    """Arguments of :func:`impact`, and options of ``fecm new``."""
 
     plate: Plate
     laminate: Laminate
@@ -119,12 +132,12 @@ class Request(NamedTuple):
     gages: Iterable[GagePlace] = ()
     giic: float | None = None
     cure: float | str | None = None
-    title: str | None = None  # by default of plate, layup, ply and energy
+    title: str | None = None  # None for the default title
     zones: Sequence[Zone] = ()
 
     @property
     def test(self) -> DropWeight | None:
-        """Test that a standard prescribes."""
+        """Values that the standard of the fixture prescribes; None without a standard."""
         return self.plate.fixture.test if self.plate.fixture else None
 
     def check(self) -> None:
@@ -146,7 +159,7 @@ class Request(NamedTuple):
 
 
 class Motion(NamedTuple):
-    """Motion of a projectile and simulated time as numbers, in the deck's units."""
+    """Velocity, energy and duration as numbers, in the units of the deck."""
 
     velocity: float | None
     energy: float | None
@@ -154,13 +167,12 @@ class Motion(NamedTuple):
 
 
 class Authored(NamedTuple):
-    """New deck, not yet checked."""
+    """New deck that is not checked yet."""
 
     deck: model.Deck
-    comments: str  # comment lines for the deck's head
-    # What was filled in, and what differs from what was asked.
-    notes: list[str]
-    doubts: list[str]
+    comments: str  # comment lines for the head of the deck
+    notes: list[str]  # values that were filled in
+    doubts: list[str]  # values that may be mistakes, or differ from the request
 
 
 def impact(
@@ -196,9 +208,8 @@ def impact(
 ) -> model.Deck:
     """Return the deck of an impact, as `fecm new` writes it.
 
-    A flat linear plate whose laminate is not coupled has its in-plane dofs restrained, as the
-    report's plate. Any other plate has them free inside, and restrained on its supports as
-    `in_plane` says.
+    A flat, linear plate with an uncoupled laminate has all in-plane dofs restrained, as in the
+    report. In any other plate only the supports restrain in-plane dofs; `in_plane` chooses which.
 
     Parameters
     ----------
@@ -207,88 +218,94 @@ def impact(
     laminate : Laminate
         Layup and ply.
     projectile : Rod or RigidMass, optional
-        In the deck's units; the report's rod, or the mass of a fixture's standard, by default.
+        Projectile in the units of the deck; by default the mass that the standard of a fixture
+        prescribes, or the rod of the report.
     contact : Contact or str
-        Indentation law, or the name of a published one.
+        Indentation law, or the name of a published law.
     velocity, energy : float or str
-        Approach velocity (length/time) or energy (force*length) of the projectile, in the deck's
-        units (mJ in mm-N-s) or with a unit, as in ``"3m/s"`` and ``"10J"``.
+        Approach velocity (length/time) or energy (force*length) of the projectile. A number is in
+        the units of the deck (mJ in mm-N-s). A text may have a unit: ``"3m/s"``, ``"10J"``.
     at : tuple of float, optional
-        Impact point; the middle of the plate by default.  The nearest node is hit; on an imported
-        mesh a patch is centred at the point itself.
+        Impact point; the middle of the plate by default. The projectile hits the nearest node. On
+        an imported mesh the patch is centred at the point itself.
     duration : float or str
-        Simulated time, also with a unit, ``"4ms"``; with a fixture by default 1.25 half periods of
-        the projectile on the plate, or 1.1 times the contact with the indentation where that is
-        longer.
+        Simulated time; a text may have a unit, ``"4ms"``. On a fixture it is optional. The default
+        is then 1.25 half periods of the projectile on the plate, or 1.1 times the duration of the
+        contact with the indentation if that is longer.
     dt : float, optional
-        Time step; 0.9 of the critical one by default.
+        Time step; 0.9 of the critical time step by default.
     every : int, optional
         Steps between stored rows; about 200 rows by default.
     plies : int or bool or tuple of int, optional
-        Store stresses and strains ply by ply, which :attr:`Result.plies` gives: the steps between
-        rows, True for about 20 rows, or the steps and how many elements nearest to the load.  They
-        are large: none by default, and with `damage` and strengths about 20 rows of the elements
-        around the load.
+        Store stresses and strains ply by ply for :attr:`Result.plies`. An integer is the number of
+        steps between rows; True stores about 20 rows. A pair has the steps and the number of
+        elements nearest to the load. Rows are large, so there are none by default. With `damage`
+        and strengths the default is about 20 rows of the elements around the load.
     failure : int or bool, optional
-        Evaluate the failure criteria, which need a named ply with strengths: the steps between
-        evaluations, or True for the rows of `every`.  By default where `damage` finds strengths.
+        Evaluate the failure criteria. They need a named ply with strengths. An integer is the
+        number of steps between evaluations; True evaluates them at the rows of `every`. The default
+        is True if `damage` finds strengths.
     units : str, optional
         Units of length, force and time, as in ``"mm-N-s"``, or of length, time and mass, as in
-        ``"mm-ms-kg"``, to which a named ply and contact are converted; those of a named ply's
-        source by default.
+        ``"mm-ms-kg"``. Named plies and contacts are converted to them. The default is the system of
+        the source of a named ply.
     patch : str or Patch or None
-        Area of the contact force: ``"disc"`` or ``"hertz"``, with ``":RADIUS"``, to which the mesh
-        of a rectangle is then refined; None is a point force.  By default a disc.
+        Area of the contact force: ``"disc"`` or ``"hertz"``; a disc by default. None is a point
+        force. The radius may follow, ``"disc:RADIUS"``; the mesh of a rectangle is then refined to
+        it.
     shear : str
         Transverse shear: assumed strains, ``"mitc"``, or full quadrature, ``"full"``.
     shear_factor : float or str, optional
-        Factor of the transverse shear stiffness, or ``"equi"``, the stiffness from equilibrium.  By
-        default ``"equi"``, and 1 with full quadrature.
+        Factor of the transverse shear stiffness, or ``"equi"`` for the stiffness from equilibrium.
+        The default is ``"equi"``, and 1 with full quadrature.
     in_plane : str, optional
-        Displacements u and v of a curved or nonlinear plate, or a coupled laminate, where it is
-        supported: ``"held"``, the default of edges; ``"free"``, that of fixtures; ``"normal"``,
-        held across the edge only; or ``"tangential"``, held along it only, the default of the
-        simple edges of a curved panel.  Pinned edges hold both.
+        Restraint of u and v on the supports of a curved or nonlinear plate, or of a coupled
+        laminate: ``"held"``, ``"free"``, ``"normal"`` (held across the edge only) or
+        ``"tangential"`` (held along the edge only). The default is ``"free"`` on fixtures,
+        ``"tangential"`` on the simple edges of a curved panel, and ``"held"`` elsewhere. Pinned
+        edges always hold both.
     radius_x, radius_y : float, optional
-        Radii of a shallow curved panel (length), positive if the struck face is the hollow one;
-        without them it is flat.
+        Radii of a shallow curved panel (length). They are positive if the struck face is hollow.
+        Without them the plate is flat.
     kinematics : str, optional
-        ``"von-karman"`` is a plate that stretches as it bends; `shear` must be ``"mitc"``.
-        ``"linear"`` is one that does not.  ``"auto"``, the default, takes the former where the
+        ``"von-karman"`` for a plate that stretches as it bends; `shear` must be ``"mitc"``.
+        ``"linear"`` for a plate that does not. ``"auto"``, the default, chooses von Kármán if the
         static estimate of the deflection exceeds 0.3 times the thickness.
     nonlinear : bool, optional
-        Older name: True is the same as `kinematics` ``"von-karman"``, False as ``"linear"``.
+        Older name: True means `kinematics` ``"von-karman"``, and False ``"linear"``.
     preload : sequence of float or str, optional
-        Uniform membrane force N0x, N0y and, by default 0, N0xy in the plate before the impact
-        (force/length, tension positive), also with a unit, ``"50N/mm"``.
+        Uniform membrane force N0x, N0y and N0xy in the plate before the impact (force/length,
+        tension positive). N0xy is 0 by default. A text may have a unit, ``"50N/mm"``.
     gages : iterable of tuple
-        Place x, y and z from the mid-plane (length) and direction (degrees) of strain gages.
+        Strain gages: x, y and z (length, z from the mid-plane) and direction (degrees) of each.
     damage : bool
-        Add strengths and toughness of a named ply, as far as they are known, and store what the
-        pictures of failure and of stresses through the thickness show.
+        Add the known strengths and toughness of a named ply, and store the data for the pictures of
+        failure and of stresses through the thickness.
     giic : float, optional
-        Toughness G_IIc of the delamination threshold, force/length; a named ply's by default.
+        Toughness G_IIc for the delamination threshold, force/length; with `damage` the default is
+        the toughness of a named ply.
     cure : float or str, optional
-        Residual stresses of the cure of a named ply with coefficients of expansion: temperature of
-        use minus stress-free temperature, K; or both, ``"177:20"``.  ``":20"`` takes the
-        stress-free temperature of the ply.
+        Residual stresses of the cure; they need a named ply with coefficients of expansion. The
+        value is the temperature of use minus the stress-free temperature, K, or both temperatures,
+        ``"177:20"``. ``":20"`` takes the stress-free temperature of the ply.
     title : str, optional
         Title of the deck; by default plate, layup, ply and energy.
     zones : sequence of tuple, optional
-        Place and layup of parts of the plate, the later over the earlier.  A place is a rectangle
-        ``(x0, y0, x1, y1)``, which has the elements whose centres lie in it, or the name of a group
-        of elements of an imported mesh.  A layup has the materials and the ply thickness of
-        `laminate`; a `Laminate` has its own, by their names.  All laminates share the mid-plane.
+        Place and layup of parts of the plate. Later zones cover earlier ones. A place is a
+        rectangle ``(x0, y0, x1, y1)`` or the name of a group of elements of an imported mesh. A
+        rectangle includes the elements with their centres in it. A layup takes the materials and
+        the ply thickness of `laminate`; a `Laminate` brings its own. All laminates share the
+        mid-plane.
 
     Returns
     -------
     Deck
-        It has no errors.
+        Deck without errors.
 
     Raises
     ------
     ValueError
-        If something is missing or makes no sense.
+        If an argument is missing or implausible.
     DeckError
         If the deck has errors.
 
@@ -332,38 +349,38 @@ def impact(
     return replace(loaded.problems[0].deck, text="")
 
 
-def author(asked: Request) -> Authored:
+def author(request: Request) -> Authored:
     """Build the deck of a request without checking it."""
-    asked.check()
-    units = system_asked(asked.units)
+    request.check()
+    units = system_asked(request.units)
     notes: list[str] = []
     doubts: list[str] = []
-    fixture, test = asked.plate.fixture, asked.test
+    fixture, test = request.plate.fixture, request.test
     if test is not None and units not in (None, STANDARD):
         raise ObjectError(f"the fixture's standard is in {STANDARD}; leave out `units`")
-    laminates = laminates_of(asked.laminate, asked.zones)
-    plies, in_zones = deck_plies(asked.laminate, laminates, STANDARD if test else units, notes)
-    strike, motion = asked.strike, _motion(asked, plies)
+    laminates = laminates_of(request.laminate, request.zones)
+    plies, in_zones = deck_plies(request.laminate, laminates, STANDARD if test else units, notes)
+    strike, motion = request.strike, _parse_motion(request, plies)
     if fixture is not None and test is not None:
-        strike, motion = _prescribed(test, strike, motion, plies.thickness)
+        strike, motion = _apply_standard(test, strike, motion, plies.thickness)
         if not test.allows(plies.thickness):
             doubts.append(_doubt_of_thickness(fixture.name, test, plies.thickness))
     if plies.is_coupled:
         notes.append(
-            f"the laminate is not symmetric, B is not zero: {plies.said} (an s after the bracket "
-            "of a layup adds the mirrored plies)"
+            f"the laminate is not symmetric, B is not zero: {plies.description} (an s after the "
+            "bracket of a layup adds the mirrored plies)"
         )
-    if fixture is None and set(asked.plate.supports.values()) <= {"free"}:
+    if fixture is None and set(request.plate.supports.values()) <= {"free"}:
         notes.append(
             "nothing supports the plate (`support` is free): it flies away with the projectile"
         )
-    patch = asked.numerics.contact_patch(prescribed=test is not None)
-    _check_complete(asked, strike, motion, plies.system)
-    if motion.duration is None:  # its search takes long with plies that are far too thin
+    patch = request.numerics.contact_patch(prescribed=test is not None)
+    _check_complete(request, strike, motion, plies.system)
+    if motion.duration is None:  # with far too thin plies, the estimate of the duration takes long
         check_thickness(plies)
 
-    mesh, node, patch = placed(asked.plate, plies, strike.at, patch, doubts)
-    zones = placed_zones(asked.zones, in_zones, mesh, node, doubts)
+    mesh, node, patch = place_impact(request.plate, plies, strike.at, patch, doubts)
+    zones = placed_zones(request.zones, in_zones, mesh, node, doubts)
     struck = plies.layups[zones.struck - MATERIAL]
     law, comment = indentation_law(strike.contact, plies, struck)
     if comment:
@@ -374,29 +391,32 @@ def author(asked: Request) -> Authored:
         doubts += doubts_of_core(plies, struck)
     if isinstance(strike.contact, Sphere):
         doubts += doubts_of_sphere(strike.contact, plies.system, test)
-    damage = damages(plies, asked.giic, notes) if asked.numerics.damage else toughness(asked.giic)
+    if request.numerics.damage:
+        damage = damage_segments(plies, request.giic, notes)
+    else:
+        damage = toughness_segment(request.giic)
     if is_sandwich(plies, struck) and any(isinstance(s, model.Delamination) for s in damage):
         damage = [s for s in damage if not isinstance(s, model.Delamination)]
         notes.append(
             "the deck has no delamination threshold (DELA): it is that of a solid laminate, and "
             "the faces of a sandwich delaminate or leave the core far below it"
         )
-    if asked.numerics.failure and not any(isinstance(s, model.Allowables) for s in damage):
+    if request.numerics.failure and not any(isinstance(s, model.Allowables) for s in damage):
         damage = [strengths_of(plies), *damage]
     segments = (
-        _units(asked, plies),
+        _unit_segment(request, plies),
         mesh.coordinates(),
         mesh.element_cards(),
-        _projectile(strike.projectile),
+        _projectile_segment(strike.projectile),
         model.Impact(node, 3, 1.0 if motion.velocity is None else motion.velocity),
         patch,
-        _gages(asked.gages),
+        _gage_segment(request.gages),
         *damage,
-        cure_segment(plies, asked.cure),
+        cure_segment(plies, request.cure),
         law,
-        asked.numerics.shear_segment(),
-        curvature_of(asked.radius_x, asked.radius_y),
-        _preload(asked, plies),
+        request.numerics.shear_segment(),
+        curvature_of(request.radius_x, request.radius_y),
+        _preload_segment(request, plies),
         *plies.segments(),
         zones.card,
     )
@@ -404,7 +424,7 @@ def author(asked: Request) -> Authored:
     plain = model.Deck("", control, tuple(s for s in segments if s is not None), ())
     if motion.energy is not None:
         plain = with_energy(plain, motion.energy)
-    notes.append(energy_note(plain, plies, per_thickness=asked.test is not None))
+    notes.append(energy_note(plain, plies, per_thickness=request.test is not None))
     is_bare = strike.energy is not None and not str(strike.energy).strip()[-1:].isalpha()
     doubts += doubts_of_energy(plain, fixture, plies, is_bare=is_bare)
     if isinstance(strike.contact, Sphere) and patch is not None:
@@ -412,31 +432,32 @@ def author(asked: Request) -> Authored:
         softest = min(plies.of(layer).ply.e2 for layer in struck)
         doubts += doubts_of_soft_tip(strike.contact, radius, law.k, energy_of(plain), softest)
     title = (
-        default_title(asked.plate, asked.laminate, plain, plies)
-        if asked.title is None
-        else asked.title
+        default_title(request.plate, request.laminate, plain, plies)
+        if request.title is None
+        else request.title
     )
     plain = replace(plain, title=title)
 
-    formed = with_kinematics(
-        asked.kinematics, lambda nonlinear: _formed(asked, plain, mesh, plies, nonlinear=nonlinear)
+    structure = with_kinematics(
+        request.kinematics,
+        lambda nonlinear: _with_supports(request, plain, mesh, plies, nonlinear=nonlinear),
     )
-    dt = asked.numerics.time_step(formed.deck)
+    dt = request.numerics.time_step(structure.deck)
     doubts += _doubts_of_duration(motion.duration, dt, plies.system)
-    deck = asked.numerics.with_program(formed.deck, dt, motion.duration)
-    comments = (fixture.comment if fixture else "") + formed.comment + comment
-    return Authored(deck, comments, [*notes, *formed.notes], doubts)
+    deck = request.numerics.with_program(structure.deck, dt, motion.duration)
+    comments = (fixture.comment if fixture else "") + structure.comment + comment
+    return Authored(deck, comments, [*notes, *structure.notes], doubts)
 
 
-def _formed(
-    asked: Request, plain: model.Deck, mesh: AnyMesh, plies: DeckPlies, *, nonlinear: bool
-) -> Formed:
-    """Return the deck with its supports, and with NONL for a nonlinear plate."""
+def _with_supports(
+    request: Request, plain: model.Deck, mesh: AnyMesh, plies: DeckPlies, *, nonlinear: bool
+) -> SupportedDeck:
+    """Add the supports to a deck, and NONL for a nonlinear plate."""
     notes: list[str] = []
     membrane = MembraneSupport.of(
         curved=plain.has(model.Curvature), stretches=nonlinear or plies.is_coupled
     )
-    boundary, comment = supported(asked.plate, mesh, asked.in_plane, notes, membrane)
+    boundary, comment = support_plate(request.plate, mesh, request.in_plane, notes, membrane)
     segments: list[model.Segment] = []
     for segment in plain.segments:
         segments.append(segment)
@@ -446,16 +467,16 @@ def _formed(
         later = (model.Preload, model.Material)
         place = next(n for n, part in enumerate(segments) if isinstance(part, later))
         segments.insert(place, model.Nonlinear())
-    return Formed(replace(plain, segments=tuple(segments)), comment, notes)
+    return SupportedDeck(replace(plain, segments=tuple(segments)), comment, notes)
 
 
 def is_sandwich(plies: DeckPlies, layers: Sequence[model.Layer]) -> bool:
-    """Return whether a layer is so soft in shear that it is the core of a sandwich."""
+    """Return whether a layer is the core of a sandwich: it is very soft in shear."""
     return any(are_cores([plies.of(layer).ply for layer in layers]))
 
 
 def doubts_of_core(plies: DeckPlies, layers: Sequence[model.Layer]) -> list[str]:
-    """Yield a doubt about an estimated k of a sandwich."""
+    """Return a doubt about an estimated k of a sandwich."""
     if not is_sandwich(plies, layers):
         return []
     return [
@@ -465,7 +486,7 @@ def doubts_of_core(plies: DeckPlies, layers: Sequence[model.Layer]) -> list[str]
 
 
 def _doubts_of_duration(duration: float | None, dt: float, system: str | None) -> list[str]:
-    """Yield a doubt about a simulated time of very many steps."""
+    """Return a doubt about a duration with very many steps."""
     if duration is None or duration / dt <= MOST_STEPS:
         return []
     unit = units_of(system)["time"] if system else ""
@@ -477,15 +498,15 @@ def _doubts_of_duration(duration: float | None, dt: float, system: str | None) -
 
 
 def _check_choice(name: str, value: str | None, choices: Sequence[str | None]) -> None:
-    """Refuse a text that is not one of the choices."""
+    """Raise ObjectError if a text is not one of the choices."""
     if value not in choices:
-        known_choices = ", ".join(choice for choice in choices if choice is not None)
-        raise ObjectError(f"`{name}` is {value!r}, none of {known_choices}")
+        listed = ", ".join(choice for choice in choices if choice is not None)
+        raise ObjectError(f"`{name}` is {value!r}, none of {listed}")
 
 
-def _motion(asked: Request, plies: DeckPlies) -> Motion:
+def _parse_motion(request: Request, plies: DeckPlies) -> Motion:
     """Return velocity, energy and duration in the units of the deck."""
-    strike, numerics, system = asked.strike, asked.numerics, plies.system
+    strike, numerics, system = request.strike, request.numerics, plies.system
     motion = Motion(
         in_units("velocity", strike.velocity, "length/time", system),
         in_units("energy", strike.energy, "force*length", system),
@@ -496,15 +517,15 @@ def _motion(asked: Request, plies: DeckPlies) -> Motion:
         duration=motion.duration,
         dt=numerics.dt,
         every=numerics.every,
-        giic=asked.giic,
+        giic=request.giic,
     )
     return motion
 
 
-def _prescribed(
+def _apply_standard(
     test: DropWeight, strike: ImpactParameters, motion: Motion, thickness: float
 ) -> tuple[ImpactParameters, Motion]:
-    """Return the values that a standard prescribes for missing arguments."""
+    """Fill missing arguments with the values that a standard prescribes."""
     if motion.velocity is None and motion.energy is None:
         motion = motion._replace(energy=test.energy * thickness)
     contact = strike.contact
@@ -515,13 +536,13 @@ def _prescribed(
 
 
 def _doubt_of_thickness(name: str, test: DropWeight, thickness: float) -> str:
-    """Return a doubt about a laminate whose thickness is outside a standard's range."""
+    """Return a doubt about a laminate with a thickness outside the range of a standard."""
     limits = f"{test.thinnest:g} to {test.thickest:g} mm"
     return f"{name} is for laminates of {limits}; this one has {thickness:.4g} mm"
 
 
 def _check_complete(
-    asked: Request, strike: ImpactParameters, motion: Motion, system: str | None
+    request: Request, strike: ImpactParameters, motion: Motion, system: str | None
 ) -> None:
     """Raise ObjectError if projectile, velocity or duration is missing."""
     if strike.projectile is None and system not in (None, SYSTEM):
@@ -531,37 +552,37 @@ def _check_complete(
         )
     if (motion.velocity is None) == (motion.energy is None):
         raise ObjectError("give either `velocity` or `energy`")
-    if motion.duration is None and asked.plate.fixture is None:
+    if motion.duration is None and request.plate.fixture is None:
         raise ObjectError("`duration` is missing")
 
 
-def _units(asked: Request, plies: DeckPlies) -> model.Units | None:
-    """Return the UNIT segment; the report's decks have none."""
-    if plies.system is None or (plies.system == SYSTEM and asked.units is None):
+def _unit_segment(request: Request, plies: DeckPlies) -> model.Units | None:
+    """Return the UNIT segment; None for a deck like the report's, without named units."""
+    if plies.system is None or (plies.system == SYSTEM and request.units is None):
         return None
     return model.Units(*units_of(plies.system).values())
 
 
-def _projectile(projectile: AnyProjectile | None) -> model.Projectile | None:
-    """Return the segment of a projectile."""
+def _projectile_segment(projectile: AnyProjectile | None) -> model.Projectile | None:
+    """Return the PROJ segment of a projectile; None for the rod of the report."""
     if isinstance(projectile, Rod | RigidMass):
         return projectile_segment(projectile)
     return projectile
 
 
-def _preload(asked: Request, plies: DeckPlies) -> model.Preload | None:
+def _preload_segment(request: Request, plies: DeckPlies) -> model.Preload | None:
     """Return the PREL segment of a membrane force, if there is one."""
-    if asked.preload is None:
+    if request.preload is None:
         return None
-    forces_given = list(asked.preload) if isinstance(asked.preload, Iterable) else []
-    forces = [in_units("preload", force, "force/length", plies.system) for force in forces_given]
+    values = list(request.preload) if isinstance(request.preload, Iterable) else []
+    forces = [in_units("preload", value, "force/length", plies.system) for value in values]
     numbers = [force for force in forces if is_finite(force)]
-    if len(numbers) < len(forces_given) or len(forces_given) not in (2, 3):
-        raise ObjectError(f"`preload` is {asked.preload!r}, not N0x, N0y and perhaps N0xy")
+    if len(numbers) < len(values) or len(values) not in (2, 3):
+        raise ObjectError(f"`preload` is {request.preload!r}, not N0x, N0y and perhaps N0xy")
     return model.Preload(*map(float, numbers))
 
 
-def _gages(places: Iterable[GagePlace]) -> model.Gages | None:
+def _gage_segment(places: Iterable[GagePlace]) -> model.Gages | None:
     """Return the GAGE segment of strain gages, if there are any."""
     try:
         gages = tuple(Gage(n, *map(float, place)) for n, place in enumerate(places, start=1))

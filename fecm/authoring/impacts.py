@@ -1,7 +1,8 @@
 """Impacts on one plate as columns: velocity, contact law, projectile and toughness of many cases.
 
-A card, a projectile and a strike for every case would take longer than its impact. The rules of the
-cards check the values as arrays. An invalid case gets its message from the rule of its card.
+Building cards, a projectile and a strike for a case would take longer than computing its impact.
+The values are therefore arrays, and the rules of the cards check whole arrays. Only an invalid case
+is built, to get the message of its card.
 """
 
 from __future__ import annotations
@@ -34,18 +35,18 @@ AS_COLUMNS = {"velocity", "energy", *CONSTANTS, *MASSES, *FAILURE_NAMES}
 
 @dataclass(frozen=True)
 class Impacts:
-    """Impacts on one plate, a row for each; arrays are (rows,)."""
+    """Impacts on one plate, one per row. All arrays are (rows,)."""
 
-    numbers: list[int]  # of the cases, ascending
+    numbers: list[int]  # numbers of the cases, ascending
     velocity: Floats
     constants: ContactParameters[Floats]
-    kinds: list[DeckProjectile]  # of projectiles; all rigid masses are a unit mass
-    kind: Indices  # places in them
+    kinds: list[DeckProjectile]  # different projectiles; a unit mass stands for all rigid masses
+    kind: Indices  # index into `kinds`
     mass: Floats
-    scale: Floats  # of mass and stiffness, relative to the kind
+    scale: Floats  # factor for the mass and the stiffness of the kind
     toughness: Floats  # G_IIc, force/length; NaN without a DELA segment
-    own_law: Law | None  # a user's contact law instead of the constants
-    cards: Callable[[int], Strike]  # the impact of a row as cards
+    own_law: Law | None  # contact law of the user, instead of the constants
+    cards: Callable[[int], Strike]  # impact of a row as cards
 
     def __len__(self) -> int:
         return len(self.numbers)
@@ -57,22 +58,22 @@ class Impacts:
 
     def select(self, rows: NDArray[np.intp]) -> Impacts:
         """Return the impacts of some rows."""
-        return replace(self._of(rows), numbers=[self.numbers[row] for row in rows.tolist()])
+        return replace(self._take(rows), numbers=[self.numbers[row] for row in rows.tolist()])
 
     def at_velocities(self, rows: NDArray[np.intp], velocity: Floats) -> Impacts:
-        """Return trials: impacts of rows, which may repeat, at other velocities."""
+        """Return the impacts of some rows at other velocities. A row may appear several times."""
 
         def cards(row: int) -> Strike:
             return self.cards(int(rows[row])).with_velocity(float(velocity[row]))
 
-        trials, numbers = self._of(rows), list(range(len(rows)))
+        trials, numbers = self._take(rows), list(range(len(rows)))
         return replace(trials, numbers=numbers, velocity=velocity, cards=cards)
 
     def deck(self, row: int) -> Deck:
         """Return the deck of the plate with the impact of a row."""
         return self.cards(row).deck()
 
-    def _of(self, rows: NDArray[np.intp]) -> Impacts:
+    def _take(self, rows: NDArray[np.intp]) -> Impacts:
         return replace(
             self,
             velocity=self.velocity[rows],
@@ -90,10 +91,10 @@ def impacts_of(
 ) -> tuple[Impacts | None, dict[int, str]]:
     """Return the impacts of cases on the plate of a problem, and the faults of invalid cases.
 
-    The impacts are None if no case has one. The faults are texts by the number of the case.
+    The impacts are None if no case is valid. The faults are texts by the number of the case.
     """
-    as_columns = _from_values(checked, numbers, cases, own_law)
-    valid = set() if as_columns is None else set(as_columns.numbers)
+    impacts = _from_values(checked, numbers, cases, own_law)
+    valid = set() if impacts is None else set(impacts.numbers)
     strikes: dict[int, Strike] = {}
     reasons: dict[int, str] = {}
     for number, case in zip(numbers, cases, strict=True):
@@ -106,14 +107,14 @@ def impacts_of(
         except CasesError as error:
             reasons[number] = str(error)
     if not strikes:
-        return as_columns, reasons
-    if as_columns is not None:
-        strikes |= {number: as_columns.cards(row) for row, number in enumerate(as_columns.numbers)}
+        return impacts, reasons
+    if impacts is not None:
+        strikes |= {number: impacts.cards(row) for row, number in enumerate(impacts.numbers)}
     return impacts_from_cards(dict(sorted(strikes.items())), own_law), reasons
 
 
 def impacts_from_cards(strikes: Mapping[int, Strike], own_law: Law | None = None) -> Impacts:
-    """Return impacts that are given as cards, by the numbers of their cases."""
+    """Return the impacts of strikes, given by the numbers of their cases."""
     rows = list(strikes.values())
     units = [UNIT if isinstance(row.projectile, RigidMass) else row.projectile for row in rows]
     kinds = {unit: place for place, unit in enumerate(dict.fromkeys(units))}
@@ -135,7 +136,7 @@ def impacts_from_cards(strikes: Mapping[int, Strike], own_law: Law | None = None
 def _from_values(
     checked: Problem, numbers: Sequence[int], cases: Sequence[Case], own_law: Law | None
 ) -> Impacts | None:
-    """Return the impacts of the cases with valid values; None if columns can't hold the values."""
+    """Return the impacts of the valid cases; None if columns can't hold the values."""
     strike = strike_of(checked.deck)
     names = cases[0].keys() - plate_values(cases[0]).keys()
     if strike.impact is None or strike.indentation is None or not _fits_columns(strike, names):
@@ -143,7 +144,7 @@ def _from_values(
     values = {name: np.array([float(case[name]) for case in cases]) for name in names}
     columns, valid = _columns(strike, strike.indentation, values, len(cases))
     rows = np.flatnonzero(valid)
-    try:  # what does not depend on these values is the same for all
+    try:  # everything else is the same for all cases, so one check is enough
         for row in rows[:1].tolist():
             strike_of_case(checked.deck, cases[row]).check(checked)
     except CasesError:
@@ -160,9 +161,9 @@ def _from_values(
 
 
 def _fits_columns(strike: Strike, names: Collection[str]) -> bool:
-    """Return whether columns can hold values of these names.
+    """Return whether columns can hold the values of these names.
 
-    A rod of another mass is another kind.
+    They can't hold the mass of a rod: a rod of another mass is another kind of projectile.
     """
     rigid = isinstance(strike.projectile, RigidMass)
     return AS_COLUMNS.issuperset(names) and (rigid or not {*MASSES}.intersection(names))
@@ -171,9 +172,9 @@ def _fits_columns(strike: Strike, names: Collection[str]) -> bool:
 def _columns(
     strike: Strike, law: model.Indentation, values: Mapping[str, Floats], count: int
 ) -> tuple[Impacts, Bools]:
-    """Return columns of cases with values by name, and a mask of the valid cases.
+    """Return the columns of cases, and a mask of the valid cases.
 
-    Missing values are the deck's.
+    `values` has the values of the cases by name. The strike of the deck has all other values.
     """
     projectile, rigid = strike.projectile, isinstance(strike.projectile, RigidMass)
     total = next((values[name] for name in MASSES if name in values), projectile.total_mass)

@@ -46,54 +46,56 @@ from fecm.problem.check import check_segment
 from fecm.problem.parts import laminates_of_deck
 from fecm.problem.rules.units import looks_like
 
-THINNEST = 1e-6  # m; thin plies have 15e-6
+THINNEST = 1e-6  # smallest plausible thickness of a ply, m; thin plies have 15e-6
 USUAL_THICKNESS = 2e-4  # m
 ORDER = 3  # integration order of stiffness and mass
-NODAL_POINTS = -3  # where stresses are computed
-# Dimensions of the stiffness matrices, and their entries 11, 22, 66, 12, 16, 26.
+NODAL_POINTS = -3  # order K of MATE: stresses at the nodes
+# Dimensions of the stiffness matrices, and indices of their entries 11, 22, 66, 12, 16, 26.
 STIFFNESS = {"A": "force/length", "B": "force", "D": "force*length"}
 ENTRIES = [0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]
 
 AnyPly = str | Ply | NamedPly
-# Angle, name of the material and thickness of a ply; missing ones come from the laminate.
+# Angle, name of the material, and thickness of a ply. The laminate supplies missing parts.
 Entry = float | tuple[float, str] | tuple[float, str, float]
 Layup = str | Sequence[Entry]
 
 
 class LaminatePly(NamedTuple):
-    """A ply of a laminate."""
+    """Ply of a laminate."""
 
     angle: float  # degrees
-    name: str = ""  # of its material; empty if the layup has none
-    thickness: float | None = None  # length; None if the layup has none
+    name: str = ""  # name of the material; empty if the layup does not name it
+    thickness: float | None = None  # length; None if the layup does not give it
 
 
 @dataclass(frozen=True)
 class Laminate:
     """Layup of a plate, and its stiffness.
 
-    The x-axis is the x-axis of the plate, and angles are counter-clockwise from it. z runs from the
-    struck face, z = -h/2, to the other. The matrices have the order xx, yy, xy, with the
-    engineering shear strain. All numbers are in the units of the first named ply's source, which
-    ``fecm.materials()`` has, or else in the units of the constants in `ply`.
+    The laminate has the x-axis of the plate. Angles are counter-clockwise from it. z runs from the
+    struck face, z = -h/2, to the other face. The matrices have the order xx, yy, xy, with the
+    engineering shear strain. All numbers are in the units of the source of the first named ply (see
+    ``fecm.materials()``), or without a named ply in the units of the constants in `ply`.
 
     Attributes
     ----------
     layup : str or sequence
-        As in ``"[0/45]2s"``, or angles in degrees, from the struck face on.  Plies of several
-        materials have a letter, ``"[0C/90G]s"``, or are tuples of angle, name and, if it is not
-        `ply_thickness`, thickness: ``[(0, "C"), (0, "foam", 10.0)]``.
+        Layup as in ``"[0/45]2s"``, or angles in degrees, from the struck face on. With several
+        materials, plies have a letter, ``"[0C/90G]s"``, or are tuples of angle, name and
+        thickness, ``[(0, "C"), (0, "foam", 10.0)]``. Without a thickness a tuple takes
+        `ply_thickness`.
     ply : str or Ply or NamedPly or dict, optional
-        Name of a ply, which `fecm materials` lists, or constants in the deck's units.  Of several
-        materials, these by the names in the layup; ``""`` is that of plies without a name.
+        Name of a ply from the list of `fecm materials`, or constants in the units of the deck. A
+        dictionary has several materials by their names in the layup; ``""`` stands for plies
+        without a name.
     ply_thickness : float or dict, optional
-        Thickness of one ply, length, also by the names of materials; a named ply's own by default,
-        where it is known.
+        Thickness of one ply, length. A dictionary has thicknesses by the names of materials. The
+        default is the thickness of the named ply, if it is known.
 
     Raises
     ------
     ValueError
-        If the layup can't be read, there is no ply of a name, or a thickness is not positive.
+        If the layup can't be read, the name of a ply is unknown, or a thickness is not positive.
 
     Examples
     --------
@@ -120,8 +122,8 @@ class Laminate:
     def __post_init__(self) -> None:
         plies = self.ply.values() if isinstance(self.ply, Mapping) else [self.ply]
         for constants in plies:
-            if constants is not None:  # a zone's laminate may have the plate's material
-                _known(constants)
+            if constants is not None:  # the laminate of a zone may take the material of the plate
+                _resolve_ply(constants)
         for ply in self.plies:
             self.material(ply.name)
             self.thickness_of(ply)
@@ -132,7 +134,7 @@ class Laminate:
         if isinstance(self.layup, str):
             return tuple(LaminatePly(*ply) for ply in parse_plies(self.layup))
         try:
-            plies = tuple(map(_ply_of, self.layup))
+            plies = tuple(map(_parse_entry, self.layup))
         except (TypeError, ValueError):
             plies = ()
         if not plies:
@@ -153,12 +155,12 @@ class Laminate:
     def thickness(self) -> float:
         """Total thickness, length.
 
-        Raises ValueError if the thickness of a ply is missing. The own thickness of a named ply is
-        in the units of its source.
+        Raises ValueError if the thickness of a ply is missing. Thicknesses of named plies are
+        converted to the units of the laminate.
         """
-        named = [bound for ply in self.plies if isinstance(bound := self._bound(ply), NamedPly)]
+        named = [item for ply in self.plies if isinstance(item := self._resolve(ply), NamedPly)]
         system = named[0].system if named else None
-        return _total([self.thickness_of(ply) or self._own(ply, system) for ply in self.plies])
+        return _total([self.thickness_of(ply) or self._listed(ply, system) for ply in self.plies])
 
     @property
     def A(self) -> Floats:
@@ -199,7 +201,7 @@ class Laminate:
         return stiffness_of_laminate(self, None, [])[0]
 
     def __hash__(self) -> int:
-        return hash(self.plies)  # a layup may be a list, and materials a dictionary
+        return hash(self.plies)  # a layup may be a list, and `ply` a dictionary
 
     def _repr_html_(self) -> str:
         """Return a table of plies, stiffness and engineering constants, for notebooks."""
@@ -211,18 +213,18 @@ class Laminate:
             rows.append(("note", str(error)))
         return html_table(Table(tuple(rows), title=repr(self)))
 
-    def _bound(self, ply: LaminatePly) -> Ply | NamedPly | None:
-        """Return the material of a ply, or None."""
+    def _resolve(self, ply: LaminatePly) -> Ply | NamedPly | None:
+        """Return the constants or the named ply of a ply; None if the laminate has no material."""
         material = self.material(ply.name)
-        return None if material is None else _known(material)
+        return None if material is None else _resolve_ply(material)
 
-    def _own(self, ply: LaminatePly, system: str | None) -> float:
-        """Return the thickness that the name of a ply gives."""
-        bound = self._bound(ply)
-        return _own_thickness(bound if isinstance(bound, NamedPly) else None, system)
+    def _listed(self, ply: LaminatePly, system: str | None) -> float:
+        """Return the thickness that the catalogue lists for a ply."""
+        material = self._resolve(ply)
+        return _listed_thickness(material if isinstance(material, NamedPly) else None, system)
 
     def material(self, name: str) -> object:
-        """Return the argument that is the material of a name."""
+        """Return the part of `ply` that belongs to a name in the layup."""
         materials = self.ply if isinstance(self.ply, Mapping) else {"": self.ply}
         if name in materials:
             return materials[name]
@@ -233,15 +235,16 @@ class Laminate:
         raise ObjectError(f"`layup` has {what}; the materials given are {names}")
 
     def thickness_of(self, ply: LaminatePly) -> float | None:
-        """Return the thickness of a ply, positive, where the laminate has it."""
-        stated = self.ply_thickness
-        common = stated.get(ply.name) if isinstance(stated, Mapping) else stated
-        thickness = common if ply.thickness is None else ply.thickness
+        """Return the thickness of a ply; None if the laminate does not give it."""
+        default = self.ply_thickness
+        if isinstance(default, Mapping):
+            default = default.get(ply.name)
+        thickness = default if ply.thickness is None else ply.thickness
         check_positive(ply_thickness=thickness)
         return thickness
 
 
-def _ply_of(entry: Entry) -> LaminatePly:
+def _parse_entry(entry: Entry) -> LaminatePly:
     if not isinstance(entry, tuple):
         return LaminatePly(float(entry))
     angle, name, *thickness = entry
@@ -251,7 +254,7 @@ def _ply_of(entry: Entry) -> LaminatePly:
 
 
 def _total(thicknesses: Sequence[float]) -> float:
-    """Return the thickness of a laminate, in the digits of a card."""
+    """Return the thickness of a laminate, rounded to the digits of a card."""
     if len(set(thicknesses)) == 1:
         return float(f"{len(thicknesses) * thicknesses[0]:.9g}")
     return float(f"{math.fsum(thicknesses):.9g}")
@@ -261,7 +264,7 @@ class Bound(NamedTuple):
     """Material in the units of a deck."""
 
     ply: Ply
-    named: NamedPly | None  # from which the constants are, if they have a name
+    named: NamedPly | None  # source of the constants; None if they have no name
 
     @property
     def nu23(self) -> float:
@@ -270,15 +273,15 @@ class Bound(NamedTuple):
 
 
 class DeckPlies(NamedTuple):
-    """Laminates in the units of a deck: of the plate and of its zones."""
+    """Laminates of the plate and of its zones, in the units of a deck."""
 
     layups: tuple[tuple[Layer, ...], ...]
-    materials: tuple[Bound, ...]  # number 1 is the first
-    system: str | None  # of units; None if the deck names none
+    materials: tuple[Bound, ...]  # the first is material 1
+    system: str | None  # system of units; None if the deck has none
 
     @property
     def thickness(self) -> float:
-        """Thickness of the plate's laminate."""
+        """Thickness of the laminate of the plate."""
         return _total([layer.thickness for layer in self.layups[0]])
 
     @property
@@ -287,9 +290,9 @@ class DeckPlies(NamedTuple):
         return max(_total([layer.thickness for layer in layers]) for layers in self.layups)
 
     @property
-    def said(self) -> str:
-        """Description of the thickest laminate."""
-        layers = max(self.layups, key=lambda one: _total([layer.thickness for layer in one]))
+    def description(self) -> str:
+        """Number of plies and thickness of the thickest laminate, for messages."""
+        layers = max(self.layups, key=lambda layup: _total([layer.thickness for layer in layup]))
         sizes = {f"{layer.thickness:g}" for layer in layers}
         each = f" of `ply_thickness` {sizes.pop()}" if len(sizes) == 1 else ""
         return f"{len(layers)} plies{each} are {self.thickest:g} thick"
@@ -317,12 +320,12 @@ class DeckPlies(NamedTuple):
         return self.materials[layer.material - MATERIAL]
 
     def segments(self) -> list[Segment]:
-        """Return MATE, and MATS and LAMS where there are several materials and laminates."""
-        (first, *other_materials), (layup, *zones) = self.materials, self.layups
+        """Return MATE, MATS if there are several materials, and LAMS if several laminates."""
+        (first, *further), (layup, *zones) = self.materials, self.layups
         integration = Integration(ORDER, ORDER, NODAL_POINTS, self.thickness)
         segments: list[Segment] = [Material(integration, first.ply, layup)]
-        if other_materials:
-            numbered = enumerate(other_materials, start=MATERIAL + 1)
+        if further:
+            numbered = enumerate(further, start=MATERIAL + 1)
             segments.append(
                 Materials(tuple(NumberedPly(MaterialNumber(n), b.ply) for n, b in numbered))
             )
@@ -335,15 +338,15 @@ class DeckPlies(NamedTuple):
 def deck_plies(
     laminate: Laminate, zones: Sequence[Laminate], units: str | None, notes: list[str]
 ) -> tuple[DeckPlies, list[int]]:
-    """Return the laminates of a plate and of its zones.
+    """Return the laminates of a plate and its zones, and the laminate number of each zone.
 
-    By default they are in the units of the first named ply. Equal laminates have one number. The
-    thickness of a ply that comes from its name is noted.
+    The default `units` are the units of the first named ply. Equal laminates share a number. The
+    function adds a note for each ply thickness that it takes from the catalogue.
     """
     laminates = (laminate, *zones)
     owners = {ply.name: item for item in reversed(laminates) for ply in reversed(item.plies)}
     names = list(dict.fromkeys(ply.name for item in laminates for ply in item.plies))
-    plies_by_name = {name: _known(owners[name].material(name)) for name in names}
+    plies_by_name = {name: _resolve_ply(owners[name].material(name)) for name in names}
     named = {name: item for name, item in plies_by_name.items() if isinstance(item, NamedPly)}
     system = units or next((item.system for item in named.values()), None)
     if named and len(named) < len(plies_by_name) and units is None:
@@ -355,14 +358,14 @@ def deck_plies(
         else Bound(item, None)
         for item in plies_by_name.values()
     ]
-    own_thickness: dict[str, float] = {}  # thickness of a material's plies where its name gives it
+    listed: dict[str, float] = {}  # ply thicknesses from the catalogue, by the names in the layup
 
     def layer(number: int, ply: LaminatePly, thickness: float | None) -> Layer:
         if thickness is None:
-            if ply.name not in own_thickness:
-                own_thickness[ply.name] = _own_thickness(named.get(ply.name), system)
-                notes.append(_note_of_thickness(own_thickness[ply.name], named[ply.name], system))
-            thickness = own_thickness[ply.name]
+            if ply.name not in listed:
+                listed[ply.name] = _listed_thickness(named.get(ply.name), system)
+                notes.append(_note_of_thickness(listed[ply.name], named[ply.name], system))
+            thickness = listed[ply.name]
         return Layer(number, ply.angle, thickness, numbers[ply.name])
 
     layups = [
@@ -377,9 +380,9 @@ def deck_plies(
 def stiffness_of_laminate(
     laminate: Laminate, units: str | None, notes: list[str]
 ) -> tuple[Stiffness, dict[str, str]]:
-    """Return stiffness and inertia of a laminate, checked as in a deck, and names of its units.
+    """Return the stiffness and inertia of a laminate, and the names of its units.
 
-    Raises ObjectError if the laminate is incomplete or impossible.
+    The laminate is checked as in a deck. Raises ObjectError if it is incomplete or impossible.
     """
     plies, _ = deck_plies(laminate, (), system_asked(units), notes)
     control = Control(0, 0, len(plies.layups[0]), 2, 5, 4)
@@ -394,7 +397,10 @@ def stiffness_of_laminate(
 
 
 def _stiffness_rows(stiffness: Stiffness, names: dict[str, str]) -> list[tuple[str, str]]:
-    """Return rows of thickness, matrices without rounding errors, and engineering constants."""
+    """Return rows with the thickness, the matrices and the engineering constants.
+
+    Entries of matrices that are only rounding errors are shown as 0.
+    """
 
     def text(values: Iterable[float], dimension: str) -> str:
         numbers = ", ".join(f"{value:.5g}" for value in values)
@@ -419,7 +425,7 @@ def _stiffness_rows(stiffness: Stiffness, names: dict[str, str]) -> list[tuple[s
 
 
 def system_asked(units: str | None) -> str | None:
-    """Return the name of the requested system of units."""
+    """Return the usual name of the system of units that a user asks for."""
     if units is None:
         return None
     if not isinstance(units, str):
@@ -430,8 +436,8 @@ def system_asked(units: str | None) -> str | None:
         raise ObjectError(f"`units`: {error}") from None
 
 
-def _known(ply: object) -> Ply | NamedPly:
-    """Return a ply, or the named ply of a name."""
+def _resolve_ply(ply: object) -> Ply | NamedPly:
+    """Return constants or a named ply as they are, and the named ply for a name."""
     if isinstance(ply, Ply):
         check_numbers(**{field.name: getattr(ply, field.name) for field in fields(Ply)[1:]})
         return ply
@@ -445,8 +451,8 @@ def _known(ply: object) -> Ply | NamedPly:
     return MATERIALS[ply]
 
 
-def _own_thickness(named: NamedPly | None, system: str | None) -> float:
-    """Return the thickness of a named ply."""
+def _listed_thickness(named: NamedPly | None, system: str | None) -> float:
+    """Return the thickness that the catalogue lists for a ply; raise ObjectError without one."""
     thickness = None if named is None or system is None else named.value("thickness", system)
     if thickness is None:
         unknown = f": {named.name} has no known one" if named else ""
@@ -455,13 +461,13 @@ def _own_thickness(named: NamedPly | None, system: str | None) -> float:
 
 
 def _note_of_thickness(thickness: float, named: NamedPly, system: str | None) -> str:
-    """Note the thickness that the name of a ply gives."""
+    """Return a note about a ply thickness from the catalogue."""
     unit = units_of(system or named.system)["length"]
     return f"the plies are {thickness:g} {unit} thick, as {named.name} is listed"
 
 
 def check_thickness(plies: DeckPlies) -> None:
-    """Raise ObjectError if plies are impossibly thin, and name the unit they seem to be in."""
+    """Raise ObjectError if plies are impossibly thin; the message guesses the right unit."""
     names = units_of(plies.system) if plies.system else {}
     unit = in_si("length", names)
     thinnest = min(layer.thickness for layers in plies.layups for layer in layers)
@@ -473,13 +479,13 @@ def check_thickness(plies: DeckPlies) -> None:
         )
 
 
-def toughness(giic: float | None) -> list[Segment]:
-    """Return the DELA segment of a given toughness."""
+def toughness_segment(giic: float | None) -> list[Segment]:
+    """Return the DELA segment of a toughness; empty without one."""
     return [] if giic is None else [Delamination(toughness=giic)]
 
 
 def strengths_of(plies: DeckPlies) -> Allowables:
-    """Return the ALLO segment of named plies, if one of them has strengths."""
+    """Return the ALLO segment of named plies; raise ObjectError if none of them has strengths."""
     strengths, lacking = _strengths(plies)
     if not strengths:
         why = "; ".join(f"{name} has {lacks}" for name, lacks in lacking.items())
@@ -488,7 +494,7 @@ def strengths_of(plies: DeckPlies) -> Allowables:
 
 
 def _strengths(plies: DeckPlies) -> tuple[list[Allowables], dict[str, str]]:
-    """Return the strengths of named plies, and what the others lack, by name."""
+    """Return the strengths of named plies, and a text by name about plies that lack strengths."""
     all_strengths: list[Allowables] = []
     lacking: dict[str, str] = {}
     for number, named in plies.named:
@@ -504,7 +510,7 @@ def _strengths(plies: DeckPlies) -> tuple[list[Allowables], dict[str, str]]:
 
 
 def toughness_of(plies: DeckPlies) -> float:
-    """Return the least toughness G_IIc of named plies."""
+    """Return the smallest toughness G_IIc of named plies; raise ObjectError without any."""
     if toughnesses := _toughnesses(plies):
         return min(toughnesses)
     raise ObjectError("no named ply with GIIc")
@@ -516,8 +522,11 @@ def _toughnesses(plies: DeckPlies) -> list[float]:
     return [delamination.toughness for delamination in delaminations if delamination]
 
 
-def damages(plies: DeckPlies, giic: float | None, notes: list[str]) -> list[Segment]:
-    """Return strengths and least toughness of named plies; missing ones are noted."""
+def damage_segments(plies: DeckPlies, giic: float | None, notes: list[str]) -> list[Segment]:
+    """Return the ALLO and DELA segments of named plies, and add notes about missing values.
+
+    DELA has `giic`, or else the smallest toughness of the plies.
+    """
     if plies.system is None or not plies.named:
         raise ObjectError("`damage` needs a named ply with strengths or toughness")
     strengths, without = _strengths(plies)
@@ -540,8 +549,8 @@ def damages(plies: DeckPlies, giic: float | None, notes: list[str]) -> list[Segm
     return segments
 
 
-def _expanding() -> list[str]:
-    """Return the names of the plies that have expansions."""
+def _names_with_expansion() -> list[str]:
+    """Return the names of the catalogue's plies with coefficients of expansion."""
     return [name for name, ply in MATERIALS.items() if ply.expansion is not None]
 
 
@@ -557,19 +566,23 @@ def cure_segment(plies: DeckPlies, cure: float | str | None) -> Cure | None:
             )
             raise ObjectError(
                 f"`cure`: {lacks} alpha1 and alpha2, which "
-                f"{', '.join(_expanding())} have; a file of your own plies may have them (fecm new "
-                "--materials)"
+                f"{', '.join(_names_with_expansion())} have; a file of your own plies may have "
+                "them (fecm new --materials)"
             )
         expansions.append(replace(expansion, material=number))
     named = [ply for _, ply in plies.named]
-    return Cure(delta_t=_cooling(cure, named), expansions=tuple(expansions))
+    return Cure(delta_t=_temperature_change(cure, named), expansions=tuple(expansions))
 
 
-def _cooling(cure: float | str, plies: Sequence[NamedPly]) -> float:
-    """Return temperature of use minus stress-free temperature, K, by default of the plies."""
+def _temperature_change(cure: float | str, plies: Sequence[NamedPly]) -> float:
+    """Return the temperature of use minus the stress-free temperature, K.
+
+    `cure` is the difference, or both temperatures, ``"177:20"``. ``":20"`` takes the stress-free
+    temperature of the plies.
+    """
     before, colon, after = str(cure).rpartition(":")
     if colon and not before.strip():
-        before = str(_stress_free(cure, plies))
+        before = str(_stress_free_temperature(cure, plies))
     try:
         change = float(after) - (float(before) if colon else 0.0)
     except ValueError:
@@ -582,8 +595,8 @@ def _cooling(cure: float | str, plies: Sequence[NamedPly]) -> float:
     return float(f"{change:.9g}")
 
 
-def _stress_free(cure: float | str, plies: Sequence[NamedPly]) -> float:
-    """Return the stress-free temperature of the plies that have one."""
+def _stress_free_temperature(cure: float | str, plies: Sequence[NamedPly]) -> float:
+    """Return the common stress-free temperature of the plies that have one."""
     temperatures = {ply.values.get("stress_free_temperature") for ply in plies} - {None}
     if len(temperatures) != 1:
         names = " and ".join(ply.name for ply in plies)

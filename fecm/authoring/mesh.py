@@ -16,13 +16,13 @@ from fecm.deck.model import Boundary, Curvature, Patch
 from fecm.problem.plate_mesh import PlateMesh
 
 MOST_ELEMENTS = 500_000
-LEAST_RADIUS = 1e-3  # least radius of a patch to which a mesh is refined, over the plate's side
+LEAST_RADIUS = 1e-3  # smallest radius to refine a mesh to, over the side of the plate
 
 InPlane = Literal["free", "held", "normal", "tangential"]  # u and v on supports
 FREE: InPlane = "free"
 HELD: InPlane = "held"
 TANGENTIAL: InPlane = "tangential"
-# What edges of a curved panel hold in its plane, for a note.
+# In-plane displacements that the edges of a curved panel hold, for a note.
 HELD_WORDS = {
     "free": "neither u nor v",
     "held": "u and v",
@@ -41,21 +41,24 @@ class Placed(NamedTuple):
     patch: Patch | None
 
 
-def placed(
+def place_impact(
     plate: Plate,
     plies: DeckPlies,
     at: tuple[float, float] | None,
     patch: Patch | None,
     doubts: list[str],
 ) -> Placed:
-    """Return mesh, impact node, and patch; changes in them are added to `doubts`."""
-    place = None if at is None else number_pair("at", at)
-    mesh = plate.imported or plate_grid(plate, place, None if patch is None else patch.radius)
+    """Return the mesh, the impact node and the patch for an impact at a point.
+
+    If the point is moved to a node or the mesh is refined, `doubts` gets a text about it.
+    """
+    point = None if at is None else number_pair("at", at)
+    mesh = plate.imported or plate_grid(plate, point, None if patch is None else patch.radius)
     low, high = mesh.extent
     side = min(high[0] - low[0], high[1] - low[1])
     if plies.thickest >= side:
-        raise ObjectError(f"{plies.said}, and the plate's shorter side is {side:g}")
-    x, y = place or ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0)
+        raise ObjectError(f"{plies.description}, and the plate's shorter side is {side:g}")
+    x, y = point or ((low[0] + high[0]) / 2.0, (low[1] + high[1]) / 2.0)
     if not (low[0] <= x <= high[0] and low[1] <= y <= high[1]):
         reach = f"x {low[0]:g} to {high[0]:g} and y {low[1]:g} to {high[1]:g}"
         raise ObjectError(f"`at` is outside the plate: {x:g}, {y:g}, where it has {reach}")
@@ -70,17 +73,17 @@ def placed(
         if patch is not None and isinstance(mesh, PlateMesh):
             patch = replace(patch, x=float(f"{x:.6g}"), y=float(f"{y:.6g}"))
         else:
-            asked = "the plate's centre" if at is None else "`at`"
+            origin = "the plate's centre" if at is None else "`at`"
             doubts.append(
-                f"the impact point is moved by {distance:.4g}: from {asked} at {x:g}, {y:g} to the "
-                f"nearest node, {node} at {node_x:g}, {node_y:g}"
+                f"the impact point is moved by {distance:.4g}: from {origin} at {x:g}, {y:g} to "
+                f"the nearest node, {node} at {node_x:g}, {node_y:g}"
             )
     doubts += _doubts_of_refinement(plate, mesh, patch)
     return Placed(mesh, node, patch)
 
 
 def _doubts_of_refinement(plate: Plate, mesh: AnyMesh, patch: Patch | None) -> list[str]:
-    """Doubt a rectangle with other numbers of elements than were given."""
+    """Return a doubt if refinement changes the numbers of elements of a rectangle."""
     if not isinstance(mesh, ElementGrid) or plate.mesh is None or plate.fixture is not None:
         return []
     if patch is None or patch.radius is None:
@@ -88,25 +91,27 @@ def _doubts_of_refinement(plate: Plate, mesh: AnyMesh, patch: Patch | None) -> l
     counts = mesh.across // 2, mesh.up // 2
     if counts == plate.mesh:
         return []
-    new, old = (f"{nx}x{ny}" for nx, ny in (counts, plate.mesh))
+    refined, requested = (f"{nx}x{ny}" for nx, ny in (counts, plate.mesh))
     return [
-        f"the mesh has {new} elements instead of {old}: their sides at the patch are at most its "
-        f"radius {patch.radius:g}"
+        f"the mesh has {refined} elements instead of {requested}: their sides at the patch are at "
+        f"most its radius {patch.radius:g}"
     ]
 
 
-def plate_grid(plate: Plate, at: tuple[float, float] | None, radius: float | None) -> ElementGrid:
+def plate_grid(
+    plate: Plate, point: tuple[float, float] | None, radius: float | None
+) -> ElementGrid:
     """Return the grid of a rectangular plate, refined to the radius of a patch.
 
-    With a fixture, size and mesh are those of its window.
+    On a fixture, `plate.size` and `plate.mesh` describe the window.
     """
     columns, rows = list(plate.columns), list(plate.rows)
     if plate.size and plate.mesh:
         whole = plate.fixture.size if plate.fixture else plate.size
-        place = at or (whole[0] / 2.0, whole[1] / 2.0)
+        centre = point or (whole[0] / 2.0, whole[1] / 2.0)
         columns, rows = (
             _sections(side, count, x - (length - side) / 2.0, plate.grading, radius)
-            for side, count, x, length in zip(plate.size, plate.mesh, place, whole, strict=True)
+            for side, count, x, length in zip(plate.size, plate.mesh, centre, whole, strict=True)
         )
         if plate.fixture:
             columns, rows = grids.framed(columns, whole[0]), grids.framed(rows, whole[1])
@@ -122,7 +127,7 @@ def plate_grid(plate: Plate, at: tuple[float, float] | None, radius: float | Non
 def _sections(
     length: float, count: int, centre: float, grading: float, radius: float | None
 ) -> list[GridSection]:
-    """Return the elements in one direction."""
+    """Return the sections in one direction, refined so that elements at `centre` fit `radius`."""
     if grading > 1.0:
         sections = grids.graded(length, count, centre, grading)
     else:
@@ -147,20 +152,20 @@ class Supported(NamedTuple):
 class MembraneSupport(Enum):
     """Reason why u and v of a plate move."""
 
-    AT_REST = auto()  # they are zero
-    STRETCHES = auto()  # with B or large deflections
+    AT_REST = auto()  # u and v are zero
+    STRETCHES = auto()  # a coupled laminate, or large deflections
     CURVED = auto()
 
     @classmethod
     def of(cls, *, curved: bool, stretches: bool) -> Self:
-        """Return the kind of a plate."""
+        """Return the reason for a plate."""
         if curved:
             return cls.CURVED
         return cls.STRETCHES if stretches else cls.AT_REST
 
 
 def curvature_of(radius_x: float | None, radius_y: float | None) -> Curvature | None:
-    """Return the CURV segment of a shallow panel; None without a radius."""
+    """Return the CURV segment of a shallow panel; None for a flat plate."""
     radii = {"radius_x": radius_x, "radius_y": radius_y}
     for name, radius in radii.items():
         if radius is not None and not (is_finite(radius) and radius):
@@ -173,14 +178,18 @@ def curvature_of(radius_x: float | None, radius_y: float | None) -> Curvature | 
     return Curvature(radius_x=float(radius_x or 0.0), radius_y=float(radius_y or 0.0))
 
 
-def supported(
+def support_plate(
     plate: Plate,
     mesh: AnyMesh,
     in_plane: InPlane | None,
     notes: list[str],
     membrane: MembraneSupport,
 ) -> Supported:
-    """Return the supports of a plate; u and v are held everywhere where they are zero."""
+    """Return the supports of a plate.
+
+    If u and v are zero anyway, they are held at every node. `in_plane` then has no effect, and
+    `notes` gets a text about it.
+    """
     if membrane is MembraneSupport.AT_REST:
         if in_plane is not None:
             notes.append(
@@ -190,8 +199,8 @@ def supported(
         everywhere, in_plane = (1, 1, 0, 0, 0), HELD
     else:
         everywhere = (0, 0, 0, 0, 0)
-        of_edges = TANGENTIAL if membrane is MembraneSupport.CURVED else HELD
-        in_plane = in_plane or (FREE if plate.fixture else of_edges)
+        default = TANGENTIAL if membrane is MembraneSupport.CURVED else HELD
+        in_plane = in_plane or (FREE if plate.fixture else default)
     if membrane is MembraneSupport.CURVED:
         notes.append(_note_of_curved(plate, in_plane))
     if isinstance(mesh, PlateMesh):
@@ -204,7 +213,7 @@ def supported(
 
 
 def _note_of_curved(plate: Plate, in_plane: InPlane) -> str:
-    """Say what the supports of a curved panel hold in its plane, which decides its stiffness."""
+    """Return a note about the in-plane supports of a curved panel, which decide its stiffness."""
     kinds: dict[str, str] = {"window": in_plane} if plate.fixture else {}
     for support in sorted(set(plate.supports.values()) - {"free"}):
         kinds[support] = held_in_plane(support, in_plane)

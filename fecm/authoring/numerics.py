@@ -24,14 +24,14 @@ from fecm.results.validity import IN_PLANE_WORDS, LIMITS, InPlane
 
 ROWS = 200  # default number of stored rows of strains and displacements
 
-# `damage` stores ply stresses of the elements within this multiple of the distance within which
-# plate theory does not hold, and of at least this number of elements.
+# Elements around the load, which store ply stresses with `damage`. Their largest distance is a
+# multiple of the distance within which plate theory fails. There is also a least number of them.
 AROUND_LOAD = 3.0
 FEWEST_ELEMENTS = 24
 
-AUTO = "auto"  # the default patch: a disc, or what a standard has
-EQUI: Literal["equi"] = "equi"  # the shear stiffness from equilibrium
-Quadrature = Literal["mitc", "full"]  # of the transverse shear
+AUTO = "auto"  # the default patch: a disc, or Hertz's patch with a standard
+EQUI: Literal["equi"] = "equi"  # shear stiffness from equilibrium
+Quadrature = Literal["mitc", "full"]  # treatment of transverse shear
 MITC: Quadrature = "mitc"
 FULL: Quadrature = "full"
 
@@ -41,17 +41,17 @@ class Numerics(NamedTuple):
 
     patch: str | Patch | None = AUTO
     shear: Quadrature = MITC
-    # Of the shear stiffness; by default EQUI with assumed strains, and the report's 1 without.
+    # Factor of the shear stiffness; by default EQUI with assumed strains, and 1 without.
     shear_factor: float | Literal["equi"] | None = None
     duration: float | str | None = None
     dt: float | None = None
     every: int | None = None  # steps between stored rows
-    plies: RowsOfPlies | None = None  # the same of ply stresses, with `damage` of some elements
-    failure: Rows | None = None  # the same of failure exposures, by default as `every`
-    damage: bool = False  # whether the deck is to show damage
+    plies: RowsOfPlies | None = None  # steps between rows of ply stresses
+    failure: Rows | None = None  # steps between evaluations of failure
+    damage: bool = False  # whether the deck stores data about damage
 
     def contact_patch(self, *, prescribed: bool) -> Patch | None:
-        """Return the contact patch; `prescribed` says whether a standard has the default."""
+        """Return the contact patch; the default is Hertz's if a standard prescribes the test."""
         if self.patch == AUTO:
             return Patch(HERTZ) if prescribed else Patch()
         return parse_patch(self.patch) if isinstance(self.patch, str) else self.patch
@@ -69,7 +69,7 @@ class Numerics(NamedTuple):
         return Shear(factor, assumed=assumed) if assumed or factor != 1.0 else None
 
     def time_step(self, deck: Deck) -> float:
-        """Return the time step, by default 0.9 of the critical one."""
+        """Return the time step; by default 0.9 of the critical time step."""
         if self.dt is not None:
             return self.dt
         mesh = generate(deck)
@@ -85,7 +85,10 @@ class Numerics(NamedTuple):
     def program(
         self, deck: Deck, dt: float, duration: float, elements: int | None = None
     ) -> tuple[Macro, ...]:
-        """Return the macro program of an impact, by default with ply stresses of `elements`."""
+        """Return the macro program of an impact.
+
+        By default it stores ply stresses in `elements` elements; None stores no ply stresses.
+        """
         steps = max(1, math.ceil(duration / dt - 1e-9))
         rows = float(self.every if self.every is not None else max(1, steps // ROWS))
         words = {"LMAS": 0.0, "DT": dt, "LOOP": float(steps), "TIME": 0.0}
@@ -98,7 +101,7 @@ class Numerics(NamedTuple):
         return with_outputs(macros, failure=failure, plies=plies)
 
     def with_program(self, deck: Deck, dt: float, duration: float | None) -> Deck:
-        """Return the deck with its program; without a duration, it is longer than the contact.
+        """Return the deck with its program. The default duration covers the contact.
 
         With `damage` and strengths the program also stores ply stresses around the load.
         """
@@ -115,24 +118,19 @@ class Numerics(NamedTuple):
 
 
 def elements_around_load(problem: Problem) -> int:
-    """Return the number of elements around the load in which the plies are most stressed.
-
-    The elements next to them count.
-    """
+    """Return the number of elements around the load that include the most stressed plies."""
     near = int((problem.distances < AROUND_LOAD * problem.reach_of_load).sum())
     return min(max(near, FEWEST_ELEMENTS), problem.deck.control.numel)
 
 
 Kinematics = Literal["auto", "linear", "von-karman"]
-AUTO_KINEMATICS: Kinematics = (
-    "auto"  # von Kármán where the static estimate of the deflection asks for it
-)
+AUTO_KINEMATICS: Kinematics = "auto"  # the static estimate of the deflection decides
 LINEAR: Kinematics = "linear"
 VON_KARMAN: Kinematics = "von-karman"
 
-LIMIT = LIMITS[InPlane.UNKNOWN]  # deflection over the thickness from which `auto` is von Kármán
-MOST_ELEMENTS = 20_000  # of a mesh whose static deflection is computed: seconds beyond
-# A program of one short step, for checks before the time step is chosen.
+LIMIT = LIMITS[InPlane.UNKNOWN]  # largest deflection over thickness of a linear plate with `auto`
+MOST_ELEMENTS = 20_000  # beyond this mesh size the static deflection would take seconds
+# Program of one short step, for checks before the choice of the time step.
 BRIEF = (
     Macro("LMAS"),
     Macro("DT", value=1e-9),
@@ -143,7 +141,7 @@ BRIEF = (
 )
 
 
-class Formed(NamedTuple):
+class SupportedDeck(NamedTuple):
     """Deck with its supports, without a program."""
 
     deck: model.Deck
@@ -152,10 +150,7 @@ class Formed(NamedTuple):
 
 
 def kinematics_of(kinematics: Kinematics | None, nonlinear: bool | None) -> Kinematics:
-    """Return the kinematics of both options.
-
-    Raises ObjectError if they contradict each other.
-    """
+    """Combine both options for the kinematics; raise ObjectError if they contradict each other."""
     if nonlinear is None:
         return kinematics or AUTO_KINEMATICS
     named = VON_KARMAN if nonlinear else LINEAR
@@ -164,50 +159,54 @@ def kinematics_of(kinematics: Kinematics | None, nonlinear: bool | None) -> Kine
     raise ObjectError(f"`kinematics` is {kinematics}, and `nonlinear` means {named}: give one")
 
 
-def with_kinematics(asked: Kinematics, form: Callable[[bool], Formed]) -> Formed:
-    """Return the deck of the requested kinematics, or of those that the static deflection needs.
+def with_kinematics(
+    kinematics: Kinematics, build: Callable[[bool], SupportedDeck]
+) -> SupportedDeck:
+    """Return the deck with the requested kinematics; with ``"auto"`` the deflection decides.
 
-    `form` builds the deck of a nonlinear plate, or of a linear one.
+    `build` returns the deck of a nonlinear plate (True) or of a linear plate (False).
     """
-    if asked == VON_KARMAN:
-        formed = form(True)
-        if not has_assumed_shear(formed.deck):
+    if kinematics == VON_KARMAN:
+        nonlinear = build(True)
+        if not has_assumed_shear(nonlinear.deck):
             raise ObjectError(
                 f"`kinematics` {VON_KARMAN} needs assumed shear strains: `shear` mitc"
             )
-        return formed
-    linear = form(False)
-    if asked == LINEAR:
+        return nonlinear
+    linear = build(False)
+    if kinematics == LINEAR:
         return linear
     if linear.deck.control.numel > MOST_ELEMENTS:
-        return _noted(
+        return _with_note(
             linear,
             f"the plate is linear: its static deflection is computed up to {MOST_ELEMENTS} "
             "elements only; `kinematics` von-karman adds the stretching (NONL)",
         )
-    ratio = _deflection(linear.deck)
+    ratio = _deflection_over_thickness(linear.deck)
     if not ratio > LIMIT:
         return linear
     estimate = f"the static estimate of the deflection is {ratio:.2g} h, beyond {LIMIT:g} h"
-    nonlinear = form(True)
+    nonlinear = build(True)
     loaded = load_deck(replace(nonlinear.deck, macros=BRIEF))
     if errors := loaded.errors():
         reason = errors[0].message.rstrip(".")
-        return _noted(linear, f"{estimate}, but the plate stays linear, too soft there: {reason}")
+        return _with_note(
+            linear, f"{estimate}, but the plate stays linear, too soft there: {reason}"
+        )
     (problem,) = loaded.problems
     edges = IN_PLANE_WORDS.get(problem.judge.in_plane, "u and v held at every node")
-    return _noted(
+    return _with_note(
         nonlinear,
         f"{estimate}: the plate stretches as it bends (NONL), {edges}; `kinematics` linear leaves "
         "it out",
     )
 
 
-def _noted(formed: Formed, note: str) -> Formed:
-    return formed._replace(notes=[*formed.notes, note])
+def _with_note(structure: SupportedDeck, note: str) -> SupportedDeck:
+    return structure._replace(notes=[*structure.notes, note])
 
 
-def _deflection(deck: model.Deck) -> float:
+def _deflection_over_thickness(deck: model.Deck) -> float:
     """Estimate the largest static deflection over the thickness; 0 for a deck with errors."""
     loaded = load_deck(replace(deck, macros=BRIEF))
     if loaded.errors():  # the deck is refused later

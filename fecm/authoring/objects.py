@@ -1,4 +1,4 @@
-"""Replacement of plate, laminate, projectile or contact of a deck by objects."""
+"""Replacement of the plate, laminate, projectile or contact of a deck."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from fecm.authoring.laminate import (
     strengths_of,
     toughness_of,
 )
-from fecm.authoring.mesh import MembraneSupport, placed, supported
+from fecm.authoring.mesh import MembraneSupport, place_impact, support_plate
 from fecm.authoring.parameters import ObjectError, check_kind
 from fecm.authoring.plate import Plate
 from fecm.authoring.plates import swapped
@@ -33,7 +33,7 @@ OF_MESH: tuple[type[model.Segment], ...] = (model.Coordinates, model.Elements, m
 
 
 class Objects(NamedTuple):
-    """Objects that replace parts of a deck; None leaves a part as it is."""
+    """New parts of a deck. None keeps a part of the deck."""
 
     plate: Plate | None = None
     laminate: Laminate | None = None
@@ -52,13 +52,13 @@ class Objects(NamedTuple):
             check_kind("contact", self.contact, AnyContact)
 
     def with_plate(self, deck: model.Deck, at: tuple[float, float] | None) -> model.Deck:
-        """Return the deck with the laminate and the plate, struck at a point."""
+        """Return the deck with the new laminate and plate; the projectile hits a point."""
         if self.laminate is not None:
             deck = with_laminate(deck, self.laminate)
         return deck if self.plate is None else with_plate(deck, self.plate, at)
 
     def with_strike(self, deck: model.Deck) -> model.Deck:
-        """Return the deck with the projectile and the contact."""
+        """Return the deck with the new projectile and contact."""
         if self.projectile is not None:
             deck = with_projectile(deck, self.projectile)
         return deck if self.contact is None else with_contact(deck, self.contact)
@@ -72,7 +72,7 @@ def with_projectile(deck: model.Deck, projectile: AnyProjectile) -> model.Deck:
 
 
 def with_contact(deck: model.Deck, contact: AnyContact) -> model.Deck:
-    """Return the deck with another contact law, which may be estimated from its laminate."""
+    """Return the deck with another contact law, or with an estimate for its laminate."""
     plies = plies_of_deck(deck)
     elastic = isinstance(contact, Sphere) and contact.modulus is not None
     if plies.system is None and not elastic and not isinstance(contact, model.Indentation):
@@ -86,25 +86,25 @@ def with_contact(deck: model.Deck, contact: AnyContact) -> model.Deck:
 
 def with_laminate(deck: model.Deck, laminate: Laminate) -> model.Deck:
     """Return the deck with another laminate; strengths of the new plies replace existing ones."""
-    _refuse(deck, "laminate", model.Laminates, model.Zones)
+    _refuse_segments(deck, "laminate", model.Laminates, model.Zones)
     system = system_of(deck)
     plies, _ = deck_plies(laminate, (), system, [])
     if system is None and plies.named:
         raise ObjectError("`laminate` has a named ply: the deck needs a UNIT segment to convert it")
-    material, *other_segments = plies.segments()
+    material, *further = plies.segments()
     assert isinstance(material, model.Material)
-    old = deck.require(model.Material)
-    integration = replace(old.integration, thickness=plies.thickness, source=None)
-    changed = swapped(deck, old, replace(material, integration=integration))
+    replaced = deck.require(model.Material)
+    integration = replace(replaced.integration, thickness=plies.thickness, source=None)
+    changed = swapped(deck, replaced, replace(material, integration=integration))
     kept = [segment for segment in changed.segments if not isinstance(segment, model.Materials)]
     control = replace(deck.control, layers=len(material.layers), source=None)
-    changed = replace(changed, control=control, segments=(*kept, *other_segments))
+    changed = replace(changed, control=control, segments=(*kept, *further))
     constants = dict(enumerate((bound.ply for bound in plies.materials), start=MATERIAL))
     return changed if constants == deck.plies else _with_properties(changed, plies)
 
 
 def _with_properties(deck: model.Deck, plies: DeckPlies) -> model.Deck:
-    """Return the deck with strengths, toughness and expansions of other plies, where it has any."""
+    """Replace strengths, toughness and expansions, where the deck has them, by those of plies."""
     segments: list[model.Segment] = []
     try:
         for segment in deck.segments:
@@ -128,17 +128,20 @@ def _with_properties(deck: model.Deck, plies: DeckPlies) -> model.Deck:
 
 
 def with_plate(deck: model.Deck, plate: Plate, at: tuple[float, float] | None) -> model.Deck:
-    """Return the deck with another mesh and its supports, by default struck in its middle."""
-    _refuse(deck, "plate", model.Forces, model.Zones)
+    """Return the deck with another mesh and its supports.
+
+    The projectile hits the point `at`, by default the middle of the plate.
+    """
+    _refuse_segments(deck, "plate", model.Forces, model.Zones)
     test = plate.fixture.test if plate.fixture else None
     if test is not None and system_of(deck) != STANDARD:
         raise ObjectError(f"`plate`: the fixture's standard is in {STANDARD}, and the deck is not")
-    old, doubts = deck.last(model.Patch), list[str]()
-    patch = None if old is None else replace(old, x=None, y=None, source=None)
-    mesh, node, patch = placed(plate, plies_of_deck(deck), at, patch, doubts)
+    old_patch, doubts = deck.last(model.Patch), list[str]()
+    patch = None if old_patch is None else replace(old_patch, x=None, y=None, source=None)
+    mesh, node, patch = place_impact(plate, plies_of_deck(deck), at, patch, doubts)
     stretches = deck.has(model.Nonlinear) or is_coupled(deck)
     membrane = MembraneSupport.of(curved=is_curved(deck), stretches=stretches)
-    boundary, _ = supported(plate, mesh, None, [], membrane)
+    boundary, _ = support_plate(plate, mesh, None, [], membrane)
     for doubt in doubts:
         warn(doubt)
     control = replace(
@@ -155,24 +158,24 @@ def with_plate(deck: model.Deck, plate: Plate, at: tuple[float, float] | None) -
         control=control,
         segments=(mesh.coordinates(), mesh.element_cards(), *supports, *kept),
     )
-    if old is not None and patch is not None:
-        changed = swapped(changed, old, patch)
+    if old_patch is not None and patch is not None:
+        changed = swapped(changed, old_patch, patch)
     if (strike := deck.last(model.Impact)) is not None:
         changed = swapped(changed, strike, replace(strike, node=node, source=None))
     return changed
 
 
-def _refuse(deck: model.Deck, name: str, *kinds: type[model.Segment]) -> None:
-    """Raise ObjectError if the deck has segments that refer to the replaced part."""
-    if there := [kind.keyword for kind in kinds if deck.has(kind)]:
+def _refuse_segments(deck: model.Deck, name: str, *kinds: type[model.Segment]) -> None:
+    """Raise ObjectError if the deck has segments that refer to the part to be replaced."""
+    if keywords := [kind.keyword for kind in kinds if deck.has(kind)]:
         raise ObjectError(
-            f"`{name}` can't be replaced in a deck with {' and '.join(there)}, which would then "
+            f"`{name}` can't be replaced in a deck with {' and '.join(keywords)}, which would then "
             "not fit"
         )
 
 
 def plies_of_deck(deck: model.Deck) -> DeckPlies:
-    """Return the laminates and materials of a deck; constants of a named ply have its name."""
+    """Return the laminates and materials of a deck, with the names of named plies."""
     system, plies = system_of(deck), deck.plies
     first = plies[MATERIAL]
     numbers = range(MATERIAL, max(plies) + 1)

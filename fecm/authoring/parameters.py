@@ -1,4 +1,4 @@
-"""Numbers and units of parameters, and the error about them."""
+"""Checks of parameters, their units, and the error about invalid parameters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from fecm.deck.units import MASS, MODULUS, in_si, unit_in_si, units_of
 
 NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
 
-# A value with a unit of a dimension, for messages.
+# Examples of values with a unit, by dimension, for messages.
 EXAMPLES = {
     "force*length": "10J",
     "length/time": "3m/s",
@@ -27,11 +27,11 @@ EXAMPLES = {
 
 
 class ObjectError(FecmError, ValueError):
-    """Objects do not give a deck; messages quote the names of parameters in backquotes."""
+    """The objects do not make a deck. Messages have the names of parameters in backquotes."""
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """Return whether a parameter is a number; True and False are not."""
+    """Return whether a parameter is a number other than True and False."""
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
@@ -41,46 +41,46 @@ def is_finite(value: object) -> TypeGuard[float]:
 
 
 def check_numbers(**values: object) -> None:
-    """Refuse parameters that are not numbers; None is a missing parameter."""
+    """Raise ObjectError if a parameter is not a number; None is allowed."""
     for name, value in values.items():
         if value is not None and not is_number(value):
             raise ObjectError(f"`{name}` is {value!r}; it must be a number")
 
 
 def check_positive(**values: float | None) -> None:
-    """Refuse parameters that are not positive numbers; None is a missing parameter."""
+    """Raise ObjectError if a parameter is not a positive number; None is allowed."""
     for name, value in values.items():
         if value is not None and not (is_finite(value) and value > 0.0):
             raise ObjectError(f"`{name}` is {value!r}; it must be a positive number")
 
 
 def check_kind(name: str, value: object, kind: type | UnionType) -> None:
-    """Refuse a parameter that is not an object of fecm."""
+    """Raise ObjectError if a parameter is not an object of fecm."""
     if not isinstance(value, kind):
         raise ObjectError(f"`{name}` is {value!r}, not a {name} of fecm")
 
 
 def text_of(value: object) -> object:
-    """Return the text of a quantity of pint, unyt or astropy, such as ``3.0 m/s``.
+    """Return a quantity of pint, unyt or astropy as a text such as ``3.0 m/s``.
 
-    Any other value stays as it is.
+    Other values are returned unchanged.
     """
     number = getattr(value, "magnitude", getattr(value, "value", None))
     unit = getattr(value, "units", getattr(value, "unit", None))
     if number is None or unit is None:
         return value
     try:
-        name = format(unit, "~C")  # the short names of pint
+        name = format(unit, "~C")  # pint's format for short names
     except (TypeError, ValueError):
         name = str(unit)
     return f"{number} {name}"
 
 
 def in_units(name: str, value: object, dimension: str, system: str | None) -> float | None:
-    """Return a parameter in a system of units; a number or None stays as it is.
+    """Convert a parameter with a unit, such as ``10J``, to a system of units.
 
-    Raises ObjectError if a text, as in ``10J`` or ``3m/s``, or a quantity is not a number with a
-    unit of the dimension, the system is not known, or the value has another type.
+    A number, None, or the number of a text without a unit stays as it is. Raises ObjectError if the
+    value is not a number, the unit does not have the dimension, or the system is not known.
     """
     value = text_of(value)
     if value is None or is_number(value):
@@ -103,7 +103,7 @@ def in_units(name: str, value: object, dimension: str, system: str | None) -> fl
 
 
 def number_pair(name: str, value: Sequence[float]) -> tuple[float, float]:
-    """Return the two numbers of a parameter."""
+    """Return the two numbers of a parameter; raise ObjectError if it has no two numbers."""
     try:
         x, y = map(float, value)
     except (TypeError, ValueError):

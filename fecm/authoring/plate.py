@@ -1,4 +1,4 @@
-"""Plate: its mesh, its supports, and the fixtures of drop-weight tests."""
+"""Plates: mesh, supports, and fixtures of drop-weight tests."""
 
 from __future__ import annotations
 
@@ -23,30 +23,31 @@ CUSTOM = "window:LXxLY,WXxWY"
 class DropWeight(NamedTuple):
     """Values that a test standard prescribes besides its fixture, in mm, N, s and t."""
 
-    mass: float  # of the rigid projectile
-    radius: float
+    mass: float  # mass of the rigid projectile
+    radius: float  # radius of its tip
     energy: float  # impact energy per thickness, force
-    thinnest: float  # limits of the laminate's thickness, length
+    # Limits of the thickness of the laminate, length.
+    thinnest: float
     thickest: float
-    least_energy: float = 100.0  # per thickness, below which a unit is probably mistaken, force
+    least_energy: float = 100.0  # smallest plausible energy per thickness, force
 
     def allows(self, thickness: float) -> bool:
-        """Return whether a laminate's thickness is in the range of the standard."""
+        """Return whether the thickness of a laminate is in the range of the standard."""
         return self.thinnest <= round(thickness, 9) <= self.thickest
 
 
 class Fixture(NamedTuple):
-    """A plate on the edges of a window in its middle."""
+    """Fixture that supports a plate on the edges of a window in its middle."""
 
     name: str
     # Sides of the plate and of the window, length.
     size: tuple[float, float]
     window: tuple[float, float]
-    test: DropWeight | None = None  # what the standard prescribes; None for a custom fixture
+    test: DropWeight | None = None  # values of the standard; None for a custom fixture
 
     @property
     def comment(self) -> str:
-        """Comment lines of a deck."""
+        """Comment lines for a deck."""
         (lx, ly), (wx, wy) = self.size, self.window
         return (
             f"! Fixture {self.name}: a plate of {lx:g} x {ly:g}, w = 0 along the edges of a "
@@ -61,7 +62,10 @@ FIXTURES = {"D7136": Fixture("D7136", (150.0, 100.0), (125.0, 75.0), D7136)}
 
 
 def parse_fixture(text: str) -> Fixture:
-    """Return the fixture of a name, or of ``window:LXxLY,WXxWY``, smaller than the plate."""
+    """Return a named fixture, or parse ``window:LXxLY,WXxWY``: sides of the plate and the window.
+
+    Raises ObjectError if the text is neither, or the window is not smaller than the plate.
+    """
     if text in FIXTURES:
         return FIXTURES[text]
     number = r"\s*(\d+\.?\d*|\.\d+)\s*"
@@ -75,8 +79,8 @@ def parse_fixture(text: str) -> Fixture:
     return Fixture("window", (lx, ly), (wx, wy))
 
 
-MOST = 2000  # elements in one direction
-# Elements of the window where the mesh does not give them, and their grading.
+MOST = 2000  # largest number of elements in one direction
+# Default number of elements of the window, and their grading.
 WINDOW_MESH = (20, 12)
 WINDOW_GRADING = 3.0
 
@@ -92,15 +96,15 @@ class Plate:
     Attributes
     ----------
     supports : dict
-        Support by the name of an edge or of a group.
+        Supports by the name of an edge or of a group.
     size : tuple of float or None
-        Sides of a rectangle, or of a fixture's window, length.
+        Sides of a rectangle, or of the window of a fixture, length.
     mesh : tuple of int or None
-        Elements along x and y.
+        Numbers of elements along x and y.
     grading : float
-        Largest over smallest element.
+        Length of the largest element over the length of the smallest.
     columns, rows : tuple of Section
-        Elements along x and y one by one.
+        Sections of elements along x and y.
     fixture : Fixture or None
     imported : PlateMesh or None
     """
@@ -137,27 +141,29 @@ class Plate:
         columns: str = "",
         rows: str = "",
     ) -> Self:
-        """Return a rectangle of elements with nine nodes, one corner at the origin.
+        """Return a rectangular plate of 9-node elements with one corner at the origin.
 
         Parameters
         ----------
         size : tuple of float
             Sides along x and y, length.
         mesh : tuple of int
-            Elements along x and y.
+            Numbers of elements along x and y.
         support : str
             Support of all edges: ``"free"``, ``"simple"``, ``"pinned"`` or ``"clamped"``.
         edges : dict, optional
             Support of single edges: ``"left"``, ``"right"``, ``"bottom"`` or ``"top"``.
         grading : float
-            Largest over smallest element; the smallest is at the impact point.
+            Length of the largest element over the length of the smallest, which is at the impact
+            point.
         columns, rows : str
-            Elements along x and y one by one, as in ``"3*0.5,8*0.375"``, instead of `size`, `mesh`.
+            Counts and lengths of the elements along x and y, as in ``"3*0.5,8*0.375"``. They
+            replace `size`, `mesh` and `grading`.
 
         Raises
         ------
         ValueError
-            If a value makes no sense.
+            If a value is missing or invalid.
 
         Examples
         --------
@@ -196,23 +202,25 @@ class Plate:
     def on_fixture(
         cls, name: str, mesh: tuple[int, int] | None = None, *, grading: float | None = None
     ) -> Self:
-        """Return a plate on the edges of a window.
+        """Return a plate that lies on the edges of a window.
 
-        The name of a standard gives the defaults of its test.
+        A standard also prescribes defaults for the projectile, the energy and the contact.
 
         Parameters
         ----------
         name : str
-            ``"D7136"`` or ``"window:LXxLY,WXxWY"``: sides of the plate and of the window.
+            Name of a standard, ``"D7136"``, or ``"window:LXxLY,WXxWY"``, the sides of the plate and
+            of the window.
         mesh : tuple of int, optional
-            Elements of the window along x and y; 20 and 12 by default.
+            Numbers of elements of the window along x and y; 20 and 12 by default.
         grading : float, optional
-            Largest over smallest element; 3 where `mesh` is not given, otherwise 1.
+            Length of the largest element over the length of the smallest. The default is 3 with the
+            default mesh, and 1 with another mesh.
 
         Raises
         ------
         ValueError
-            If the name or a value makes no sense.
+            If the name or a value is invalid.
         """
         fixture = parse_fixture(name)
         ratio = grading or (WINDOW_GRADING if mesh is None else 1.0)
@@ -227,11 +235,12 @@ class Plate:
         *,
         groups: Mapping[str, ArrayLike] | None = None,
     ) -> Self:
-        """Return a plate with the elements of a mesh generator.
+        """Return a plate with the mesh of a mesh generator.
 
-        All elements are triangles of 3 or 6 nodes, or all are quadrilaterals of 4, 8 or 9. They are
-        turned counter-clockwise, and nodes without an element dropped. A triangle becomes three
-        quadrilaterals of 4 nodes; an element of 8 nodes gets its centre.
+        The elements are triangles of 3 or 6 nodes, or quadrilaterals of 4, 8 or 9 nodes, and all
+        have the same type. Clockwise elements are reversed, and nodes without an element dropped. A
+        triangle becomes three quadrilaterals of 4 nodes. An element of 8 nodes gets a node at its
+        centre.
 
         Parameters
         ----------
@@ -239,19 +248,19 @@ class Plate:
             A file that meshio reads, such as Gmsh's `.msh`; a mesh of meshio or PyVista; or points
             (n, 2) and cells (m, k) with points counted from 0.
         support : dict or str, optional
-            Support by the name of a group of lines: ``"free"``, ``"simple"``, ``"pinned"`` or
-            ``"clamped"``.  The group ``"boundary"``, or a single support, means all outer sides and
-            those of holes that are in no other group named here.  A group with the name of a
-            support has it.
+            Supports by the names of groups of lines: ``"free"``, ``"simple"``, ``"pinned"`` or
+            ``"clamped"``. The group ``"boundary"`` has all sides of the outline and of holes that
+            are in no other group named here. A single support applies to this group. A group that
+            is named like a support has that support.
         groups : dict, optional
-            Points of groups, for arrays.
+            Points of groups; only for a mesh of arrays.
 
         Raises
         ------
         ValueError
-            If the mesh or a support cannot be used.
+            If the mesh or a support can't be used.
         ImportError
-            If a file is given and meshio is not installed.
+            If the mesh is a file and meshio is not installed.
         OSError
             If the file can't be read.
 

@@ -1,6 +1,6 @@
-"""Setters of the values that change the plate of a deck, its mesh or its impact position.
+"""Setters for values that change the plate of a deck, its mesh or the impact point.
 
-Each setter takes a deck and a value and returns the deck with the value. CasesError says why a
+A setter takes a deck and a value and returns the deck with the value. It raises CasesError if the
 value is invalid for the deck.
 """
 
@@ -29,7 +29,7 @@ PlateSetter = Callable[[model.Deck, Value], model.Deck]
 
 
 def swapped(deck: model.Deck, old: model.Segment | None, new: model.Segment) -> model.Deck:
-    """Replace a segment, or add one."""
+    """Return the deck with the segment `new` instead of `old`; add `new` if `old` is None."""
     if old is None:
         return replace(deck, segments=(*deck.segments, new))
     segments = tuple(new if segment is old else segment for segment in deck.segments)
@@ -40,52 +40,55 @@ def swapped(deck: model.Deck, old: model.Segment | None, new: model.Segment) -> 
 
 
 def set_layup(deck: model.Deck, value: Value) -> model.Deck:
-    """Change the angles and their number; all plies keep the thickness of the deck.
+    """Change the angles of the plies, and the number of plies.
 
-    If there are as many angles as layers, each layer keeps its own material and thickness.
+    If the layers have several materials, the number must stay, and each layer keeps its material
+    and its thickness. Otherwise all plies must have the same thickness, and the new plies have it
+    too.
     """
     try:
         angles = parse_layup(str(value))
     except LayupError as error:
         raise CasesError(f"layup: {error}") from None
-    old = deck.require(model.Material)
-    if any(layer.material != old.layers[0].material for layer in old.layers):
-        if len(angles) != len(old.layers):
+    material = deck.require(model.Material)
+    if any(layer.material != material.layers[0].material for layer in material.layers):
+        count = len(material.layers)
+        if len(angles) != count:
             raise CasesError(
-                f"layup: the {len(old.layers)} layers of the deck have several materials, and this "
+                f"layup: the {count} layers of the deck have several materials, and this "
                 f"layup {len(angles)} plies"
             )
-        return swapped(deck, old, replace(old, layers=_each(old.layers, "angle", angles)))
+        layers = _with_fields(material.layers, "angle", angles)
+        return swapped(deck, material, replace(material, layers=layers))
     thickness = _common_thickness("layup", deck)
-    number = old.layers[0].material
-    layers = [Layer(n, angle, thickness, number) for n, angle in enumerate(angles, start=1)]
-    changed = _with_layers(deck, layers, len(angles) * thickness)
-    return replace(changed, control=replace(deck.control, layers=len(layers), source=None))
+    number = material.layers[0].material
+    plies = [Layer(n, angle, thickness, number) for n, angle in enumerate(angles, start=1)]
+    changed = _with_layers(deck, plies, len(angles) * thickness)
+    return replace(changed, control=replace(deck.control, layers=len(plies), source=None))
 
 
 def set_layer_materials(deck: model.Deck, value: Value) -> model.Deck:
-    """Change the materials of the layers; numbers are written as the angles of a layup."""
-    old = deck.require(model.Material)
+    """Change the materials of the layers; the value has their numbers in the form of a layup."""
+    material = deck.require(model.Material)
     try:
         numbers = parse_layup(str(value), math.inf)
     except LayupError as error:
         raise CasesError(f"layer_materials: {error}") from None
-    known_numbers = sorted(deck.plies)
-    if unknown := [number for number in numbers if number not in known_numbers]:
-        listed = ", ".join(map(str, known_numbers))
+    existing = sorted(deck.plies)
+    if unknown := [number for number in numbers if number not in existing]:
+        listed = ", ".join(map(str, existing))
         raise CasesError(
             f"layer_materials: the deck has no material {unknown[0]:g}; its materials are {listed}"
         )
-    if len(numbers) != len(old.layers):
-        raise CasesError(
-            f"layer_materials: {len(numbers)} materials for the deck's {len(old.layers)} layers"
-        )
-    layers = _each(old.layers, "material", [int(number) for number in numbers])
-    return swapped(deck, old, replace(old, layers=layers))
+    count = len(material.layers)
+    if len(numbers) != count:
+        raise CasesError(f"layer_materials: {len(numbers)} materials for the deck's {count} layers")
+    layers = _with_fields(material.layers, "material", [int(number) for number in numbers])
+    return swapped(deck, material, replace(material, layers=layers))
 
 
-def _each(layers: Sequence[Layer], name: str, values: Sequence[float]) -> tuple[Layer, ...]:
-    """Return the layers with another value of a field for each."""
+def _with_fields(layers: Sequence[Layer], name: str, values: Sequence[float]) -> tuple[Layer, ...]:
+    """Return the layers with new values of one field, a value for each layer."""
     pairs = zip(layers, values, strict=True)
     changed: list[tuple[Layer, dict[str, Any]]] = [(layer, {name: v}) for layer, v in pairs]
     return tuple(replace(layer, **fields, source=None) for layer, fields in changed)
@@ -103,123 +106,124 @@ def set_ply_thickness(deck: model.Deck, value: Value) -> model.Deck:
 
 
 def set_thickness(deck: model.Deck, value: Value) -> model.Deck:
-    """Change the thickness of the laminate; every ply is scaled."""
-    old = deck.require(model.Material).layers
-    factor = float(value) / sum(layer.thickness for layer in old)
-    layers = [replace(layer, thickness=layer.thickness * factor, source=None) for layer in old]
-    return _with_layers(deck, layers, float(value))
+    """Change the thickness of the laminate; all plies are scaled."""
+    layers = deck.require(model.Material).layers
+    factor = float(value) / sum(layer.thickness for layer in layers)
+    scaled = [replace(layer, thickness=layer.thickness * factor, source=None) for layer in layers]
+    return _with_layers(deck, scaled, float(value))
 
 
 def add_angle(deck: model.Deck, value: Value) -> model.Deck:
-    """Rotate all plies."""
-    old = deck.require(model.Material)
-    layers = [replace(layer, angle=layer.angle + float(value), source=None) for layer in old.layers]
-    return swapped(deck, old, replace(old, layers=tuple(layers)))
+    """Rotate all plies by an angle."""
+    material = deck.require(model.Material)
+    angles = [layer.angle + float(value) for layer in material.layers]
+    layers = _with_fields(material.layers, "angle", angles)
+    return swapped(deck, material, replace(material, layers=layers))
 
 
 def ply_property(name: str) -> PlateSetter:
     """Return the setter of a property of the ply."""
 
-    def changed(deck: model.Deck, value: Value) -> model.Deck:
-        old = deck.require(model.Material)
+    def set_property(deck: model.Deck, value: Value) -> model.Deck:
+        material = deck.require(model.Material)
         fields: dict[str, Any] = {name: float(value)}  # mypy compares each with every field
-        return swapped(deck, old, replace(old, ply=replace(old.ply, **fields, source=None)))
+        ply = replace(material.ply, **fields, source=None)
+        return swapped(deck, material, replace(material, ply=ply))
 
-    return changed
+    return set_property
 
 
 def preload_force(name: str) -> PlateSetter:
-    """Return the setter of a force of the preload, which is added to a deck without one."""
+    """Return the setter of a force of the preload; a deck without a preload gets one."""
 
-    def changed(deck: model.Deck, value: Value) -> model.Deck:
-        old = deck.last(model.Preload)
+    def set_force(deck: model.Deck, value: Value) -> model.Deck:
+        preload = deck.last(model.Preload)
         fields: dict[str, Any] = {name: float(value)}  # mypy compares each with every field
-        new = replace(old or model.Preload(0.0), **fields, source=None)
-        return swapped(deck, old, new)
+        changed = replace(preload or model.Preload(0.0), **fields, source=None)
+        return swapped(deck, preload, changed)
 
-    return changed
+    return set_force
 
 
 def curvature_radius(name: str) -> PlateSetter:
-    """Return the setter of a radius of a curved panel; 0 is flat.
+    """Return the setter of a radius of a curved panel. The radius 0 is flat.
 
-    A deck without radii gets them.
+    A deck without CURV gets this segment.
     """
 
-    def changed(deck: model.Deck, value: Value) -> model.Deck:
-        old = deck.last(model.Curvature)
+    def set_radius(deck: model.Deck, value: Value) -> model.Deck:
+        curvature = deck.last(model.Curvature)
         fields: dict[str, Any] = {name: float(value)}  # mypy compares each with every field
-        return swapped(deck, old, replace(old or model.Curvature(), **fields, source=None))
+        changed = replace(curvature or model.Curvature(), **fields, source=None)
+        return swapped(deck, curvature, changed)
 
-    return changed
+    return set_radius
 
 
 def set_cure(deck: model.Deck, value: Value) -> model.Deck:
-    """Change the temperature of CURE, which has the coefficients of expansion."""
-    if (old := deck.last(model.Cure)) is None:
+    """Change the temperature of CURE; the deck must have this segment."""
+    if (cure := deck.last(model.Cure)) is None:
         raise CasesError("cure_dT: the deck has no CURE, which has the coefficients of expansion")
-    return swapped(deck, old, replace(old, delta_t=float(value), source=None))
+    return swapped(deck, cure, replace(cure, delta_t=float(value), source=None))
 
 
 def strength(name: str) -> PlateSetter:
     """Return the setter of a strength of the ply of MATE."""
 
-    def changed(deck: model.Deck, value: Value) -> model.Deck:
-        old = deck.last(model.Allowables)
-        if old is None or (ply := old.of(MATERIAL)) is None:
+    def set_strength(deck: model.Deck, value: Value) -> model.Deck:
+        allowables = deck.last(model.Allowables)
+        if allowables is None or (strengths := allowables.of(MATERIAL)) is None:
             raise CasesError(
                 f"{name}: the deck has no strengths of the ply of MATE; add an ALLO segment"
             )
         fields: dict[str, Any] = {name: float(value)}  # mypy compares each with every field
-        new = replace(ply, **fields, source=None)
-        if ply is old:
-            return swapped(deck, old, new)
-        other_cards = tuple(new if card is ply else card for card in old.others)
-        return swapped(deck, old, replace(old, others=other_cards, source=None))
+        changed = replace(strengths, **fields, source=None)
+        if strengths is allowables:
+            return swapped(deck, allowables, changed)
+        others = tuple(changed if item is strengths else item for item in allowables.others)
+        return swapped(deck, allowables, replace(allowables, others=others, source=None))
 
-    return changed
+    return set_strength
 
 
 def _common_thickness(name: str, deck: model.Deck) -> float:
-    """Return the thickness of every ply.
-
-    Raises CasesError if the thicknesses differ.
-    """
-    first, *other_thicknesses = (layer.thickness for layer in deck.require(model.Material).layers)
-    if any(thickness != first for thickness in other_thicknesses):
+    """Return the common thickness of the plies; raise CasesError if they differ in thickness."""
+    first, *rest = (layer.thickness for layer in deck.require(model.Material).layers)
+    if any(thickness != first for thickness in rest):
         raise CasesError(f"{name}: the plies of the deck differ in thickness")
     return first
 
 
 def _with_layers(deck: model.Deck, layers: Sequence[Layer], thickness: float) -> model.Deck:
-    """Replace the layers, and the thickness of the laminate, which MATE gives too."""
-    old = deck.require(model.Material)
-    integration = replace(old.integration, thickness=thickness, source=None)
-    return swapped(deck, old, replace(old, layers=tuple(layers), integration=integration))
+    """Replace the layers of MATE, and the thickness of the laminate on its first card."""
+    material = deck.require(model.Material)
+    integration = replace(material.integration, thickness=thickness, source=None)
+    changed = replace(material, layers=tuple(layers), integration=integration)
+    return swapped(deck, material, changed)
 
 
-# Where the plate is struck ------------------------------------------------------------------------
+# Impact point -------------------------------------------------------------------------------------
 
 
 def set_impact_node(deck: model.Deck, value: Value) -> model.Deck:
     """Change the node of ROD."""
-    old = deck.require(model.Impact)
-    return swapped(deck, old, replace(old, node=int(value), source=None))
+    impact = deck.require(model.Impact)
+    return swapped(deck, impact, replace(impact, node=int(value), source=None))
 
 
 def patch_field(field: str) -> PlateSetter:
     """Return the setter of a field of the patch; a deck without a patch gets a disc."""
 
-    def changed(deck: model.Deck, value: Value) -> model.Deck:
-        old = deck.last(model.Patch)
+    def set_field(deck: model.Deck, value: Value) -> model.Deck:
+        patch = deck.last(model.Patch)
         fields: dict[str, Any] = {field: float(value)}  # mypy compares each with every field
-        return swapped(deck, old, replace(old or model.Patch(), **fields, source=None))
+        return swapped(deck, patch, replace(patch or model.Patch(), **fields, source=None))
 
-    return changed
+    return set_field
 
 
 def set_place(deck: model.Deck, value: Value) -> model.Deck:
-    """Move the centre of the patch; without one, hit the nearest node."""
+    """Move the centre of the patch to a point; a deck without a patch gets the nearest node."""
     x, y = pair_of_text("at", str(value))
     patch = deck.last(model.Patch)
     if patch is not None:
@@ -236,23 +240,22 @@ def set_place(deck: model.Deck, value: Value) -> model.Deck:
 
 
 def set_size(deck: model.Deck, value: Value) -> model.Deck:
-    """Scale coordinates, the centre of the patch and the gages."""
+    """Scale the coordinates of the nodes, of the centre of the patch, and of the gages."""
     a, b = pair_of_text("size", str(value))
     if not min(a, b) > 0.0:
         raise CasesError(f"the sides of the plate must be positive, not {value}")
     mesh = generate(deck)
     width, height = np.ptp(mesh.coordinates[mesh.used], axis=0).tolist()
 
-    def moved_node(node: NodeValues) -> NodeValues:
+    def scale_node(node: NodeValues) -> NodeValues:
         x, y = node.values[:2]
         return replace(node, values=(x * a / width, y * b / height), source=None)
 
-    def moved(segment: model.Segment) -> model.Segment:
+    def scale(segment: model.Segment) -> model.Segment:
         match segment:
             case model.Coordinates():
-                return replace(
-                    segment, records=tuple(map(moved_node, segment.records)), source=None
-                )
+                nodes = tuple(map(scale_node, segment.records))
+                return replace(segment, records=nodes, source=None)
             case model.Gages():
                 gages = tuple(
                     replace(gage, x=gage.x * a / width, y=gage.y * b / height, source=None)
@@ -263,11 +266,11 @@ def set_size(deck: model.Deck, value: Value) -> model.Deck:
                 return replace(segment, x=x * a / width, y=y * b / height, source=None)
         return segment
 
-    return replace(deck, segments=tuple(map(moved, deck.segments)))
+    return replace(deck, segments=tuple(map(scale, deck.segments)))
 
 
 def set_support(deck: model.Deck, value: Value) -> model.Deck:
-    """Replace all restraints by a support of the outline, as ``fecm new`` writes it."""
+    """Replace all restraints by a support of the outline, written as ``fecm new`` does."""
     mesh, support = generate(deck), str(value)
     if deck.has(model.Forces) or mesh.elements.shape[1] not in (4, 9) or not mesh.elements.all():
         raise CasesError("support: the deck must have no FORC, and all elements four or nine nodes")
@@ -278,18 +281,16 @@ def set_support(deck: model.Deck, value: Value) -> model.Deck:
         boundary = plate.supported(everywhere, {BOUNDARY: support}, in_plane=in_plane)
     except MeshError as error:
         raise CasesError(f"support {support}: {error}") from None
-    other_segments = tuple(s for s in deck.segments if not isinstance(s, model.Boundary))
+    segments = tuple(s for s in deck.segments if not isinstance(s, model.Boundary))
     if boundary is not None and support in ("simple", "pinned") and mesh.elements.shape[1] == 4:
         codes = restraint_codes([boundary], deck.control.numnp, deck.control.ndf) != 0
         if (codes[:, 2] & ~codes[:, 3:].any(axis=1)).any():
             raise CasesError(f"support {support}: elements of four nodes need sides along x or y")
-    return replace(
-        deck, segments=other_segments if boundary is None else (*other_segments, boundary)
-    )
+    return replace(deck, segments=segments if boundary is None else (*segments, boundary))
 
 
 def refine(deck: model.Deck, value: Value) -> model.Deck:
-    """Divide the sides of all elements by a power of two."""
+    """Divide the sides of all elements by the value, a power of two."""
     try:
         for _ in range(int(value).bit_length() - 1):
             deck = refined_deck(deck, generate(deck))
@@ -299,7 +300,7 @@ def refine(deck: model.Deck, value: Value) -> model.Deck:
 
 
 def check_free_in_plane(deck: model.Deck) -> None:
-    """Raise CasesError if a curved panel can't stretch, as its supports decide its stiffness."""
+    """Raise CasesError if the deck of a curved panel holds u and v at every node."""
     if _holds_the_plane(deck):
         raise CasesError(
             "the deck holds u and v at every node, which clamps the membrane of a curved panel: "
@@ -318,12 +319,13 @@ def free_in_plane(deck: model.Deck) -> model.Deck:
     if not _holds_the_plane(deck):
         return deck
 
-    # Codes are generated for each dof independently, so that copies of the codes of w act like w's.
-    def freed(record: NodeCodes) -> NodeCodes:
+    # Each dof generates its codes by itself. Copies of the codes of w therefore restrain the same
+    # nodes.
+    def copy_codes(record: NodeCodes) -> NodeCodes:
         w = record.codes[2]
         return replace(record, codes=(w, w, *record.codes[2:]), source=None)
 
-    for old in deck.all(model.Boundary):
-        new = replace(old, records=tuple(map(freed, old.records)), source=None)
-        deck = swapped(deck, old, new)
+    for boundary in deck.all(model.Boundary):
+        changed = replace(boundary, records=tuple(map(copy_codes, boundary.records)), source=None)
+        deck = swapped(deck, boundary, changed)
     return deck

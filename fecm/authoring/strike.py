@@ -1,7 +1,7 @@
-"""Strike of a case: ROD, EXPE, the projectile, and DELA, which judges the force.
+"""Strike of a case: ROD, EXPE, PROJ, and DELA, whose threshold the force may reach.
 
-Values that only change the strike need no deck of their own: cases of one plate differ in their
-strikes.
+Values that only change the strike need no new deck. The cases of one plate differ in their strikes
+only.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ _S = TypeVar("_S", bound=model.Segment)
 class Strike(NamedTuple):
     """Velocity, contact law, projectile and toughness of a case."""
 
-    plate: model.Deck  # deck whose plate is struck; its own strike does not count
+    plate: model.Deck  # deck of the plate; its strike may be another one
     impact: model.Impact | None
     indentation: model.Indentation | None
-    card: model.Projectile | None  # None if the deck has the report's rod
+    card: model.Projectile | None  # None for the rod of the report
     projectile: DeckProjectile
-    delamination: model.Delamination | None = None  # toughness, whose threshold the force may reach
+    delamination: model.Delamination | None = None
 
     @property
     def velocity(self) -> float:
@@ -56,18 +56,18 @@ class Strike(NamedTuple):
         return 0.5 * self.projectile.total_mass * self.velocity**2
 
     def with_velocity(self, velocity: float) -> Strike:
-        """Return the strike at another velocity."""
+        """Return the strike with another velocity."""
         impact = _required(self.impact, model.Impact)
         return self._replace(impact=replace(impact, velocity=velocity, source=None))
 
     def with_constant(self, name: str, value: float) -> Strike:
         """Return the strike with another constant of EXPE."""
-        old = _required(self.indentation, model.Indentation)
-        changed: dict[str, Any] = {name: value}  # mypy compares each with every field
-        return self._replace(indentation=replace(old, **changed, source=None))
+        indentation = _required(self.indentation, model.Indentation)
+        fields: dict[str, Any] = {name: value}  # mypy compares each with every field
+        return self._replace(indentation=replace(indentation, **fields, source=None))
 
     def with_projectile(self, projectile: DeckProjectile) -> Strike:
-        """Return the strike of another projectile; a rod keeps the transducer of the deck."""
+        """Return the strike with another projectile; a rod keeps the transducer of the deck."""
         transducer = 0
         if self.card is not None and isinstance(projectile, Rod):
             transducer = self.card.transducer
@@ -83,13 +83,13 @@ class Strike(NamedTuple):
             (model.Projectile, self.card),
             (model.Delamination, self.delamination),
         ):
-            old = deck.last(kind)
-            if segment is not None and segment is not old:
-                deck = swapped(deck, old, segment)
-        return replace(deck, text="")  # whose cards are not those that were read
+            current = deck.last(kind)
+            if segment is not None and segment is not current:
+                deck = swapped(deck, current, segment)
+        return replace(deck, text="")  # the text has the cards before the changes
 
     def check(self, plate: Problem) -> None:
-        """Raise CasesError with the first error of a deck with this strike."""
+        """Raise CasesError with the first error of this strike on a plate."""
         findings = Findings()
         if self.impact is not None:
             deck = swapped(plate.deck, plate.deck.last(model.Impact), self.impact)
@@ -130,7 +130,7 @@ def set_velocity(strike: Strike, value: Value) -> Strike:
 
 
 def set_energy(strike: Strike, value: Value) -> Strike:
-    """Change the velocity to give the projectile an energy."""
+    """Change the velocity of ROD so that the projectile has an energy."""
     mass, energy = strike.projectile.total_mass, float(value)
     if not (mass > 0.0 and energy >= 0.0):
         raise CasesError(f"no velocity gives the energy {energy:g} to the mass {mass:g}")
@@ -143,7 +143,7 @@ def constant(name: str) -> StrikeSetter:
 
 
 def set_radius(strike: Strike, value: Value) -> Strike:
-    """Change k to the value of a steel sphere on the laminate of the deck."""
+    """Change k to the estimate for a steel sphere on the laminate of the deck."""
     unit = in_si(MODULUS, unit_names(strike.plate))
     if unit is None:
         hint = "add a UNIT segment, or vary k instead"
@@ -177,26 +177,28 @@ def _indentation_modulus(layers: tuple[model.Layer, ...], plies: tuple[model.Ply
 
 def set_toughness(strike: Strike, value: Value) -> Strike:
     """Change the toughness of DELA."""
-    if (old := strike.delamination) is None:
+    if (delamination := strike.delamination) is None:
         raise CasesError(f"giic: {NO_THRESHOLD}")
-    return strike._replace(delamination=replace(old, toughness=float(value), source=None))
+    changed = replace(delamination, toughness=float(value), source=None)
+    return strike._replace(delamination=changed)
 
 
 def set_mass(strike: Strike, value: Value) -> Strike:
-    """Change the mass of the projectile; the density of a rod follows."""
-    old, mass = strike.projectile, float(value)
-    if isinstance(old, RigidMass):
+    """Change the mass of the projectile; for a rod, scale its density."""
+    projectile, mass = strike.projectile, float(value)
+    if isinstance(projectile, RigidMass):
         return strike.with_projectile(RigidMass(mass))
-    return strike.with_projectile(replace(old, density=old.density * mass / old.total_mass))
+    density = projectile.density * mass / projectile.total_mass
+    return strike.with_projectile(replace(projectile, density=density))
 
 
 def rod_property(name: str, field: str) -> StrikeSetter:
-    """Return the setter of a field of the rod, which varies under a name."""
+    """Return the setter of a field of the rod; `name` is the name of the value in messages."""
 
-    def changed(strike: Strike, value: Value) -> Strike:
+    def set_field(strike: Strike, value: Value) -> Strike:
         if isinstance(strike.projectile, RigidMass):
             raise CasesError(f"{name}: the projectile of the deck is a rigid mass")
         fields: dict[str, Any] = {field: float(value)}  # mypy compares each with every field
         return strike.with_projectile(replace(strike.projectile, **fields))
 
-    return changed
+    return set_field

@@ -1,4 +1,4 @@
-"""Time steps and durations of the decks of cases."""
+"""Time step and duration of the decks of cases."""
 
 from __future__ import annotations
 
@@ -16,19 +16,22 @@ from fecm.mechanics.time_step import rounded_time_step, taken_time_step
 from fecm.problem.check import check_program
 from fecm.problem.problem import Problem
 
-LONGEST_LOOP = 1e15  # the checks reject much shorter programs
+LONGEST_LOOP = 1e15  # passes; the checks reject much shorter programs already
 STORING = ("RODP", "DISP", "STRE", "PLYS")  # macros that store every N-th step or pass
 
 
 class Clock(NamedTuple):
-    """Rule by which the time step of a plate follows from its critical step."""
+    """Rule for the time step of a plate."""
 
-    own: float  # time step of the deck
-    rule: Callable[[float], float]
+    deck_step: float  # time step of the deck
+    rule: Callable[[float], float]  # returns the time step for a critical time step
 
 
 def clock_of(checked: Problem) -> Clock | None:
-    """Return the rule of a deck: DT 0 or ``fecm new``; None if its DT applies to every case."""
+    """Return the rule of a deck with DT 0, or with the DT that ``fecm new`` chooses.
+
+    Returns None for any other DT. All cases then take the time step of the deck.
+    """
     sizes = {macro.value for macro in flat(checked.program) if macro.word == "DT"}
     if len(sizes) != 1:
         return None
@@ -39,13 +42,14 @@ def clock_of(checked: Problem) -> Clock | None:
 
 
 def with_clock(deck: Deck, clock: Clock | None, case: Case) -> Problem:
-    """Check the deck of a case, with the time step of its plate if there is a clock."""
+    """Check the deck of a case; with a clock, its time step first changes to suit its plate."""
     if clock is None:
         return check_deck(deck)
-    checked = check_deck(with_time_step(deck, 0.0))  # below the critical time step of any plate
+    # DT 0 is below the critical time step of any plate.
+    checked = check_deck(with_time_step(deck, 0.0))
     dt = clock.rule(checked.critical_time_step)
     duration = float(case["duration"]) if "duration" in case else None
-    timed = with_time_step(deck, dt, clock.own, duration)
+    timed = with_time_step(deck, dt, clock.deck_step, duration)
     findings = Findings()
     problem = Problem(timed, checked.mesh, compile_program(timed.macros, findings))
     check_program(problem, findings)
@@ -76,24 +80,25 @@ def lengthened(checked: Problem, factor: float) -> Problem:
 def with_time_step(
     deck: Deck, dt: float | None, default_step: float = 0.0, duration: float | None = None
 ) -> Deck:
-    """Change every DT of a deck, and the loops so that the duration is kept, or changed.
+    """Change the time step of a deck, and the passes of its loops to suit the duration.
 
-    `default_step` is the time step that DT 0 takes in the deck; 0 if no DT is 0. If the new step is
-    None, every DT is kept; if it is not positive, only the DT cards change. Macros that store rows
-    keep approximately their number of rows. Raises CasesError if whole numbers of passes miss the
-    duration by a step and by 1 %.
+    The new time step is `dt`: None keeps every DT, and a value that is not positive changes only
+    the DT cards. `duration` is the new duration; None keeps it. `default_step` is the time step
+    that DT 0 takes in the deck; it may be 0 if no DT is 0. Macros that store rows keep
+    approximately their number of rows. Raises CasesError if loops with whole passes miss the
+    duration by more than a step and by more than 1 %.
     """
     before = _length(deck.macros, default_step).duration
     share = 1.0 if duration is None or not before else duration / before
     visits = list(_visits(deck.macros, default_step))
-    ratios: dict[int, float] = {}  # of the passes, by the place of a LOOP
+    ratios: dict[int, float] = {}  # new passes over old passes, by the place of the LOOP
     for visit in visits:
         if visit.loop is None or visit.macro.word not in STEPS:
             continue
         if visit.dt > 0.0 and (dt is None or dt > 0.0):
             ratios[visit.loop] = share * (1.0 if dt is None else visit.dt / dt)
 
-    macros = tuple(_changed(visit, dt, ratios) for visit in visits)
+    macros = tuple(_adjust_macro(visit, dt, ratios) for visit in visits)
     target, length = share * before, _length(macros, default_step)
     if ratios and abs(length.duration - target) > max(0.01 * target, length.largest_step):
         text = (
@@ -104,17 +109,17 @@ def with_time_step(
 
 
 class _Visit(NamedTuple):
-    """Macro on the way through a program."""
+    """Macro of a program with its loop and time step."""
 
     macro: Macro
-    place: int
+    place: int  # index in the program
     loop: int | None  # place of the innermost LOOP around it
-    passes: float  # of that loop
+    passes: float  # total number of passes of that loop
     dt: float  # time step
 
 
 def _visits(cards: Sequence[Macro], default_step: float) -> Iterator[_Visit]:
-    loops: list[tuple[int, float]] = []  # place and passes of the open ones
+    loops: list[tuple[int, float]] = []  # place and passes of the open loops
     dt = 0.0
     for place, macro in enumerate(cards):
         if macro.word == "NEXT" and loops:
@@ -127,8 +132,8 @@ def _visits(cards: Sequence[Macro], default_step: float) -> Iterator[_Visit]:
             loops.append((place, passes * max(1.0, macro.value)))
 
 
-def _changed(visit: _Visit, dt: float | None, ratios: dict[int, float]) -> Macro:
-    """Return a macro of a program with another time step, and with other passes of its loops."""
+def _adjust_macro(visit: _Visit, dt: float | None, ratios: dict[int, float]) -> Macro:
+    """Return the macro for another time step and other passes of the loops."""
     macro = visit.macro
     if macro.word == "DT" and dt is not None:
         return replace(macro, value=dt, source=None)
@@ -142,7 +147,7 @@ def _changed(visit: _Visit, dt: float | None, ratios: dict[int, float]) -> Macro
 
 
 class _Length(NamedTuple):
-    """Length of a program in time."""
+    """Simulated time of a program, and its largest time step."""
 
     duration: float
     largest_step: float

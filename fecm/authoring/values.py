@@ -1,4 +1,4 @@
-"""Values that can vary: one row each, which determines checks, help and docs/sweeps.md."""
+"""Values that can vary. The table of this module determines checks, help and docs/sweeps.md."""
 
 from __future__ import annotations
 
@@ -33,26 +33,27 @@ class ValueKind(Enum):
 
 
 class Changes(IntEnum):
-    """Part that a value changes, in the order in which the values of a case are applied.
+    """Part of the deck that a value changes.
 
-    Values of failure and of a strike share a run of the plate; each other value needs its own.
+    The values of a case are applied in this order. Cases that differ only in values of FAILURE and
+    STRIKE share a run of the plate. All other values need a run for each case.
     """
 
-    FAILURE = auto()  # exposures or the threshold, which do not affect the motion
+    FAILURE = auto()  # exposures or the threshold; they do not affect the motion
     LAMINATE = auto()
     PLATE = auto()  # mesh and supports
-    PLACE = auto()  # where the force acts
+    PLACE = auto()  # impact point and patch
     STRIKE = auto()  # velocity, contact law and projectile
     TIME = auto()  # time step and duration
 
 
 @dataclass(frozen=True)
 class SweepValue(Generic[_Setter]):
-    """A value that can vary."""
+    """Value that can vary."""
 
     name: str
     changes: Changes
-    dimension: str  # of its unit; empty for a pure number or a text
+    dimension: str  # dimension of its unit; empty for a pure number or a text
     setter: _Setter
     kind: ValueKind = ValueKind.NUMBER
     meaning: str = ""  # Markdown of docs/sweeps.md
@@ -167,14 +168,14 @@ PLATE_VALUES: tuple[SweepValue[PlateSetter], ...] = (
              meaning="`free`, `simple`, `pinned` or `clamped`: [support](#supports-of-the-outline) "
                      "of the outline"),
 )
-TIME_VALUES: tuple[SweepValue[None], ...] = (  # which are set together, after all others
+TIME_VALUES: tuple[SweepValue[None], ...] = (  # set together, after all other values
     SweepValue("dt", Changes.TIME, "time", None,
              meaning="[time step](#time-step-and-duration), or `auto`; the duration is kept"),
     SweepValue("duration", Changes.TIME, "time", None,
              meaning="simulated time, rounded up to a step"),
 )
 # fmt: on
-REFINEMENT = SweepValue("refine", Changes.PLATE, "", plates.refine)  # of a refinement study
+REFINEMENT = SweepValue("refine", Changes.PLATE, "", plates.refine)  # only for refinement studies
 REFINE = REFINEMENT.name
 VARIABLES: dict[str, SweepValue[PlateSetter] | SweepValue[StrikeSetter] | SweepValue[None]] = {
     **{variable.name: variable for variable in STRIKE_VALUES},
@@ -182,7 +183,7 @@ VARIABLES: dict[str, SweepValue[PlateSetter] | SweepValue[StrikeSetter] | SweepV
     **{variable.name: variable for variable in TIME_VALUES},
 }
 NAMES = tuple(VARIABLES)
-EXCLUDING = (  # names of which only one can vary
+EXCLUDING = (  # groups of names; only one name of a group can vary
     ("velocity", "energy"),
     ("k", "radius"),
     ("mass", "rod_mass", "rod_density"),
@@ -191,31 +192,31 @@ EXCLUDING = (  # names of which only one can vary
     ("at", "y0"),
     ("laminate_thickness", "ply_thickness", "thickness"),
 )
-# Names of results, which cases and measured columns can't have.
+# Names of results. They can't be names of values or of measured columns.
 RESERVED = ("case", "step", "steps", "force", "unsettled_steps", *VERDICTS, *COLUMNS)
 
 
 def names_of(*changes: Changes) -> tuple[str, ...]:
-    """Return the names of the values that change something."""
+    """Return the names of the values that change one of some parts."""
     return tuple(name for name, variable in VARIABLES.items() if variable.changes in changes)
 
 
 PLATE_NAMES = names_of(Changes.PLACE, Changes.LAMINATE, Changes.PLATE, Changes.TIME)
 FAILURE_NAMES = names_of(Changes.FAILURE)
-EXPOSURE_NAMES = ("cure_dT", *STRENGTHS)  # names that change nothing but exposures
-LAW_VALUES = ("k", "radius", "alpha_p", "s_p", "q")  # of EXPE
-OF_PLATE = frozenset((*PLATE_NAMES, REFINE))  # which need another response of the plate
+EXPOSURE_NAMES = ("cure_dT", *STRENGTHS)  # values that change only exposures
+LAW_VALUES = ("k", "radius", "alpha_p", "s_p", "q")  # values of EXPE
+OF_PLATE = frozenset((*PLATE_NAMES, REFINE))  # values that need another response of the plate
 
 
 def plate_values(case: Case) -> Case:
     """Return the values of a case that need another response of the plate."""
-    if OF_PLATE.isdisjoint(case):  # most cases, of which there may be many
+    if OF_PLATE.isdisjoint(case):  # fast path: there may be very many such cases
         return {}
     return {name: value for name, value in case.items() if name in OF_PLATE}
 
 
 def motion_values(case: Case) -> Case:
-    """Return the values of a case that change its motion."""
+    """Return the values of a case that affect the motion."""
     return {name: value for name, value in case.items() if name not in FAILURE_NAMES}
 
 
@@ -225,44 +226,42 @@ def kind_of(name: str) -> ValueKind:
 
 
 def dimension_of(name: str) -> str:
-    """Return the dimension of a value; empty if the table lacks its name."""
+    """Return the dimension of a value; empty if the name is not in the table."""
     return VARIABLES[name].dimension if name in VARIABLES else ""
 
 
 def check_names(names: Collection[str]) -> None:
-    """Raise CasesError if names exclude each other."""
+    """Raise CasesError if two of the names exclude each other."""
     for group in EXCLUDING:
         if len(present := [name for name in group if name in names]) > 1:
             raise CasesError(f"{present[0]} and {present[1]} exclude each other; vary one of them")
 
 
-def check_known(name: str, where: str, known_names: Collection[str] = NAMES) -> None:
-    """Raise CasesError if a name is unknown, by default if the table lacks it."""
-    if name not in known_names:
-        alternatives = (
-            did_you_mean(str(name), known_names) or f"; the names are {', '.join(known_names)}"
-        )
+def check_known(name: str, where: str, names: Collection[str] = NAMES) -> None:
+    """Raise CasesError if a name is not one of `names`."""
+    if name not in names:
+        alternatives = did_you_mean(str(name), names) or f"; the names are {', '.join(names)}"
         raise CasesError(f"{where}: `{name}` cannot be varied{alternatives}")
 
 
 def check_free(name: object, where: str) -> None:
-    """Raise CasesError if a name that the caller chose can't be the name of a column."""
+    """Raise CasesError if a name chosen by the caller can't be the name of a column."""
     if fault := name_fault(name):
         raise CasesError(f"{where}: {fault}")
 
 
 def name_fault(name: object) -> str:
-    """Return why a name can't be the name of a column; empty if it can."""
+    """Explain why a name can't be the name of a column; empty if it can."""
     if not (isinstance(name, str) and name.isidentifier()):
         return f"`{name}` is not a name such as width"
     return f"`{name}` is a name of the results; choose another" if name in RESERVED else ""
 
 
 def without_unit(name: str, text: str, system: str | None) -> str:
-    """Return a number in a system of units, from a text that may have a unit, as in ``10J``.
+    """Convert a number with a unit, such as ``10J``, to a system of units, and drop the unit.
 
-    Other texts stay as they are. Raises CasesError if the unit does not belong to the name's
-    dimension, or the system, which is the deck's, is unknown.
+    Other texts stay as they are. Raises CasesError if the unit does not have the dimension of the
+    value, or the deck has no system of units.
     """
     match = re.fullmatch(rf"\s*{NUMBER}\s*(\S.*)?", text)
     if match is None or match[1] is None:
@@ -285,10 +284,9 @@ def without_unit(name: str, text: str, system: str | None) -> str:
 
 
 def parse_value(name: str, text: str, system: str | None = None) -> Value:
-    """Parse the value of a name.
+    """Parse the value of a name; raise CasesError if it is invalid.
 
-    A value with a unit is converted to a system of units. Raises CasesError if the value is
-    invalid.
+    A value with a unit is converted to the given system of units.
     """
     if name in PAIRS:
         return normal_pair(name, text)
@@ -306,10 +304,9 @@ def parse_value(name: str, text: str, system: str | None = None) -> Value:
 
 
 def value_of(name: str, value: object, where: str, system: str | None = None) -> Value:
-    """Return the value of a name that a caller of Python has given.
+    """Convert a Python object to the value of a name; raise CasesError if it is invalid.
 
-    A text with a unit, or a quantity, is converted to a system of units. Raises CasesError if the
-    value is invalid.
+    A text with a unit, or a quantity, is converted to the given system of units.
     """
     value = text_of(value)
     if isinstance(value, np.generic):
@@ -324,7 +321,7 @@ def value_of(name: str, value: object, where: str, system: str | None = None) ->
         separator = {"at": ",", "size": "x"}.get(name, "/")
         value = separator.join(map(str, value))
     try:
-        # float() reports what is not a number
+        # float() raises for other objects than numbers
         text = value if isinstance(value, str) else repr(float(value))  # type: ignore[arg-type]
         return parse_value(name, text, system)
     except (TypeError, ValueError) as error:
@@ -333,7 +330,7 @@ def value_of(name: str, value: object, where: str, system: str | None = None) ->
 
 
 def free_value_of(name: str, value: object, where: str) -> Value:
-    """Return the value of a name that the caller chose: a finite number or a text."""
+    """Return the value of a name chosen by the caller: a finite number or a text."""
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, str) or (isinstance(value, float | int) and math.isfinite(value)):

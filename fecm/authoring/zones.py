@@ -1,4 +1,4 @@
-"""Zones of a plate that have their own laminate."""
+"""Zones: parts of a plate with their own laminates."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from fecm.mechanics.mesh import MeshArrays
 from fecm.problem.generate import generate
 from fecm.problem.plate_mesh import PlateMesh
 
-SAME = 1e-6  # share of an element's size by which it may pass a zone's edge
+SLACK = 1e-6  # share of its size by which an element may cross the edge of a zone
 CORNERS = 4
 
 # A rectangle x0, y0, x1, y1 or the name of a group of elements, and a layup or a laminate.
@@ -30,11 +30,11 @@ class ElementLaminates(NamedTuple):
     """Laminates of the elements of a plate."""
 
     struck: int  # number of the laminate under the load
-    card: model.Zones | None  # None if all elements have the plate's laminate
+    card: model.Zones | None  # None if all elements have the laminate of the plate
 
 
 def laminates_of(laminate: Laminate, zones: Sequence[Zone]) -> list[Laminate]:
-    """Return the laminates of the zones; a layup has the materials of the plate's laminate."""
+    """Return the laminates of the zones; a layup takes the materials of the plate's laminate."""
     try:
         layups = [layup for _, layup in zones]
     except (TypeError, ValueError):
@@ -47,10 +47,10 @@ def laminates_of(laminate: Laminate, zones: Sequence[Zone]) -> list[Laminate]:
 def placed_zones(
     zones: Sequence[Zone], laminates: Sequence[int], mesh: AnyMesh, node: int, doubts: list[str]
 ) -> ElementLaminates:
-    """Return the elements of zones, later zones over earlier ones.
+    """Return the laminates of the elements. Later zones cover earlier zones.
 
-    `laminates` are the numbers of their laminates. A rectangle has the elements whose centres lie
-    in it; a rectangle whose edge cuts elements is doubted.
+    `laminates` has the laminate number of each zone. A rectangle includes the elements with their
+    centres in it. `doubts` gets a text about each rectangle with an edge that cuts elements.
     """
     if not zones:
         return ElementLaminates(MATERIAL, None)
@@ -61,17 +61,17 @@ def placed_zones(
     numbers = np.full(mesh.elements, MATERIAL)
     for (place, _), laminate in zip(zones, laminates, strict=True):
         inside = (
-            _group(mesh, place)
+            _elements_of_group(mesh, place)
             if isinstance(place, str)
-            else _rectangle(mesh_of_plate, place, doubts)
+            else _elements_of_rectangle(mesh_of_plate, place, doubts)
         )
         numbers[inside] = laminate
     struck = int(numbers[(mesh_of_plate.elements == node).any(axis=1)][0])
-    records = _runs(numbers)
+    records = _zone_cards(numbers)
     return ElementLaminates(struck, model.Zones(records) if records else None)
 
 
-def _group(mesh: AnyMesh, name: str) -> Indices:
+def _elements_of_group(mesh: AnyMesh, name: str) -> Indices:
     """Return the elements of a group of surfaces."""
     surfaces = mesh.surfaces if isinstance(mesh, PlateMesh) else {}
     if name not in surfaces:
@@ -83,7 +83,7 @@ def _group(mesh: AnyMesh, name: str) -> Indices:
     return surfaces[name]
 
 
-def _rectangle(mesh: MeshArrays, place: Sequence[float], doubts: list[str]) -> Bools:
+def _elements_of_rectangle(mesh: MeshArrays, place: Sequence[float], doubts: list[str]) -> Bools:
     """Return the elements that have their centres in a rectangle."""
     try:
         x0, y0, x1, y1 = map(float, place)
@@ -99,7 +99,7 @@ def _rectangle(mesh: MeshArrays, place: Sequence[float], doubts: list[str]) -> B
     if not inside.any():
         raise ObjectError(f"{zone} has no element whose centre lies in it")
     least, most = corners.min(axis=1), corners.max(axis=1)
-    slack = SAME * (most - least)
+    slack = SLACK * (most - least)
     within = ((least >= low - slack) & (most <= high + slack)).all(axis=1)
     beside = ((most <= low + slack) | (least >= high - slack)).any(axis=1)
     if cut := int((~within & ~beside).sum()):
@@ -111,8 +111,8 @@ def _rectangle(mesh: MeshArrays, place: Sequence[float], doubts: list[str]) -> B
     return inside
 
 
-def _runs(numbers: Indices) -> tuple[model.Zone, ...]:
-    """Yield cards of consecutive elements of one laminate; the plate's laminate needs none."""
+def _zone_cards(numbers: Indices) -> tuple[model.Zone, ...]:
+    """Return a card for each run of elements with the same laminate, except the plate's."""
     starts = np.flatnonzero(np.diff(numbers, prepend=MATERIAL - 1))
     ends = [*starts[1:].tolist(), len(numbers)]
     runs = zip(starts.tolist(), ends, strict=True)
