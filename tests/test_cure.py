@@ -154,7 +154,7 @@ def bent(load: float, dt: float) -> fecm.Result:
     others = [decks.MITC, STRENGTHS, Cure(dt, expansions=(ALPHA,))]
     macros = decks.program("TANG FORM SOLV FAIL")
     pressure = load * np.outer(along, along)
-    return decks.run_of_deck(decks.quarter_plate(8, plate, macros, pressure, others=others))
+    return decks.run_of_deck(decks.quarter_plate(8, plate, macros, pressure, further=others))
 
 
 @pytest.mark.parametrize(
@@ -305,7 +305,7 @@ def test_the_factor_acts_on_the_load_alone_under_a_preload() -> None:
     def largest(load: float) -> LargestExposure:
         others = [decks.MITC, STRENGTHS, Preload(2e5, 1e5), Cure(-50.0, expansions=(ALPHA,))]
         macros = decks.program("TANG FORM SOLV FAIL")
-        made = decks.quarter_plate(4, plate, macros, load * along, others=others)
+        made = decks.quarter_plate(4, plate, macros, load * along, further=others)
         return largest_exposures(decks.run_of_deck(made))[0]
 
     one = largest(5e4)

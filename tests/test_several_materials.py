@@ -111,7 +111,7 @@ def bent(name: str, theory: str, words: str) -> Result:
         material(plies[0], layup),
         decks.program(words),
         np.outer(along, along),
-        others=[THEORIES[theory], materials(*plies[1:])],
+        further=[THEORIES[theory], materials(*plies[1:])],
         side=side,
     )
     return decks.run_of_deck(made)

@@ -1,6 +1,7 @@
 """Built-in verification against closed forms, external references and regression values.
 
-Decks are built in Python; what is expected of them, and why, is in `checks.toml`.
+The modules build decks in Python and compute values. `checks.toml` has the expected values, their
+sources, and the tolerances with their reasons.
 """
 
 from __future__ import annotations
@@ -8,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 from fecm._errors import FecmError
-from fecm.verification import (  # noqa: F401  (they fill CASE_OF)
+from fecm.verification import (  # noqa: F401  (importing them fills CASE_OF)
     curved,
     fields,
     impacts,
@@ -25,11 +26,11 @@ CASES: tuple[Case, ...] = tuple(CASE_OF[name] for name in TABLES)
 
 
 class UnknownCaseError(FecmError, LookupError, ValueError):
-    """The name of a case is unknown."""
+    """Unknown name of a case."""
 
 
 def chosen(names: Iterable[str] = ()) -> list[Case]:
-    """Return the named cases in their usual order; all cases if there are no names."""
+    """Return the named cases in their usual order; without names, all cases."""
     requested = list(names)
     for name in requested:
         if name not in CASE_OF:
@@ -43,17 +44,17 @@ def verify(*cases: str) -> list[Row]:
     Parameters
     ----------
     *cases : str
-        Names of cases, as ``fecm verify --list`` shows them; all cases without one.
+        Names of cases, as ``fecm verify --list`` shows them. Without names, all cases run.
 
     Returns
     -------
     list of Row
-        One row per quantity; ``within`` says whether it is within its tolerance.
+        One row per quantity; ``within`` is True if its error is within the tolerance.
 
     Raises
     ------
     UnknownCaseError
-        If a name is unknown; a ValueError.
+        If a name is unknown. It is a ValueError.
 
     Examples
     --------

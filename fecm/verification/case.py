@@ -1,6 +1,6 @@
-"""Verification cases: each computes a few values, its checks state the expected ones.
+"""Verification cases. A case computes a few values; its checks have the expected values.
 
-Their rows are written as text, as values for JSON, and as Markdown.
+The result of a check is a row. Rows are written as text, JSON and Markdown.
 """
 
 from __future__ import annotations
@@ -21,26 +21,26 @@ TABLES: dict[str, dict[str, Any]] = tomllib.loads(
     (resources.files("fecm.verification") / "checks.toml").read_text("utf-8")
 )
 INTRODUCTION: Any = TABLES.pop("introduction")
-# A number; a field, of which the value farthest from the expected one counts; or a field and its
-# expected shape, of which the amplitude at the point farthest from the expected field counts.
+# A check compares one number. A field gives its value farthest from the expected value. A field and
+# its expected shape give the amplitude at the point with the largest difference.
 Value = float | Floats | tuple[Floats, Floats]
 Compute = Callable[[], Sequence[Value]]
 HEAD = ("case", "source", "quantity", "expected", "got", "error", "allowed", "label", "verdict")
-# Widths of columns whose texts are not known before the rows: numbers of nine digits, errors.
+# Smallest widths of columns with numbers. The numbers are not known when the first line is written.
 LEAST_WIDTHS = {"expected": 15, "got": 15, "error": 8}
 COLUMNS = "| quantity | source | expected | got | error | allowed | because | label |"
 
 
 class Label(StrEnum):
-    """What a check proves."""
+    """Kind of evidence that a check gives."""
 
     INDEPENDENT = "independent"  # the expected value comes from outside the program
-    CONSISTENCY = "consistency"  # two ways through the program agree
-    AGAINST_CHANGE = "against change"  # the value is the one of an earlier version
+    CONSISTENCY = "consistency"  # two computations by the program agree
+    AGAINST_CHANGE = "against change"  # the expected value comes from an earlier version
 
 
 class RowVerdict(StrEnum):
-    """Whether a row is within its tolerance."""
+    """Verdict on a row: within its tolerance or not."""
 
     FINE = "ok"
     FAILED = "FAILED"
@@ -56,13 +56,13 @@ class Check(NamedTuple):
     expected : float
         Expected value.
     source : str
-        Its source.
+        Source of the expected value.
     tolerance : float
         Largest admissible error.
     why : str
         Reason for the tolerance.
     label : Label
-        What the check proves: ``"independent"``, ``"consistency"`` or ``"against change"``.
+        Kind of evidence: ``"independent"``, ``"consistency"`` or ``"against change"``.
     scale : float or None
         Reference of the relative error; None for the expected value.
     """
@@ -77,7 +77,7 @@ class Check(NamedTuple):
 
 
 class Case(NamedTuple):
-    """Quantities computed together: `compute` returns one value per check, in order."""
+    """Quantities that one function computes: `compute` returns a value for each check, in order."""
 
     name: str
     title: str
@@ -97,7 +97,7 @@ class Row(NamedTuple):
     got : float
         Computed value; NaN if the computation failed.
     failure : str
-        Why it failed; empty if it did not.
+        Reason why the computation failed; empty if it did not.
     """
 
     case: str
@@ -118,11 +118,11 @@ class Row(NamedTuple):
 
     @property
     def verdict(self) -> RowVerdict:
-        """The verdict."""
+        """Verdict on the row."""
         return RowVerdict.FINE if self.within else RowVerdict.FAILED
 
     def to_dict(self) -> dict[str, object]:
-        """Return plain values, for JSON; None for values that could not be computed."""
+        """Return the row as plain values for JSON; None stands for NaN."""
         check = self.check
         got, error = (value if math.isfinite(value) else None for value in (self.got, self.error))
         return {
@@ -144,7 +144,10 @@ CASE_OF: dict[str, Case] = {}
 
 
 def case(compute: Compute) -> Compute:
-    """Decorate a function that computes the case of its name in `checks.toml`."""
+    """Register a function as the computation of a case.
+
+    The function ``_rod_pulse`` computes the case ``rod-pulse`` of `checks.toml`.
+    """
     name = compute.__name__[1:].replace("_", "-")
     common = dict(TABLES[name])
     title, groups = common.pop("title"), common.pop("checks")
@@ -159,24 +162,25 @@ def case(compute: Compute) -> Compute:
 
 
 def compute_rows(case: Case) -> list[Row]:
-    """Compute the rows of a case; an exception becomes the failure of all rows."""
+    """Compute the rows of a case; if an exception occurs, all rows fail."""
     try:
         values, failure = case.compute(), ""
         if len(values) != len(case.checks):
             raise ValueError(f"{len(values)} numbers for {len(case.checks)} checks")
-        numbers = [_number(v, c.expected) for v, c in zip(values, case.checks, strict=True)]
-    except Exception as error:  # any exception fails the rows
+        pairs = zip(values, case.checks, strict=True)
+        numbers = [_number_to_check(value, check.expected) for value, check in pairs]
+    except Exception as error:  # whatever the exception is, it belongs in the rows
         failure = f"{type(error).__name__}: {error}".splitlines()[0]
         numbers = [math.nan] * len(case.checks)
-    pairs = zip(case.checks, numbers, strict=True)
-    return [Row(case.name, check, number, failure) for check, number in pairs]
+    results = zip(case.checks, numbers, strict=True)
+    return [Row(case.name, check, number, failure) for check, number in results]
 
 
-def _number(value: Value, expected: float) -> float:
-    """Return the number that a value is compared by; NaN if any part of it is NaN."""
+def _number_to_check(value: Value, expected: float) -> float:
+    """Reduce a value to the number that is compared; NaN if any part of the value is NaN."""
     if isinstance(value, tuple):
-        off = (value[0] - expected * value[1]).ravel()
-        return expected + float(off[np.abs(off).argmax()])
+        difference = (value[0] - expected * value[1]).ravel()
+        return expected + float(difference[np.abs(difference).argmax()])
     field = np.ravel(value)
     return float(field[np.abs(field - expected).argmax()])
 
@@ -198,7 +202,10 @@ def cells(row: Row) -> tuple[str, ...]:
 
 
 def table_lines(cases: Sequence[Case], rows: Iterable[Row]) -> Iterator[str]:
-    """Yield the lines of a table as rows are computed; the cases give the widths of the columns."""
+    """Yield the lines of a table while the rows are computed.
+
+    The widths of the columns follow from the cases.
+    """
     expected_cells = [
         cells(Row(item.name, check, math.nan)) for item in cases for check in item.checks
     ]

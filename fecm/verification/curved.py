@@ -23,17 +23,17 @@ STATIC = decks.program("TANG FORM SOLV DISP STRE")
 
 
 def panel(
-    curvature: Curvature, grid: ElementGrid, macros: Iterable[Macro], *others: model.Segment
+    curvature: Curvature, grid: ElementGrid, macros: Iterable[Macro], *further: model.Segment
 ) -> Result:
     """Run a simply supported panel (SS3) of IM7/8552 (mm, N, s)."""
     ply = MATERIALS["IM7/8552"].converted("mm-N-s")
     supports = grid.supported((0,) * 5, dict.fromkeys(EDGES, "simple"), in_plane="tangential")
-    segments = (supports, curvature, *others, decks.MITC, decks.material(ply, ANGLES, 0.2))
+    segments = (supports, curvature, *further, decks.MITC, decks.material(ply, ANGLES, 0.2))
     return decks.run_of_deck(decks.deck(grid, segments, macros))
 
 
 def refined_grid(side: float) -> ElementGrid:
-    """Build a grid with elements of this side where the force acts."""
+    """Build a grid whose elements have at most a given side in the middle, where the force acts."""
     return ElementGrid(
         *(refined_sections(a, round(a / ELEMENT), a / 2.0, 2.0, side) for a in SIDES)
     )
@@ -45,7 +45,7 @@ def middle_node(grid: ElementGrid) -> int:
 
 
 def pressed(curvature: Curvature, grid: ElementGrid) -> tuple[Result, float]:
-    """Press the panel in its middle; its deflection is the mean over the patch per force."""
+    """Press the panel in its middle; return the result, and the compliance under the patch."""
     result = panel(curvature, grid, STATIC, PATCH)
     w = result.tape3.w[0, result["patch/node"] - 1] @ result["patch/weight"]
     return result, float(w) / PATCH.load
@@ -53,7 +53,7 @@ def pressed(curvature: Curvature, grid: ElementGrid) -> tuple[Result, float]:
 
 @case
 def _curved_panel() -> Sequence[Value]:
-    """Compute static deflections, forces and moments in the middle, and frequencies."""
+    """Compute compliances, forces and moments per force in the middle, and frequencies."""
     coarse, fine = refined_grid(4.0), refined_grid(2.0)
     flatter = pressed(Curvature(radius_y=1000.0), coarse)[1]
     result, deflection = pressed(Curvature(radius_x=500.0), fine)
@@ -80,14 +80,14 @@ def _curved_impact() -> Sequence[Value]:
 
 @case
 def _curved_strains() -> Sequence[Value]:
-    """Compute the strains of a twisted element with NONL, held in a constant w."""
+    """Compute the strains and the pressure of a twisted nonlinear element with constant w."""
     side, w = 10.0, 0.01
     grid = ElementGrid(uniform_section(side, 1), uniform_section(side, 1))
     held = np.zeros((grid.nodes, 5))
     held[:, 2] = w
     ply = MATERIALS["IM7/8552"].converted("mm-N-s")
     segments = (
-        decks.held_but(0, node=5),  # u of the middle, on which a constant N does not act
+        decks.held_but(0, node=5),  # u of the middle node; a constant N does no work on it
         decks.forces(held),
         Curvature(500.0, -1000.0, 800.0),
         model.Nonlinear(),

@@ -1,4 +1,4 @@
-"""Decks of the verification cases, built in Python."""
+"""Builders of the decks of the verification cases."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ REPORT_PLY = Ply(0.000148, 0.3, 17.5e6, 1.15e6, 0.8e6, 0.8e6, 0.8e6)
 REPORT_HALF = (0.0, 45.0, 0.0, -45.0, 0.0) * 2
 REPORT_ANGLES = REPORT_HALF + REPORT_HALF[::-1]
 REPORT_THICKNESS = 0.0053
-SIDES = (6.0, 4.0)  # of rectangles (in)
+SIDES = (6.0, 4.0)  # sides of rectangles (in)
 
 # Codes of every node of a rectangle, and of the left, bottom, right and top edge.
 FREE = "11000 00000 00000 00000 00000"
@@ -48,19 +48,19 @@ ONE = isotropic(1.0, 0.3, 1.0)
 def material(
     ply: Ply, angles: Sequence[float], thickness: float, shear_order: int = 3, points: int = -3
 ) -> model.Material:
-    """Build a MATE segment of layers of equal thickness; -3 takes the strains at the nodes."""
+    """Build a MATE segment of equal layers; `points` -3 computes strains at the nodes."""
     layers = tuple(Layer(n, angle, thickness) for n, angle in enumerate(angles, start=1))
     total = float(f"{len(layers) * thickness:.9g}")
     return model.Material(Integration(3, shear_order, points, total), ply, layers)
 
 
 def elastic(k: float) -> model.Indentation:
-    """Build Hertz' law, without permanent indentation."""
+    """Build Hertz's law, without permanent indentation."""
     return model.Indentation(k, 1.0, 0.0, 1.5)
 
 
 def program(text: str) -> tuple[Macro, ...]:
-    """Return macros of words, some with ``=`` and a value."""
+    """Parse a program of words such as ``LMAS EIGE=4``."""
     parts = (word.partition("=") for word in text.split())
     return tuple(Macro(word, value=float(value or 0.0)) for word, _, value in parts)
 
@@ -75,16 +75,16 @@ STRESSES = program("TANG FORM SOLV STRE")
 
 
 def restraints(grid: ElementGrid, codes: str) -> model.Boundary | None:
-    """Return restraints of codes such as `SUPPORTED`."""
+    """Build restraints from codes such as `SUPPORTED`."""
     every, *edges = ([int(code) for code in word] for word in codes.split())
     return grid.boundary(every, dict(zip(("left", "bottom", "right", "top"), edges, strict=True)))
 
 
 def held_but(dof: int, node: int = 1) -> model.Boundary:
-    """Hold the nodes of an element, except a dof of one node, as a deck needs an equation."""
-    freed = tuple(int(number != dof) for number in range(5))
+    """Hold all dofs of an element except one, because a deck needs an equation."""
+    codes = tuple(int(number != dof) for number in range(5))
     return model.Boundary(
-        tuple(NodeCodes(n, 0, freed if n == node else (1,) * 5) for n in range(1, 10))
+        tuple(NodeCodes(n, 0, codes if n == node else (1,) * 5) for n in range(1, 10))
     )
 
 
@@ -94,22 +94,22 @@ def deck(
     macros: Iterable[Macro],
     coordinates: model.Coordinates | None = None,
 ) -> model.Deck:
-    """Build a deck of 9-node elements on a grid's numbering."""
-    segments_and_mesh = (grid.element_cards(), coordinates or grid.coordinates(), *segments)
-    present = tuple(segment for segment in segments_and_mesh if segment is not None)
+    """Build a deck with the elements of a grid and, by default, its coordinates."""
+    optional = (grid.element_cards(), coordinates or grid.coordinates(), *segments)
+    present = tuple(segment for segment in optional if segment is not None)
     layers = next(len(s.layers) for s in present if isinstance(s, model.Material))
     control = Control(grid.nodes, grid.elements, layers, 2, 5, 9)
     return model.Deck("verification", control, present, tuple(macros))
 
 
 def run_of_deck(deck_of_run: model.Deck, mode: Mode = "report") -> Result:
-    """Run a deck of one problem."""
+    """Run a deck without its warnings."""
     with warnings.catch_warnings(action="ignore", category=FecmWarning):
         return run_one(deck_of_run, mode=mode)
 
 
 def field_values(result: Result, group: str, names: str) -> list[Floats]:
-    """Return the fields of a group, by name."""
+    """Return datasets of a group; `names` are separated by blanks."""
     return [result[f"{group}/{name}"] for name in names.split()]
 
 
@@ -121,7 +121,7 @@ def constant_strains(
     strain: Sequence[float] = (0.0, 0.0, 0.0),
     shear: Sequence[float] = (0.0, 0.0),
 ) -> Floats:
-    """Return dofs (nodes, 5) of constant midplane strains, curvatures and shear yz, xz."""
+    """Return dofs (nodes, 5) with constant mid-plane strains, curvatures and shears yz, xz."""
     (ex, ey, exy), (kx, ky, kxy), (gyz, gxz) = strain, curvature, shear
     w = -(kx * x**2 + ky * y**2 + kxy * x * y) / 2.0 + gxz * x + gyz * y
     u, v = ex * x + exy / 2.0 * y, ey * y + exy / 2.0 * x
@@ -129,18 +129,18 @@ def constant_strains(
 
 
 def forces(field: Floats) -> model.Forces:
-    """Build a FORC segment of a field: forces, or displacements where a dof is restrained."""
+    """Build a FORC segment of a field: forces, or displacements of restrained dofs."""
     rows = field.reshape(-1, 5).tolist()
     return model.Forces(tuple(NodeValues(n, 0, tuple(row)) for n, row in enumerate(rows, start=1)))
 
 
 def weights(coordinates: Sequence[float]) -> Floats:
-    """Return Simpson's weights of the lines of nodes: integrals of their shape functions."""
-    weights_of_nodes = np.zeros(len(coordinates))
+    """Return the integrals of the shape functions of lines of nodes: Simpson's weights."""
+    integrals = np.zeros(len(coordinates))
     for first in range(0, len(coordinates) - 1, 2):
-        part = (coordinates[first + 2] - coordinates[first]) / 6.0
-        weights_of_nodes[first : first + 3] += part * np.array([1.0, 4.0, 1.0])
-    return weights_of_nodes
+        sixth = (coordinates[first + 2] - coordinates[first]) / 6.0
+        integrals[first : first + 3] += sixth * np.array([1.0, 4.0, 1.0])
+    return integrals
 
 
 def quarter_plate(
@@ -149,33 +149,37 @@ def quarter_plate(
     macros: Iterable[Macro],
     load: float | Floats = 0.0,
     codes: str = BENDING,
-    others: Sequence[model.Segment] = (),
+    further: Sequence[model.Segment] = (),
     side: float = 1.0,
 ) -> model.Deck:
     """Build a quarter of a simply supported square plate.
 
-    x = 0 and y = 0 are lines of symmetry, and node 1 is the plate's middle.
-    `elements` are those of a side, `load` is force/area at the nodes, (nodes along y, nodes along
-    x), `codes` are supports such as `BENDING`, `others` further segments.
+    x = 0 and y = 0 are lines of symmetry. Node 1 is the middle of the plate. `elements` is the
+    number of elements along a side of the quarter, and `side` the side of the whole plate. `load`
+    is a force/area at the nodes, (nodes along y, nodes along x). `codes` are supports such as
+    `BENDING`, and `further` are more segments.
     """
     half = uniform_section(side / 2.0, elements)
     grid = ElementGrid(half, half)
     along = weights(grid_lines(grid.columns))
     loads = np.zeros((grid.up, grid.across, 5))
     loads[..., 2] = np.outer(along, along) * load
-    loads[-1] = loads[:, -1] = 0.0  # a value there would be a displacement
+    loads[-1] = loads[:, -1] = 0.0  # on a restrained dof, FORC is a displacement
     load_segment = forces(loads) if np.any(load) else None
-    return deck(grid, (restraints(grid, codes), load_segment, plate, *others), macros)
+    return deck(grid, (restraints(grid, codes), load_segment, plate, *further), macros)
 
 
 def pressed_rectangle(
-    along: int, patch: model.Patch, macros: Iterable[Macro], *others: model.Segment
+    along: int, patch: model.Patch, macros: Iterable[Macro], *further: model.Segment
 ) -> model.Deck:
-    """Build a simply supported [0/90]5s of the report's ply with MITC, pressed on a patch."""
+    """Build a simply supported [0/90]5s of the report's ply with MITC, pressed on a patch.
+
+    `along` is the number of elements along x.
+    """
     grid = ElementGrid(uniform_section(SIDES[0], along), uniform_section(SIDES[1], along * 2 // 3))
     plate = material(REPORT_PLY, 5 * (0.0, 90.0) + 5 * (90.0, 0.0), 0.106 / 20)
-    held = restraints(grid, SUPPORTED)
-    return deck(grid, (held, patch, *others, MITC, plate), macros)
+    supports = restraints(grid, SUPPORTED)
+    return deck(grid, (supports, patch, *further, MITC, plate), macros)
 
 
 def struck_plate(
@@ -187,7 +191,7 @@ def struck_plate(
     dt: float,
     steps: int,
 ) -> model.Deck:
-    """Build a plate without supports that is hit in the middle."""
+    """Build a plate without supports and an impact in its middle."""
     middle = grid.nearest(grid.columns[-1].end / 2.0, grid.rows[-1].end / 2.0)[0]
     segments = (restraints(grid, FREE), projectile, model.Impact(middle, 3, velocity), law, plate)
     return deck(grid, segments, impact_program(dt, steps))
@@ -215,7 +219,7 @@ def report_impact(steps: int = 4000) -> model.Deck:
 
 
 def panel_with_gages(along: int, up: int) -> model.Deck:
-    """Build the panel of examples/panel-with-gages.inp (mm, N, s) with other elements."""
+    """Build the panel of examples/panel-with-gages.inp (mm, N, s) with another mesh."""
     example = read_one(examples.path("panel-with-gages.inp"))
     grid = ElementGrid(uniform_section(300.0, along), uniform_section(200.0, up))
     kinds = (model.Material, model.Shear, model.Patch, model.Gages)

@@ -1,4 +1,4 @@
-"""Plates whose strains, resultants and failure every mesh must reproduce."""
+"""Plates with strains, resultants and failure that any mesh must reproduce exactly."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def _patch() -> Sequence[Value]:
 def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = False) -> Deck:
     """Build a rectangle of [0/45] under edge tractions, on supports without reactions.
 
-    `x` and `y` are the forces per length of the five dofs on an edge with normal x or y.  With
-    `shears` only w moves, and a shear correction factor acts.
+    `x` and `y` are the forces per length of the five dofs on an edge with normal x or y. With
+    `shears` only w moves, and the shear correction factor is 0.8.
     """
     columns = [GridSection(0.0, 1.2, 1), GridSection(1.2, 2.0, 1)]
     grid = ElementGrid(columns, [GridSection(0.0, 0.5, 1), GridSection(0.5, 1.5, 1)])
@@ -71,7 +71,7 @@ def loaded_rectangle(x: Sequence[float], y: Sequence[float], *, shears: bool = F
 @case
 def _resultants() -> Sequence[Value]:
     n_x, n_y, n_xy, m_x, m_y, m_xy = 100.0, -40.0, 30.0, 0.5, 0.3, -0.2
-    # A couple M does work on -theta.
+    # A moment M does work on -theta.
     pulled = loaded_rectangle((n_x, n_xy, 0.0, -m_x, -m_xy), (n_xy, n_y, 0.0, -m_xy, -m_y))
     shears = (0.0, 0.0, 20.0, 0.0, 0.0), (0.0, 0.0, -8.0, 0.0, 0.0)
     result = decks.run_of_deck(pulled)
@@ -84,10 +84,10 @@ def _resultants() -> Sequence[Value]:
 
 @case
 def _tape8() -> Sequence[Value]:
-    """Compute strains of a plate whose nodes, except one w, are held in constant strains.
+    """Compute the strains of a plate that is held in constant strains.
 
-    A very slow rigid mass hits this dof, in the middle of the first element, for one step. The
-    other elements keep the field.
+    One dof is free: w in the middle of the first element. A very slow rigid mass hits it for one
+    step. The strains of the other elements stay as they are.
     """
     grid = ElementGrid(uniform_section(2.0, 2), uniform_section(2.0, 2))
     struck = 2 + grid.across
@@ -106,7 +106,8 @@ def _tape8() -> Sequence[Value]:
 def held_trapezoid() -> Deck:
     """Build one element with MITC, x = ξ and y = η (1 + ξ/2)/2, that is held in θ_y = ξ².
 
-    The other dofs are 0, so that γ_yz is -θ_y, of which a cubic part in ξ is interpolated.
+    The other dofs are 0, so γ_yz is -θ_y. Its covariant component is cubic in ξ and has to be
+    interpolated.
     """
     grid = ElementGrid(uniform_section(2.0, 1), uniform_section(1.0, 1))
     xi, eta = (v.ravel() for v in np.meshgrid((-1.0, 0.0, 1.0), (-1.0, 0.0, 1.0)))
@@ -122,7 +123,7 @@ def held_trapezoid() -> Deck:
 def _assumed_shear() -> Sequence[Value]:
     cards = (decks.material(decks.ONE, [0.0], h) for h in (0.1, 0.001))
     variants = [
-        decks.quarter_plate(4, card, decks.DEFLECTION, 1.0, others=[decks.MITC]) for card in cards
+        decks.quarter_plate(4, card, decks.DEFLECTION, 1.0, further=[decks.MITC]) for card in cards
     ]
     x, shear = decks.field_values(decks.run_of_deck(held_trapezoid()), "stresses", "x gamma_yz")
     sides = [shear[:, np.isclose(x, end)] for end in (-1.0, 1.0)]
@@ -133,7 +134,7 @@ CARBON = Ply(1.6e-9, 0.3, 150e3, 10e3, 5e3, 5e3, 3.5e3)
 ANGLES = (30.0, -45.0, 90.0)
 PLY_THICKNESS = 0.25
 STRENGTHS = Allowables(2000.0, 1200.0, 60.0, 200.0, 90.0, 80.0, 50.0, -0.4, 0.3, 0.25)
-# By x, y, xx, xy and yy of u, v and the negatives of the rotations, in the middle of the element.
+# Derivatives by x, y, xx, xy and yy of u, v, -theta_x and -theta_y in the middle of the element.
 FIELD = np.array([
     [-3.0, 5.0, -1.5, 2.0, 1.25],
     [5.0, 2.0, 0.75, -1.5, -0.25],
@@ -145,7 +146,7 @@ CRITERIA = ("max_stress", "tsai_wu", "hashin", "puck")
 
 @case
 def _failure_states() -> Sequence[Value]:
-    """Compute exposures in the middle of an element, one of whose w is free."""
+    """Compute exposures in the middle of an element; all dofs but one w are held."""
     grid = ElementGrid(uniform_section(1.0, 1), uniform_section(1.0, 1))
     x, y = (v.ravel() - 0.5 for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     u, v, p, q = FIELD @ [x, y, x * x / 2.0, x * y, y * y / 2.0]
@@ -159,13 +160,13 @@ def _failure_states() -> Sequence[Value]:
     return [*np.ravel(plies), *result["failure/interlaminar/exposure"][0]]
 
 
-# σ2 and τ12 of a ply at 0 degrees that is pressed across its fibres; the action plane is inclined.
+# σ2 and τ12 of a ply at 0 degrees, compressed across its fibres; the action plane is inclined.
 PRESSED = ((-180.0, 0.0), (-180.0, 60.0), (-150.0, -80.0))
 
 
 @case
 def _inclined_failure() -> Sequence[Value]:
-    """Compute Puck's exposure in constant stresses of an element, where mode C decides."""
+    """Compute Puck's exposure of an element under constant stresses; mode C decides."""
     grid = ElementGrid(uniform_section(1.0, 1), uniform_section(1.0, 1))
     x, y = (v.ravel() - 0.5 for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     plate, macros = decks.material(CARBON, [0.0], 1.0), decks.program("TANG FORM SOLV FAIL")

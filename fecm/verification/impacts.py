@@ -27,11 +27,11 @@ from fecm.sweeps.plan import plan
 from fecm.verification.case import Value, case
 from fecm.verification.parts import ALPHA_CR
 
-V = 100.0  # of projectiles
+V = 100.0  # velocity of the projectiles
 
 
 def largest_force(result: Result) -> list[float]:
-    """Return the largest force, and its time."""
+    """Return the largest force and its time."""
     return [result.force.max(), result.time[result.force.argmax()]]
 
 
@@ -48,41 +48,41 @@ def _rigid_target() -> Sequence[Value]:
 
 @case
 def _end_of_contact() -> Sequence[Value]:
-    """Compute a run that is cut at every phase of a half-sine contact."""
+    """Judge runs that end at different phases of a half-sine contact."""
     phase, ones = np.linspace(0.0, np.pi, 20001)[1:-1], np.ones(19999)
     force = np.sin(phase)
     peak = np.maximum.accumulate(force)
     last = LastContact(force, np.append(0.0, force[:-1]), peak, peak, -np.cos(phase), 0.0 * ones)
 
-    def known(speed: float) -> float:
-        """Return the share of the contact that knows its peak.
-
-        The plate has a largest velocity.
-        """
+    def share_with_known_peak(speed: float) -> float:
+        """Return the share of the runs that know the peak force, for a velocity of the plate."""
         plate = Deflection(ones, 0.0 * ones, speed * ones, ones, ones)
         return float(peak_known(ends(last, plate)).mean())
 
-    passed = ends(last, Deflection(ones, 0.0 * ones, ones, ones, ones))
-    # Deflections that go on growing, and that fall with the force.
-    growing = np.isfinite(decided(phase, phase, passed)).mean()
-    falling = np.isfinite(decided(peak, force, passed)).mean()
-    return [known(1.0), known(3.0), growing, falling]
+    run_ends = ends(last, Deflection(ones, 0.0 * ones, ones, ones, ones))
+    # A deflection that still grows, and a deflection that falls with the force.
+    growing = np.isfinite(decided(phase, phase, run_ends)).mean()
+    falling = np.isfinite(decided(peak, force, run_ends)).mean()
+    return [share_with_known_peak(1.0), share_with_known_peak(3.0), growing, falling]
 
 
 @case
 def _free_plate() -> Sequence[Value]:
-    """Compute a plate so stiff that it moves as a rigid body, which DAMP slows down."""
+    """Compute the impact on a free plate that moves as a damped rigid body."""
     grid = ElementGrid(uniform_section(1.0, 2), uniform_section(1.0, 2))
     plate, law = decks.material(decks.isotropic(1e9, 0.3, 2.5e-4), [0.0], 0.2), decks.elastic(1e5)
     deck = decks.struck_plate(grid, plate, Projectile(0, 0, 2.0e-4), V, law, 3e-8, 10000)
     result = decks.run_of_deck(replace(deck, segments=(*deck.segments, model.Damping(2000.0))))
-    ends = (result.velocity[-1], result.plate_w[-1], result.energy.damping_work[-1])
-    return [result.force.max(), *ends]
+    final = (result.velocity[-1], result.plate_w[-1], result.energy.damping_work[-1])
+    return [result.force.max(), *final]
 
 
 @case
 def _infinite_plate() -> Sequence[Value]:
-    """Compute a thin plate of 12 x 12 in, stiff in shear; no reflection returns within 200 us."""
+    """Compute the impact on a thin plate of 12 x 12 in that is stiff in shear.
+
+    No reflection returns within 200 us.
+    """
     grid = ElementGrid(uniform_section(12.0, 48), uniform_section(12.0, 48))
     plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4, 13.0), [0.0], 0.1)
     mass, law = Projectile(0, 0, 2.0e-5), decks.elastic(5.0e4)
@@ -92,11 +92,11 @@ def _infinite_plate() -> Sequence[Value]:
 
 @case
 def _supported_plate() -> Sequence[Value]:
-    """Compute a quarter of the plate, with a quarter of mass and contact coefficient."""
+    """Compute the impact on a quarter plate with a quarter of the mass and of k."""
     plate = decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.03)
     hit = (Projectile(0, 0, 5.0e-6 / 4.0), Impact(1, 3, V), decks.elastic(1.0e5 / 4.0))
     macros = decks.impact_program(8e-8, 2500)
-    result = decks.run_of_deck(decks.quarter_plate(8, plate, macros, others=hit))
+    result = decks.run_of_deck(decks.quarter_plate(8, plate, macros, further=hit))
     force, time = largest_force(result)
     return [4.0 * force, time, result.plate_w.max(), result.velocity[-1]]
 
@@ -109,16 +109,16 @@ def _report_impact() -> Sequence[Value]:
     first = int(result.force[result.time < 500e-6].argmax())
     return [
         balance,
-        _at(result, "force", 42e-6),
-        _at(result, "force", 642e-6),
-        _at(result, "transducer", 642e-6),
+        _value_at(result, "force", 42e-6),
+        _value_at(result, "force", 642e-6),
+        _value_at(result, "transducer", 642e-6),
         result.force[first],
         result.time[first],
         *largest_force(result),
     ]
 
 
-def _at(result: Result, name: str, time: float) -> float:
+def _value_at(result: Result, name: str, time: float) -> float:
     """Return the value of a history at the step nearest to a time."""
     values: Floats = result[f"history/{name}"]
     return float(values[int(np.abs(result.time - time).argmin())])
@@ -128,7 +128,7 @@ def _at(result: Result, name: str, time: float) -> float:
 def _listing_impact() -> Sequence[Value]:
     result = decks.run_of_deck(decks.report_impact(500), "listing")
     end = result.time[result.force > 0.0][-1]
-    return [_at(result, "force", 46e-6), _at(result, "transducer", 46e-6), end]
+    return [_value_at(result, "force", 46e-6), _value_at(result, "transducer", 46e-6), end]
 
 
 @case
@@ -146,7 +146,7 @@ def _convolution() -> Sequence[Value]:
 @case
 def _patch_impact() -> Sequence[Value]:
     patch = Patch("DISC", 0.125, decks.SIDES[0] / 2.0, decks.SIDES[1] / 2.0)
-    middle = 97 * 32 + 49  # of 97 by 65 nodes
+    middle = 97 * 32 + 49  # middle of 97 by 65 nodes
     hit = (Projectile(0, 0, 0.000181), Impact(middle, 3, 115.0), decks.elastic(1.912e6))
     return largest_force(
         decks.run_of_deck(
@@ -162,7 +162,7 @@ SQUARE_K = 8.2641942e9  # contact coefficient
 
 
 def struck_square(mass: float, end: float) -> Deck:
-    """Build the simply supported square, hit in the middle at 1 m/s, until a time."""
+    """Build the impact at 1 m/s on the middle of the simply supported square, until a time."""
     side, radius = 0.2, 0.002
     sections = refined_sections(side, 12, side / 2.0, 4.0, radius)
     grid = ElementGrid(sections, sections)

@@ -39,17 +39,17 @@ from fecm.verification.decks import (
     material,
 )
 
-# A ply of the report's kind, with a different G23, and the thickness of two layers.
+# A ply like the report's with a different G23, and the thickness of two layers.
 FIBRES = Ply(2.5e-4, 0.3, 17.5e6, 1.15e6, 0.8e6, 0.8e6, 0.5e6)
 THICK = 0.02
-AT = [0, 0, 2], [0, 1, 2]  # stiffnesses 11, 12 and 66
+ENTRIES = [0, 0, 2], [0, 1, 2]  # indices of the entries 11, 12 and 66
 DT = 2e-7  # for the report's steel bar and its pulse, section 4.2
 # The report's laminate with the 0.75 in indenter.
 K = 1.912e6
 ALPHA_P = 6.564e-4
 S_P = 0.094
 Q = 2.0
-ALPHA_CR = 1.2e-3  # critical indentation of ACR
+ALPHA_CR = 1.2e-3  # critical indentation of equation 3-7
 PEAK = 2e-3
 REMAINS = S_P * (PEAK - ALPHA_P)
 HALFWAY = (PEAK + REMAINS) / 2.0
@@ -62,9 +62,9 @@ def _isotropic_ply() -> Sequence[Value]:
     section = laminate(isotropic(1.0e7, 0.3, 2.5e-4), [30.0], [h])
     vanishing = [*section.A[:2, 2] / h, *section.B.ravel() / h**2, *section.D[:2, 2] / h**3]
     return [
-        *section.A[AT],
+        *section.A[ENTRIES],
         np.abs(vanishing).max() / plate,
-        *section.D[AT],
+        *section.D[ENTRIES],
         section.shear[0, 0],
         section.mass,
         section.rotary_inertia,
@@ -75,7 +75,7 @@ def _isotropic_ply() -> Sequence[Value]:
 def _cross_ply() -> Sequence[Value]:
     section = laminate(FIBRES, [0.0, 90.0], [THICK / 2.0] * 2)
     b = section.B.diagonal()
-    return [*section.A[AT], b[0], b[1], section.D[0, 0], section.D[2, 2], section.shear[0, 0]]
+    return [*section.A[ENTRIES], b[0], b[1], section.D[0, 0], section.D[2, 2], section.shear[0, 0]]
 
 
 @case
@@ -83,7 +83,7 @@ def _angle_ply() -> Sequence[Value]:
     section = laminate(FIBRES, [45.0, -45.0], [THICK / 2.0] * 2)
     turned, a11 = laminate(FIBRES, [45.0], [THICK]), section.A[0, 0]
     return [
-        *section.A[AT],
+        *section.A[ENTRIES],
         section.A[0, 2] / a11,
         section.B[0, 2],
         section.B[0, 0] / (a11 * THICK),
@@ -94,13 +94,13 @@ def _angle_ply() -> Sequence[Value]:
 
 
 def report_laminate() -> LaminateSection:
-    """Stack [0/45/0/-45/0]2s of the report's graphite/epoxy."""
+    """Return the section of the report's laminate, [0/45/0/-45/0]2s graphite/epoxy."""
     return laminate(REPORT_PLY, REPORT_ANGLES, [REPORT_THICKNESS] * len(REPORT_ANGLES))
 
 
 @case
 def _internal_force() -> Sequence[Value]:
-    """Compute K u on a mesh without parallel sides, from the strains of the elements."""
+    """Compare K u with the sum over the elements, on a mesh without parallel sides."""
     grid = ElementGrid(uniform_section(2.0, 3), uniform_section(2.0, 3))
     x, y = (v.ravel() for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     corners = enumerate(np.stack([x + 0.1 * x * y, y + 0.2 * x * y], axis=1).tolist(), start=1)
@@ -151,14 +151,14 @@ def bar(length: float) -> Rod:
 
 @case
 def _rod_pulse() -> Sequence[Value]:
-    pulse, later = (gauss_pulse(1000.0, middle, 40e-6) for middle in (200e-6, 300e-6))
-    result = simulate_pulse(bar(1.0), pulse, DT, 600e-6, (0.5,))
-    second = simulate_pulse(bar(1.0), later, DT, 300e-6, (0.5,))
-    at_later_time = np.interp(250e-6, second.time, second.forces[:, 0])
+    early, late = (gauss_pulse(1000.0, middle, 40e-6) for middle in (200e-6, 300e-6))
+    result = simulate_pulse(bar(1.0), early, DT, 600e-6, (0.5,))
+    second = simulate_pulse(bar(1.0), late, DT, 300e-6, (0.5,))
+    force_of_late_pulse = np.interp(250e-6, second.time, second.forces[:, 0])
     velocity = result.accelerations[:, 2].sum() * DT
     return [
         result.forces.max(),
-        at_later_time,
+        force_of_late_pulse,
         result.mean_ratios[0],
         velocity,
         report_rod().total_mass,

@@ -25,10 +25,11 @@ from fecm.results.result import Result
 from fecm.verification.case import Value, case
 from fecm.verification.parts import FIBRES
 
-ELEMENTS = 8  # of 16 a side
-FEWER = 6  # of 12 a side
+# Elements along a side of a quarter plate.
+ELEMENTS = 8
+FEWER = 6
 THICKNESS = 0.1
-STIFF = Ply(1.0, 0.25, 25.0, 1.0, 0.5, 0.5, 0.2)  # Pagano's
+STIFF = Ply(1.0, 0.25, 25.0, 1.0, 0.5, 0.5, 0.2)  # Pagano's ply
 SANDWICH_CORE = Ply(0.2, 0.25, 0.04, 0.04, 0.016, 0.06, 0.06)
 CROSS = (0.0, 90.0, 0.0)
 QUASI = (45.0, 0.0, -45.0, 90.0)
@@ -39,7 +40,7 @@ def _time_step() -> Sequence[Value]:
     grid = ElementGrid(uniform_section(0.3, 1), uniform_section(0.3, 1))
     deck = decks.deck(grid, [decks.material(decks.isotropic(1.0e7, 0.3, 2.5e-4), [0.0], 0.1)], ())
     mesh, steps = generate(deck), []
-    for dof in (2, 3):  # of node 5, the centre
+    for dof in (2, 3):  # w and theta_x of node 5, the centre
         codes, equations = np.ones_like(mesh.codes), np.zeros_like(mesh.equations)
         codes[4, dof], equations[4, dof] = 0, 1
         held = replace(mesh, codes=codes, equations=equations)
@@ -49,7 +50,7 @@ def _time_step() -> Sequence[Value]:
 
 @case
 def _static_bending() -> Sequence[Value]:
-    """Compute deflections with shear orders 2, which does not lock, and 3."""
+    """Compute deflections with shear order 2, which does not lock, and with order 3."""
 
     def w(thickness: float, factor: float = 1.0, shear_order: int = 2) -> Floats:
         ply = decks.isotropic(1.0, 0.3, 1.0, factor)
@@ -71,7 +72,7 @@ def _static_bending() -> Sequence[Value]:
 
 @case
 def _frequencies() -> Sequence[Value]:
-    """Compute frequencies of symmetric modes, on a quarter of the plate, and of uniform shear."""
+    """Compute the frequencies of symmetric modes of a quarter plate, and of uniform shear."""
     plate = decks.material(decks.ONE, [0.0], 0.1, 2)
     macros = decks.program("LMAS EIGE=4 CMAS EIGE=4")
     frequencies = decks.run_of_deck(
@@ -83,21 +84,21 @@ def _frequencies() -> Sequence[Value]:
     deck = decks.deck(grid, (held, decks.material(decks.ONE, [0.0], 0.1)), ())
     free = build_plate(deck, generate(deck))
     ones = np.ones(free.neq)
-    # Rayleigh's quotient of a free plate in uniform transverse shear.
+    # Rayleigh's quotient of a free plate under uniform transverse shear.
     shear = math.sqrt(float(ones @ (free.stiffness @ ones)) / float(free.mass @ ones))
-    # Modes 11, 13 and 31, 33 with the lumped mass, then with the consistent mass.
+    # Modes 11, 13, 31 and 33 with the lumped mass, then the same modes with the consistent mass.
     return [scaled[0], scaled[1], scaled[4], scaled[7], shear]
 
 
 def two_layers(angles: Sequence[float], codes: str, mode: int, node: int) -> Sequence[Value]:
-    """Compute frequencies of two modes, and w in the middle and u at a node under a load."""
+    """Compute two frequencies, and under a load w in the middle and u at a node."""
 
-    def made(shear_order: int, load: float, macros: Sequence[Macro]) -> Result:
+    def run(shear_order: int, load: float, macros: Sequence[Macro]) -> Result:
         card = decks.material(FIBRES, angles, THICKNESS / 2.0, shear_order)
         return decks.run_of_deck(decks.quarter_plate(FEWER, card, macros, load, codes))
 
-    modes = [made(n, 0.0, decks.program("LMAS EIGE=3")).modes.angular_frequency for n in (2, 3)]
-    first, second = (made(n, 1.0, decks.DEFLECTION).tape3.displacement[0] for n in (2, 3))
+    modes = [run(n, 0.0, decks.program("LMAS EIGE=3")).modes.angular_frequency for n in (2, 3)]
+    first, second = (run(n, 1.0, decks.DEFLECTION).tape3.displacement[0] for n in (2, 3))
     return [modes[0][0], modes[0][mode], modes[1][0], first[0, 2], first[node, 0], second[0, 2]]
 
 
@@ -120,20 +121,20 @@ def _preload() -> Sequence[Value]:
     """Compute buckling loads of symmetric modes, frequencies, deflection, forces and stresses."""
     plate = decks.material(STIFF, CROSS, THICKNESS / len(CROSS))
 
-    def made(preload: model.Preload, macros: str, load: float = 0.0) -> model.Deck:
+    def build(preload: model.Preload, macros: str, load: float = 0.0) -> model.Deck:
         segments = [decks.MITC, preload]
-        return decks.quarter_plate(ELEMENTS, plate, decks.program(macros), load, others=segments)
+        return decks.quarter_plate(ELEMENTS, plate, decks.program(macros), load, further=segments)
 
     def factor(n_x: float, n_y: float) -> float:
-        deck = made(model.Preload(n_x, n_y), "")
+        deck = build(model.Preload(n_x, n_y), "")
         return buckling_factor(build_plate(deck, generate(deck)))
 
     modes = [
-        decks.run_of_deck(made(preload, "LMAS EIGE=2")).modes.angular_frequency
+        decks.run_of_deck(build(preload, "LMAS EIGE=2")).modes.angular_frequency
         for preload in (TENSION, COMPRESSION)
     ]
-    bent = decks.run_of_deck(made(TENSION, "TANG FORM SOLV DISP", 1.0))
-    rest = decks.run_of_deck(made(TENSION, "STRE PLYS"))
+    bent = decks.run_of_deck(build(TENSION, "TANG FORM SOLV DISP", 1.0))
+    rest = decks.run_of_deck(build(TENSION, "STRE PLYS"))
     return [
         *(factor(*force) for force in ((-1.0, 0.0), (0.0, -1.0), (-1.0, 0.5))),
         *modes[0],
@@ -147,8 +148,8 @@ def _preload() -> Sequence[Value]:
 
 @case
 def _forced_plate() -> Sequence[Value]:
-    # One of the 2 x 2 points where the strains of a 9-node element are most accurate; the face away
-    # from the load.
+    # The gage is on the face away from the load, at one of the 2 x 2 Gauss points, where the
+    # strains of a 9-node element are most accurate.
     root = (1.0 - 1.0 / np.sqrt(3.0)) / 2.0 * 0.5 / FEWER
     gage = Gage(
         1, float(f"{1 / 12 + root:.9g}"), float(f"{0.25 + root:.9g}"), THICKNESS / 2.0, 30.0
@@ -180,7 +181,7 @@ def _equilibrium_shear() -> Sequence[Value]:
 
     def shear(ply: Ply, angles: Sequence[float]) -> Floats:
         plate = decks.material(ply, angles, 1.0 / len(angles))
-        deck = decks.quarter_plate(1, plate, (), others=[model.Shear(equilibrium=True)])
+        deck = decks.quarter_plate(1, plate, (), further=[model.Shear(equilibrium=True)])
         return build_plate(deck, generate(deck)).laminate.shear
 
     unsymmetric = shear(STIFF, (30.0, -45.0, 90.0))
@@ -199,14 +200,14 @@ def bent(
     angles: Sequence[float],
     thickness: float = THICKNESS,
     word: str = "PLYS",
-    *others: Segment,
+    *further: Segment,
     q: float = 1.0,
 ) -> Result:
-    """Run a simply supported square under q cos(pi x) cos(pi y), its origin in the middle."""
+    """Run a simply supported square under q cos(pi x) cos(pi y) with the origin in its middle."""
     along = np.cos(np.pi * np.array(grid_lines(uniform_section(0.5, ELEMENTS))))
     plate = decks.material(ply, angles, thickness / len(angles), points=2)
     macros, load = decks.program(f"TANG FORM SOLV STRE {word}"), q * np.outer(along, along)
-    deck = decks.quarter_plate(ELEMENTS, plate, macros, load, others=[decks.MITC, *others])
+    deck = decks.quarter_plate(ELEMENTS, plate, macros, load, further=[decks.MITC, *further])
     return decks.run_of_deck(deck)
 
 
@@ -231,9 +232,12 @@ def _ply_stresses() -> Sequence[Value]:
 
 
 def _sandwich_deck(ratio: float) -> model.Deck:
-    """Build Pagano's sandwich, a square of side 1, under q = cos(pi x) cos(pi y)."""
+    """Build Pagano's sandwich, a square of side 1 and thickness 1/ratio.
+
+    The load is cos(pi x) cos(pi y).
+    """
     along = np.cos(np.pi * np.array(grid_lines(uniform_section(0.5, ELEMENTS))))
-    parts = ((0.1, 1), (0.8, 2), (0.1, 1))  # of the thickness; material
+    parts = ((0.1, 1), (0.8, 2), (0.1, 1))  # share of the thickness, and material
     layers = tuple(
         model.Layer(n, 0.0, share / ratio, material)
         for n, (share, material) in enumerate(parts, start=1)
@@ -243,12 +247,12 @@ def _sandwich_deck(ratio: float) -> model.Deck:
     shear = model.Shear(assumed=True, equilibrium=True)
     macros = decks.program("TANG FORM SOLV DISP PLYS STRE")
     load = np.outer(along, along)
-    return decks.quarter_plate(ELEMENTS, plate, macros, load, others=[shear, core])
+    return decks.quarter_plate(ELEMENTS, plate, macros, load, further=[shear, core])
 
 
 @case
 def _unlike_densities() -> Sequence[Value]:
-    """Compute the sandwich of thickness 1, whose core has a fifth of the faces' density."""
+    """Compute mass and inertia of a sandwich; its core has a fifth of the faces' density."""
     deck = _sandwich_deck(1.0)
     laminate = build_plate(deck, generate(deck)).laminate
     return [laminate.mass, laminate.rotary_inertia]
@@ -291,7 +295,7 @@ def _failure() -> Sequence[Value]:
 
 
 def cure_of_named_ply(dt: float) -> model.Cure:
-    """Return the change of temperature of the named ply T300/5208."""
+    """Return CURE for the named ply T300/5208 after a change of temperature."""
     expansion = MATERIALS["T300/5208"].expansion
     assert expansion is not None
     return model.Cure(dt, expansions=(expansion,))

@@ -21,18 +21,18 @@ from fecm.verification.case import Value, case
 
 NEWTON = decks.program("LOOP=30 TANG FORM SOLV CONV NEXT DISP")
 STRETCHES: tuple[Segment, ...] = (decks.MITC, model.Nonlinear())
-FACTOR = 5.0 / 6.0  # of the shear moduli
+FACTOR = 5.0 / 6.0  # factor of the transverse shear moduli
 THICKNESS = 2.0
 ALUMINIUM = decks.isotropic(70e3, 0.3, 2.7e-9, FACTOR)
 FIBRES = Ply(1.53e-9, 0.3, 141e3, 9700.0, 5500.0, 5500.0 * FACTOR, 3700.0 * FACTOR)
-ELEMENTS = 6  # of a side of a quarter
-# Codes of every node, and of the left, bottom, right and top edge of a quarter whose left and
-# bottom edges are lines of symmetry.
+ELEMENTS = 6  # elements along a side of a quarter
+# Codes of all nodes, and of the left and bottom edges of a quarter, its lines of symmetry.
 QUARTER = "00000 10010 01001"
+# Codes of the right and top edges.
 CLAMPED = "11111 11111"
 RESTS = "00100 00100"
-PRESSURES = (0.1022849258, 0.02069852564)  # of a clamped disc, and of one that rests on its rim
-VELOCITY = 2271.56334  # of the mass
+PRESSURES = (0.1022849258, 0.02069852564)  # on a clamped disc, and on a disc that rests on its rim
+VELOCITY = 2271.56334  # velocity of the mass
 
 
 def middle_deflection(deck: Deck) -> float:
@@ -42,7 +42,7 @@ def middle_deflection(deck: Deck) -> float:
 
 @case
 def _stretching_plate() -> Sequence[Value]:
-    """Compute Levy's clamped plate, of side, thickness and modulus 1, 1/100 and 1."""
+    """Compute the deflection of Levy's clamped plate with side 1, thickness 1/100 and modulus 1."""
     h = 0.01
     plate = decks.material(decks.isotropic(1.0, 0.1**0.5, 1.0, FACTOR), [0.0], h)
     codes = f"{QUARTER} {CLAMPED}"
@@ -51,37 +51,35 @@ def _stretching_plate() -> Sequence[Value]:
 
 
 def strip(
-    end: str, pressure: float, others: Sequence[Segment] = STRETCHES, *, slant: float = 0.0
+    end: str, pressure: float, further: Sequence[Segment] = STRETCHES, *, slant: float = 0.0
 ) -> Deck:
     """Build half a strip of [0_4/90_4] in cylindrical bending, from its middle to an end.
 
-    The lines across the strip are slanted one way and the other, by a share of an element.
+    The lines of nodes across the strip slant to alternate sides by `slant`, a share of an element.
     """
     half, width = 50.0, 10.0
     grid = ElementGrid(uniform_section(half, 8), uniform_section(width, 1))
     loads = np.zeros((grid.up, grid.across, 5))
     across, along = (decks.weights(grid_lines(parts)) for parts in (grid.rows, grid.columns))
     loads[..., 2] = pressure * np.outer(across, along)
-    loads[:, -1] = 0.0  # a value there would be a displacement
+    loads[:, -1] = 0.0  # on a restrained dof, FORC is a displacement
     plate = decks.material(FIBRES, 4 * (0.0,) + 4 * (90.0,), 0.25)
-    held = decks.restraints(grid, f"01001 11011 01001 {end} 01001")
-    x, y = (
-        grid_axis.ravel()
-        for grid_axis in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows))
-    )
+    supports = decks.restraints(grid, f"01001 11011 01001 {end} 01001")
+    x, y = (v.ravel() for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     side = half / 8
     x = x + slant * side * np.sin(np.pi * x / (2.0 * side)) * (2.0 * y / width - 1.0)
     places = np.column_stack([x, y]).tolist()
     cards = (NodeValues(n, 0, tuple(place)) for n, place in enumerate(places, start=1))
     coordinates = model.Coordinates(tuple(cards)) if slant else None
-    return decks.deck(grid, (held, decks.forces(loads), plate, *others), NEWTON, coordinates)
+    segments = (supports, decks.forces(loads), plate, *further)
+    return decks.deck(grid, segments, NEWTON, coordinates)
 
 
 @case
 def _cylindrical_bending() -> Sequence[Value]:
     pinned, clamped, sliding = "11101", "11111", "01101"
-    strong = 0.1
-    bent, linear = strip(sliding, strong), strip(sliding, strong, [decks.MITC])
+    pressure = 0.1
+    bent, linear = strip(sliding, pressure), strip(sliding, pressure, [decks.MITC])
     return [
         middle_deflection(strip(pinned, 0.01)),
         middle_deflection(strip(pinned, -0.01)),
@@ -92,27 +90,25 @@ def _cylindrical_bending() -> Sequence[Value]:
 
 
 def disc(rim: str, pressure: float) -> Deck:
-    """Build a quarter of a circular plate under pressure; its elements are a mapped square."""
+    """Build a quarter of a circular plate under pressure; its mesh is a mapped square."""
     radius = 100.0
     grid = ElementGrid(uniform_section(1.0, ELEMENTS), uniform_section(1.0, ELEMENTS))
-    x, y = (
-        coordinates.ravel()
-        for coordinates in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows))
-    )
+    x, y = (v.ravel() for v in np.meshgrid(grid_lines(grid.columns), grid_lines(grid.rows)))
     places = radius * np.stack([x * np.sqrt(1.0 - y**2 / 2.0), y * np.sqrt(1.0 - x**2 / 2.0)], 1)
     cards = (NodeValues(n, 0, tuple(place)) for n, place in enumerate(places.tolist(), start=1))
-    held = decks.restraints(grid, f"{QUARTER} {rim}")
+    supports = decks.restraints(grid, f"{QUARTER} {rim}")
     plate = decks.material(ALUMINIUM, [0.0], THICKNESS)
-    deck = decks.deck(grid, (held, plate, *STRETCHES), NEWTON, model.Coordinates(tuple(cards)))
+    segments = (supports, plate, *STRETCHES)
+    deck = decks.deck(grid, segments, NEWTON, model.Coordinates(tuple(cards)))
     loads = pressure * areas(deck)
-    loads[(x == 1.0) | (y == 1.0)] = 0.0  # a value there would be a displacement
+    loads[(x == 1.0) | (y == 1.0)] = 0.0  # on a restrained dof, FORC is a displacement
     field = np.zeros((grid.nodes, 5))
     field[:, 2] = loads
     return replace(deck, segments=(*deck.segments, decks.forces(field)))
 
 
 def areas(deck: Deck) -> Floats:
-    """Return the integrals of the nodes' shape functions, (numnp,)."""
+    """Return the integrals of the shape functions of the nodes, (numnp,)."""
     plate = build_plate(deck, generate(deck))
     integrals = np.zeros(len(plate.mesh.coordinates))
     for family in plate.families:
@@ -129,7 +125,7 @@ def _stretching_disc() -> Sequence[Value]:
 
 @case
 def _stretching_impact() -> Sequence[Value]:
-    """Compute a mass on the middle of a clamped square plate, until both peaks are over."""
+    """Compute an impact on the middle of a clamped square plate, until both peaks have passed."""
     side, end = 100.0, 1.7e-3
     sections = graded(side, 8, side / 2.0, 2.0)
     grid = ElementGrid(sections, sections)
@@ -152,7 +148,10 @@ def _stretching_impact() -> Sequence[Value]:
 
 @case
 def _reduced_plate() -> Sequence[Value]:
-    """Compute the first mode of a simply supported square plate with w = h in the middle."""
+    """Compute the reduced model of a simply supported square plate with w = h in the middle.
+
+    The value is the internal force of the first mode over its linear part.
+    """
     codes = f"{QUARTER} 10101 01110"
     plate = decks.material(ALUMINIUM, [0.0], THICKNESS)
     side = 200.0 * THICKNESS

@@ -36,7 +36,10 @@ from fecm.verification.case import Value, case
 
 @case
 def _random_values() -> Sequence[Value]:
-    """Compute Ishigami's function, a lognormal value, and the share of 3 hits in 40 draws."""
+    """Compute the indices of Ishigami's function, statistics, and Wilson's interval.
+
+    The statistics describe a lognormal value. The interval is for 3 hits in 40 draws.
+    """
     law, samples = ValueDistribution("uniform", (-np.pi, np.pi)), 1024
     design = Design(dict.fromkeys("xyz", law), samples, 0, "sobol", sensitivity=True)
     x, y, z = matrix(design).T
@@ -67,7 +70,10 @@ def _refinement() -> Sequence[Value]:
 
 @case
 def _identification() -> Sequence[Value]:
-    """Compute the force of Hertz's impact on a fixed target, fitted from other values."""
+    """Fit k and the velocity to the force of Hertz's impact on a fixed target.
+
+    The fit starts at other values.
+    """
     k, mass, velocity = 1.0e6, 2.0e-4, 100.0
     deepest = (5.0 * mass * velocity**2 / (4.0 * k)) ** 0.4
     # t = a/v times the integral of dx/sqrt(1 - x^2.5), an incomplete beta function of x^2.5.
@@ -89,8 +95,8 @@ def _contact_coefficient() -> Sequence[Value]:
     return [unit_modulus, modulus, hertz_coefficient(0.008, 207e9, 0.3, modulus)]
 
 
-STRUCK = (112.5, 81.0)  # place of the impact (mm)
-POINTS = 150  # of the strains: 0.3 ms
+STRUCK = (112.5, 81.0)  # impact point (mm)
+POINTS = 150  # times of the strains: 0.3 ms
 
 
 @case
@@ -109,13 +115,13 @@ def _location() -> Sequence[Value]:
 def _reciprocity() -> Sequence[Value]:
     problem = checked_problem(decks.panel_with_gages(9, 6))
     mesh = problem.mesh
-    read = gages(mesh, problem.deck.require(Gages).records)
+    sensors = gages(mesh, problem.deck.require(Gages).records)
     weights = patch_weights(mesh, "DISC", 4.0, *STRUCK)
     motion = PlateMotion(moving_plate(problem.plate))
     sampling = Sampling(dt=4e-7, every=5, count=60, width=3)
 
-    every = np.arange(len(weights))
-    computed = responses(motion, rows_of(read, len(every)), every, sampling, dtype=np.float64)
+    nodes = np.arange(len(weights))
+    computed = responses(motion, rows_of(sensors, len(nodes)), nodes, sampling, dtype=np.float64)
     by_gages = np.einsum("n,gns->sg", weights, computed)
 
     shares = np.zeros((len(weights), NDOF))
@@ -128,6 +134,6 @@ def _reciprocity() -> Sequence[Value]:
         motion.advance(state, sampling.dt, 0.0, applied)
         sample, rest = divmod(step + 1, sampling.every)
         if not rest:
-            dofs = motion.field(state, 0.0).ravel()[read.dof_indices]
-            direct[sample] = read.strains((read.weights * dofs).sum(axis=1))
+            dofs = motion.field(state, 0.0).ravel()[sensors.dof_indices]
+            direct[sample] = sensors.strains((sensors.weights * dofs).sum(axis=1))
     return [(by_gages - direct) / np.abs(direct).max()]
