@@ -492,7 +492,7 @@ CODES = ("E453", "E454", "W462", "W463", "W464", "W465", "W496")
 @pytest.mark.parametrize(
     ("card", "code", "message"),
     [
-        (Cure(-100.0), "E453", "CURE has no card for material 1, that of MATE."),
+        (Cure(-100.0), "E453", "CURE has no card for material 1, MATE's."),
         (Cure(-9.0, expansions=(Expansion(),)), "E453", "by -9, but alpha1 and alpha2 are 0."),
         (Cure(0.0, 1.0, (ALPHA,)), "E453", "moisture by 1, but beta1 and beta2 are 0."),
         (
