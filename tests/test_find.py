@@ -103,7 +103,7 @@ def test_a_search_that_makes_no_sense_is_refused(tmp_path: Path) -> None:
     for options, words in (
         ((*FIND, "peak_force=threshold"), "the threshold needs a DELA segment"),
         ((*FIND, "peak_force=-3"), "a positive number, not -3"),
-        ((*FIND, "peak_force=3", "--vary", "velocity=1,2"), "velocity is what is searched"),
+        ((*FIND, "peak_force=3", "--vary", "velocity=1,2"), "velocity is searched"),
         ((*FIND, "force=3"), "write peak_force=NUMBER or peak_force=threshold"),
         (("--find", "velocity", "--vary", "k=1e6"), "belong together"),
         ((*FIND, "peak_force=3", "--full", "0"), "--vary velocity=FOUND"),

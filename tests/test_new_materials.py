@@ -169,7 +169,7 @@ def test_k_of_a_sandwich_is_doubted() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (("--layup", "[0X]", *HYBRID[2:]), "has the material 'X'; the materials given are C, G"),
+        (("--layup", "[0X]", *HYBRID[2:]), "has the material 'X'; the given materials are C, G"),
         (("--layup", "[0]", *HYBRID[2:]), "a ply without a material"),
         ((*HYBRID, "--material", "C=T300/914"), "C is given twice"),
         ((*HYBRID, "--zone", "1,1,1,2:[0C]"), "--zone 1,1,1,2 is empty"),
@@ -312,7 +312,7 @@ def test_a_sweep_over_the_cure_of_several_materials_is_that_of_single_runs() -> 
 def test_a_sandwich_has_no_delamination_threshold() -> None:
     options = (*SANDWICH, "--units", "mm-N-s", "--damage")
     made = new(*LAW, *options)
-    assert "no delamination threshold (DELA): it is that of a solid laminate" in made.stderr
+    assert "no delamination threshold (DELA): it holds for a solid laminate" in made.stderr
     deck = deck_of(*options)
     assert deck.last(Delamination) is None
     with_threshold = replace(deck, segments=(Delamination(0.3), *deck.segments), text="")

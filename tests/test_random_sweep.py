@@ -426,7 +426,7 @@ def test_the_cost_is_told_beforehand(folder: Path) -> None:
     assert "16 draws need 16 plates, because e1 is random" in done.stderr
     done = sweep(folder, "--random", "k=uniform:1e6,2e6", "--samples", 17, "--design", "sobol")
     assert "17 draws share 1 plate" in done.stderr
-    assert "17 samples are no power of 2" in done.stderr
+    assert "17 samples are not a power of 2" in done.stderr
     assert "take 16" in done.stderr
     done = sweep(folder, "--random", "velocity=lognormal:50,2", "--samples", 16, "--design", "mc")
     assert "of the logarithm; a standard deviation of 2 is SIGMA 0.04\n" in done.stderr

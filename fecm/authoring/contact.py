@@ -227,7 +227,7 @@ def indentation_law(
         case NamedContact():
             if plies.system is None:
                 raise ObjectError(
-                    "a named `contact` with constants of a `ply` needs `units`, theirs"
+                    "a named `contact` with constants of a `ply` needs the `units` of the constants"
                 )
             return contact.converted(plies.system), ""
         case None:

@@ -398,7 +398,7 @@ def author(request: Request) -> Authored:
     if is_sandwich(plies, struck) and any(isinstance(s, model.Delamination) for s in damage):
         damage = [s for s in damage if not isinstance(s, model.Delamination)]
         notes.append(
-            "the deck has no delamination threshold (DELA): it is that of a solid laminate, and "
+            "the deck has no delamination threshold (DELA): it holds for a solid laminate, and "
             "the faces of a sandwich delaminate or leave the core far below it"
         )
     if request.numerics.failure and not any(isinstance(s, model.Allowables) for s in damage):

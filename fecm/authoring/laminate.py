@@ -232,7 +232,7 @@ class Laminate:
             return name
         names = ", ".join(filter(None, materials)) or "only plies without a name"
         what = f"the material {name!r}" if name else "a ply without a material"
-        raise ObjectError(f"`layup` has {what}; the materials given are {names}")
+        raise ObjectError(f"`layup` has {what}; the given materials are {names}")
 
     def thickness_of(self, ply: LaminatePly) -> float | None:
         """Return the thickness of a ply; None if the laminate does not give it."""
@@ -350,7 +350,7 @@ def deck_plies(
     named = {name: item for name, item in plies_by_name.items() if isinstance(item, NamedPly)}
     system = units or next((item.system for item in named.values()), None)
     if named and len(named) < len(plies_by_name) and units is None:
-        raise ObjectError("constants of a `ply` beside a named one need `units`, theirs")
+        raise ObjectError("constants of a `ply` beside a named ply need their `units`")
     numbers = {name: number for number, name in enumerate(names, start=MATERIAL)}
     materials = [
         Bound(item.converted(system or item.system), item)

@@ -98,7 +98,7 @@ def in_units(name: str, value: object, dimension: str, system: str | None) -> fl
         return float(match[1])
     size = in_si(dimension, units_of(system)) if system else None
     if size is None:
-        raise ObjectError(f"`{name}` is {value!r}: give `units`, the deck's")
+        raise ObjectError(f"`{name}` is {value!r}: give the deck's `units`")
     return float(f"{float(match[1]) * factor / size:.9g}")
 
 

@@ -319,9 +319,9 @@ def _notes(
     elif is_runs_few(solution):
         far = -sign_runs(fit.residual)
         yield (
-            f"the residual changes its sign too seldom for independent errors ({far:.1f} standard "
+            f"the residual changes its sign too rarely for independent errors ({far:.1f} standard "
             "deviations of a runs test): the model does not describe the measurement down to its "
-            "noise; is a filter of the measurement not named by --filter?"
+            "noise; does the measurement have a filter that --filter does not name?"
         )
     fitted = model.outcome([strike_of(fit.deck)], judged=True)
     if not fitted.fine[0]:

@@ -427,7 +427,7 @@ def _remarks(location: Location, wide: bool) -> Iterator[str]:
         )
     if location.contact_end is None:
         until = f"{location.determined_until:.4g} {clock}".rstrip()
-        yield f"the force has not ended at {until}: the impulse is at least that until then"
+        yield f"the force has not ended at {until}: the impulse is a lower bound"
 
 
 def residual_correlation(location: Location) -> float:

@@ -99,7 +99,7 @@ def judgements(result: Result, problem: Problem | None) -> Iterator[Judgement]:
         yield Judgement(TrustLevel.DOUBTFUL, "deck", UNKNOWN, words)
     if result.notes and not result.validity:  # without impact, or of an older version
         count = len(result.notes)
-        words = "what the run itself says of its range; see the notes"
+        words = "the run doubts its range; see the notes"
         yield Judgement(
             TrustLevel.OUTSIDE, "notes of the run", ShownNumber(count, str(count)), words
         )

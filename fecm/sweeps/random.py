@@ -184,7 +184,7 @@ def doubt(design: Design) -> str:
     """Return a doubt about a design, or an empty text."""
     texts = [f"{name}: {text}" for name, law in design.laws.items() if (text := law.doubt())]
     if design.kind == "sobol" and design.samples & (design.samples - 1):
-        why = "no power of 2, which a Sobol' design needs to be balanced"
+        why = "not a power of 2, which a balanced Sobol' design needs"
         nearest = 2 ** round(math.log2(design.samples))
         texts.append(f"{design.samples} samples are {why}; take {nearest}")
     return "; ".join(texts)

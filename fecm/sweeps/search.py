@@ -43,7 +43,7 @@ class Search(NamedTuple):
     def check(self, deck: Deck, names: Collection[str]) -> None:
         """Raise CasesError if the search is not possible in cases of a deck with these names."""
         if not {"velocity", "energy"}.isdisjoint(names):
-            raise CasesError("velocity is what is searched; it can't be varied as well")
+            raise CasesError("velocity is searched; it can't be varied as well")
         if not deck.require(Impact).velocity:
             raise CasesError("the search starts at the velocity of ROD, which must not be 0")
         if self.level == THRESHOLD:

@@ -168,7 +168,7 @@ def remarks(result: StoredSweep) -> Iterator[str]:
         )
     if wide := _decided_by_mesh(result):
         yield (
-            f"the mesh decides the energy found in {wide} of {len(result)} cases: finer meshes may "
+            f"the mesh decides the energy in {wide} of {len(result)} cases: finer meshes may "
             f"find less than {WIDE:g} of it; the elements at the load are larger than "
             f"{RESOLVED:g} (c + h/2); refine them (fecm new --grading)"
         )
