@@ -29,7 +29,7 @@ SOFTEST, HARDEST = 1e9, 2e12
 SOLID = (5e10, 1e12)
 STEEL_IN_SI = 2e11
 ELASTIC_POWER = 1.5  # power of unloading of an elastic law, the same as of loading
-SOFT_TIP = 0.3  # largest modulus of a soft tip over E2; the contact of a soft tip is wide
+SOFT_TIP = 0.3  # modulus of a tip over E2; a tip below this ratio is soft, and its contact wide
 # Shapes of the contact patch.
 PATCHES = {"disc": DISC, "hertz": HERTZ}
 

@@ -350,7 +350,7 @@ def impact(
 
 
 def author(request: Request) -> Authored:
-    """Build the deck of a request without checking it."""
+    """Build the deck of a request, but do not check it."""
     request.check()
     units = system_asked(request.units)
     notes: list[str] = []

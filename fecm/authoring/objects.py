@@ -104,7 +104,7 @@ def with_laminate(deck: model.Deck, laminate: Laminate) -> model.Deck:
 
 
 def _with_properties(deck: model.Deck, plies: DeckPlies) -> model.Deck:
-    """Replace strengths, toughness and expansions, where the deck has them, by those of plies."""
+    """Replace the strengths, toughness and expansions of a deck by the values of new plies."""
     segments: list[model.Segment] = []
     try:
         for segment in deck.segments:

@@ -225,7 +225,7 @@ def _detect_format(text: str) -> str:
 
 
 def _warn_if_soft(ply: NamedPly) -> None:
-    """Warn if E1 is so small that it may be in GPa instead of the unit of the system."""
+    """Warn about an implausibly small E1, which may be in GPa instead of the unit of the system."""
     units = units_of(ply.system)
     modulus_unit, density_unit = in_si(MODULUS, units), in_si(DENSITY, units)
     if modulus_unit is None or density_unit is None:
@@ -290,7 +290,7 @@ MATERIALS = read_plies(_read_resource("materials.toml"))
 
 
 def named_ply(ply: Ply, system: str | None) -> NamedPly | None:
-    """Return the named ply with these constants in a system of units; None if there is no such."""
+    """Return the named ply with these constants in a system of units; None without a match."""
     return None if system is None else _by_constants(system).get(ply)
 
 
