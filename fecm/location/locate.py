@@ -22,7 +22,7 @@ from fecm.location.verdict import BETTER, Cause, is_doubtful, judged, likely_cau
 from fecm.problem.problem import Problem
 from fecm.sweeps.job import checked_problem
 
-CERTAIN = 2.0  # fall of the misfit by which no other cause is tried
+CERTAIN = 2.0  # fall of the misfit above which no other cause is tried
 
 
 def locate(
@@ -38,12 +38,12 @@ def locate(
     mass: float | None = None,
     mesh_error: bool = True,
 ) -> Location:
-    """Locate an impact, and find its force history, from the strains of gages.
+    """Locate an impact and find its force history from the strains of gages.
 
-    The plate is linear: the strain of a gage is the sum of its responses to the force. One run of
-    the plate per gage gives these for a force anywhere (reciprocity). The force is a sum of hats
-    and nowhere negative. Least squares give its history at every candidate place, and a
-    Gauss-Newton iteration from the best candidates gives the place.
+    The plate is linear: the strain of a gage is the sum of its responses to the force. By
+    reciprocity, one run of the plate per gage gives the responses to a force anywhere. The force is
+    a sum of hats and nowhere negative. Least squares give its history at every candidate place, and
+    a Gauss-Newton iteration from the best candidates gives the place.
 
     The plate is at rest before time 0 of the table, or before its first time if that is negative.
     The notes of the result are :class:`FecmWarning`.
@@ -52,43 +52,44 @@ def locate(
     ----------
     deck : str, Path or Deck
         Deck with a single problem: plate, supports, GAGE, and PATC, the circle on which the force
-        acts; without it the force acts on a point.  What it says of projectile, contact and
-        program is not used, except the time step.
+        acts. Without PATC the force acts on a point. Of projectile, contact and program, only the
+        time step is used.
     strains : str, Path, tuple, mapping or DataFrame
-        Measured strains: a CSV file with the column time and columns of gages, which are matched by
-        their numbers (``gage 1``) or else taken in the order of the deck; times and strains
-        (points, gages); or columns by name.  Times are in the deck's unit.
+        Measured strains: a CSV file with a column time and a column per gage; times and strains
+        (points, gages); or columns by name. Columns are matched by the numbers of the gages
+        (``gage 1``), or taken in the order of the deck if they have none. Times are in the deck's
+        unit.
     region : sequence of float, optional
         Rectangle that contains the place: x0, y0, x1, y1; the plate by default.
     grid : float, optional
-        Distance of the candidate places; by default the region has about 126.
+        Distance between candidate places; by default the region has about 126 of them.
     basis : float, optional
-        Time between the peaks of two hats of the force.  By default about 1/40 of the record in the
-        search; place and force are then fitted with hats half as wide if there are strains enough,
-        and with narrower ones that describe the strains significantly better.
+        Time between the peaks of two hats of the force; by default about 1/40 of the record in the
+        search. Place and force are then fitted with hats half as wide if there are enough strains,
+        and with narrower hats as long as they describe the strains significantly better.
     noise : float, optional
-        Standard deviation of the strains' errors; by default taken from the residual.
+        Standard deviation of the errors of the strains; by default taken from the residual.
     shift : bool
-        Fit the time at which the force may begin, for a record that begins after the impact.
+        Fit the time at which the force may begin; for a record that begins after the impact.
     gains : bool
-        Fit the gains of three gages or more, over their geometric mean.
+        Fit the gains of three or more gages, relative to their geometric mean.
     mass : float, optional
         Mass of the projectile, for :attr:`Location.energy_bound`.
     mesh_error : bool
-        Add the error of the mesh to the standard deviations, by a run of a mesh of elements half as
-        long; it takes longer than all the rest.
+        Add the error of the mesh to the standard deviations. It takes a run on a mesh of elements
+        half as long, which is longer than the rest of the work.
 
     Returns
     -------
     Location
-        Place, force, their errors, and the strains that were fitted.
+        Place, force, their errors, and measured and fitted strains.
 
     Raises
     ------
     LocateError
         If the gages can't tell two places apart, or no force explains the strains.
     StudyError
-        If the table or an option is invalid, or the deck has NONL, or too few gages.
+        If the table or an option is invalid, or the deck has NONL or too few gages.
     DeckError
         If the deck has errors.
     CasesError
@@ -96,8 +97,8 @@ def locate(
 
     Examples
     --------
-    >>> found = fecm.locate("panel.inp", "strains.csv", noise=4e-6)  # doctest: +SKIP
-    >>> found.x, found.y, found.peak_force  # doctest: +SKIP
+    >>> location = fecm.locate("panel.inp", "strains.csv", noise=4e-6)  # doctest: +SKIP
+    >>> location.x, location.y, location.peak_force  # doctest: +SKIP
     (112.5, 81.0, 160.5)
     """
     box = None if region is None else tuple(map(float, region))
@@ -135,19 +136,19 @@ def located(problem: Problem, strains: StrainSource, options: LocationSettings) 
     else:
         wide = is_wide(fit, minima.best, options.noise)
     location = _location(problem, table, options, (fit, times), minima)
-    cause = _cause(problem, table, options, searched) if is_doubtful(location) else None
+    cause = _find_cause(problem, table, options, searched) if is_doubtful(location) else None
     return judged(location, region, wide, cause)
 
 
 class Searched(NamedTuple):
-    """Fit and best trial of the search, before hats are narrowed."""
+    """Fit and best trial of the search, before the hats are narrowed."""
 
     fit: LocationFit
     best: PlaceTrial
     region: Region
 
 
-def _cause(
+def _find_cause(
     problem: Problem, table: StrainTable, options: LocationSettings, searched: Searched
 ) -> Cause | None:
     """Return the likely cause of strains that the model does not describe."""
@@ -156,11 +157,11 @@ def _cause(
     if options.shift or (cause is not None and cause.ratio > CERTAIN):
         return cause
     try:
-        late, *_ = prepared(problem, table, options._replace(shift=True))
-        shifted = best_fits(late, region, options.grid).best
-    except FecmError:  # the record is too short for it
+        late_fit, *_ = prepared(problem, table, options._replace(shift=True))
+        shifted = best_fits(late_fit, region, options.grid).best
+    except FecmError:  # the record is too short for a shift
         return cause
-    ratio = fit.deviation(best) / max(late.deviation(shifted), np.finfo(float).tiny)
+    ratio = fit.deviation(best) / max(late_fit.deviation(shifted), np.finfo(float).tiny)
     if ratio < max(BETTER, 0.0 if cause is None else cause.ratio) or shifted.shift >= 0.0:
         return cause
     clock = unit_names(problem.deck).get("time", "")
@@ -175,15 +176,17 @@ def _location(
     fitted: tuple[LocationFit, Timing],
     minima: SearchResult,
 ) -> Location:
-    """Return the location with errors, verdict and notes of a fit."""
+    """Return the location that a fit gives, with errors and without notes."""
     (fit, times), best = fitted, minima.best
     rms = fit.deviation(best)
     noise = options.noise or rms
     if noise == 0.0:
         noise = float(np.finfo(np.float32).eps) * float(np.abs(table.strains).max())
     misfit = rms / noise if options.noise is not None else 1.0
-    finer = _finer_mesh(problem, table, (fit, times), best) if options.mesh_error else None
-    errors = fit.errors(best, noise * max(1.0, misfit), finer)
+    mesh_change = (
+        _find_mesh_error(problem, table, (fit, times), best) if options.mesh_error else None
+    )
+    errors = fit.errors(best, noise * max(1.0, misfit), mesh_change)
     knots = times.origin + fit.model.knots(best.shift)
     force = judged_force(knots, best.force, errors, fit.model.basis)
     cards = {card.number: card for card in problem.deck.require(Gages).records}
@@ -206,7 +209,7 @@ def _location(
         contact_end=force.end,
         impulse=force.impulse,
         sd_impulse=force.impulse_sd,
-        mesh_error=None if finer is None else float(np.hypot(*errors.place_change)),
+        mesh_error=None if mesh_change is None else float(np.hypot(*errors.place_change)),
         mass=options.mass,
         candidates=minima.candidates,
         candidate_misfit=minima.misfit,
@@ -229,10 +232,10 @@ def _location(
     )
 
 
-def _finer_mesh(
+def _find_mesh_error(
     problem: Problem, table: StrainTable, fitted: tuple[LocationFit, Timing], best: PlaceTrial
 ) -> Floats | None:
-    """Return the error of the strains due to the mesh, (gages, rows); None if not known."""
+    """Return the error of the strains due to the mesh, (gages, rows); None if it is unknown."""
     fit, times = fitted
     history = (
         np.append(0.0, fit.model.knots(0.0)),

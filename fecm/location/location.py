@@ -35,7 +35,7 @@ class LocateError(FecmError):
     exit_code = 1
 
 
-# Paths of the datasets by the attribute of a location.
+# Paths of the datasets, by attribute of a location.
 PATHS = {
     "place": "locate/place",
     "covariance": "locate/covariance",
@@ -53,7 +53,7 @@ PATHS = {
     "strains": "locate/strains/measured",
     "fitted": "locate/strains/fitted",
 }
-BY_TIME = ("strains", "fitted")  # arrays with the gages first
+BY_TIME = ("strains", "fitted")  # arrays that are transposed in the file, to (points, gages)
 # Physical dimensions of the attributes; pure numbers have no entry.
 DIMENSIONS = {
     **{name: schema.LOCATION_DATASETS[path].dimension for name, path in PATHS.items()},
@@ -65,12 +65,12 @@ DIMENSIONS = {
     "energy_bound": "force*length",
     "mass": "force*time^2/length",
 }
-POINTS = 181  # of an ellipse
-DIGITS = 5  # of a location
-BIASED = 0.1  # bias of a peak over its standard deviation, from which on it is shown
-# Numbers that are attributes of the group of the force, or of the place.
+POINTS = 181  # points of an ellipse
+DIGITS = 5  # significant digits of a location
+BIASED = 0.1  # bias of a peak, over its standard deviation, above which it is shown
+# Attributes of the group of the force, those that may be missing, and of the group of the place.
+# The end of the contact is missing if the contact has not ended, errors in files of fecm 1.
 OF_FORCE = ("determined_until", "peak_force", "time_of_peak", "impulse")
-# Those that may be missing: of the contact if it has not ended, of the errors in files of fecm 1.
 OPTIONAL = ("contact_end", "sd_peak_force", "peak_bias", "sd_impulse")
 OF_PLACE = (
     *("x", "y", "sd_x", "sd_y", "correlation", "noise", "misfit", "shift", "sd_shift"),
@@ -79,7 +79,7 @@ OF_PLACE = (
 
 
 class Candidate(NamedTuple):
-    """Place with its misfit over the misfit of the located place."""
+    """Place with the ratio of its misfit to the misfit of the located place."""
 
     x: float
     y: float
@@ -90,9 +90,10 @@ class Candidate(NamedTuple):
 class Location:
     """Place and force history of an impact, located from strain gages.
 
-    Standard deviations are computed for independent errors of the strains with the standard
-    deviation `noise`, times `misfit` if that is above 1 (Cramér-Rao bound), and for the error of
-    the mesh, from the strains of elements half as long. Other errors of the model come in addition.
+    Standard deviations have two parts. The first is the Cramér-Rao bound for independent errors of
+    the strains with the standard deviation `noise`, times `misfit` if it is above 1. The second is
+    the error of the mesh, from the strains of elements half as long. Other errors of the model come
+    in addition.
 
     Attributes
     ----------
@@ -101,46 +102,46 @@ class Location:
     covariance : ndarray (2, 2)
         Covariance of x and y.
     time, force, force_sd : ndarray (hats,)
-        Times of the peaks of the force's hats, force then, and its standard deviation.  The force
-        is linear between these times and 0 one interval before the first.
+        Times of the peaks of the hats, and the force and its standard deviation at these times. The
+        force is linear between them, and 0 one interval before the first.
     determined : ndarray (hats,) of bool
-        Whether the strains determine the force then; `force` is 0 where they do not, as it has
-        hardly reached a gage at the end of the record.
+        Whether the strains determine the force. At the end of the record it has hardly reached a
+        gage; `force` is 0 where it is not determined.
     determined_until : float
-        Last time at which they do.
+        Last time at which the strains determine the force.
     peak_force, time_of_peak : float
-        Largest force among the determined ones, and its time.
+        Largest determined force, and its time.
     sd_peak_force, peak_bias : float or None
-        Standard deviation of the peak force, and how much the largest of values with noise is too
-        high on average; None in files of older versions.
+        Standard deviation of the peak force, and the mean excess of the largest noisy value over
+        the true peak; None in files of older versions.
     contact_end : float or None
-        Time after the peak until which the contact lasts at least: for a third of the time of the
-        contact, no impulse that follows is beyond three standard deviations.  None if the record
-        does not show it.
+        Time until which the contact lasts at least: for a third of the duration of the contact, the
+        impulse that follows stays within three standard deviations. None if the record does not
+        show it.
     impulse, sd_impulse : float
-        Time integral of the force until the end of the contact, or as far as it is determined, and
-        its standard deviation (None in files of older versions).
+        Time integral of the force until the end of the contact, or until the force is no longer
+        determined, and its standard deviation (None in files of older versions).
     mesh_error : float or None
-        How far the place moves with the strains of a mesh of elements half as long; None if it is
+        Distance by which the strains of elements half as long move the place; None if it is
         unknown.
     mass : float or None
-        Mass of the projectile, if given.
+        Mass of the projectile; None if it was not given.
     candidates : ndarray (k, 2)
-        Places that were tried first.
+        Places at which the search starts.
     candidate_misfit : ndarray (k,)
-        Their misfits over the least misfit.
+        Misfits of the candidates over the least misfit.
     second : Candidate or None
         The second-best place, away from the first; None if no other candidate is a minimum.
     noise : float
-        Standard deviation of a strain: the given one, or estimated from the residual.
+        Standard deviation of a strain, given or estimated from the residual.
     noise_given : bool
-        Whether it was given.
+        Whether `noise` was given.
     misfit : float
         Standard deviation of the residual over `noise`; 1 if `noise` is estimated from it.
     gages : ndarray (gages,)
         Numbers of the gages.
     gage_places : ndarray (gages, 2)
-        Their places.
+        Places of the gages.
     strain_time : ndarray (points,)
         Times of the measured strains.
     strains, fitted : ndarray (gages, points)
@@ -148,7 +149,8 @@ class Location:
     shift, sd_shift : float
         Time at which the force may begin, and its standard deviation if it was fitted.
     gains, sd_gains : ndarray (gages,)
-        Fitted gains of the gages over their geometric mean; 1 and 0 if they were not.
+        Fitted gains of the gages over their geometric mean, and their standard deviations; 1 and 0
+        if they were not fitted.
     notes : tuple of str
         Reasons to doubt the place or the force.
     accepted : bool
@@ -216,9 +218,10 @@ class Location:
 
     @property
     def energy_bound(self) -> float | None:
-        """Energy I^2/2m of a projectile of `mass` that the impulse I just stops; None without it.
+        """Energy I^2/2m of a projectile of `mass` that the impulse I just stops.
 
-        A projectile that rebounds had less energy, one that continues had more.
+        A projectile that rebounds had less energy; one that passes through had more. None if the
+        mass is unknown.
         """
         return None if self.mass is None else self.impulse**2 / (2.0 * self.mass)
 
@@ -240,7 +243,7 @@ class Location:
         return unit_of(DIMENSIONS.get(name, ""), self.units)
 
     def ellipse(self, level: float = 0.95) -> Floats:
-        """Return a closed polygon around the confidence region of the place, (points, 2).
+        """Return the confidence region of the place as a closed polygon, (points, 2).
 
         Parameters
         ----------
@@ -255,7 +258,7 @@ class Location:
         if not 0.0 < level < 1.0:
             raise OptionsError(f"level is {level:g}; it must be between 0 and 1")
         squares, axes = np.linalg.eigh(self.covariance)
-        # The square of the distance in standard deviations is exponential with the mean 2.
+        # The squared distance in standard deviations has an exponential distribution with mean 2.
         reach = np.sqrt(-2.0 * math.log1p(-level) * np.maximum(squares, 0.0))
         angles = np.linspace(0.0, 2.0 * np.pi, POINTS)
         circle = np.column_stack([np.cos(angles), np.sin(angles)])
@@ -288,7 +291,7 @@ class Location:
         return plot_results("location", {"the impact": self}, path, None, overwrite=overwrite)
 
     def save(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write a file as ``fecm locate -o`` does, which :func:`fecm.load_location` reads.
+        """Write a file like ``fecm locate -o``; :func:`fecm.load_location` reads it.
 
         Parameters
         ----------
@@ -309,11 +312,11 @@ class Location:
         path = Path(path)
         check_outputs([path], overwrite)
         attributes = {
-            "locate": self._of_place(),
-            "locate/force": self._present(*OF_FORCE, *OPTIONAL),
+            "locate": self._place_attributes(),
+            "locate/force": self._known_attributes(*OF_FORCE, *OPTIONAL),
         }
         with result_writing(path, schema.Form.LOCATION, overwrite=overwrite) as sink:
-            sink.attributes("", self._about())
+            sink.attributes("", self._file_attributes())
             sink.deck(self.deck.to_text())
             for group in schema.FILES[schema.Form.LOCATION].groups:
                 sink.attributes(group, attributes.get(group, {}))
@@ -322,7 +325,7 @@ class Location:
                 sink.store(place, values.T if name in BY_TIME else values)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values, as ``fecm locate --format json`` prints them."""
+        """Return plain values, as printed by ``fecm locate --format json``."""
         names = (
             *("x", "y", "sd_x", "sd_y", "correlation", "peak_force", "time_of_peak"),
             *("contact_end", "sd_peak_force", "peak_bias", "impulse", "sd_impulse", "mesh_error"),
@@ -357,24 +360,24 @@ class Location:
         rows = (*location_table(self).rows, *(("note", note) for note in self.notes))
         return html_table(Table(rows, title=repr(self)[1:-1]))
 
-    def _about(self) -> dict[str, Any]:
+    def _file_attributes(self) -> dict[str, Any]:
         """Return the attributes of the file."""
         units = {f"unit_{name}": unit for name, unit in self.units.items()}
         heading = schema.heading(schema.Form.LOCATION, self.deck.title)
         return {**heading, "notes": list(self.notes), **units}
 
-    def _of_place(self) -> dict[str, Any]:
-        """Return the attributes of the group of the place."""
+    def _place_attributes(self) -> dict[str, Any]:
+        """Return the attributes of the place's group."""
         second = {} if self.second is None else self.second._asdict()
         return {
-            **self._present(*OF_PLACE),
+            **self._known_attributes(*OF_PLACE),
             **{f"second_{name}": value for name, value in second.items()},
             "noise_given": self.noise_given,
             "accepted": self.accepted,
         }
 
-    def _present(self, *names: str) -> dict[str, Any]:
-        """Return the attributes of these names that are not None."""
+    def _known_attributes(self, *names: str) -> dict[str, Any]:
+        """Return the attributes with these names, except those that are None."""
         values = {name: getattr(self, name) for name in names}
         return {name: value for name, value in values.items() if value is not None}
 
@@ -401,8 +404,11 @@ def location_table(location: Location) -> Table:
         bias = quantity(location.peak_bias, location.unit("peak_bias"), 2)
         rows.append(("", f"the largest of noisy values, too high by about {bias}"))
     rows += [
-        ("impulse", f"{_with_error(location, 'impulse')} until {shown('time', _end(location))}"),
-        ("contact", f"until {shown('time', _end(location))} at least"),
+        (
+            "impulse",
+            f"{_with_error(location, 'impulse')} until {shown('time', _impulse_end(location))}",
+        ),
+        ("contact", f"until {shown('time', _impulse_end(location))} at least"),
     ]
     if location.energy_bound is not None:
         bound = shown("energy_bound", location.energy_bound)
@@ -417,8 +423,8 @@ def location_table(location: Location) -> Table:
     rows += [
         ("noise", f"strain {location.noise:.3g}, {noise}"),
         ("misfit", misfit),
-        ("second place", _rival(location)),
-        ("mesh", _mesh(location)),
+        ("second place", _second_place(location)),
+        ("mesh", _mesh_effect(location)),
         ("determined until", shown("time", location.determined_until)),
     ]
     if location.sd_shift:
@@ -432,8 +438,8 @@ def location_table(location: Location) -> Table:
     return Table(tuple(rows), title=location.deck.title or "(no title)")
 
 
-def _mesh(location: Location) -> str:
-    """Say how far a finer mesh moves the place."""
+def _mesh_effect(location: Location) -> str:
+    """Describe how far a finer mesh moves the place."""
     if location.mesh_error is None:
         return "its error is unknown"
     moved = quantity(location.mesh_error, location.unit("mesh_error"), 2)
@@ -441,18 +447,19 @@ def _mesh(location: Location) -> str:
 
 
 def _with_error(location: Location, name: str) -> str:
-    """Format a value with its standard deviation, if it is known."""
+    """Format a value with its standard deviation, if this is known."""
     error = getattr(location, f"sd_{name}")
     spread = "" if error is None else f" ± {error:.2g}"
     return f"{getattr(location, name):.5g}{spread} {location.unit(name)}".rstrip()
 
 
-def _end(location: Location) -> float:
-    """Return the end of the time over which the impulse is taken."""
+def _impulse_end(location: Location) -> float:
+    """Return the time until which the force is integrated."""
     return location.determined_until if location.contact_end is None else location.contact_end
 
 
-def _rival(location: Location) -> str:
+def _second_place(location: Location) -> str:
+    """Describe the second-best place."""
     if location.second is None:
         return "none: the misfit has one minimum"
     x, y, ratio = location.second
@@ -462,12 +469,12 @@ def _rival(location: Location) -> str:
 
 
 def load_location(path: str | Path | AnyFile) -> Location:
-    """Read a location that ``fecm locate -o`` or :meth:`Location.save` wrote.
+    """Read a location written by ``fecm locate -o`` or :meth:`Location.save`.
 
     Parameters
     ----------
     path : str, Path or file
-        HDF5 file, or one that is open as bytes.
+        HDF5 file, or a file that is open as bytes.
 
     Raises
     ------
@@ -484,7 +491,7 @@ def load_location(path: str | Path | AnyFile) -> Location:
 def location_of(contents: FileContents) -> Location:
     """Create a location from the contents of its file.
 
-    Raises ResultFileError if it is incomplete.
+    Raises ResultFileError if the contents are incomplete.
     """
     try:
         arrays = _arrays(contents)
@@ -512,9 +519,9 @@ def location_of(contents: FileContents) -> Location:
 
 
 def _arrays(contents: FileContents) -> dict[str, Any]:
-    """Return the arrays by attribute of a location.
+    """Return the arrays of a location, by attribute.
 
-    Raises KeyError or ValueError if an array is missing or wrong.
+    Raises KeyError if an array is missing, ValueError if it is wrong.
     """
     from fecm.results.hdf5_reader import first_misfit  # h5py takes 60 ms to import
 
@@ -532,12 +539,12 @@ def _arrays(contents: FileContents) -> dict[str, Any]:
 
 
 def _optional(attributes: Mapping[str, Any], names: Iterable[str]) -> dict[str, Any]:
-    """Return finite floats among attributes by name; missing ones are None."""
+    """Return the named attributes as finite floats; None where an attribute is missing."""
     return {name: _number(attributes, name) if name in attributes else None for name in names}
 
 
 def _number(attributes: Mapping[str, Any], name: str) -> Any:
-    """Return a finite float among attributes.
+    """Return an attribute as a float.
 
     Raises ValueError if it is not finite.
     """

@@ -1,10 +1,10 @@
-"""Strains of gages as functions of the place and the history of a force, and observations of them.
+"""Strains of gages under a force at a place, and their observation.
 
 The strain of a gage is b u, with the row b of its strain-displacement relation. The plate is linear
-and its mass diagonal, so that u after n steps is P_n(M^-1 K) M^-1 g for an impulse on the nodal
-shares g, with a polynomial P_n: a symmetric matrix. The strain after an impulse on g is therefore
-the sum of g times the displacement after an impulse on b. One run per gage gives the strains of an
-impulse anywhere.
+and its mass diagonal. An impulse on the nodal shares g therefore gives u = P_n(M^-1 K) M^-1 g after
+n steps, where P_n is a polynomial. The matrix P_n(M^-1 K) M^-1 is symmetric, so that b and g may be
+exchanged: the strain after an impulse on g is the sum of g times the displacement after an impulse
+on b. One run per gage gives the strains of an impulse anywhere.
 """
 
 from __future__ import annotations
@@ -32,28 +32,28 @@ from fecm.mechanics.projectile import RigidMass
 from fecm.mechanics.symmetry import restrain_resting_dofs
 from fecm.sweeps.responses import NO_FORCE
 
-BLOCK = 128  # rows that are reduced together: small enough for BLAS to use one thread
-ON_SAMPLE = 1e-3  # distance of a time from a sample, over their interval, that is rounding
-MANY = 1.5  # observations per sample from which on they are reduced
+BLOCK = 128  # rows reduced at a time: few enough that BLAS uses one thread
+ON_SAMPLE = 1e-3  # distance from a time to a sample, over the interval, that is rounding
+MANY = 1.5  # points per sample above which the points are reduced
 # Samples around a time in cubic interpolation.
 STENCIL = np.array([-1, 0, 1, 2])
 
 
 @dataclass(frozen=True)
 class Observation:
-    """Measured strains, and the values of the functions that they observe.
+    """Measured strains, and the map from samples of strains to the measured values.
 
-    Many points are replaced by as many rows as there are samples, by an orthogonal transformation.
-    The sum of the squares of a residual is the sum over the rows plus `left`.
+    If there are more points than samples, an orthogonal transformation reduces them to one row per
+    sample. The sum of the squares of a residual is then the sum over the rows plus `remainder`.
     """
 
     values: Floats  # (gages, rows)
-    left: Floats  # (gages,): squares that no function can describe
-    points: int  # measured times
-    step: float  # usual time between two of them
+    remainder: Floats  # (gages,): sums of squares that no samples can describe
+    points: int  # number of measured times
+    step: float  # usual time between two measured times
     interval: float  # between two samples
-    # Samples of the rows, (rows,), or a matrix of the values of the rows per sample, (rows,
-    # samples), sparse if it interpolates.
+    # Sample of each row, (rows,), or the matrix that maps samples to rows, (rows, samples). It is
+    # sparse if it interpolates.
     rows: Any
 
     @property
@@ -62,7 +62,7 @@ class Observation:
         return len(self.values) * self.points
 
     def of(self, samples: Floats) -> Floats:
-        """Return the rows of functions with samples, (..., samples): (..., rows)."""
+        """Return the rows, (..., rows), for samples, (..., samples)."""
         if self.rows.ndim == 1:
             return samples[..., self.rows]
         *outer, count = samples.shape
@@ -71,11 +71,11 @@ class Observation:
 
 
 def observe(time: Floats, strains: Floats, interval: float, count: int) -> Observation:
-    """Observe functions with `count` samples from time 0 on by strains, (gages, points)."""
+    """Return strains, (gages, points), as observations of `count` samples from time 0 on."""
     places, step = time / interval, float(np.median(np.diff(time)))
-    near = np.round(places)
-    if (np.abs(places - near) < ON_SAMPLE).all() and near[0] >= 0.0:
-        rows: Indices | Floats = near.astype(np.intp)
+    nearest = np.round(places)
+    if (np.abs(places - nearest) < ON_SAMPLE).all() and nearest[0] >= 0.0:
+        rows: Indices | Floats = nearest.astype(np.intp)
         return Observation(strains, np.zeros(len(strains)), len(time), step, interval, rows)
     matrix = interpolation(places, count)
     remainder = np.zeros(len(strains))
@@ -88,9 +88,9 @@ def observe(time: Floats, strains: Floats, interval: float, count: int) -> Obser
 
 
 def interpolation(places: Floats, count: int) -> Floats:
-    """Return the cubic interpolation between samples at places, (places, samples).
+    """Return the matrix of cubic interpolation between samples, (places, samples).
 
-    Places are counted in samples. The functions are 0 before their first sample.
+    A place is a time in units of the sampling interval. The samples before the first one are 0.
     """
     before = np.floor(places)
     part = places - before
@@ -111,7 +111,7 @@ def interpolation(places: Floats, count: int) -> Floats:
 
 
 def triangular(matrix: Floats) -> Floats:
-    """Return the triangular factor of a matrix with the same inner products of columns."""
+    """Return a triangular matrix whose columns have the same inner products as those given."""
     factor = np.zeros((0, matrix.shape[1]))
     step = max(BLOCK, matrix.shape[1])
     for start in range(0, len(matrix), step):
@@ -122,7 +122,7 @@ def triangular(matrix: Floats) -> Floats:
 
 @dataclass(frozen=True)
 class Footprint:
-    """Circle on which a contact force acts, or a point."""
+    """Circle or point on which a contact force acts."""
 
     mesh: MeshArrays
     shape: str  # ``"DISC"`` or ``"HERT"``; empty for a point
@@ -130,7 +130,7 @@ class Footprint:
     held: Bools  # (nodes,): whether w is restrained
 
     def weights(self, x: float, y: float) -> Floats:
-        """Return the shares of the nodes in a unit force at a place, (nodes,).
+        """Return the share of each node in a unit force at a place, (nodes,).
 
         Raises PatchError or OutsideError if the circle, or the point, is not on the plate.
         """
@@ -142,7 +142,7 @@ class Footprint:
 
 
 def point_weights(mesh: MeshArrays, x: float, y: float) -> Floats:
-    """Return the shape functions at a point, (nodes,): shares of the nodes in a unit force.
+    """Return the share of each node in a unit force at a point, (nodes,): the shape functions.
 
     Raises OutsideError if the point is not on the plate.
     """
@@ -161,8 +161,8 @@ def point_weights(mesh: MeshArrays, x: float, y: float) -> Floats:
 class StrainModel:
     """Strains of gages under a force at a place.
 
-    The force is a sum of hats. Their peaks are `width` samples apart, and the first peak comes this
-    time after the start of the force.
+    The force is a sum of hats. Their peaks are `width` samples apart, and the first peak comes
+    `width` samples after the force starts.
     """
 
     footprint: Footprint
@@ -172,7 +172,7 @@ class StrainModel:
     responses: NDArray[np.floating]
     unit: int
     width: int  # a multiple of `unit`
-    length: int  # samples at which the force may act
+    length: int  # number of samples at which the force may act
 
     @property
     def hats(self) -> int:
@@ -185,7 +185,7 @@ class StrainModel:
         return self.width * self.observation.interval
 
     def knots(self, shift: float) -> Floats:
-        """Return the times of the peaks of the hats, (hats,), of a force that starts at `shift`."""
+        """Return the times of the hats' peaks, (hats,), for a force that starts at `shift`."""
         return shift + self.basis * np.arange(1.0, self.hats + 1.0)
 
     @cached_property
@@ -198,7 +198,8 @@ class StrainModel:
     def first_hat(self, x: float, y: float) -> Floats:
         """Return the strains of the first hat of a force at a place, (gages, samples).
 
-        Raises PatchError or OutsideError as :meth:`Footprint.weights`, and outside the region.
+        Raises PatchError or OutsideError like :meth:`Footprint.weights`, and OutsideError if the
+        place is outside the region.
         """
         weights = self.footprint.weights(x, y)
         (loaded,) = np.nonzero(weights)
@@ -207,21 +208,24 @@ class StrainModel:
             raise OutsideError(f"({x:g}, {y:g}) is outside the region")
         near = self.responses[:, rows].astype(np.float64)
         narrow: Floats = np.einsum("n,gns->gs", weights[loaded], near)
-        return self._of_width(narrow)
+        return self._widen(narrow)
 
-    def _of_width(self, narrow: Floats) -> Floats:
-        """Return the strains of a hat of the force as a sum of hats of the responses."""
+    def _widen(self, narrow: Floats) -> Floats:
+        """Return the strains of a hat of the force, a sum of the narrow hats of the responses."""
         parts, count = self.width // self.unit, narrow.shape[1]
         wide = np.zeros_like(narrow)
         for part in range(1, 2 * parts):
-            late = (part - 1) * self.unit
-            if late < count:
+            delay = (part - 1) * self.unit
+            if delay < count:
                 share = 1.0 - abs(part - parts) / parts
-                wide[:, late:] += share * narrow[:, : count - late]
+                wide[:, delay:] += share * narrow[:, : count - delay]
         return wide
 
     def every_hat(self, x: float, y: float, shift: float) -> Floats:
-        """Return samples of the strains of every hat of a force that starts at `shift`."""
+        """Return the strains of every hat of a force that starts at `shift`.
+
+        The result is (gages, hats, samples).
+        """
         first = self.first_hat(x, y)
         gages, count = first.shape
         if shift:
@@ -229,21 +233,21 @@ class StrainModel:
             first = first @ interpolation(places, count).T
         every = np.zeros((gages, self.hats, count))
         for hat in range(self.hats):
-            late = hat * self.width
-            if late < count:
-                every[:, hat, late:] = first[:, : count - late]
+            delay = hat * self.width
+            if delay < count:
+                every[:, hat, delay:] = first[:, : count - delay]
         return every
 
     def design(self, x: float, y: float, shift: float = 0.0) -> Floats:
-        """Return the observed strains per coefficient of the force, (gages, rows, hats)."""
+        """Return the observed strains per unit force of each hat, (gages, rows, hats)."""
         return self.observation.of(self.every_hat(x, y, shift)).swapaxes(1, 2)
 
     def strains(self, x: float, y: float, shift: float, force: Floats) -> Floats:
-        """Return samples of the strains of a force, (gages, samples)."""
+        """Return the strains of a force at the samples, (gages, samples)."""
         return np.asarray(np.einsum("h,ghs->gs", force, self.every_hat(x, y, shift)))
 
 
-ROWS = 16  # sampled fields of all dofs that are in memory at the same time
+ROWS = 16  # sampled fields of all dofs that are in memory at a time
 
 
 @dataclass(frozen=True)
@@ -261,7 +265,7 @@ class Sampling:
         return self.every * self.dt
 
     def hat(self) -> Floats:
-        """Force at the start of every step until it is 0 again: it rises to 1 and falls."""
+        """Return the force at the start of every step; it rises to 1 and falls to 0."""
         rise = np.arange(self.width * self.every) / (self.width * self.every)
         return np.concatenate([rise, 1.0 - rise])
 
@@ -281,9 +285,9 @@ def rows_of(gages: GageArray, nodes: int) -> Floats:
 
 
 def deflections(motion: PlateMotion, row: Floats, sampling: Sampling) -> Iterator[Floats]:
-    """Yield the deflection of every node, (rows, nodes), at the samples after time 0, in parts.
+    """Yield parts of the deflections, (rows, nodes), at the samples after time 0.
 
-    The nodal forces are the row of a gage, (nodes, 5), times the force of the sampling.
+    The nodal forces are the row of a gage, (nodes, 5), times the hat of the sampling.
     """
     load = motion.load(row)
     system = ImpactSystem(motion, RigidMass(1.0), NO_FORCE, ImpactConditions(load, 0.0))
@@ -310,14 +314,14 @@ def responses(
     sampling: Sampling,
     dtype: DTypeLike = np.float32,
 ) -> NDArray[np.floating]:
-    """Return the strains of gages per force at some nodes, (gages, nodes, samples).
+    """Return the strains of gages under a force at each node, (gages, nodes, samples).
 
-    `rows` come from :func:`rows_of`. The force is the force of the sampling.
+    `rows` come from :func:`rows_of`. The force is the hat of the sampling.
     """
     strains = np.zeros((len(rows), len(nodes), sampling.count), dtype)
-    for row, into in zip(rows, strains, strict=True):
+    for row, of_gage in zip(rows, strains, strict=True):
         first = 1
         for fields in deflections(motion, row, sampling):
-            into[:, first : first + len(fields)] = fields[:, nodes].T
+            of_gage[:, first : first + len(fields)] = fields[:, nodes].T
             first += len(fields)
     return strains

@@ -1,4 +1,4 @@
-"""Preparation of a location: model of the strains, places that gages confuse, finer mesh."""
+"""Preparation of a location: model of the strains, symmetry of the gages, finer mesh."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ from fecm.problem.refine import refined_deck
 from fecm.sweeps.job import checked_problem
 from fecm.sweeps.responses import plate_response
 
-SAME = 1e-9  # relative difference of equal stiffnesses and rows
+SAME = 1e-9  # relative difference that is rounding, of stiffnesses and rows
 
 
 class Symmetry(NamedTuple):
@@ -57,7 +57,7 @@ class Symmetry(NamedTuple):
 
     @property
     def is_mirror(self) -> bool:
-        """Whether it reverses angles, unlike the half turn."""
+        """Whether the symmetry reverses angles; the half turn does not."""
         return self.flip[0] != self.flip[1]
 
     @property
@@ -75,45 +75,47 @@ SYMMETRIES = (
 
 
 def shared_symmetry(plate: PlateModel, rows: Floats) -> Symmetry | None:
-    """Return a symmetry of the plate that keeps every gage's reading, or None.
+    """Return a symmetry of plate, supports and laminates that keeps every gage's reading.
 
-    Plate, supports and laminates have the symmetry. `rows` are the strains of the gages per
-    displacement, (gages, nodes, 5).
+    `rows` are the strains of the gages per displacement, (gages, nodes, 5). Returns None if there
+    is no such symmetry.
     """
     for symmetry in SYMMETRIES:
         nodes = images(plate.mesh.coordinates, symmetry.flip)
-        if nodes is None or not _maps(plate, symmetry, nodes):
+        if nodes is None or not _is_symmetric(plate, symmetry, nodes):
             continue
-        turned = symmetry.signs * rows[:, nodes]
-        if np.abs(turned - rows).max() <= SAME * np.abs(rows).max():
+        images_of_rows = symmetry.signs * rows[:, nodes]
+        if np.abs(images_of_rows - rows).max() <= SAME * np.abs(rows).max():
             return symmetry
     return None
 
 
-def _maps(plate: PlateModel, symmetry: Symmetry, nodes: Indices) -> bool:
-    """Return whether a symmetry of the nodes maps elements, supports, laminates and loads too."""
+def _is_symmetric(plate: PlateModel, symmetry: Symmetry, nodes: Indices) -> bool:
+    """Return whether a symmetry of the nodes also maps elements, supports and laminates."""
     mesh = plate.mesh
     if ((mesh.codes != 0) != (mesh.codes[nodes] != 0)).any():
         return False
-    if symmetry.is_mirror and not _unturned(plate):
+    if symmetry.is_mirror and not _is_mirror_symmetric(plate):
         return False
     numbers = np.zeros(len(mesh.elements), int)
     if plate.laminate_numbers is not None:
         numbers = plate.laminate_numbers
-    return np.array_equal(_elements(mesh, numbers, None), _elements(mesh, numbers, nodes))
+    return np.array_equal(
+        _sorted_elements(mesh, numbers, None), _sorted_elements(mesh, numbers, nodes)
+    )
 
 
-def _elements(mesh: MeshArrays, numbers: Indices, nodes: Indices | None) -> Floats:
-    """Return sorted nodes and laminate of every element, in one order, optionally of its image."""
+def _sorted_elements(mesh: MeshArrays, numbers: Indices, nodes: Indices | None) -> Floats:
+    """Return a sorted table of the elements, or of their images: nodes and laminate of each."""
     elements = mesh.elements.astype(np.intp)
     if nodes is not None:
         elements = np.where(elements > 0, nodes[elements - 1] + 1, 0)
-    every = np.column_stack([np.sort(elements, axis=1), numbers])
-    return np.asarray(every[np.lexsort(every.T[::-1])])
+    table = np.column_stack([np.sort(elements, axis=1), numbers])
+    return np.asarray(table[np.lexsort(table.T[::-1])])
 
 
-def _unturned(plate: PlateModel) -> bool:
-    """Return whether reversed angles leave laminates, preload and curvature unchanged."""
+def _is_mirror_symmetric(plate: PlateModel) -> bool:
+    """Return whether laminates, preload and curvature stay the same if angles are reversed."""
     for laminate in plate.laminates:
         for matrix in (laminate.A, laminate.B, laminate.D):
             scale = SAME * np.abs(laminate.A if matrix is laminate.B else matrix).max()
@@ -128,13 +130,13 @@ def _unturned(plate: PlateModel) -> bool:
 
 FEWEST_STEPS, MOST_STEPS = 10.0, 1e5  # critical time steps in a record
 MOST_PERIODS = 50.0  # fundamental periods in a record
-LIKELY = math.log(30.0)  # of a record over the fundamental period
-HATS = 40  # of the force in the search, by default
+LIKELY = math.log(30.0)  # logarithm of a likely record over the fundamental period, at most
+HATS = 40  # hats of the force in the search, by default
 MOST_HATS = 400
-SAMPLES = 8  # fewest between the peaks of two hats
-UNIFORM = 1e-3  # deviation of times from equal intervals, over these, that is rounding
+SAMPLES = 8  # fewest samples between the peaks of two hats
+UNIFORM = 1e-3  # relative deviation from equal intervals that is rounding
 LATE = 0.5  # largest first time over the length of the record
-# Widths of the hats over the widths of the responses: hats are sums of narrower hats.
+# Width of the hats over the width of the responses' hats, in the search and with a given basis.
 SEARCHED, GIVEN = 4, 2
 
 
@@ -151,7 +153,7 @@ class LocationSettings(NamedTuple):
     mesh_error: bool = True
 
     def check(self) -> None:
-        """Refuse values that make no sense with a StudyError."""
+        """Raise StudyError if an option is not positive."""
         for name in ("grid", "basis", "noise", "mass"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < math.inf:
@@ -159,9 +161,9 @@ class LocationSettings(NamedTuple):
 
 
 class Timing(NamedTuple):
-    """Times of a fit; all but the first two are in samples."""
+    """Times of a fit, in samples except for the origin and the interval."""
 
-    origin: float  # time of the table from which on the force may act
+    origin: float  # time in the table from which on the force may act
     interval: float  # between two samples
     unit: int  # width of the hat of the responses
     width: int  # of the hats of the force
@@ -170,9 +172,9 @@ class Timing(NamedTuple):
 
 
 def timing(table: StrainTable, options: LocationSettings) -> Timing:
-    """Return samples and hats for a table.
+    """Return the samples and hats for a table.
 
-    Raises StudyError if the table is too coarse for them.
+    Raises StudyError if the table is too coarse or starts too late.
     """
     name, time = table.name, table.time
     origin = min(0.0, float(time[0]))
@@ -182,12 +184,12 @@ def timing(table: StrainTable, options: LocationSettings) -> Timing:
             f"{name} begins at time {time[0]:g} and ends at {time[-1]:g}: the plate is at rest "
             "before time 0; subtract the time from which on the force may act"
         )
-    each = float(np.median(np.diff(time)))
-    basis = options.basis or max(record / HATS, 2.0 * each)
-    if basis < each:
+    spacing = float(np.median(np.diff(time)))
+    basis = options.basis or max(record / HATS, 2.0 * spacing)
+    if basis < spacing:
         raise StudyError(
-            f"{name} has a point every {each:.3g}, too few for a force every {basis:.3g}; take a "
-            "larger basis"
+            f"{name} has a point every {spacing:.3g}, too few for a force every {basis:.3g}; take "
+            "a larger basis"
         )
     parts = GIVEN if options.basis else SEARCHED
     interval = _interval(time, basis)
@@ -206,7 +208,7 @@ def timing(table: StrainTable, options: LocationSettings) -> Timing:
 
 
 def _interval(time: Floats, basis: float) -> float:
-    """Return the time between two samples: equal times are samples if possible."""
+    """Return the time between two samples, which include equally spaced times if possible."""
     spacing = (float(time[-1]) - float(time[0])) / (len(time) - 1)
     equal = time[0] + spacing * np.arange(len(time))
     if np.abs(time - equal).max() > UNIFORM * spacing:
@@ -219,18 +221,20 @@ def _interval(time: Floats, basis: float) -> float:
 def prepared(
     problem: Problem, table: StrainTable, options: LocationSettings
 ) -> tuple[LocationFit, Region, Timing]:
-    """Return the model of the strains, and the region in which the place is searched."""
-    sampled = timing(table, options)
+    """Return the fit of the strains, the region of the search, and the times of the fit."""
+    times = timing(table, options)
     footprint = _footprint(problem)
     region = Region.of(problem.mesh, footprint.radius, options.region)
-    samples = sampled.interval, sampled.unit, sampled.samples
-    nodes, strains = _shared(problem.deck, tuple(table.gages.tolist()), samples, region)
-    seen = observe(table.time - sampled.origin, table.strains, sampled.interval, sampled.samples)
+    samples = times.interval, times.unit, times.samples
+    nodes, strains = _responses_in_region(
+        problem.deck, tuple(table.gages.tolist()), samples, region
+    )
+    observation = observe(table.time - times.origin, table.strains, times.interval, times.samples)
     model = StrainModel(
-        footprint, seen, nodes, strains, sampled.unit, sampled.width, sampled.length
+        footprint, observation, nodes, strains, times.unit, times.width, times.length
     )
     side = float(np.median(longest_sides(problem.mesh.elements, problem.mesh.coordinates)))
-    return LocationFit(model, side, options.shift, options.gains), region, sampled
+    return LocationFit(model, side, options.shift, options.gains), region, times
 
 
 def _footprint(problem: Problem) -> Footprint:
@@ -245,24 +249,24 @@ def _footprint(problem: Problem) -> Footprint:
 
 
 @lru_cache(maxsize=1)
-def _shared(
+def _responses_in_region(
     deck: Deck, numbers: tuple[int, ...], samples: tuple[float, int, int], region: Region
 ) -> tuple[Indices, NDArray[np.floating]]:
-    """Return nodes of a region and responses of gages there, cached for other tables."""
+    """Return the nodes of a region and the gages' responses there, cached for other tables."""
     interval, unit, count = samples
     problem = checked_problem(deck)
     mesh, plate = problem.mesh, moving_plate(problem.plate)
-    every = {card.number: card for card in deck.require(Gages).records}
-    cards = [every[number] for number in numbers]
+    all_cards = {card.number: card for card in deck.require(Gages).records}
+    cards = [all_cards[number] for number in numbers]
     read = gages(mesh, cards, curvature=plate.curvature)
     rows = rows_of(read, len(mesh.coordinates))
-    _refuse_mirrors(plate, rows, numbers, region)
+    _check_symmetry(plate, rows, numbers, region)
     critical = critical_time_step(plate)
-    _refuse_records(problem, interval * count, critical)
-    asked = [macro.value for macro in flat(problem.program) if macro.word == "DT"]
-    stable = [dt for dt in asked if 0.0 < dt < critical]
-    most = stable[0] if stable else taken_time_step(critical)
-    steps = math.ceil(interval / most * (1.0 - 1e-9))
+    _check_length_of_record(problem, interval * count, critical)
+    steps_of_deck = [macro.value for macro in flat(problem.program) if macro.word == "DT"]
+    stable = [dt for dt in steps_of_deck if 0.0 < dt < critical]
+    longest = stable[0] if stable else taken_time_step(critical)
+    steps = math.ceil(interval / longest * (1.0 - 1e-9))
     sampling = Sampling(interval / steps, steps, count, unit)
     nodes = region.nodes(mesh)
     stored = 4 * len(numbers) * len(nodes) * count
@@ -272,19 +276,19 @@ def _shared(
     return nodes, responses(motion, rows, nodes, sampling)
 
 
-def _refuse_records(problem: Problem, record: float, critical: float) -> None:
-    """Raise StudyError if a record is far too long or too short for the waves of the plate."""
+def _check_length_of_record(problem: Problem, record: float, critical: float) -> None:
+    """Raise StudyError if the record is far too long or too short for the waves of the plate."""
     steps, period = record / critical, _period(problem)
     if FEWEST_STEPS <= steps <= MOST_STEPS and record <= MOST_PERIODS * period:
         return
     units = unit_names(problem.deck)
     clock, sizes = plain_unit(units.get("time", "")), UNITS["time"]
-    what = f"{record:.3g} {clock}".rstrip()
-    usual = f"{period:.2g} {clock}".rstrip()
+    duration = f"{record:.3g} {clock}".rstrip()
+    expected = f"{period:.2g} {clock}".rstrip()
     times = record / period
     text = (
-        f"the record lasts {what}, {times:.2g} times the fundamental period of the plate (about "
-        f"{usual})"
+        f"the record lasts {duration}, {times:.2g} times the fundamental period of the plate "
+        f"(about {expected})"
     )
     other_units = [u for u in ("s", "ms", "us") if clock in sizes and sizes[u] != sizes[clock]]
     likely = [(abs(math.log(times * sizes[u] / sizes[clock])), u) for u in other_units]
@@ -305,7 +309,7 @@ def _refuse_records(problem: Problem, record: float, critical: float) -> None:
 def _period(problem: Problem) -> float:
     """Return the fundamental period of a simply supported plate with the sides of the mesh.
 
-    Navier's formula for an orthotropic plate without shear deformation.
+    It is Navier's formula for an orthotropic plate without shear deformation.
     """
     places = problem.mesh.coordinates[problem.mesh.used]
     a, b = np.ptp(places, axis=0).tolist()
@@ -315,7 +319,7 @@ def _period(problem: Problem) -> float:
     return float(2.0 / math.pi * math.sqrt(laminate.mass / stiffness))
 
 
-def _refuse_mirrors(
+def _check_symmetry(
     plate: PlateModel, rows: Floats, numbers: tuple[int, ...], region: Region
 ) -> None:
     """Raise LocateError if the gages can't distinguish a place from its image."""
@@ -324,18 +328,18 @@ def _refuse_mirrors(
     low, high = plate.mesh.coordinates.min(axis=0), plate.mesh.coordinates.max(axis=0)
     middle = 0.5 * (low + high)
     place = region.low + 0.25 * region.size
-    other = middle + (place - middle) * symmetry.flip
-    named = ", ".join(map(str, numbers))
+    image = middle + (place - middle) * symmetry.flip
+    gage_numbers = ", ".join(map(str, numbers))
     raise LocateError(
         f"mirror places can't be told apart: a {symmetry.name} maps plate, supports, laminate and "
-        f"the readings of all gages ({named}) onto themselves, so that an impact at "
-        f"({place[0]:.4g}, {place[1]:.4g}) and one at ({other[0]:.4g}, {other[1]:.4g}) give the "
+        f"the readings of all gages ({gage_numbers}) onto themselves, so that an impact at "
+        f"({place[0]:.4g}, {place[1]:.4g}) and one at ({image[0]:.4g}, {image[1]:.4g}) give the "
         "same strains; add a gage off its axis"
     )
 
 
-# Error of the deck's mesh over the difference of both meshes: errors fall with the square of the
-# elements' side.
+# Error of the deck's mesh over the difference of the two meshes. The error falls with the square of
+# the element side.
 EXTRAPOLATED = 4.0 / 3.0
 
 
@@ -347,11 +351,11 @@ def finer_strains(
     footprint: Footprint,
     times: Timing,
 ) -> Floats | None:
-    """Return samples of the strains on a mesh of elements half as long, (gages, samples).
+    """Return the strains on a mesh of elements half as long, (gages, samples).
 
-    The force acts at a place on the area of a footprint on the deck's mesh. Its history is times
-    from 0 on, and the forces then. Returns None if an element can't be bisected, or the finer plate
-    can't be run.
+    The force acts at a place, on the area of the footprint. `history` has times from 0 on, and the
+    forces at these times. Returns None if an element can't be bisected or the finer plate can't be
+    run.
     """
     try:
         deck = refined_deck(problem.deck, problem.mesh)

@@ -1,4 +1,4 @@
-"""Search for the place: candidates on a grid, and the minima from the best of them."""
+"""Search for the place: candidates on a grid, then refinement of the best candidates."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from fecm.location.fit import LocationFit, PlaceTrial, is_determined
 from fecm.location.location import Candidate, LocateError
 from fecm.mechanics.mesh import MeshArrays, longest_sides
 
-CANDIDATES = 126  # by default, about
+CANDIDATES = 126  # approximate number by default
 MOST_CANDIDATES = 10_000
-STARTS = 4  # least minima of the grid that are refined
-APART = 0.5  # least distance of two minima, over the distance of the candidates
-EDGE = 1e-6  # rounding of places on the edge of the region, over its side
-ONSET = 0.1  # share of the peak that a force passes at its beginning
-BEGINNINGS = 33  # times that are tried around it
-ENOUGH = 5  # strains per value of a force that determine it
-CHANCE = 3.0  # standard deviations of a fall of the misfit that may be chance
+STARTS = 4  # best minima of the grid, which are refined
+APART = 0.5  # smallest distance of two minima, over the distance of the candidates
+EDGE = 1e-6  # distance from the edge that is rounding, over the side of the region
+ONSET = 0.1  # share of the peak that a force passes when it starts
+BEGINNINGS = 33  # starts that are tried around this time
+ENOUGH = 5  # fewest strains per value of the force that determine it
+CHANCE = 3.0  # standard deviations of a fall of the misfit that chance explains
 NOISY = 10.0  # variances of a residual by which two fits differ by chance
-BEFORE = 0.25  # how much earlier a force may begin if the shift is fitted, over the record
+BEFORE = 0.25  # time, over the record, by which a force may start early if the shift is fitted
 
 
 class Region(NamedTuple):
@@ -34,13 +34,13 @@ class Region(NamedTuple):
 
     @classmethod
     def of(
-        cls, mesh: MeshArrays, radius: float, asked: tuple[float, float, float, float] | None
+        cls, mesh: MeshArrays, radius: float, corners: tuple[float, float, float, float] | None
     ) -> Self:
-        """Return the requested rectangle, or the largest with the circle on the plate."""
+        """Return the region between corners, or the largest; the circle stays on the plate."""
         places = mesh.coordinates[mesh.used]
         low, high = places.min(axis=0) + radius, places.max(axis=0) - radius
-        if asked is not None:
-            x0, y0, x1, y1 = asked
+        if corners is not None:
+            x0, y0, x1, y1 = corners
             if not (x0 < x1 and y0 < y1):
                 raise StudyError(
                     f"region {x0:g},{y0:g},{x1:g},{y1:g} has no area: x0 < x1, y0 < y1"
@@ -65,9 +65,9 @@ class Region(NamedTuple):
         """Sides."""
         return self.high - self.low
 
-    def grid(self, asked: float | None) -> tuple[Floats, Floats]:
-        """Return the coordinates of the columns and of the rows of candidates in the region."""
-        pitch = asked or math.sqrt(float(self.size.prod()) / CANDIDATES)
+    def grid(self, pitch: float | None) -> tuple[Floats, Floats]:
+        """Return x of the columns and y of the rows of candidates."""
+        pitch = pitch or math.sqrt(float(self.size.prod()) / CANDIDATES)
         counts = np.maximum(np.round(self.size / pitch), 1.0).astype(int)
         if counts.prod() > MOST_CANDIDATES:
             raise StudyError(
@@ -80,7 +80,7 @@ class Region(NamedTuple):
         return x, y
 
     def nodes(self, mesh: MeshArrays) -> Indices:
-        """Return the nodes of the elements that a force in the region may act on, sorted."""
+        """Return the nodes on which a force in the region may act, sorted."""
         margin = 1.5 * float(longest_sides(mesh.elements, mesh.coordinates).max())
         margin += max(0.0, float((self.low - mesh.coordinates[mesh.used].min(axis=0)).min()))
         low, high = self.low - margin, self.high + margin
@@ -94,7 +94,7 @@ class Region(NamedTuple):
 
 
 class SearchResult(NamedTuple):
-    """Best fit, another minimum, and the candidates, (k, 2), with their misfits, (k,)."""
+    """Best fit, second minimum, and the candidates, (k, 2), with their misfits, (k,)."""
 
     best: PlaceTrial
     second: Candidate | None
@@ -111,7 +111,7 @@ class Scan(NamedTuple):
     squares: Floats  # (columns, rows): sums of the squares; infinite off the plate
 
     def minima(self) -> list[tuple[float, float]]:
-        """Return the candidates that no neighbour is better than, the best first."""
+        """Return the candidates that are at least as good as their neighbours, the best first."""
         around = np.pad(self.squares, 1, constant_values=math.inf)
         windows = np.lib.stride_tricks.sliding_window_view(around, (3, 3))
         least = (self.squares <= windows.min(axis=(2, 3))) & np.isfinite(self.squares)
@@ -126,22 +126,22 @@ def best_fits(fit: LocationFit, region: Region, pitch: float | None) -> SearchRe
     """
     x, y = region.grid(pitch)
     box = np.array([region.low, region.high])
-    begin = _beginning(fit, x, y, box) if fit.shift else 0.0
-    scan = _scanned(fit, x, y, begin)
-    starts = [fit.at(*place, begin) for place in scan.minima()[:STARTS]]
-    refined = sorted((fit.refined(start, box) for start in starts), key=lambda one: one.square)
+    start_time = _find_start_of_force(fit, x, y, box) if fit.shift else 0.0
+    scan = _scan(fit, x, y, start_time)
+    starts = [fit.at(*place, start_time) for place in scan.minima()[:STARTS]]
+    refined = sorted((fit.refined(start, box) for start in starts), key=lambda trial: trial.square)
     best = refined[0]
     apart = APART * float(np.hypot(region.size[0] / len(x), region.size[1] / len(y)))
-    distant = [r for r in refined if math.hypot(r.x - best.x, r.y - best.y) > apart]
+    distant = [t for t in refined if math.hypot(t.x - best.x, t.y - best.y) > apart]
     least = max(best.square, np.finfo(float).tiny)
-    there = np.isfinite(scan.squares)
+    on_plate = np.isfinite(scan.squares)
     return SearchResult(
         best,
         Candidate(distant[0].x, distant[0].y, math.sqrt(distant[0].square / least))
         if distant
         else None,
-        np.column_stack([x[np.nonzero(there)[0]], y[np.nonzero(there)[1]]]),
-        np.sqrt(scan.squares[there] / least),
+        np.column_stack([x[np.nonzero(on_plate)[0]], y[np.nonzero(on_plate)[1]]]),
+        np.sqrt(scan.squares[on_plate] / least),
     )
 
 
@@ -150,46 +150,47 @@ def narrowed(
 ) -> tuple[LocationFit, SearchResult]:
     """Fit place and force with narrower hats, from the minimum of wider ones.
 
-    A force of straight lines differs from the curved true force, which moves the place. Hats of
-    half the width are always taken if there are enough strains, and again as long as the misfit
-    falls by more than chance.
+    A polygon differs from the curved true force, which moves the place. The hats are halved once if
+    there are enough strains, and again as long as the misfit falls by more than chance.
     """
     box, best = np.array([region.low, region.high]), minima.best
     first = True
     while (half := fit.halved()) is not None:
         trial = half.refined(half.at(best.x, best.y, best.shift, best.gains), box)
         enough = ENOUGH * half.model.hats <= half.model.observation.count
-        if not (first and enough) and not falls(half, best, trial, noise):
+        if not (first and enough) and not is_clear_fall(half, best, trial, noise):
             break
         fit, best, first = half, trial, False
     return fit, minima._replace(best=best)
 
 
 def is_wide(fit: LocationFit, best: PlaceTrial, noise: float | None) -> bool:
-    """Return whether hats of half the width describe the strains better than by chance."""
+    """Return whether hats of half the width lower the misfit by more than chance."""
     if (half := fit.halved()) is None:
         return False
-    return falls(half, best, half.at(best.x, best.y, best.shift, best.gains), noise)
+    return is_clear_fall(half, best, half.at(best.x, best.y, best.shift, best.gains), noise)
 
 
-def falls(half: LocationFit, wide: PlaceTrial, narrow: PlaceTrial, noise: float | None) -> bool:
-    """Return whether the misfit falls from wide to narrow hats by more than chance."""
+def is_clear_fall(
+    half: LocationFit, wide: PlaceTrial, narrow: PlaceTrial, noise: float | None
+) -> bool:
+    """Return whether narrow hats lower the misfit of wide ones by more than chance."""
     added = max(1, int(narrow.active.sum()) - int(wide.active.sum()))
     variance = (noise or half.deviation(narrow)) ** 2
     return wide.square - narrow.square > variance * (added + CHANCE * math.sqrt(2.0 * added))
 
 
-def _scanned(fit: LocationFit, x: Floats, y: Floats, shift: float) -> Scan:
-    """Compute misfits at the candidates of columns x and rows y."""
-    squares, pushed = np.full((len(x), len(y)), math.inf), False
+def _scan(fit: LocationFit, x: Floats, y: Floats, shift: float) -> Scan:
+    """Compute the misfits of the candidates in columns x and rows y."""
+    squares, has_force = np.full((len(x), len(y)), math.inf), False
     for i, j in np.ndindex(squares.shape):
         try:
             trial = fit.at(float(x[i]), float(y[j]), shift)
         except FecmError:  # a hole or a notch
             continue
         squares[i, j] = trial.square
-        pushed = pushed or bool(trial.active.any())
-    if not pushed:
+        has_force = has_force or bool(trial.active.any())
+    if not has_force:
         raise LocateError(
             "no force in the region explains the strains; check the signs of the gages, the times "
             "and the region"
@@ -197,21 +198,21 @@ def _scanned(fit: LocationFit, x: Floats, y: Floats, shift: float) -> Scan:
     return Scan(x, y, shift, squares)
 
 
-def _beginning(fit: LocationFit, x: Floats, y: Floats, box: Floats) -> float:
+def _find_start_of_force(fit: LocationFit, x: Floats, y: Floats, box: Floats) -> float:
     """Return the time at which the force starts, which may be before time 0.
 
-    A force that may act much earlier fits as well as one that starts with its first hat. The last
-    start that describes the strains is taken.
+    A force that may start much too early fits as well as one that starts at the right time. The
+    last start that describes the strains is therefore the right one.
     """
     record = fit.model.observation.interval * (fit.model.responses.shape[2] - 1)
     earliest = -BEFORE / (1.0 + BEFORE) * record
-    (place, *_) = _scanned(fit, x, y, earliest).minima()
-    fit_of_place = replace(fit, shift=False)
-    early = fit_of_place.refined(fit.at(*place, earliest), box)
-    determined = np.where(is_determined(fit_of_place.errors(early, 1.0).force), early.force, 0.0)
+    (place, *_) = _scan(fit, x, y, earliest).minima()
+    fixed_start = replace(fit, shift=False)
+    early = fixed_start.refined(fit.at(*place, earliest), box)
+    determined = np.where(is_determined(fixed_start.errors(early, 1.0).force), early.force, 0.0)
     first = int(np.argmax(determined > ONSET * determined.max()))
     rough = float(fit.model.knots(early.shift)[first]) - fit.model.basis
-    begins = rough + fit.model.basis * np.linspace(-2.0, 2.0, BEGINNINGS)
-    squares = np.array([fit.at(early.x, early.y, begin).square for begin in begins.tolist()])
+    starts = rough + fit.model.basis * np.linspace(-2.0, 2.0, BEGINNINGS)
+    squares = np.array([fit.at(early.x, early.y, start).square for start in starts.tolist()])
     as_good = squares <= squares.min() * (1.0 + NOISY / early.residual.size)
-    return float(begins[np.flatnonzero(as_good)[-1]])
+    return float(starts[np.flatnonzero(as_good)[-1]])

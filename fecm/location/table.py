@@ -20,10 +20,10 @@ _K = TypeVar("_K")
 # A CSV file; times and strains, (points, gages); or columns by name, as of a DataFrame.
 StrainSource = str | Path | tuple[Any, Any] | Mapping[str, Any]
 
-LARGEST = 0.1  # strain beyond which a table must be in another unit
+LARGEST = 0.1  # strain above which a table must be in another unit
 USUAL = (1e-5, 1e-2)  # largest strains of impacts that leave the plate linear
 DIVISORS = {"per cent": 100.0, "per mille": 1e3, "microstrain": 1e6}
-FEWEST = 10  # points
+FEWEST = 10  # points of a table
 _NUMBER = re.compile(r"(?:gage|gauge|strain)?[ _-]?([0-9]+)")
 
 
@@ -39,10 +39,11 @@ class StrainTable(NamedTuple):
 def strain_table(
     source: StrainSource, units: Mapping[str, str], numbers: Sequence[int]
 ) -> StrainTable:
-    """Return the strains of gages with these numbers on the cards, in the order of the table.
+    """Return the strains in a table, in its order of gages.
 
-    `units` has the names of the deck's units, which may be empty. Raises StudyError if the table is
-    invalid, in other units, or not of strains; OSError if a file can't be read.
+    `numbers` are the gages of the deck. `units` has the names of the deck's units, which may be
+    empty. Raises StudyError if the table is invalid, in other units, or not of strains. Raises
+    OSError if a file can't be read.
     """
     if isinstance(source, str | Path):
         table = _from_file(Path(source), units, numbers)
@@ -55,7 +56,7 @@ def strain_table(
 
 
 def _check(table: StrainTable) -> None:
-    """Refuse strains that are not numbers, too few, or in microstrain."""
+    """Raise StudyError if times or strains are invalid, too few, or in another unit."""
     name, time, strains = table.name, table.time, table.strains
     if not (np.isfinite(time).all() and np.isfinite(strains).all()):
         raise StudyError(f"{name}: times and strains must be finite numbers")
@@ -74,7 +75,7 @@ def _check(table: StrainTable) -> None:
 
 
 def _likely_unit(largest: float) -> str:
-    """Return units in which a too large strain would be a usual one, and the remedy."""
+    """Suggest units in which a strain that is too large would be usual, and the remedy."""
     texts = [
         f"{unit} ({largest / divisor:.2g}; divide by {divisor:g})"
         for unit, divisor in DIVISORS.items()
@@ -88,10 +89,11 @@ def _likely_unit(largest: float) -> str:
     )
 
 
-def _numbered(name: str, heads: Mapping[_K, str], numbers: Sequence[int]) -> dict[_K, int]:
-    """Return the gage numbers of columns; in the deck's order if no column has a number.
+def _match_columns(name: str, heads: Mapping[_K, str], numbers: Sequence[int]) -> dict[_K, int]:
+    """Return the gage of each column of strains.
 
-    Columns without a number beside others with one are not strains, and left out.
+    Columns without a number are left out if others have one. If no column has a number, the columns
+    are in the order of the deck.
     """
     matches = {n: _NUMBER.fullmatch(unit_free(head).casefold()) for n, head in heads.items()}
     numbers_of_deck = ", ".join(map(str, numbers))
@@ -115,7 +117,7 @@ def _numbered(name: str, heads: Mapping[_K, str], numbers: Sequence[int]) -> dic
     return gages
 
 
-def _made(name: str, time: Any, gages: Sequence[int], strains: Any) -> StrainTable:
+def _as_table(name: str, time: Any, gages: Sequence[int], strains: Any) -> StrainTable:
     return StrainTable(
         name,
         np.asarray(time, dtype=float),
@@ -128,7 +130,7 @@ def _made(name: str, time: Any, gages: Sequence[int], strains: Any) -> StrainTab
 
 
 def _from_arrays(source: tuple[Any, Any], numbers: Sequence[int]) -> StrainTable:
-    """Return times and strains, (points, gages), in the order of the deck."""
+    """Read a pair of times and strains, (points, gages), in the order of the deck."""
     hint = "the strains are a CSV file, columns by name, or a pair of times and strains"
     try:
         time, strains = (np.asarray(values, dtype=float) for values in source)
@@ -139,13 +141,13 @@ def _from_arrays(source: tuple[Any, Any], numbers: Sequence[int]) -> StrainTable
             f"{hint}: {len(numbers)} gages of the deck need times (points,) and strains (points, "
             f"{len(numbers)}), not {time.shape} and {strains.shape}"
         )
-    return _made("the table", time, numbers, strains.T)
+    return _as_table("the table", time, numbers, strains.T)
 
 
 def _from_columns(
     source: Mapping[str, Any], units: Mapping[str, str], numbers: Sequence[int]
 ) -> StrainTable:
-    """Read a column of times and columns of gages, by name."""
+    """Read columns of times and strains, by name."""
     try:
         columns = {str(name): np.asarray(source[name], dtype=float) for name in source}
     except (TypeError, ValueError):
@@ -156,33 +158,36 @@ def _from_columns(
     time = columns.pop(times[0])
     if time.ndim != 1 or any(column.shape != time.shape for column in columns.values()):
         raise StudyError("the columns of the table differ in length")
-    gages = _numbered("the table", {name: name for name in columns}, numbers)
+    gages = _match_columns("the table", {name: name for name in columns}, numbers)
     time = time * factor("the table: time", unit_in(times[0]), units.get("time", ""), "time")
     strains = [columns[n] * factor(f"the table: {n}", unit_in(n), "", "strain") for n in gages]
-    return _made("the table", time, list(gages.values()), strains)
+    return _as_table("the table", time, list(gages.values()), strains)
 
 
 # A file -------------------------------------------------------------------------------------------
 
 
 def _from_file(path: Path, units: Mapping[str, str], numbers: Sequence[int]) -> StrainTable:
+    """Read a CSV file with a column per gage, or with a row for every time and gage."""
     table, name = read_table(path), printable(path.name)
     if all(map(table.has, ("time", "gage", "strain"))):
         return _from_long(table, name, units, numbers)
     width = len(table.rows[0][1]) if table.rows else 0
     heads = table.head[1] or [f"column {n}" for n in range(1, width + 1)]
-    named = table.has("time") or not table.head[1]
-    clock = table.find(["time"])[0] if named else table.column("time", 0)
-    gages = _numbered(name, {n: head for n, head in enumerate(heads) if n != clock.place}, numbers)
+    has_time = table.has("time") or not table.head[1]
+    clock = table.find(["time"])[0] if has_time else table.column("time", 0)
+    gages = _match_columns(
+        name, {n: head for n, head in enumerate(heads) if n != clock.place}, numbers
+    )
     columns = [clock, *(table.column(f"gage {gage}", place) for place, gage in gages.items())]
     time, *strains = table.values(columns, units, increasing="time")
-    return _made(name, time, list(gages.values()), strains)
+    return _as_table(name, time, list(gages.values()), strains)
 
 
 def _from_long(
     table: MeasuredTable, name: str, units: Mapping[str, str], numbers: Sequence[int]
 ) -> StrainTable:
-    """Read a row for every time and gage, as ``fecm export`` writes them."""
+    """Read a table with a row for every time and gage, as written by ``fecm export``."""
     time, gage, strain = table.values(table.find(("time", "gage", "strain"), units=units), units)
     gages = [number for number in numbers if (gage == number).any()]
     if unknown := sorted(set(gage.tolist()) - set(gages)):
@@ -193,4 +198,4 @@ def _from_long(
     rows = [gage == number for number in gages]
     if any(not np.array_equal(time[row], time[rows[0]]) for row in rows):
         raise StudyError(f"{name}: the gages have different times")
-    return _made(name, time[rows[0]], gages, [strain[row] for row in rows])
+    return _as_table(name, time[rows[0]], gages, [strain[row] for row in rows])

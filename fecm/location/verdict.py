@@ -1,11 +1,11 @@
 """Verdict on a location, and likely causes of strains that do not fit.
 
 Every cause is tried at the candidate places and at the place of the unchanged strains, with the
-hats of the search. The likeliest causes are tried at the place that they lead to. Each gage counts
+hats of the search. The likeliest causes are then fitted: each gets its own place. Each gage counts
 by the share of its squares that remains, so that a gage with a wrong factor does not outweigh the
 others. A cause is also named if its effect shows in the sum of the squares of all gages, but not in
 the noise of the weak ones. A gain that stands out when the gains of all gages are fitted is always
-tried: a gain of 1.3 may hide in the noise, as it changes the misfit little.
+tried: a gain of 1.3 changes the misfit little and may hide in the noise.
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ from fecm.location.fit import CLEAR, LocationFit, PlaceTrial
 from fecm.location.location import Location
 from fecm.location.search import Region
 
-BETTER = 1.5  # fall of the misfit by which a cause is named
-SLIGHT = 1.1  # least fall of the misfit for a gain that is far from the other gains
-DISTINCT = 1.15  # such a gain over the others, or its inverse
-REFINED = 3  # causes, with the least shares at the candidates, for which a place is searched
-PLACES = 6  # candidates, with the least squares of coefficients of any sign, for forces
-RIDGE = 1e-10  # of the normal equations, over their largest diagonal
-MOST = 12  # gages whose exchanges are tried: those with the largest shares left
-PASSES = 4  # of place and gain, one after the other
+BETTER = 1.5  # fall of the misfit from which on a cause is named
+SLIGHT = 1.1  # the same for a gain that differs much from the other gains
+DISTINCT = 1.15  # smallest ratio of such a gain to the others, or the inverse
+REFINED = 3  # causes that are fitted: those with the least shares at the candidates
+PLACES = 6  # candidates that get a non-negative force: the best with forces of any sign
+RIDGE = 1e-10  # added to the diagonal of the normal equations, over its largest entry
+MOST = 12  # gages whose exchanges are tried: those with the largest remaining shares
+PASSES = 4  # fits of the place and the gain in turn
 LEAST = 1e-12  # share of the squares that is rounding
-FEWEST = 3  # gages, for one of them to have a gain of its own
+FEWEST = 3  # gages that are needed to find a wrong gain
 ROUND = (10.0, 100.0, 1e3, 1e6)  # factors of another unit
-NEAR = 0.2  # relative distance from them
+NEAR = 0.2  # relative distance within which a factor is taken for one of these
 
 
 @dataclass(frozen=True)
 class Cause:
-    """Likely cause, and the factor by which the misfit is smaller without it."""
+    """Likely cause of a misfit, and the factor by which the misfit falls without it."""
 
     text: str  # with a verb
     remedy: str
@@ -53,14 +53,14 @@ class Cause:
 
 
 class _Hypothesis(NamedTuple):
-    """Hypothesis about the gages of the model."""
+    """Hypothesis about a mistake in the table or the gages."""
 
     text: str
     remedy: str
-    columns: tuple[int, ...]  # of the table, by gage
+    columns: tuple[int, ...]  # column of the table for each gage
     signs: tuple[float, ...]
-    gain: int = -1  # gage whose gain is free
-    zero: int = -1  # gage whose zero is free
+    gain: int = -1  # gage whose gain is fitted
+    zero: int = -1  # gage whose zero is fitted
 
 
 class _Products(NamedTuple):
@@ -68,66 +68,66 @@ class _Products(NamedTuple):
 
     place: tuple[float, float]
     hats: Floats  # (gages, hats, hats): of the design
-    both: Floats  # (gages, columns, hats): of design and strains
+    mixed: Floats  # (gages, columns, hats): of design and strains
     ones: Floats  # (gages, hats): of design and a constant
     level: Floats  # (columns,): of strains and a constant
     squares: Floats  # (columns,): of the strains
     norm: float  # square of the constant
 
     def without_zero(self, gage: int) -> tuple[Floats, Floats, float]:
-        """Return the products of a gage without its mean: design, design and strains, strains."""
+        """Return the products of a gage without its mean: hats, mixed, squares."""
         ones, level = self.ones[gage], self.level[gage]
         hats = self.hats[gage] - np.outer(ones, ones) / self.norm
-        both = self.both[gage, gage] - ones * level / self.norm
-        return hats, both, float(self.squares[gage] - level**2 / self.norm)
+        mixed = self.mixed[gage, gage] - ones * level / self.norm
+        return hats, mixed, float(self.squares[gage] - level**2 / self.norm)
 
 
 class _Shares(NamedTuple):
-    """Shares of the squares of every gage that a force at a place leaves, (gages,)."""
+    """Shares of the squared strains that a force at a place does not explain."""
 
-    left: Floats
+    remains: Floats  # (gages,)
     place: tuple[float, float]
-    factor: float  # of the gage whose gain is free: measured over computed strains
-    level: float  # of the gage whose zero is free
+    factor: float  # measured over computed strains of the gage whose gain is fitted
+    level: float  # zero of the gage whose zero is fitted
 
 
 def likely_cause(
     fit: LocationFit, best: PlaceTrial, region: Region, pitch: float | None, names: list[int]
 ) -> Cause | None:
-    """Return the cause without which the strains are explained best, or None if none is clear.
+    """Return the likeliest cause of a misfit; None if no cause is clear.
 
-    `best` is the fit of the unchanged strains, `names` are the numbers of the gages in messages.
+    `best` is the fit of the unchanged strains. `names` has the numbers of the gages in messages.
     """
     places = [*_products(fit, _candidates(region, pitch, best))]
     gages = len(names)
     plain = _Hypothesis("", "", tuple(range(gages)), (1.0,) * gages)
-    worst = sorted(np.argsort(-_least(places, plain).left, kind="stable")[:MOST].tolist())
+    worst = sorted(np.argsort(-_best_shares(places, plain).remains, kind="stable")[:MOST].tolist())
     hypotheses = _hypotheses(plain, worst, names)
-    tried = [(hypothesis, _least(places, hypothesis)) for hypothesis in hypotheses]
-    tried.sort(key=lambda pair: float(pair[1].left.sum()))
-    before = _unexplained(fit, best)
+    trials = [(hypothesis, _best_shares(places, hypothesis)) for hypothesis in hypotheses]
+    trials.sort(key=lambda pair: float(pair[1].remains.sum()))
+    shares_before = _unexplained_shares(fit, best)
     causes: list[Cause] = []
-    likely = tried[:REFINED]
+    likely = trials[:REFINED]
     if gages >= FEWEST:
-        odd, shares = _odd_gain(fit, best, region)
-        likely = [(h, shares) for h, _ in tried if h.gain == odd]
-        likely += [pair for pair in tried if pair[0].gain != odd][:REFINED]
+        odd, shares = _find_odd_gain(fit, best, region)
+        likely = [(h, shares) for h, _ in trials if h.gain == odd]
+        likely += [pair for pair in trials if pair[0].gain != odd][:REFINED]
     for hypothesis, shares in likely:
-        remains, factor, level = _refined(fit, region, hypothesis, shares)
+        remains, factor, level = _fit_hypothesis(fit, region, hypothesis, shares)
         text = hypothesis.text
         if hypothesis.gain >= 0:
-            text = f"gage {names[hypothesis.gain]}, divided by {_rounded(factor)}, explains"
+            text = f"gage {names[hypothesis.gain]}, divided by {_format_factor(factor)}, explains"
         if hypothesis.zero >= 0:
             text = f"gage {names[hypothesis.zero]} less {level:.2g} explains"
-        ratio = float(np.sqrt((before / np.maximum(remains, LEAST)).max()))
+        ratio = float(np.sqrt((shares_before / np.maximum(remains, LEAST)).max()))
         distinct = hypothesis.gain >= 0 and max(factor, 1.0 / factor) > DISTINCT
         if ratio >= (SLIGHT if distinct else BETTER):
             causes.append(Cause(text, hypothesis.remedy, ratio))
-    return max(causes, key=lambda one: one.ratio, default=None)
+    return max(causes, key=lambda cause: cause.ratio, default=None)
 
 
-def _odd_gain(fit: LocationFit, best: PlaceTrial, region: Region) -> tuple[int, _Shares]:
-    """Return the gage whose gain differs most from the others, and the start of its search."""
+def _find_odd_gain(fit: LocationFit, best: PlaceTrial, region: Region) -> tuple[int, _Shares]:
+    """Return the gage whose gain differs most from the others, and where its fit starts."""
     free = replace(fit, gains=True)
     trial = free.refined(best, np.array([region.low, region.high]))
     apart = np.log(trial.gains) - np.median(np.log(trial.gains))
@@ -136,37 +136,38 @@ def _odd_gain(fit: LocationFit, best: PlaceTrial, region: Region) -> tuple[int, 
     return odd, _Shares(np.zeros(len(apart)), place, factor, 0.0)
 
 
-def _unexplained(fit: LocationFit, trial: PlaceTrial) -> Floats:
-    """Return what a fit leaves: sum of the shares of every gage, and share of all squares."""
-    seen = fit.model.observation
-    squares = np.maximum((seen.values**2).sum(axis=1) + seen.left, np.finfo(float).tiny)
-    rest = (trial.residual**2).sum(axis=1) + seen.left
+def _unexplained_shares(fit: LocationFit, trial: PlaceTrial) -> Floats:
+    """Return the unexplained squares of a fit, (2,): sum of the gages' shares, and share in all."""
+    observation = fit.model.observation
+    squares = np.maximum(
+        (observation.values**2).sum(axis=1) + observation.remainder, np.finfo(float).tiny
+    )
+    rest = (trial.residual**2).sum(axis=1) + observation.remainder
     return np.array([(rest / squares).sum(), rest.sum() / squares.sum()])
 
 
-def _refined(
+def _fit_hypothesis(
     fit: LocationFit, region: Region, hypothesis: _Hypothesis, shares: _Shares
 ) -> tuple[Floats, float, float]:
-    """Return the remains at the place of a hypothesis, with its factor and level.
+    """Fit a hypothesis; return its :func:`_unexplained_shares`, its factor and its level.
 
-    The remains are those of :func:`_unexplained`. Only the gage of the hypothesis has another
-    factor: with free gains of all gages, every gage would explain the strains as well as the right
-    one.
+    Only the gage of the hypothesis has another factor. If the gains of all gages were free, every
+    gage would explain the strains as well as the right one.
     """
-    seen, factor, level = fit.model.observation, shares.factor, shares.level
+    observation, factor, level = fit.model.observation, shares.factor, shares.level
     columns, signs = list(hypothesis.columns), np.array(hypothesis.signs)[:, None]
-    constant = seen.of(np.ones(fit.model.responses.shape[2]))
+    constant = observation.of(np.ones(fit.model.responses.shape[2]))
     box = np.array([region.low, region.high])
     place, shift, gains = shares.place, 0.0, None
     passes = PASSES if hypothesis.gain >= 0 else 1
     while True:
-        values, remainder = signs * seen.values[columns], seen.left[columns]
+        values, remainder = signs * observation.values[columns], observation.remainder[columns]
         if hypothesis.gain >= 0:
             values[hypothesis.gain] /= factor
             remainder[hypothesis.gain] /= factor**2
         if hypothesis.zero >= 0:
             values[hypothesis.zero] -= level * constant
-        corrected = replace(seen, values=values, left=remainder)
+        corrected = replace(observation, values=values, remainder=remainder)
         corrected_fit = replace(fit, model=replace(fit.model, observation=corrected))
         trial = corrected_fit.refined(corrected_fit.at(*place, shift, gains), box)
         place, shift, gains = (trial.x, trial.y), trial.shift, trial.gains
@@ -178,13 +179,13 @@ def _refined(
         factor *= max(float(measured @ computed), LEAST) / max(float(computed @ computed), LEAST)
     if hypothesis.zero >= 0:
         level += float(trial.residual[hypothesis.zero] @ constant) / float(constant @ constant)
-        values[hypothesis.zero] = seen.values[hypothesis.zero] - level * constant
+        values[hypothesis.zero] = observation.values[hypothesis.zero] - level * constant
         trial = corrected_fit.at(trial.x, trial.y, trial.shift, trial.gains)
-    return _unexplained(corrected_fit, trial), factor, level
+    return _unexplained_shares(corrected_fit, trial), factor, level
 
 
 def _hypotheses(plain: _Hypothesis, worst: list[int], names: list[int]) -> Iterator[_Hypothesis]:
-    """Yield every hypothesis: signs, exchanges, gains and zeros."""
+    """Yield all hypotheses: signs, zeros, gains and exchanges."""
     gages = len(names)
     opposite = tuple(-sign for sign in plain.signs)
     check = "check the signs of the gages"
@@ -206,34 +207,34 @@ def _hypotheses(plain: _Hypothesis, worst: list[int], names: list[int]) -> Itera
 
 
 def _candidates(region: Region, pitch: float | None, best: PlaceTrial) -> list[tuple[float, float]]:
-    """Return candidates of the search, after the place of the unchanged strains.
+    """Return the place of the unchanged strains and the candidates of the search.
 
-    A gain, a zero or a sign of one of several gages hardly moves the place. The other candidates
-    are too far from it to tell which gage has it.
+    A wrong gain, zero or sign of one of several gages hardly moves the place. The candidates are
+    too far apart to tell which gage has it.
     """
     x, y = region.grid(pitch)
     return [(best.x, best.y), *((u, v) for u in x.tolist() for v in y.tolist())]
 
 
 def _products(fit: LocationFit, candidates: list[tuple[float, float]]) -> Iterator[_Products]:
-    """Return the inner products at the candidates."""
-    seen = fit.model.observation
-    values = seen.values
-    constant = seen.of(np.ones(fit.model.responses.shape[2]))
-    squares = np.maximum((values**2).sum(axis=1) + seen.left, np.finfo(float).tiny)
+    """Yield the inner products at the candidates."""
+    observation = fit.model.observation
+    values = observation.values
+    constant = observation.of(np.ones(fit.model.responses.shape[2]))
+    squares = np.maximum((values**2).sum(axis=1) + observation.remainder, np.finfo(float).tiny)
     level = values @ constant
     for place in candidates:
         try:
             design = fit.model.design(*place)
         except FecmError:  # a hole or a notch
             continue
-        turned = np.ascontiguousarray(design.swapaxes(1, 2))  # (gages, hats, rows)
-        both = (turned @ values.T).swapaxes(1, 2)
+        by_hat = np.ascontiguousarray(design.swapaxes(1, 2))  # (gages, hats, rows)
+        mixed = (by_hat @ values.T).swapaxes(1, 2)
         yield _Products(
             place,
-            turned @ design,
-            both,
-            turned @ constant,
+            by_hat @ design,
+            mixed,
+            by_hat @ constant,
             level,
             squares,
             float(constant @ constant),
@@ -241,53 +242,53 @@ def _products(fit: LocationFit, candidates: list[tuple[float, float]]) -> Iterat
 
 
 def _normal(products: _Products, hypothesis: _Hypothesis) -> tuple[Floats, Floats]:
-    """Return the normal equations of the force, weighted by the squares of every gage's strains."""
+    """Return the normal equations of the force; each gage is weighted by its squared strains."""
     matrix, vector = np.zeros(products.hats.shape[1:]), np.zeros(products.hats.shape[1])
     for gage, (column, sign) in enumerate(zip(hypothesis.columns, hypothesis.signs, strict=True)):
         if gage == hypothesis.gain:
             continue
-        hats, both, square = (
+        hats, mixed, square = (
             products.hats[gage],
-            products.both[gage, column],
+            products.mixed[gage, column],
             float(products.squares[column]),
         )
         if gage == hypothesis.zero:
-            hats, both, square = products.without_zero(gage)
+            hats, mixed, square = products.without_zero(gage)
         matrix += hats / square
-        vector += sign / square * both
+        vector += sign / square * mixed
     matrix[np.diag_indices(len(matrix))] += RIDGE * float(np.diagonal(matrix).max()) + LEAST
     return matrix, vector
 
 
-def _least(places: list[_Products], hypothesis: _Hypothesis) -> _Shares:
-    """Return the remaining shares at the best of the candidates."""
+def _best_shares(places: list[_Products], hypothesis: _Hypothesis) -> _Shares:
+    """Return the shares at the best candidate."""
     from scipy.optimize import nnls  # takes 0.2 s to import
 
     normals = [_normal(products, hypothesis) for products in places]
     factors = np.linalg.cholesky(np.array([matrix for matrix, _ in normals]))
     vectors = np.array([vector for _, vector in normals])
     roots = np.linalg.solve(factors, vectors[:, :, None])[:, :, 0]
-    described = (roots**2).sum(axis=1)  # squares, by coefficients of any sign
-    shares_left = []
+    described = (roots**2).sum(axis=1)  # squares that forces of any sign explain
+    shares_of_places = []
     for place in np.argsort(-described, kind="stable")[:PLACES].tolist():
         force = nnls(factors[place].T, roots[place], maxiter=30 * len(roots[place]))[0]
-        shares_left.append(_shares(places[place], hypothesis, force))
-    return min(shares_left, key=lambda shares: float(shares.left.sum()))
+        shares_of_places.append(_shares_of_force(places[place], hypothesis, force))
+    return min(shares_of_places, key=lambda shares: float(shares.remains.sum()))
 
 
-def _shares(products: _Products, hypothesis: _Hypothesis, force: Floats) -> _Shares:
-    """Return the shares of the squares that a force leaves."""
+def _shares_of_force(products: _Products, hypothesis: _Hypothesis, force: Floats) -> _Shares:
+    """Return the shares of the squares that a force does not explain."""
     remains, factor, level = np.ones(len(hypothesis.columns)), 1.0, 0.0
     for gage, (column, sign) in enumerate(zip(hypothesis.columns, hypothesis.signs, strict=True)):
-        hats, both, square = (
+        hats, mixed, square = (
             products.hats[gage],
-            products.both[gage, column],
+            products.mixed[gage, column],
             float(products.squares[column]),
         )
         if gage == hypothesis.zero:
             level = float(products.level[gage] - products.ones[gage] @ force) / products.norm
-            hats, both, square = products.without_zero(gage)
-        computed, product = float(force @ hats @ force), sign * float(both @ force)
+            hats, mixed, square = products.without_zero(gage)
+        computed, product = float(force @ hats @ force), sign * float(mixed @ force)
         if gage == hypothesis.gain:
             if product > 0.0 and computed > 0.0:
                 factor = product / computed
@@ -297,27 +298,27 @@ def _shares(products: _Products, hypothesis: _Hypothesis, force: Floats) -> _Sha
     return _Shares(np.maximum(remains, 0.0), products.place, factor, level)
 
 
-def _rounded(factor: float) -> str:
-    """Return a factor, or the factor of a unit that it is near to."""
+def _format_factor(factor: float) -> str:
+    """Format a factor; a factor near the ratio of two units becomes this ratio."""
     for size in (*ROUND, *(1.0 / number for number in ROUND)):
         if abs(factor / size - 1.0) < NEAR:
             return f"{size:g}"
     return f"{factor:.3g}"
 
 
-RIVAL = 1.1  # misfit ratio of a place that can hardly be told from the first
-NOT_DESCRIBED = 1.5  # misfit over the noise
-UNLIKELY = 3.0  # standard deviations of a misfit that noise explains
-LARGE = 0.01  # strain: plies fail at one to two per cent
-LEFT = 0.5  # share of the squares of a gage that is not described
-OF_MESH = 0.8  # share of the mesh in the standard deviation of the place
-VAGUE = 0.25  # standard deviation of a place over the side of the region
+RIVAL = 1.1  # misfit ratio below which a second place can hardly be told from the first
+NOT_DESCRIBED = 1.5  # misfit above which the model does not describe the strains
+UNLIKELY = 3.0  # standard deviations of the misfit that noise explains
+LARGE = 0.01  # strain near failure: plies fail at one to two per cent
+LEFT = 0.5  # unexplained share of a gage's squares above which the gage is not described
+OF_MESH = 0.8  # share of the mesh in the standard deviation of the place, for a note
+VAGUE = 0.25  # standard deviation, over the side of the region, of a place not determined
 
 
 def is_doubtful(location: Location) -> bool:
     """Return whether the model does not describe the strains down to their noise."""
-    bad = location.misfit > NOT_DESCRIBED or residual_correlation(location) > COLOURED
-    return bad or location.misfit > likely_misfit(location) or bool(undescribed_gages(location))
+    is_poor = location.misfit > NOT_DESCRIBED or residual_correlation(location) > COLOURED
+    return is_poor or location.misfit > likely_misfit(location) or bool(undescribed_gages(location))
 
 
 def likely_misfit(location: Location) -> float:
@@ -330,29 +331,29 @@ def likely_misfit(location: Location) -> float:
 
 
 def undescribed_gages(location: Location) -> list[int]:
-    """Return the gages whose residual has a shape, and is a large share of their strains."""
-    rest = location.strains - location.fitted
-    energies = (rest**2).sum(axis=1)
-    follow = (rest[:, 1:] * rest[:, :-1]).sum(axis=1)
+    """Return the gages whose residual has a shape and is a large share of their strains."""
+    residual = location.strains - location.fitted
+    energies = (residual**2).sum(axis=1)
+    neighbours = (residual[:, 1:] * residual[:, :-1]).sum(axis=1)
     large = energies > LEFT * (location.strains**2).sum(axis=1)
-    return [int(n) for n in location.gages[large & (follow > COLOURED * energies)]]
+    return [int(n) for n in location.gages[large & (neighbours > COLOURED * energies)]]
 
 
 def judged(location: Location, region: Region, wide: bool, cause: Cause | None) -> Location:
-    """Return the location with its notes, and whether it is accepted.
+    """Return the location with its notes and the verdict whether it is accepted.
 
-    `wide` says whether narrower hats of the force describe the strains better, `cause` what may be
-    wrong with the strains.
+    `wide` says whether narrower hats of the force would describe the strains better. `cause` says
+    what may be wrong with the strains.
     """
-    serious = [*_serious(location, region)]
+    reasons = [*_reasons_to_reject(location, region)]
     if cause is not None:
-        serious.append(str(cause))
-    return replace(location, notes=(*serious, *_remarks(location, wide)), accepted=not serious)
+        reasons.append(str(cause))
+    return replace(location, notes=(*reasons, *_remarks(location, wide)), accepted=not reasons)
 
 
-def _serious(location: Location, region: Region) -> Iterator[str]:
-    """Yield reasons not to accept a location."""
-    near = residual_correlation(location)
+def _reasons_to_reject(location: Location, region: Region) -> Iterator[str]:
+    """Yield the reasons to reject a location."""
+    correlation = residual_correlation(location)
     compare = "compare supports, laminate, patch, mesh and gages with the test"
     share = float(((location.strains - location.fitted) ** 2).sum() / (location.strains**2).sum())
     if location.misfit > NOT_DESCRIBED:
@@ -360,11 +361,11 @@ def _serious(location: Location, region: Region) -> Iterator[str]:
             "the model does not describe these signals: the residual is "
             f"{location.misfit:.2g} times the noise; {compare}"
         )
-    elif not location.noise_given and near > COLOURED:
+    elif not location.noise_given and correlation > COLOURED:
         yield (
             f"the model does not describe these signals: neighbouring residuals have the "
-            f"correlation {near:.2f}, and {100.0 * share:.2g} % of the squares of the strains are "
-            f"left; {compare}"
+            f"correlation {correlation:.2f}, and {100.0 * share:.2g} % of the squares of the "
+            f"strains are left; {compare}"
         )
     elif gages := undescribed_gages(location):
         which = ", ".join(map(str, gages))
@@ -392,30 +393,30 @@ def _serious(location: Location, region: Region) -> Iterator[str]:
                 f"{name} is not determined: its standard deviation is {error:.3g}, and the region "
                 f"is {side:.3g} wide"
             )
-    top = int(np.abs(location.time - location.time_of_peak).argmin())
-    if location.peak_force < CLEAR * float(location.force_sd[top]):
+    peak = int(np.abs(location.time - location.time_of_peak).argmin())
+    if location.peak_force < CLEAR * float(location.force_sd[peak]):
         yield "the force is not above its noise"
 
 
 def _remarks(location: Location, wide: bool) -> Iterator[str]:
-    """Yield other notes."""
-    clock = unit_of("time", location.units)
+    """Yield the notes that do not reject a location."""
+    time_unit = unit_of("time", location.units)
     if wide:
-        half = f"{0.5 * (location.time[1] - location.time[0]):.3g} {clock}".rstrip()
+        half = f"{0.5 * (location.time[1] - location.time[0]):.3g} {time_unit}".rstrip()
         yield (
             f"a force every {half} describes the strains better: its error is not in the standard "
             "deviations; take a smaller basis"
         )
-    near = residual_correlation(location)
+    correlation = residual_correlation(location)
     if likely_misfit(location) < location.misfit <= NOT_DESCRIBED:
         yield (
             f"the residual is {location.misfit:.3g} times the noise, which chance does not "
             "explain: the model has errors, and the standard deviations are multiplied by it"
         )
-    if location.noise_given and near > COLOURED:
+    if location.noise_given and correlation > COLOURED:
         yield (
-            f"neighbouring residuals have the correlation {near:.2f}: the model does not describe "
-            "the strains down to their noise, and the standard deviations are too small"
+            f"neighbouring residuals have the correlation {correlation:.2f}: the model does not "
+            "describe the strains down to their noise, and the standard deviations are too small"
         )
     if location.mesh_error is None:
         yield "the standard deviations do not include the error of the mesh, which is unknown"
@@ -426,12 +427,12 @@ def _remarks(location: Location, wide: bool) -> Iterator[str]:
             "deviations; take a finer mesh"
         )
     if location.contact_end is None:
-        until = f"{location.determined_until:.4g} {clock}".rstrip()
+        until = f"{location.determined_until:.4g} {time_unit}".rstrip()
         yield f"the force has not ended at {until}: the impulse is a lower bound"
 
 
 def residual_correlation(location: Location) -> float:
     """Return the correlation of consecutive residuals."""
-    rest = location.strains - location.fitted
-    size = float((rest**2).sum())
-    return float((rest[:, 1:] * rest[:, :-1]).sum()) / size if size else 0.0
+    residual = location.strains - location.fitted
+    size = float((residual**2).sum())
+    return float((residual[:, 1:] * residual[:, :-1]).sum()) / size if size else 0.0
