@@ -1,4 +1,4 @@
-"""Least squares between a measured force and the forces of one plate with trial values."""
+"""Least-squares fit of the parameters of an impact to a measured force, on one plate."""
 
 from __future__ import annotations
 
@@ -25,35 +25,35 @@ from fecm.studies import StudyError
 from fecm.studies.rod_test.filters import Filter
 from fecm.sweeps.outcome import Backend, Outcome
 
-DELAY = "delay"  # measured time at which the approach of the projectile ends in a contact
+DELAY = "delay"  # measured time at which the projectile touches the plate
 OFFSET = "offset"  # measured force without a contact
-OF_RECORD = {DELAY: "time", OFFSET: "force"}  # dimensions of values that no deck has
-STEP = 1e-3  # half of the step of central differences, in the scaled parameters
-POINTS = 10  # fewest measured points
-LOST = 0.2  # largest share of the points of the contact that may be outside the run of the deck
-SINGULAR = 1e-3  # smallest singular value of the Jacobian with unit columns
-NO_EFFECT = 1e-6  # smallest column of the Jacobian, rms over peak
+OF_RECORD = {DELAY: "time", OFFSET: "force"}  # dimensions of the parameters of the record
+STEP = 1e-3  # half the step of central differences in the scaled parameters
+POINTS = 10  # fewest measured points of a fit
+LOST = 0.2  # largest share of the contact's points that may be outside the run of the deck
+SINGULAR = 1e-3  # smallest allowed singular value of the Jacobian with unit columns
+NO_EFFECT = 1e-6  # column of the Jacobian, rms over peak, below which a parameter has no effect
 SHARE = 0.1  # share of a parameter in a singular vector above which the vector concerns it
-SETTLED = 0.01  # share of a standard error: the fit ends with a step below it
-MOST_EVALUATIONS = 60  # of a fit
-FIRST_EVALUATIONS = 6  # of each start of the delay
-MOST_FITS = 4  # with fewer points each, as the points of the deck's run depend on the delay
+SETTLED = 0.01  # step, over a standard error, below which the fit ends
+MOST_EVALUATIONS = 60  # evaluations of a fit
+FIRST_EVALUATIONS = 6  # evaluations of the short fit from each start of the delay
+MOST_FITS = 4  # fits in turn: the delay decides which points the run of the deck covers
 
 
 def fitted(deck: Deck, values: Mapping[str, float]) -> Strike:
-    """Return the strike of a deck with the fitted values of the deck, not those of the record."""
+    """Return the strike of a deck with fitted values; parameters of the record are ignored."""
     case: Case = {name: v for name, v in values.items() if name not in OF_RECORD}
     check_names(case)
     return strike_of_case(deck, case)
 
 
 class ForceModel(NamedTuple):
-    """Contact forces of a deck with trial values, all from one response of the plate."""
+    """Contact forces of a deck with trial values, computed from one response of the plate."""
 
     deck: Deck
     backend: Backend
     sensor: Filter | None
-    law: Law | None = None  # a user's contact law instead of the deck's
+    law: Law | None = None  # user's contact law, which replaces the law of the deck
     computed: Callable[[int], object] = lambda forces: None  # called with the number of forces
 
     def outcome(self, trials: Sequence[Strike], *, judged: bool) -> Outcome:
@@ -62,13 +62,16 @@ class ForceModel(NamedTuple):
         return self.backend.outcomes(impacts, judged=judged)
 
     def histories(self, trials: Sequence[Mapping[str, float]]) -> tuple[Floats, Floats]:
-        """Return times, from one duration before the contact on, and forces (times, trials)."""
+        """Return the forces of trials, (times, trials), after their times.
+
+        The times start one duration of the run before the contact.
+        """
         outcome = self.outcome([fitted(self.deck, trial) for trial in trials], judged=False)
         assert outcome.force is not None
         failed = np.flatnonzero(~np.isfinite(outcome.force).all(axis=1))
-        if self.law is not None and len(failed):  # the run alone tells why
-            trial = self.outcome([fitted(self.deck, trials[failed[0]])], judged=True)
-            raise IdentifyError(str(trial.status[0]))
+        if self.law is not None and len(failed):  # a judged run gives the reason
+            judged = self.outcome([fitted(self.deck, trials[failed[0]])], judged=True)
+            raise IdentifyError(str(judged.status[0]))
         self.computed(len(trials))
         steps = outcome.force.shape[1]
         clock = float(outcome.columns["dt"][0]) * np.arange(-steps, steps + 1.0)
@@ -87,7 +90,10 @@ class ForceModel(NamedTuple):
 
 @dataclass(frozen=True)
 class Scaling:
-    """Parameters as functions of x: start exp(x) where the size is 0, otherwise start + size x."""
+    """Parameters as functions of the scaled parameters x.
+
+    A parameter is start exp(x) if its size is 0, otherwise start + size x.
+    """
 
     start: dict[str, float]
     size: Floats
@@ -101,23 +107,23 @@ class Scaling:
         return dict(zip(self.start, numbers.tolist(), strict=True))
 
     def slopes(self, x: Floats) -> Floats:
-        """Return the derivatives of the values."""
+        """Return the derivatives of the values with respect to x."""
         return np.where(self.size > 0.0, self.size, list(self.values(x).values()))
 
 
 @dataclass(frozen=True)
 class FittedPoints:
-    """Parameters of least squares, and the points that were fitted."""
+    """Fitted parameters, and the points to which they were fitted."""
 
     scaling: Scaling
     x: Floats
     time: Floats
     force: Floats
     model: Floats  # fitted force
-    jacobian: Floats  # of the fitted force by x, (points, names)
+    jacobian: Floats  # derivatives of the fitted force with respect to x, (points, names)
     converged: bool
     active: NDArray[np.int64]  # (names,): -1 or 1 at a bound
-    lost: float  # share of the points of the contact that are outside the run of the deck
+    lost: float  # share of the contact's points that are outside the run of the deck
 
     @property
     def values(self) -> dict[str, float]:
@@ -136,22 +142,22 @@ class FittedPoints:
 
 
 def during_run(time: Floats, clock: Floats, delay: float) -> NDArray[np.bool_]:
-    """Return a mask of the measured times that the histories of a model cover."""
+    """Return a mask of the measured times that the run of the deck covers."""
     return np.asarray(np.abs(time - delay) <= clock[-1] * (1.0 + 1e-9))
 
 
 def share_lost(force: Floats, inside: NDArray[np.bool_]) -> float:
-    """Return the share of the points of the contact that are outside the run of the deck."""
-    loaded = contact_points(force)
-    return float(np.mean(~inside[loaded]))
+    """Return the share of the contact's points that are outside the run of the deck."""
+    in_contact = contact_points(force)
+    return float(np.mean(~inside[in_contact]))
 
 
 def fit_parameters(
     model: ForceModel, measured: Measurement, scaling: Scaling, x: Floats, evaluations: int
 ) -> FittedPoints | None:
-    """Fit parameters from x; the delay selects the points that the run of the deck covers.
+    """Fit parameters from the start x, to the points that the run of the deck covers.
 
-    Returns None if there are fewer than :data:`POINTS`.
+    The delay decides which points these are. Returns None if they are fewer than :data:`POINTS`.
     """
     clock, _ = model.histories([scaling.start])
 
@@ -159,16 +165,16 @@ def fit_parameters(
         return during_run(measured.time, clock, scaling.values(x).get(DELAY, 0.0))
 
     inside, points = within(x), None
-    for number in range(MOST_FITS):
+    for fit_number in range(MOST_FITS):
         if np.count_nonzero(inside) < POINTS:
             return None
         points = _least_squares(model, measured, inside, scaling, x, evaluations)
-        still = within(points.x)
-        if number:  # points at the end of the run don't come and go
-            still &= inside
-        if np.array_equal(still, inside):
+        still_inside = within(points.x)
+        if fit_number:  # once lost, a point stays lost
+            still_inside &= inside
+        if np.array_equal(still_inside, inside):
             break
-        inside, x = still, points.x
+        inside, x = still_inside, points.x
     return points
 
 
@@ -186,9 +192,9 @@ def _least_squares(
     peak = float(np.abs(force).max()) or 1.0
 
     @lru_cache(maxsize=1)
-    def evaluate(*given: float) -> tuple[Floats, Floats]:
+    def evaluate(*parameters: float) -> tuple[Floats, Floats]:
         """Return force over peak and its Jacobian."""
-        x, steps = np.array(given), STEP * np.eye(len(given))
+        x, steps = np.array(parameters), STEP * np.eye(len(parameters))
         up, down = np.minimum(x + steps, scaling.high), np.maximum(x - steps, scaling.low)
         forces = model.at(time, [scaling.values(row) for row in (x, *up, *down)]) / peak
         above, below = np.split(forces[:, 1:], 2, axis=1)
@@ -219,7 +225,7 @@ def _least_squares(
 def covariance(points: FittedPoints) -> Floats:
     """Return the covariance of the scaled parameters.
 
-    Raises IdentifyError if the residual does not determine them.
+    Raises IdentifyError if the measurement does not determine them.
     """
     names, peak = list(points.scaling.start), float(np.abs(points.force).max())
     jac = points.jacobian / peak
@@ -230,34 +236,34 @@ def covariance(points: FittedPoints) -> Floats:
         raise IdentifyError(f"{text} (does the indentation reach alpha_p?); {hint}")
     _, singular, right = np.linalg.svd(jac / columns, full_matrices=False)
     if singular[-1] < SINGULAR:
-        both = [n for n, share in zip(names, right[-1], strict=True) if abs(share) > SHARE]
-        text = f"a combination of {join_names(both)} (singular value {singular[-1]:.1g})"
+        combined = [n for n, share in zip(names, right[-1], strict=True) if abs(share) > SHARE]
+        text = f"a combination of {join_names(combined)} (singular value {singular[-1]:.1g})"
         hint = "give one of them the known value in the deck and leave it out"
         raise IdentifyError(f"the force determines only {text}; {hint}")
     root = right.T / singular / columns[:, None]
-    found_covariance: Floats = points.variance / peak**2 * root @ root.T
-    errors = zip(names, np.sqrt(np.diagonal(found_covariance)), strict=True)
-    # Delay and offset may be 0, which no error can be compared with.
+    matrix: Floats = points.variance / peak**2 * root @ root.T
+    errors = zip(names, np.sqrt(np.diagonal(matrix)), strict=True)
+    # Delay and offset may be 0: they have no relative error.
     vague = [f"{n} ({100.0 * e:.0f} %)" for n, e in errors if e > 1.0 and n not in OF_RECORD]
     if vague:
         hint = (
             "the standard error is above 100 %; set known values in the deck, and do not fit them"
         )
         raise IdentifyError(f"the measurement does not determine {join_names(vague)}: {hint}")
-    return found_covariance
+    return matrix
 
 
 def join_names(names: Sequence[str]) -> str:
-    """Names with commas and an `and`."""
+    """Join names with commas and `and`."""
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
 def parameter_bounds(
     name: str, start: float, sizes: Mapping[str, float]
 ) -> tuple[float, float, float]:
-    """Return the size of a parameter (0: exponential) and the bounds of its x.
+    """Return the size of a parameter, 0 if it is exponential in x, and the bounds of its x.
 
-    `sizes` are a time for the delay, a force for the offset and an indentation for alpha_p.
+    `sizes` has a time for the delay, a force for the offset and an indentation for alpha_p.
     """
     bound = 1e3
     if name in OF_RECORD:

@@ -36,8 +36,8 @@ from fecm.identification.fitting import (
     share_lost,
 )
 from fecm.identification.misfit import (
-    coloured,
-    is_runs_few,
+    has_few_sign_runs,
+    has_shape,
     neighbour_correlation,
     plate_errors,
     proposal,
@@ -60,8 +60,8 @@ from fecm.sweeps.outcome import Backend
 from fecm.sweeps.plan import check_law, shares_plate
 
 FREE = (*CARDS, *OF_RECORD)
-CORRELATED = 0.99  # a finding reports a larger correlation of two parameters
-UNIT_OFFSET = 0.01  # size of an offset over the peak of the deck's own run
+CORRELATED = 0.99  # correlation of two parameters above which a note reports it
+UNIT_OFFSET = 0.01  # unit of the offset, over the peak of the deck's run
 
 
 def identify(
@@ -74,9 +74,9 @@ def identify(
 ) -> Identification:
     """Fit parameters of an impact to a measured contact force.
 
-    The values of the deck are the start of the fit, by least squares with equal weights. A delay is
-    started from several lags. Standard errors hold for independent errors of the measured points,
-    with the variance of the residual. Errors of the model come in addition;
+    The fit is by least squares with equal weights, and starts at the values of the deck. The delay
+    starts at several lags in turn. Standard errors hold for independent errors of the measured
+    points, with the variance of the residual. Errors of the model come in addition;
     :attr:`Identification.plate_errors` has two of them. The notes of the result are
     :class:`FecmWarning`.
 
@@ -88,17 +88,17 @@ def identify(
         Measured contact force, positive in compression, at increasing times, in the deck's units.
         At time 0 the projectile touches the plate, as in the deck.
     free : str or sequence of str
-        Parameters to fit: ``"velocity"``, ``"energy"``, ``"k"``, ``"alpha_p"``, ``"s_p"``, ``"q"``,
-        ``"mass"``, ``"rod_length"``, ``"rod_modulus"``, ``"rod_density"``; and of the
-        record ``"delay"``, the measured time at which the projectile touches the plate, and
-        ``"offset"``, the measured force without a contact.
+        Parameters to fit. Parameters of the impact are ``"velocity"``, ``"energy"``, ``"k"``,
+        ``"alpha_p"``, ``"s_p"``, ``"q"``, ``"mass"``, ``"rod_length"``, ``"rod_modulus"`` and
+        ``"rod_density"``. Parameters of the record are ``"delay"``, the measured time at which the
+        projectile touches the plate, and ``"offset"``, the measured force without contact.
     filter : str, optional
-        Filter of the measurement, which the computed force passes too: ``"first-order:RISE"``,
+        Filter of the measurement, which is applied to the computed force: ``"first-order:RISE"``,
         ``"moving-average:RISE"``, ``"butterworth:ORDER,FREQUENCY[,zero-phase]"`` in Hz, or
         ``"cfc:CLASS"``.
     law : Law or str, optional
-        Contact law instead of EXPE, as in :func:`run`; the constants of EXPE can't be
-        fitted then.
+        Contact law that replaces EXPE, as in :func:`run`. The constants of EXPE can't be fitted
+        then.
 
     Returns
     -------
@@ -115,8 +115,8 @@ def identify(
     DeckError
         If the deck has errors.
     CasesError
-        If the deck has several problems, its cases do not share a plate, or `law` takes the place
-        of a constant that is to be fitted.
+        If the deck has several problems, its cases do not share a plate, or `law` replaces a
+        constant that is to be fitted.
     LawError
         If `law` is not a contact law, or fails.
     ExtensionError
@@ -127,8 +127,8 @@ def identify(
     >>> import numpy as np
     >>> table = fecm.examples.path("measured-force.csv")
     >>> time, force = np.loadtxt(table, delimiter=",", skiprows=3, unpack=True)
-    >>> found = fecm.identify("impact-patch.inp", time, force, ["k"], filter="first-order:5e-6")
-    >>> round(found.values["k"], -4)
+    >>> fit = fecm.identify("impact-patch.inp", time, force, ["k"], filter="first-order:5e-6")
+    >>> round(fit.values["k"], -4)
     1900000.0
     """
     measured = measurement_of((time, force), {})
@@ -141,8 +141,8 @@ def identify(
 
 
 @lru_cache(maxsize=4)
-def _shared(deck: Deck) -> Backend:
-    """Return the back end that computes impacts on the plate of a deck by its response."""
+def _shared_backend(deck: Deck) -> Backend:
+    """Return the back end that computes impacts from the response of the deck's plate."""
     problem = checked_problem(deck)
     if problem.deck.has(Nonlinear):
         raise StudyError(
@@ -175,7 +175,7 @@ def fit_deck(
         check_law(law, free)
     units = unit_names(deck)
     sensor = None if sensor is None else sensor.in_unit(units.get("time", ""))
-    model = ForceModel(deck, _shared(deck), sensor, law, computed)
+    model = ForceModel(deck, _shared_backend(deck), sensor, law, computed)
     clock, force = model.histories([{}])
     width = check_measured(measured, clock, force[:, 0], units)
     if len(measured.time) < POINTS:
@@ -185,34 +185,41 @@ def fit_deck(
     depth = (force.max() / deck.require(Indentation).k) ** (2.0 / 3.0)
     sizes = {DELAY: width, OFFSET: UNIT_OFFSET * float(force.max()), "alpha_p": depth}
 
-    def best(names: Sequence[str], by: ForceModel = model) -> FittedPoints | None:
-        """Return the best fit over all starts of the delay; None if the deck's run is too short."""
+    def fit_from_starts(
+        names: Sequence[str], trial_model: ForceModel = model
+    ) -> FittedPoints | None:
+        """Return the best fit from all starts of the delay; None if the deck's run is too short."""
         start_values = {name: _start(deck, name) for name in names}
         trials = (
             [{**start_values, DELAY: lag} for lag in starts] if DELAY in names else [start_values]
         )
         scalings, x = [_scaling(scaling, sizes) for scaling in trials], np.zeros(len(names))
-        chosen = 0
+        best = 0
         if len(scalings) > 1:
-            short = [
-                fit_parameters(by, measured, scaling, x, FIRST_EVALUATIONS) for scaling in scalings
+            short_fits = [
+                fit_parameters(trial_model, measured, scaling, x, FIRST_EVALUATIONS)
+                for scaling in scalings
             ]
-            chosen = min(range(len(short)), key=lambda n: _rank(short[n]))
-        points = fit_parameters(by, measured, scalings[chosen], x, MOST_EVALUATIONS)
+            best = min(range(len(short_fits)), key=lambda n: _rank(short_fits[n]))
+        points = fit_parameters(trial_model, measured, scalings[best], x, MOST_EVALUATIONS)
         return None if points is None or points.lost > LOST else points
 
-    points = best(free)
+    points = fit_from_starts(free)
     if points is None:
         lag = starts[0] if DELAY in free else 0.0
         if share_lost(measured.force, during_run(measured.time, clock, lag)) <= LOST:
             raise IdentifyError(wrong_model("the fit shifts the run away from the contact"))
-        raise StudyError(f"{measured.name}: {_outside(free, starts[0], width, units)}")
+        raise StudyError(
+            f"{measured.name}: {_explain_points_outside(free, starts[0], width, units)}"
+        )
 
-    def filtered(filter: Filter) -> FittedPoints | None:
-        """Return the best fit of a run behind a filter."""
-        return best(free, model._replace(sensor=filter))
+    def fit_with_filter(filter: Filter) -> FittedPoints | None:
+        """Return the best fit with a filter of the measurement."""
+        return fit_from_starts(free, model._replace(sensor=filter))
 
-    fault, suspicion = proposal(model, points, lambda: best([*free, DELAY]), filtered, units)
+    fault, suspicion = proposal(
+        model, points, lambda: fit_from_starts([*free, DELAY]), fit_with_filter, units
+    )
     fault = fault or undescribed(points, units)
     try:
         cov = covariance(points)
@@ -229,7 +236,7 @@ def fit_deck(
 def _identification(
     model: ForceModel, measured: Measurement, points: FittedPoints, cov: Floats, fault: str
 ) -> Identification:
-    """Return values, errors and notes of a fit; `fault` is the reason to reject it."""
+    """Return the result of a fit; `fault` is the reason to reject it, or empty."""
     deviation = np.sqrt(np.diagonal(cov))
     correlation = cov / np.outer(deviation, deviation)
     np.fill_diagonal(correlation, 1.0)
@@ -239,7 +246,7 @@ def _identification(
     plates = {}
     if not fault:
         plates = plate_errors(
-            model, points, lambda deck: model._replace(deck=deck, backend=_shared(deck))
+            model, points, lambda deck: model._replace(deck=deck, backend=_shared_backend(deck))
         )
     identification = Identification(
         values=values,
@@ -261,27 +268,31 @@ def _identification(
 
 
 def _rank(points: FittedPoints | None) -> tuple[bool, float]:
-    """Return the sort key of a fit: fits with the points of the contact first, then by residual."""
+    """Return the sort key of a fit: first whether it covers the contact, then its residual."""
     return (True, math.inf) if points is None else (points.lost > LOST, points.variance)
 
 
 def _scaling(start: dict[str, float], sizes: Mapping[str, float]) -> Scaling:
+    """Return the scaling of parameters with these start values."""
     size, low, high = np.array([parameter_bounds(n, v, sizes) for n, v in start.items()]).T
     return Scaling(start, size, low, high)
 
 
-def _outside(free: Sequence[str], lag: float, width: float, units: dict[str, str]) -> str:
-    """Say why points of the contact are outside the run of the deck."""
+def _explain_points_outside(
+    free: Sequence[str], lag: float, width: float, units: dict[str, str]
+) -> str:
+    """Explain why points of the contact are outside the run of the deck."""
     text = f"more than {100.0 * LOST:.0f} % of the points of the contact are outside the run"
     if DELAY not in free and abs(lag) > width:
         side = "after" if lag > 0.0 else "before"
-        late = f"{abs(lag):.3g} {units.get('time', '')}".rstrip()
-        rise = f"the force rises {late} {side} the deck's own run"
+        shift = f"{abs(lag):.3g} {units.get('time', '')}".rstrip()
+        rise = f"the force rises {shift} {side} the deck's own run"
         return f"{text}, and {rise}; fit delay too, or shift the times"
     return f"{text} of the deck; lengthen the run, or cut the table"
 
 
 def _start(deck: Deck, name: str) -> float:
+    """Return the value at which the fit of a parameter starts."""
     if name in OF_RECORD:
         return 0.0
     rod = build_projectile(deck)
@@ -302,32 +313,33 @@ def _notes(
     """Yield reasons to doubt the values, from the fit and from the run of the fitted deck."""
     if not fit.converged:
         yield "the fit has not converged; start from better values in the deck"
-    if out := len(measured.time) - len(fit.time):
-        yield f"{out} of {len(measured.time)} points are outside the run of the deck and left out"
-    for name, side in zip(fit.values, solution.active, strict=True):
-        if side:
+    if outside := len(measured.time) - len(fit.time):
+        count = len(measured.time)
+        yield f"{outside} of {count} points are outside the run of the deck and left out"
+    for name, bound in zip(fit.values, solution.active, strict=True):
+        if bound:
             yield f"{name} is at its bound {fit.values[name]:.6g}; its standard error is void"
     names = list(fit.values)
     for i, j in zip(*np.nonzero(np.triu(np.abs(fit.correlation) > CORRELATED, 1)), strict=True):
         text = f"{names[i]} and {names[j]} have the correlation {fit.correlation[i, j]:.4f}"
         yield f"{text}: their values can hardly be told apart"
-    if coloured(solution):
-        near = neighbour_correlation(fit.residual)
+    if has_shape(solution):
+        correlation = neighbour_correlation(fit.residual)
         text = "the model does not describe the measurement down to its noise"
         text = f"{text}, and the standard errors are too small"
-        yield f"neighbouring residuals have the correlation {near:.2f}: {text}"
-    elif is_runs_few(solution):
-        far = -sign_runs(fit.residual)
+        yield f"neighbouring residuals have the correlation {correlation:.2f}: {text}"
+    elif has_few_sign_runs(solution):
+        rarity = -sign_runs(fit.residual)
         yield (
-            f"the residual changes its sign too rarely for independent errors ({far:.1f} standard "
-            "deviations of a runs test): the model does not describe the measurement down to its "
-            "noise; does the measurement have a filter that --filter does not name?"
+            f"the residual changes its sign too rarely for independent errors ({rarity:.1f} "
+            "standard deviations of a runs test): the model does not describe the measurement down "
+            "to its noise; does the measurement have a filter that --filter does not name?"
         )
-    fitted = model.outcome([strike_of(fit.deck)], judged=True)
-    if not fitted.fine[0]:
-        yield f"the run of the fitted deck fails: {fitted.status[0]}"
-    # A measurement may end before the peak does; what the model lacks biases the parameters.
-    beyond = [r for r in reasons_of(str(fitted.columns["validity"][0])) if r != Reason.OPEN]
-    if beyond:
-        meaning = ", ".join(MEANING.get(reason, reason) for reason in beyond)
+    outcome = model.outcome([strike_of(fit.deck)], judged=True)
+    if not outcome.fine[0]:
+        yield f"the run of the fitted deck fails: {outcome.status[0]}"
+    # The measurement may end in contact. Other limits of the model bias the parameters.
+    limits = [r for r in reasons_of(str(outcome.columns["validity"][0])) if r != Reason.OPEN]
+    if limits:
+        meaning = ", ".join(MEANING.get(reason, reason) for reason in limits)
         yield f"the run of the fitted deck is {meaning}: the parameters make up for what it lacks"

@@ -1,4 +1,4 @@
-"""Reasons against a fit: a missing delay, offset or filter, another model, the plate."""
+"""Reasons to doubt a fit: missing delay, offset or filter, wrong model, errors of the plate."""
 
 from __future__ import annotations
 
@@ -23,23 +23,23 @@ from fecm.identification.fitting import (
 )
 from fecm.studies.rod_test.filters import Filter, FilterKind
 
-FEW_RUNS = -4.0  # standard deviations of the number of runs of equal signs in a residual
-RISES = np.geomspace(3e-3, 0.3, 14)  # of filters that are tried, over the time of the contact
-FINER = 7  # rise times around the best of them
-CLEARLY = 0.9  # rms of the residual with a filter over that with a delay or an offset
-COLOURED = 0.5  # a finding reports a larger correlation of neighbouring residuals
-FAINT = 1e-3  # share of the peak up to which residuals are the errors of arithmetic
-# Share of the variance of the force in a residual with a shape, above which the model does not
-# describe it.
+FEW_RUNS = -4.0  # number of sign runs, in standard deviations, below which a note reports it
+RISES = np.geomspace(3e-3, 0.3, 14)  # rise times that are tried, over the time of the contact
+FINER = 7  # rise times around the best one, which are tried next
+CLEARLY = 0.9  # residual with a filter over the residual with delay or offset, for a proposal
+COLOURED = 0.5  # correlation of neighbours above which a residual has a shape
+FAINT = 1e-3  # share of the peak up to which residuals are errors of arithmetic
+# Share of the force's variance in a residual with a shape, above which the model does not describe
+# the force.
 UNDESCRIBED = 0.05
-CERTAIN = 5.0  # standard errors from 0, beyond which a delay or an offset is not noise
-LIKELY = 4.0  # the same of a filter, for a note
-HALF = 0.5  # of the systematic part of the residual, which a proposal must remove
+CERTAIN = 5.0  # standard errors above which a delay, an offset or a filter is not noise
+LIKELY = 4.0  # the same for a note about a filter
+HALF = 0.5  # share of the systematic residual that a proposal must remove
 QUIET = 1e-3  # share of the peak below which a force means no contact
-LEAST_QUIET = 10  # fewest points without contact
+LEAST_QUIET = 10  # fewest points without contact that show an offset
 SMALL = 5e-3  # share of the peak up to which an offset without contact is not reported
-# Relative change of a property of the plate that gives the derivatives.  Vibrations shift in phase,
-# so that larger changes are not linear.
+# Relative change of a property of the plate that gives the derivatives. It is small because
+# vibrations shift in phase, which is not linear.
 CHANGED = 1e-3
 PERCENT = 0.01  # the relative change whose effect is reported
 PROPERTIES = ("thickness", "e1")
@@ -51,11 +51,11 @@ def neighbour_correlation(residual: Floats) -> float:
 
 
 def sign_runs(residual: Floats) -> float:
-    """Return the number of runs of equal signs, in standard deviations from independent errors.
+    """Return how far the number of sign runs is from its mean for independent errors.
 
-    Wald and Wolfowitz 1940; 0 if all signs are equal.
+    The unit is the standard deviation (Wald and Wolfowitz 1940). Returns 0 if all signs are equal.
 
-    >>> bool(abs(runs(np.random.default_rng(0).normal(size=4000))) < 3.0)
+    >>> bool(abs(sign_runs(np.random.default_rng(0).normal(size=4000))) < 3.0)
     True
     """
     signs = residual > 0.0
@@ -69,18 +69,19 @@ def sign_runs(residual: Floats) -> float:
     return float((number - mean) / math.sqrt(variance))
 
 
-def coloured(points: FittedPoints) -> bool:
-    """Return whether the residual has a shape, and exceeds the errors of arithmetic."""
-    return not _faint(points) and neighbour_correlation(points.residual) > COLOURED
+def has_shape(points: FittedPoints) -> bool:
+    """Return whether the residual has a shape and exceeds the errors of arithmetic."""
+    return not _is_negligible(points) and neighbour_correlation(points.residual) > COLOURED
 
 
-def _faint(points: FittedPoints) -> bool:
+def _is_negligible(points: FittedPoints) -> bool:
+    """Return whether the residual is an error of arithmetic."""
     return math.sqrt(points.variance) <= FAINT * float(points.force.max())
 
 
 def undescribed(points: FittedPoints, units: dict[str, str]) -> str:
-    """Say that the model does not describe the data; empty if it does."""
-    if _faint(points) or _describes(points.residual, points.force):
+    """Describe why the model does not fit the data; empty if it does."""
+    if _is_negligible(points) or _describes(points.residual, points.force):
         return ""
     rms = f"{math.sqrt(points.variance):.3g} {unit_of('force', units)}".rstrip()
     share = 100.0 * math.sqrt(points.variance) / float(np.std(points.force))
@@ -90,12 +91,13 @@ def undescribed(points: FittedPoints, units: dict[str, str]) -> str:
 
 
 def wrong_model(why: str) -> str:
-    """Say that the model does not describe the data, and what to look at."""
+    """Return a note that the model does not describe the data, and what to check."""
     hint = "compare supports, laminate, patch, mesh and filter with the test"
     return f"the model does not describe the data: {why}; {hint}"
 
 
 def _describes(residual: Floats, force: Floats) -> bool:
+    """Return whether a fit with this residual describes the force."""
     share = float(residual @ residual) / (len(force) * float(np.var(force)))
     shaped = neighbour_correlation(residual) > COLOURED
     return share < 1.0 and (share <= UNDESCRIBED or not shaped)
@@ -105,7 +107,7 @@ def _describes(residual: Floats, force: Floats) -> bool:
 
 
 class LargerFit(NamedTuple):
-    """Fit with more parameters."""
+    """Fit with a delay, an offset or a filter in addition."""
 
     added: dict[str, float]  # values of the added parameters
     residual: Floats
@@ -115,12 +117,12 @@ class LargerFit(NamedTuple):
         """Return whether the model describes the force.
 
         Less than half of a systematic residual may remain. The covariance of neighbours estimates
-        the systematic part; noise of independent points has no share in it.
+        the systematic part, to which the noise of independent points does not contribute.
         """
-        first = float(before[1:] @ before[:-1]) / len(before)
-        rest = float(self.residual[1:] @ self.residual[:-1]) / len(self.residual)
-        white = float(self.residual @ self.residual) / len(self.residual) ** 1.5
-        halved = first > 0.0 and rest < max(HALF**2 * first, 2.0 * white)
+        systematic = float(before[1:] @ before[:-1]) / len(before)
+        remaining = float(self.residual[1:] @ self.residual[:-1]) / len(self.residual)
+        chance = float(self.residual @ self.residual) / len(self.residual) ** 1.5
+        halved = systematic > 0.0 and remaining < max(HALF**2 * systematic, 2.0 * chance)
         return self.certain and halved and _describes(self.residual, force)
 
 
@@ -131,22 +133,24 @@ def proposal(
     filtered: Callable[[Filter], FittedPoints | None],
     units: dict[str, str],
 ) -> tuple[str, str]:
-    """Propose to fit a delay or an offset too, or to name a filter, and note a likely filter.
+    """Return a proposal that rejects the fit, and a note; both are empty if there is no reason.
 
-    Both texts are empty if nothing explains the residual. Linearised fits come first. If the
-    residual has a shape, `refit` fits the delay too, from several starts, and `filtered` fits with
-    the most likely filter of first order. A filter that lowers the residual by more than chance,
-    but does not explain half of its shape, is a note.
+    The proposal is to fit a delay or an offset too, or to name a filter. Linearised fits come
+    first. If the residual has a shape, `refit` also fits the delay, from several starts. `filtered`
+    fits with the most likely filter of first order. A filter that lowers the residual by more than
+    chance, but does not explain half of its shape, gives the note.
     """
-    trial, text = _of_record(model, points, refit, units)
-    other, sensor = _filter(model, points, filtered)
-    if other is None or (trial and _rms(other.residual) > CLEARLY * _rms(trial.residual)):
+    record_fit, text = _propose_record_parameter(model, points, refit, units)
+    filter_fit, sensor = _find_filter(model, points, filtered)
+    if filter_fit is None or (
+        record_fit and _rms(filter_fit.residual) > CLEARLY * _rms(record_fit.residual)
+    ):
         return text, ""
     seems = (
         f"the measurement seems to be filtered: with --filter first-order:{sensor.size:.2g} "
-        f"{_fall(other, points.residual, units)}"
+        f"{_format_fall(filter_fit, points.residual, units)}"
     )
-    if other.explains(points.residual, points.force):
+    if filter_fit.explains(points.residual, points.force):
         return f"{seems}; the values given here are biased", ""
     return text, f"{seems}, which is more than chance; the values may be biased"
 
@@ -155,80 +159,86 @@ def _rms(residual: Floats) -> float:
     return float(np.sqrt(np.mean(residual**2)))
 
 
-def _of_record(
+def _propose_record_parameter(
     model: ForceModel,
     points: FittedPoints,
     refit: Callable[[], FittedPoints | None],
     units: dict[str, str],
 ) -> tuple[LargerFit | None, str]:
-    """Return a delay or an offset that explains the residual, and the proposal; else empty."""
+    """Return the fit with a delay or an offset that explains the residual, and its proposal.
+
+    Returns None and an empty text if neither explains it.
+    """
     before = points.residual
     missing = [name for name in (OFFSET, DELAY) if name not in points.scaling.start]
     choices = [[name] for name in missing] + ([missing] if len(missing) > 1 else [])
-    if _faint(points):
+    if _is_negligible(points):
         return None, ""
     for names in choices:
         trial = _linear(model, points, names)
         if trial.explains(before, points.force):
-            return trial, _told(trial, before, units)
-    if DELAY in missing and coloured(points) and (other := refit()) is not None:
-        trial = LargerFit({DELAY: other.values[DELAY]}, other.residual, certain=True)
-        if trial.explains(before, other.force):
-            return trial, _told(trial, before, units)
-    if OFFSET in missing and (level := _out_of_contact(model, points)):
+            return trial, _format_proposal(trial, before, units)
+    if DELAY in missing and has_shape(points) and (refitted := refit()) is not None:
+        trial = LargerFit({DELAY: refitted.values[DELAY]}, refitted.residual, certain=True)
+        if trial.explains(before, refitted.force):
+            return trial, _format_proposal(trial, before, units)
+    if OFFSET in missing and (level := _force_without_contact(model, points)):
         force = f"{level:.3g} {unit_of('force', units)}".rstrip()
         text = f"fit {OFFSET} too: without contact the measured force is {force}, beyond its noise"
         return None, text
     return None, ""
 
 
-def _filter(
+def _find_filter(
     model: ForceModel, points: FittedPoints, filtered: Callable[[Filter], FittedPoints | None]
 ) -> tuple[LargerFit | None, Filter]:
-    """Return the fit with the likeliest filter of first order; None if chance explains it."""
-    none = Filter(FilterKind.FIRST_ORDER, 0.0)
-    if model.sensor is not None or _faint(points):
-        return None, none
+    """Return the fit with the likeliest filter of first order, and the filter.
+
+    The fit is None if chance explains the fall of the residual.
+    """
+    no_filter = Filter(FilterKind.FIRST_ORDER, 0.0)
+    if model.sensor is not None or _is_negligible(points):
+        return None, no_filter
     top = points.time[points.model > 0.5 * points.model.max()]
     width = float(np.ptp(top)) if len(top) else 0.0
 
-    def rest(rise: float) -> float:
-        """Return the remaining squares if the linearised fit has a filter."""
+    def remaining_squares(rise: float) -> float:
+        """Return the sum of squares of the linearised fit with a filter."""
         filtered_model = model._replace(sensor=Filter(FilterKind.FIRST_ORDER, rise))
         residual = points.force - filtered_model.at(points.time, [points.values])[:, 0]
         x = np.linalg.lstsq(points.jacobian, residual, rcond=None)[0]
         return float(((residual - points.jacobian @ x) ** 2).sum())
 
     if width <= 0.0:
-        return None, none
+        return None, no_filter
     rises = width * RISES
-    best = min(rises.tolist(), key=rest)
+    best = min(rises.tolist(), key=remaining_squares)
     step = float(RISES[1] / RISES[0])
-    best = min((best * np.geomspace(1.0 / step, step, FINER)).tolist(), key=rest)
-    sensor, remaining = Filter(FilterKind.FIRST_ORDER, best), rest(best)
+    best = min((best * np.geomspace(1.0 / step, step, FINER)).tolist(), key=remaining_squares)
+    sensor, remaining = Filter(FilterKind.FIRST_ORDER, best), remaining_squares(best)
     before = float(points.residual @ points.residual)
     fall = (before - remaining) / remaining * max(1, len(points.residual) - len(points.x) - 1)
     if fall < LIKELY**2:
         return None, sensor
-    other = filtered(sensor)
-    if other is None or _rms(other.residual) >= _rms(points.residual):
+    refitted = filtered(sensor)
+    if refitted is None or _rms(refitted.residual) >= _rms(points.residual):
         return None, sensor
-    return LargerFit({}, other.residual, certain=fall > CERTAIN**2), sensor
+    return LargerFit({}, refitted.residual, certain=fall > CERTAIN**2), sensor
 
 
-def is_runs_few(points: FittedPoints) -> bool:
+def has_few_sign_runs(points: FittedPoints) -> bool:
     """Return whether the residual changes its sign less often than chance explains."""
-    return not _faint(points) and sign_runs(points.residual) < FEW_RUNS
+    return not _is_negligible(points) and sign_runs(points.residual) < FEW_RUNS
 
 
 def _linear(model: ForceModel, points: FittedPoints, names: Sequence[str]) -> LargerFit:
-    """Add parameters to the linearised fit."""
+    """Return the linearised fit with more parameters."""
     columns = {OFFSET: np.ones(len(points.time))}
     if DELAY in names:
         values, step = points.values, float(np.median(np.diff(points.time)))
         trials = [{**values, DELAY: values.get(DELAY, 0.0) + s * step} for s in (1.0, -1.0)]
         columns[DELAY] = model.at(points.time, trials) @ [1.0, -1.0] / (2.0 * step)
-    old = len(points.x)
+    first_added = len(points.x)
     jac = np.column_stack([points.jacobian, *(columns[name] for name in names)])
     size = np.linalg.norm(jac, axis=0)
     size[size == 0.0] = 1.0
@@ -236,40 +246,41 @@ def _linear(model: ForceModel, points: FittedPoints, names: Sequence[str]) -> La
     kept = singular > 1e-10 * singular[0]
     root = right[kept].T / singular[kept]
     x = root @ (left[:, kept].T @ points.residual) / size
-    rest = points.residual - jac @ x
-    variance = float(rest @ rest) / (len(rest) - len(x))
+    residual = points.residual - jac @ x
+    variance = float(residual @ residual) / (len(residual) - len(x))
     errors = np.sqrt(variance * np.sum(root**2, axis=1)) / size
-    certain = bool(np.all(np.abs(x[old:]) > CERTAIN * errors[old:]))
-    return LargerFit(dict(zip(names, x[old:].tolist(), strict=True)), rest, certain)
+    certain = bool(np.all(np.abs(x[first_added:]) > CERTAIN * errors[first_added:]))
+    return LargerFit(dict(zip(names, x[first_added:].tolist(), strict=True)), residual, certain)
 
 
-def _told(trial: LargerFit, before: Floats, units: dict[str, str]) -> str:
+def _format_proposal(trial: LargerFit, before: Floats, units: dict[str, str]) -> str:
+    """Propose to fit the added parameters too."""
     values = [
         f"{name} {value:.3g} {unit_of(OF_RECORD[name], units)}".rstrip()
         for name, value in trial.added.items()
     ]
-    effect = f"with {join_names(values)} {_fall(trial, before, units)}"
+    effect = f"with {join_names(values)} {_format_fall(trial, before, units)}"
     return f"fit {join_names(list(trial.added))} too: {effect}; the values given here are biased"
 
 
-def _fall(trial: LargerFit, before: Floats, units: dict[str, str]) -> str:
-    """Return how much smaller the residual of a trial is."""
+def _format_fall(trial: LargerFit, before: Floats, units: dict[str, str]) -> str:
+    """Describe how much the residual falls with a trial."""
     force = f"{_rms(trial.residual):.3g} {unit_of('force', units)}".rstrip()
     return f"the rms of the residual falls from {_rms(before):.3g} to {force}"
 
 
-def _out_of_contact(model: ForceModel, points: FittedPoints) -> float:
+def _force_without_contact(model: ForceModel, points: FittedPoints) -> float:
     """Return the median force before the contact, or after it; 0 if it is noise.
 
-    It is also 0 if there is no such time. After the contact the force must have no shape, which
-    another model could explain.
+    Returns 0 also if the record has too few points there, or if the force after the contact has a
+    shape, which another model could explain.
     """
     without = {**points.values, OFFSET: 0.0}
     model_force = model.at(points.time, [without])[:, 0]
     quiet = model_force <= QUIET * model_force.max()
     before = quiet & (points.time <= points.values.get(DELAY, 0.0))
     if np.count_nonzero(before) >= LEAST_QUIET:
-        quiet = before  # whatever the model is
+        quiet = before  # free of errors of the model
     elif np.count_nonzero(quiet) < LEAST_QUIET:
         return 0.0
     force = points.force[quiet]
@@ -289,23 +300,25 @@ def _out_of_contact(model: ForceModel, points: FittedPoints) -> float:
 def plate_errors(
     model: ForceModel, points: FittedPoints, runs: Callable[[Deck], ForceModel]
 ) -> dict[str, dict[str, float]]:
-    """Return the changes of the fitted values with 1 % more thickness, or E1, of the deck's plate.
+    """Return the changes of the fitted values for a plate with 1 % more thickness or E1.
 
-    The fit is linearised. `runs` returns the model of another deck. A property is left out if the
-    plate can't be run with the time step of the deck.
+    The fit is linearised. `runs` returns the model of a changed deck. A property is left out if the
+    changed plate can't be run with the time step of the deck.
     """
     material = model.deck.require(Material)
-    properties = {"thickness": sum(y.thickness for y in material.layers), "e1": material.ply.e1}
+    properties = {
+        "thickness": sum(layer.thickness for layer in material.layers),
+        "e1": material.ply.e1,
+    }
     clock, _ = model.histories([points.values])
     dt = float(clock[len(clock) // 2 + 1])  # the first time after 0
     errors: dict[str, dict[str, float]] = {}
     for name in PROPERTIES:
-        for change in (CHANGED, -CHANGED):  # one of them may be unstable
+        for change in (CHANGED, -CHANGED):  # one of the two plates may be unstable
             try:
-                other = runs(
-                    apply_case(model.deck, {name: (1.0 + change) * properties[name], "dt": dt})
-                )
-                force = other.at(points.time, [points.values])[:, 0]
+                case = {name: (1.0 + change) * properties[name], "dt": dt}
+                changed = runs(apply_case(model.deck, case))
+                force = changed.at(points.time, [points.values])[:, 0]
             except FecmError:
                 continue
             x = np.linalg.lstsq(points.jacobian, points.model - force, rcond=None)[0]

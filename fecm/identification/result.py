@@ -1,4 +1,4 @@
-"""Result of a fit to a measured force, and its tables."""
+"""Parameters fitted to a measured force, and their tables."""
 
 from __future__ import annotations
 
@@ -22,14 +22,14 @@ CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
     **dict.fromkeys(("k", "alpha_p", "s_p", "q"), Indentation),
     **dict.fromkeys(("mass", "rod_length", "rod_modulus", "rod_density"), Projectile),
 }
-DIGITS = 5  # of fitted values; their errors have two
+DIGITS = 5  # significant digits of fitted values; their errors have two
 LABEL_WIDTH = 13
 PLATE_ERRORS = "Change of the values with 1 % more of a property of the plate in the deck"
 
 
 @dataclass(frozen=True)
 class Identification:
-    """Parameters fitted to a measured force.
+    """Parameters of an impact, fitted to a measured force.
 
     Attributes
     ----------
@@ -54,8 +54,8 @@ class Identification:
     notes : tuple of str
         Reasons to doubt the values.
     law : str
-        Name of the contact law that took the place of EXPE, which the deck has all the same; empty
-        if none did.
+        Name of the contact law that replaced EXPE; empty if none did. The deck has EXPE all the
+        same.
     """
 
     values: dict[str, float]
@@ -110,9 +110,10 @@ class Identification:
         return unit_of(OF_RECORD.get(name) or dimension_of(name), self.units)
 
     def report(self, path: str | Path, *, overwrite: bool = False) -> None:
-        """Write an HTML page to hand on, as ``fecm identify --report`` does.
+        """Write an HTML page like ``fecm identify --report``.
 
-        The page is one file: verdict, fitted values, their errors, pictures, deck.
+        The page is one file with the verdict, the fitted values and their errors, pictures and the
+        deck.
 
         Parameters
         ----------
@@ -132,7 +133,7 @@ class Identification:
 
         Examples
         --------
-        >>> found.report("impact.html")  # doctest: +SKIP
+        >>> fit.report("impact.html")  # doctest: +SKIP
         """
         report_results({"the measurement": self}, path, overwrite=overwrite)
 
@@ -140,10 +141,12 @@ class Identification:
         """Return the cards of the deck with fitted values."""
         kinds = dict.fromkeys(CARDS[name] for name in self.values if name in CARDS)
         segments = (self.deck.require(kind) for kind in kinds)
-        return "\n".join(line for s in segments for line in s.cards(self.deck.control)).rstrip()
+        return "\n".join(
+            line for segment in segments for line in segment.cards(self.deck.control)
+        ).rstrip()
 
     def to_dict(self) -> dict[str, object]:
-        """Return plain values, as ``fecm identify --format json`` prints them."""
+        """Return plain values, as printed by ``fecm identify --format json``."""
         return {
             **({"law": self.law} if self.law else {}),
             "values": {
@@ -177,7 +180,7 @@ class Identification:
 
 
 def identification_tables(fit: Identification) -> Iterator[Table]:
-    """Return the quality of a fit, its values, their correlations, and the effect of the plate."""
+    """Yield tables: quality of the fit, its values, their correlations, effect of the plate."""
     yield _quality(fit)
     values = tuple(_value_row(fit, name) for name in fit.values)
     yield Table(values, ("parameter", "value", "standard error", "start"), "Fitted values")
