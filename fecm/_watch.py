@@ -83,8 +83,8 @@ class CallerWatch(Watch):
     def deferring_interrupts(self) -> Iterator[None]:
         """Let the first SIGINT stop the job in good order, and the second one at once.
 
-        A stopped job ends in KeyboardInterrupt. Only the main thread gets signals. A handler of the
-        caller stays in place.
+        The block ends in KeyboardInterrupt, which says what the job has left. Only the main thread
+        gets signals. A handler of the caller stays in place.
         """
         is_main = threading.current_thread() is threading.main_thread()
         if not is_main or signal.getsignal(signal.SIGINT) is not signal.default_int_handler:
@@ -100,6 +100,9 @@ class CallerWatch(Watch):
             yield
         except StoppedError as stopped:
             raise KeyboardInterrupt(str(stopped)) from None
+        else:
+            if self._interrupted:
+                raise KeyboardInterrupt(f"stopped; the result of {self._name} is complete")
         finally:
             signal.signal(signal.SIGINT, signal.default_int_handler)
 

@@ -99,6 +99,27 @@ def test_a_sweep_that_was_stopped_resumes_to_the_same_bytes(tmp_path: Path) -> N
     assert {path.name for path in tmp_path.iterdir()} == {"whole.h5", "stopped.h5"}
 
 
+@pytest.mark.posix
+@pytest.mark.parametrize(
+    ("after", "text"),
+    [(2, r"after \d of 8 cases; the same call resumes"), (8, "the result of .* is complete")],
+)
+def test_an_interrupt_of_a_sweep_says_what_is_left(tmp_path: Path, after: int, text: str) -> None:
+    def interrupt(done: int, total: int) -> None:
+        if done == after:
+            os.kill(os.getpid(), signal.SIGINT)
+
+    whole, path = tmp_path / "whole.h5", tmp_path / "s.h5"
+    vary: dict[str, list[Any]] = {"layup": LAYUPS, "k": [1e6, 2e6]}
+    with pytest.raises(KeyboardInterrupt, match=text):
+        fecm.sweep(small(), vary, output=path, progress=interrupt)
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    assert path.exists() == (after == 8)
+    fecm.sweep(small(), vary, output=path, overwrite=True)
+    fecm.sweep(small(), vary, output=whole)
+    assert path.read_bytes() == whole.read_bytes()
+
+
 def test_a_sweep_of_the_command_is_resumed_from_python(tmp_path: Path) -> None:
     (tmp_path / "d.inp").write_text(small())
     done = call("sweep", "d.inp", "--vary", f"layup={','.join(LAYUPS)}", "-o", "a.h5", cwd=tmp_path)

@@ -464,13 +464,18 @@ class Sweep:
             If there are finished cases of another sweep with the same output.
         StoppedError
             If the watch stops the sweep.  With an output file, the same sweep continues it.
+        KeyboardInterrupt
+            After an interrupt, without a watch.
         OSError
             If a file can't be written.
         """
-        watch = watch or CallerWatch(self.title, self.progress)
+        caller = CallerWatch(self.title, self.progress)
+        defers = watch is None and self.path is not None
+        watch = watch or caller
         for text in (*self._loaded.warnings, *self.doubts):
             watch.note(text)
-        result = self.compute(watch)
+        with caller.deferring_interrupts() if defers else contextlib.nullcontext():
+            result = self.compute(watch)
         for text in result.notes:
             watch.note(text)
         for run in self.full_runs().values():
