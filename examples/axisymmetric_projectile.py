@@ -84,9 +84,9 @@ for force in result.force:
 
 # %%
 # Both ring, the solid more. Averaged over a period of the ringing the two agree:
-def compare(name, one, other):
-    rms = np.sqrt(np.mean((one - other) ** 2) / np.mean(other**2))
-    peaks = f"{one.max():.2f} and {other.max():.2f} lb, {one.max() / other.max() - 1:+.1%}"
+def compare(name, force, other):
+    rms = np.sqrt(np.mean((force - other) ** 2) / np.mean(other**2))
+    peaks = f"{force.max():.2f} and {other.max():.2f} lb, {force.max() / other.max() - 1:+.1%}"
     print(f"{name:8}  peak {peaks}, rms of the difference {rms:.1%}")
 
 

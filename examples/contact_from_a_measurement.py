@@ -20,13 +20,13 @@ time = truth.time[::20]
 scatter = np.random.default_rng(0).normal(size=len(time))
 force = truth.force[::20] + 0.02 * truth.force.max() * scatter
 
-found = fecm.identify(deck, time, force, ["k", "velocity"])
-for name, value in found.values.items():
-    print(f"{name}: {value:.4g} ± {found.errors[name]:.2g}")
+fit = fecm.identify(deck, time, force, ["k", "velocity"])
+for name, value in fit.values.items():
+    print(f"{name}: {value:.4g} ± {fit.errors[name]:.2g}")
 
 figure, ax = plt.subplots(figsize=(5, 3), layout="constrained")
 ax.plot(1e6 * time, force, ".", label="measured")
-ax.plot(1e6 * time, found.model, label="fitted")
+ax.plot(1e6 * time, fit.model, label="fitted")
 ax.set(xlabel="Time (µs)", ylabel="Contact force (lbf)")
 ax.legend(frameon=False)
 figure.savefig("fitted.png")

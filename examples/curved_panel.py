@@ -19,9 +19,9 @@ settings = {"velocity": "1m/s", "duration": "0.8ms", "patch": "disc:10", "units"
 radii, stiffness, peak = (None, 4000, 2000, 1000, 700, 500), [], []
 for radius in radii:
     deck = fecm.impact(plate, laminate, mass, contact, radius_y=radius, **settings)
-    found = fecm.estimate(deck)
-    stiffness.append(found.stiffness)
-    peak.append(found.models["run"].peak_force)
+    estimate = fecm.estimate(deck)
+    stiffness.append(estimate.stiffness)
+    peak.append(estimate.models["run"].peak_force)
     print(f"radius {radius}: {stiffness[-1]:.0f} N/mm, peak force {peak[-1]:.1f} N")
 
 figure, ax = plt.subplots(figsize=(5, 3), layout="constrained")

@@ -19,6 +19,6 @@ with Client(processes=False, n_workers=2, threads_per_worker=1, dashboard_addres
     fine = fecm.sweep(deck, {"velocity": near}, scheduler=client)
     print(f"the client is {client.status}")
 
-for found in (coarse, fine):
-    case = int(np.argmax(found["peak_force"] >= 100))
-    print(f"{found['peak_force'][case]:.2f} lbf at {found['velocity'][case]:g} in/s")
+for result in (coarse, fine):
+    case = int(np.argmax(result["peak_force"] >= 100))
+    print(f"{result['peak_force'][case]:.2f} lbf at {result['velocity'][case]:g} in/s")

@@ -12,14 +12,14 @@ import fecm
 warnings.simplefilter("ignore", fecm.FecmWarning)  # at high energies the plate leaves its range
 deck = fecm.read_one(fecm.examples.path("drop-weight.inp"))
 energies = [500.0 * n for n in range(1, 21)]  # mJ
-found = fecm.sweep(deck, {"energy": energies, "duration": [0.005]})
+result = fecm.sweep(deck, {"energy": energies, "duration": [0.005]})
 
 # %%
 # A search finds the energy at the threshold to six digits:
 onset = fecm.sweep(deck, until="threshold")["found_energy"][0]
 print(f"it delaminates from {onset / 1000:.2f} J on")
 
-ax = found.plot(over="energy")
+ax = result.plot(over="energy")
 ax.axvline(onset, color="black", linewidth=0.8)
 ax.annotate(f" {onset / 1000:.1f} J", (onset, 1000))
 ax.figure.savefig("energy.png", bbox_inches="tight")

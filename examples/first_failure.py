@@ -13,7 +13,10 @@ import fecm
 warnings.simplefilter("ignore", fecm.FecmWarning)  # plies fail, and the run continues elastically
 deck = fecm.read_one(fecm.examples.path("drop-weight.inp")).with_(energy="4.5J")
 result = fecm.run_one(deck)
-for one in result.first_failures:
-    print(f"{one.criterion:12} {one.mode}, ply {one.ply}: {one.force:.0f} N, {one.energy:.0f} mJ")
+for failure in result.first_failures:
+    print(
+        f"{failure.criterion:12} {failure.mode}, ply {failure.ply}: "
+        f"{failure.force:.0f} N, {failure.energy:.0f} mJ"
+    )
 
 result.plot("failure", "failure.png", width="full", overwrite=True)

@@ -10,11 +10,11 @@ import fecm
 
 deck = fecm.examples.path("panel-with-gages.inp")
 strains = fecm.examples.path("panel-strains.csv")
-found = fecm.locate(deck, strains, noise=3.7e-6)
+location = fecm.locate(deck, strains, noise=3.7e-6)
 
-print(f"x = {found.x:.2f} ± {found.sd_x:.2f} {found.unit('x')}")
-print(f"y = {found.y:.2f} ± {found.sd_y:.2f} {found.unit('y')}")
-print(f"peak force {found.peak_force:.0f} {found.unit('peak_force')}")
-print(f"impulse    {found.impulse:.4f} {found.unit('impulse')}")
-print(f"misfit     {found.misfit:.2f} times the noise; second place {found.second.ratio:.1f}")
-found.plot("located.png")
+print(f"x = {location.x:.2f} ± {location.sd_x:.2f} {location.unit('x')}")
+print(f"y = {location.y:.2f} ± {location.sd_y:.2f} {location.unit('y')}")
+print(f"peak force {location.peak_force:.0f} {location.unit('peak_force')}")
+print(f"impulse    {location.impulse:.4f} {location.unit('impulse')}")
+print(f"misfit     {location.misfit:.2f} times the noise; second place {location.second.ratio:.1f}")
+location.plot("located.png")

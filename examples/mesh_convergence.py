@@ -24,11 +24,11 @@ def deck_of(case):
     )
 
 
-found = fecm.sweep(build=deck_of, vary={"elements": [10, 14, 20]})
-peak = found["peak_force"]
-for elements, force in zip(found["elements"], peak, strict=True):
+result = fecm.sweep(build=deck_of, vary={"elements": [10, 14, 20]})
+peak = result["peak_force"]
+for elements, force in zip(result["elements"], peak, strict=True):
     print(f"{elements:3.0f} elements a side: {force:.2f} N ({force / peak[-1] - 1:+.2%})")
 
-ax = found.plot(quantity="peak_force")
+ax = result.plot(quantity="peak_force")
 ax.set(xlabel="Elements a side", ylim=(177, 178))
 ax.figure.savefig("convergence.png")

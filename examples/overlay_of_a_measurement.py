@@ -9,9 +9,9 @@ import fecm
 measured = fecm.examples.path("measured-force.csv")  # columns time, force
 result = fecm.run_one(fecm.examples.path("impact-patch.inp"))
 
-found = result.compare(measured)
-print(found)
-print(f"correlation {found.correlation:.4f}")
+comparison = result.compare(measured)
+print(comparison)
+print(f"correlation {comparison.correlation:.4f}")
 
 ax = result.plot("force", overlay=measured, width="full")
 ax.set_title("115 in/s")

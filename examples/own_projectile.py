@@ -27,9 +27,9 @@ class SpringMounted:
 
 
 deck = fecm.read_one(fecm.examples.path("impact-patch.inp"))
-projectiles = {"rigid": SpringMounted(1e7), "mounted": SpringMounted(1e4)}
-results = {name: fecm.run_one(deck, projectile=one) for name, one in projectiles.items()}
-for name, result in results.items():
+results = {}
+for name, spring in {"rigid": 1e7, "mounted": 1e4}.items():
+    result = results[name] = fecm.run_one(deck, projectile=SpringMounted(spring))
     stored = result.energy.projectile_strain.max()
     print(f"{name}: {result.force.max():.1f} lbf, up to {stored:.3f} lbf in in the spring")
 draw_results("force", results, "projectiles.png")

@@ -23,13 +23,13 @@ deck = fecm.examples.path("impact-patch.inp").read_text()
 deck = re.sub("PATC\n|DISC\n|SHEA MITC\n", "", deck)
 grid = {"velocity": np.linspace(113, 117, 9), "k": np.linspace(1.7e6, 2.1e6, 9)}
 with warnings.catch_warnings(action="ignore"):  # a point force depends on the mesh
-    found = fecm.sweep(deck, grid, history=True)
+    result = fecm.sweep(deck, grid, history=True)
 
 # %%
 # The transducer is a first-order filter with a rise time of 5 µs.
-dt = found.dt[0]
+dt = result.dt[0]
 decay = np.exp(-dt * np.log(9) / 5e-6)
-force = lfilter([1 - decay, 1 - decay], [2, -2 * decay], found.force)
+force = lfilter([1 - decay, 1 - decay], [2, -2 * decay], result.force)
 force = force[:, np.rint(time / dt).astype(int) - 1].reshape(9, 9, -1)
 model = RegularGridInterpolator(tuple(grid.values()), force, bounds_error=False)
 
@@ -45,8 +45,8 @@ sampler.random_state = np.random.RandomState(0).get_state()
 start = np.random.default_rng(0).uniform([114, 1.8e6], [116, 2.0e6], (16, 2))
 sampler.run_mcmc(start, 2000)
 velocity, k = sampler.get_chain(discard=200, flat=True).T
-print(f"velocity {velocity.mean():.2f} ± {velocity.std():.2f} in/s; the true one is 115")
-print(f"k {k.mean():.3e} ± {k.std():.1e} lbf/in^1.5; the true one is 1.912e+06")
+print(f"velocity {velocity.mean():.2f} ± {velocity.std():.2f} in/s; the true velocity is 115")
+print(f"k {k.mean():.3e} ± {k.std():.1e} lbf/in^1.5; the true k is 1.912e+06")
 
 figure, ax = plt.subplots(figsize=(5, 3.5), layout="constrained")
 ax.hexbin(velocity, k, gridsize=40, cmap="Blues")

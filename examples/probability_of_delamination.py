@@ -12,8 +12,8 @@ import fecm
 warnings.simplefilter("ignore", fecm.FecmWarning)  # some of the draws delaminate
 deck = fecm.read_one(fecm.examples.path("drop-weight.inp")).with_(energy="4.3J")
 laws = {"energy": "normal:4300,200", "k": "lognormal:42000,0.2"}  # mJ, N/mm^1.5
-found = fecm.sweep(deck, random=laws, samples=512, exceed={"peak_force": "threshold"})
-chance = found.random.exceedance
+result = fecm.sweep(deck, random=laws, samples=512, exceed={"peak_force": "threshold"})
+chance = result.random.exceedance
 print(f"{chance.probability.item():.0%} ({chance.lower.item():.0%} to {chance.upper.item():.0%})")
 
-found.plot("exceedance", "probability.png", overwrite=True)
+result.plot("exceedance", "probability.png", overwrite=True)

@@ -18,15 +18,15 @@ problem = {"names": list(ends), "num_vars": len(ends), "bounds": list(ends.value
 draws = sample(problem, 256, calc_second_order=False, seed=1)
 by_salib = fecm.sweep(deck, cases=pd.DataFrame(draws, columns=problem["names"]))
 dents = by_salib["permanent_indentation"]
-found = sobol.analyze(problem, dents, calc_second_order=False, seed=1)
+of_salib = sobol.analyze(problem, dents, calc_second_order=False, seed=1)
 
 # %%
 # The same study by ``fecm``, with a sample of its own:
 laws = {name: f"uniform:{a},{b}" for name, (a, b) in ends.items()}
-own = fecm.sweep(deck, random=laws, samples=256, design="sobol", sensitivity=True)
-indices = own.random.sensitivity["permanent_indentation"]
+result = fecm.sweep(deck, random=laws, samples=256, design="sobol", sensitivity=True)
+indices = result.random.sensitivity["permanent_indentation"]
 print("first-order index      SALib (95 %)            fecm (95 %)")
 for n, name in enumerate(ends):
     low, high = indices.first_interval[n]
-    salib = f"{found['S1'][n]:.3f} ± {found['S1_conf'][n]:.3f}"
+    salib = f"{of_salib['S1'][n]:.3f} ± {of_salib['S1_conf'][n]:.3f}"
     print(f"{name:20} {salib:>14}  {indices.first[n]:.3f} ({low:.3f} to {high:.3f})")

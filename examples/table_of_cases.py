@@ -17,9 +17,9 @@ tests = pd.DataFrame(
     }
 ).set_index("specimen")
 
-found = fecm.sweep(fecm.examples.path("impact-patch.inp"), cases=tests)
+result = fecm.sweep(fecm.examples.path("impact-patch.inp"), cases=tests)
 columns = ["peak_force", "contact_time", "energy_absorbed", "status"]
-results = tests.join(found.to_dataframe()[columns].set_index(tests.index))
+results = tests.join(result.to_dataframe()[columns].set_index(tests.index))
 print(results.to_string())
 
 # %%
