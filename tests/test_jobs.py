@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -65,7 +66,16 @@ def test_a_run_that_was_stopped_resumes_to_the_same_bytes(tmp_path: Path, solver
     assert list(tmp_path.glob("*.checkpoint")) == []
 
 
+@pytest.fixture
+def _interruptible() -> Iterator[None]:
+    """Let SIGINT interrupt, also in a shell that ignores SIGINT in background jobs."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 @pytest.mark.posix
+@pytest.mark.usefixtures("_interruptible")
 def test_an_interrupt_of_a_run_with_a_file_leaves_a_checkpoint(tmp_path: Path) -> None:
     def interrupt(done: int, total: int) -> None:
         if 0 < done < total:
@@ -100,6 +110,7 @@ def test_a_sweep_that_was_stopped_resumes_to_the_same_bytes(tmp_path: Path) -> N
 
 
 @pytest.mark.posix
+@pytest.mark.usefixtures("_interruptible")
 @pytest.mark.parametrize(
     ("after", "text"),
     [(2, r"after \d of 8 cases; the same call resumes"), (8, "the result of .* is complete")],

@@ -97,7 +97,7 @@ def test_a_unit_needs_the_decks_own() -> None:
         "4J",
     )
     assert_unusable(made)
-    assert "--energy is '4J': give --units, the deck's" in made.stderr
+    assert "--energy is '4J': give the deck's --units" in made.stderr
 
 
 def test_a_fixtures_energy_in_millijoules_is_doubted() -> None:

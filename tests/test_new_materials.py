@@ -98,7 +98,7 @@ def test_constants_of_one_material_have_a_name() -> None:
     assert rows(deck_of(*letter, "--units", "mm-N-s"))[1] == (0, 5, 2)
     refused = new(*LAW, *letter)
     assert refused.exit_code == 2
-    assert "need --units" in refused.stderr
+    assert "need their --units" in refused.stderr
 
 
 def test_a_zone_has_the_elements_whose_centres_lie_in_it() -> None:
