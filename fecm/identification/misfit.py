@@ -10,6 +10,7 @@ import numpy as np
 
 from fecm._errors import FecmError
 from fecm._typing import Floats
+from fecm.authoring.case import Case
 from fecm.authoring.vary import apply_case
 from fecm.deck.model import Deck, Material
 from fecm.deck.units import unit_of
@@ -316,7 +317,7 @@ def plate_errors(
     for name in PROPERTIES:
         for change in (CHANGED, -CHANGED):  # one of the two plates may be unstable
             try:
-                case = {name: (1.0 + change) * properties[name], "dt": dt}
+                case: Case = {name: (1.0 + change) * properties[name], "dt": dt}
                 changed = runs(apply_case(model.deck, case))
                 force = changed.at(points.time, [points.values])[:, 0]
             except FecmError:
