@@ -28,10 +28,10 @@ from fecm.problem.problem import Problem
 from fecm.results.validity import LIMITS
 from fecm.studies import StudyError
 
-# Masses over the plate's.
-SMALL = 0.1  # below, waves control the impact
-LARGE = 50.0  # above, the impact is quasi-static
-# Of the static model of a nonlinear plate; isotropic circular plates, clamped and simply supported.
+# Mass of the projectile over the mass of the plate.
+SMALL = 0.1  # ratio below which waves control the impact
+LARGE = 50.0  # ratio above which the impact is quasi-static
+# Remark on the nonlinear static plate, from clamped and simply supported isotropic circular plates.
 LOW = "the nonlinear static plate is 9 to 26 % low in force at M/M_plate = 24"
 
 
@@ -42,15 +42,15 @@ class QuickModel:
     name: str
     impact: QuickImpact
     threshold: float  # delamination threshold that applies to the model, force; NaN without DELA
-    velocity: float  # at which the model reaches it; NaN without DELA
-    applies: bool  # whether the mass ratio is in the model's range
+    velocity: float  # velocity at which the model reaches the threshold; NaN without DELA
+    applies: bool  # whether the mass ratio is in the range of the model
 
 
 class QuickEstimate(NamedTuple):
     """Quick estimates of an impact."""
 
     mass: float  # of the projectile
-    mass_ratio: float  # to the plate's
+    mass_ratio: float  # to the mass of the plate
     parameter: float  # Zener's lambda
     stiffness: float  # of the plate under its load, force/length; NaN for a free plate
     models: tuple[QuickModel, ...]
@@ -71,7 +71,7 @@ class QuickEstimate(NamedTuple):
 def quick_estimate(problem: Problem) -> QuickEstimate:
     """Estimate the impact of a checked problem.
 
-    Raises StudyError without an impact.
+    Raises StudyError if the problem has no impact.
     """
     contact = problem.contact
     if contact is None:
@@ -86,7 +86,9 @@ def quick_estimate(problem: Problem) -> QuickEstimate:
     parameter = _inelasticity(problem, mass, velocity)
 
     small = infinite_plate(mass, velocity, k, parameter)
-    reached = _velocity(_peaks_on_infinite_plate(problem, mass), velocity, SMALL_MASS * force)
+    reached = _velocity_at_peak(
+        _peaks_on_infinite_plate(problem, mass), velocity, SMALL_MASS * force
+    )
     models = [
         QuickModel("infinite plate", small, SMALL_MASS * force, reached, applies=ratio < SMALL)
     ]
@@ -94,7 +96,7 @@ def quick_estimate(problem: Problem) -> QuickEstimate:
     if not math.isfinite(stiffness):
         return QuickEstimate(mass, ratio, parameter, stiffness, tuple(models))
     large = static_plate(mass, velocity, k, stiffness)
-    reached = _velocity(lambda v: static_peak(mass, v, k, stiffness), velocity, force)
+    reached = _velocity_at_peak(lambda v: static_peak(mass, v, k, stiffness), velocity, force)
     static = QuickModel("static plate", large, force, reached, applies=ratio > LARGE)
     models.append(static)
     remark = ""
@@ -112,24 +114,24 @@ def quick_estimate(problem: Problem) -> QuickEstimate:
 
 
 def velocity_at(problem: Problem, force: float) -> float:
-    """Return the velocity at which the better of the quick models reaches a peak force.
+    """Return the velocity at which the better quick model reaches a peak force.
 
-    Between the ranges of both models all forces are too low. Where no model applies, as for a free
-    plate under a large mass, it is the velocity of the deck.
+    Between the ranges of the two models, both underestimate the force. Where no model applies, as
+    for a free plate under a large mass, the velocity of the deck is returned.
     """
     deck, contact = problem.deck, problem.contact
     assert contact is not None  # the program has impact steps
     mass, velocity = build_projectile(deck).total_mass, deck.require(Impact).velocity
     k = deck.require(Indentation).k
     if mass < problem.plate.total_mass():
-        return _velocity(_peaks_on_infinite_plate(problem, mass), velocity, force)
+        return _velocity_at_peak(_peaks_on_infinite_plate(problem, mass), velocity, force)
     try:
         return _static_velocity(nonlinear_curve(problem, 0.0, force), mass, k, force)
     except NoCurveError:
         stiffness = static_stiffness(problem.moving_plate, contact)
     if math.isnan(stiffness):
         return velocity
-    return _velocity(lambda v: static_peak(mass, v, k, stiffness), velocity, force)
+    return _velocity_at_peak(lambda v: static_peak(mass, v, k, stiffness), velocity, force)
 
 
 def _nonlinear_model(
@@ -144,9 +146,9 @@ def _nonlinear_model(
 
 
 def _static_velocity(curve: StaticCurve, mass: float, k: float, force: float) -> float:
-    """Return the velocity at which the static model reaches a force of the curve."""
-    most = curve.deflection[-1]
-    deflection = root(lambda w: stored_at(curve, k, w)[0] - force, 0.0, most, 1e-12 * most)
+    """Return the velocity at which the static model reaches a force."""
+    largest = curve.deflection[-1]
+    deflection = root(lambda w: stored_at(curve, k, w)[0] - force, 0.0, largest, 1e-12 * largest)
     return math.sqrt(2.0 * stored_at(curve, k, deflection)[1] / mass)
 
 
@@ -157,13 +159,13 @@ def _inelasticity(problem: Problem, mass: float, velocity: float) -> float:
 
 
 def _peaks_on_infinite_plate(problem: Problem, mass: float) -> Callable[[float], float]:
-    """Return the peak forces on the infinite plate by velocity."""
+    """Return the peak force on the infinite plate as a function of the velocity."""
     k = problem.deck.require(Indentation).k
     return lambda v: peak_on_infinite_plate(mass, v, k, _inelasticity(problem, mass, v))
 
 
-def _velocity(peak: Callable[[float], float], start: float, force: float) -> float:
-    """Return the velocity at which an increasing peak force has a value; NaN if not finite."""
+def _velocity_at_peak(peak: Callable[[float], float], start: float, force: float) -> float:
+    """Return the velocity at which an increasing peak reaches a force; NaN if not finite."""
     if not math.isfinite(force):
         return math.nan
     low = high = start

@@ -1,7 +1,6 @@
 """Parameters of the contact law from an indentation test (report, chapter 3).
 
-A test is a series of indentations and forces in the order of measurement, which `measured` reads.
-`turns` finds its turning points, `curves` fits the loading, unloading and reloading curves,
-`permanent` the relation of permanent to largest indentation, and `constants` all parameters;
-`output` shows them.  `modulus` computes k without a test.
+A test is a series of indentations and forces in the order of measurement. `turns` reads it and
+finds its turning points. `curves` fits the loading, unloading and reloading curves, and the
+relation of permanent to largest indentation. `constants` fits all parameters and formats them.
 """

@@ -51,25 +51,26 @@ class FreePower(NamedTuple):
 def free_power(curves: Curves) -> FreePower:
     """Fit the first loading with a free power.
 
-    The coefficient at the largest indentation is almost independent of the power; the coefficient
-    at unit indentation, far from every point, inherits the error of the power.
+    The coefficient is fitted at the largest indentation, where it is almost independent of the
+    power. The coefficient at unit indentation is far from every point and inherits the error of the
+    power.
     """
     from scipy.optimize import least_squares  # takes 0.3 s, and most commands do not fit
 
     rows = curves.division.rows(StretchKind.LOADING)
-    everywhere = np.maximum(curves.a[rows], 0.0), curves.f[rows]
-    a, f = (values[everywhere[0] > 0.0] for values in everywhere)
+    all_points = np.maximum(curves.a[rows], 0.0), curves.f[rows]
+    a, f = (values[all_points[0] > 0.0] for values in all_points)
     start = [1.0, LOADING_POWER]
     c, n = least_squares(lambda p: f - p[0] * a ** p[1], start, xtol=1e-12, ftol=1e-12).x
     fitted = c * a**n
-    _, of_points = influence(np.stack([a**n, fitted * np.log(a)], axis=1), f - fitted)
-    covariance = of_points @ of_points.T
+    _, influences = influence(np.stack([a**n, fitted * np.log(a)], axis=1), f - fitted)
+    covariance = influences @ influences.T
     k = c * curves.force / curves.length**n
-    by = np.array([k / c, -k * np.log(curves.length)])
+    derivatives = np.array([k / c, -k * np.log(curves.length)])
     return FreePower(
         FittedValue(float(n), float(covariance[1, 1] ** 0.5)),
-        FittedValue(float(k), float((by @ covariance @ by) ** 0.5)),
-        r_squared(c * everywhere[0] ** n, everywhere[1]),
+        FittedValue(float(k), float((derivatives @ covariance @ derivatives) ** 0.5)),
+        r_squared(c * all_points[0] ** n, all_points[1]),
     )
 
 
@@ -77,18 +78,18 @@ def free_power(curves: Curves) -> FreePower:
 class Cycle:
     """Unloading and reloading from a point of the first loading curve."""
 
-    alpha_m: FittedValue  # largest indentation (length); its error is 0 if it is the recorded value
+    alpha_m: FittedValue  # largest indentation (length); the error is 0 for a recorded value
     alpha_m_recorded: float  # smoothed if noisy
     alpha_0: FittedValue  # permanent indentation (length)
     k_1: FittedValue  # reloading rigidity, equation 3-12, force/length^1.5
-    # Like `k_1`, from the origin of the first reloading curve; None without reloading, and if the
-    # reloading began without contact, where both are equal.
+    # Like `k_1`, from the origin of the first reloading curve. None without reloading, and if the
+    # reloading began without contact, because both are then equal.
     k_1_measured: FittedValue | None
 
 
 @dataclass(frozen=True)
 class ContactLawFit:
-    """Result of a fit."""
+    """Contact law fitted to a test, with its curves."""
 
     k: FittedValue  # contact coefficient with n = 3/2, force/length^1.5
     free: FreePower
@@ -123,11 +124,11 @@ def fit_contact_law(
 ) -> ContactLawFit:
     """Fit the contact law to a test.
 
-    Indentation and force, (n,), are in the order of measurement from first contact at zero, and
-    positive in compression.  A decrease of the indentation by `retreat` (automatic if None) counts
-    as a turn.  The unloading power `q` is fitted if None.  With `acr` alpha_cr of equation 3-7 is
-    fitted with q = 5/2 instead of s_p and alpha_p of equation 3-8.  Raises StudyError if the points
-    are not an indentation test.
+    Indentation and force, (n,), are positive in compression. They are in the order of measurement,
+    from the first contact at zero. A decrease of the indentation by `retreat` (automatic if None)
+    counts as a turn. The unloading power `q` is fitted if it is None. With `acr`, q is 5/2, and
+    alpha_cr of equation 3-7 is fitted instead of s_p and alpha_p of equation 3-8. Raises StudyError
+    if the points are not an indentation test.
     """
     a, f = np.asarray(indentation, dtype=float), np.asarray(force, dtype=float)
     if a.shape != f.shape or a.ndim != 1:
@@ -147,7 +148,7 @@ def fit_contact_law(
         covariance = covariance + np.eye(len(places)) * (ROUNDING * p[peaks].max()) ** 2
     points = p[peaks], p[layout.permanents], covariance
     cycles = tuple(_cycle(solution, n) for n in range(len(peaks)))
-    straight = fit_permanent_line(*points) if not acr and len(cycles) > 1 else None
+    line = fit_permanent_line(*points) if not acr and len(cycles) > 1 else None
     of_curves = {
         kind.value: r_squared(*solution.curves.of(solution.scaled, kind)) for kind in StretchKind
     }
@@ -157,23 +158,26 @@ def fit_contact_law(
         free=free_power(curves),
         q=_parameter(solution, layout.Q) if cycles else None,
         cycles=cycles,
-        line=straight,
+        line=line,
         critical=critical(*points) if acr and cycles else None,
-        r_squared={**of_curves, "permanent": _explained(straight, *points[:2])},
+        r_squared={**of_curves, "permanent": _r_squared_of_line(line, *points[:2])},
         scatter=float(np.sqrt(np.mean((fitted - measured) ** 2))),
         solution=solution,
     )
 
 
-def _explained(straight: PermanentLine | None, peaks: Floats, permanents: Floats) -> float | None:
+def _r_squared_of_line(
+    line: PermanentLine | None, peaks: Floats, permanents: Floats
+) -> float | None:
     """Return R² of equation 3-8; None for fewer than three cycles."""
-    if straight is None or len(peaks) < 3:
+    if line is None or len(peaks) < 3:
         return None
-    fitted = np.maximum(straight.s_p.value * (peaks - straight.alpha_p.value), 0.0)
+    fitted = np.maximum(line.s_p.value * (peaks - line.alpha_p.value), 0.0)
     return r_squared(fitted, permanents)
 
 
 def _parameter(solution: CurveSolution, place: int) -> FittedValue:
+    """Return a parameter of the solution with its error."""
     error = max(float(solution.covariance[place, place]), 0.0) ** 0.5
     return FittedValue(float(solution.values[place]), error)
 
@@ -200,12 +204,12 @@ def _cycle(solution: CurveSolution, number: int) -> Cycle:
 
 
 DIGITS = 5  # digits on the card
-NOT_ZERO = 2.0  # standard errors within which a slope does not differ from 0
-BAD = 0.05  # scatter that triggers a note
+NOT_ZERO = 2.0  # standard errors above which a slope differs from 0
+BAD = 0.05  # scatter above which a note reports it
 
 
 def law(fit: ContactLawFit) -> Contact | None:
-    """Return the law in the digits of a card; None if the test does not determine it."""
+    """Return the law, rounded as on a card; None if the test does not determine it."""
     relation = fit.relation()
     if isinstance(relation, YangSunPermanent):
         values, word = (relation.k, relation.alpha_cr, 0.0, relation.q), Indentation.ACR
@@ -227,7 +231,7 @@ def fit_notes(fit: ContactLawFit) -> list[str]:
     """Return notes on the reliability of the fit."""
     notes: list[str] = []
     corners = [fit.solution.curves.division.corners[n] for n in fit.solution.held]
-    held = [corner.cycle + 1 for corner in corners if corner.is_peak]
+    held_cycles = [corner.cycle + 1 for corner in corners if corner.is_peak]
     if not fit.cycles:
         notes.append("the test has no unloading: it gives only k and n, and no card")
     elif fit.line is None and fit.critical is None:
@@ -239,26 +243,27 @@ def fit_notes(fit: ContactLawFit) -> list[str]:
         notes.append("a value is at a bound of the fit: the law does not fit this test")
     if fit.scatter > BAD:
         notes.append(f"the points scatter by {100.0 * fit.scatter:.2g} % of the largest force")
-    if held:
-        which = ", ".join(map(str, sorted(held)))
+    if held_cycles:
+        cycle_numbers = ", ".join(map(str, sorted(held_cycles)))
         notes.append(
-            f"alpha_m of cycle {which} is the recorded value: the curves do not determine it"
+            f"alpha_m of cycle {cycle_numbers} is the recorded value: "
+            "the curves do not determine it"
         )
-    straight = fit.line
-    if straight is not None:
-        if straight.s_p.value < NOT_ZERO * straight.s_p.error or straight.s_p.value >= 1.0:
+    line = fit.line
+    if line is not None:
+        if line.s_p.value < NOT_ZERO * line.s_p.error or line.s_p.value >= 1.0:
             notes.append("s_p does not differ significantly from 0")
-        if straight.alpha_p.value < 0.0 < straight.s_p.value:
+        if line.alpha_p.value < 0.0 < line.s_p.value:
             notes.append("alpha_p is negative; the card has 0")
-        if straight.elastic:
-            which = ", ".join(str(n + 1) for n in straight.elastic)
-            notes.append(f"cycle {which} is below alpha_p and has no permanent indentation")
-        if side := _one_side(fit.cycles, straight):
+        if line.elastic:
+            cycle_numbers = ", ".join(str(n + 1) for n in line.elastic)
+            notes.append(f"cycle {cycle_numbers} is below alpha_p and has no permanent indentation")
+        if side := _find_side_of_line(fit.cycles, line):
             notes.append(
                 f"the line of s_p and alpha_p is {side} all of its points: the test does not "
                 "follow the law; compare n with 3/2, and fit single cycles to compare q"
             )
-    scatter = straight.scatter if straight else fit.critical.scatter if fit.critical else 1.0
+    scatter = line.scatter if line else fit.critical.scatter if fit.critical else 1.0
     if scatter > 1.0:
         notes.append(
             f"the scatter of the permanent indentations is {scatter:.1f} times that expected from "
@@ -267,15 +272,18 @@ def fit_notes(fit: ContactLawFit) -> list[str]:
     return notes
 
 
-def _one_side(cycles: tuple[Cycle, ...], straight: PermanentLine) -> str:
-    """Return whether the line is ``"above"`` or ``"below"`` all points by more than an error."""
-    slope, start = straight.s_p.value, straight.alpha_p.value
-    points = [cycle for n, cycle in enumerate(cycles) if n not in straight.elastic]
-    off = [c.alpha_0.value - slope * (c.alpha_m.value - start) for c in points]
-    least = [max(c.alpha_0.error, 1e-6 * c.alpha_m.value) for c in points]
-    if len(off) < 3 or not any(abs(o) > e for o, e in zip(off, least, strict=True)):
+def _find_side_of_line(cycles: tuple[Cycle, ...], line: PermanentLine) -> str:
+    """Return ``"above"`` or ``"below"`` if the line is there of all points, else an empty text.
+
+    A line within the error of every point is on neither side.
+    """
+    slope, start = line.s_p.value, line.alpha_p.value
+    points = [cycle for n, cycle in enumerate(cycles) if n not in line.elastic]
+    deviations = [c.alpha_0.value - slope * (c.alpha_m.value - start) for c in points]
+    errors = [max(c.alpha_0.error, 1e-6 * c.alpha_m.value) for c in points]
+    if len(deviations) < 3 or not any(abs(o) > e for o, e in zip(deviations, errors, strict=True)):
         return ""
-    return "above" if max(off) < 0.0 else "below" if min(off) > 0.0 else ""
+    return "above" if max(deviations) < 0.0 else "below" if min(deviations) > 0.0 else ""
 
 
 def _format(estimate: FittedValue | None) -> str:
@@ -326,14 +334,14 @@ def _table(cycles: tuple[Cycle, ...]) -> list[str]:
 
 def plain(fit: ContactLawFit) -> dict[str, Any]:
     """Return the fit as plain values for JSON."""
-    straight = fit.line
+    line = fit.line
     constants = {
         "k": fit.k,
         "n": fit.free.n,
         "k_with_n": fit.free.k,
         "q": fit.q,
-        "s_p": straight.s_p if straight else None,
-        "alpha_p": straight.alpha_p if straight else None,
+        "s_p": line.s_p if line else None,
+        "alpha_p": line.alpha_p if line else None,
         "alpha_cr": fit.critical.alpha_cr if fit.critical else None,
     }
     return {

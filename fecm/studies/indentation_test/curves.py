@@ -1,21 +1,18 @@
-"""Least squares fits of the curves of an indentation test, and of its permanent indentation.
+"""Least-squares fits of the curves of an indentation test, and of its permanent indentation.
 
-Least squares fits of the curves of an indentation test.
-
-k follows from the first loading (equation 3-1 with n = 3/2).  With this k, one fit of all unloading
-and reloading curves (equations 3-3 and 3-11) gives the power q, the peak alpha_m and the permanent
-indentation alpha_0 of every cycle, and the origin of every reloading.  A peak is the intersection
-of the unloading and first loading curves; the largest recorded value, which noise increases and
-coarse steps reduce, is only the initial guess.
+Curves: k follows from the first loading (equation 3-1 with n = 3/2). With this k, one fit of all
+unloading and reloading curves (equations 3-3 and 3-11) gives the power q, the peak alpha_m and the
+permanent indentation alpha_0 of every cycle, and the origin of every reloading. A peak is the
+intersection of the unloading and first loading curves. The largest recorded value, which noise
+increases and coarse steps reduce, is only the initial guess.
 
 Covariances follow from the residuals of the points (divided by 1 minus their leverage) instead of
-a common variance: they hold also for a scatter that grows with the force, and include the error of
+a common variance. They hold also for a scatter that grows with the force, and include the error of
 k.
 
-Relation of permanent to largest indentation, equations 3-8 and 3-7.
-
-Both coordinates of a cycle have errors, which are correlated with each other and with those of
-other cycles; the fit is by generalised least squares with the complete covariance.
+Permanent indentation: equations 3-8 and 3-7 relate it to the largest indentation. Both coordinates
+of a cycle have errors, which are correlated with each other and with the errors of other cycles.
+The fit is by generalised least squares with the complete covariance.
 """
 
 from __future__ import annotations
@@ -41,7 +38,7 @@ class FittedValue:
 
 
 def r_squared(fitted: Floats, measured: Floats) -> float | None:
-    """Return 1 minus the residual fraction of the variance; None for constant data."""
+    """Return 1 minus the residual share of the variance; None for constant data."""
     if len(measured) < 2 or not np.ptp(measured):
         return None
     total = float(((measured - measured.mean()) ** 2).sum())
@@ -58,7 +55,7 @@ def influence(jacobian: Floats, residual: Floats) -> tuple[Floats, Floats]:
 LIMITS_Q = (0.3, 12.0)  # bounds of the unloading power
 FEWEST = 5  # fewest points of a curve
 FIRST_Q = 2.2  # initial guess of the unloading power
-AT_LIMIT = 1e-4  # distance from a bound at which a value counts as at it, relative to the range
+AT_LIMIT = 1e-4  # distance from a bound, over the range, within which a value is at the bound
 # Bounds of peaks relative to the recorded value, and of origins relative to the peak.
 PEAK_MOVES = 0.15
 LIMITS_PERMANENT = (-0.5, 0.8)
@@ -72,8 +69,8 @@ STEP = 1e-6  # step of the scaled parameters in derivatives
 class ParameterLayout:
     """Index of each parameter in the vector of parameters.
 
-    Stretches that begin without contact have no origin of their own, but the permanent indentation
-    of their cycle; those with too few points are not fitted.
+    The origin of a reloading that starts without contact is the permanent indentation of its cycle.
+    Reloadings with too few points are not fitted.
     """
 
     corners: list[int]
@@ -111,8 +108,8 @@ class Curves:
     @property
     def units(self) -> Floats:
         """Unit of every parameter."""
-        of_k = self.force / self.length**LOADING_POWER
-        return np.array([of_k, 1.0, *[self.length] * (self.layout.size - 2)])
+        unit_of_k = self.force / self.length**LOADING_POWER
+        return np.array([unit_of_k, 1.0, *[self.length] * (self.layout.size - 2)])
 
     def peak_force(self, p: Floats, cycle: int) -> float:
         """Return the force at the peak of a cycle, equation 3-1."""
@@ -199,22 +196,22 @@ class CurveSolution(NamedTuple):
 def fit_curves(curves: Curves, q: float | None = None) -> CurveSolution:
     """Fit all curves; corners that the curves do not determine keep their recorded values.
 
-    The unloading power is fitted unless `q` prescribes it.  In a first fit, every reloading has a
-    separate origin.  If it is significantly above the turn at which the reloading began, contact
-    was lost, and the origin is the permanent indentation; a reloading that began in contact has its
-    origin below the turn.
+    The unloading power is fitted unless `q` prescribes it. In the first fit, every reloading has a
+    separate origin. A reloading that began in contact has its origin below the turn at which it
+    began. If the origin is significantly above the turn, contact was lost, and the second fit takes
+    the permanent indentation as the origin.
     """
-    solution = _held_or_not(curves, q)
+    solution = _fit_determined(curves, q)
     lowest = solution.values - SURE * np.sqrt(np.diag(solution.covariance))
     turns = {n: curves.division.stretches[n].turn for n in curves.layout.origins}
     tied = frozenset(n for n, place in curves.layout.origins.items() if lowest[place] > turns[n])
     if not tied:
         return solution
-    return _held_or_not(replace(curves, layout=parameter_layout(curves.division, tied)), q)
+    return _fit_determined(replace(curves, layout=parameter_layout(curves.division, tied)), q)
 
 
-def _held_or_not(curves: Curves, q: float | None) -> CurveSolution:
-    """Fit; hold corners that the curves do not determine."""
+def _fit_determined(curves: Curves, q: float | None) -> CurveSolution:
+    """Fit the curves, and hold corners that they do not determine."""
     held: frozenset[int] = frozenset()
     while True:
         solution = _solve(curves, q, held)
@@ -298,26 +295,30 @@ def _origin(a: Floats, f: Floats, power: float) -> float:
 
 def _covariance(curves: Curves, p: Floats, free: Bools) -> Floats:
     """Return the covariance of the scaled parameters; zero for parameters that are not free."""
-    # The sum over the points of the squares of their influence.  Points of the first loading affect
-    # k and, through k, all other parameters.
+    # The covariance is the sum over the points of their squared influence. Points of the first
+    # loading affect k and, through k, all other parameters.
     rows = curves.division.rows(StretchKind.LOADING)
     x = np.maximum(curves.a[rows], 0.0) ** LOADING_POWER
     share = x / float(x @ x)
-    on_k = share * ((curves.f[rows] - p[ParameterLayout.K] * x) / np.sqrt(1.0 - x * share))
-    covariance, by_k = np.zeros((len(p), len(p))), np.zeros(len(p))
-    by_k[ParameterLayout.K] = 1.0
+    influence_on_k = share * (
+        (curves.f[rows] - p[ParameterLayout.K] * x) / np.sqrt(1.0 - x * share)
+    )
+    covariance, sensitivity_to_k = np.zeros((len(p), len(p))), np.zeros(len(p))
+    sensitivity_to_k[ParameterLayout.K] = 1.0
     if free.any():
         jacobian = _derivatives(
             lambda x: curves.of(x, StretchKind.FALLING, StretchKind.RISING)[0], p
         )
         fitted, measured = curves.of(p, StretchKind.FALLING, StretchKind.RISING)
-        inverse, of_points = influence(jacobian[:, free], measured - fitted)
-        by_k[free] = -inverse @ jacobian[:, ParameterLayout.K]
-        block = of_points @ of_points.T
+        inverse, influences = influence(jacobian[:, free], measured - fitted)
+        sensitivity_to_k[free] = -inverse @ jacobian[:, ParameterLayout.K]
+        block = influences @ influences.T
         if np.linalg.matrix_rank(jacobian[:, free], tol=1e-9 * len(fitted)) < len(block):
             block += np.diag(np.full(len(block), np.inf))
         covariance[np.ix_(free, free)] = block
-    return covariance + np.outer(by_k, by_k) * float(on_k @ on_k)
+    return covariance + np.outer(sensitivity_to_k, sensitivity_to_k) * float(
+        influence_on_k @ influence_on_k
+    )
 
 
 def _derivatives(function: Callable[[Floats], Floats], p: Floats) -> Floats:
@@ -327,7 +328,7 @@ def _derivatives(function: Callable[[Floats], Floats], p: Floats) -> Floats:
 
 
 ROUNDS = 20  # iterations of the weights, which depend on the slope
-UNLIKELY = 0.01  # probability below which the scatter exceeds the noise of the points
+UNLIKELY = 0.01  # probability of chi² below which the scatter exceeds the noise of the points
 
 
 @dataclass(frozen=True)
@@ -337,7 +338,7 @@ class PermanentLine:
     s_p: FittedValue
     alpha_p: FittedValue
     elastic: tuple[int, ...]  # cycles below alpha_p, without permanent indentation
-    scatter: float  # of :func:`_scatter`; it multiplies the errors
+    scatter: float  # factor on the errors, from :func:`_scatter`
 
 
 def fit_permanent_line(
@@ -345,21 +346,22 @@ def fit_permanent_line(
 ) -> PermanentLine | None:
     """Fit alpha_0 = max(0, s_p (alpha_m - alpha_p)); None if fewer than two cycles exceed alpha_p.
 
-    The covariance, regular, has all peaks alpha_m, then all permanent indentations alpha_0.
+    The covariance must be regular. It has all peaks alpha_m, then all permanent indentations
+    alpha_0.
     """
     order = np.argsort(peaks)
     fits: list[tuple[float, PermanentLine]] = []
     for count in range(len(peaks) - 1):
-        line = _split(peaks, permanents, covariance, order[:count])
-        if line is None:
+        chi_and_line = _fit_line(peaks, permanents, covariance, order[:count])
+        if chi_and_line is None:
             continue
-        start = line[1].alpha_p.value
+        start = chi_and_line[1].alpha_p.value
         if not count or peaks[order[count - 1]] <= start < peaks[order[count]]:
-            fits.append(line)
-    return min(fits, key=lambda one: one[0])[1] if fits else None
+            fits.append(chi_and_line)
+    return min(fits, key=lambda pair: pair[0])[1] if fits else None
 
 
-def _split(
+def _fit_line(
     peaks: Floats, permanents: Floats, covariance: Floats, elastic: Indices
 ) -> tuple[float, PermanentLine] | None:
     """Return chi² and the line for a set of elastic cycles."""
@@ -383,14 +385,16 @@ def _split(
     residual = permanents - design @ [slope, level]
     chi = float(residual @ weight @ residual)
     scatter = _scatter(chi, n - 2)
-    by = np.array([level / slope**2, -1.0 / slope])
+    derivatives = np.array([level / slope**2, -1.0 / slope])
     s_p = FittedValue(float(slope), scatter * float(errors[0, 0] ** 0.5))
-    alpha_p = FittedValue(float(-level / slope), scatter * float((by @ errors @ by) ** 0.5))
+    alpha_p = FittedValue(
+        float(-level / slope), scatter * float((derivatives @ errors @ derivatives) ** 0.5)
+    )
     return chi, PermanentLine(s_p, alpha_p, tuple(elastic.tolist()), scatter)
 
 
 def _scatter(chi: float, freedom: int) -> float:
-    """Return the root of chi² per degree of freedom if it exceeds the noise, else 1."""
+    """Return the root of chi² per degree of freedom if the scatter exceeds the noise, else 1."""
     from scipy.special import chdtrc  # takes 0.15 s, and most commands do not fit
 
     if freedom > 0 and chdtrc(freedom, chi) < UNLIKELY:
@@ -408,8 +412,8 @@ class Critical(NamedTuple):
 def critical(peaks: Floats, permanents: Floats, covariance: Floats) -> Critical:
     """Fit alpha_cr = (alpha_m - alpha_0)^(5/2)/alpha_m^(3/2), equal for all cycles.
 
-    Parameters are those of :func:`fit_permanent_line`.  A cycle below alpha_cr has no permanent
-    indentation and only bounds alpha_cr: such cycles are excluded if there are others.
+    It takes the parameters of :func:`fit_permanent_line`. A cycle below alpha_cr has no permanent
+    indentation and only bounds alpha_cr; such cycles are excluded if there are others.
     """
     values = (peaks - permanents) ** ACR_POWER / peaks**LOADING_POWER
     by_peak = values * (ACR_POWER / (peaks - permanents) - LOADING_POWER / peaks)

@@ -1,4 +1,4 @@
-"""Contact law of an indentation test."""
+"""Fit of a contact law to an indentation test."""
 
 from __future__ import annotations
 
@@ -25,18 +25,18 @@ from fecm.studies.indentation_test.turns import Test, read_test
 class IndentationFit:
     """Contact law fitted to an indentation test; ``str()`` is the page of `fecm indent fit`.
 
-    A fitted value has a `value` and its standard `error`, 0 for a prescribed value. It is None
-    where the test does not determine it.
+    A fitted value has a `value` and its standard `error`, which is 0 for a prescribed value. It is
+    None if the test does not determine it.
 
     Attributes
     ----------
     indentation, force : ndarray (points,)
         The test, in `units`.
     units : Mapping of str to str
-        Names of the units of length and force; empty if they are not known.
+        Names of the units of length and force; empty if they are unknown.
     stated : tuple of str
         Units of both columns in the file.
-    fit : Fit
+    fit : ContactLawFit
         Curves and parameters of the fit, for pictures.
     """
 
@@ -53,7 +53,7 @@ class IndentationFit:
 
     @property
     def n(self) -> FittedValue:
-        """Power of the first loading, if it is free."""
+        """Power of the first loading if it is fitted too."""
         return self.fit.free.n
 
     @property
@@ -88,7 +88,7 @@ class IndentationFit:
 
     @property
     def r_squared(self) -> dict[str, float | None]:
-        """Share of the variance that the curves explain, by curve."""
+        """Share of the variance that a curve explains, by curve."""
         return self.fit.r_squared
 
     @property
@@ -103,11 +103,11 @@ class IndentationFit:
 
     @property
     def law(self) -> Contact | None:
-        """Law for `fecm.impact`, as on the card; None if the test does not determine it."""
+        """Contact law for `fecm.impact`, rounded as on the card; None if it is not determined."""
         return constants.law(self.fit)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values, as `fecm indent fit --format json` prints them."""
+        """Return plain values, as printed by `fecm indent fit --format json`."""
         return {"units": dict(self.units) or None, **constants.plain(self.fit)}
 
     def __str__(self) -> str:
@@ -115,10 +115,10 @@ class IndentationFit:
         stated = (
             "" if self.stated in (("", ""), units) else f" (the test: {', '.join(self.stated)})"
         )
-        about = f"{', '.join(units)}{stated}" if units else "not named in the test"
+        unit_names = f"{', '.join(units)}{stated}" if units else "not named in the test"
         card = constants.card(self.fit)
-        shown = [*constants.fit_lines(self.fit), f"units           {about}"]
-        return "\n".join([*shown, card] if card else shown)
+        lines = [*constants.fit_lines(self.fit), f"units           {unit_names}"]
+        return "\n".join([*lines, card] if card else lines)
 
 
 def fit_indentation(
@@ -132,8 +132,8 @@ def fit_indentation(
 ) -> IndentationFit:
     """Fit the contact law to an indentation test (report, chapter 3).
 
-    The rows are in the order of measurement: first loading, unloading, reloading, in any number of
-    cycles.  The notes of the result are :class:`FecmWarning`.
+    The rows are in the order of measurement: first loading, then unloading and reloading in any
+    number of cycles. The notes of the result are :class:`FecmWarning`.
 
     Parameters
     ----------
@@ -146,14 +146,15 @@ def fit_indentation(
         Fit alpha_cr of the law with one unloading rigidity (equation 3-7, q = 5/2) instead of s_p
         and alpha_p.
     turn : float, optional
-        Decrease of the indentation that counts as a turn, length; by default 2 % of its range, or 8
-        standard deviations of its noise.
+        Decrease of the indentation that counts as a turn, length. By default it is 2 % of the
+        range, or 8 standard deviations of the noise if that is more.
     columns : sequence of str, optional
-        Names or numbers (from 1) of the columns of indentation and force in a table; a minus before
-        one changes its sign.
+        Names or numbers (from 1) of the columns of indentation and force in a table. A minus before
+        a name or number changes the sign of the column.
     units : tuple of str, optional
-        Units of length and force to which a table that names its units is converted, by default in
-        and lbf, mm and N, or m and N, as the table's; of arrays, their own.
+        Units of length and force. A table that names its units is converted to them, by default to
+        in and lbf, mm and N, or m and N, whichever is nearest to the units of the table. For
+        arrays, they are the units of the arrays.
 
     Returns
     -------
@@ -172,10 +173,10 @@ def fit_indentation(
     Examples
     --------
     >>> import fecm
-    >>> found = fecm.fit_indentation(fecm.examples.path("indentation-test"), units=("in", "lbf"))
-    >>> print(f"k = {found.k.value:.4g} ± {found.k.error:.2g} lbf/in^1.5")
+    >>> fit = fecm.fit_indentation(fecm.examples.path("indentation-test"), units=("in", "lbf"))
+    >>> print(f"k = {fit.k.value:.4g} ± {fit.k.error:.2g} lbf/in^1.5")
     k = 1.331e+06 ± 1.7e+03 lbf/in^1.5
-    >>> found.law
+    >>> fit.law
     Contact(k=1330500.0, alpha_p=0.00076098, s_p=0.10378, q=2.4795, word='')
     """
     fit = fit_law(_measured(test, columns or (), units), q=q, acr=acr, turn=turn)
@@ -187,7 +188,10 @@ def fit_indentation(
 def fit_law(
     test: Test, *, q: float | None = None, acr: bool = False, turn: float | None = None
 ) -> IndentationFit:
-    """Fit the law to a test in consistent units; raises as :func:`fit_indentation`."""
+    """Fit the law to a test in consistent units.
+
+    Raises StudyError or ValueError like :func:`fit_indentation`.
+    """
     check_positive(turn=turn)
     if acr and q not in (None, ACR_POWER):
         raise StudyError("`acr` needs q = 5/2: equation 3-7 holds for no other power")

@@ -22,11 +22,11 @@ from fecm.studies import StudyError
 
 Rows = NDArray[np.int64]  # numbers of points
 
-# Smallest retreat that is a turn: fraction of the range of the path, standard deviations of noise.
+# Smallest retreat that is a turn: share of the range of the path, standard deviations of the noise.
 LEAST_RETREAT = 0.02
 QUIET = 8.0
 GUARD = 2.0  # standard deviations of a smoothed point within which its neighbours may be the turn
-NEGLIGIBLE = 0.1  # noise below this fraction of a step reverses no step
+NEGLIGIBLE = 0.1  # noise, over a step of the path, below which it reverses no step
 
 
 class SmoothedIndentation(NamedTuple):
@@ -70,7 +70,7 @@ def _moving_mean(values: Floats, reach: int) -> Floats:
 
 
 def turns(path: SmoothedIndentation, retreat: float) -> list[int]:
-    """Find points from which the path retreats by more than `retreat`, and the first and last."""
+    """Return the first and last point, and those from which the path retreats by `retreat`."""
     s = path.smooth
     numbers = [0]
     high = low = 0  # points of the largest and smallest indentation since the last turn
@@ -98,7 +98,7 @@ def turns(path: SmoothedIndentation, retreat: float) -> list[int]:
 class StretchKind(StrEnum):
     """Kinds of stretches."""
 
-    LOADING = "loading"  # for the first time
+    LOADING = "loading"  # first loading
     FALLING = "unloading"
     RISING = "reloading"
 
@@ -107,11 +107,11 @@ class CurveStretch(NamedTuple):
     """Points on one curve."""
 
     kind: StretchKind
-    cycle: int  # number of the last peak, from 0; of LOADING, of the next peak
+    cycle: int  # number of the last peak from 0; for LOADING, of the next peak
     rows: Rows
-    # Of FALLING, the corner at which it begins: the peak of its cycle, or a turn during reloading.
+    # For FALLING, the corner at which it starts: the peak of its cycle, or a turn during reloading.
     begin: int = -1
-    turn: float = 0.0  # of RISING, the recorded indentation at its beginning
+    turn: float = 0.0  # for RISING, the recorded indentation at which it starts
 
 
 class Corner(NamedTuple):
@@ -136,7 +136,7 @@ class Division(NamedTuple):
         return [n for n, corner in enumerate(self.corners) if corner.is_peak]
 
     def rows(self, kind: StretchKind, cycle: int | None = None) -> Rows:
-        """Return the points of all stretches of a kind, or only of a cycle."""
+        """Return the points of all stretches of a kind, or of those in a cycle."""
         stretches = [s for s in self.stretches if s.kind == kind]
         parts = [s.rows for s in stretches if cycle is None or s.cycle == cycle]
         return np.concatenate([np.empty(0, dtype=np.int64), *parts])
@@ -145,8 +145,8 @@ class Division(NamedTuple):
 def divide(indentation: Floats, retreat: float | None = None) -> Division:
     """Divide a test into stretches on the curves of the law.
 
-    A retreat of the path counts as a turn; by default if it exceeds 2 % of the range of the path
-    and eight standard deviations of its noise.
+    A decrease of the indentation by more than `retreat` is a turn. By default it must exceed 2 % of
+    the range of the path and eight standard deviations of the noise.
     """
     path = smoothed(indentation)
     if path.range <= 0.0:
@@ -163,7 +163,7 @@ def divide(indentation: Floats, retreat: float | None = None) -> Division:
 
 
 def _stretches(path: SmoothedIndentation, turning_points: list[int], *, near: float) -> Division:
-    """Divide a path at its turns; peaks within a distance `near` are one."""
+    """Divide a path at its turns; peaks closer than `near` are the same."""
     s = path.smooth
     stretches: list[CurveStretch] = []
     corners: list[Corner] = []
@@ -232,11 +232,11 @@ def read_test(
 ) -> Test:
     """Read an indentation test in consistent units.
 
-    The columns are named as in :data:`WORDS`, or `columns` has their names or numbers (from 1).
-    Values are converted to `units` of length and force; by default, a file in inches and pounds to
-    in and lbf, others to m and N or mm and N.  A file without units is assumed to be in `units`.
-    Raises StudyError if a column is missing, a unit is unknown, or a number is invalid.  Raises
-    OSError if the file cannot be read.
+    The columns have a usual name, or `columns` has their names or numbers (from 1). Values are
+    converted to `units` of length and force. By default a file in inches and pounds is converted to
+    in and lbf, other files to m and N or mm and N. A file without units is assumed to be in
+    `units`. Raises StudyError if a column is missing, a unit is unknown, or a number is invalid.
+    Raises OSError if the file can't be read.
     """
     table = read_table(path)
     length, load = table.find(NAMES, columns)
@@ -244,7 +244,7 @@ def read_test(
     if units is None and any(stated) and not all(stated):
         text = f"{path}: one column is in {stated[0] or stated[1]}, the other has no unit"
         raise StudyError(f"{text}; state both, or give both in `units`")
-    names = units or (_system(*stated) if any(stated) else None)
+    names = units or (_consistent_units(*stated) if any(stated) else None)
     target = dict(zip(("length", "force"), names, strict=True)) if names else {}
     indentation, force = table.values((length, load), target)
     if names and any(stated):
@@ -252,8 +252,8 @@ def read_test(
     return Test(indentation, force, target, stated)
 
 
-def _system(length: str, force: str) -> tuple[str, str]:
-    """Return units of length and force of the same system as the file's."""
+def _consistent_units(length: str, force: str) -> tuple[str, str]:
+    """Return consistent units of length and force, close to the units of a file."""
     if {length.casefold(), force.casefold()} <= IMPERIAL:
         return "in", "lbf"
     return ("m" if length == "m" else "mm"), "N"

@@ -1,15 +1,13 @@
 """Time histories of results and of measured tables, and their filters.
 
-Filters with a given rise time model a transducer; others are channel frequency classes.
+First-order and moving-average filters model a transducer by its rise time: the time in which the
+response to a unit step rises from 0.1 to 0.9. They take the history as linear between samples at
+any spacing, and as constant before the first sample. Their response at the samples is exact.
 
-The rise time is the time in which the response to a unit step rises from 0.1 to 0.9.  The filters
-take the history as linear between samples at any spacing, and as constant before the first sample;
-their response at the samples is exact.
-
-Channel frequency classes (CFC) are those of SAE J211-1: two poles forward and two backward, so
-that nothing is delayed.  Butterworth filters are those of amplifiers and of test software: causal,
-or forward and backward (zero-phase), which delays nothing and weakens twice.  Both kinds need equal
-time steps, and take the history as constant before the first and after the last sample.
+Channel frequency classes (CFC) follow SAE J211-1: two poles forward and two backward, so that
+nothing is delayed. Butterworth filters occur in amplifiers and test software. They are causal, or
+run forward and backward (zero-phase), which delays nothing and attenuates twice. Both kinds need
+equal time steps, and take the history as constant before the first and after the last sample.
 """
 
 from __future__ import annotations
@@ -43,8 +41,8 @@ HIGHEST_ORDER = 10  # poles
 CUT_OFF = 2.0775  # cut-off frequency of the two poles over the class
 SAMPLES = 10  # fewest samples in the time 1/class
 FEWEST = 4.0  # samples in a period of the cut-off frequency of a Butterworth filter
-SETTLED = 4.0  # of these periods, times the order: until a step has decayed
-UNEQUAL = 0.05  # relative difference of time steps that count as equal: of rounded times
+SETTLED = 4.0  # periods of the cut-off frequency, per pole, in which a step decays
+UNEQUAL = 0.05  # relative difference up to which time steps are equal: times may be rounded
 
 
 class FilterKind(StrEnum):
@@ -52,25 +50,25 @@ class FilterKind(StrEnum):
 
     FIRST_ORDER = "first-order"  # T y' + y = x, whose rise time is T ln 9
     MOVING_AVERAGE = "moving-average"  # the mean of x over the last W, whose rise time is 0.8 W
-    BUTTERWORTH = "butterworth"  # which weakens sines of the cut-off frequency by 3 dB a pass
-    CFC = "cfc"  # a channel frequency class, which weakens sines by 3 dB at 5/3 of the class
+    BUTTERWORTH = "butterworth"  # attenuates sines of the cut-off frequency by 3 dB a pass
+    CFC = "cfc"  # channel frequency class; attenuates sines of 5/3 of the class (Hz) by 3 dB
 
 
 @dataclass(frozen=True)
 class Filter:
-    """A filter of unit static gain."""
+    """Filter with a static gain of 1."""
 
     kind: str  # a :class:`FilterKind` or its text
-    # Time from 10 to 90 % of the step response (10 us in Table 4.1); the class or the cut-off
-    # frequency, 1/time.
+    # Rise time from 10 to 90 % of the step response (10 us in Table 4.1), class, or cut-off
+    # frequency (1/time).
     size: float
     order: int = 0  # poles of a Butterworth filter
     is_zero_phase: bool = False
 
     def in_unit(self, time: str) -> Filter:
-        """Return the same filter for times in a unit; a class and a frequency are in Hz.
+        """Return the same filter for times in a unit; a class or a frequency is in Hz.
 
-        Raises StudyError if the filter has one of them, and the unit is unknown.
+        Raises StudyError if the filter has a class or a frequency and the unit is unknown.
         """
         if self.kind not in (FilterKind.CFC, FilterKind.BUTTERWORTH) or not time:
             return self
@@ -167,8 +165,8 @@ def _equal_step(time: Floats, kind: str) -> float:
 def filter_of(text: str) -> Filter:
     """Parse ``first-order:10e-6``, ``moving-average:10e-6``, ``butterworth:4,10e3`` or ``cfc:600``.
 
-    A class and a frequency are in Hz; ``butterworth:4,10e3,zero-phase`` filters forward and
-    backward.  Anything else is a StudyError.
+    Classes and frequencies are in Hz. ``butterworth:4,10e3,zero-phase`` filters forward and
+    backward. Raises StudyError if the text is anything else.
     """
     kind, _, rise = text.partition(":")
     if kind == FilterKind.CFC and rise in CLASSES:
@@ -193,8 +191,8 @@ def _butterworth_of(text: str, numbers: str) -> Filter:
         poles, value = int(order), float(frequency)
     except ValueError:
         poles, value = 0, math.nan
-    sound = 1 <= poles <= HIGHEST_ORDER and 0.0 < value < math.inf
-    if not sound or numbers.count(",") != 1 + is_zero_phase:
+    is_valid = 1 <= poles <= HIGHEST_ORDER and 0.0 < value < math.inf
+    if not is_valid or numbers.count(",") != 1 + is_zero_phase:
         raise StudyError(
             f"{text}: a butterworth filter has 1 to {HIGHEST_ORDER} poles and a positive frequency "
             "in Hz, as in butterworth:4,10e3 or butterworth:4,10e3,zero-phase"
@@ -207,23 +205,23 @@ TRANSDUCER = "transducer"
 
 @dataclass(frozen=True)
 class TimeHistory:
-    """A quantity in time."""
+    """History of a quantity."""
 
     name: str
     time: Floats  # (rows,)
     values: Floats  # (rows,)
     dimension: str  # empty if unknown
     first: int = 0  # first recorded row; the rows before it are the state of rest
-    beside: Mapping[str, Floats] = field(default_factory=dict)  # others for the same plot
+    beside: Mapping[str, Floats] = field(default_factory=dict)  # other histories for the same plot
     units: Mapping[str, str] = field(default_factory=dict)  # names; empty if unknown
 
 
 def recorded(path: Path, column: str | None = None) -> TimeHistory:
     """Read a history from a result file or a CSV file.
 
-    The column is by default the transducer, or the second of a CSV file.  Raises StudyError if the
-    history does not exist, or the CSV file is invalid, ResultFileError if the result file is
-    damaged, OSError if the file cannot be read.
+    The default column is the transducer, or the second column of a CSV file. Raises StudyError if
+    the history does not exist or the CSV file is invalid, ResultFileError if the result file is
+    damaged, and OSError if the file can't be read.
     """
     with open_input(path) as file:
         is_result = file.read(len(HDF5)) == HDF5
@@ -234,21 +232,23 @@ def _of_result(path: Path, result: Result, column: str | None) -> TimeHistory:
     columns = [name.partition("/")[2] for name in result if name.startswith("history/")]
     if not columns:
         raise StudyError(f"{path} has no history: the run has no impact step")
-    choice = [name for name in columns if name not in ("step", "time")]
+    names_available = [name for name in columns if name not in ("step", "time")]
     name = column or TRANSDUCER
-    if name not in choice:
-        raise StudyError(f"{path} has no history of {name}; it has {', '.join(choice)}")
-    # Histories begin after the first step; before it, the rod is at rest.
+    if name not in names_available:
+        raise StudyError(f"{path} has no history of {name}; it has {', '.join(names_available)}")
+    # Histories begin after the first step. Before it the rod is at rest.
     dataset = DATASETS.get(f"history/{name}")
     dimension = dataset.dimension if dataset else ""
     rest = [0.0] if dimension in ("force", "length") else []
 
-    def begun(column: str) -> Floats:
+    def from_rest(column: str) -> Floats:
         return np.concatenate([rest, result[f"history/{column}"]])
 
-    beside = {"contact force": begun("force")} if name == TRANSDUCER else {}
+    beside = {"contact force": from_rest("force")} if name == TRANSDUCER else {}
     units = result.units
-    return TimeHistory(name, begun("time"), begun(name), dimension, len(rest), beside, units)
+    return TimeHistory(
+        name, from_rest("time"), from_rest(name), dimension, len(rest), beside, units
+    )
 
 
 def _of_table(path: Path, column: str | None) -> TimeHistory:

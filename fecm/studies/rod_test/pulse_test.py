@@ -1,15 +1,12 @@
 """Free rod under a force pulse, and the calibration of its transducer, report section 4.2.
 
-Free rod under a force pulse on its end, report section 4.2, figures 4.7 to 4.9.
+The pulse acts on one end of the rod from t = 0 (figures 4.7 to 4.9). The rod has the elements, mass
+and integrator of the projectile in an impact; x is the distance from the struck end. Forces are
+positive in compression, accelerations in the direction of the pulse.
 
-Elements, mass and integrator are those of the projectile in an impact; x is the distance from the
-struck end.  Forces are positive in compression, accelerations in the direction of the pulse, which
-acts from t = 0.
-
-Sensitivity of the transducer from the acceleration of a target, report section 4.2.
-
-The output of the transducer is V_F = c_F F, that of the accelerometer on a free target of mass m is
-V_a = c_a a, and F = m a (equations 4-1 to 4-3).  The slope of V_F over V_a gives
+The calibration gives the sensitivity of the transducer from the acceleration of a target. The
+output of the transducer is V_F = c_F F. An accelerometer on a free target of mass m has the output
+V_a = c_a a, and F = m a (equations 4-1 to 4-3). The slope of V_F over V_a gives
 c_F = (c_a / m) V_F / V_a (equation 4-4).
 """
 
@@ -35,7 +32,7 @@ USAGE = "gauss:F0,TAU,B, sine:F0,B or a CSV file of time and force"
 
 
 class Pulse(NamedTuple):
-    """A force as a function of times of any shape, and the default duration of a test."""
+    """Force as a function of an array of times, and the default duration of a test."""
 
     force: Callable[[Floats], Floats]
     duration: float
@@ -62,7 +59,7 @@ def sine_pulse(peak: float, b: float) -> Pulse:
 
 
 def table_pulse(times: Floats, forces: Floats) -> Pulse:
-    """Return a table of forces, linear between rows, and zero before and after them."""
+    """Return the pulse of a table of forces: linear between rows, zero before and after."""
     return Pulse(
         lambda time: np.asarray(np.interp(time, times, forces, left=0.0, right=0.0)),
         float(times[-1]),
@@ -72,12 +69,12 @@ def table_pulse(times: Floats, forces: Floats) -> Pulse:
 def pulse_of(text: str, units: Mapping[str, str] = NO_UNITS) -> Pulse:
     """Parse ``gauss:F0,TAU,B``, ``sine:F0,B``, or the path of a CSV file of time and force.
 
-    A file that names its units is converted to `units`.  Anything else, a width that is not
-    positive, and an invalid table are a StudyError.
+    A file that names its units is converted to `units`. Raises StudyError if the text is anything
+    else, a width is not positive, or a table is invalid.
     """
     kind, colon, rest = text.partition(":")
     if not colon or kind not in FORMS:
-        return _table(text, units)
+        return _pulse_of_file(text, units)
     names = FORMS[kind]
     try:
         values = [float(part) for part in rest.split(",")]
@@ -90,7 +87,8 @@ def pulse_of(text: str, units: Mapping[str, str] = NO_UNITS) -> Pulse:
     return gauss_pulse(*values) if kind == "gauss" else sine_pulse(*values)
 
 
-def _table(text: str, units: Mapping[str, str]) -> Pulse:
+def _pulse_of_file(text: str, units: Mapping[str, str]) -> Pulse:
+    """Read the pulse in a CSV file."""
     path = Path(text)
     if not path.is_file():
         raise StudyError(f"{text} is neither a file nor a pulse; use {USAGE}")
@@ -105,8 +103,8 @@ def _table(text: str, units: Mapping[str, str]) -> Pulse:
 # The rod ------------------------------------------------------------------------------------------
 
 MOST_STEPS = 2_000_000
-PART = 0.8  # default time step relative to the travel time of a wave through an element
-COUNTS = 0.01  # fraction of the peak of the pulse above which a row counts in the mean ratio
+PART = 0.8  # default time step, over the travel time of a wave through an element
+COUNTS = 0.01  # share of the pulse's peak above which a row counts in the mean ratio
 
 POINTS = ("struck_end", "middle", "far_end")
 
@@ -123,7 +121,7 @@ class RodHistory:
 
     @property
     def ratios(self) -> Floats:
-        """Force at the stations over the applied force, (rows, stations); NaN where that is 0."""
+        """Force at the stations over the applied force, (rows, stations); NaN without a force."""
         with np.errstate(all="ignore"):
             ratios = self.forces / self.applied[:, None]
         return np.where(self.applied[:, None] == 0.0, np.nan, ratios)
@@ -132,7 +130,7 @@ class RodHistory:
     def mean_ratios(self) -> Floats:
         """Mean ratio over all rows with a pulse above 1 % of its peak, (stations,).
 
-        The report has 0.498 (section 4.2) for its exponential pulse.
+        The report gives 0.498 for its exponential pulse (section 4.2).
         """
         size = np.abs(self.applied)
         counted = size > COUNTS * size.max()
@@ -157,10 +155,10 @@ def simulate_pulse(
     """Compute the response of a free rod, initially at rest, to a pulse at x = 0.
 
     As in an impact, the force is linear between two steps, and extrapolated linearly to t + theta
-    dt.  If the pulse starts with a jump, the rod has the corresponding acceleration at t = 0.  The
-    last step ends at or after the duration; the integrator is a key of
-    :data:`fecm.mechanics.projectile.STEPS`.  Raises StudyError if a station is not on the rod,
-    the steps are more than two million, or the motion is not finite.
+    dt. If the pulse starts with a jump, the rod has the corresponding acceleration at t = 0. The
+    last step ends at or after the duration. The integrator is a key of
+    :data:`fecm.mechanics.projectile.STEPS`. Raises StudyError if a station is not on the rod, there
+    are more than two million steps, or the motion is not finite.
     """
     for x in stations:
         if not 0.0 <= x <= rod.length:
@@ -206,8 +204,8 @@ def _march(
     return history
 
 
-def _place(rod: Rod, x: float) -> tuple[int, float]:
-    """Return the element at x (the farther of two) and the local coordinate, from 0 to 1."""
+def _element_at(rod: Rod, x: float) -> tuple[int, float]:
+    """Return the element at x, at a node the farther one, and the local coordinate from 0 to 1."""
     along = x / rod.length * rod.elements
     node = round(along)
     if abs(along - node) < 1e-9 * rod.elements:
@@ -218,7 +216,7 @@ def _place(rod: Rod, x: float) -> tuple[int, float]:
 
 def force_row(rod: Rod, x: float) -> Floats:
     """Return the row (n,) that maps the dofs to the force at x, -E A du/dx."""
-    (element, s), L = _place(rod, x), rod.element_length
+    (element, s), L = _element_at(rod, x), rod.element_length
     row = np.zeros(2 * rod.elements + 2)
     row[2 * element : 2 * element + 4] = [
         6.0 * (s**2 - s) / L,
@@ -231,7 +229,7 @@ def force_row(rod: Rod, x: float) -> Floats:
 
 def displacement_row(rod: Rod, x: float) -> Floats:
     """Return the row (n,) that maps the dofs to the displacement at x, equation 4-19."""
-    (element, s), L = _place(rod, x), rod.element_length
+    (element, s), L = _element_at(rod, x), rod.element_length
     row = np.zeros(2 * rod.elements + 2)
     row[2 * element : 2 * element + 2] = (1.0 - s) ** 2 * (1.0 + 2.0 * s), L * s * (1.0 - s) ** 2
     row[2 * element + 2 : 2 * element + 4] = s**2 * (3.0 - 2.0 * s), L * s**2 * (s - 1.0)
@@ -241,9 +239,9 @@ def displacement_row(rod: Rod, x: float) -> Floats:
 def pulse_table(
     history: RodHistory, filtered: Floats | None = None
 ) -> tuple[dict[str, str], list[list[float]]]:
-    """Return dimensions by column, and rows, of a CSV of the history.
+    """Return the dimensions of a CSV table of the history, by column, and its rows.
 
-    It has the filtered forces at the stations, if there are any.
+    The table has the filtered forces at the stations if there are any.
     """
     names = [f"{x:.12g}" for x in history.stations]
     dimensions = {"time": "time", "force": "force"}
@@ -267,7 +265,7 @@ class Calibration:
     slope_error: float
     offset: float  # V_F at V_a = 0; 0 for a line through the origin
     offset_error: float
-    r_squared: float  # of the variation of V_F, about zero for a line through the origin
+    r_squared: float  # share of the variation of V_F, about zero for a line through the origin
     sensitivity: float  # c_F of the transducer, V_F per force
     sensitivity_error: float
 
@@ -277,10 +275,10 @@ def calibrate_transducer(
 ) -> Calibration:
     """Fit the sensitivity of a transducer by least squares, equations 4-1 to 4-4.
 
-    The scatter is attributed to V_F.  Scatter of V_a flattens the line: the true slope is between
-    the fitted slope and the fitted slope divided by R².
+    The fit attributes all scatter to V_F. Scatter of V_a flattens the line: the true slope lies
+    between the fitted slope and the fitted slope divided by R².
 
-    The outputs, (points,), are of the same instants, `mass` is that of the target
+    Both outputs, (points,), are recorded at the same instants. `mass` is the mass of the target
     (force*time^2/length), `c_a` the sensitivity of the accelerometer (output per length/time^2).
     Raises StudyError if there are fewer than three points, V_a or V_F is constant, or a sum
     overflows.
@@ -295,18 +293,18 @@ def calibrate_transducer(
     with np.errstate(all="ignore"):
         xx, yy = float(x @ x), float(y @ y)
         slope = float(x @ y) / xx
-        rest = y - slope * x
-        variance = float(rest @ rest) / (len(x) - (1 if through_origin else 2))
+        residual = y - slope * x
+        variance = float(residual @ residual) / (len(x) - (1 if through_origin else 2))
         slope_error = float(np.sqrt(variance / xx))
-        share = 0.0 if through_origin else 1.0 / len(x) + middle_a**2 / xx
+        variance_of_offset = 0.0 if through_origin else 1.0 / len(x) + middle_a**2 / xx
         factor = c_a / mass
     calibration = Calibration(
         points=len(x),
         slope=slope,
         slope_error=slope_error,
         offset=float(middle_f - slope * middle_a),
-        offset_error=float(np.sqrt(variance * share)),
-        r_squared=1.0 - float(rest @ rest) / yy,
+        offset_error=float(np.sqrt(variance * variance_of_offset)),
+        r_squared=1.0 - float(residual @ residual) / yy,
         sensitivity=factor * slope,
         sensitivity_error=abs(factor) * slope_error,
     )

@@ -1,4 +1,4 @@
-"""The free rod of a projectile under a pulse."""
+"""Test of a projectile's rod under a force pulse."""
 
 from __future__ import annotations
 
@@ -37,11 +37,11 @@ from fecm.studies.rod_test.pulse_test import (
     table_pulse,
 )
 
-MOST_TRAVELS = 1000.0  # of a wave along the rod in a usual pulse
+MOST_TRAVELS = 1000.0  # travel times of a wave along the rod in a usual pulse, at most
 
 
 class Struck(NamedTuple):
-    """A rod under a pulse: where its force is computed, and with which time step, by default."""
+    """Rod under a pulse, with its default station and time step."""
 
     rod: Rod
     station: float
@@ -66,11 +66,11 @@ class PulseTest(RodHistory):
     forces : ndarray (rows, stations)
         Forces at the stations.
     accelerations : ndarray (rows, 3)
-        Of the struck end, the middle and the far end.
+        Accelerations of the struck end, the middle and the far end.
     filtered : ndarray (rows, stations) or None
-        Forces behind the filter, if there is one.
+        Filtered forces; None without a filter.
     units : dict of str to str
-        Names of the units; empty if they are not known.
+        Names of the units; empty if they are unknown.
     """
 
     rod: Rod
@@ -112,26 +112,26 @@ def pulse_test(
     Parameters
     ----------
     rod : Rod, str, Path or Deck
-        The rod, or a deck with a single problem, whose projectile it is.
+        The rod, or a deck with a single problem, whose projectile is a rod.
     pulse : str, Path or tuple of array_like
         ``"gauss:F0,TAU,B"``, F0 exp(-(t - TAU)^2/4 B^2); ``"sine:F0,B"``, F0 sin(pi t/B) until B; a
-        table of time and force, or both as arrays (points,), linear between the points.
+        table of time and force; or arrays of both (points,). A table is linear between its points.
     dt : float, optional
-        Time step; the deck's, or 0.8 of the travel time of a wave through an element, by default.
+        Time step; by default the deck's, or 0.8 of the travel time of a wave through an element.
     duration : float, optional
-        Simulated time; TAU + 10 B, 1.5 B, or the table's by default.
+        Simulated time; by default TAU + 10 B, 1.5 B, or the last time of the table.
     stations : iterable of float
-        Distances from the struck end at which forces are computed; by default the middle, or the
-        deck's transducer.
+        Distances from the struck end at which forces are computed; by default the middle of a
+        `Rod`, or the transducer of a deck.
     filter : str, optional
-        Filter of these forces: ``"first-order:RISE"``, ``"moving-average:RISE"`` or
+        Filter of the forces at the stations: ``"first-order:RISE"``, ``"moving-average:RISE"`` or
         ``"cfc:CLASS"``.
     mass_matrix : str
         ``"lumped"``, as in the report's program, or ``"consistent"``.
     integrator : str
         ``"wilson"``, as in the report's program, or ``"average-acceleration"``.
     units : str, optional
-        Units of a `Rod`, as in ``"mm-N-s"``, which a filter of a class needs.
+        Units of a `Rod`, as in ``"mm-N-s"``. A filter with a class needs them.
 
     Returns
     -------
@@ -143,10 +143,10 @@ def pulse_test(
     DeckError
         If the deck has errors.
     StudyError
-        If the pulse, the filter or a station is invalid, the projectile is a rigid mass, the steps
-        are more than two million, or the motion is not finite.
+        If the pulse, the filter or a station is invalid, the projectile is a rigid mass, there are
+        more than two million steps, or the motion is not finite.
     ValueError
-        If a number is not positive, or the deck has several problems, or none.
+        If a number is not positive, or the deck has several problems or none.
     OSError
         If the table can't be read.
 
@@ -154,8 +154,8 @@ def pulse_test(
     --------
     >>> import fecm
     >>> rod = fecm.Rod.cylinder(1.0, 0.625, 30e6, 7.33e-4)
-    >>> found = fecm.pulse_test(rod, "gauss:1000,200e-6,40e-6", stations=[0.5])
-    >>> print(f"mean ratio to the applied force: {found.mean_ratios[0]:.3f}")  # report: 0.498
+    >>> test = fecm.pulse_test(rod, "gauss:1000,200e-6,40e-6", stations=[0.5])
+    >>> print(f"mean ratio to the applied force: {test.mean_ratios[0]:.3f}")  # report: 0.498
     mean ratio to the applied force: 0.498
     """
     check_positive(dt=dt, duration=duration)
@@ -171,21 +171,21 @@ def pulse_test(
         raise StudyError("the deck has its own `units`; leave them out")
     else:
         struck = rod_of(sole_problem(rod, warns=False).deck)
-    chosen = filter_of(filter) if isinstance(filter, str) else filter
+    transducer = filter_of(filter) if isinstance(filter, str) else filter
     return simulate_rod_test(
         struck,
         _pulse(pulse, struck.units),
         dt,
         duration,
         tuple(stations),
-        chosen,
+        transducer,
         mass_matrix,
         integrator,
     )
 
 
 def uniform_rod(rod: Rod, units: str | None) -> Struck:
-    """Return a uniform rod in a system of units."""
+    """Return the test of a uniform rod in a system of units."""
     system = system_asked(units)
     return Struck(rod, rod.length / 2.0, None, units_of(system) if system else {})
 
@@ -214,7 +214,10 @@ def simulate_rod_test(
     mass_matrix: MassMatrix,
     integrator: Integrator,
 ) -> PulseTest:
-    """Simulate a test; raises StudyError as :func:`pulse_test`."""
+    """Simulate a test.
+
+    Raises StudyError like :func:`pulse_test`.
+    """
     rod = struck.rod.with_mass(mass_matrix)
     travels = pulse.duration / (rod.length * math.sqrt(rod.density / rod.modulus))
     if travels > MOST_TRAVELS:
@@ -238,7 +241,7 @@ def simulate_rod_test(
 
 
 def _pulse(pulse: str | Path | tuple[ArrayLike, ArrayLike], units: Mapping[str, str]) -> Pulse:
-    """Return a pulse from a text, a table or arrays."""
+    """Return the pulse of a text, a table or arrays."""
     if isinstance(pulse, str | Path):
         return pulse_of(str(pulse), units)
     try:

@@ -1,17 +1,14 @@
-"""Wave fronts: velocities, rays, positions and cusps, and their sheets, section 2.3.
-
-Sheets of the wave fronts: eigenvalues, derivatives, branch tracking.
-
-The squares of the five normal velocities are the eigenvalues of M^-1 L(n).  As functions of the
-normal they form sheets; sheets that cross are identified by their modes.
-
-Wave fronts: normal velocities, rays, positions and cusps, section 2.3.
+"""Wave fronts: normal velocities, rays, positions and cusps, section 2.3.
 
 Across a front only the highest derivatives are discontinuous, so that k drops out of the 5 x 5
 problem: L(n) a = c_n^2 M a couples A, B, D with P, R, I, and transverse shear is independent
-(equations 2-60 to 2-65).  Rays follow from c_n and its derivatives with respect to the normal's
-angle, computed by perturbation of the eigenvalue problem: with the slowness p = n/c_n, equation
-2-84 is the ray velocity V = c_n n + c_n' t, and V' = (c_n + c_n'') t.
+(equations 2-60 to 2-65). The squares of the five normal velocities are the eigenvalues of
+M^-1 L(n). As functions of the normal they form sheets; sheets that cross are identified by their
+modes.
+
+Rays follow from c_n and its derivatives with respect to the normal's angle, computed by
+perturbation of the eigenvalue problem. With the slowness p = n/c_n, equation 2-84 is the ray
+velocity V = c_n n + c_n' t, and V' = (c_n + c_n'') t.
 """
 
 from __future__ import annotations
@@ -41,7 +38,7 @@ EQUAL = 1e-10  # relative tolerance of equal squared velocities
 SURE = 0.8  # squared scalar product above which one mode continues another
 FINEST = 1e-9  # smallest step of the normal (degrees)
 
-ORDERS = np.array(list(permutations(range(5))))  # in which five modes may continue five others
+ORDERS = np.array(list(permutations(range(5))))  # orders in which five modes may continue five
 
 # Names of the fronts, by their dominant component: u_n, u_t, phi_n, phi_t, w.
 FRONTS = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shear")
@@ -60,7 +57,7 @@ class Fronts:
     velocity : ndarray (n, 5)
         Normal velocity c_n, length/time.
     slope, curvature : ndarray (n, 5)
-        Its first and second derivative with respect to the angle of the normal (radian).
+        First and second derivative of `velocity` with respect to the normal's angle (radian).
     share : ndarray (n, 5, 5)
         Share of u_n, u_t, phi_n, phi_t, w (last axis) in the kinetic energy.
     """
@@ -118,7 +115,7 @@ def sheets(medium: Medium, normal: Floats) -> Sheets:
         operators = [root @ matrix @ root.T for matrix in _stiffness(medium, normal)]
         if not np.isfinite(operators).all():
             raise StudyError(OUT_OF_RANGE)
-        square, basis = _solved(*operators)
+        square, basis = _solve_sheets(*operators)
         first, second = (basis.transpose(0, 2, 1) @ matrix @ basis for matrix in operators[1:])
         gap = square[:, :, None] - square[:, None, :]
         apart = np.abs(gap) > EQUAL * square[:, :1, None]
@@ -136,8 +133,8 @@ def sheets(medium: Medium, normal: Floats) -> Sheets:
 def match_modes(before: Floats, after: Floats) -> tuple[Indices, Floats]:
     """Match modes of neighbouring normals; the modes are columns, (n, 5, 5).
 
-    Indices in `after` of the modes that continue those of `before`, (n, 5), and the smallest
-    squared scalar product of such a pair, (n,), at most 1.
+    Returns the indices in `after` of the modes that continue the modes of `before`, (n, 5), and the
+    smallest squared scalar product of a pair, (n,), at most 1.
     """
     likeness = (before.transpose(0, 2, 1) @ after) ** 2
     pairs = likeness[:, np.arange(5), ORDERS]
@@ -160,11 +157,11 @@ def track_branch(medium: Medium, first: float, last: float) -> Indices:
 
 
 def _stiffness(medium: Medium, normal: Floats) -> Floats:
-    """Return L(n) and its first and second derivative by the angle, (3, n, 5, 5)."""
-    both = np.zeros((3, len(normal), 6, 4))
-    for matrix, part in zip(both, gradients(normal), strict=True):
+    """Return L(n) and its first and second derivatives by the angle, (3, n, 5, 5)."""
+    gradients_of_both = np.zeros((3, len(normal), 6, 4))
+    for matrix, part in zip(gradients_of_both, gradients(normal), strict=True):
         matrix[:, :3, :2] = matrix[:, 3:, 2:] = part
-    strain, first, second = both
+    strain, first, second = gradients_of_both
 
     def product(a: Floats, b: Floats) -> Floats:
         half = a.transpose(0, 2, 1) @ medium.section @ b
@@ -180,7 +177,7 @@ def _stiffness(medium: Medium, normal: Floats) -> Floats:
     return stiffness
 
 
-def _solved(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
+def _solve_sheets(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Floats]:
     """Return descending eigenvalues and eigenvectors; equal eigenvalues follow the sheets."""
     # Uncoupled in-plane and flexural components are solved separately.
     coupled = operator[:, :2, 2:4].any()
@@ -192,17 +189,17 @@ def _solved(operator: Floats, first: Floats, second: Floats) -> tuple[Floats, Fl
         limit = EQUAL * np.abs(square).max(axis=1)
         meeting = (np.diff(square, axis=1) < limit[:, None]).any(axis=1)
         for row in np.flatnonzero(meeting).tolist():
-            basis[row] = _kept_apart(square[row], basis[row], part[1:, row], limit[row])
+            basis[row] = _separate_sheets(square[row], basis[row], part[1:, row], limit[row])
         values[:, block], vectors[:, block, block] = square, basis
     order = np.argsort(-values, axis=1, kind="stable")
     values = np.take_along_axis(values, order, axis=1)
     return values, np.take_along_axis(vectors, order[:, None], axis=2)
 
 
-def _kept_apart(values: Floats, vectors: Floats, derivatives: Floats, limit: float) -> Floats:
+def _separate_sheets(values: Floats, vectors: Floats, derivatives: Floats, limit: float) -> Floats:
     """Return eigenvectors that are continuous in the normal where sheets meet."""
     # Among equal eigenvalues they diagonalise the first, then the second derivative of the
-    # operator; for identical sheets they separate the components.
+    # operator. For identical sheets they separate the components.
     parts: list[Floats] = []
     first, second = derivatives
     for group in _runs(values, limit):
@@ -274,7 +271,7 @@ class WaveSurfaces:
         for row in np.flatnonzero(self._close).tolist():
             step[row] = track_branch(medium, row / STEPS, (row + 1) / STEPS)
         self._close &= (step == np.arange(5)).all(axis=1)
-        # Indices of the sheets that continue each sheet of the normal 0.
+        # Indices of the sheets that continue each sheet from the normal 0.
         place = np.empty((AROUND + 1, 5), dtype=np.intp)
         place[0] = np.arange(5)
         for row, following in enumerate(step):
@@ -282,7 +279,7 @@ class WaveSurfaces:
         mean = np.take_along_axis(around.velocity, place, axis=1).mean(axis=0)
         place = place[:, np.argsort(-mean, kind="stable")]
         share = np.take_along_axis(around.share, place[:, :, None], axis=1).mean(axis=0)
-        # To each name the mode that makes the sum of the shares largest.
+        # The assignment of names maximises the sum of the shares.
         scores = share[ORDERS, np.arange(5)].sum(axis=1)
         self._place = place[:, ORDERS[first_largest(scores[None])[0]]]
 
@@ -319,13 +316,13 @@ class WaveSurfaces:
         turning_points = []
         for mode, row in np.argwhere(passes.T).tolist():
 
-            def at(normal: float, mode: int = mode) -> float:
+            def growth_at(normal: float, mode: int = mode) -> float:
                 return float(self.fronts(normal).growth(time, radius)[0, mode])
 
-            normal = float(brentq(at, normals[row], normals[row + 1], xtol=1e-11))
+            normal = float(brentq(growth_at, normals[row], normals[row + 1], xtol=1e-11))
             fronts = self.fronts(normal)
             # Where fronts touch, the sign may change by a jump instead of a zero.
-            if abs(at(normal)) < 1e-5 * (radius + time * fronts.velocity[0, mode]):
+            if abs(growth_at(normal)) < 1e-5 * (radius + time * fronts.velocity[0, mode]):
                 x, y = fronts.positions(time, radius)[0, mode].tolist()
                 turning_points.append(Cusp(FRONTS[mode], normal % 360.0, x, y))
         return sorted(turning_points, key=lambda cusp: (FRONTS.index(cusp.mode), cusp.normal))
@@ -339,8 +336,10 @@ class WaveSurfaces:
         share = self.fronts(normals).share
         runs: dict[str, list[tuple[float, float]]] = {}
         for place, name in enumerate(FRONTS):
-            other = share[:, place].max(axis=1) > share[:, place, place] + 1e-6
-            edges = np.flatnonzero(np.diff([False, *other.tolist(), False], n=1)).reshape(-1, 2)
+            is_misnamed = share[:, place].max(axis=1) > share[:, place, place] + 1e-6
+            edges = np.flatnonzero(np.diff([False, *is_misnamed.tolist(), False], n=1)).reshape(
+                -1, 2
+            )
             if len(edges):
                 runs[name] = [(float(normals[a]), float(normals[b - 1])) for a, b in edges]
         return runs

@@ -1,4 +1,4 @@
-"""Infinite laminate, and harmonic plane waves in it: velocities, frequencies, section 2.2."""
+"""Infinite laminate, and velocities and frequencies of harmonic plane waves, section 2.2."""
 
 from __future__ import annotations
 
@@ -80,9 +80,9 @@ def trigonometry(degrees: ArrayLike) -> tuple[Floats, Floats]:
 
 
 def gradients(degrees: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """Return the strains xx, yy, xy of a unit gradient along n of u_n and u_t, (n, 3, 2).
+    """Return the strains xx, yy, xy of unit gradients along n of u_n and u_t, (n, 3, 2).
 
-    The first and second derivative by the angle (radian) follow.
+    Their first and second derivatives by the angle (radian) follow.
     """
     cos, sin = trigonometry(degrees)
     cos_2, sin_2 = cos**2 - sin**2, 2.0 * sin * cos  # cosine and sine of twice the angle
@@ -113,7 +113,7 @@ def shares(inertia: Floats, vectors: Floats) -> Floats:
 
 
 def first_largest(scores: Floats) -> Indices:
-    """Return the index of the largest score of every row; the first of equal ones."""
+    """Return the index of the largest score in every row; the first if scores are equal."""
     equal = scores > scores.max(axis=-1, keepdims=True) - 1e-9  # sums of shares, of order 1
     return np.asarray(equal.argmax(axis=-1))
 
@@ -145,11 +145,11 @@ class Dispersion:
     angle : float
         Direction of propagation, degrees.
     wavelength : ndarray (n,)
-        Over the thickness.
+        Wavelengths over the thickness.
     phase_velocity : ndarray (n, modes)
-        Length/time.
+        Phase velocities, length/time.
     angular_frequency : ndarray (n, modes)
-        Radian/time.
+        Angular frequencies, radian/time.
     """
 
     modes: ClassVar[tuple[str, ...]] = MODES
@@ -172,21 +172,23 @@ def dispersion(medium: Medium, angle: float, wavelengths: ArrayLike) -> Dispersi
         raise StudyError("wavelengths over thickness must lie between 1e-9 and 1e9")
     k = 2.0 * np.pi / (ratio * medium.laminate.thickness)
     with np.errstate(all="ignore"):  # overflow raises an error below
-        stiffness, inertia, back = _problem(medium, angle, k)
+        stiffness, inertia, back = _wave_problem(medium, angle, k)
         frequency, modes = graded_modes(stiffness, inertia)
         share = shares(medium.inertia, back @ modes)
-    frequency = np.take_along_axis(frequency, _in_order(share), axis=1)
+    frequency = np.take_along_axis(frequency, _order_of_modes(share), axis=1)
     return Dispersion(float(angle), ratio, frequency / k[:, None], frequency)
 
 
-def _problem(medium: Medium, angle: float, k: Floats) -> tuple[Floats, Floats, Floats]:
+def _wave_problem(medium: Medium, angle: float, k: Floats) -> tuple[Floats, Floats, Floats]:
     """Return stiffness, inertia, and transformation to u_n ... w, each (n, 5, 5)."""
-    # With w a quarter of a period ahead of the others all matrices are real: 2-32 without i.  In
-    # long flexural waves phi_n nearly cancels k w; the variable phi_n + tau k w replaces phi_n to
-    # avoid the cancellation.  In short waves tau vanishes.
+    # With w a quarter of a period ahead of the other components, all matrices are real (2-32
+    # without i). In long flexural waves phi_n nearly cancels k w, so that phi_n + tau k w replaces
+    # phi_n. In short waves tau vanishes.
     laminate = medium.laminate
-    beyond = k**2 * laminate.rotary_inertia / laminate.mass  # rotary over translatory inertia
-    tau = 1.0 / (1.0 + beyond)
+    inertia_ratio = (
+        k**2 * laminate.rotary_inertia / laminate.mass
+    )  # rotary over translatory inertia
+    tau = 1.0 / (1.0 + inertia_ratio)
     back = np.tile(np.eye(5), (len(k), 1, 1))
     back[:, 2, 4] = -tau * k
     strain = gradients([angle])[0][0]
@@ -195,7 +197,7 @@ def _problem(medium: Medium, angle: float, k: Floats) -> tuple[Floats, Floats, F
     generalized[:, 3:6, 2:4] = k[:, None, None] * strain
     generalized[:, 3:6, 4] = (-tau * k**2)[:, None] * strain[:, 0]
     generalized[:, [6, 7], [2, 3]] = 1.0
-    generalized[:, 6, 4] = beyond * tau * k  # (1 - tau) k
+    generalized[:, 6, 4] = inertia_ratio * tau * k  # (1 - tau) k
     constitutive = np.zeros((8, 8))
     constitutive[:6, :6] = medium.section
     constitutive[6:, 6:] = in_normal_axes(laminate.shear, [angle])[0]
@@ -248,10 +250,10 @@ def _singular_values(matrices: Floats) -> tuple[Floats, Floats]:
     return values, vectors
 
 
-def _in_order(share: Floats) -> Indices:
+def _order_of_modes(share: Floats) -> Indices:
     """Return the indices of the modes in the order of :data:`MODES`, (n, 5).
 
-    Modes of equal name are sorted by velocity.
+    Flexural modes are sorted by velocity, and so are in-plane modes.
     """
     in_plane = share[:, :, :2].sum(axis=2)
     pair = _PAIRS[first_largest(in_plane[:, _PAIRS].sum(axis=2))]

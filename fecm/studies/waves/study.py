@@ -31,9 +31,9 @@ class Waves:
     medium : Medium
         Stiffness and inertia.
     units : dict of str to str
-        Names of the units; empty if they are not known.
+        Names of the units; empty if they are unknown.
     notes : tuple of str
-        What was filled in or left out.
+        Assumptions and omissions.
     """
 
     def __init__(self, medium: Medium, units: dict[str, str], notes: tuple[str, ...] = ()) -> None:
@@ -84,7 +84,8 @@ class Waves:
         Returns
         -------
         Fronts
-            Normal velocities (length/time), (n, fronts); its `positions` are those at a time.
+            Normal velocities (length/time), (n, fronts); the method `positions` gives the fronts
+            at a time.
         """
         return self.surfaces.fronts(normals)
 
@@ -119,8 +120,8 @@ def waves(
 ) -> Waves:
     """Return plane waves and wave fronts in a laminate (report, chapter 2).
 
-    The laminate is a layup, or the laminate of a deck. A plate with several laminates has the one
-    under the load. An initial membrane force is neglected, and a note says so.
+    The laminate is a layup, or the laminate of a deck. In a plate with several laminates it is the
+    laminate under the load. An initial membrane force is neglected, with a note.
 
     Parameters
     ----------
@@ -130,8 +131,8 @@ def waves(
         Factor of the transverse shear stiffness, in addition to a deck's SHEA; with pi^2/12 the
         cut-off frequencies are exact.
     units : str, optional
-        Units to which a named ply of a `Laminate` is converted, as in ``"mm-N-s"``; its source's by
-        default.
+        Units to which a named ply of a `Laminate` is converted, as in ``"mm-N-s"``; by default the
+        units of its source.
 
     Returns
     -------
@@ -145,7 +146,7 @@ def waves(
     StudyError
         If stiffness or inertia is not positive definite.
     ValueError
-        If the laminate is incomplete or impossible, or the deck has several problems, or none.
+        If the laminate is incomplete or impossible, or the deck has several problems or none.
 
     Examples
     --------
@@ -164,7 +165,7 @@ def waves(
         return waves_of(sole_problem(laminate, warns=False), shear_factor)
     notes: list[str] = []
     stiffness, names = stiffness_of_laminate(laminate, units, notes)
-    return _waves(stiffness, shear_factor, names, notes)
+    return _waves_in_section(stiffness, shear_factor, names, notes)
 
 
 def waves_of(problem: Problem, shear_factor: float) -> Waves:
@@ -176,10 +177,12 @@ def waves_of(problem: Problem, shear_factor: float) -> Waves:
         notes.append("CURV is left out: these are waves of the flat laminate")
     if problem.plate.others:
         notes.append("the plate has several laminates; these are waves of the one under the load")
-    return _waves(problem.laminate, shear_factor, unit_names(problem.deck), notes)
+    return _waves_in_section(problem.laminate, shear_factor, unit_names(problem.deck), notes)
 
 
-def _waves(stiffness: Stiffness, factor: float, units: dict[str, str], notes: list[str]) -> Waves:
+def _waves_in_section(
+    stiffness: Stiffness, factor: float, units: dict[str, str], notes: list[str]
+) -> Waves:
     """Return the waves in a laminate with a factor on its shear stiffness."""
     scaled = replace(stiffness, shear=factor * stiffness.shear)
     return Waves(Medium(scaled), units, tuple(notes))
