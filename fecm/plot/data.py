@@ -21,16 +21,17 @@ from fecm.results.groups import NotStoredError, remedy
 from fecm.results.plies import points_of, rows_at
 from fecm.results.result import Result
 
-LARGEST = 1e100  # larger numbers are refused: axes fail long before numbers overflow
+LARGEST = 1e100  # numbers above it are refused: axes fail long before numbers overflow
 MANY = 2000  # meshes with more elements are drawn with fewer points per element
 
 
 def require_datasets(result: Result, name: str, *paths: str, padded: bool = False) -> list[Array]:
     """Return datasets of a result.
 
-    Raises LackingError if one is missing (the message names the macro that stores it) or empty,
-    PlotError if it holds numbers that an axis can't show. With `padded` NaN is allowed in results
-    of several laminates or materials: plies that an element lacks, or that have no strengths.
+    Raises LackingError if a dataset is empty or missing; the message names the macro that stores
+    it. Raises PlotError if a dataset holds numbers that an axis can't show. `padded` allows NaN in
+    results of several laminates or materials, for plies that an element lacks or that have no
+    strengths.
     """
     padded &= "mesh/laminate" in result or "plies/material" in result
     for path in paths:
@@ -39,10 +40,10 @@ def require_datasets(result: Result, name: str, *paths: str, padded: bool = Fals
     for path in paths:
         if not result[path].size:
             raise LackingError(f"{name} has no rows of {path}")
-        sound = np.abs(result[path]) <= LARGEST
+        is_drawable = np.abs(result[path]) <= LARGEST
         if padded:
-            sound |= np.isnan(result[path])
-        if not sound.all():
+            is_drawable |= np.isnan(result[path])
+        if not is_drawable.all():
             raise PlotError(
                 f"{path} of {name} holds numbers beyond ±{LARGEST:g}, infinities or NaN, which "
                 "can't be drawn"
@@ -51,9 +52,9 @@ def require_datasets(result: Result, name: str, *paths: str, padded: bool = Fals
 
 
 def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
-    """Return elements, and x and y of all nodes (length).
+    """Return the elements, and x and y of all nodes (length).
 
-    Nodes on one line along an axis are refused.
+    Raises PlotError if the nodes lie on a line along an axis.
     """
     elements, coordinates = require_datasets(result, name, "mesh/elements", "mesh/coordinates")
     coordinates = coordinates[:, :2]
@@ -66,7 +67,7 @@ def mesh_of(result: Result, name: str) -> tuple[Array, Floats]:
 
 
 def result_deck(result: Result, name: str) -> Deck:
-    """Return the model of a result's deck."""
+    """Return the deck of a result."""
     try:
         return result.deck
     except ResultFileError:
@@ -103,7 +104,7 @@ def struck(result: Result, name: str) -> Floats:
 def impact_point(result: Result, name: str) -> Floats:
     """Return the centre of the contact patch, or the impact node, (2,), length.
 
-    A deck without either is refused.
+    Raises PlotError if the deck has neither.
     """
     points = struck(result, name)
     if not len(points):
@@ -112,9 +113,10 @@ def impact_point(result: Result, name: str) -> Floats:
 
 
 def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -> Indices:
-    """Return the rows of tape3 nearest to the given times, by default `count` equally spaced ones.
+    """Return the rows of tape3 nearest to the given times.
 
-    If the contact ends within the run, the default rows lie before its end.
+    Without times, `count` equally spaced rows are returned. They lie before the end of the contact
+    if it ends within the run.
     """
     (stored,) = require_datasets(result, name, "tape3/time")
     if not times:
@@ -131,7 +133,7 @@ def stored_rows(result: Result, name: str, times: Sequence[float], count: int) -
 
 
 def contact_end(result: Result) -> float:
-    """Return the time at which the last contact ends; infinite without an end or an impact."""
+    """Return the time at which the last contact ends; infinite without an impact or an end."""
     if "history/force" not in result or result.still_in_contact:
         return np.inf
     touching = result["history/time"][result["history/force"] > 0.0]
@@ -139,21 +141,21 @@ def contact_end(result: Result) -> float:
 
 
 class Patches(NamedTuple):
-    """Plate divided into small quadrilaterals, equally many per element."""
+    """Plate divided into small quadrilaterals, the same number in every element."""
 
     points: Floats  # (n, 2): corners (length)
     quads: Indices  # (m, 4): rows of the corners in `points`
-    # (k,) each: rows of the points around an element; the first is repeated at the end.
+    # (k,) each: rows of the points around an element, with the first repeated at the end.
     edges: list[Indices]
-    parts: list[tuple[ElementBlock, Floats]]  # elements, and the shape functions at their points
+    parts: list[tuple[ElementBlock, Floats]]  # elements and the shape functions at their points
 
     def values(self, nodal: Array) -> Floats:
-        """Return values at the points, by the elements' shape functions from the nodes."""
+        """Interpolate nodal values to the points with the shape functions of the elements."""
         return np.concatenate([(nodal[family.nodes] @ N.T).ravel() for family, N in self.parts])
 
     @property
     def triangles(self) -> Indices:
-        """Two triangles per quadrilateral; those without area are left out."""
+        """Two triangles per quadrilateral, (n, 3), without triangles that have no area."""
         corners = np.concatenate([self.quads[:, [0, 1, 2]], self.quads[:, [0, 2, 3]]])
         first, second = (self.points[corners[:, n]] - self.points[corners[:, 0]] for n in (1, 2))
         area = np.abs(first[:, 0] * second[:, 1] - first[:, 1] * second[:, 0])
@@ -200,23 +202,23 @@ def strain_points(result: Result, name: str) -> Floats:
         raise PlotError(f"{name}: {error}") from None
 
 
-def on_plate(points: Floats, at: Floats, name: str) -> None:
-    """Refuse a place outside of the plate's points, (..., 2)."""
+def check_on_plate(points: Floats, place: Floats, name: str) -> None:
+    """Raise PlotError if a place is outside the plate's points, (..., 2)."""
     low, high = points.reshape(-1, 2).min(axis=0), points.reshape(-1, 2).max(axis=0)
     room = 0.02 * float((high - low).max())
-    if not ((at >= low - room) & (at <= high + room)).all():
+    if not ((place >= low - room) & (place <= high + room)).all():
         raise PlotError(
-            f"the point {at[0]:g},{at[1]:g} is not on the plate of {name}, which extends from "
-            f"{low[0]:g},{low[1]:g} to {high[0]:g},{high[1]:g}"
+            f"the point {place[0]:g},{place[1]:g} is not on the plate of {name}, which extends "
+            f"from {low[0]:g},{low[1]:g} to {high[0]:g},{high[1]:g}"
         )
 
 
-def nearest(points: Floats, at: Floats, name: str) -> Bools:
+def nearest(points: Floats, place: Floats, name: str) -> Bools:
     """Return a mask of the points nearest to a place on the plate.
 
-    There are several if elements meet there.
+    Several points are nearest if elements meet there.
     """
-    on_plate(points, at, name)
-    distance = np.hypot(*np.moveaxis(points - at, -1, 0))
+    check_on_plate(points, place, name)
+    distance = np.hypot(*np.moveaxis(points - place, -1, 0))
     size = float(np.ptp(points, axis=(0, 1)).max())
     return np.asarray(distance <= distance.min() + 1e-6 * size)

@@ -1,4 +1,4 @@
-"""Picture of failure: largest exposures over the plate, and of every ply."""
+"""Picture of failure: largest exposures over the plate and of every ply."""
 
 from __future__ import annotations
 
@@ -43,8 +43,8 @@ HATCH: style.Look = {"facecolor": "white", "edgecolor": "0.55", "hatch": "//////
 OPEN: style.Look = {"mfc": "none", "ls": "none"}
 LARGEST: style.Look = OPEN | {"color": RED, "marker": "o", "ms": 5.0, "mew": 0.9}
 CIRCLE: style.Look = {"color": "black", "linewidth": 0.6, "linestyle": style.DASHED}
-# Marks of the criteria in the bars, in lanes below each other, as values may coincide.
-LANE = 0.68 / len(CRITERIA)  # of the distance of two bars
+# Marks of the criteria in the bars. Each criterion has a lane, as values may coincide.
+LANE = 0.68 / len(CRITERIA)  # distance of lanes, over the distance of bars
 FILLED: style.Look = {"ls": "none", "mew": 0.0, "zorder": 3.5}
 MARKS: tuple[style.Look, ...] = (
     FILLED | {"marker": "s", "ms": 2.0},
@@ -52,20 +52,20 @@ MARKS: tuple[style.Look, ...] = (
     FILLED | {"marker": "o", "ms": 2.3},
     FILLED | {"marker": "^", "ms": 2.5},
 )
-MANY = 5000  # maps of more cells are drawn as pixels in PDF and SVG
-NAMED = 12  # elements under the load that a note names; the others it counts
-TICKS = 16  # numbers on the axis of the plies at most
+MANY = 5000  # cells above which PDF and SVG have the map as pixels
+NAMED = 12  # elements under the load that a warning names; it counts the others
+TICKS = 16  # most numbers on the axis of the plies
 
 
 class DrawnExposures(NamedTuple):
-    """Exposures of a result that are drawn."""
+    """Exposures that a picture shows."""
 
-    under_load: Bools  # (numel, points): mask of the points that are left out
-    # (numel, points): largest exposure of all plies (or interfaces) at every point.
+    under_load: Bools  # (numel, points): mask of the points under the load, which are left out
+    # (numel, points): largest exposure at every point, of all plies or of all interfaces.
     over_plate: Floats
-    # (plies,) or (plies - 1,) each: largest exposure of points outside the load, by criterion.
+    # (plies,) or (plies - 1,) each: largest exposure outside the load, by criterion.
     over_plies: dict[str, Floats]
-    largest: list[LargestExposure]  # of each criterion, the largest first
+    largest: list[LargestExposure]  # largest exposure of each criterion, in descending order
 
     @property
     def worst(self) -> LargestExposure:
@@ -85,12 +85,12 @@ class DrawnExposures(NamedTuple):
 def failure(results: Mapping[str, Result], *, quantity: str = "", width: Width = "full") -> Picture:
     """Draw the largest exposures over time.
 
-    The plate shows the worst ply, the bars show every ply. Points under the load are hatched; the
-    bars leave them out. Values between two plies belong to an element, which the bars leave out if
-    its centre is under the load. Exposures are also evaluated on the dashed circle around the load;
-    the largest ones have rings in the bars. `quantity` is a criterion. By default the bars show all
-    criteria, and the plate the plies, or the interfaces between them if their exposure is the
-    largest.
+    The plate shows the worst ply, the bars show every ply. Points under the load are hatched on the
+    plate and left out of the bars. Interlaminar values belong to an element; the bars leave it out
+    if its centre is under the load. Exposures are also evaluated on the dashed circle around the
+    load. The largest exposures have rings in the bars. `quantity` is a criterion. By default the
+    bars show all criteria, and the plate shows the plies, or the interfaces if their exposure is
+    the largest.
     """
     ((name, result),) = results.items()
     exposures = _exposures(result, name, quantity)
@@ -126,7 +126,7 @@ def _in_words(exposure: LargestExposure) -> str:
 
 
 def _panels(width: Width, high: float, bars: int) -> tuple[Figure, Axes, Axes]:
-    """Return axes of the plate, of `high` over width, and of the bars, below it or beside it."""
+    """Return the axes of the plate, with the aspect `high`, and of the bars, below or beside it."""
     inches = style.WIDTHS[width]
     height_of_bars = float(np.clip(0.8 + 0.1 * bars, 1.4, 5.0))
     if width == "column":
@@ -155,7 +155,7 @@ def _draw_circle(axes: Axes, result: Result, name: str) -> bool:
 
 
 def _warn_of_load(name: str, under_load: Bools) -> None:
-    """Say which points under the load, (numel, points), are left out."""
+    """Warn that points under the load, (numel, points), are left out."""
     elements = 1 + np.flatnonzero(under_load.any(axis=1))
     if not len(elements):
         return
@@ -174,8 +174,8 @@ def _exposures(result: Result, name: str, quantity: str) -> DrawnExposures:
     if quantity and quantity not in NAMES:
         raise PlotError(f"there is no criterion {quantity!r}; there are {', '.join(NAMES)}")
     (near,) = require_datasets(result, name, "failure/under_load")
-    under = near != 0
-    whole = np.broadcast_to(near_load(result, BETWEEN), under.shape)  # elements
+    is_under = near != 0
+    centre_under = np.broadcast_to(near_load(result, BETWEEN), is_under.shape)  # elements
     over_plies: dict[str, Floats] = {}
     fields: dict[str, Floats] = {}
     for criterion in (quantity,) if quantity else NAMES:
@@ -194,26 +194,28 @@ def _exposures(result: Result, name: str, quantity: str) -> DrawnExposures:
             raise PlotError(f"no {what} of {name} has strengths (ALLO)")
         values = np.where(np.isnan(values), UNKNOWN, values)
         if criterion == BETWEEN:
-            field, outside = values.max(axis=1)[:, None], values[~whole[:, 0]]
+            field, outside = values.max(axis=1)[:, None], values[~centre_under[:, 0]]
         else:
-            field, outside = values.max(axis=(2, 3)), values[~under].max(axis=2)
+            field, outside = values.max(axis=(2, 3)), values[~is_under].max(axis=2)
         if (outside != UNKNOWN).any():
-            over_plies[criterion] = _known(outside.max(axis=0))
-        fields[criterion] = np.broadcast_to(field, under.shape)
+            over_plies[criterion] = _without_unknown(outside.max(axis=0))
+        fields[criterion] = np.broadcast_to(field, is_under.shape)
     largest = [
         exposure for exposure in largest_exposures(result) if exposure.criterion in over_plies
     ]
     if not largest:
         raise PlotError(f"the load is over all elements of {name}: no exposure is left to show")
     largest.sort(key=lambda exposure: -exposure.exposure)
-    between = largest[0].criterion == BETWEEN
-    shown = [field for criterion, field in fields.items() if (criterion == BETWEEN) == between]
-    left_out = whole if between else under
-    return DrawnExposures(left_out, _known(np.max(shown, axis=0)), over_plies, largest)
+    is_interlaminar = largest[0].criterion == BETWEEN
+    shown = [
+        field for criterion, field in fields.items() if (criterion == BETWEEN) == is_interlaminar
+    ]
+    left_out = centre_under if is_interlaminar else is_under
+    return DrawnExposures(left_out, _without_unknown(np.max(shown, axis=0)), over_plies, largest)
 
 
-def _known(exposures: Floats) -> Floats:
-    """Return the exposures, NaN where no ply has strengths."""
+def _without_unknown(exposures: Floats) -> Floats:
+    """Return the exposures, with NaN where no ply has strengths."""
     return np.where(exposures == UNKNOWN, np.nan, exposures)
 
 
@@ -236,7 +238,7 @@ def _cells(result: Result, name: str, count: int) -> Floats:
 
 
 def outline(cells: Floats) -> Floats:
-    """Return the sides of cells, (n, 4, 2), that belong to only one of them: (sides, 2, 2)."""
+    """Return the outline of cells, (n, 4, 2): the sides of only one cell, (sides, 2, 2)."""
     sides = np.stack([cells, np.roll(cells, -1, axis=1)], axis=2).reshape(-1, 2, 2)
     if not len(sides):
         return sides
@@ -285,10 +287,15 @@ def _bars(axes: Axes, exposures_drawn: DrawnExposures) -> dict[str, Artist]:
     if plies:
         largest = np.max(list(plies.values()), axis=0)
         number = np.arange(1, len(largest) + 1)
-        alone = next(iter(plies)) if len(plies) == 1 else ""
-        axes.barh(number, largest, height=0.8, color=COLOUR_OF[alone] if alone else "0.85")
-        if alone:
-            entries[alone.replace("_", " ")] = Patch(color=COLOUR_OF[alone])
+        sole = next(iter(plies)) if len(plies) == 1 else ""
+        axes.barh(
+            number,
+            largest,
+            height=0.8,
+            color=COLOUR_OF[sole] if sole else "0.85",
+        )
+        if sole:
+            entries[sole.replace("_", " ")] = Patch(color=COLOUR_OF[sole])
         else:
             for lane, ((name, values), mark) in enumerate(zip(plies.items(), cycle(MARKS))):
                 place = number + LANE * (lane - (len(plies) - 1) / 2.0)

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Results = Mapping[str, Result]
 
-POINTS = 200  # measured points drawn one by one at most
+POINTS = 200  # most measured points that are drawn as points
 
 
 class DrawnForces(NamedTuple):
@@ -61,13 +61,13 @@ ENERGIES = {
 
 
 def time_axis(axes: Axes, clock: style.AxisScale, times: Iterable[Array]) -> None:
-    """Label the axis of time, and end it with the longest history."""
+    """Label the time axis, and end it with the longest history."""
     clock.name(axes.xaxis, "Time")
     axes.set_xlim(0.0, max(float(array[-1]) for array in times))
 
 
 def _mark_open_ends(axes: Axes, results: Results, width: Width) -> None:
-    """Say above a graph that contacts last to the end; name the results unless all do."""
+    """Note above a graph which contacts last to the end."""
     if text := style.open_ends_note(results):
         text = textwrap.fill(text, int(style.LETTERS * style.WIDTHS[width]))
         axes.set_title(text, loc="right", fontsize=style.FOOTER).set_parse_math(False)
@@ -83,14 +83,15 @@ def force(
     offset: float = 0.0,
     width: Width = "column",
 ) -> Picture:
-    """Draw contact force and transducer against time; several results below each other.
+    """Draw contact force and transducer against time.
 
-    A rigid mass has the contact force as transducer, which is not drawn again. A dashed line marks
-    the delamination threshold of a result that has one. `overlay` is a measured force: a CSV file
-    with the columns time and force (or transducer), or times and forces. It is converted to the
-    deck's units if it names its own. `columns` has the names or the numbers (from 1) of the columns
-    of time and force, and `units` their units, for a measurement that names none. `delay` and
-    `offset`, in the deck's units, are subtracted from times and forces.
+    The contact forces of several results have one graph, the transducers another. The transducer of
+    a rigid mass is its contact force and is not drawn again. A dashed line marks the delamination
+    threshold of a result that has one. `overlay` is a measured force: a CSV file with the columns
+    time and force (or transducer), or times and forces. It is converted to the deck's units if it
+    names its own. `columns` has the names or the numbers (from 1) of the columns of time and force.
+    `units` has their units, for a measurement that names none. `delay` and `offset`, in the deck's
+    units, are subtracted from times and forces.
     """
     if overlay is None and (delay or offset or columns or units):
         raise PlotError(
@@ -118,7 +119,7 @@ def force(
     time_axis(axes[-1], style.scale_of(results, "time", times), times)
     _mark_open_ends(axes[0], results, width)
     notes = []
-    if measured is not None:  # over what it is compared with
+    if measured is not None:  # drawn last, over the computed forces
         look = _measured_look(measured.time) | {"color": "0.2", "zorder": 3.0}
         ax = axes[-1] if measured.column == "transducer" else axes[0]
         if ax is not axes[0]:
@@ -134,7 +135,7 @@ def force(
 def _draw_forces(
     drawn: Mapping[str, DrawnForces], pound: style.AxisScale, width: Width
 ) -> tuple[Figure, list[Axes]]:
-    """Draw the forces of one result in one graph, of several above the transducers."""
+    """Draw the forces of one result in one graph; of several results, transducers have a second."""
     colours = style.colours()
     rigid = all(
         np.array_equal(forces_of_run.contact, forces_of_run.transducer)
@@ -162,7 +163,7 @@ def _draw_forces(
 def _mark_thresholds(
     axes: Axes, limits: Mapping[str, float], names: Sequence[str], pound: style.AxisScale
 ) -> None:
-    """Draw thresholds, and name their results unless all have the same one."""
+    """Draw thresholds, and name their results unless all share one threshold."""
     colours = dict(zip(names, style.colours(), strict=False))
     for limit in dict.fromkeys(limits.values()):
         owners = [name for name in limits if limits[name] == limit]
@@ -177,7 +178,7 @@ def _mark_thresholds(
 
 
 def _measured_look(time: Array) -> style.Look:
-    """Return the style of measured numbers: points if they are few, else a thin line."""
+    """Return the look of measured values: points if there are few, else a thin line."""
     if len(time) <= POINTS:
         return {"lw": 0.6, "ls": "none", "marker": ".", "ms": 3.0}
     return {"lw": 0.6}
@@ -185,7 +186,7 @@ def _measured_look(time: Array) -> style.Look:
 
 @style.styled
 def force_fit_picture(fit: Identification, units: Mapping[str, str]) -> Picture:
-    """Draw measured and fitted force above, the residual and its rms below."""
+    """Draw measured and fitted force, and below them the residual and its rms."""
     clock = style.scale_in(units, "time", fit.time)
     figure, (above, below) = style.panels("column", 2, sharex=True, tall=0.6)
     look = _measured_look(fit.time)
@@ -217,10 +218,10 @@ def _thresholds(results: Results) -> dict[str, float]:
 def loop(results: Results, *, against: Against | None = None, width: Width = "column") -> Picture:
     """Draw the contact force against indentation or displacement, from rest.
 
-    ``"deflection"`` is the displacement of the plate under the load, ``"displacement"`` the
-    displacement of the projectile's impacted end towards the plate, in contact the sum of both
-    others. The default is the displacement if every projectile is a rigid mass, else the
-    indentation.
+    ``"deflection"`` is the displacement of the plate under the load. ``"displacement"`` is the
+    displacement of the projectile's impacted end towards the plate: in contact, the sum of
+    deflection and indentation. The default is the displacement if every projectile is a rigid mass,
+    else the indentation.
     """
     style.limit_count(len(results), "loops")
     if against is None:
@@ -232,7 +233,7 @@ def loop(results: Results, *, against: Against | None = None, width: Width = "co
     for name, result in results.items():
         x, values = data.require_datasets(result, name, f"history/{column}", "history/force")
         drawn[name] = np.append(0.0, sign * x), np.append(0.0, values)
-    # Without force the bodies move apart.
+    # Without force the bodies move apart: the axis ends with the contact.
     touched = np.concatenate([[0.0], *(x[force > 0.0] for x, force in drawn.values())])
     length = style.scale_of(results, "length", [touched])
     pound = style.scale_of(results, "force", [f for _, f in drawn.values()])
@@ -296,9 +297,9 @@ def _is_rigid(result: Result) -> bool:
 
 
 def _membrane(axes: Axes, results: Results) -> Line2D | None:
-    """Draw the membrane's part of the strain energy at its rows.
+    """Draw the membrane's part of the strain energy at the stored rows.
 
-    Returns None where it is not stored.
+    Returns None if it is not stored.
     """
     ((name, result),) = results.items()
     if "membrane/energy" not in result:
@@ -322,10 +323,11 @@ def strain_picture(
 ) -> Picture:
     """Draw surface strain z κ, or curvature, in directions at points against time.
 
-    At an angle θ from the x-axis κ = κx cos² θ + κy sin² θ + κxy sin θ cos θ, with the engineering
-    twist κxy. At a node it is the mean of the adjacent elements. The points `at` (length) are by
-    default the one with the largest bending strain outside the load; `gages` are degrees from the
-    x-axis; `face` is ``"far"`` (z = h/2), ``"struck"`` (z = -h/2), or ``"curvature"``.
+    At an angle θ from the x-axis, κ = κx cos² θ + κy sin² θ + κxy sin θ cos θ, with the engineering
+    twist κxy. At a node, κ is the mean of the adjacent elements. `at` has points (length), by
+    default the point with the largest bending strain outside the load. `gages` has directions in
+    degrees from the x-axis. `face` is ``"far"`` (z = h/2), ``"struck"`` (z = -h/2), or
+    ``"curvature"``.
     """
     lines: dict[str, tuple[Array, Array]] = {}
     for name, result in results.items():
@@ -356,7 +358,7 @@ def strain_picture(
 def _strains(
     result: Result, name: str, at: Sequence[tuple[float, float]], gages: Sequence[float], face: Face
 ) -> dict[str, Array]:
-    """Return the histories of one result, by point and direction."""
+    """Return the histories of one result, by the name of point and direction."""
     columns = data.require_datasets(
         result, name, "tape8/kappa_x", "tape8/kappa_y", "tape8/kappa_xy"
     )
@@ -408,7 +410,7 @@ def _distance(result: Result, name: str, points: Array) -> Array:
 def _most_strained(curvatures: Sequence[Array], points: Array, outside: Array) -> Array:
     """Return the place, (2,), of the largest principal curvature, outside the load if possible.
 
-    Of equal values, as in a symmetric plate, the place with the largest x, then y, is taken.
+    If values are equal, as in a symmetric plate, it is the place with the largest x, then y.
     """
     x, y, xy = curvatures
     largest = (np.abs(x + y) + np.hypot(x - y, xy)).max(axis=0)

@@ -1,6 +1,6 @@
 """Kinds of pictures, their options and their errors.
 
-Imports no matplotlib: the command line lists the kinds without it.
+This module does not import matplotlib, so that the command line lists the kinds without it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ class MatplotlibError(FecmError, ImportError):
 
 
 class Picture(NamedTuple):
-    """Figure; `frames` draw its frames if it is animated; `notes` describe it in words."""
+    """Figure, with functions that draw its frames if it is animated, and notes about it."""
 
     figure: Figure
     frames: Sequence[Callable[[], None]] = ()
@@ -73,10 +73,10 @@ class Shows(Enum):
 class Drawing(NamedTuple):
     """Function and options of a kind of picture."""
 
-    function: str  # ``module:name`` in this package; it is imported when it draws
+    function: str  # ``module:name`` in this package, imported when the picture is drawn
     shows: Shows
     summary: str
-    suffixes: tuple[str, ...] = SUFFIXES  # formats it can be written in, the usual one first
+    suffixes: tuple[str, ...] = SUFFIXES  # suffixes of its formats, the usual one first
 
 
 KINDS: dict[str, Drawing] = {
@@ -126,14 +126,14 @@ KINDS: dict[str, Drawing] = {
     ),
 }
 
-Width = Literal["column", "full"]  # of a journal's column, or of its page
+Width = Literal["column", "full"]  # width of a journal's column or page
 Against = Literal["indentation", "deflection", "displacement"]
 Face = Literal["far", "struck", "curvature"]
 Direction = Literal["x", "y"]
 
 
 class PictureOptions(TypedDict, total=False):
-    """Options of pictures; each kind takes some of them, as its function's docstring says."""
+    """Options of pictures; the docstring of a kind's function says which of them it takes."""
 
     width: Width
     at: Sequence[tuple[float, float]]

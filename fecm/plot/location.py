@@ -25,14 +25,14 @@ if TYPE_CHECKING:
     from fecm.location.location import Location
 
 COLUMNS = 2
-MOST_GAGES = 12  # whose strains are drawn
-# Heights of what is around the map, of the force, and of a row of strains (in).
+MOST_GAGES = 12  # most gages whose strains are drawn
+# Heights of the room around the map, of the force, and of a row of strains (in).
 AROUND_MAP = 1.05
 FORCE = 1.85
 STRAINS = 1.15
 CORNERS = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-ROOM = 0.05  # above and below every graph and its legend
-GAGE_LENGTH = 0.05  # of the mark, over the longer side of the plate
+ROOM = 0.05  # room above and below every graph and its legend (in)
+GAGE_LENGTH = 0.05  # length of a gage's mark, over the longer side of the plate
 ZOOM = 1.6  # half the side of the zoom over the reach of the ellipse
 FOUND = style.COLOURS[1]
 FITTED = style.COLOURS[0]
@@ -41,7 +41,7 @@ OTHER: style.Look = {"marker": "D", "mec": FOUND, "mfc": "white", "ms": 4.5, "ls
 
 
 def location(results: Mapping[str, Location]) -> Picture:
-    """Draw the map of the misfit with the located place, fitted force, measured and fitted strains.
+    """Draw the misfit with the located place, the fitted force, and measured and fitted strains.
 
     The second panel enlarges the place and its 95 % ellipse.
     """
@@ -85,7 +85,7 @@ def location_picture(located: Location) -> Picture:
 
 
 def _outline(located: Location) -> Floats:
-    """Return the sides of the plate's edges, corner to corner, (n, 2, 2)."""
+    """Return the outline of the plate: sides of elements from corner to corner, (n, 2, 2)."""
     mesh = generate(located.deck)
     sides: list[Indices] = []
     for block in element_blocks(mesh.elements, mesh.coordinates):
@@ -96,9 +96,10 @@ def _outline(located: Location) -> Floats:
 
 
 def _cells(located: Location, size: float) -> Floats:
-    """Return corners of a rectangle around every candidate, (n, 4, 2), which nearly touch.
+    """Return the corners of a rectangle around every candidate, (n, 4, 2).
 
-    Their sides are the distances of neighbouring candidates, or a tenth of the plate's size.
+    The rectangles nearly touch. Where all candidates are on a line, they are a tenth of the plate's
+    size wide.
     """
     steps = [np.diff(np.unique(values)) for values in located.candidates.T]
     sides = np.array([distances.min() if len(distances) else 0.1 * size for distances in steps])
@@ -163,7 +164,7 @@ def _draw_gages(axes: Axes, located: Location, length: float) -> None:
 
 
 def _draw_zoom(axes: Axes, located: Location, place: style.AxisScale) -> None:
-    """Draw the place and its ellipse, enlarged; axes are distances from the place."""
+    """Draw the place and its ellipse, enlarged; the axes show distances from the place."""
     ellipse = located.ellipse(0.95) - np.array([located.x, located.y])
     axes.set_title("95 % confidence region", loc="left")
     reach = ZOOM * float(np.abs(ellipse).max())
@@ -178,7 +179,7 @@ def _draw_zoom(axes: Axes, located: Location, place: style.AxisScale) -> None:
 
 
 def _draw_force(axes: Axes, located: Location) -> None:
-    """Draw the fitted force with its band; where it is not determined, a hatched area."""
+    """Draw the fitted force with its band, and hatch where it is not determined."""
     # The force begins one interval before its first value.
     begin = 2.0 * located.time[0] - located.time[1]
     time = np.append(begin, located.time)
@@ -212,7 +213,7 @@ def _draw_force(axes: Axes, located: Location) -> None:
 
 
 def _draw_strains(axes: list[Axes], located: Location) -> None:
-    """Draw measured and fitted strains, a graph per gage, all with the same axes."""
+    """Draw measured and fitted strains, one graph per gage, all with the same limits."""
     micro = style.scale(style.largest_absolute(located.strains, located.fitted), "")
     clock = style.scale_in(located.units, "time", located.strain_time)
     largest = max(float(values.max()) for values in (located.strains, located.fitted))

@@ -36,20 +36,20 @@ if TYPE_CHECKING:
 MOST_CURVES = len(style.COLOURS)
 THRESHOLD = "delamination threshold"
 LEVEL_COLOUR = style.COLOURS[1]  # among colours
-# Looks of a level among curves, and of the points from a level on.
+# Looks of a level among curves, and of points at or above a level.
 LEVEL: style.Look = {"color": "0.2", "linestyle": style.DASHED, "linewidth": 1.1}
 RING: style.Look = {"ms": 4.2, "mfc": "none", "mec": LEVEL_COLOUR}
 
 
 class MarkedLevel(NamedTuple):
-    """Value of the quantity to mark."""
+    """Value of the quantity that is marked."""
 
     value: float
     is_threshold: bool = False  # of delamination
 
     @property
     def name(self) -> str:
-        """What the value is."""
+        """Name of the value in the legend."""
         return THRESHOLD if self.is_threshold else "level"
 
 
@@ -61,21 +61,21 @@ class MapContents(NamedTuple):
     levels: list[MarkedLevel]
     title: str  # values that select the cases; empty for all cases
     other: DrawnVariable | None  # second varying parameter of a map over one
-    beyond: dict[str, Bools]  # by what they are: masks of the cases beyond the range of the model
-    ended: dict[str, Bools]  # the same of the cases whose contact is not over
-    # (cases,): delamination thresholds, if they differ and peak forces are shown; else empty.
+    beyond: dict[str, Bools]  # masks of the cases beyond the range of the model, by reason
+    ended: dict[str, Bools]  # masks of the cases whose contact is not over, by reason
+    # (cases,): delamination thresholds if they differ and the map shows peak forces; else empty.
     thresholds: Floats
 
 
 class Graph(NamedTuple):
-    """Axes, and the variables along them."""
+    """Axes and the variables along them."""
 
     axes: Axes
     x: DrawnVariable
     y: DrawnVariable
 
     def label(self) -> None:
-        """Label the axes, except for texts in rows."""
+        """Label the axes, except y if it has texts."""
         self.x.mark(self.axes.xaxis)
         if not self.y.ticks:
             self.y.mark(self.axes.yaxis)
@@ -146,9 +146,9 @@ def choose(
 def _parameters(
     sweep: SweepResult, name: str, rows: Indices, over: Sequence[str]
 ) -> tuple[list[DrawnVariable], DrawnVariable | None]:
-    """Return the parameters of the axes, and the other one of a map over one.
+    """Return the parameters of the axes, and a second varying parameter if there is one axis.
 
-    Hidden cases are refused.
+    Raises PlotError if cases would hide one another.
     """
     varying = [n for n, values in sweep.cases.items() if len(np.unique(values[rows])) > 1]
     axes = [
@@ -177,13 +177,13 @@ def _parameters(
 
 
 def _names_of_axes(
-    sweep: SweepResult, name: str, varying: list[str], asked: Sequence[str]
+    sweep: SweepResult, name: str, varying: list[str], names_given: Sequence[str]
 ) -> list[str]:
-    """Return one or two parameters of the axes."""
-    for parameter in asked:
+    """Return the names of the parameters on the axes, one or two."""
+    for parameter in names_given:
         if parameter not in varying and len(parameter_values(sweep, name, parameter)):
             raise PlotError(f"{parameter} does not vary among the cases; a map needs one that does")
-    over = list(dict.fromkeys(asked)) or varying
+    over = list(dict.fromkeys(names_given)) or varying
     if not over:
         raise PlotError(f"nothing varies in {name}: all cases are equal")
     if len(over) > 2:
@@ -203,9 +203,9 @@ def _text(sweep: SweepResult, name: str, row: int) -> str:
     return style.scale(abs(float(value)), sweep.unit(name)).show(float(value))
 
 
-MANY = 10_000  # more cells or points are stored as an image in vector formats
-CONTOUR_LINES = 8  # approximately
-SHADES = 256  # of a colour map
+MANY = 10_000  # cells or points above which vector formats store an image
+CONTOUR_LINES = 8  # approximate number
+SHADES = 256  # shades of a colour map
 LEVEL_WIDTH = 1.2
 # Looks of the contour lines of levels, and of the numbers on contour lines.
 CONTOUR: style.Look = {
@@ -250,7 +250,7 @@ def _draw_cells(
     form = style.Multiple(shown.scale.factor)
     if not shown.whole and low < high:
         ticks = MaxNLocator(CONTOUR_LINES).tick_values(low, high)
-        apart = 0.3 * np.diff(ticks).min()  # the numbers of near lines would collide
+        apart = 0.3 * np.diff(ticks).min()  # the numbers of close lines would collide
         inner = [
             tick
             for tick in ticks
@@ -265,7 +265,7 @@ def _draw_cells(
 
 
 def _mark_crossings(axes: Axes, grid: ValueGrid, level: float) -> None:
-    """Mark where a row crosses a level, interpolated linearly between cases."""
+    """Mark where a row crosses a level; values between cases are interpolated linearly."""
     x = grid.x
     for row, values in zip(grid.y, grid.values.filled(np.nan) - level, strict=True):
         before, after = values[:-1], values[1:]
@@ -276,7 +276,7 @@ def _mark_crossings(axes: Axes, grid: ValueGrid, level: float) -> None:
 
 
 def _draw_points(graph: Graph, shown: DrawnVariable, levels: Collection[float]) -> None:
-    """Draw one coloured point per case; those above the lowest level have an edge."""
+    """Draw one coloured point per case; points above the lowest level have an edge."""
     fine = np.isfinite(shown.values)
     values = shown.values[fine]
     drawn = graph.axes.scatter(
@@ -296,7 +296,7 @@ def _draw_points(graph: Graph, shown: DrawnVariable, levels: Collection[float]) 
 
 
 def norm_of(shown: DrawnVariable) -> Normalize:
-    """Return the colour scale of the values; counts have one colour each."""
+    """Return the colour scale of the values; every count has its own colour."""
     low, high = shown.range
     if shown.whole and high - low < SHADES - 1:
         return BoundaryNorm(np.arange(low - 0.5, high + 1.0), SHADES)
@@ -338,7 +338,7 @@ def name_level(graph: Graph, text: str) -> None:
 
 
 def name_levels(graph: Graph, contents: MapContents) -> list[str]:
-    """Name levels in the legend; return the note of a threshold that no colour reaches."""
+    """Name the levels in the legend; return notes on thresholds outside the values."""
     shown, notes = contents.shown, []
     low, high = shown.range
     in_cells = value_grid(graph.x, graph.y, shown.values) is not None
@@ -367,7 +367,7 @@ def draw_curves(
     looks = zip(texts.ticks, style.colours(), MARKERS, strict=False)
     for here, (text, colour, marker) in zip(runs_in_order(x, texts), looks, strict=True):
         values = contents.shown.values[here]
-        if not np.isnan(values).all():  # else they have failed
+        if not np.isnan(values).all():  # else all cases have failed
             axes.plot(x.values[here], values, marker=marker, color=colour, ms=2.2, label=text)
     graph = Graph(axes, x, contents.shown)
     _finish(graph, contents)
@@ -397,7 +397,7 @@ def draw_points(graph: Graph, contents: MapContents) -> None:
 
 
 def runs_in_order(x: DrawnVariable, texts: DrawnVariable | None) -> list[Indices]:
-    """Return cases in the order of x: the cases of each text, or all."""
+    """Return the cases in the order of x, one array for each text, or one for all."""
     order = np.argsort(x.values, kind="stable")
     if texts is None:
         return [order]
@@ -405,15 +405,15 @@ def runs_in_order(x: DrawnVariable, texts: DrawnVariable | None) -> list[Indices
 
 
 def _finish(graph: Graph, contents: MapContents) -> None:
-    """Label the axes and mark the levels; the axis of the quantity begins at zero if it can."""
+    """Label the axes and mark the levels; the quantity starts at zero unless it is negative."""
     axes, shown = graph.axes, contents.shown
-    across = graph.x is shown
+    along_x = graph.x is shown
     graph.label()
     for level in contents.levels:
         look = LEVEL | {"label": f"{level.name} {shown.scale.show(level.value)}"}
         if not level.is_threshold:
             look["linestyle"] = style.DOTTED
-        if across:
+        if along_x:
             axes.axvline(level.value, **look)
         else:
             axes.axhline(level.value, **look)
@@ -421,11 +421,11 @@ def _finish(graph: Graph, contents: MapContents) -> None:
     if lowest >= 0.0:
         thresholds = [level.value for level in contents.levels if level.is_threshold]
         end = 1.05 * max(highest, *thresholds, 0.0) or 1.0  # with room for the markers
-        if across:
+        if along_x:
             axes.set_xlim(0.0, end)
         else:
             axes.set_ylim(0.0, end)
-    if across:
+    if along_x:
         axes.grid(axis="y", linewidth=0.4, color="0.85")
         axes.set_axisbelow(True)
 
@@ -454,11 +454,11 @@ def mark_threshold_curves(graph: Graph, contents: MapContents) -> None:
         axes.plot(x.values[here], thresholds[here], **look)
 
 
-# Heights of a row of texts, of everything around the rows, and of a colour bar (in).
+# Heights of a row of texts, of the room around the rows, and of a colour bar (in).
 ROW = 0.17
 AROUND = 0.75
 BAR = 0.45
-FEWEST_ROWS = 4  # that the height has room for
+FEWEST_ROWS = 4  # rows for which there is room at least
 MARK: style.Look = {"color": "0.25", "ms": 3.5, "ls": "none", "zorder": 4, "clip_on": False}
 # Marks of cases beyond the range of the model, on colours and around the points of a graph.
 HATCHING = MARK | {"marker": "$/$", "mew": 0.0}
@@ -476,13 +476,15 @@ def parameter_map(
 ) -> Picture:
     """Draw a quantity of a sweep's cases over one or two varying parameters.
 
-    One parameter: points, joined if each has one case; texts are rows.  Two: cells with contour
-    lines if the cases form a full grid, else coloured points; if one parameter is a text, one curve
-    per text, or rows of cells if there are too many curves.
+    Over one parameter, the map has points, which are joined if each value has one case; texts have
+    rows. Over two parameters, it has cells with contour lines if the cases form a full grid, else
+    coloured points. If one parameter is a text, each text has a curve, or a row of cells if there
+    are too many curves.
 
-    `quantity` is a name of the sweep's summary, by default the peak force, or the velocity found;
-    `over` one or two parameters, by default all that vary.  `where` selects the cases with these
-    values, of numbers the nearest; `level` are values to mark (the deck's unit).
+    `quantity` is a name of the sweep's summary, by default the peak force, or the velocity that was
+    searched. `over` has one or two parameters, by default all that vary. `where` selects the cases
+    with these values; numbers select the nearest value. `level` has values to mark (the deck's
+    unit).
     """
     ((name, sweep),) = results.items()
     contents = choose(sweep, name, quantity=quantity, over=over, where=where or {}, level=level)
@@ -511,7 +513,7 @@ def _draw(contents: MapContents, width: Width) -> Graph:
     if x.ticks:  # texts lie along y
         x, y = y, x
 
-    texts = other if y is shown else y  # of the curves
+    texts = other if y is shown else y  # one curve each
     if x is not shown and texts is not None and 0 < len(texts.ticks) <= MOST_CURVES:
         return draw_curves(x, texts, contents, width)
 
@@ -532,7 +534,7 @@ def _draw(contents: MapContents, width: Width) -> Graph:
 
 
 def _mark_cases(graph: Graph, masks: Mapping[str, Bools], look: style.Look, sign: str) -> list[str]:
-    """Mark a kind of cases; return lines that count them. `sign` is the mark as text."""
+    """Mark cases; return lines that count them by reason. `sign` is the mark as text."""
     if masks:
         is_marked = np.logical_or.reduce(list(masks.values()))
         graph.axes.plot(graph.x.values[is_marked], graph.y.values[is_marked], **look)

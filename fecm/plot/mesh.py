@@ -31,7 +31,7 @@ class Support(StrEnum):
 
 
 HOLLOW: style.Look = {"mfc": "white", "mew": 0.7}
-FAINT = 0.45  # opacity of the laminates, over which the mesh is drawn
+FAINT = 0.45  # opacity of the laminates' colours below the mesh
 # Marks of the supports.
 MARKS: dict[Support, style.Look] = {
     Support.CLAMPED: {"marker": "s", "color": style.COLOURS[0], "ms": 3.0},
@@ -41,11 +41,12 @@ MARKS: dict[Support, style.Look] = {
 
 
 def support_masks(result: Result) -> dict[Support, Bools]:
-    """Return masks of the nodes held against bending, by kind of support; each (numnp,)."""
+    """Return masks of the nodes that are held against bending, (numnp,), by kind of support."""
     held = result["mesh/equations"][:, 2:5] == 0
     w, rotations = held[:, 0], held[:, 1:]
     full = w & rotations.all(axis=1)
-    # At a corner of a simply supported plate one node of an element is fully held, others hold w.
+    # At a corner of a simply supported plate, one node of an element is fully held; in other nodes
+    # only w is held.
     nodes, present = result["mesh/elements"] - 1, result["mesh/elements"] > 0
     has_one_end = (full[nodes] & present).sum(axis=1) == 1
     several = (w[nodes] & present).sum(axis=1) > 1
@@ -66,7 +67,7 @@ def mesh_picture(
     at: Sequence[tuple[float, float]] = (),
     width: Width = "column",
 ) -> Picture:
-    """Draw elements, supports, impact point, contact patch, and points to mark (`at`)."""
+    """Draw elements, supports, impact point, contact patch, and the points `at`."""
     ((name, result),) = results.items()
     coordinates, _ = data.require_datasets(result, name, "mesh/coordinates", "mesh/elements")
     cut = data.patches(result, 4, name)
@@ -96,14 +97,14 @@ def mesh_picture(
 
 
 def _curved(result: Result, name: str, place: style.AxisScale) -> str:
-    """Return the title of a curved panel, which is seen from above: its radii and its rise."""
+    """Return the title of a curved panel, with its radii and its rise."""
     (z,) = data.require_datasets(result, name, "mesh/z")
     named = [f"$R_{{{axis}}}$ {place.show(radius)}" for axis, radius in radii_of(result).items()]
     return ", ".join(["curved", *named, f"rise {place.show(float(np.ptp(z)))}"])
 
 
 def _colour_laminates(axes: Axes, result: Result, name: str, cut: data.Patches) -> None:
-    """Fill the elements with a colour for each laminate, where there are several."""
+    """Fill the elements with a colour for each laminate if there are several."""
     if "mesh/laminate" not in result:
         return
     (of_elements,) = data.require_datasets(result, name, "mesh/laminate")
@@ -122,7 +123,7 @@ def _colour_laminates(axes: Axes, result: Result, name: str, cut: data.Patches) 
 
 
 def _mark_load(axes: Axes, result: Result, name: str) -> None:
-    """Mark where the plate is hit or loaded, and the contact patch."""
+    """Mark the impact point or the load, and the contact patch."""
     where = data.struck(result, name)
     if len(where):
         in_patch = data.circle(result, name) is not None

@@ -1,8 +1,8 @@
 """Drawing and saving of pictures of results: the report's figures.
 
-A kind of picture is a row of :data:`~fecm.plot.kinds.KINDS`. Its function takes named results and
-the options of the kind as keywords, and returns a :class:`~fecm.plot.kinds.Picture`. matplotlib is
-imported when something is drawn: it takes half a second, and it may be absent.
+A kind of picture is a row of :data:`~fecm.plot.kinds.KINDS`. Its function takes named results, and
+the options of the kind as keywords. It returns a :class:`~fecm.plot.kinds.Picture`. matplotlib is
+imported when something is drawn, as the import takes half a second and matplotlib may be absent.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from fecm.location.location import Location
     from fecm.sweeps.result import SweepResult
 
-# What kinds show, in words.
+# Results that kinds show, in words.
 SOURCES = {
     Shows.RUN: "the result of a run",
     Shows.RUNS: "the result of a run",
@@ -48,7 +48,10 @@ FRAMES_PER_SECOND = 15
 
 
 def kind_named(name: str) -> PictureKind:
-    """Return the kind of this name, or raise a PlotError."""
+    """Return the kind with this name.
+
+    Raises PlotError if there is no such kind.
+    """
     try:
         return PictureKind(name)
     except ValueError:
@@ -59,7 +62,7 @@ def kind_named(name: str) -> PictureKind:
 
 
 def require_matplotlib() -> None:
-    """Raise MatplotlibError, which says what to do, if matplotlib can't be imported."""
+    """Raise MatplotlibError, with the remedy, if matplotlib can't be imported."""
     try:
         import matplotlib  # noqa: F401
     except ImportError:
@@ -88,7 +91,7 @@ def options_of(kind: str) -> list[str]:
 
 
 def check_picture_options(kinds: Iterable[str], options: Iterable[str]) -> None:
-    """Refuse options that none of these kinds of picture takes."""
+    """Raise PlotError if none of these kinds of picture takes an option."""
     kinds = list(kinds)
     options_taken = {option for kind in kinds for option in options_of(kind)}
     for option in options:
@@ -104,7 +107,7 @@ def check_picture_options(kinds: Iterable[str], options: Iterable[str]) -> None:
 
 @contextlib.contextmanager
 def _errors_as_one(what: str) -> Iterator[None]:
-    """Turn any error of matplotlib about senseless numbers into one PlotError."""
+    """Turn any error of matplotlib into a PlotError."""
     try:
         yield
     except (FecmError, ImportError, OSError, MemoryError):
@@ -115,7 +118,7 @@ def _errors_as_one(what: str) -> Iterator[None]:
 
 
 def _source(result: Result | SweepResult | Location) -> str:
-    """Return the kind of a result, as a word of :data:`SOURCES`."""
+    """Return the kind of a result, in the words of :data:`SOURCES`."""
     if isinstance(result, Result):
         return SOURCES[Shows.RUN]
     from fecm.sweeps.result import SweepResult  # loaded already if there is such a result
@@ -126,15 +129,21 @@ def _source(result: Result | SweepResult | Location) -> str:
 def _check_source(
     kind: PictureKind, results: Mapping[str, Result | SweepResult | Location]
 ) -> None:
-    """Refuse a result that this kind can't show, such as a sweep for a kind of runs."""
+    """Raise PlotError if the kind can't show a result, such as a sweep in a picture of runs."""
     for name, result in results.items():
-        what = _source(result)
-        if what != SOURCES[KINDS[kind].shows]:
-            able = [
-                kind_name for kind_name, drawing in KINDS.items() if SOURCES[drawing.shows] == what
+        source = _source(result)
+        if source != SOURCES[KINDS[kind].shows]:
+            able_kinds = [
+                kind_name
+                for kind_name, drawing in KINDS.items()
+                if SOURCES[drawing.shows] == source
             ]
-            kinds = f"kind {able[0]} does" if len(able) == 1 else f"kinds {', '.join(able)} do"
-            raise PlotError(f"{name} is {what}, which the kind {kind} can't show; the {kinds}")
+            kinds = (
+                f"kind {able_kinds[0]} does"
+                if len(able_kinds) == 1
+                else f"kinds {', '.join(able_kinds)} do"
+            )
+            raise PlotError(f"{name} is {source}, which the kind {kind} can't show; the {kinds}")
 
 
 def draw(
@@ -143,18 +152,18 @@ def draw(
     style: Mapping[str, Any] | None = None,
     **options: Unpack[PictureOptions],
 ) -> Picture:
-    """Draw a picture of the kind from results by their names in the legend.
+    """Draw a picture of a kind, from results by their names in the legend.
 
-    `style` has matplotlib's settings; by default those of the command line. Raises PlotError if the
-    kind is unknown, a result lacks what it shows, or the options do not fit. Raises ImportError if
-    matplotlib is not installed.
+    `style` has settings of matplotlib, by default the settings of the command line. Raises
+    PlotError if the kind is unknown, a result lacks the data, or the options do not fit. Raises
+    ImportError if matplotlib is not installed.
     """
     chosen = kind_named(kind)
     if len(results) > 1 and KINDS[chosen].shows is not Shows.RUNS:
         raise PlotError(f"the kind {kind} shows one result; {len(results)} were given")
     check_picture_options([chosen], options)
     _check_source(chosen, results)
-    # 0.3 s, and an extra that may be absent; so in the functions below.
+    # The import takes 0.3 s, and matplotlib may be absent; so in the functions below.
     import matplotlib
 
     from fecm.plot.style import RC
@@ -202,13 +211,13 @@ def draw_results(
     ------
     PlotError
         If results lack the data, options are invalid, both `path` and `ax` are given, or `ax` is
-        and the picture has several axes.
+        given and the picture has several axes.
     FileExistsError
         If the file exists and may not be replaced.
 
     Examples
     --------
-    >>> plot("loop", {"lumped": one, "consistent": other}, "rods.pdf")  # doctest: +SKIP
+    >>> plot("loop", {"lumped": lumped, "consistent": consistent}, "rods.pdf")  # doctest: +SKIP
     """
     if kind not in list(PictureKind) and any(
         isinstance(result, Container) and kind in result for result in results.values()
@@ -227,7 +236,7 @@ def draw_results(
 
     from fecm.plot.style import TARGET, style_on
 
-    # Loads the backend: a notebook's changes settings, to be kept.
+    # This loads the backend. The backend of a notebook changes settings, which are kept.
     pyplot.draw_if_interactive()  # type: ignore[no-untyped-call]
     before = set(pyplot.get_fignums())
     token = TARGET.set("pyplot" if ax is None else ax)
@@ -245,7 +254,7 @@ def draw_results(
 
 
 def check_suffix(kind: str, path: Path) -> None:
-    """Refuse a file name whose suffix is not a format of the kind."""
+    """Raise PlotError if the suffix of a file is not a format of the kind."""
     suffixes = KINDS[kind_named(kind)].suffixes
     if path.suffix.lower() not in suffixes:
         raise PlotError(f"{path}: the kind {kind} is written as {' or '.join(suffixes)}")

@@ -1,4 +1,4 @@
-"""Pictures of the plate's deflection: along a line, from above, in three dimensions, moving."""
+"""Pictures of the plate's deflection: along a line, from above, in three dimensions, animated."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ LEVELS = 21
 
 
 def aspect(points: Floats) -> float:
-    """Return height over width of the plate's picture, from its points (n, 2)."""
+    """Return height over width of the plate's picture, from points of the plate, (n, 2)."""
     wide, high = np.ptp(points, axis=0)
     return float(np.clip(high / wide, 0.3, 2.0))
 
@@ -56,15 +56,18 @@ def mark_impact(axes: Axes, result: Result, name: str) -> None:
 
 
 def profile(result: Result, name: str, along: Direction, rows: Array) -> tuple[Floats, Floats]:
-    """Return the deflection on a line through the impact point along x or y, at rows of tape3."""
+    """Return positions on a line through the impact point, and the deflection at rows of tape3.
+
+    The line is along x or y. The deflection is (rows, positions).
+    """
     coordinates, w = result["mesh/coordinates"], result["tape3/w"][rows]
     axis, across = AXES[along], 1 - AXES[along]
     level = data.impact_point(result, name)[across]
     extent = float(np.ptp(coordinates[:, axis]))
-    on = np.flatnonzero(np.abs(coordinates[:, across] - level) <= 1e-6 * extent)
-    on = on[np.argsort(coordinates[on, axis])]
+    nodes = np.flatnonzero(np.abs(coordinates[:, across] - level) <= 1e-6 * extent)
+    nodes = nodes[np.argsort(coordinates[nodes, axis])]
     cut = data.patches(result, 4, name)
-    # The ends of the plate on the line, from its intersections with sides of quadrilaterals.
+    # The line ends at the outermost intersections with sides of quadrilaterals.
     corners = cut.points[cut.quads]
     ends = np.roll(corners, -1, axis=1)
     a, b = corners[..., across] - level, ends[..., across] - level
@@ -72,11 +75,11 @@ def profile(result: Result, name: str, along: Direction, rows: Array) -> tuple[F
     share = a[crossed] / (a[crossed] - b[crossed])
     positions = corners[crossed][:, axis] + share * (ends[crossed] - corners[crossed])[:, axis]
     position = np.linspace(positions.min(), positions.max(), SAMPLES)
-    inside = coordinates[on, axis]
-    sides = np.diff(inside).max() if len(on) > 2 else math.inf
+    inside = coordinates[nodes, axis]
+    sides = np.diff(inside).max() if len(nodes) > 2 else math.inf
     longest = longest_sides(result["mesh/elements"], coordinates).max()
     if sides <= 2.0 * longest and np.isclose(np.ptp(inside), np.ptp(position)):
-        return inside, w[:, on]
+        return inside, w[:, nodes]
     points = np.empty((2, SAMPLES))
     points[axis], points[across] = position, level
     triangles = Triangulation(cut.points[:, 0], cut.points[:, 1], cut.triangles)
@@ -93,8 +96,8 @@ def line_picture(
 ) -> Picture:
     """Draw the deflection along a line through the impact point.
 
-    Several results have one graph per time. The stored rows nearest to `times` (the deck's unit)
-    are drawn, by default a few, in the direction `along`.
+    The line is in the direction `along`. Several results have one graph per time. The picture shows
+    the stored rows nearest to `times` (the deck's unit), by default a few.
     """
     drawn = {}
     for name, result in results.items():
@@ -169,13 +172,13 @@ Show = Callable[[int], None]  # shows a row of tape3
 
 FRAMES = 60
 EXAGGERATION = 0.3  # height of the deflected plate over its longer side
-ON_PANEL = 0.15  # the same of the deflection that is drawn on a curved panel
+ON_PANEL = 0.15  # height of the deflection drawn on a curved panel, over its longer side
 
 
 def surface_picture(
     results: Results, *, times: Sequence[float] = (), width: Width = "column"
 ) -> Picture:
-    """Draw the deflected plate, by default at the instant of the largest deflection range."""
+    """Draw the deflected plate, by default when its deflections differ most."""
     ((name, result),) = results.items()
     (w,) = data.require_datasets(result, name, "tape3/w")
     largest = np.array([int(np.ptp(w, axis=1).argmax())])
@@ -201,9 +204,9 @@ def animation(results: Results, *, times: Sequence[float] = (), width: Width = "
 def _plates(
     results: Results, width: Width, rows: Array, count: int, clock: style.AxisScale
 ) -> tuple[Figure, list[Show]]:
-    """Draw `count` plates at rest on the common scale of all rows.
+    """Draw `count` plates at rest, on the common scale of all rows.
 
-    Returns a function that shows a row on each plate.
+    Returns a function for each plate that shows a row on it.
     """
     ((name, result),) = results.items()
     cut, w = data.patches(result, 2, name), result["tape3/w"]
@@ -256,7 +259,8 @@ def _plates(
 def _at_rest(result: Result, name: str, cut: data.Patches, largest: float) -> tuple[Floats, float]:
     """Return the heights of the points at rest, (n,), and the scale of the deflections.
 
-    The shape of a curved panel has the scale of its sides, on which a deflection would not be seen.
+    A curved panel has one scale for its shape and its sides. Deflections are magnified, as they
+    would not be visible on this scale.
     """
     if "mesh/z" not in result:
         return np.zeros(len(cut.points)), 1.0
@@ -297,7 +301,7 @@ def _draw_at_rest(axes: Axes3D, cut: data.Patches, low: float, high: float) -> P
 
 
 def _label(axes: Axes3D, place: style.AxisScale, length: style.AxisScale) -> None:
-    """Label three-dimensional axes, and thin out their ticks."""
+    """Label three-dimensional axes and thin out their ticks."""
     for axis, shown, text, pad in (
         (axes.xaxis, place, "$x$", -4.0),
         (axes.yaxis, place, "$y$", -4.0),

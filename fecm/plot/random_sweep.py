@@ -21,12 +21,12 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
 Sweeps = Mapping[str, SweepResult]
-BESIDE: dict[Width, int] = {"column": 2, "full": 4}  # scatter plots side by side
-# Heights of a pair of bars, and of what is around the pairs (in).
+BESIDE: dict[Width, int] = {"column": 2, "full": 4}  # scatter plots in a row
+# Heights of a pair of bars, and of the room around the pairs (in).
 PAIR = 0.3
 AROUND = 0.75
 POINT: Look = {"alpha": 0.5, "mew": 0.0, "rasterized": True}
-POINT_SIZES = (2.2, 5.0)  # of many points and of few (points)
+POINT_SIZES = (2.2, 5.0)  # size of many points and of few points (pt)
 
 
 class Draws(NamedTuple):
@@ -38,7 +38,10 @@ class Draws(NamedTuple):
     rows: dict[int, Indices]  # cases by the number of the combination of varied values
 
     def only(self) -> tuple[int, Indices]:
-        """Return the only combination, and its cases; refuse several."""
+        """Return the only combination and its cases.
+
+        Raises PlotError if there are several combinations.
+        """
         if len(self.rows) > 1:
             raise PlotError(
                 f"{self.name} has {len(self.rows)} combinations of varied values; select one of "
@@ -47,19 +50,19 @@ class Draws(NamedTuple):
         return next(iter(self.rows.items()))
 
     def limits(self, quantity: str, level: Sequence[float]) -> list[float]:
-        """Return the limits of a quantity to mark: the given ones, or those of the sweep."""
+        """Return the limits of a quantity to mark: `level`, or the limits of the sweep."""
         exceedance = self.random.exceedance
         limits_of_sweep = exceedance.limit[
             (exceedance.quantity == quantity) & np.isfinite(exceedance.limit)
         ]
         return list(level) or limits_of_sweep.tolist()
 
-    def say_doubts(self, axes: Axes) -> None:
-        """Count the draws beyond the range of the model below a graph."""
+    def count_doubts(self, axes: Axes) -> None:
+        """Count the draws beyond the range of the model, in a line below a graph."""
         footer(axes, case_counts(beyond(self.sweep, np.concatenate(list(self.rows.values())))))
 
 
-def _draws(results: Sweeps, where: Where | None) -> Draws:
+def _select_draws(results: Sweeps, where: Where | None) -> Draws:
     """Return the draws of the combinations of varied values that `where` selects."""
     where = where or {}
     ((name, sweep),) = results.items()
@@ -86,11 +89,11 @@ def exceedance(
 ) -> Picture:
     """Draw the probability that a quantity is larger than a value, with 95 % intervals at limits.
 
-    Each combination of varied values has a curve; `where` selects some.  `quantity` is a name of
-    the sweep's summary, by default the peak force, or the velocity found; `level` are limits (the
-    deck's unit), by default those of the sweep.
+    Each combination of varied values has a curve; `where` selects some of them. `quantity` is a
+    name of the sweep's summary, by default the peak force, or the velocity that was searched.
+    `level` has limits (the deck's unit), by default the limits of the sweep.
     """
-    drawn = _draws(results, where)
+    drawn = _select_draws(results, where)
     limit_count(len(drawn.rows), "curves")
     every = [quantity_of(drawn.sweep, drawn.name, rows, quantity) for rows in drawn.rows.values()]
     limits = drawn.limits(every[0].name, level)
@@ -109,7 +112,7 @@ def exceedance(
             p, low, high = map(float, exceedance_bounds(hits, np.array(count), np.array(open_ends)))
             centre = p if np.isfinite(p) else (low + high) / 2.0
             interval = [[centre - low], [high - centre]]
-            marker = "o" if np.isfinite(p) else "none"  # draws are open: only the interval is known
+            marker = "o" if np.isfinite(p) else "none"  # with open draws only the interval is known
             style: dict[str, Any] = {"fmt": marker, "capsize": 2.0, "ms": 3.0, "lw": 0.9}
             axes.errorbar(limit, centre, interval, color=colour, **style)
             case = f", {label}" if label else ""
@@ -122,7 +125,7 @@ def exceedance(
     axes.set_ylim(top=1.15)
     axes.set_ylabel("Probability of exceedance")
     last.scale.name(axes.xaxis, last.label)
-    drawn.say_doubts(axes)
+    drawn.count_doubts(axes)
     if len(drawn.rows) > 1 or limits:
         lines_legend(figure, axes)
     return Picture(figure, notes=notes)
@@ -137,9 +140,9 @@ def sensitivity(
 ) -> Picture:
     """Draw the Sobol' indices of a quantity as bars, with their 95 % intervals.
 
-    `where` selects one of several combinations of varied values; `quantity` as of `exceedance`.
+    `where` selects one of several combinations of varied values. `quantity` is as in `exceedance`.
     """
-    drawn = _draws(results, where)
+    drawn = _select_draws(results, where)
     name, sweep, random = drawn.name, drawn.sweep, drawn.random
     if not random.sensitivity:
         raise LackingError(f"{name} has no indices; run the sweep with --sensitivity")
@@ -167,7 +170,7 @@ def sensitivity(
     axes.set_xlim(left=min(0.0, axes.get_xlim()[0]))
     axes.axvline(0.0, color="0.2", linewidth=0.6)
     axes.set_xlabel(f"Sobol' index: {shown.label}")
-    drawn.say_doubts(axes)
+    drawn.count_doubts(axes)
     legend(figure, *axes.get_legend_handles_labels())
     return Picture(figure)
 
@@ -182,10 +185,10 @@ def scatter(
 ) -> Picture:
     """Draw a quantity over every random value.
 
-    `where` selects one of several combinations of varied values; `quantity` and `level` as of
+    `where` selects one of several combinations of varied values. `quantity` and `level` are as in
     `exceedance`.
     """
-    drawn = _draws(results, where)
+    drawn = _select_draws(results, where)
     _, rows = drawn.only()
     shown = quantity_of(drawn.sweep, drawn.name, rows, quantity)
     limits = drawn.limits(shown.name, level)
@@ -206,7 +209,7 @@ def scatter(
             shown.scale.name(axes.yaxis, shown.label)
         for axis in (axes.xaxis, axes.yaxis):  # a half column is narrow
             axis.set_label_text(axis.get_label_text().replace(" (", "\n("))
-    drawn.say_doubts(every[len(laws) - 1])
+    drawn.count_doubts(every[len(laws) - 1])
     if limits:
         lines_legend(figure, every[0])
     return Picture(figure)

@@ -53,10 +53,10 @@ class GraphLine(NamedTuple):
 def indentation_fit_picture(
     indentation: Floats, force: Floats, fit: ContactLawFit, units: Mapping[str, str]
 ) -> Picture:
-    """Draw a test with the fitted curves, and permanent against largest indentation."""
-    both = len(fit.cycles) > 1
+    """Draw a test with its fitted curves, and permanent against largest indentation."""
+    has_line = len(fit.cycles) > 1
     ratio = style.RATIO["column"]
-    if both:
+    if has_line:
         figure, axes = style.panels("full", 1, 2, ratio=ratio)
     else:
         figure, axes = style.panels("column", ratio=ratio)
@@ -74,7 +74,7 @@ def indentation_fit_picture(
         )
         if number in curves.numbers(stretch.kind) and len(a):
             top = float(a.max())
-            if stretch.kind is StretchKind.FALLING:  # begin at the turning point
+            if stretch.kind is StretchKind.FALLING:  # it starts at the turning point
                 top = max(top, fit.solution.values[curves.layout.corners[stretch.begin]])
             x = np.linspace(max(0.0, a.min()), top, POINTS)
             y = curves.force * curves.stretch(p, number, x / curves.length)
@@ -85,7 +85,7 @@ def indentation_fit_picture(
     style.lines_legend(figure, axes[0])
     for handle in figure.legends[0].get_lines():
         handle.set(markersize=5.0, alpha=1.0)
-    if both:
+    if has_line:
         _permanent(axes[1], fit, length)
     return Picture(figure)
 
@@ -119,7 +119,7 @@ def rigidity_picture(
 ) -> Picture:
     """Draw the unloading rigidity against the largest indentation (figure 3.19).
 
-    Rigidities, force/length^power, of each relation are drawn at the `peaks`, (n,).
+    Each relation has its rigidities, force/length^power, at the `peaks`, (n,).
     """
     # The rigidity is unbounded towards zero: the deeper half sets the height of the axis.
     top = 3.0 * max(float(s[len(s) // 2 :].max()) for s in relations.values())
@@ -144,7 +144,7 @@ def _against_time(
     dimension: str,
     units: Mapping[str, str],
 ) -> None:
-    """Draw lines against time, both axes scaled."""
+    """Draw lines against time, and label both axes."""
     for line in lines:
         axes.plot(time, line.values, color=line.colour, ls=line.style, label=line.label)
     style.scale(float(time[-1]), unit_of("time", dict(units))).name(axes.xaxis, "Time")
@@ -157,7 +157,7 @@ def _against_time(
 def pulse_picture(
     history: RodHistory, filtered: Floats | None, units: Mapping[str, str]
 ) -> Picture:
-    """Draw forces above, accelerations below, as in figures 4.7 and 4.8.
+    """Draw forces, and accelerations below them, as in figures 4.7 and 4.8.
 
     `filtered` are the filtered forces at the stations, (rows, stations).
     """
@@ -192,9 +192,9 @@ def pulse_picture(
 def filter_picture(
     time: Floats, named: Mapping[str, Floats], units: Mapping[str, str], dimension: str
 ) -> Picture:
-    """Draw a history, the filtered history, and others beside them, (rows,) each, against time.
+    """Draw histories, (rows,) each, against time: measured, filtered and others.
 
-    The legend has the names of the histories. Their dimension is empty if it is unknown.
+    The legend has the names of the histories. `dimension` is empty if it is unknown.
     """
     figure, (axes,) = style.panels("column")
     looks = zip(named.items(), style.COLOURS, strict=False)
@@ -214,10 +214,10 @@ def calibration_picture(
     `units` are the units of time, V_F and V_a.
     """
     figure, (left, right) = style.panels("full", 1, 2, ratio=2 * style.RATIO["full"])
-    other = left.twinx()
-    other.spines["right"].set_visible(True)
+    a_axes = left.twinx()
+    a_axes.spines["right"].set_visible(True)
     handles: list[Artist] = [*left.plot(time, v_f, color=style.COLOURS[0])]
-    handles += other.plot(time, v_a, color=style.COLOURS[1])
+    handles += a_axes.plot(time, v_a, color=style.COLOURS[1])
     handles += right.plot(v_a, v_f, "o", color=style.COLOURS[0], ms=2.0)
     ends = np.array([min(0.0, float(v_a.min())), max(0.0, float(v_a.max()))])
     handles += right.plot(
@@ -228,7 +228,7 @@ def calibration_picture(
     clock.name(left.xaxis, "Time")
     f_scale.name(left.yaxis, "$V_F$")
     f_scale.name(right.yaxis, "$V_F$")
-    a_scale.name(other.yaxis, "$V_a$")
+    a_scale.name(a_axes.yaxis, "$V_a$")
     a_scale.name(right.xaxis, "$V_a$")
     labels = [
         "$V_F$",
@@ -245,10 +245,10 @@ def calibration_picture(
 AROUND = np.arange(1441) / 4.0  # directions of the normals, degrees
 RAYS = 45.0  # degrees between the normals of the rays
 WORDS = {name: name.replace("_", " ").replace("in plane", "in-plane") for name in (*MODES, *FRONTS)}
-# A style per mode.
-DASHCUSPTED: LineStyleType = (0, (7, 1.5, 1, 1.5))
-DASHCUSPCUSPTED: LineStyleType = (0, (7, 1.5, 1, 1.5, 1, 1.5))
-DASHES = (SOLID, DASHED, DOTTED, DASHCUSPTED, DASHCUSPCUSPTED)
+# One style per mode.
+DASH_DOT: LineStyleType = (0, (7, 1.5, 1, 1.5))
+DASH_DOT_DOT: LineStyleType = (0, (7, 1.5, 1, 1.5, 1, 1.5))
+DASHES = (SOLID, DASHED, DOTTED, DASH_DOT, DASH_DOT_DOT)
 CUSP: Look = {"ls": "", "marker": "o", "ms": 3.0, "mfc": "white", "mec": "black", "mew": 0.6}
 
 
@@ -256,9 +256,9 @@ CUSP: Look = {"ls": "", "marker": "o", "ms": 3.0, "mfc": "white", "mec": "black"
 def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
     """Draw phase velocities and frequencies of all modes against the wavelength.
 
-    Velocities are divided by the transverse shear velocity, frequencies by that velocity over the
-    thickness, as in figures 2.4 and 2.5. The axes end just above the in-plane modes and the
-    cut-off.
+    Velocities are divided by the transverse shear velocity, frequencies by the ratio of this
+    velocity to the thickness, as in figures 2.4 and 2.5. The axes end just above the in-plane modes
+    and the cut-off.
     """
     limit_count(len(curves), "directions")
     unit = medium.shear_velocity
@@ -287,7 +287,7 @@ def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
 
 @styled
 def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
-    """Draw polar graphs of the normal velocities of in-plane and flexural fronts."""
+    """Draw the normal velocities of in-plane and flexural fronts as polar graphs."""
     fronts = surfaces.fronts(AROUND)
     speed = scale_in(units, "length/time", fronts.velocity)
     figure, axes = panels("full", 1, 2, ratio=1.16, projection="polar")
@@ -311,7 +311,7 @@ def speeds_picture(surfaces: WaveSurfaces, units: Mapping[str, str]) -> Picture:
 def fronts_picture(
     surfaces: WaveSurfaces, times: Sequence[float], radius: float, units: Mapping[str, str]
 ) -> Picture:
-    """Draw fronts at several times with rays and cusps, one graph per mode."""
+    """Draw fronts with rays and cusps at several times, one graph per mode."""
     limit_count(len(times), "times")
     fronts, rays = surfaces.fronts(AROUND), surfaces.fronts(np.arange(0.0, 360.0, RAYS))
     places = [fronts.positions(time, radius) for time in times]

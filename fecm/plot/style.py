@@ -1,6 +1,6 @@
 """Style of the pictures: journal sizes and colours, units on the axes, legends beside the data.
 
-Axes hold numbers in the deck's units. Their ticks show them times the factor of an
+Axes hold numbers in the deck's units. Their ticks show the numbers times the factor of an
 :class:`AxisScale`.
 """
 
@@ -41,9 +41,9 @@ Look = dict[str, Any]
 
 WIDTHS: dict[Width, float] = {"column": 3.5, "full": 7.2}  # inches
 RATIO: dict[Width, float] = {"column": 0.68, "full": 0.45}  # height over width of a graph
-LETTERS = 16  # of small text per inch
+LETTERS = 16  # letters of small text per inch
 FOOTER = 7.0  # size of small text (points)
-COLOUR_BAR_HEIGHT = 0.32  # with its labels (in)
+COLOUR_BAR_HEIGHT = 0.32  # height of a colour bar with its labels (in)
 # Dots per inch in print and on a screen.
 RESOLUTION = 300
 SCREEN = 150
@@ -58,7 +58,7 @@ STYLES = (SOLID, DASHED, DOTTED, DASH_DOTTED)
 SEQUENTIAL = "viridis"
 DIVERGING = "RdBu_r"  # about zero
 
-# Where pictures are drawn: on axes, on a new figure of pyplot, or on a figure by itself.
+# Where pictures are drawn: on given axes, on a new figure of pyplot, or on their own figure.
 TARGET: ContextVar[Axes | Literal["pyplot"] | None] = ContextVar("TARGET", default=None)
 # Any: matplotlib's types of these names differ between versions.
 RC: Any = {
@@ -98,23 +98,23 @@ UNDATED: dict[str, dict[str, None]] = {
 }
 _SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
-# Decorates functions to draw in this style.
+# Decorator of functions that draw in this style.
 styled = cast(ContextDecorator, matplotlib.rc_context(RC))
 
 
 def literal(text: str) -> str:
-    """Escape a text so that matplotlib shows it literally, without mathematics."""
+    """Escape a text so that matplotlib does not read mathematics in it."""
     return printable(text).replace("$", r"\$")
 
 
 class Multiple(Formatter):
-    """Formatter of ticks times a factor, all with the decimals that one of them needs."""
+    """Formatter of ticks times a factor; all ticks have the decimals that the longest needs."""
 
     MOST_DECIMALS = 11
 
     def __init__(self, factor: float) -> None:
         self._factor = factor
-        self._decimals: int | None = None  # None if no number of decimals shows the ticks
+        self._decimals: int | None = None  # None if ticks need more than MOST_DECIMALS
 
     def set_locs(self, locs: Sequence[float]) -> None:
         """Receive the positions of the ticks."""
@@ -139,14 +139,14 @@ class Multiple(Formatter):
 
 
 class AxisScale(NamedTuple):
-    """Scale of an axis: factor of the numbers at its ticks, and text of the unit."""
+    """Scale of an axis: factor of the numbers at its ticks, and the unit."""
 
     factor: float
     unit: str
 
     @property
     def shown(self) -> str:
-        """Unit with its broken powers, as in N/mm^1.5, as superscripts."""
+        """Unit for matplotlib, with fractional powers, as in N/mm^1.5, as superscripts."""
         return re.sub(r"\^(\d+\.\d+)", r"$^{\1}$", literal(self.unit))
 
     def label(self, name: str) -> str:
@@ -154,7 +154,7 @@ class AxisScale(NamedTuple):
         return f"{name} ({self.shown})" if self.unit else name
 
     def name(self, axis: Axis, name: str) -> None:
-        """Label an axis; its ticks show the numbers in the unit."""
+        """Label an axis, and show its ticks in the unit."""
         axis.set_label_text(self.label(name))
         axis.set_major_formatter(Multiple(self.factor))
 
@@ -167,7 +167,7 @@ class AxisScale(NamedTuple):
 def scale(peak: float, unit: str) -> AxisScale:
     """Return the scale for numbers up to `peak`, in powers of 1000; 1 for numbers near 1.
 
-    Some units take a prefix (800 µs), others follow the power (1.3, 10⁻³ in).
+    Some units take a prefix (800 µs); other units follow the power of ten (1.3, 10⁻³ in).
     """
     power = 0
     if 1e-100 < peak < math.inf and not (1.0 if unit in PREFIXED else 0.1) <= peak < 1e4:
@@ -175,15 +175,15 @@ def scale(peak: float, unit: str) -> AxisScale:
     if name := with_prefix(unit, power):
         return AxisScale(10.0**-power, name)
     text = f"{unit[2:]}⁻¹" if unit.startswith("1/") else unit
-    text = re.sub(r"\^(\d+)(?![\d.])", lambda found: found[1].translate(_SUPERSCRIPTS), text)
+    text = re.sub(r"\^(\d+)(?![\d.])", lambda match: match[1].translate(_SUPERSCRIPTS), text)
     power_of_ten = f"10{str(power).translate(_SUPERSCRIPTS)} " if power else ""
     return AxisScale(10.0**-power, f"{power_of_ten}{text.replace('*', '·')}".strip())
 
 
 def open_ends_note(results: Mapping[str, Result]) -> str:
-    """Say that contacts last to the end; name the results unless all do.
+    """Return a note about contacts that last to the end; empty if no contact does.
 
-    The text is empty if no contact does.
+    It names the results unless all contacts last to the end.
     """
     named = [name for name, result in results.items() if result.still_in_contact]
     which = f" ({', '.join(named)})" if len(named) < len(results) else ""
@@ -191,9 +191,9 @@ def open_ends_note(results: Mapping[str, Result]) -> str:
 
 
 def scale_of(results: Mapping[str, Result], dimension: str, arrays: Iterable[Array]) -> AxisScale:
-    """Return the scale for arrays of one dimension, in the results' unit.
+    """Return the scale for arrays of one dimension, in the unit of the results.
 
-    The units of the results must agree.
+    Raises PlotError if the results differ in this unit.
     """
     units = {name: unit_of(dimension, result.units) for name, result in results.items()}
     named = {unit: name for name, unit in units.items() if unit}
@@ -215,21 +215,22 @@ def scale_in(units: Mapping[str, str], dimension: str, *arrays: Array) -> AxisSc
 
 
 def limit_count(count: int, what: str, most: int = len(COLOURS)) -> None:
-    """Refuse more lines than there are colours or styles."""
+    """Raise PlotError if there are more lines than colours or styles."""
     if count > most:
         raise PlotError(f"{count} {what} can't be told apart in one picture; at most {most} can")
 
 
 def colours() -> list[str]:
-    """Return the colours of the lines: this style's, or the user's own."""
+    """Return the colours of lines in the current settings, which may be the user's."""
     cycle = matplotlib.rcParams["axes.prop_cycle"].by_key().get("color", COLOURS)
     return list(itertools.islice(itertools.cycle(cycle), len(COLOURS)))
 
 
 def style_on(axes: Axes | None) -> Look:
-    """Return the part of this style that the user's settings leave open, or the style on axes.
+    """Return the settings to draw with on given axes, or on a new figure of pyplot.
 
-    On given axes it is the user's style, with the colours after those of the lines there.
+    A new figure has this style where the user has not changed matplotlib's defaults. Given axes
+    have the user's style, and colours start after the colours of the lines there.
     """
     settings = matplotlib.rcParams
     if axes is not None:
@@ -252,10 +253,10 @@ def panels(
     width_ratios: Sequence[float] | None = None,
     height_ratios: Sequence[float] | None = None,
 ) -> tuple[Figure, list[Axes]]:
-    """Return a figure with equal axes by rows.
+    """Return a figure and its axes, row by row.
 
-    Height over width is `ratio`, or `tall` times a graph's. The ratios of widths and heights make
-    axes unequal.
+    Height over width of the axes is `ratio`, or `tall` times the usual ratio. The axes are unequal
+    if `width_ratios` or `height_ratios` are given.
     """
     target = TARGET.get()
     if isinstance(target, Axes):
@@ -288,7 +289,10 @@ def panels(
 
 
 def _figure_of(target: Axes, count: int, *, solid: bool) -> Figure:
-    """Return the figure of the user's axes; refuse a picture that does not fit them."""
+    """Return the figure of the user's axes.
+
+    Raises PlotError if the picture does not fit them.
+    """
     if count > 1:
         raise PlotError(f"this picture has {count} axes and can't be drawn on one")
     if solid and target.name != "3d":
@@ -312,7 +316,8 @@ def colour_bar(
 ) -> Colorbar:
     """Draw a colour bar above axes.
 
-    `aspect` is its length over its height; `fraction`, `pad` and `shrink` are relative to the axes.
+    `aspect` is length over height of the bar; `fraction`, `pad` and `shrink` are relative to the
+    axes.
     """
     figure = cast(Figure, drawn.figure)
     bar = figure.colorbar(
@@ -330,7 +335,7 @@ def colour_bar(
 def legend(
     figure: Figure, handles: Sequence[Artist], labels: Sequence[str], title: str = ""
 ) -> None:
-    """Draw a legend with literal labels above the axes, or in the axes if they are given."""
+    """Draw a legend with literal labels above the axes, or in the user's axes."""
     target = TARGET.get()
     if isinstance(target, Axes):
         drawn = target.legend(handles, labels, title=title or None)
@@ -346,7 +351,7 @@ def legend(
 
 
 def footer(axes: Axes, lines: Sequence[str]) -> None:
-    """Write lines below a picture, wrapped to its width, or below given axes."""
+    """Write lines below a picture, or below the user's axes, wrapped to their width."""
     if not lines:
         return
     on_given = isinstance(TARGET.get(), Axes)
@@ -362,7 +367,7 @@ def footer(axes: Axes, lines: Sequence[str]) -> None:
 
 def lines_legend(figure: Figure, axes: Axes, title: str = "") -> None:
     """Draw the legend of the labelled lines of axes, if there are any."""
-    unnamed = ("_", "_nolegend_")  # matplotlib gives the latter to error bars
+    unnamed = ("_", "_nolegend_")  # matplotlib labels error bars with the second
     lines: list[Artist] = []
     labels: list[str] = []
     for line in axes.get_lines():

@@ -35,11 +35,13 @@ LABELS = {
     "yc": "$Y_C$", "s12": "$S_{12}$", "s13": "$S_{13}$", "s23": "$S_{23}$",
     "max_indentation": "Largest indentation",
 }  # fmt: skip
-_NUMBERS_OF_NODES = (name for name, one in VARIABLES.items() if one.kind is ValueKind.INTEGER)
+_NUMBERS_OF_NODES = (
+    name for name, variable in VARIABLES.items() if variable.kind is ValueKind.INTEGER
+)
 INTEGERS = (*_NUMBERS_OF_NODES, *COUNTS)
 STILL = "still in contact at the end"
 ENDED = "contact not over at the end"
-Where = Mapping[str, float | str]  # values of parameters, by name, that select cases
+Where = Mapping[str, float | str]  # values of parameters that select cases, by name
 
 
 class DrawnVariable(NamedTuple):
@@ -47,35 +49,35 @@ class DrawnVariable(NamedTuple):
 
     name: str
     scale: style.AxisScale
-    values: Array  # (cases,): numbers; for texts their positions in `ticks`
+    values: Array  # (cases,): numbers, or positions of texts in `ticks`
     ticks: tuple[str, ...] = ()  # texts in the order of the cases; empty for numbers
 
     @property
     def label(self) -> str:
         """Name in words."""
         plain = self.name.replace("_", " ")
-        is_named_by_caller = self.name not in (*COLUMNS, *NAMES)  # the caller's symbol or word
-        return LABELS.get(self.name, plain if is_named_by_caller else plain.capitalize())
+        is_user_name = self.name not in (*COLUMNS, *NAMES)  # a word or symbol of the user
+        return LABELS.get(self.name, plain if is_user_name else plain.capitalize())
 
     @property
     def whole(self) -> bool:
-        """Whether the numbers are counts."""
+        """Whether the numbers are integers."""
         return self.name in INTEGERS
 
     @property
     def range(self) -> tuple[float, float]:
-        """Smallest and largest number of the cases that have one."""
+        """Smallest and largest number, without NaN."""
         return float(np.nanmin(self.values)), float(np.nanmax(self.values))
 
     def mark(self, axis: Axis) -> None:
-        """Label an axis of a graph; counts have ticks at integers only."""
+        """Label an axis of a graph; integers have ticks at integers only."""
         self.scale.name(axis, self.label)
         if self.whole:
             axis.set_major_locator(MaxNLocator(integer=True))
 
 
 def variable_of(sweep: SweepResult, name: str, values: Array) -> DrawnVariable:
-    """Return the variable of a parameter's or a quantity's values; counts are not scaled."""
+    """Return the values of a parameter or quantity as a variable; integers are not scaled."""
     plain = style.AxisScale(1.0, "")
     if values.dtype.kind == "U":
         ticks = tuple(dict.fromkeys(values.tolist()))
@@ -91,7 +93,7 @@ def variable_of(sweep: SweepResult, name: str, values: Array) -> DrawnVariable:
 
 
 def case_rows(sweep: SweepResult, name: str, where: Where) -> Indices:
-    """Return the cases at given values; numbers select the nearest value."""
+    """Return the cases that `where` selects; a number selects the nearest value."""
     kept = np.ones(len(sweep), dtype=bool)
     for parameter, value in where.items():
         values = parameter_values(sweep, name, parameter)
@@ -105,7 +107,10 @@ def case_rows(sweep: SweepResult, name: str, where: Where) -> Indices:
 
 
 def _equal_texts(values: Array, text: float | str, otherwise: str) -> Bools:
-    """Return a mask of the cases with a text; `otherwise` starts the refusal of another."""
+    """Return a mask of the cases with a text.
+
+    Raises PlotError, with a message that starts with `otherwise`, if no case has it.
+    """
     chosen = np.asarray(values == str(text))
     if not chosen.any():
         raise PlotError(f"{otherwise}; there is {names_in_words(dict.fromkeys(values))}")
@@ -113,7 +118,10 @@ def _equal_texts(values: Array, text: float | str, otherwise: str) -> Bools:
 
 
 def _nearest_numbers(values: Array, value: float | str, otherwise: str) -> Bools:
-    """Return a mask of the cases nearest to a number; `otherwise` starts a refusal."""
+    """Return a mask of the cases nearest to a number.
+
+    Raises PlotError, with a message that starts with `otherwise`, if it is outside all values.
+    """
     try:
         number = float(value)
     except ValueError:
@@ -126,7 +134,10 @@ def _nearest_numbers(values: Array, value: float | str, otherwise: str) -> Bools
 
 
 def parameter_values(sweep: SweepResult, name: str, parameter: str) -> Array:
-    """Return the values of a parameter, (cases,); refuse an unknown parameter."""
+    """Return the values of a parameter, (cases,).
+
+    Raises PlotError if the sweep has no such parameter.
+    """
     if parameter not in sweep.cases:
         raise PlotError(
             f"{name} has no parameter {parameter}; it has {names_in_words(sweep.cases)}"
@@ -135,15 +146,15 @@ def parameter_values(sweep: SweepResult, name: str, parameter: str) -> Array:
 
 
 def names_in_words(names: Iterable[object]) -> str:
-    """Join names in words."""
+    """Join names with commas and `and`."""
     *most, last = map(str, names)
     return f"{', '.join(most)} and {last}" if most else last
 
 
 def quantity_of(sweep: SweepResult, name: str, rows: Indices, quantity: str) -> DrawnVariable:
-    """Return the quantity to show, NaN for cases without a value, with a warning about them.
+    """Return the quantity to show, with NaN for cases without a value; warn of these cases.
 
-    The default is the velocity that was searched, or else the peak force.
+    The default is the velocity that was searched; without a search, the peak force.
     """
     quantity = quantity or ("found_velocity" if "found_velocity" in sweep.summary else "peak_force")
     names = [name for name in sweep.summary if name not in VERDICTS]
@@ -159,7 +170,10 @@ def quantity_of(sweep: SweepResult, name: str, rows: Indices, quantity: str) -> 
 def _warn_of_gaps(
     sweep: SweepResult, name: str, rows: Indices, quantity: str, lacking: Bools
 ) -> None:
-    """Warn of cases that lack a quantity, by reason; refuse a picture if all do."""
+    """Warn of cases that lack a quantity, by reason.
+
+    Raises PlotError if all cases lack it.
+    """
     fine = sweep.completed[rows]
     open_ends = ended(sweep, rows)
     still = next(iter(open_ends.values()), np.zeros_like(fine))
@@ -186,19 +200,19 @@ def _warn_of_gaps(
 
 
 def beyond(sweep: SweepResult, rows: Indices) -> dict[str, Bools]:
-    """Return masks of the cases beyond the range of the model, by kind."""
-    elsewhere = (Reason.OPEN, Reason.DELAMINATED)  # they have a mark and a line of their own
+    """Return masks of the cases beyond the range of the model, by reason."""
+    elsewhere = (Reason.OPEN, Reason.DELAMINATED)  # these have their own mark and line
     masks = counted(sweep.validity[rows])
     return {MEANING[reason]: mask for reason, mask in masks if reason not in elsewhere}
 
 
 def ended(sweep: SweepResult, rows: Indices) -> dict[str, Bools]:
-    """Return masks of the cases whose contact is not over, by kind."""
+    """Return masks of the cases whose contact is not over, by reason."""
     mask = sweep.completed[rows] & ~sweep.contact_over[rows]
     what = STILL if np.array_equal(mask, sweep.still_in_contact[rows]) else ENDED
     return {what: mask} if mask.any() else {}
 
 
 def case_counts(masks: Mapping[str, Bools], sign: str = "") -> list[str]:
-    """Return lines below a picture with the numbers of cases by kind."""
+    """Return lines for the footer of a picture that count the cases by reason."""
     return [f"{sign}{what}: {mask.sum()} of {len(mask)} cases" for what, mask in masks.items()]

@@ -1,4 +1,4 @@
-"""Picture of the stresses of plies through the thickness of an element."""
+"""Picture of ply stresses through the thickness of an element."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from fecm._typing import Array, Floats
 from fecm.mechanics.mesh import element_blocks, element_centres
 from fecm.mechanics.points import containing_elements
 from fecm.plot import style
-from fecm.plot.data import mesh_of, on_plate, reach, require_datasets
+from fecm.plot.data import check_on_plate, mesh_of, reach, require_datasets
 from fecm.plot.kinds import Picture, PlotError, Width
 from fecm.results.groups import NotStoredError
 from fecm.results.plies import IN_PLANE, INTERLAMINAR, PlyResults, cure_stress_of, rows_at
 from fecm.results.result import Result
 
-THIN = 0.6  # width of the line of residual stresses
-LARGE_RESIDUAL = 0.1  # over the largest interlaminar stress: a note says so
-# A parabola through the lower, middle and upper value of a ply, at some parts of its thickness.
+THIN = 0.6  # line width of residual stresses
+LARGE_RESIDUAL = 0.1  # residual, over the largest interlaminar stress, above which a note says so
+# Weights of the lower, middle and upper value of a ply in a parabola through its thickness.
 _PARTS = np.linspace(0.0, 1.0, 9)
 _PARABOLA = np.stack(
     [(1 - _PARTS) * (1 - 2 * _PARTS), 4 * _PARTS * (1 - _PARTS), _PARTS * (2 * _PARTS - 1)]
@@ -30,12 +30,12 @@ _PARABOLA = np.stack(
 
 
 class Stress(NamedTuple):
-    """Stress over the thickness."""
+    """Stress through the thickness."""
 
     label: str
     z: Array  # (plies, n), from the midplane
     values: Array  # (plies, n)
-    residual: Array | None = None  # of CURE, of the same shape; None without CURE
+    residual: Array | None = None  # residual stress of CURE, (plies, n); None without CURE
 
 
 def thickness(
@@ -47,18 +47,19 @@ def thickness(
 ) -> Picture:
     """Draw the stresses of the plies of one element over z, the struck face at the top.
 
-    In-plane stresses are in the axes of each ply, interlaminar ones in the axes of the plate; the
-    last graph is the resultant of the latter. sigma_z is not computed. A thin line is the residual
-    stress of CURE, which the others do not contain.
+    In-plane stresses are in the axes of each ply, interlaminar stresses in the axes of the plate.
+    The last graph shows the resultant of the interlaminar stresses. sigma_z is not computed. A thin
+    line shows the residual stress of CURE, which the other lines do not contain.
 
-    `at` (length) has at most one place, which selects the nearest element with ply stresses and its
-    nearest point. `times` (the deck's unit) has at most one time, which selects the nearest stored
-    row. By default both belong to the largest abs(sigma_1) outside the elements under the load.
+    `at` (length) has at most one place. It selects the nearest element with ply stresses, and the
+    nearest point of this element. `times` (the deck's unit) has at most one time, which selects the
+    nearest stored row. By default, both belong to the largest abs(sigma_1) outside the elements
+    under the load.
     """
     ((name, result),) = results.items()
-    plies, point = _chosen(result, name, at, times)
+    plies, point = _select_plies(result, name, at, times)
     drawn = _stresses(plies, point, result)
-    _warn(result, name, plies)
+    _warn_of_limits(result, name, plies)
     z = plies.z
     columns = 2 if width == "column" else 3
     lines = math.ceil(len(drawn) / columns)
@@ -100,7 +101,7 @@ def thickness(
 
 
 def _stresses(plies: PlyResults, point: int, result: Result) -> list[Stress]:
-    """Return stresses at a point; interlaminar stresses only where they are computed."""
+    """Return the stresses at a point; interlaminar stresses only if they are computed."""
     faces = plies.z[:, ::2]
     residual: list[Array | None] = [None] * 3
     cured = cure_stress_of(result, int(plies.element[0]))
@@ -121,7 +122,7 @@ def _stresses(plies: PlyResults, point: int, result: Result) -> list[Stress]:
     return stresses
 
 
-def _chosen(
+def _select_plies(
     result: Result, name: str, at: Sequence[tuple[float, float]], times: Sequence[float]
 ) -> tuple[PlyResults, int]:
     """Return the plies of one element at one time, and the number of the point in it, from 0."""
@@ -142,8 +143,12 @@ def _chosen(
     try:
         rows = rows_at(stored, times, "ply stresses") if times else np.arange(len(stored))
         largest = np.abs(sigma[rows]).max(axis=(3, 4))  # (rows, elements, points)
-        loaded = largest.max(axis=(0, 2))  # (elements,)
-        member = int(np.where(outside, loaded, -1.0).argmax() if outside.any() else loaded.argmax())
+        largest_of_elements = largest.max(axis=(0, 2))  # (elements,)
+        member = int(
+            np.where(outside, largest_of_elements, -1.0).argmax()
+            if outside.any()
+            else largest_of_elements.argmax()
+        )
         if at:
             member = _nearest_element(mesh, numbers, np.array(at[0]), name)
         row, point = np.unravel_index(largest[:, member].argmax(), largest[:, member].shape)
@@ -154,11 +159,11 @@ def _chosen(
         raise PlotError(f"{name}: {error}") from None
     if at:
         point = np.hypot(plies.x[0] - at[0][0], plies.y[0] - at[0][1]).argmin()
-    return _own(plies), int(point)
+    return _drop_missing_plies(plies), int(point)
 
 
-def _own(plies: PlyResults) -> PlyResults:
-    """Return the plies of one element, without those that only other laminates have."""
+def _drop_missing_plies(plies: PlyResults) -> PlyResults:
+    """Return the plies of one element, without plies that only other laminates have."""
     if plies.z.ndim == 2:
         return plies
     z = plies.z[0]
@@ -173,7 +178,7 @@ def _nearest_element(mesh: tuple[Array, Floats], numbers: Array, at: Floats, nam
     """Return the position of the element that contains a place, or of the nearest one."""
     coordinates = mesh[1]
     elements = mesh[0][numbers - 1]
-    on_plate(coordinates, at, name)
+    check_on_plate(coordinates, at, name)
     distance = np.hypot(*(element_centres(elements, coordinates) - at).T)
     blocks = element_blocks(elements, coordinates)
     inside = np.concatenate(
@@ -189,8 +194,8 @@ def _nearest_element(mesh: tuple[Array, Floats], numbers: Array, at: Floats, nam
     return nearest
 
 
-def _warn(result: Result, name: str, plies: PlyResults) -> None:
-    """Name what limits the stresses of an element."""
+def _warn_of_limits(result: Result, name: str, plies: PlyResults) -> None:
+    """Warn of limits of the stresses of an element."""
     element = f"element {plies.element[0]} of {name}"
     if plies.under_load[0]:
         near = reach(result, name, 2.0 * float(plies.z[-1, 2]))
