@@ -82,8 +82,8 @@ def ringing(ax: Any, names: Names) -> None:
 
 def energy(ax: Any, names: Names) -> None:
     """Force over energy, and the energy at the threshold in figures."""
-    found, onset = names["found"], names["onset"]
-    curves(ax, (found["energy"], found["peak_force"]))
+    result, onset = names["result"], names["onset"]
+    curves(ax, (result["energy"], result["peak_force"]))
     ax.axvline(onset, color=COLOURS[1], lw=STROKE)
     text = f"{onset / 1000:.1f} J"
     ax.text(0.98, 0.08, text, size=44, color=COLOURS[1], ha="right", transform=ax.transAxes)
@@ -91,7 +91,7 @@ def energy(ax: Any, names: Names) -> None:
 
 def probability(ax: Any, names: Names) -> None:
     """Share of the draws above a force, and the chance in figures."""
-    peak = np.sort(names["found"]["peak_force"])
+    peak = np.sort(names["result"]["peak_force"])
     curves(ax, (peak, 1.0 - (np.arange(len(peak)) + 0.5) / len(peak)))
     chance = names["chance"].probability.item()
     ax.text(peak[-1], 0.72, f"{chance:.0%}", size=44, color=COLOURS[1], ha="right")
@@ -105,9 +105,9 @@ def bars(ax: Any, *sizes: Any) -> None:
 
 def map_of(ax: Any, names: Names) -> None:
     """Draw a cell for each case."""
-    found = names["found"]
-    rows = len(set(found["velocity"]))
-    ax.imshow(found["peak_force"].reshape(rows, -1).T, aspect="auto", origin="lower")
+    result = names["result"]
+    rows = len(set(result["velocity"]))
+    ax.imshow(result["peak_force"].reshape(rows, -1).T, aspect="auto", origin="lower")
     ax.set_axis_off()
 
 
@@ -136,10 +136,10 @@ def density(ax: Any, names: Names) -> None:
 
 def place(ax: Any, names: Names) -> None:
     """Draw the misfit at the candidates, and the located place."""
-    found = names["found"]
-    ax.tricontourf(*found.candidates.T, np.log(found.candidate_misfit), 12)
-    ax.plot(*found.gage_places.T, "ko", ms=2 * STROKE)
-    ax.plot(found.x, found.y, "x", color=COLOURS[1], ms=5 * STROKE, mew=STROKE)
+    location = names["location"]
+    ax.tricontourf(*location.candidates.T, np.log(location.candidate_misfit), 12)
+    ax.plot(*location.gage_places.T, "ko", ms=2 * STROKE)
+    ax.plot(location.x, location.y, "x", color=COLOURS[1], ms=5 * STROKE, mew=STROKE)
     ax.set_aspect("equal")
     ax.set_axis_off()
 
@@ -161,15 +161,15 @@ OWN: dict[str, Callable[[Any, Names], None]] = {
     "posterior": density,
     "probability_of_delamination": probability,
     "reports": lambda ax, names: forces(ax, {key: names["pages"][key] for key in ("drop-weight",)}),
-    "sobol_indices": lambda ax, names: bars(ax, names["found"]["S1"], names["indices"].first),
+    "sobol_indices": lambda ax, names: bars(ax, names["of_salib"]["S1"], names["indices"].first),
     "table_of_cases": lambda ax, names: bars(ax, names["results"]["peak_force"]),
 }
 
 
-def fitted(ax: Any, found: Any) -> None:
+def fitted(ax: Any, fit: Any) -> None:
     """Draw a fitted force through the measured points."""
-    ax.plot(found.time, found.force, "o", color=COLOURS[0], ms=STROKE)
-    ax.plot(found.time, found.model, color=COLOURS[1], lw=STROKE / 2)
+    ax.plot(fit.time, fit.force, "o", color=COLOURS[0], ms=STROKE)
+    ax.plot(fit.time, fit.model, color=COLOURS[1], lw=STROKE / 2)
 
 
 def impact(ax: Any, result: Any) -> None:

@@ -22,12 +22,12 @@ laws = {"velocity": "normal:1300,60", "k": "lognormal:42000,0.2"}
 grid = {"velocity": [600, 900, 1200, 1500, 1800], "k": [2e4, 3e4, 4e4, 6e4]}
 threshold = {"peak_force": "threshold"}
 time, force = np.loadtxt(measured, delimiter=",", skiprows=3, unpack=True)
-results = {
+pages = {
     "report-deck": fecm.run_one(report),
     "drop-weight": fecm.run_one(drop),
     "map": fecm.sweep(drop, grid),
     "random": fecm.sweep(drop, random=laws, samples=64, exceed=threshold),
     "identification": fecm.identify(report, time, force, ["k", "velocity"]),
 }
-for name, result in results.items():
+for name, result in pages.items():
     result.report(f"{name}.html", overwrite=True)
