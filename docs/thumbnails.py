@@ -179,17 +179,17 @@ def impact(ax: Any, result: Any) -> None:
         ax.axhline(result.metrics["threshold_force"], color=COLOURS[1], lw=STROKE)
 
 
-def of_page(found: Any, path: Path) -> None:
+def of_page(result: Any, path: Path) -> None:
     """Draw what a report is about."""
-    match found:
+    match result:
         case fecm.Result():
-            _save(path, lambda ax: impact(ax, found))
+            _save(path, lambda ax: impact(ax, result))
         case fecm.Identification():
-            _save(path, lambda ax: fitted(ax, found))
+            _save(path, lambda ax: fitted(ax, result))
         case fecm.SweepResult(random=None):
-            _save(path, lambda ax: map_of(ax, {"found": found}))
+            _save(path, lambda ax: map_of(ax, {"result": result}))
         case _:
-            names = {"found": found, "chance": found.random.exceedance}
+            names = {"result": result, "chance": result.random.exceedance}
             _save(path, lambda ax: probability(ax, names))
 
 
