@@ -144,6 +144,8 @@ def test_without_resume_all_cases_are_computed_again(tmp_path: Path) -> None:
     with pytest.raises(StoppedError):
         fecm.Sweep(small(), {"layup": LAYUPS}, output=path).execute(StopAfter(2))
     job = fecm.Sweep(small(), {"layup": LAYUPS}, output=path, resume=False)
+    with pytest.raises(StoppedError, match="same call with resume=True resumes this sweep"):
+        job.execute(StopAfter(2))
     watch = StopAfter(100)
     job.execute(watch)
     assert watch.done == 4

@@ -323,8 +323,11 @@ def carry_out_plan(
 
     def idle() -> None:
         if watch.stops():
-            more = "" if parts is None else "; the same call resumes this sweep"
-            raise StoppedError(f"stopped after {finished} of {count} cases{more}")
+            text = f"stopped after {finished} of {count} cases"
+            if parts is not None:
+                call = "the same call" if parts.resumes else "the same call with resume=True"
+                text += f"; {call} resumes this sweep"
+            raise StoppedError(text)
 
     def keep(task: Task, outcome: Outcome) -> None:
         nonlocal finished

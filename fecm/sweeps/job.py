@@ -463,18 +463,20 @@ class Sweep:
         OtherSweepError
             If there are finished cases of another sweep with the same output.
         StoppedError
-            If the watch stops the sweep.  With an output file, the same sweep continues it.
+            If the watch stops the sweep.  With an output file, the message says how to resume it.
         KeyboardInterrupt
             After an interrupt, without a watch.
         OSError
             If a file can't be written.
         """
         caller = CallerWatch(self.title, self.progress)
-        defers = watch is None and self.path is not None
+        defers_interrupts = watch is None and self.path is not None
         watch = watch or caller
         for text in (*self._loaded.warnings, *self.doubts):
             watch.note(text)
-        with caller.deferring_interrupts() if defers else contextlib.nullcontext():
+        with contextlib.ExitStack() as stack:
+            if defers_interrupts:
+                stack.enter_context(caller.deferring_interrupts())
             result = self.compute(watch)
         for text in result.notes:
             watch.note(text)

@@ -66,6 +66,7 @@ class PartialResults:
     ) -> None:
         self.folder = parts_of(result)
         self.tasks: Sequence[Task] = ()  # tasks of all cases, once they are known
+        self.resumes = resume  # whether the same call takes these outcomes
         self._fingerprint = fingerprint
         make_folder(self.folder)
         mark = self.folder / "sweep.json"
