@@ -221,7 +221,7 @@ declare(
     "E505",
     Subject.PROGRAM,
     "The number of a macro is out of range.",
-    remedy="See [words](words.md).",
+    remedy="See [macros](deck.md#macro-program).",
 )
 declare(
     "E506",
