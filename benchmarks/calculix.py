@@ -12,7 +12,7 @@ the node in the middle.  CalculiX has its shells S8R:
 - A plate of one layer is struck in CalculiX itself, by a mass on a nonlinear spring of 150 straight
   pieces, with and without NLGEOM.
 
-Prints the table of docs/compares.md, with the processor times of both.  Takes some minutes.
+Prints the table of docs/other-programs.md, with the processor times of both.  Takes some minutes.
 """
 
 from __future__ import annotations

@@ -328,7 +328,7 @@ def test_a_wrong_tolerance_file_exits_2_and_names_the_key(
 def test_the_documented_recipe_passes_rounding_and_fails_a_tenth_of_a_degree(
     tmp_path: Path,
 ) -> None:
-    page = (ROOT / "docs" / "comparing.md").read_text()
+    page = (ROOT / "docs" / "diff.md").read_text()
     run, compare = (
         line.split("fecm ")[1].split() for line in page.splitlines() if "- run: fecm" in line
     )
