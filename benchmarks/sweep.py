@@ -32,9 +32,9 @@ from run import seconds as processor_time
 import fecm
 from fecm.authoring.case import Case, Value
 from fecm.authoring.cases import parse_vary
-from fecm.authoring.vary import apply_case
+from fecm.authoring.values import apply_case
 from fecm.mechanics import kernels
-from fecm.sweeps.batch import _plate
+from fecm.sweeps.backends import _plate
 
 DECK = HERE.parent / "decks" / "impact-115.inp"
 VARY = ("--vary", "velocity=50:300:40", "--vary", "k=1e6:3e6:25")

@@ -17,8 +17,10 @@ from fecm.deck.findings import DeckError as DeckError
 from fecm.deck.model import Deck as Deck
 from fecm.deck.model import Ply as Ply
 from fecm.deck.reader import read_deck as read_deck
+from fecm.identification.identify import IdentificationJob as IdentificationJob
 from fecm.identification.identify import identify as identify
 from fecm.identification.result import Identification as Identification
+from fecm.location.locate import LocationJob as LocationJob
 from fecm.location.locate import locate as locate
 from fecm.location.location import LocateError as LocateError
 from fecm.location.location import Location as Location

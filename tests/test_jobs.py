@@ -1,4 +1,4 @@
-"""Runs and sweeps as objects: price, progress, stop, resume, options declared once."""
+"""Runs, sweeps, fits and locations as objects: price, progress, stop, resume, options."""
 
 from __future__ import annotations
 
@@ -14,11 +14,19 @@ import pytest
 import fecm
 from fecm._options import declared_options
 from fecm._watch import show_progress
-from fecm.errors import CasesError, CheckpointError, OptionsError, OtherSweepError, StoppedError
+from fecm.errors import (
+    CasesError,
+    CheckpointError,
+    OptionsError,
+    OtherSweepError,
+    StoppedError,
+    StudyError,
+)
 from fecm.simulation import Solver
 from fecm.sweeps.exclusions import exclusions_table
 from tests.calls import call
 from tests.decks import small
+from tests.panels import TIME, struck_on_a_point
 
 ROOT = Path(__file__).resolve().parents[1]
 IMPACT = ROOT / "decks/impact-115.inp"
@@ -174,6 +182,40 @@ def test_the_price_of_a_run_and_a_sweep_is_known_before_they_start(tmp_path: Pat
     assert apart.seconds > 0.0
 
 
+def test_a_fit_is_a_job_with_a_price_that_a_watch_may_stop() -> None:
+    deck, table = fecm.examples.path("impact-patch"), fecm.examples.path("measured-force.csv")
+    job = fecm.IdentificationJob(deck, table, "k", filter="first-order:5e-6")
+    assert job.price.steps == fecm.Run(deck).price.steps
+    assert job.price.seconds > 0.0
+    assert job.price.memory_bytes > 0
+    with pytest.raises(StoppedError, match=r"stopped after \d+ trial forces"):
+        job.execute(StopAfter(8))
+    watch = StopAfter()
+    fit = job.execute(watch)
+    time, force = job.measurement.time, job.measurement.force
+    assert fit.values == fecm.identify(deck, time, force, "k", "first-order:5e-6").values
+    assert watch.done >= 8
+    with pytest.raises(StudyError, match="can't fit mess; fit different ones of"):
+        fecm.IdentificationJob(deck, table, "mess")
+
+
+def test_a_location_is_a_job_with_a_price_that_a_watch_may_stop() -> None:
+    deck, strains, _ = struck_on_a_point()
+    close: dict[str, Any] = {"region": (52.0, 38.0, 72.0, 58.0), "grid": 20.0, "mesh_error": False}
+    job = fecm.LocationJob(deck, (TIME, strains), **close)
+    # One run of the plate per gage, which has at least a step for every point of the record.
+    assert job.price.steps % strains.shape[1] == 0
+    assert job.price.steps >= strains.size - strains.shape[1]
+    assert job.price.seconds > 0.0
+    with pytest.raises(StoppedError, match="no place is known yet"):
+        job.execute(StopAfter(2))
+    location = job.execute()
+    same = fecm.locate(deck, (TIME, strains), **close)
+    assert (location.x, location.y, location.peak_force) == (same.x, same.y, same.peak_force)
+    with pytest.raises(StudyError, match="region has 3 numbers"):
+        fecm.LocationJob(deck, (TIME, strains), region=(1.0, 2.0, 3.0))
+
+
 def test_the_progress_has_the_seconds_that_are_left(capsys: pytest.CaptureFixture[str]) -> None:
     now = 0.0
     show = show_progress(lambda: now)
@@ -197,12 +239,21 @@ def test_what_needs_an_output_file_is_refused_without_one() -> None:
         fecm.sweep(small(), {"k": [1e6]}, full=[0])
 
 
-@pytest.mark.parametrize(("command", "job"), [("run", fecm.Run), ("sweep", fecm.Sweep)])
+@pytest.mark.parametrize(
+    ("command", "job"),
+    [
+        ("run", fecm.Run),
+        ("sweep", fecm.Sweep),
+        ("identify", fecm.IdentificationJob),
+        ("locate", fecm.LocationJob),
+    ],
+)
 def test_the_command_has_the_options_of_the_job_with_their_help(command: str, job: type) -> None:
     page = " ".join(call(command, "--help").stdout.split())
     for name, (about, _) in declared_options(job).items():
         if about.group and name not in ("output", "workers"):
-            assert (about.flag or f"--{name.replace('_', '-')}") in page
+            flag = about.flag or f"--{name.replace('_', '-')}"
+            assert flag.replace("/", " / ") in page
             assert about.help.split(".")[0].split("-")[0] in page
         assert f"{name} : " in (job.__doc__ or "")
 

@@ -16,5 +16,5 @@ from fecm.authoring.timing import with_time_step as with_time_step
 from fecm.authoring.values import NAMES as NAMES
 from fecm.authoring.values import VARIABLES as VARIABLES
 from fecm.authoring.values import Changes as Changes
-from fecm.authoring.vary import apply_case as apply_case
-from fecm.authoring.vary import strike_of_case as strike_of_case
+from fecm.authoring.values import apply_case as apply_case
+from fecm.authoring.values import strike_of_case as strike_of_case

@@ -28,6 +28,33 @@ from fecm.authoring.values import (
 )
 
 
+def cases_of(
+    vary: object, cases: object, *, free: bool = False, system: str | None = None
+) -> list[Case]:
+    """Return the cases of a table, or every combination of varied values.
+
+    `cases` is the path of a CSV file, a mapping for each case, or a DataFrame. Without it, `vary`
+    has texts ``NAME=VALUES``, or is a mapping of names to values. `free` and `system` are as in
+    :func:`checked`. Raises CasesError if a name or a value is invalid.
+    """
+    if isinstance(cases, str | Path):
+        return read_cases(Path(cases), system)
+    if cases is not None:
+        return checked(cases, free=free, system=system)
+    if texts := texts_of(vary):
+        return grid_cases([parse_vary(text, system) for text in texts])
+    return combined(vary or {}, free=free, system=system)
+
+
+def texts_of(texts: object) -> list[str]:
+    """Return one or several texts of the form NAME=...; an empty list for anything else."""
+    if isinstance(texts, str):
+        return [texts]
+    if isinstance(texts, list | tuple) and all(isinstance(text, str) for text in texts):
+        return list(texts)
+    return []
+
+
 def read_cases(path: Path, system: str | None = None) -> list[Case]:
     """Read a CSV table: a header of names and one row per case.
 
@@ -90,7 +117,7 @@ def _rows(table: CaseTable) -> list[dict[Any, Any]]:
 
 
 def checked(
-    cases: Iterable[Mapping[str, Any]] | CaseTable,
+    cases: object,
     source: str = "",
     *,
     free: bool = False,
@@ -183,9 +210,7 @@ def grid_cases(varied: Sequence[tuple[str, Sequence[Value]]]) -> list[Case]:
     return [dict(zip(names, values, strict=True)) for values in combinations]
 
 
-def combined(
-    vary: Mapping[str, Iterable[Any]], *, free: bool = False, system: str | None = None
-) -> list[Case]:
+def combined(vary: object, *, free: bool = False, system: str | None = None) -> list[Case]:
     """Return every combination of the values in the lists of `vary`.
 
     `free` and `system` are as in :func:`checked`. Raises CasesError if a name is unknown, a value

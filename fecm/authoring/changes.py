@@ -11,8 +11,7 @@ from fecm.authoring.case import Case, CasesError, check_deck
 from fecm.authoring.cases import checked
 from fecm.authoring.parameters import EXAMPLES, in_units
 from fecm.authoring.timing import clock_of, with_clock
-from fecm.authoring.values import NAMES, check_known, dimension_of
-from fecm.authoring.vary import apply_case
+from fecm.authoring.values import NAMES, apply_case, check_known, dimension_of
 from fecm.deck.catalogue import system_of
 from fecm.deck.findings import DeckError
 from fecm.deck.macros import Macro, compile_program, with_outputs

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from fecm._typing import Bools, Floats, Indices
 from fecm.authoring.case import Case, CasesError
 from fecm.authoring.strike import Strike, strike_of
-from fecm.authoring.values import FAILURE_NAMES, plate_values
-from fecm.authoring.vary import strike_of_case
+from fecm.authoring.values import FAILURE_NAMES, OF_PLATE, strike_of_case
 from fecm.deck import model
 from fecm.deck.model import Deck
 from fecm.mechanics.contact_law import ContactParameters, Law, stack_parameters
@@ -138,15 +137,14 @@ def _from_values(
 ) -> Impacts | None:
     """Return the impacts of the valid cases; None if columns can't hold the values."""
     strike = strike_of(checked.deck)
-    names = cases[0].keys() - plate_values(cases[0]).keys()
+    names = cases[0].keys() - OF_PLATE
     if strike.impact is None or strike.indentation is None or not _fits_columns(strike, names):
         return None
     values = {name: np.array([float(case[name]) for case in cases]) for name in names}
     columns, valid = _columns(strike, strike.indentation, values, len(cases))
     rows = np.flatnonzero(valid)
     try:  # everything else is the same for all cases, so one check is enough
-        for row in rows[:1].tolist():
-            strike_of_case(checked.deck, cases[row]).check(checked)
+        strike.check(checked)
     except CasesError:
         return None
     impacts = replace(

@@ -2,56 +2,32 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 from click import option
 
-from fecm.cli.common import DASH, FAILED, echo, echo_json, every_minute, note
+from fecm.cli.common import DASH, FAILED, TerminalWatch, echo, echo_json, every_minute, note
 from fecm.cli.decks import load_single
 from fecm.cli.options import (
     COLUMNS_OPTION,
     DECK_PATH,
     FORMAT_OPTION,
-    LAW_OPTION,
     NAMED_PATH,
     UNITS_OPTION,
     Format,
     OneOf,
     Parsed,
-    collected,
+    job_options,
     list_of,
     typical,
 )
 from fecm.cli.outputs import OutputPaths, write_lines
-from fecm.cli.rod import FILTER_HELP
-from fecm.deck.model import Deck
 from fecm.deck.units import unit_names
-from fecm.identification.identify import FREE, fit_deck
-from fecm.identification.result import Identification
-from fecm.mechanics.own_law import own_law
+from fecm.identification.identify import FREE, IdentificationJob
 from fecm.report.content import check_page
-from fecm.results.comparison import Measurement, measurement_of
-from fecm.studies.rod_test.filters import Filter, filter_of
-
-
-@dataclass(frozen=True)
-class IdentifyOptions:
-    """Arguments and options of ``fecm identify``."""
-
-    deck: Path
-    measured: Path
-    free: tuple[str, ...]
-    columns: tuple[str, ...] | None
-    units: tuple[str, ...] | None
-    sensor: Filter | None
-    output: Path | None
-    picture: Path | None
-    page: Path | None
-    overwrite: bool
-    form: Format
-    law: str | None  # name of a contact law of an installed package
+from fecm.studies.rod_test.filters import filter_of
 
 
 @click.command(
@@ -71,13 +47,7 @@ class IdentifyOptions:
 )
 @COLUMNS_OPTION
 @UNITS_OPTION
-@option(
-    "--filter",
-    "sensor",
-    type=Parsed(filter_of, "FILTER"),
-    help=f"Filter of the measurement, also applied to the computed force: {FILTER_HELP}",
-)
-@LAW_OPTION
+@job_options(IdentificationJob, filter={"type": Parsed(filter_of, "FILTER")})
 @option(
     "-o",
     "--output",
@@ -101,8 +71,19 @@ class IdentifyOptions:
 )
 @option("--overwrite", is_flag=True, help="Replace existing files.")
 @FORMAT_OPTION
-@collected(IdentifyOptions)
-def identify_command(options: IdentifyOptions) -> None:
+def identify_command(
+    deck: Path,
+    measured: Path,
+    free: tuple[str, ...],
+    columns: tuple[str, ...] | None,
+    units: tuple[str, ...] | None,
+    options: dict[str, Any],
+    output: Path | None,
+    picture: Path | None,
+    page: Path | None,
+    overwrite: bool,
+    form: Format,
+) -> None:
     """Fit parameters of the impact of DECK to a measured contact force.
 
     MEASURED.csv has the columns time and force (or load), which are converted to the deck's units
@@ -111,43 +92,30 @@ def identify_command(options: IdentifyOptions) -> None:
     parameters, the fit does not converge, the model does not describe the data, or a delay or an
     offset should be fitted too.
     """
-    output, overwrite = options.output, options.overwrite
-    targets = OutputPaths(
-        output or DASH, options.picture, overwrite, options.deck, options.measured
+    targets = OutputPaths(output or DASH, picture, overwrite, deck, measured)
+    if page is not None:
+        check_page(page, overwrite, [deck, measured])
+    problem = load_single(deck, "identify")
+    job = IdentificationJob(
+        problem.deck, measured, free, **options, columns=columns or (), units=units or ()
     )
-    if options.page is not None:
-        check_page(options.page, overwrite, [options.deck, options.measured])
-    problem = load_single(options.deck, "identify")
-    units = unit_names(problem.deck)
-    measured = measurement_of(options.measured, units, options.columns or (), options.units or ())
-    fit = _fit(problem.deck, measured, options)
-    targets.draw("histories:force_fit_picture", fit, units)
+    watch = TerminalWatch(lambda forces: None)
+    with every_minute(lambda minutes: f"fecm: {watch.done} trial forces after {minutes} min"):
+        fit = job.execute(watch)
+    targets.draw("histories:force_fit_picture", fit, unit_names(problem.deck))
     if output is not None:
         write_lines([fit.deck.to_text()], output, overwrite=overwrite)
         note(f"wrote {output}")
-    if options.page is not None:
+    if page is not None:
         # 0.5 s with matplotlib, which other fits do not need.
         from fecm.report.report import write_report
 
-        write_report({measured.name: fit}, options.page, overwrite=overwrite)
-        note(f"wrote {options.page}")
+        write_report({job.measurement.name: fit}, page, overwrite=overwrite)
+        note(f"wrote {page}")
     note(*fit.notes)
-    if options.form is Format.JSON:
+    if form is Format.JSON:
         echo_json(fit.to_dict())
     else:
         echo(fit)
     if not fit.accepted:
         raise SystemExit(FAILED)
-
-
-def _fit(deck: Deck, measured: Measurement, options: IdentifyOptions) -> Identification:
-    """Fit, and say once a minute how many forces have been computed."""
-    forces = 0
-
-    def computed(more: int) -> None:
-        nonlocal forces
-        forces += more
-
-    with every_minute(lambda minutes: f"fecm: {forces} trial forces after {minutes} min"):
-        law = own_law(options.law)
-        return fit_deck(deck, measured, options.free, options.sensor, law, computed)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import click
 from click import option
@@ -18,33 +18,12 @@ from fecm.cli.options import (
     POSITIVE,
     Finite,
     Format,
-    collected,
+    job_options,
     list_of,
     typical,
 )
 from fecm.cli.outputs import OutputPaths
-from fecm.location.locate import located
-from fecm.location.prepare import LocationSettings
-
-
-@dataclass(frozen=True)
-class LocateOptions:
-    """Arguments and options of ``fecm locate``."""
-
-    deck: Path
-    strains: Path
-    region: tuple[float, float, float, float] | None
-    grid: float | None
-    basis: float | None
-    noise: float | None
-    shift: bool
-    gains: bool
-    mass: float | None
-    mesh_error: bool
-    output: Path | None
-    picture: Path | None
-    overwrite: bool
-    form: Format
+from fecm.location.locate import LocationJob
 
 
 @click.command(
@@ -56,42 +35,13 @@ class LocateOptions:
 )
 @click.argument("deck", type=DECK_PATH)
 @click.argument("strains", type=DECK_PATH, metavar="STRAINS.csv")
-@option(
-    "--region",
-    type=list_of("X0,Y0,X1,Y1", Finite(), [4]),
-    help="Rectangle that contains the place.  [default: the plate]",
-)
-@option(
-    "--grid",
-    type=POSITIVE,
-    metavar="LENGTH",
-    help="Distance of the places that are tried first.  [default: gives about 126 places]",
-)
-@option(
-    "--basis",
-    type=POSITIVE,
-    metavar="TIME",
-    help="Time between two values of the force.  [default: 1/40 of the record in the search, "
-    "then a half or a quarter of it]",
-)
-@option(
-    "--noise",
-    type=POSITIVE,
-    metavar="STRAIN",
-    help="Standard deviation of the strains' errors.  [default: from the residual]",
-)
-@option(
-    "--shift",
-    is_flag=True,
-    help="Fit the time at which the force may begin: the record begins after the impact.",
-)
-@option("--gains", is_flag=True, help="Fit the gains of the gages over their geometric mean.")
-@option("--mass", type=POSITIVE, help="Mass of the projectile, for a bound of its energy.")
-@option(
-    "--mesh-error/--no-mesh-error",
-    default=True,
-    help="Add the error of the mesh to the standard deviations, by a run of elements half as long; "
-    "it takes longer than all the rest.  [default: mesh-error]",
+@job_options(
+    LocationJob,
+    region={"type": list_of("X0,Y0,X1,Y1", Finite(), [4])},
+    grid={"type": POSITIVE},
+    basis={"type": POSITIVE},
+    noise={"type": POSITIVE},
+    mass={"type": POSITIVE},
 )
 @option(
     "-o",
@@ -109,8 +59,15 @@ class LocateOptions:
 )
 @option("--overwrite", is_flag=True, help="Replace existing files.")
 @FORMAT_OPTION
-@collected(LocateOptions)
-def locate_command(options: LocateOptions) -> None:
+def locate_command(
+    deck: Path,
+    strains: Path,
+    options: dict[str, Any],
+    output: Path | None,
+    picture: Path | None,
+    overwrite: bool,
+    form: Format,
+) -> None:
     """Find place and force history of an impact on the plate of DECK from strain gages.
 
     STRAINS.csv has the columns time and those of the gages (GAGE) of the deck, by their numbers or
@@ -118,29 +75,17 @@ def locate_command(options: LocateOptions) -> None:
     is 1 if the strains do not determine the place, another place explains them almost as well, or
     the model does not describe them.
     """
-    targets = OutputPaths(
-        options.output or DASH, options.picture, options.overwrite, options.deck, options.strains
-    )
-    problem = load_single(options.deck, "locate")
-    settings = LocationSettings(
-        options.region,
-        options.grid,
-        options.basis,
-        options.noise,
-        options.shift,
-        options.gains,
-        options.mass,
-        options.mesh_error,
-    )
+    targets = OutputPaths(output or DASH, picture, overwrite, deck, strains)
+    job = LocationJob(load_single(deck, "locate").deck, strains, **options)
     with every_minute(lambda minutes: f"fecm: locating for {minutes} min"):
-        location = located(problem, options.strains, settings)
+        location = job.execute()
     targets.draw("location:location_picture", location)
-    if options.output is not None:
+    if output is not None:
         with signals.deferred():
-            location.save(options.output, overwrite=options.overwrite)
-        note(f"wrote {options.output}")
+            location.save(output, overwrite=overwrite)
+        note(f"wrote {output}")
     note(*location.notes)
-    if options.form is Format.JSON:
+    if form is Format.JSON:
         echo_json(location.to_dict())
     else:
         echo(location)

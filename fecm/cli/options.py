@@ -200,14 +200,6 @@ class OneOf(click.Choice):  # type: ignore[type-arg]
         return super().convert(value, param, ctx)
 
 
-LAW_OPTION = click.option(
-    "--law",
-    metavar="NAME",
-    help="Contact law instead of EXPE: the name that an installed package gives it (entry points "
-    "of the group fecm.laws).",
-)
-
-
 class Member(click.Choice):  # type: ignore[type-arg]
     """Member of an enumeration of texts, given by its value."""
 

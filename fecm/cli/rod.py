@@ -39,15 +39,9 @@ from fecm.mechanics.projectile import (
 )
 from fecm.studies import StudyError
 from fecm.studies.rod_test import pulse_test
-from fecm.studies.rod_test.filters import Filter, filter_of, recorded
+from fecm.studies.rod_test.filters import FILTERS, Filter, filter_of, recorded
 from fecm.studies.rod_test.pulse_test import calibrate_transducer as fit_sensitivity
 from fecm.studies.rod_test.study import Struck, rod_of, simulate_rod_test, uniform_rod
-
-FILTER_HELP = (
-    "first-order:RISE or moving-average:RISE, with the time RISE from 10 to 90 % of the "
-    "step response; butterworth:ORDER,FREQUENCY in Hz, with ,zero-phase if it filters forward and "
-    "backward; or cfc:60, 180, 600 or 1000 of SAE J211."
-)
 
 
 class _PulseGroup(HelpGroup):
@@ -153,7 +147,7 @@ class PulseOptions:
     "--filter",
     "transducer",
     type=Parsed(filter_of, "FILTER"),
-    help=f"Also filter these forces as a transducer does: {FILTER_HELP}",
+    help=f"Also filter these forces as a transducer does: {FILTERS}",
 )
 @option(
     "--mass-matrix",
@@ -228,7 +222,7 @@ def _of_deck(options: PulseOptions) -> Struck:
     ),
 )
 @click.argument("history", type=DECK_PATH, metavar="RESULT")
-@option("--filter", "transducer", type=Parsed(filter_of, "FILTER"), required=True, help=FILTER_HELP)
+@option("--filter", "transducer", type=Parsed(filter_of, "FILTER"), required=True, help=FILTERS)
 @option(
     "--column",
     metavar="NAME",

@@ -15,8 +15,7 @@ from fecm._typing import Floats
 from fecm.authoring.case import Case
 from fecm.authoring.impacts import impacts_from_cards
 from fecm.authoring.strike import Strike
-from fecm.authoring.values import check_names
-from fecm.authoring.vary import strike_of_case
+from fecm.authoring.values import check_names, strike_of_case
 from fecm.deck.model import Deck
 from fecm.identification.alignment import IdentifyError, contact_points
 from fecm.mechanics.contact_law import Law

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import math
+import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import replace
-from functools import lru_cache
-from pathlib import Path
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
 from fecm._errors import warn
+from fecm._options import documented, option
 from fecm._typing import Floats
+from fecm._watch import SILENT, StoppedError, Watch
 from fecm.authoring.strike import strike_of
 from fecm.deck.model import Deck, Impact, Indentation, Nonlinear, Projectile
 from fecm.deck.units import unit_names
@@ -49,23 +51,174 @@ from fecm.identification.result import CARDS, Identification
 from fecm.mechanics.contact_law import Law
 from fecm.mechanics.own_law import law_name, own_law
 from fecm.mechanics.projectile import RigidMass
+from fecm.problem.loading import AnyDeck
+from fecm.problem.memory import needed_bytes
 from fecm.problem.parts import build_projectile
-from fecm.results.comparison import Measurement, measurement_of
+from fecm.problem.problem import Problem
+from fecm.results.comparison import Measurement, Source, measurement_of
 from fecm.results.validity import MEANING, Reason, reasons_of
+from fecm.simulation.job import Price
 from fecm.studies import StudyError
-from fecm.studies.rod_test.filters import Filter, filter_of
+from fecm.studies.rod_test.filters import FILTERS, Filter, filter_of
 from fecm.sweeps.backends import backend_of
 from fecm.sweeps.job import checked_problem
 from fecm.sweeps.outcome import Backend
 from fecm.sweeps.plan import check_law, shares_plate
 
 FREE = (*CARDS, *OF_RECORD)
+USUAL_EVALUATIONS = 30  # of a fit, each with one force more than there are parameters
 CORRELATED = 0.99  # correlation of two parameters above which a note reports it
 UNIT_OFFSET = 0.01  # unit of the offset, over the peak of the deck's run
 
 
+@documented
+@dataclass(eq=False, repr=False)
+class IdentificationJob:
+    """Measured force of an impact, ready for the fit of parameters.
+
+    Deck, measurement and options are checked at once. :attr:`price` says what the fit takes, and
+    :meth:`execute` carries it out.
+
+    The fit is by least squares with equal weights, and starts at the values of the deck. The delay
+    starts at several lags in turn. Standard errors hold for independent errors of the measured
+    points, with the variance of the residual. Errors of the model come in addition;
+    :attr:`Identification.plate_errors` has two of them.
+
+    Parameters
+    ----------
+    deck : str, Path or Deck
+        Deck with a single problem.
+    measured : str, Path or pair of array_like (points,)
+        Measured contact force: a CSV file, or increasing times and forces in the deck's units.
+        Forces are positive in compression. At time 0 the projectile touches the plate, as in the
+        deck.
+    free : str or sequence of str
+        Parameters to fit. Parameters of the impact are ``"velocity"``, ``"energy"``, ``"k"``,
+        ``"alpha_p"``, ``"s_p"``, ``"q"``, ``"mass"``, ``"rod_length"``, ``"rod_modulus"`` and
+        ``"rod_density"``. Parameters of the record are ``"delay"``, the measured time at which the
+        projectile touches the plate, and ``"offset"``, the measured force without contact.
+    {parameters}
+    columns, units : sequence of str
+        Names of the file's columns of time and force, and their units, where the file does not say
+        them.
+
+    Attributes
+    ----------
+    problem : Problem
+        The problem of the deck, checked.
+    measurement : Measurement
+        The measured force in the deck's units.
+
+    Raises
+    ------
+    StudyError
+        If the measurement is invalid or in other units; or if a name or the filter is unknown.
+    DeckError
+        If the deck has errors.
+    CasesError
+        If the deck has several problems, or `law` replaces a constant that is to be fitted.
+    LawError
+        If `law` is not a contact law.
+    ExtensionError
+        If no installed package has an entry point of the name `law`.
+
+    Examples
+    --------
+    >>> job = IdentificationJob("impact-patch.inp", "measured-force.csv", "k")  # doctest: +SKIP
+    >>> fit = job.execute()  # doctest: +SKIP
+    """
+
+    deck: AnyDeck
+    measured: Source
+    free: str | Sequence[str]
+    filter: str | Filter | None = option(
+        None,
+        f"Filter of the measurement, also applied to the computed force: {FILTERS}",
+        group="Fit",
+        metavar="FILTER",
+    )
+    law: Law | str | None = option(
+        None,
+        "Contact law instead of EXPE: the name that an installed package gives it (entry points of "
+        "the group fecm.laws).",
+        python="Or an object with the methods of Law.  The constants of EXPE can't be fitted then.",
+        group="Fit",
+        metavar="NAME",
+    )
+    columns: Sequence[str] = ()
+    units: Sequence[str] = ()
+
+    def __post_init__(self) -> None:
+        self.problem: Problem = checked_problem(self.deck)
+        self.measurement: Measurement = measurement_of(
+            self.measured, unit_names(self.problem.deck), self.columns, self.units
+        )
+        self._free = (self.free,) if isinstance(self.free, str) else tuple(self.free)
+        if not self._free or not {*self._free} <= {*FREE} or len({*self._free}) < len(self._free):
+            names = ", ".join(map(str, self._free)) or "none"
+            raise StudyError(f"can't fit {names}; fit different ones of {', '.join(FREE)}")
+        self._filter = filter_of(self.filter) if isinstance(self.filter, str) else self.filter
+        self._law = own_law(self.law)
+        if self._law is not None:
+            check_law(self._law, self._free)
+
+    @cached_property
+    def price(self) -> Price:
+        """What the fit takes. The time is of the plate's response and of the usual trial forces."""
+        begin = time.perf_counter()
+        model = ForceModel(self.problem.deck, _shared_backend(self.problem.deck), None, self._law)
+        model.histories([{}])
+        first = time.perf_counter()
+        model.histories([{}] * (len(self._free) + 1))
+        each = time.perf_counter() - first
+        memory = needed_bytes(self.problem, in_memory=False)
+        seconds = first - begin + USUAL_EVALUATIONS * each
+        return Price(self.problem.work.steps, 0, memory, seconds)
+
+    def execute(self, watch: Watch = SILENT) -> Identification:
+        """Fit the parameters.
+
+        Parameters
+        ----------
+        watch : Watch, optional
+            Gets the number of trial forces that are computed, and their usual number. It may stop
+            the fit.
+
+        Returns
+        -------
+        Identification
+            Fitted values, their errors and correlations, and the deck with them.
+
+        Raises
+        ------
+        IdentifyError
+            If the measurement does not determine the parameters, or is constant.
+        StudyError
+            If the measurement is too short; or if more than 20 % of the points of the contact are
+            outside the run of the deck.
+        CasesError
+            If the cases of the deck do not share a plate.
+        LawError
+            If the contact law fails.
+        StoppedError
+            If the watch stops the fit.
+        """
+        usual, computed = USUAL_EVALUATIONS * (len(self._free) + 1), 0
+
+        def count(forces: int) -> None:
+            nonlocal computed
+            computed += forces
+            watch.advance(computed, max(usual, computed))
+            if watch.stops():
+                raise StoppedError(f"stopped after {computed} trial forces; nothing is fitted yet")
+
+        return fit_deck(
+            self.problem.deck, self.measurement, self._free, self._filter, self._law, count
+        )
+
+
 def identify(
-    deck: str | Path | Deck,
+    deck: AnyDeck,
     time: Any,
     force: Any,
     free: str | Sequence[str],
@@ -74,11 +227,8 @@ def identify(
 ) -> Identification:
     """Fit parameters of an impact to a measured contact force.
 
-    The fit is by least squares with equal weights, and starts at the values of the deck. The delay
-    starts at several lags in turn. Standard errors hold for independent errors of the measured
-    points, with the variance of the residual. Errors of the model come in addition;
-    :attr:`Identification.plate_errors` has two of them. The notes of the result are
-    :class:`FecmWarning`.
+    :class:`IdentificationJob` says how, and has the errors of the parameters. The notes of the
+    result are :class:`FecmWarning`.
 
     Parameters
     ----------
@@ -88,17 +238,13 @@ def identify(
         Measured contact force, positive in compression, at increasing times, in the deck's units.
         At time 0 the projectile touches the plate, as in the deck.
     free : str or sequence of str
-        Parameters to fit. Parameters of the impact are ``"velocity"``, ``"energy"``, ``"k"``,
-        ``"alpha_p"``, ``"s_p"``, ``"q"``, ``"mass"``, ``"rod_length"``, ``"rod_modulus"`` and
-        ``"rod_density"``. Parameters of the record are ``"delay"``, the measured time at which the
-        projectile touches the plate, and ``"offset"``, the measured force without contact.
+        Parameters to fit; see :class:`IdentificationJob`.
     filter : str, optional
         Filter of the measurement, which is applied to the computed force: ``"first-order:RISE"``,
         ``"moving-average:RISE"``, ``"butterworth:ORDER,FREQUENCY[,zero-phase]"`` in Hz, or
         ``"cfc:CLASS"``.
     law : Law or str, optional
-        Contact law that replaces EXPE, as in :func:`run`. The constants of EXPE can't be fitted
-        then.
+        Contact law that replaces EXPE, as in :func:`run`.
 
     Returns
     -------
@@ -112,15 +258,6 @@ def identify(
     StudyError
         If the measurement is invalid, in other units, or too short; if more than 20 % of the points
         of the contact are outside the run of the deck; or if a name or the filter is unknown.
-    DeckError
-        If the deck has errors.
-    CasesError
-        If the deck has several problems, its cases do not share a plate, or `law` replaces a
-        constant that is to be fitted.
-    LawError
-        If `law` is not a contact law, or fails.
-    ExtensionError
-        If no installed package has an entry point of the name `law`.
 
     Examples
     --------
@@ -131,10 +268,7 @@ def identify(
     >>> round(fit.values["k"], -4)
     1900000.0
     """
-    measured = measurement_of((time, force), {})
-    sensor = filter_of(filter) if isinstance(filter, str) else filter
-    names = (free,) if isinstance(free, str) else tuple(free)
-    fit = fit_deck(checked_problem(deck).deck, measured, names, sensor, own_law(law))
+    fit = IdentificationJob(deck, (time, force), free, filter, law).execute()
     for text in fit.notes:
         warn(text)
     return fit
@@ -164,15 +298,10 @@ def fit_deck(
     law: Law | None = None,
     computed: Callable[[int], object] = lambda forces: None,
 ) -> Identification:
-    """Fit parameters of a deck to a measurement; see :func:`identify`.
+    """Fit parameters of a deck to a measurement; see :class:`IdentificationJob`.
 
     `computed` is called with the number of new trial forces.
     """
-    if not free or not set(free) <= set(FREE) or len(set(free)) < len(free):
-        free_names = ", ".join(map(str, free)) or "none"
-        raise StudyError(f"can't fit {free_names}; fit different ones of {', '.join(FREE)}")
-    if law is not None:
-        check_law(law, free)
     units = unit_names(deck)
     sensor = None if sensor is None else sensor.in_unit(units.get("time", ""))
     model = ForceModel(deck, _shared_backend(deck), sensor, law, computed)

@@ -11,7 +11,7 @@ import numpy as np
 from fecm._errors import FecmError
 from fecm._typing import Floats
 from fecm.authoring.case import Case
-from fecm.authoring.vary import apply_case
+from fecm.authoring.values import apply_case
 from fecm.deck.model import Deck, Material
 from fecm.deck.units import unit_of
 from fecm.identification.fitting import (

@@ -2,43 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from pathlib import Path
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import count
+from typing import NamedTuple
 
 import numpy as np
 
 from fecm._errors import FecmError, StudyError, warn
+from fecm._options import documented, with_parameters_of
 from fecm._typing import Floats
-from fecm.deck.model import Deck, Gages, Nonlinear
+from fecm._watch import SILENT, StoppedError, Watch
+from fecm.deck.model import Gages, Nonlinear
 from fecm.deck.units import unit_names
 from fecm.location.fit import LocationFit, PlaceTrial, judged_force
 from fecm.location.location import Location
-from fecm.location.model import interpolation
-from fecm.location.prepare import EXTRAPOLATED, LocationSettings, Timing, finer_strains, prepared
+from fecm.location.model import Sampling, interpolation, moving_plate
+from fecm.location.prepare import (
+    EXTRAPOLATED,
+    LocationOptions,
+    Timing,
+    finer_strains,
+    gage_rows,
+    prepared,
+    response_bytes,
+    seconds_of_step,
+    steps_between,
+    timing,
+)
 from fecm.location.search import Region, SearchResult, best_fits, is_wide, narrowed
 from fecm.location.table import StrainSource, StrainTable, strain_table
 from fecm.location.verdict import BETTER, Cause, is_doubtful, judged, likely_cause
+from fecm.mechanics.plate_motion import PlateMotion
+from fecm.mechanics.time_step import critical_time_step
+from fecm.problem.loading import AnyDeck
 from fecm.problem.problem import Problem
+from fecm.simulation.job import Price
 from fecm.sweeps.job import checked_problem
 
 CERTAIN = 2.0  # fall of the misfit above which no other cause is tried
+PARTS = 4  # of a search: responses, places, force, errors
+FINER_NODES = 4  # nodes of the mesh with elements half as long, over the nodes of the deck's mesh
 
 
-def locate(
-    deck: str | Path | Deck,
-    strains: Any,
-    *,
-    region: Sequence[float] | None = None,
-    grid: float | None = None,
-    basis: float | None = None,
-    noise: float | None = None,
-    shift: bool = False,
-    gains: bool = False,
-    mass: float | None = None,
-    mesh_error: bool = True,
-) -> Location:
-    """Locate an impact and find its force history from the strains of gages.
+@documented
+@dataclass(eq=False, repr=False)
+class LocationJob(LocationOptions):
+    """Measured strains of an impact, ready for the search of its place and force.
+
+    Deck, strains and options are checked at once. :attr:`price` says what the search takes, and
+    :meth:`execute` carries it out.
 
     The plate is linear: the strain of a gage is the sum of its responses to the force. By
     reciprocity, one run of the plate per gage gives the responses to a force anywhere. The force is
@@ -46,7 +59,6 @@ def locate(
     a Gauss-Newton iteration from the best candidates gives the place.
 
     The plate is at rest before time 0 of the table, or before its first time if that is negative.
-    The notes of the result are :class:`FecmWarning`.
 
     Parameters
     ----------
@@ -59,25 +71,135 @@ def locate(
         (points, gages); or columns by name. Columns are matched by the numbers of the gages
         (``gage 1``), or taken in the order of the deck if they have none. Times are in the deck's
         unit.
-    region : sequence of float, optional
-        Rectangle that contains the place: x0, y0, x1, y1; the plate by default.
-    grid : float, optional
-        Distance between candidate places; by default the region has about 126 of them.
-    basis : float, optional
-        Time between the peaks of two hats of the force; by default about 1/40 of the record in the
-        search. Place and force are then fitted with hats half as wide if there are enough strains,
-        and with narrower hats as long as they describe the strains significantly better.
-    noise : float, optional
-        Standard deviation of the errors of the strains; by default taken from the residual.
-    shift : bool
-        Fit the time at which the force may begin; for a record that begins after the impact.
-    gains : bool
-        Fit the gains of three or more gages, relative to their geometric mean.
-    mass : float, optional
-        Mass of the projectile, for :attr:`Location.energy_bound`.
-    mesh_error : bool
-        Add the error of the mesh to the standard deviations. It takes a run on a mesh of elements
-        half as long, which is longer than the rest of the work.
+    {parameters}
+
+    Attributes
+    ----------
+    problem : Problem
+        The problem of the deck, checked.
+
+    Raises
+    ------
+    StudyError
+        If the table or an option is invalid, or the deck has NONL or too few gages.
+    DeckError
+        If the deck has errors.
+    CasesError
+        If the deck has several problems.
+
+    Examples
+    --------
+    >>> job = LocationJob("panel.inp", "strains.csv", noise=4e-6)  # doctest: +SKIP
+    >>> location = job.execute()  # doctest: +SKIP
+    """
+
+    deck: AnyDeck
+    strains: StrainSource
+
+    def __post_init__(self) -> None:
+        self.check()
+        self.problem: Problem = checked_problem(self.deck)
+        deck = self.problem.deck
+        if deck.has(Nonlinear):
+            raise StudyError(
+                "locate needs a linear plate, and the deck has NONL; take an impact that leaves "
+                "the deflection below a quarter of the plate's thickness, without NONL"
+            )
+        cards = deck.last(Gages)
+        numbers = [card.number for card in cards.records] if cards is not None else []
+        if len(numbers) < 2:
+            raise StudyError(
+                f"the deck has {len(numbers)} gages (GAGE); a place needs two at least"
+            )
+        self._table = strain_table(self.strains, unit_names(deck), numbers)
+        if self.gains and len(self._table.gages) < 3:
+            raise StudyError("gains needs the strains of three gages at least")
+        self._times = timing(self._table, self.basis, shift=self.shift)
+
+    @cached_property
+    def price(self) -> Price:
+        """What the location takes.
+
+        The time is estimated from some steps of the plate. It is the time of its runs; the least
+        squares take up to as long again.
+        """
+        gages, mesh, times = len(self._table.gages), self.problem.mesh, self._times
+        plate = moving_plate(self.problem.plate)
+        each = steps_between(self.problem, times.interval, critical_time_step(plate))
+        # The mesh of the second run has four times as many nodes and half the step, for one force.
+        steps = each * times.samples
+        work = steps * (gages + 2 * FINER_NODES * self.mesh_error)
+        memory = response_bytes(mesh, gages, len(mesh.coordinates), times.samples)
+        sampling = Sampling(times.interval / each, each, times.samples, times.unit)
+        rows = gage_rows(self.problem, self._table.gages.tolist(), plate)
+        motion = PlateMotion(plate, damping=self.problem.damping)
+        seconds = work * seconds_of_step(motion, rows[0], sampling)
+        return Price(steps * (gages + 2 * self.mesh_error), 0, memory, seconds)
+
+    def execute(self, watch: Watch = SILENT) -> Location:
+        """Search for place and force.
+
+        Parameters
+        ----------
+        watch : Watch, optional
+            Gets the number of finished parts of the search, and may stop it between two parts.
+
+        Returns
+        -------
+        Location
+            Place, force, their errors, and measured and fitted strains.
+
+        Raises
+        ------
+        LocateError
+            If the gages can't tell two places apart, or no force explains the strains.
+        StudyError
+            If the record is far too long or too short for the waves of the plate.
+        StoppedError
+            If the watch stops the search.
+        """
+        problem, table = self.problem, self._table
+        finished = count()
+
+        def advance() -> None:
+            watch.advance(next(finished), PARTS)
+            if watch.stops():
+                raise StoppedError("stopped; no place is known yet")
+
+        advance()
+        fit, region, times = prepared(problem, table, self, shift=self.shift)
+        advance()
+        minima = best_fits(fit, region, self.grid)
+        searched = Searched(fit, minima.best, region)
+        advance()
+        wide = False
+        if self.basis is None:
+            fit, minima = narrowed(fit, minima, region, self.noise)
+        else:
+            wide = is_wide(fit, minima.best, self.noise)
+        advance()
+        location = _location(problem, table, self, (fit, times), minima)
+        cause = _find_cause(problem, table, self, searched) if is_doubtful(location) else None
+        watch.advance(PARTS, PARTS)
+        return judged(location, region, wide, cause)
+
+
+@with_parameters_of(LocationJob)
+def locate(job: LocationJob) -> Location:
+    """Locate an impact and find its force history from the strains of gages.
+
+    :class:`LocationJob` says how, and has the errors of the parameters. The notes of the result are
+    :class:`FecmWarning`.
+
+    Parameters
+    ----------
+    deck : str, Path or Deck
+        Deck with a single problem: plate, supports, GAGE, and PATC, the circle on which the force
+        acts.
+    strains : str, Path, tuple, mapping or DataFrame
+        Measured strains: a CSV file with a column time and a column per gage; times and strains
+        (points, gages); or columns by name.
+    {parameters}
 
     Returns
     -------
@@ -88,12 +210,6 @@ def locate(
     ------
     LocateError
         If the gages can't tell two places apart, or no force explains the strains.
-    StudyError
-        If the table or an option is invalid, or the deck has NONL or too few gages.
-    DeckError
-        If the deck has errors.
-    CasesError
-        If the deck has several problems.
 
     Examples
     --------
@@ -101,43 +217,10 @@ def locate(
     >>> location.x, location.y, location.peak_force  # doctest: +SKIP
     (112.5, 81.0, 160.5)
     """
-    box = None if region is None else tuple(map(float, region))
-    if box is not None and len(box) != 4:
-        raise StudyError(f"region has {len(box)} numbers; it takes x0, y0, x1, y1")
-    options = LocationSettings(box, grid, basis, noise, shift, gains, mass, mesh_error)
-    location = located(checked_problem(deck), strains, options)
+    location = job.execute()
     for text in location.notes:
         warn(text)
     return location
-
-
-def located(problem: Problem, strains: StrainSource, options: LocationSettings) -> Location:
-    """Locate an impact on the plate of a checked deck; see :func:`locate`."""
-    options.check()
-    deck = problem.deck
-    if deck.has(Nonlinear):
-        raise StudyError(
-            "locate needs a linear plate, and the deck has NONL; take an impact that leaves the "
-            "deflection below a quarter of the plate's thickness, without NONL"
-        )
-    cards = deck.last(Gages)
-    numbers = [card.number for card in cards.records] if cards is not None else []
-    if len(numbers) < 2:
-        raise StudyError(f"the deck has {len(numbers)} gages (GAGE); a place needs two at least")
-    table = strain_table(strains, unit_names(deck), numbers)
-    if options.gains and len(table.gages) < 3:
-        raise StudyError("gains needs the strains of three gages at least")
-    fit, region, times = prepared(problem, table, options)
-    minima = best_fits(fit, region, options.grid)
-    searched = Searched(fit, minima.best, region)
-    wide = False
-    if options.basis is None:
-        fit, minima = narrowed(fit, minima, region, options.noise)
-    else:
-        wide = is_wide(fit, minima.best, options.noise)
-    location = _location(problem, table, options, (fit, times), minima)
-    cause = _find_cause(problem, table, options, searched) if is_doubtful(location) else None
-    return judged(location, region, wide, cause)
 
 
 class Searched(NamedTuple):
@@ -149,7 +232,7 @@ class Searched(NamedTuple):
 
 
 def _find_cause(
-    problem: Problem, table: StrainTable, options: LocationSettings, searched: Searched
+    problem: Problem, table: StrainTable, options: LocationOptions, searched: Searched
 ) -> Cause | None:
     """Return the likely cause of strains that the model does not describe."""
     fit, best, region = searched
@@ -157,7 +240,7 @@ def _find_cause(
     if options.shift or (cause is not None and cause.ratio > CERTAIN):
         return cause
     try:
-        late_fit, *_ = prepared(problem, table, options._replace(shift=True))
+        late_fit, *_ = prepared(problem, table, options, shift=True)
         shifted = best_fits(late_fit, region, options.grid).best
     except FecmError:  # the record is too short for a shift
         return cause
@@ -172,7 +255,7 @@ def _find_cause(
 def _location(
     problem: Problem,
     table: StrainTable,
-    options: LocationSettings,
+    options: LocationOptions,
     fitted: tuple[LocationFit, Timing],
     minima: SearchResult,
 ) -> Location:

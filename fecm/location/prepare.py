@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -13,6 +15,7 @@ from numpy.typing import NDArray
 from fecm._errors import FecmError, StudyError
 from fecm._machine import require_memory
 from fecm._measured_tables import UNITS, plain_unit
+from fecm._options import option
 from fecm._typing import Floats, Indices
 from fecm.deck import model
 from fecm.deck.macros import flat
@@ -25,6 +28,7 @@ from fecm.location.model import (
     Footprint,
     Sampling,
     StrainModel,
+    deflections,
     moving_plate,
     observe,
     responses,
@@ -43,6 +47,7 @@ from fecm.problem.generate import generate
 from fecm.problem.parts import build_plate
 from fecm.problem.problem import Problem
 from fecm.problem.refine import refined_deck
+from fecm.simulation.job import ENOUGH
 from fecm.sweeps.job import checked_problem
 from fecm.sweeps.responses import plate_response
 
@@ -140,24 +145,66 @@ LATE = 0.5  # largest first time over the length of the record
 SEARCHED, GIVEN = 4, 2
 
 
-class LocationSettings(NamedTuple):
-    """Options of a location; see :func:`locate`."""
+@dataclass(kw_only=True, eq=False, repr=False)
+class LocationOptions:
+    """Options of a location."""
 
-    region: tuple[float, float, float, float] | None = None
-    grid: float | None = None
-    basis: float | None = None
-    noise: float | None = None
-    shift: bool = False
-    gains: bool = False
-    mass: float | None = None
-    mesh_error: bool = True
+    region: Sequence[float] | None = option(
+        None,
+        "Rectangle that contains the place; the plate by default.",
+        python="x0, y0, x1, y1.",
+        group="Search",
+        metavar="X0,Y0,X1,Y1",
+    )
+    grid: float | None = option(
+        None,
+        "Distance of the places that are tried first; by default the region has about 126 of them.",
+        group="Search",
+        metavar="LENGTH",
+    )
+    basis: float | None = option(
+        None,
+        "Time between two values of the force; by default 1/40 of the record in the search, then a "
+        "half or a quarter of it.",
+        python="The force is linear between them.",
+        group="Search",
+        metavar="TIME",
+    )
+    noise: float | None = option(
+        None,
+        "Standard deviation of the errors of the strains; by default from the residual.",
+        group="Search",
+        metavar="STRAIN",
+    )
+    shift: bool = option(
+        False,
+        "Fit the time at which the force may begin: the record begins after the impact.",
+        group="Search",
+    )
+    gains: bool = option(
+        False,
+        "Fit the gains of three or more gages over their geometric mean.",
+        group="Search",
+    )
+    mass: float | None = option(
+        None, "Mass of the projectile, for a bound of its energy.", group="Search", metavar="MASS"
+    )
+    mesh_error: bool = option(
+        True,
+        "Add the error of the mesh to the standard deviations, by a run of elements half as long; "
+        "it takes longer than all the rest.",
+        group="Search",
+        flag="--mesh-error/--no-mesh-error",
+    )
 
     def check(self) -> None:
-        """Raise StudyError if an option is not positive."""
+        """Raise StudyError if an option is not positive, or the region has not four numbers."""
         for name in ("grid", "basis", "noise", "mass"):
             value = getattr(self, name)
             if value is not None and not 0.0 < value < math.inf:
                 raise StudyError(f"{name} is {value:g}; it must be positive")
+        if self.region is not None and len(self.region) != 4:
+            raise StudyError(f"region has {len(self.region)} numbers; it takes x0, y0, x1, y1")
 
 
 class Timing(NamedTuple):
@@ -171,8 +218,8 @@ class Timing(NamedTuple):
     samples: int
 
 
-def timing(table: StrainTable, options: LocationSettings) -> Timing:
-    """Return the samples and hats for a table.
+def timing(table: StrainTable, basis: float | None, *, shift: bool) -> Timing:
+    """Return the samples and hats for a table; see :class:`LocationOptions`.
 
     Raises StudyError if the table is too coarse or starts too late.
     """
@@ -185,19 +232,19 @@ def timing(table: StrainTable, options: LocationSettings) -> Timing:
             "before time 0; subtract the time from which on the force may act"
         )
     spacing = float(np.median(np.diff(time)))
-    basis = options.basis or max(record / HATS, 2.0 * spacing)
-    if basis < spacing:
+    width = basis or max(record / HATS, 2.0 * spacing)
+    if width < spacing:
         raise StudyError(
-            f"{name} has a point every {spacing:.3g}, too few for a force every {basis:.3g}; take "
+            f"{name} has a point every {spacing:.3g}, too few for a force every {width:.3g}; take "
             "a larger basis"
         )
-    parts = GIVEN if options.basis else SEARCHED
-    interval = _interval(time, basis)
-    unit = max(1, math.floor(basis / interval / parts + 0.5 + UNIFORM))
-    if options.basis and abs(parts * unit * interval - basis) > UNIFORM * basis:
+    parts = GIVEN if basis else SEARCHED
+    interval = _interval(time, width)
+    unit = max(1, math.floor(width / interval / parts + 0.5 + UNIFORM))
+    if basis and abs(parts * unit * interval - basis) > UNIFORM * basis:
         # Hats of the width that was asked for, or of the next number of samples.
         interval, unit = interval / 2.0, round(basis / interval)
-    length = math.ceil(record * (1.0 + BEFORE * options.shift) / interval - UNIFORM)
+    length = math.ceil(record * (1.0 + BEFORE * shift) / interval - UNIFORM)
     hats = math.ceil(length / (parts * unit))
     if hats > MOST_HATS or 2 * (hats + 2) > table.strains.size:
         raise StudyError(
@@ -219,10 +266,10 @@ def _interval(time: Floats, basis: float) -> float:
 
 
 def prepared(
-    problem: Problem, table: StrainTable, options: LocationSettings
+    problem: Problem, table: StrainTable, options: LocationOptions, *, shift: bool
 ) -> tuple[LocationFit, Region, Timing]:
     """Return the fit of the strains, the region of the search, and the times of the fit."""
-    times = timing(table, options)
+    times = timing(table, options.basis, shift=shift)
     footprint = _footprint(problem)
     region = Region.of(problem.mesh, footprint.radius, options.region)
     samples = times.interval, times.unit, times.samples
@@ -234,7 +281,7 @@ def prepared(
         footprint, observation, nodes, strains, times.unit, times.width, times.length
     )
     side = float(np.median(longest_sides(problem.mesh.elements, problem.mesh.coordinates)))
-    return LocationFit(model, side, options.shift, options.gains), region, times
+    return LocationFit(model, side, shift, options.gains), region, times
 
 
 def _footprint(problem: Problem) -> Footprint:
@@ -256,24 +303,49 @@ def _responses_in_region(
     interval, unit, count = samples
     problem = checked_problem(deck)
     mesh, plate = problem.mesh, moving_plate(problem.plate)
-    all_cards = {card.number: card for card in deck.require(Gages).records}
-    cards = [all_cards[number] for number in numbers]
-    read = gages(mesh, cards, curvature=plate.curvature)
-    rows = rows_of(read, len(mesh.coordinates))
+    rows = gage_rows(problem, numbers, plate)
     _check_symmetry(plate, rows, numbers, region)
     critical = critical_time_step(plate)
     _check_length_of_record(problem, interval * count, critical)
+    steps = steps_between(problem, interval, critical)
+    sampling = Sampling(interval / steps, steps, count, unit)
+    nodes = region.nodes(mesh)
+    needed = response_bytes(mesh, len(numbers), len(nodes), count)
+    require_memory(needed, f"the responses of {len(numbers)} gages at {len(nodes)} nodes")
+    motion = PlateMotion(plate, damping=problem.damping)
+    return nodes, responses(motion, rows, nodes, sampling)
+
+
+def steps_between(problem: Problem, interval: float, critical: float) -> int:
+    """Return the number of steps between two samples: of the deck, or 0.9 of the critical."""
     steps_of_deck = [macro.value for macro in flat(problem.program) if macro.word == "DT"]
     stable = [dt for dt in steps_of_deck if 0.0 < dt < critical]
     longest = stable[0] if stable else taken_time_step(critical)
-    steps = math.ceil(interval / longest * (1.0 - 1e-9))
-    sampling = Sampling(interval / steps, steps, count, unit)
-    nodes = region.nodes(mesh)
-    stored = 4 * len(numbers) * len(nodes) * count
-    fields = 2 * 8 * NDOF * ROWS * len(mesh.coordinates)
-    require_memory(stored + fields, f"the responses of {len(numbers)} gages at {len(nodes)} nodes")
-    motion = PlateMotion(plate, damping=problem.damping)
-    return nodes, responses(motion, rows, nodes, sampling)
+    return math.ceil(interval / longest * (1.0 - 1e-9))
+
+
+def seconds_of_step(motion: PlateMotion, row: Floats, sampling: Sampling) -> float:
+    """Return the seconds of a step on this machine, from the response of a gage after its hat."""
+    begin, steps = time.perf_counter(), 0
+    for number, fields in enumerate(deflections(motion, row, sampling)):
+        if number == 2 * sampling.width:  # the steps under a force take longer
+            begin, steps = time.perf_counter(), 0
+        steps += len(fields) * sampling.every
+        if number > 2 * sampling.width and time.perf_counter() - begin > ENOUGH:
+            break
+    return (time.perf_counter() - begin) / steps
+
+
+def gage_rows(problem: Problem, numbers: Sequence[int], plate: PlateModel) -> Floats:
+    """Return the strain of every gage per displacement of every dof, (gages, nodes, 5)."""
+    cards = {card.number: card for card in problem.deck.require(Gages).records}
+    read = gages(problem.mesh, [cards[number] for number in numbers], curvature=plate.curvature)
+    return rows_of(read, len(problem.mesh.coordinates))
+
+
+def response_bytes(mesh: MeshArrays, gages: int, nodes: int, samples: int) -> int:
+    """Return the memory of the responses of gages at nodes, and of the fields that are stepped."""
+    return 4 * gages * nodes * samples + 2 * 8 * NDOF * ROWS * len(mesh.coordinates)
 
 
 def _check_length_of_record(problem: Problem, record: float, critical: float) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple, Self
 
@@ -33,9 +34,7 @@ class Region(NamedTuple):
     corners: tuple[float, float, float, float]
 
     @classmethod
-    def of(
-        cls, mesh: MeshArrays, radius: float, corners: tuple[float, float, float, float] | None
-    ) -> Self:
+    def of(cls, mesh: MeshArrays, radius: float, corners: Sequence[float] | None) -> Self:
         """Return the region between corners, or the largest; the circle stays on the plate."""
         places = mesh.coordinates[mesh.used]
         low, high = places.min(axis=0) + radius, places.max(axis=0) - radius

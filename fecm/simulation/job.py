@@ -73,10 +73,13 @@ class Price(NamedTuple):
     seconds: float
 
     def __str__(self) -> str:
-        took = "" if math.isnan(self.seconds) else f", about {self.seconds:.2g} s"
-        sizes = f"{format_bytes(self.output_bytes)} of results"
-        memory = f"{format_bytes(self.memory_bytes)} of memory"
-        return f"{self.steps} steps, {sizes}, {memory}{took}"
+        parts = [f"{self.steps} steps"]
+        if self.output_bytes:
+            parts.append(f"{format_bytes(self.output_bytes)} of results")
+        parts.append(f"{format_bytes(self.memory_bytes)} of memory")
+        if not math.isnan(self.seconds):
+            parts.append(f"about {self.seconds:.2g} s")
+        return ", ".join(parts)
 
 
 @documented

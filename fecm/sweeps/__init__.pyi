@@ -1,6 +1,6 @@
 """Names of this room for other rooms and for tests; each is imported when it is first used."""
 
-from fecm.sweeps.batch import run_task as run_task
+from fecm.sweeps.backends import run_task as run_task
 from fecm.sweeps.checks import ADVANCED_BYTES as ADVANCED_BYTES
 from fecm.sweeps.checks import HISTORY_BYTES as HISTORY_BYTES
 from fecm.sweeps.checks import JUDGED as JUDGED

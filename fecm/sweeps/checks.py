@@ -10,8 +10,15 @@ import numpy as np
 
 from fecm import _machine
 from fecm.authoring.case import Case, CasesError, check_deck, pair_of_text
-from fecm.authoring.values import EXPOSURE_NAMES, REFINE, Changes, ValueKind, kind_of, names_of
-from fecm.authoring.vary import apply_case
+from fecm.authoring.values import (
+    EXPOSURE_NAMES,
+    REFINE,
+    Changes,
+    ValueKind,
+    apply_case,
+    kind_of,
+    names_of,
+)
 from fecm.deck import model
 from fecm.deck.findings import Finding, Findings
 from fecm.mechanics.kernels import LIBRARY

@@ -30,7 +30,7 @@ from fecm._inputs import read_input
 from fecm._machine import NotEnoughMemoryError, free_processors
 from fecm._watch import SILENT, StoppedError, Watch
 from fecm.problem.problem import Problem
-from fecm.sweeps.batch import run_task
+from fecm.sweeps.backends import run_task
 from fecm.sweeps.checks import check_sweep_memory
 from fecm.sweeps.in_full import told
 from fecm.sweeps.outcome import Outcome, merge

@@ -12,8 +12,7 @@ from fecm._typing import Floats
 from fecm.authoring.case import Case, CasesError
 from fecm.authoring.strike import strike_of
 from fecm.authoring.timing import with_clock
-from fecm.authoring.values import name_fault
-from fecm.authoring.vary import apply_case
+from fecm.authoring.values import apply_case, name_fault
 from fecm.deck.macros import Body, Loop
 from fecm.deck.model import Deck, Macro
 from fecm.deck.units import unit_names

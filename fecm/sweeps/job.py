@@ -20,7 +20,7 @@ from fecm._options import documented, option, with_parameters_of
 from fecm._table import Row, Table, html_table
 from fecm._watch import LOGGER, CallerWatch, Progress, Watch
 from fecm.authoring.case import Case, CasesError, Limit, parse_exceed
-from fecm.authoring.cases import CaseTable, checked, combined, grid_cases, parse_vary, read_cases
+from fecm.authoring.cases import CaseTable, cases_of, texts_of
 from fecm.authoring.values import NAMES
 from fecm.deck.catalogue import system_of
 from fecm.mechanics.contact_law import Law
@@ -29,7 +29,7 @@ from fecm.problem.build import RunOptions
 from fecm.problem.loading import AnyDeck, LoadedDeck, load_deck
 from fecm.problem.problem import Problem
 from fecm.simulation.job import Price, ProblemRun
-from fecm.sweeps.batch import case_deck
+from fecm.sweeps.backends import case_deck
 from fecm.sweeps.checks import (
     check_sweep_memory,
     doubtful_values,
@@ -299,20 +299,13 @@ class Sweep:
         """Return the cases, and the design of random cases."""
         free = self.build is not None
         system = None if loaded is None else system_of(loaded.problems[0].deck)
-        if isinstance(self.cases, str | Path):
-            cases = read_cases(Path(self.cases), system)
-        elif self.cases is not None:
-            cases = checked(self.cases, free=free, system=system)
-        elif texts := _texts(self.vary):
-            cases = grid_cases([parse_vary(text, system) for text in texts])
-        else:
-            cases = combined(self.vary or {}, free=free, system=system)  # type: ignore[arg-type]
+        cases = cases_of(self.vary, self.cases, free=free, system=system)
         if not self.random:
             return cases, None
         named = _by_name("random", self.random, "NAME=LAW")
         laws = {name: distribution_of(name, law, free=free) for name, law in named.items()}
         correlation: Any = self.correlation
-        if pairs := _texts(correlation):
+        if pairs := texts_of(correlation):
             parsed = [parse_correlation(text) for text in pairs]
             if len(correlation := dict(parsed)) < len(parsed):
                 raise CasesError("`correlation`: a pair is given twice")
@@ -632,20 +625,11 @@ def _measures(
     return None, names
 
 
-def _texts(texts: object) -> list[str]:
-    """Return one or several texts of the form NAME=...; an empty list for anything else."""
-    if isinstance(texts, str):
-        return [texts]
-    if isinstance(texts, list | tuple) and all(isinstance(text, str) for text in texts):
-        return list(texts)
-    return []
-
-
 def _by_name(option: str, argument: Any, form: str) -> dict[str, Any]:
     """Return values by name, from a mapping or from texts of a form."""
     if isinstance(argument, Mapping):
         return dict(argument)
-    pairs = [text.partition("=")[::2] for text in _texts(argument)]
+    pairs = [text.partition("=")[::2] for text in texts_of(argument)]
     if not pairs or not all(name.strip() and value for name, value in pairs):
         raise CasesError(f"{option} is {argument!r}; write {form}, or a mapping of names to values")
     values = {name.strip(): value.strip() for name, value in pairs}
@@ -656,7 +640,7 @@ def _by_name(option: str, argument: Any, form: str) -> dict[str, Any]:
 
 def _limits(exceed: Any) -> tuple[Limit, ...]:
     """Return limits of quantities, from texts or from values by name."""
-    if texts := _texts(exceed):
+    if texts := texts_of(exceed):
         return tuple(map(parse_exceed, texts))
     if not isinstance(exceed or {}, Mapping):
         raise CasesError(f'exceed is {exceed!r}; write {{"peak_force": [100.0]}} or the like')

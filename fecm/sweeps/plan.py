@@ -1,8 +1,8 @@
 """Plan of a sweep: its cases, and the tasks that compute them.
 
 A study (grid, cases, random, refine) gives cases. A plan has the cases and their common
-:class:`Settings`. :func:`tasks` splits it. :func:`fecm.sweeps.batch.run_task` computes the outcome
-of a task. :func:`fecm.sweeps.result.sweep_result` makes the result of the plan from all outcomes.
+:class:`Settings`. :func:`tasks` splits it. :func:`fecm.sweeps.backends.run_task` computes a task,
+and :func:`fecm.sweeps.result.sweep_result` makes the result of the plan from all outcomes.
 """
 
 from __future__ import annotations
@@ -15,19 +15,26 @@ from enum import StrEnum
 from typing import Any
 
 from fecm._version import __version__
-from fecm.authoring.case import NO_THRESHOLD, THRESHOLD, Case, CasesError, Limit, check_limits
+from fecm.authoring.case import (
+    NO_THRESHOLD,
+    THRESHOLD,
+    Case,
+    CasesError,
+    Limit,
+    Value,
+    check_limits,
+)
 from fecm.authoring.timing import Clock, clock_of
 from fecm.authoring.values import (
     FAILURE_NAMES,
     LAW_VALUES,
+    OF_PLATE,
     REFINE,
     Changes,
+    apply_case,
     check_names,
-    motion_values,
     names_of,
-    plate_values,
 )
-from fecm.authoring.vary import apply_case
 from fecm.deck.macros import flat
 from fecm.deck.model import Deck, Gages, Nonlinear
 from fecm.mechanics.contact_law import Law
@@ -127,6 +134,11 @@ class Task:
     number: int
     numbers: tuple[int, ...]  # of the cases
     cases: tuple[Case, ...]
+
+    @property
+    def plate_values(self) -> Case:
+        """Values of the plate, which the cases share unless each is run in full."""
+        return {name: value for name, value in self.cases[0].items() if name in OF_PLATE}
 
 
 def plan(
@@ -290,15 +302,17 @@ def tasks(checked: Problem, definition: Plan, cases: Sequence[int] | None = None
     A task has cases that share a plate, full runs that share a motion, or a single case.
     """
     together = max(1, runs_together(checked, definition) // _runs_of_case(definition))
-    common = plate_values
+    names = [name for name in definition.cases[0] if name in OF_PLATE]
     if definition.settings.shares_motion:
-        together, common = MOST_IN_MOTION, motion_values
-    plates: dict[object, list[int]] = {}
+        together = MOST_IN_MOTION
+        names = [name for name in definition.cases[0] if name not in FAILURE_NAMES]
+    sharing: dict[tuple[Value, ...], list[int]] = {}
     for number in range(len(definition.cases)) if cases is None else cases:
-        plates.setdefault(frozenset(common(definition.cases[number]).items()), []).append(number)
+        key = tuple(definition.cases[number][name] for name in names)
+        sharing.setdefault(key, []).append(number)
     parts = [
         tuple(numbers[start : start + together])
-        for numbers in plates.values()
+        for numbers in sharing.values()
         for start in range(0, len(numbers), together)
     ]
     return [

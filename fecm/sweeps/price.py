@@ -13,7 +13,7 @@ from fecm.authoring.timing import duration_of, lengthened
 from fecm.authoring.values import REFINE
 from fecm.problem.problem import Problem
 from fecm.results.metrics import SUMMARY
-from fecm.sweeps.batch import run_task
+from fecm.sweeps.backends import run_task
 from fecm.sweeps.in_full import run_case_in_full
 from fecm.sweeps.plan import WORTH_WORKERS, Plan, Task, shares_plate, tasks
 from fecm.sweeps.search import USUAL

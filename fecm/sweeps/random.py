@@ -18,7 +18,7 @@ import numpy as np
 
 from fecm._typing import Floats
 from fecm.authoring.case import Case, CasesError, check_count, number_of_text
-from fecm.authoring.values import FAILURE_NAMES, PLATE_NAMES, plate_values
+from fecm.authoring.values import FAILURE_NAMES, OF_PLATE, PLATE_NAMES
 from fecm.sweeps.distributions import (
     CustomDistribution,
     ValueDistribution,
@@ -257,7 +257,8 @@ def cost(cases: Sequence[Case], design: Design, *, shared: bool, motions: bool) 
             f"; those that differ only in {', '.join(names)}, together" if names else ", one by one"
         )
         return f"{what} are run in full{how}"
-    plates = len({frozenset(plate_values(case).items()) for case in cases})
+    of_plate = [name for name in cases[0] if name in OF_PLATE]
+    plates = len({tuple(case[name] for name in of_plate) for case in cases})
     causes = [name for name in design.laws if name in PLATE_NAMES]
     if not causes:
         return f"{what} share {plates} plate{'s' * (plates > 1)}"

@@ -20,7 +20,7 @@ from fecm.authoring.case import CasesError
 from fecm.authoring.impacts import Impacts
 from fecm.authoring.strike import Strike
 from fecm.authoring.timing import duration_of
-from fecm.authoring.vary import strike_of_case
+from fecm.authoring.values import strike_of_case
 from fecm.mechanics.contact_law import ContactPoint
 from fecm.mechanics.impact import ContactState, couple_step
 from fecm.mechanics.projectile import Rod

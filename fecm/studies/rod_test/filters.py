@@ -54,6 +54,13 @@ class FilterKind(StrEnum):
     CFC = "cfc"  # channel frequency class; attenuates sines of 5/3 of the class (Hz) by 3 dB
 
 
+FILTERS = (  # forms of the text of a filter
+    "first-order:RISE or moving-average:RISE, with the time RISE from 10 to 90 % of the "
+    "step response; butterworth:ORDER,FREQUENCY in Hz, with ,zero-phase if it filters forward and "
+    "backward; or cfc:60, 180, 600 or 1000 of SAE J211."
+)
+
+
 @dataclass(frozen=True)
 class Filter:
     """Filter with a static gain of 1."""
