@@ -169,10 +169,10 @@ def _computed(job: Sweep) -> SweepResult:
 def _print(result: SweepResult, job: Sweep) -> None:
     """Print title, summary and the tables of a study of the mesh or of random values."""
     echo(job.title)
-    for line in (
-        *sweep_summary(result),
-        *convergence_lines(result.cases, result.summary, result.convergence),
-    ):
+    lines = sweep_summary(result)
+    if studies := result.convergence:
+        lines += convergence_lines(result.cases, result.summary, studies)
+    for line in lines:
         echo(f"  {line}")
     for line in () if result.random is None else tables(result.random, result.unit):
         echo(f"  {line}".rstrip())

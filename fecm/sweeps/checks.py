@@ -27,7 +27,7 @@ from fecm.problem.check import check_segments, check_values
 from fecm.problem.memory import needed_bytes, reduction_bytes
 from fecm.problem.problem import Problem
 from fecm.sweeps.in_full import stores_rows, without_output
-from fecm.sweeps.plan import FORCES, MOST_TOGETHER, Plan, Task, runs_together, tasks
+from fecm.sweeps.plan import FORCES, MOST_TOGETHER, Plan, runs_together, tasks
 
 THICKNESS = "thickness"
 LAMINATE = names_of(Changes.LAMINATE)
@@ -155,10 +155,12 @@ def _findings(problem: Problem) -> list[Finding]:
     return [finding for finding in findings if finding.severity == "warning"]
 
 
-def freed(tasks: Sequence[Task]) -> int:
+def freed(checked: Problem, definition: Plan) -> int:
     """Count cases with B != 0 in which u and v, restrained at every node, are released."""
     count = 0
-    for task in tasks:
+    if definition.cases[0].keys().isdisjoint(LAMINATE):
+        return count
+    for task in tasks(checked, definition):
         if "support" in task.cases[0]:  # which has its own u and v
             continue
         deck = task.settings.deck

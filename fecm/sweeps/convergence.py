@@ -113,8 +113,6 @@ def convergence_lines(
     cases: Mapping[str, Column], summary: Mapping[str, Column], studies: Mapping[str, Convergence]
 ) -> list[str]:
     """Return lines of the values of every case, and of order, limit and band of every quantity."""
-    if not studies:
-        return []
     rows = [[n, *(f"{v:.6g}" for v in cases[n].tolist()), "", "", "", ""] for n in cases]
     rows[0][-4:-1] = "order", "limit", "band"
     for name, study in studies.items():

@@ -378,7 +378,7 @@ class Sweep:
             texts += [*unused_values(self.plan), *doubtful_values(self.problem, cases)]
         if design is not None and (text := doubt(design)):
             texts.append(text)
-        if self.build is None and (count := freed(tasks(self.problem, self.plan))):
+        if self.build is None and (count := freed(self.problem, self.plan)):
             texts.append(
                 f"B is not zero in {count} case{'' if count == 1 else 's'}: u and v, which the "
                 "deck restrains at every node, are free there except where w is held"
