@@ -74,15 +74,13 @@ def html_table(*tables: Table) -> str:
 def _html(table: Table) -> str:
     from html import escape  # 1 ms, only in notebooks
 
-    def cells(row: Iterable[Cell], first: str, tag_of_others: str) -> str:
-        tags = [first, *[tag_of_others] * (len(table.header) or 2)]
+    def tagged(tag: str, cells: Iterable[Cell]) -> str:
         return "".join(
-            f"<{tag} style='text-align:left'>{escape(_text(cell))}</{tag}>"
-            for tag, cell in zip(tags, row, strict=False)
+            f"<{tag} style='text-align:left'>{escape(_text(cell))}</{tag}>" for cell in cells
         )
 
-    rows = [cells(table.header, "th", "th")] if table.header else []
-    rows += (cells(row, "th", "td") for row in table.rows)
+    rows = [tagged("th", table.header)] if table.header else []
+    rows += (tagged("th", row[:1]) + tagged("td", row[1:]) for row in table.rows)
     body = "".join(f"<tr>{row}</tr>" for row in rows)
     return f"<table><caption>{escape(table.title)}</caption>{body}</table>"
 
