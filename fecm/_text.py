@@ -64,6 +64,7 @@ def csv_lines(rows: Iterable[Iterable[object]]) -> Iterator[str]:
 # Significant digits that are printed.  Errors of the model are some per cent; JSON and HDF5 keep
 # all digits.
 DIGITS = 4  # of computed values
+FITTED_DIGITS = 5  # of values fitted to a measurement; their errors have two
 DECK_DIGITS = 6  # of values that the deck gives
 
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from fecm._table import Cell, Row, ShownNumber, Table, html_table, text_lines
+from fecm._table import Row, ShownNumber, Table, html_table, text_lines
+from fecm._text import FITTED_DIGITS
 from fecm._typing import Floats
 from fecm.authoring.values import dimension_of
 from fecm.deck.model import Deck, Impact, Indentation, Projectile
@@ -22,7 +23,6 @@ CARDS: dict[str, type[Impact | Indentation | Projectile]] = {
     **dict.fromkeys(("k", "alpha_p", "s_p", "q"), Indentation),
     **dict.fromkeys(("mass", "rod_length", "rod_modulus", "rod_density"), Projectile),
 }
-DIGITS = 5  # significant digits of fitted values; their errors have two
 LABEL_WIDTH = 13
 PLATE_ERRORS = "Change of the values with 1 % more of a property of the plate in the deck"
 
@@ -186,7 +186,7 @@ def identification_tables(fit: Identification) -> Iterator[Table]:
     yield Table(values, ("parameter", "value", "standard error", "start"), "Fitted values")
     if len(fit.values) > 1:
         rows = tuple(
-            _row(name, (_number(value, f"{value:.3f}") for value in row))
+            (name, *(ShownNumber(value, f"{value:.3f}") for value in row))
             for name, row in zip(fit.values, fit.correlation.tolist(), strict=True)
         )
         yield Table(rows, ("correlation", *fit.values), "Correlations")
@@ -211,10 +211,10 @@ def _quality(fit: Identification) -> Table:
 
 def _value_row(fit: Identification, name: str) -> Row:
     """Return a parameter with its value, standard error and start."""
-    power, unit = readable(fit.values[name], fit.unit(name), DIGITS)
+    power, unit = readable(fit.values[name], fit.unit(name), FITTED_DIGITS)
 
-    def cell(value: float, digits: int = DIGITS) -> ShownNumber:
-        return _number(value, f"{value / 10.0**power:.{digits}g} {unit}".rstrip())
+    def cell(value: float, digits: int = FITTED_DIGITS) -> ShownNumber:
+        return ShownNumber(value, f"{value / 10.0**power:.{digits}g} {unit}".rstrip())
 
     return name, cell(fit.values[name]), cell(fit.errors[name], 2), cell(fit.start[name])
 
@@ -224,13 +224,5 @@ def _plate_error_row(fit: Identification, name: str) -> Row:
     value = fit.values[name]
     changes = [errors[name] for errors in fit.plate_errors.values()]
     if name in CARDS and value:
-        return _row(name, (_number(c / value, f"{c / value:+.2%}") for c in changes))
-    return _row(name, (_number(c, f"{c:+.2g}") for c in changes))
-
-
-def _row(label: str, cells: Iterable[Cell]) -> Row:
-    return (label, *cells)
-
-
-def _number(value: float, text: str) -> ShownNumber:
-    return ShownNumber(float(value), text)
+        return (name, *(ShownNumber(c / value, f"{c / value:+.2%}") for c in changes))
+    return (name, *(ShownNumber(c, f"{c:+.2g}") for c in changes))

@@ -15,6 +15,7 @@ from fecm._arrays import read_only
 from fecm._errors import FecmError, OptionsError, ResultFileError
 from fecm._files import check_outputs
 from fecm._table import Row, Table, html_table, text_lines
+from fecm._text import FITTED_DIGITS
 from fecm._typing import AnyFile, Bools, Floats
 from fecm.deck.model import Deck
 from fecm.deck.units import quantity, unit_names, unit_of
@@ -66,7 +67,6 @@ DIMENSIONS = {
     "mass": "force*time^2/length",
 }
 POINTS = 181  # points of an ellipse
-DIGITS = 5  # significant digits of a location
 BIASED = 0.1  # bias of a peak, over its standard deviation, above which it is shown
 # Attributes of the group of the force, those that may be missing, and of the group of the place.
 # The end of the contact is missing if the contact has not ended, errors in files of fecm 1.
@@ -75,6 +75,12 @@ OPTIONAL = ("contact_end", "sd_peak_force", "peak_bias", "sd_impulse")
 OF_PLACE = (
     *("x", "y", "sd_x", "sd_y", "correlation", "noise", "misfit", "shift", "sd_shift"),
     *("mass", "energy_bound", "mesh_error"),
+)
+IN_JSON = (
+    *("x", "y", "sd_x", "sd_y", "correlation", "peak_force", "time_of_peak", "contact_end"),
+    *("sd_peak_force", "peak_bias", "impulse", "sd_impulse", "mesh_error", "mass"),
+    *("energy_bound", "determined_until", "noise", "noise_given", "misfit", "shift", "sd_shift"),
+    "accepted",
 )
 
 
@@ -326,14 +332,8 @@ class Location:
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, as printed by ``fecm locate --format json``."""
-        names = (
-            *("x", "y", "sd_x", "sd_y", "correlation", "peak_force", "time_of_peak"),
-            *("contact_end", "sd_peak_force", "peak_bias", "impulse", "sd_impulse", "mesh_error"),
-            *("mass", "energy_bound", "determined_until", "noise", "noise_given", "misfit"),
-            *("shift", "sd_shift", "accepted"),
-        )
         return {
-            **{name: getattr(self, name) for name in names},
+            **{name: getattr(self, name) for name in IN_JSON},
             "second": None if self.second is None else self.second._asdict(),
             "gages": self.gages.tolist(),
             "gains": self.gains.tolist(),
@@ -386,7 +386,7 @@ def location_table(location: Location) -> Table:
     """Return the summary of a location, in the deck's units."""
 
     def shown(name: str, value: float) -> str:
-        return quantity(value, location.unit(name), DIGITS)
+        return quantity(value, location.unit(name), FITTED_DIGITS)
 
     length = location.unit("x")
     rows: list[Row] = [
