@@ -127,7 +127,7 @@ def thousands(value: float) -> int:
 
 
 def with_prefix(unit: str, power: int) -> str:
-    """Return the name of a unit times 10^power: kN for 10^3 N; empty if there is no name."""
+    """Return the name of 10^power units: kN for 10^3 N. The text is empty if no prefix fits."""
     base, power_of_unit = PREFIXED.get(unit, ("", 0))
     if not base or power + power_of_unit not in PREFIXES:
         return ""

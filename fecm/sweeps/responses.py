@@ -196,10 +196,10 @@ class TipState(NamedTuple):
 
 
 class TipSteps:
-    """Steps of size `dt` of the projectiles of impacts, for the motion of the tips only.
+    """Time steps of the tips of projectiles.
 
-    The stiffness and mass of a case are those of its kind times its scale. `count` is the number of
-    steps.
+    `dt` is the size of a step and `count` the number of steps. Each case multiplies the stiffness
+    and the mass of its kind of projectile by its scale.
     """
 
     def __init__(self, hits: Hits, dt: float, count: int) -> None:
