@@ -95,7 +95,7 @@ def estimated_mesh_error(elements: float, slenderness: float, shear: int) -> flo
     return (0.031 + 0.0011 * slenderness**2) * (ENOUGH_PER_WAVE / elements) ** 2
 
 
-def said_error(error: float) -> str:
+def format_mesh_error(error: float) -> str:
     """Format an estimated mesh error of the peak force."""
     if error > MOST_ERROR:
         return f"mesh error of the peak above {MOST_ERROR:.0%}"

@@ -13,20 +13,19 @@ import numpy as np
 
 from fecm._machine import format_bytes
 from fecm._table import Row, Table, text_lines
-from fecm._text import DIGITS
+from fecm._text import significant
 from fecm._typing import FiniteFloat, Floats
 from fecm.deck.macros import flat
 from fecm.deck.model import Cure, Impact, Shear
-from fecm.deck.units import MASS, mass_in_si, unit_names, unit_of
-from fecm.deck.units import quantity as readable_quantity
+from fecm.deck.units import MASS, mass_in_si, quantity, unit_names, unit_of
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.plate import PlateModel, UnsoundPlateError
 from fecm.mechanics.ply_stresses import equilibrium_shear_stiffness
-from fecm.mechanics.solutions import SingularStiffnessError, compliance
+from fecm.mechanics.solutions import FAR, SingularStiffnessError, compliance
 from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.strains import midplane_height
 from fecm.mechanics.time_step import taken_time_step
-from fecm.problem.estimates import MOST_SOLVED, resolution, said_error
+from fecm.problem.estimates import MOST_SOLVED, format_mesh_error, resolution
 from fecm.problem.parts import build_projectile
 from fecm.problem.problem import Problem
 from fecm.problem.rules.preload import FEWEST_ELEMENTS
@@ -199,7 +198,7 @@ def summary_table(summary: ProblemSummary) -> Table:
 
 def _quantity(summary: ProblemSummary, value: float, dimension: str) -> str:
     """Format a value with its unit."""
-    return f"{value:.{DIGITS}g} {unit_of(dimension, summary.units)}".rstrip()
+    return quantity(value, unit_of(dimension, summary.units))
 
 
 def _stiffness_rows(summary: ProblemSummary) -> Iterator[Row]:
@@ -221,7 +220,7 @@ def _stiffness_rows(summary: ProblemSummary) -> Iterator[Row]:
 
 def _plate_rows(summary: ProblemSummary) -> Iterator[Row]:
     """Yield rows about kinematics, preload, curvature, cure and delamination threshold."""
-    quantity = partial(_quantity, summary)
+    in_units = partial(_quantity, summary)
     if summary.nonlinear:
         share = f"{summary.free_in_plane} of {summary.nodes} nodes"
         yield ("kinematics", f"von Kármán plate, u and v free at {share}")
@@ -229,30 +228,31 @@ def _plate_rows(summary: ProblemSummary) -> Iterator[Row]:
         yield ("kinematics", "linear plate")
     if any(summary.preload):
         named = zip(("N0x", "N0y", "N0xy"), summary.preload, strict=True)
-        forces = (f"{name} {quantity(force, 'force/length')}" for name, force in named)
+        forces = (f"{name} {in_units(force, 'force/length')}" for name, force in named)
         yield ("preload", ", ".join(forces))
     if any(summary.curvature):
         named = zip(("Rx", "Ry", "Rxy"), summary.curvature, strict=True)
-        radii = [f"{name} {quantity(1.0 / k, 'length')}" for name, k in named if k]
-        rise = f"rise {quantity(summary.rise, 'length')}"
+        radii = [f"{name} {in_units(1.0 / k, 'length')}" for name, k in named if k]
+        rise = f"rise {in_units(summary.rise, 'length')}"
         yield ("curved panel", ", ".join([*radii, rise]))
     if summary.cure is not None:
         yield ("cure", f"{summary.cure:+g} K")
     if summary.threshold is not None:
-        yield ("delamination", f"from {quantity(summary.threshold, 'force')}")
+        yield ("delamination", f"from {in_units(summary.threshold, 'force')}")
 
 
 def _impact_rows(summary: ProblemSummary) -> Iterator[Row]:
     """Yield rows about masses, velocity and energy."""
 
     def mass_text(mass: float) -> str:
+        text = f"{significant(mass)} {unit_of(MASS, summary.units)}".rstrip()
         in_si = mass_in_si(mass, summary.units)
-        return _quantity(summary, mass, MASS) + (f" ({in_si})" if in_si else "")
+        return f"{text} ({in_si})" if in_si else text
 
     yield ("plate mass", mass_text(summary.plate_mass))
     yield ("projectile mass", mass_text(summary.projectile_mass))
     if summary.velocity is not None and summary.energy is not None:
-        energy = readable_quantity(summary.energy, unit_of("force*length", summary.units), DIGITS)
+        energy = _quantity(summary, summary.energy, "force*length")
         velocity = _quantity(summary, summary.velocity, "length/time")
         yield ("impact", f"{velocity}, {energy}")
 
@@ -262,10 +262,8 @@ def _program_rows(summary: ProblemSummary) -> Iterator[Row]:
     critical = summary.critical_time_step
     yield ("critical time step", _quantity(summary, critical, "time"))
     if summary.buckling_factor is not None:
-        from fecm.mechanics.solutions import FAR  # 0.3 ms, for PREL only
-
         far = math.isinf(summary.buckling_factor)
-        times = f"more than {FAR:g}" if far else f"{summary.buckling_factor:.{DIGITS}g}"
+        times = f"more than {FAR:g}" if far else significant(summary.buckling_factor)
         count = summary.elements_per_buckle
         bound = "at most " if count is not None and count < FEWEST_ELEMENTS else ""
         yield ("buckling load", f"{bound}{times} times the preload")
@@ -278,7 +276,7 @@ def _program_rows(summary: ProblemSummary) -> Iterator[Row]:
             longer = f"; DT 0 takes {default:.3g}: {default / step:.1f} times fewer steps"
         yield ("DT", f"{_quantity(summary, step, 'time')} ({share:.0%} of it{longer})")
     if summary.elements_per_wave is not None:
-        error = "" if summary.mesh_error is None else f" ({said_error(summary.mesh_error)})"
+        error = "" if summary.mesh_error is None else f" ({format_mesh_error(summary.mesh_error)})"
         yield ("elements per wave", f"{summary.elements_per_wave:.1f}{error}")
     yield ("impact steps", str(summary.steps))
     yield ("output", format_bytes(summary.output_bytes))

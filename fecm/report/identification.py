@@ -6,6 +6,7 @@ import hashlib
 from collections.abc import Iterator
 
 from fecm._table import ShownNumber
+from fecm._text import FITTED_DIGITS
 from fecm.deck.units import readable, unit_names, unit_of
 from fecm.identification.result import Identification, identification_tables
 from fecm.plot.histories import force_fit_picture
@@ -28,7 +29,7 @@ from fecm.report.figures import inside
 
 def identification_page(name: str, fit: Identification) -> ReportPage:
     """Return the page about a fit. `name` is the name of the measurement."""
-    values = ", ".join(_said(fit, key) for key in fit.values)
+    values = ", ".join(_format_parameter(fit, key) for key in fit.values)
     verdict = [f"Fitted to {name}: {values}."]
     level = TrustLevel.WITHIN
     if not fit.accepted:
@@ -51,10 +52,10 @@ def identification_page(name: str, fit: Identification) -> ReportPage:
     return ReportPage(fit.deck.title or f"Identification from {name}", tuple(verdict), level, body)
 
 
-def _said(fit: Identification, name: str) -> str:
+def _format_parameter(fit: Identification, name: str) -> str:
     """Format a parameter with its standard error."""
     value = fit.values[name]
-    power, unit = readable(value, fit.unit(name), digits=5)
+    power, unit = readable(value, fit.unit(name), FITTED_DIGITS)
     best, error = value / 10.0**power, fit.errors[name] / 10.0**power
     return f"{name} = {best:.5g} ± {error:.2g} {unit}".rstrip()
 

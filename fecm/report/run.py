@@ -174,7 +174,7 @@ def _model_row(result: Result, problem: Problem | None) -> dict[str, Cell]:
 
 def _sentence(result: Result, problem: Problem | None) -> str:
     """Say in one sentence what hit what, and what happened."""
-    in_units = partial(_said, result)
+    in_units = partial(_format_quantity, result)
     if "history/force" not in result or not len(result["history/force"]):
         return "No impact: see Results."
     force, time = result["history/force"], result["history/time"]
@@ -367,6 +367,6 @@ def _provenance(results: Mapping[str, Result], digests: Mapping[str, str]) -> It
         yield listing("The deck" if len(texts) == 1 else f"The deck of {name}", text)
 
 
-def _said(result: Result, value: float, dimension: str) -> str:
+def _format_quantity(result: Result, value: float, dimension: str) -> str:
     """Format a value with the unit of its dimension."""
     return quantity(float(value), unit_of(dimension, result.units))

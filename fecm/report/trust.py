@@ -11,7 +11,7 @@ from fecm._errors import ResultFileError
 from fecm._table import Cell, ShownNumber
 from fecm.deck.macros import flat
 from fecm.listing.slips import LISTING
-from fecm.problem.estimates import ENOUGH_PER_WAVE, said_error
+from fecm.problem.estimates import ENOUGH_PER_WAVE, format_mesh_error
 from fecm.problem.loading import load_deck
 from fecm.problem.problem import Problem
 from fecm.problem.summary import deck_summary
@@ -168,7 +168,7 @@ def _failure(result: Result) -> Iterator[Judgement]:
     if not largest:
         yield Judgement(TrustLevel.UNJUDGED, "failure of plies", UNKNOWN, "the deck has no FAIL")
         return
-    top = max(largest, key=lambda one: one.exposure)
+    top = max(largest, key=lambda row: row.exposure)
     broken = top.exposure > CROSSED
     words = f"{spelt(top.criterion)}; " + (
         "the run is elastic beyond the first failure" if broken else "1 is failure"
@@ -215,7 +215,7 @@ def _mesh(problem: Problem) -> Iterator[Judgement]:
         coarse = count < ENOUGH_PER_WAVE
         words = f"{ENOUGH_PER_WAVE} are enough for a peak"
         if summary.mesh_error is not None:
-            words = f"{words}; {said_error(summary.mesh_error)}"
+            words = f"{words}; {format_mesh_error(summary.mesh_error)}"
         level = TrustLevel.DOUBTFUL if coarse else TrustLevel.WITHIN
         yield Judgement(
             level, "elements per bending wave", number_with_unit(count, digits=3), words

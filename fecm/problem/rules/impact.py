@@ -9,7 +9,7 @@ from fecm.deck import model
 from fecm.deck.rules import Report, Reports, Subject, rule
 from fecm.mechanics.interpolation import W
 from fecm.mechanics.mesh import distinct, extent
-from fecm.problem.estimates import ENOUGH_PER_WAVE, resolution, said_error
+from fecm.problem.estimates import ENOUGH_PER_WAVE, format_mesh_error, resolution
 from fecm.problem.problem import Problem
 
 W_DOF = W + 1  # number of w on the card
@@ -157,7 +157,7 @@ def coarse_mesh(problem: Problem) -> Reports:
     coarse = waves.elements < LEAST_PER_WAVE
     if not coarse and (waves.error is None or waves.error < WORTH_SAYING):
         return
-    about = "" if waves.error is None else f": {said_error(waves.error)}"
+    about = "" if waves.error is None else f": {format_mesh_error(waves.error)}"
     what = f"The mesh is {'too coarse' if coarse else 'coarse'} at the impact node"
     sides = f"{waves.elements:.1f} elements of side {waves.side:.3g}"
     wave = f"bending wave of the contact's duration, which is {waves.wave:.3g} long"
