@@ -29,21 +29,22 @@ def installed(group: EntryPoints, name: str) -> object:
     from importlib.metadata import entry_points  # 20 ms, and few runs need it
 
     what = WHAT[group]
-    found = [one for one in entry_points(group=group) if one.name == name]
-    if not found:
-        known = sorted(entry_points(group=group).names)
-        listed = ", ".join(known) if known else "none"
+    matches = [entry for entry in entry_points(group=group) if entry.name == name]
+    if not matches:
+        names = sorted(entry_points(group=group).names)
+        listed = ", ".join(names) if names else "none"
         raise ExtensionError(
             f"no installed package offers the {what} {name!r}; entry points of the group {group}: "
-            f"{listed}{did_you_mean(name, known)}"
+            f"{listed}{did_you_mean(name, names)}"
         )
-    if len({one.value for one in found}) > 1:
-        places = ", ".join(sorted({one.value for one in found}))
+    targets = sorted({entry.value for entry in matches})
+    if len(targets) > 1:
+        places = ", ".join(targets)
         raise ExtensionError(f"several installed packages offer the {what} {name!r}: {places}")
     try:
-        return found[0].load()
+        return matches[0].load()
     except Exception as error:  # importing a package of others can raise anything
         text = f"{type(error).__name__}: {error}"
         raise ExtensionError(
-            f"the {what} {name!r} of {found[0].value} can't be imported ({text})"
+            f"the {what} {name!r} of {matches[0].value} can't be imported ({text})"
         ) from error

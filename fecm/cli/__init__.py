@@ -82,7 +82,7 @@ GROUPED = {
         "waves": LazyCommand("fecm.cli.waves", "Waves in a laminate."),
     },
 }
-COMMANDS = {name: one for commands in GROUPED.values() for name, one in commands.items()}
+COMMANDS = {name: command for commands in GROUPED.values() for name, command in commands.items()}
 
 
 class LazyGroup(click.Group):

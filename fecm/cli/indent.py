@@ -137,8 +137,8 @@ def fit_command(options: FitOptions) -> None:
 def _law(deck: Path) -> tuple[Deck, Indentation]:
     """Return the first problem of a deck that has an EXPE segment, and the segment."""
     reader = Reader(load_text(deck)[0])
-    problems = [problem.deck for problem in reader.problems() if problem.deck is not None]
-    laws = [(one, law) for one in problems if (law := one.last(Indentation)) is not None]
+    decks = [problem.deck for problem in reader.problems() if problem.deck is not None]
+    laws = [(deck, law) for deck in decks if (law := deck.last(Indentation)) is not None]
     if laws:
         check_segment(laws[0][1], reader.findings)
     for finding in reader.findings:

@@ -232,7 +232,7 @@ class NewOptions:
     "--ply-of",
     type=Parsed(new_values.ply_of, "NAME=RHO,NU12,E1,E2,G12,G13,G23"),
     multiple=True,
-    callback=lambda context, parameter, given: unique(given, context, parameter),
+    callback=lambda context, parameter, values: unique(values, context, parameter),
     help="Constants of a material, in the deck's units: of a letter of the layup, or of a --core.",
 )
 @option(

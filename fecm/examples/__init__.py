@@ -53,12 +53,12 @@ def path(name: str) -> Path:
     >>> path("impact-patch").name
     'impact-patch.inp'
     """
-    for known in CONTENTS:
-        if name in (known, Path(known).stem):
-            return Path(__file__).parent / known
-    stems = [Path(known).stem for known in CONTENTS]
-    others = did_you_mean(name, [*CONTENTS, *stems]) or f"; there are {', '.join(CONTENTS)}"
-    raise OptionsError(f"there is no example {name!r}{others}")
+    for file in CONTENTS:
+        if name in (file, Path(file).stem):
+            return Path(__file__).parent / file
+    stems = [Path(file).stem for file in CONTENTS]
+    hint = did_you_mean(name, [*CONTENTS, *stems]) or f"; there are {', '.join(CONTENTS)}"
+    raise OptionsError(f"there is no example {name!r}{hint}")
 
 
 def __dir__() -> list[str]:

@@ -100,10 +100,10 @@ def check(deck: AnyDeck, mode: Mode = "report") -> DeckCheck:
     Examples
     --------
     >>> import fecm
-    >>> found = fecm.check(fecm.examples.path("impact-patch"))
-    >>> found.ok, len(found.warnings)
+    >>> check = fecm.check(fecm.examples.path("impact-patch"))
+    >>> check.ok, len(check.warnings)
     (True, 0)
-    >>> (problem,) = found.problems
+    >>> (problem,) = check.problems
     >>> print(f"{problem.nodes} nodes, DT at most {problem.critical_time_step:.3g} s")
     609 nodes, DT at most 5.07e-07 s
     """

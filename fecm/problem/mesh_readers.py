@@ -416,11 +416,11 @@ def _lines(path: Path, depth: int) -> Iterator[tuple[str, str]]:
             continue
         if depth == DEPTH:
             raise NastranError(f"{place}: INCLUDE is nested deeper than {DEPTH} files")
-        other = path.parent / match[2]
+        included = path.parent / match[2]
         try:
-            yield from _lines(other, depth + 1)
+            yield from _lines(included, depth + 1)
         except OSError as error:
             why = error.strerror or str(error)
             raise NastranError(
-                f"{place}: INCLUDE: {other} can't be read ({why}); put it beside this file"
+                f"{place}: INCLUDE: {included} can't be read ({why}); put it beside this file"
             ) from None

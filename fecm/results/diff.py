@@ -386,10 +386,10 @@ def diff(
     >>> import fecm
     >>> deck = fecm.read_one(fecm.examples.path("impact-patch"))
     >>> result, other = fecm.run_one(deck), fecm.run_one(deck.with_(velocity=116.0))
-    >>> found = fecm.diff(result, other, rtol=1e-6, only=["laminate", "history/force"])
-    >>> found.same, found.different
+    >>> comparison = fecm.diff(result, other, rtol=1e-6, only=["laminate", "history/force"])
+    >>> comparison.same, comparison.different
     (False, ['history/force'])
-    >>> force = found.datasets[0]
+    >>> force = comparison.datasets[0]
     >>> print(f"{force.largest_difference:.3f} lb of {force.maximum:.2f} lb")
     0.768 lb of 85.76 lb
     """

@@ -127,9 +127,9 @@ def ends(last: LastContact, plate: Deflection, *, is_held: bool = True) -> Texts
 
     Examples
     --------
-    >>> one = np.ones(2)
-    >>> last = LastContact(np.array([0.0, 5.0]), 6.0 * one, 9.0 * one, 9.0 * one, one, -one)
-    >>> ends(last, Deflection(one, one, one, one, 0.0 * one, one)).tolist()
+    >>> ones = np.ones(2)
+    >>> last = LastContact(np.array([0.0, 5.0]), 6.0 * ones, 9.0 * ones, 9.0 * ones, ones, -ones)
+    >>> ends(last, Deflection(ones, ones, ones, ones, 0.0 * ones, ones)).tolist()
     ['contact over', 'in contact, peak passed']
     """
     touching = last.force > 0.0

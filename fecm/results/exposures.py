@@ -371,7 +371,7 @@ def first_failures(stored: Stored, level: float = 1.0) -> list[FirstFailure]:
                 materials=materials,
             )
         )
-    return sorted(failures, key=lambda one: one.time)
+    return sorted(failures, key=lambda failure: failure.time)
 
 
 def threshold_energy(stored: Stored) -> float:

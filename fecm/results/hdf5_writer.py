@@ -112,17 +112,19 @@ class FileSink:
         kept = [
             (d, shape, self.arrays[p]) for p, (d, shape) in self._made.items() if p in self.arrays
         ]
-        clocks = {d.group: made for d, _, made in kept if d.name == "time" and d.shape[0] == "rows"}
+        clocks = {
+            d.group: array for d, _, array in kept if d.name == "time" and d.shape[0] == "rows"
+        }
         for clock in clocks.values():
             clock.make_scale("time")
-        for dataset, shape, made in kept:
+        for dataset, shape, array in kept:
             clock = clocks.get(dataset.group)
-            if made is clock or not {*dataset.shape} <= {"rows", *schema.SCALES}:
+            if array is clock or not {*dataset.shape} <= {"rows", *schema.SCALES}:
                 continue
             for axis, (size, length) in enumerate(zip(dataset.shape, shape, strict=True)):
                 rows = size == "rows"
                 scale = clocks[dataset.group] if rows else self._scale(size, length)
-                h5py.h5ds.attach_scale(made.id, scale.id, axis)
+                h5py.h5ds.attach_scale(array.id, scale.id, axis)
 
     def _scale(self, size: Any, length: int) -> h5py.Dataset:
         """Return the scale of an axis, created on first use."""

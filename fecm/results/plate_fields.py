@@ -107,7 +107,7 @@ def _strains(stored: Stored, steps: Ints, note: Note) -> Iterator[Fields]:
     if "tape8/step" not in stored:
         note("the result has no strains (tape8), which the macro RODP stores")
         return
-    at, shared = _rows_of(stored, "tape8", steps, "strains", note)
+    rows, shared = _rows_of(stored, "tape8", steps, "strains", note)
     if not shared.any():
         return
     elements = stored["mesh/elements"]
@@ -124,13 +124,13 @@ def _strains(stored: Stored, steps: Ints, note: Note) -> Iterator[Fields]:
     def mean(row: Array) -> Array:
         if not at_nodes:
             return np.asarray(row.mean(axis=1))
-        own = row[:, : there.shape[1]][there]
-        return np.bincount(points, weights=own, minlength=numnp) / shares
+        at_points = row[:, : there.shape[1]][there]
+        return np.bincount(points, weights=at_points, minlength=numnp) / shares
 
     def of_step(number: int) -> list[Array]:
         if not shared[number]:
             return [np.full(length, np.nan) for _ in STRAINS]
-        return [mean(fields[at[number]]) for fields in values]
+        return [mean(fields[rows[number]]) for fields in values]
 
     where = At.POINTS if at_nodes else At.CELLS
     yield Fields(where, dict.fromkeys(STRAINS, (length,)), of_step)
@@ -155,7 +155,7 @@ def _ply_stresses(stored: Stored, steps: Ints, note: Note) -> Iterator[Fields]:
     """Return the ply stress of largest magnitude in each cell, by component, and its ply."""
     if "plies/step" not in stored:
         return
-    at, shared = _rows_of(stored, "plies", steps, "ply stresses", note)
+    rows, shared = _rows_of(stored, "plies", steps, "ply stresses", note)
     if not shared.any():
         return
     cells = stored["plies/element"] - 1
@@ -169,7 +169,7 @@ def _ply_stresses(stored: Stored, steps: Ints, note: Note) -> Iterator[Fields]:
         def of_step(number: int) -> Array:
             extremes = np.full((2, length), np.nan)
             if shared[number]:
-                extremes[:, cells] = _largest(values[at[number]])
+                extremes[:, cells] = _largest(values[rows[number]])
             return extremes
 
         return Fields(At.CELLS, dict.fromkeys((name, f"{name}_ply"), (length,)), of_step)

@@ -250,10 +250,10 @@ def _constants(
 
 def _strains(stresses: Mapping[str, Floats], ply: _Constants) -> dict[str, Floats]:
     """Return the strains of plies by their compliance."""
-    one, two, shear = (stresses[name] for name in IN_PLANE)
+    stress_1, stress_2, shear = (stresses[name] for name in IN_PLANE)
     return {
-        "eps_1": (one - ply.nu12 * two) / ply.e1,
-        "eps_2": two / ply.e2 - ply.nu12 * one / ply.e1,
+        "eps_1": (stress_1 - ply.nu12 * stress_2) / ply.e1,
+        "eps_2": stress_2 / ply.e2 - ply.nu12 * stress_1 / ply.e1,
         "gamma_12": shear / ply.g12,
     }
 

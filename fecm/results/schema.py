@@ -432,9 +432,9 @@ DATASETS = {d.path: d for name, kind in GROUP_TYPES.items() for d in _datasets(n
 # Datasets of numbered laminates, and of users' criteria of the plies.
 _NAMED_DATASETS = {
     f"{group}/*/{dataset.name}": dataset
-    for group, known in (("laminate", "laminate"), ("failure", "failure/puck"))
+    for group, example in (("laminate", "laminate"), ("failure", "failure/puck"))
     for dataset in DATASETS.values()
-    if dataset.group == known
+    if dataset.group == example
 }
 
 

@@ -321,14 +321,16 @@ class Recorder:
     ) -> None:
         self._sink = sink
         self._model = model
-        own = () if model.failure is None else tuple(model.failure.criteria)[len(CRITERIA) :]
-        self._own = own  # names of users' criteria
-        known_datasets = [
+        own_criteria = (
+            () if model.failure is None else tuple(model.failure.criteria)[len(CRITERIA) :]
+        )
+        self._own_criteria = own_criteria
+        dataset_kinds = [
             *DATASETS.values(),
-            *(d for name in own for d in criterion_datasets(name)),
+            *(d for name in own_criteria for d in criterion_datasets(name)),
         ]
-        if own:
-            sink.axis_names["criteria"] = (*ALL_CRITERIA, *own)
+        if own_criteria:
+            sink.axis_names["criteria"] = (*ALL_CRITERIA, *own_criteria)
         has_impact = model.impact is not None
         self._room = {  # upper bound of the rows of each group
             **{group: sizes.passes[STORED_BY[group]] for group in AT_MACROS},
@@ -340,7 +342,10 @@ class Recorder:
             "gages": (model.gages is not None) * sizes.steps,
             MEMBRANE: 0,
             "failure": int(model.failure is not None),
-            **{f"failure/{name}": int(model.failure is not None) for name in (*ALL_CRITERIA, *own)},
+            **{
+                f"failure/{name}": int(model.failure is not None)
+                for name in (*ALL_CRITERIA, *own_criteria)
+            },
             "failure/circle": int(model.failure is not None and model.failure.circle is not None),
             "patch": int(model.patch is not None),
         }
@@ -350,10 +355,10 @@ class Recorder:
         absent = _absent(model)
         self._datasets = [
             (dataset, self._shape(dataset))
-            for known in known_datasets
-            if (self._room.get(known.group) != 0 or known.path in (CURE_STRESS, MATERIAL))
-            and known.path not in absent
-            for dataset in _of_laminates(known, model)
+            for kind in dataset_kinds
+            if (self._room.get(kind.group) != 0 or kind.path in (CURE_STRESS, MATERIAL))
+            and kind.path not in absent
+            for dataset in _of_laminates(kind, model)
         ]
         self._buffers: dict[str, RowBuffer] = {}
         for group in (*EVERY_STEP, "tape9", *AT_MACROS, MEMBRANE):
@@ -378,7 +383,7 @@ class Recorder:
             "layers": max(len(laminate.plies.angles) for laminate in self._model.plate.laminates),
             "laminates": len(self._model.plate.laminates),
             **FIXED,
-            "criteria": len(ALL_CRITERIA) + len(self._own),
+            "criteria": len(ALL_CRITERIA) + len(self._own_criteria),
         }
         if self._model.plies is not None:
             numbers["members"], numbers["npp"], _ = self._model.plies.shape
@@ -415,8 +420,8 @@ class Recorder:
                 self._sink.attributes("gages", {"preload": "excluded"})
         if model.under_load is not None and model.failure is not None:
             self._sink.attributes("failure", {"modes": list(model.failure.modes)})
-            if self._own:
-                self._sink.attributes("failure", {OWN_CRITERIA: list(self._own)})
+            if self._own_criteria:
+                self._sink.attributes("failure", {OWN_CRITERIA: list(self._own_criteria)})
             if model.failure.around is not None:
                 self._sink.attributes(
                     "failure/circle", {COARSENESS: model.failure.around.coarseness}

@@ -118,8 +118,8 @@ def _write_cure(simulation: Simulation) -> None:
     for number in simulation.problem.used_laminates:
         stresses = model.cure[number].stresses
         plies = simulation.problem.plate.laminates[number].plies.constants
-        for one in largest_in_plies(strengths[number], plies, stresses, model.failure.criteria):
-            largest[one.criterion] = max(largest.get(one.criterion, 0.0), one.exposure)
+        for top in largest_in_plies(strengths[number], plies, stresses, model.failure.criteria):
+            largest[top.criterion] = max(largest.get(top.criterion, 0.0), top.exposure)
     for criterion, exposure in largest.items():
         sink.attributes(f"failure/{criterion}", {AT_REST: exposure})
 

@@ -136,7 +136,7 @@ LAWS = {
         _triangular,
     ),
 }
-FORMS = tuple(f"{name}:{known.parameters}" for name, known in LAWS.items())
+FORMS = tuple(f"{name}:{law.parameters}" for name, law in LAWS.items())
 
 
 class ValueDistribution(NamedTuple):

@@ -178,11 +178,11 @@ def estimate(deck: str | Path | Deck) -> Estimate:
     Examples
     --------
     >>> import fecm
-    >>> found = fecm.estimate(fecm.examples.path("drop-weight"))
-    >>> found.response
+    >>> result = fecm.estimate(fecm.examples.path("drop-weight"))
+    >>> result.response
     'quasi-static: the static plate applies, which underestimates the force by about 10 %'
-    >>> static, run = found.models["static plate"], found.models["run"]
-    >>> print(f"{static.peak_force:.0f} and {run.peak_force:.0f} {found.units['force']}")
+    >>> static, run = result.models["static plate"], result.models["run"]
+    >>> print(f"{static.peak_force:.0f} and {run.peak_force:.0f} {result.units['force']}")
     4650 and 4790 N
     """
     result = estimate_problem(sole_problem(deck))

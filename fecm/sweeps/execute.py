@@ -32,7 +32,7 @@ from fecm._watch import SILENT, StoppedError, Watch
 from fecm.problem.problem import Problem
 from fecm.sweeps.backends import run_task
 from fecm.sweeps.checks import check_sweep_memory
-from fecm.sweeps.in_full import told
+from fecm.sweeps.in_full import format_exception
 from fecm.sweeps.outcome import Outcome, merge
 from fecm.sweeps.partial_results import DamagedPartError, PartialResults
 from fecm.sweeps.plan import WORTH_WORKERS, Plan, Task, tasks
@@ -239,7 +239,9 @@ def on_executor(tasks: Sequence[Task], executor: futures.Executor, done: Done, i
         try:
             outcome = future.result()
         except Exception as error:
-            outcome = Outcome.failed(dict.fromkeys(task.numbers, f"{LOST} ({told(error)})"))
+            outcome = Outcome.failed(
+                dict.fromkeys(task.numbers, f"{LOST} ({format_exception(error)})")
+            )
         done(task, outcome)
 
 

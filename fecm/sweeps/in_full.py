@@ -151,7 +151,7 @@ def built(build: BuildFunction, case: Case) -> LoadedDeck:
             raise TypeError(f"returned {type(deck).__name__}, not a Deck")
         prepared = load_deck(deck)
     except Exception as error:
-        raise CasesError(f"build: {told(error)}") from error
+        raise CasesError(f"build: {format_exception(error)}") from error
     if errors := prepared.errors():
         raise CasesError(errors[0].message)
     if not any(macro.word == "RODP" for macro in deck.macros):
@@ -309,7 +309,7 @@ def _measured(
             raise TypeError(f"returned {type(columns).__name__}, not numbers by name")
         values = {name: np.asarray(value) for name, value in columns.items()}
     except Exception as error:
-        raise CasesError(f"measure: {told(error)}") from error
+        raise CasesError(f"measure: {format_exception(error)}") from error
     for name, value in values.items():
         fault = name_fault(name)
         if name in names or name == "dt":
@@ -348,6 +348,6 @@ def without_output(checked: Problem, measures: Sequence[Measure] = ()) -> Proble
     return replace(checked, program=tuple(kept(checked.program)))
 
 
-def told(error: Exception) -> str:
+def format_exception(error: Exception) -> str:
     """Format type and text of an exception in one line."""
     return f"{type(error).__name__}: {' '.join(str(error).split())}"

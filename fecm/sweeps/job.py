@@ -688,26 +688,26 @@ def sweep(job: Sweep) -> SweepResult:
 
     Examples
     --------
-    >>> found = sweep("decks/impact-115.inp", {"velocity": [50.0, 115.0]})
-    >>> [f"{force:.3f}" for force in found["peak_force"]]
+    >>> result = sweep("decks/impact-115.inp", {"velocity": [50.0, 115.0]})
+    >>> [f"{force:.3f}" for force in result["peak_force"]]
     ['36.058', '86.202']
 
-    >>> found = sweep("decks/appendix.inp", random={"k": "lognormal:1.9e6,0.15"}, samples=64,
-    ...               exceed={"peak_force": 5.0})
-    >>> found.random.statistics["peak_force"].quantiles.shape
+    >>> result = sweep("decks/appendix.inp", random={"k": "lognormal:1.9e6,0.15"}, samples=64,
+    ...                exceed={"peak_force": 5.0})
+    >>> result.random.statistics["peak_force"].quantiles.shape
     (5,)
 
     >>> from scipy.stats import gamma
-    >>> found = sweep("decks/appendix.inp",
-    ...               random={"k": gamma(40, scale=5e4), "velocity": "truncnormal:115,9,90,140"},
-    ...               correlation={("k", "velocity"): 0.5}, samples=16)
-    >>> bool(90.0 < found["velocity"].min() < found["velocity"].max() < 140.0)
+    >>> result = sweep("decks/appendix.inp",
+    ...                random={"k": gamma(40, scale=5e4), "velocity": "truncnormal:115,9,90,140"},
+    ...                correlation={("k", "velocity"): 0.5}, samples=16)
+    >>> bool(90.0 < result["velocity"].min() < result["velocity"].max() < 140.0)
     True
 
     >>> def largest_w(result):
     ...     return {"w": result.plate_w.max()}
-    >>> found = sweep("decks/appendix.inp", {"velocity": [50.0, 115.0]}, measure=largest_w)
-    >>> found["w"].shape
+    >>> result = sweep("decks/appendix.inp", {"velocity": [50.0, 115.0]}, measure=largest_w)
+    >>> result["w"].shape
     (2,)
     """
     return job.execute()

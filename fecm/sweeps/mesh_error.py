@@ -107,8 +107,8 @@ def mesh_error(
     Examples
     --------
     >>> import fecm
-    >>> found = fecm.mesh_error(fecm.examples.path("impact-patch"))
-    >>> print(f"{found.peak_force:.3f} lb, {found.refined_peak_force:.3f} lb")
+    >>> error = fecm.mesh_error(fecm.examples.path("impact-patch"))
+    >>> print(f"{error.peak_force:.3f} lb, {error.refined_peak_force:.3f} lb")
     85.013 lb, 85.101 lb
     """
     options = RunOptions(active_slips(mode, ()))

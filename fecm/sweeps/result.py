@@ -108,9 +108,9 @@ class SweepResult(StoredSweep):
         Examples
         --------
         >>> import fecm
-        >>> found = fecm.sweep("decks/impact-115.inp", {"velocity": [50.0, 115.0]})
-        >>> found.save("velocities.h5", overwrite=True)
-        >>> fecm.load_sweep("velocities.h5").keys() == found.keys()
+        >>> result = fecm.sweep("decks/impact-115.inp", {"velocity": [50.0, 115.0]})
+        >>> result.save("velocities.h5", overwrite=True)
+        >>> fecm.load_sweep("velocities.h5").keys() == result.keys()
         True
         """
         from fecm.sweeps.files import save_sweep  # h5py takes 60 ms to import
@@ -145,8 +145,8 @@ class SweepResult(StoredSweep):
         Examples
         --------
         >>> from fecm import sweep
-        >>> found = sweep("decks/appendix.inp", {"velocity": [50.0, 115.0], "k": [1e6, 2e6]})
-        >>> found.to_xarray().max_indentation.sel(velocity=115.0).dims
+        >>> result = sweep("decks/appendix.inp", {"velocity": [50.0, 115.0], "k": [1e6, 2e6]})
+        >>> result.to_xarray().max_indentation.sel(velocity=115.0).dims
         ('k',)
         """
         try:
@@ -208,8 +208,8 @@ class SweepResult(StoredSweep):
         --------
         >>> import fecm
         >>> deck = fecm.examples.path("impact-patch")
-        >>> found = fecm.sweep(deck, {"velocity": [100.0, 115.0, 130.0]})
-        >>> found.export("velocities.csv")
+        >>> result = fecm.sweep(deck, {"velocity": [100.0, 115.0, 130.0]})
+        >>> result.export("velocities.csv")
         """
         from fecm.sweeps.files import sweep_csv_lines  # 2 ms at start
 
@@ -264,7 +264,7 @@ class SweepResult(StoredSweep):
 
         Examples
         --------
-        >>> found.plot(quantity="max_indentation", over="velocity")  # doctest: +SKIP
+        >>> result.plot(quantity="max_indentation", over="velocity")  # doctest: +SKIP
         """
         names = (over,) if isinstance(over, str) else tuple(over)
         named = {self.title or "the sweep": self}
@@ -297,7 +297,7 @@ class SweepResult(StoredSweep):
 
         Examples
         --------
-        >>> found.report("impact.html")  # doctest: +SKIP
+        >>> result.report("impact.html")  # doctest: +SKIP
         """
         report_results({self.title or "the sweep": self}, path, overwrite=overwrite)
 

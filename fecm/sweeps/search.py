@@ -275,7 +275,7 @@ def _search_in_turn(
     velocity = velocity_at_level(start, level, reached, NAMES[quantity])
     outcome = _with_velocities(outcomes[velocity], trial(velocity))
     if quantity is Sought.EXPOSURE:
-        exposures = {v: largest_exposure(one) for v, one in outcomes.items()}
+        exposures = {v: largest_exposure(tried) for v, tried in outcomes.items()}
         _add_band(outcome, velocity, level, exposures)
     return outcome
 

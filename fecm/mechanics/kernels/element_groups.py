@@ -266,7 +266,7 @@ class ElementGroup:
             ]
             weights = [strains.tying_weights(nn, axis, shear) for axis in (0, 1)]
             values = np.concatenate([value for value, _ in tied])
-            deflection = np.concatenate([at[:, axis] for axis, (_, at) in enumerate(tied)])
+            deflection = np.concatenate([slopes[:, axis] for axis, (_, slopes) in enumerate(tied)])
             fields["tying"] = len(tied[0][0])
             fields["tied"] = np.stack(weights)
             fields["tied_t"] = np.stack([table.T for table in weights])

@@ -37,9 +37,9 @@ def mixed_elements(problem: Problem) -> Reports:
     Remedy: Report mode.
     """
     present = problem.mesh.elements != 0
-    other = np.flatnonzero((present != present[:1]).any(axis=1))
-    if len(other):
-        number = int(other[0]) + 1
+    different = np.flatnonzero((present != present[:1]).any(axis=1))
+    if len(different):
+        number = int(different[0]) + 1
         counts = f"{present[number - 1].sum()} against {present[0].sum()}"
         why = "the printed program takes element 1's node list for the mass of every element"
         message = f"Element {number} has other nodes than element 1 ({counts}): {why}."

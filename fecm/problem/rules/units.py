@@ -91,7 +91,7 @@ def needed_unit(dimension: str, names: dict[str, str]) -> str:
     if not names:
         return ""
     factor, unit = in_si(dimension, names), unit_of(dimension, names)
-    same = (known for known, size in USED[dimension].items() if _same(size, factor))
+    same = (name for name, size in USED[dimension].items() if _same(size, factor))
     *others, last = names.values()
     return f"{', '.join(others)} and {last} need {next(same, unit)}"
 
