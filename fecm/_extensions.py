@@ -24,7 +24,7 @@ class ExtensionError(FecmError, ValueError):
 def installed(group: EntryPoints, name: str) -> object:
     """Load the entry point of a group by its name.
 
-    Raises ExtensionError if there is none, several packages have one, or it can't be imported.
+    Raises ExtensionError if no package has it, several packages have one, or it can't be imported.
     """
     from importlib.metadata import entry_points  # 20 ms, and few runs need it
 

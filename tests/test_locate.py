@@ -372,7 +372,9 @@ def test_hats_are_narrowed_where_the_strains_show_it_and_a_given_width_is_kept()
     wide = fecm.locate(deck, (TIME, strains), basis=9e-6, **near)  # type: ignore[arg-type]
     assert np.diff(wide.time) == pytest.approx(9e-6)
     assert wide.peak_force < 0.95 * peak
-    assert any("a force every 4.5e-06 s describes the strains better" in n for n in wide.notes)
+    assert any(
+        "a value of the force every 4.5e-06 s describes the strains better" in n for n in wide.notes
+    )
     # Noise hides what narrow hats could show, and few strains are not spread over many values.
     rough = fecm.locate(deck, (TIME, scatter(strains, 0.1, 0)[0]), **near)  # type: ignore[arg-type]
     assert np.diff(rough.time)[0] > TIME[-1] / 60.0

@@ -118,7 +118,7 @@ def doubts_of_soft_tip(
         return []
     return [
         f"the tip is soft: its contact circle has a radius of up to {circle:.2g}, and the patch "
-        f"one of {radius:.3g}; `patch` disc:RADIUS takes another, on which stresses depend"
+        f"one of {radius:.3g}; `patch` disc:RADIUS sets another radius; stresses depend on it"
     ]
 
 

@@ -138,9 +138,9 @@ def check_command(
 ) -> None:
     """Check decks without running them; print their findings and a summary.
 
-    A DECK of - is standard input.  Of several decks, those that pass have one line each instead of
-    a summary.  With --format json, each finding and each problem is a JSON object on a line.  The
-    exit status is the worst of all decks: 1 if one has errors, 2 if one can't be read.
+    A DECK of - is standard input.  With several decks, each deck that passes has one line instead
+    of a summary.  With --format json, each finding and each problem is a JSON object on a line.
+    The exit status is the worst of all decks: 1 if one has errors, 2 if one can't be read.
     """
     if mesh_error and form is Format.SARIF:
         raise click.UsageError("--mesh-error has no form in SARIF")
@@ -312,7 +312,7 @@ def fmt_command(
 ) -> None:
     """Align the columns of decks and put a ruler above each kind of card.
 
-    The model, comments, blank cards and line ends stay as they are.  What is written is UTF-8.  A
+    The model, comments, blank cards and line ends stay as they are.  The output is UTF-8.  A
     DECK of - is standard input, whose aligned deck goes to standard output.
     """
     from fecm.deck.format import format_deck  # which other commands do not need

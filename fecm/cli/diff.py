@@ -117,8 +117,8 @@ def _tolerances(text: str) -> Tolerances:
     "--rtol",
     type=NOT_NEGATIVE,
     metavar="R",
-    help="Relative tolerance, of the dataset's largest absolute value.  [default: 0; of "
-    "tapes their last digit]",
+    help="Relative tolerance, as a share of the dataset's largest absolute value.  [default: 0; "
+    "for tapes one unit of the last digit]",
 )
 @option(
     "--atol",

@@ -24,10 +24,10 @@ from fecm.sweeps.estimate import estimate_problem
 def estimate_command(deck: Path, form: Format) -> None:
     """Estimate the impact of DECK by quick models, and compare them with the run.
 
-    The infinite plate is for small masses. The static plate is for large masses; a deck with NONL
-    has it linear and nonlinear. A model out of its range is marked. With a DELA segment, velocity
-    and energy are the values at which the peak force reaches the delamination threshold. The models
-    without a mesh neglect DAMP, and the infinite plate neglects PREL.
+    The infinite plate is for small masses, the static plate for large masses. With NONL the static
+    plate is computed linear and nonlinear. A model out of its range is marked. With a DELA segment,
+    velocity and energy are the values at which the peak force reaches the delamination threshold.
+    The models without a mesh neglect DAMP, and the infinite plate neglects PREL.
     """
     estimate = estimate_problem(load_single(deck, "estimate"))
     note(*estimate.notes)

@@ -100,7 +100,7 @@ class FitOptions:
     "units",
     type=list_of("LENGTH,FORCE", click.STRING, [2]),
     help="Units of the card, to which a file that names its units is converted.  [default: "
-    "in,lbf or mm,N or m,N, as the file's]",
+    "in,lbf or mm,N or m,N, whichever is nearest to the file's]",
 )
 @outputs("test", table=False)
 @FORMAT_OPTION

@@ -70,10 +70,10 @@ def locate_command(
 ) -> None:
     """Find place and force history of an impact on the plate of DECK from strain gages.
 
-    STRAINS.csv has the columns time and those of the gages (GAGE) of the deck, by their numbers or
-    in the deck's order, in the deck's units.  The plate is at rest before time 0.  The exit status
-    is 1 if the strains do not determine the place, another place explains them almost as well, or
-    the model does not describe them.
+    STRAINS.csv has a column time and a column for each gage (GAGE), named by its number or in the
+    order of the deck.  Times are in the deck's unit.  The plate is at rest before time 0.  The exit
+    status is 1 if the strains do not determine the place, another place explains them almost as
+    well, or the model does not describe them.
     """
     targets = OutputPaths(output or DASH, picture, overwrite, deck, strains)
     job = LocationJob(load_single(deck, "locate").deck, strains, **options)

@@ -196,7 +196,7 @@ class NewOptions:
     type=Finite(min=1.0),
     default=1.0,
     metavar="RATIO",
-    help="Largest over smallest element; the smallest at the impact point.",
+    help="Length of the largest over the smallest element; the smallest is at the impact point.",
 )
 @option(
     "--columns",
@@ -233,7 +233,7 @@ class NewOptions:
     type=Parsed(new_values.ply_of, "NAME=RHO,NU12,E1,E2,G12,G13,G23"),
     multiple=True,
     callback=lambda context, parameter, values: unique(values, context, parameter),
-    help="Constants of a material, in the deck's units: of a letter of the layup, or of a --core.",
+    help="Constants of a material, in the deck's units.  NAME is a letter of the layup, or a core.",
 )
 @option(
     "--core",

@@ -180,7 +180,7 @@ class PlotOptions:
     type=Parsed(assignment, "NAME=VALUE"),
     callback=_by_name,
     multiple=True,
-    help="Show of a sweep only the cases nearest to this value; may be repeated.",
+    help="Show only the cases of a sweep that are nearest to this value; may be repeated.",
 )
 @option(
     "--level",

@@ -86,8 +86,8 @@ def _texts(form: str) -> dict[str, Any]:
     workers={
         "type": click.IntRange(1, 1024),
         "default": None,
-        "help": "Worker processes on this machine.  [default: if the sweep takes more than some "
-        "seconds, as many as other work leaves processors free]",
+        "help": "Worker processes on this machine.  [default: one for each free processor, if the "
+        "sweep takes more than some seconds]",
     },
     output={
         "type": NAMED_PATH,

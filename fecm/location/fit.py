@@ -160,7 +160,7 @@ class LocationFit:
         return best
 
     def _find_lower(self, best: PlaceTrial, change: Floats, box: Floats) -> PlaceTrial | None:
-        """Return a trial with a smaller misfit along a change; None if there is none."""
+        """Return a trial with a smaller misfit along a change, or None."""
         for halving in range(HALVINGS):
             fraction = 0.5**halving
             x, y = np.clip(np.array([best.x, best.y]) + fraction * change[:2], *box).tolist()
@@ -308,7 +308,7 @@ def judged_force(time: Floats, force: Floats, errors: Errors, basis: float) -> F
 
 
 def _find_contact_end(force: Floats, covariance: Floats, top: int) -> int | None:
-    """Return the first hat after which the impulse stays within its noise; None if there is none.
+    """Return the first hat after which the impulse stays within its noise, if there is one.
 
     A long weak force may have every value below the noise, but its sums exceed it. The contact has
     ended if, for a third of its duration, no sum over the following hats exceeds its noise.

@@ -68,8 +68,9 @@ DIMENSIONS = {
 }
 POINTS = 181  # points of an ellipse
 BIASED = 0.1  # bias of a peak, over its standard deviation, above which it is shown
-# Attributes of the group of the force, those that may be missing, and of the group of the place.
-# The end of the contact is missing if the contact has not ended, errors in files of fecm 1.
+# Attributes of the group of the force, attributes that may be missing, and attributes of the group
+# of the place.  The end of the contact is missing if the contact has not ended, errors in files of
+# fecm 1.
 OF_FORCE = ("determined_until", "peak_force", "time_of_peak", "impulse")
 OPTIONAL = ("contact_end", "sd_peak_force", "peak_bias", "sd_impulse")
 OF_PLACE = (
@@ -121,9 +122,8 @@ class Location:
         Standard deviation of the peak force, and the mean excess of the largest noisy value over
         the true peak; None in files of older versions.
     contact_end : float or None
-        Time until which the contact lasts at least: for a third of the duration of the contact, the
-        impulse that follows stays within three standard deviations. None if the record does not
-        show it.
+        Earliest end of the contact: for a third of the duration of the contact, the impulse after
+        this time stays within three standard deviations. None if the record does not show an end.
     impulse, sd_impulse : float
         Time integral of the force until the end of the contact, or until the force is no longer
         determined, and its standard deviation (None in files of older versions).

@@ -235,8 +235,8 @@ def timing(table: StrainTable, basis: float | None, *, shift: bool) -> Timing:
     width = basis or max(record / HATS, 2.0 * spacing)
     if width < spacing:
         raise StudyError(
-            f"{name} has a point every {spacing:.3g}, too few for a force every {width:.3g}; take "
-            "a larger basis"
+            f"{name} has a point every {spacing:.3g}, too few for a value of the force every "
+            f"{width:.3g}; take a larger basis"
         )
     parts = GIVEN if basis else SEARCHED
     interval = _interval(time, width)

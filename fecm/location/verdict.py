@@ -26,7 +26,7 @@ from fecm.location.fit import CLEAR, LocationFit, PlaceTrial
 from fecm.location.location import Location
 from fecm.location.search import Region
 
-BETTER = 1.5  # fall of the misfit from which on a cause is named
+BETTER = 1.5  # least factor by which the misfit falls if a cause is named
 SLIGHT = 1.1  # the same for a gain that differs much from the other gains
 DISTINCT = 1.15  # smallest ratio of such a gain to the others, or the inverse
 REFINED = 3  # causes that are fitted: those with the least shares at the candidates
@@ -404,8 +404,8 @@ def _remarks(location: Location, wide: bool) -> Iterator[str]:
     if wide:
         half = f"{0.5 * (location.time[1] - location.time[0]):.3g} {time_unit}".rstrip()
         yield (
-            f"a force every {half} describes the strains better: its error is not in the standard "
-            "deviations; take a smaller basis"
+            f"a value of the force every {half} describes the strains better: its error is not in "
+            "the standard deviations; take a smaller basis"
         )
     correlation = residual_correlation(location)
     if likely_misfit(location) < location.misfit <= NOT_DESCRIBED:

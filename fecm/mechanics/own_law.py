@@ -19,7 +19,7 @@ from fecm.mechanics.contact_law import ContactPoint, HystereticLaw, Law
 from fecm.mechanics.impact_steps import knows
 
 METHODS = ("start", "trial", "accept", "permanent")
-# An indentation beyond this, in any unit, belongs to a diverging motion and is no fault of the law.
+# An indentation beyond this, in any unit, belongs to a diverging motion, not to a fault.
 FAR = 1e30
 
 

@@ -61,19 +61,19 @@ class RunOptions:
 
     # Slips of the printed program that are on: see :func:`~fecm.listing.slips.active_slips`.
     slips: frozenset[str] = frozenset()
-    # Computation of K·u, one of ``SOLVERS``: compiled kernels where there are any, else NumPy; or
-    # one of them; or a sparse matrix.
+    # Computation of K·u, one of ``SOLVERS``.  "auto" takes the compiled kernels if there are any,
+    # NumPy otherwise.
     solver: str = AUTO
-    # Threads that share the work of a step; 0 takes as many for a large mesh as other work leaves
-    # processors free.  The result does not depend on it.
+    # Threads that share the work of a step.  With 0 a large mesh takes a thread for each free
+    # processor.  The result does not depend on it.
     threads: int = 0
     rod_method: RodMethod = field(default_factory=RodMethod)  # the rod's mass matrix and integrator
     # Error of the energy balance, relative to the supplied energy, that ends a run without slips.
     energy_limit: float = ENERGY_LIMIT
     # Contact law instead of the deck's; see :func:`~fecm.mechanics.own_law.own_law`.
     law: contact_law.Law | None = None
-    projectile: Projectile | None = None  # a user's instead of the deck's
-    criteria: tuple[OwnCriterion, ...] = ()  # of users, that FAIL evaluates too
+    projectile: Projectile | None = None  # user's projectile instead of the deck's
+    criteria: tuple[OwnCriterion, ...] = ()  # user-defined criteria
 
     def __post_init__(self) -> None:
         if self.solver not in SOLVERS:
@@ -110,7 +110,7 @@ class ImpactModel(NamedTuple):
     plate: PlateModel
     motion: PlateMotion  # motion of the plate; its own plate has only the moving dofs
     impact: ImpactSystem | None  # plate and projectile; None without impact
-    steps: ImpactSteps | None  # its steps by the compiled kernels; None where they can't take them
+    steps: ImpactSteps | None  # steps by the compiled kernels; None if they can't take them
     station: Transducer
     # Points of tape8 and of the stresses.
     strains: StrainField
@@ -120,7 +120,7 @@ class ImpactModel(NamedTuple):
     patch: ContactPatch | None
     plies: PlyStresses | None  # elements whose ply stresses are stored; None without PLYS
     failure: FailureMonitor | None  # failure criteria; None without FAIL
-    stress_places: PlyPoints | None  # of the points of these stresses; None without PLYS and FAIL
+    stress_places: PlyPoints | None  # points of these stresses; None without PLYS and FAIL
     # (numel, points): where plate theory does not hold; None without PLYS and FAIL.
     under_load: Bools | None
     # Residual stresses of the plies of each laminate; None without CURE.
@@ -166,7 +166,7 @@ def build_model(problem: Problem, options: RunOptions | None = None) -> ImpactMo
         _gages(problem, mesh, plate),
         build_station(deck, rod, variant.impact, is_own=chosen.projectile is not None),
     )
-    steps = None  # the kernels take many steps at once of the report's program only
+    steps = None  # the kernels take many steps at once only for the report's program
     if impact is not None and variant.is_report and can_step(impact):
         sums = None if read is None else motion.dof_sums(read.dof_indices, read.weights)
         steps = ImpactSteps(impact, sums, station.dof, workers.count)
@@ -211,7 +211,7 @@ def _share_of_contact_force(problem: Problem) -> tuple[MeshArrays, float]:
 def _plates(
     problem: Problem, mesh: MeshArrays, variant: PlateVariant
 ) -> tuple[PlateModel, PlateModel]:
-    """Return the plate, and the plate with only the dofs free that the program moves."""
+    """Return the plate, and the plate in which only the dofs that the program moves are free."""
     if mesh is problem.mesh and variant == REPORT_PLATE:
         return problem.plate, problem.moving_plate
     plate = build_plate(problem.deck, mesh, variant)
@@ -333,7 +333,7 @@ def _gages(problem: Problem, mesh: MeshArrays, plate: PlateModel) -> GageArray |
 
 
 def _stretching(problem: Problem, plate: PlateModel) -> Stretching | None:
-    """Return what evaluates the stretching of a nonlinear plate where it is stored."""
+    """Return the evaluator of the stretching of a nonlinear plate; None if it is not stored."""
     work = problem.work
     rows = work.contact_rows if problem.has_impact else work.passes["DISP"]
     if not (plate.nonlinear and rows):

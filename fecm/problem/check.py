@@ -42,7 +42,7 @@ from fecm.problem.rules import (
 )
 from fecm.problem.rules import listing as listing_mode
 
-# Segments that can be judged alone.
+# Segments that can be judged individually.
 ALONE: tuple[type[model.Segment], ...] = (
     model.Material,
     model.Indentation,
@@ -64,7 +64,7 @@ def check_problem(
 ) -> Problem | None:
     """Check a problem; return None without a control card.
 
-    Its L2 counts if the run `uses_l2`.
+    L2 is checked only if the run `uses_l2`.
     """
     deck, unsound = problem.deck, problem.unsound
     if deck is None:
@@ -123,7 +123,7 @@ def _check_shapes(checked: Problem, findings: Findings, *, uses_l2: bool) -> Non
 
 
 def _check_each_segment(checked: Problem, findings: Findings, unsound: set[str]) -> None:
-    """Check each segment as far as this needs no sound mesh."""
+    """Check each segment as far as possible without a sound mesh."""
     if checked.deck.has(model.Impact):
         check_impact(checked, findings)
     check_segments(checked.deck, findings)

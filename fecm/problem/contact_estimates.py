@@ -18,8 +18,8 @@ from fecm.mechanics.time_step import critical_time_step
 from fecm.problem.parts import build_constants, build_projectile
 
 # A clamped square plate under a central force has the stiffness D/(0.0056 a^2): Timoshenko and
-# Woinowsky-Krieger, Theory of Plates and Shells, Table 35.  In terms of the force 8 v (m D)^(1/2)
-# of a wave, that is this factor on the ratio of the masses.
+# Woinowsky-Krieger, Theory of Plates and Shells, Table 35.  The square of its
+# force over the force 8 v (m D)^(1/2) of a wave is this factor times the ratio of the masses.
 CLAMPED = 1.0 / (64.0 * 0.0056)
 
 

@@ -107,9 +107,9 @@ MOST_SOLVED = 1000  # elements up to which checks and notes take static solution
 CURVE_STEPS = 20
 LONGEST_STEP = 0.25
 NO_CURVE = "there is no nonlinear static plate"
-# Simulated time over half a period of the projectile on the plate's static stiffness, and least
-# simulated time over the contact of the two with the indentation in series: a plate that vibrates
-# ends it up to 2 % later.
+# Simulated time over half a period of the projectile on the plate's static stiffness.  Least
+# simulated time over the contact with plate and indentation in series: the contact with a vibrating
+# plate ends up to 2 % later.
 HALF_PERIODS = 1.25
 CONTACT_TIMES = 1.1
 
@@ -139,13 +139,15 @@ def static_deflection(problem: Problem) -> float:
     wave = 2.0 * mass * velocity / wave_impedance(problem.laminate)
     try:
         peak = static_peak(mass, velocity, _coefficient(problem), stiffness)
-    except OverflowError:  # of a k that the checks doubt
+    except OverflowError:  # the checks doubt such a k
         return math.nan
     return min(wave, peak / stiffness)
 
 
 def nonlinear_curve(problem: Problem, energy: float, force: float) -> StaticCurve:
-    """Return the static curve of a nonlinear plate up to an energy, and a force unless it is NaN.
+    """Return the static curve of a nonlinear plate up to an energy and a force.
+
+    A force of NaN sets no limit.
 
     Raises NoCurveError if the plate has no such curve.
     """
@@ -189,7 +191,7 @@ def contact_duration(problem: Problem) -> float:
     stiffness = static_stiffness(problem.moving_plate, contact)
     duration = HALF_PERIODS * math.pi * math.sqrt(mass / stiffness)
     if velocity > 0.0:
-        with suppress(OverflowError):  # of a k that the checks doubt
+        with suppress(OverflowError):  # the checks doubt such a k
             k = _coefficient(problem)
             duration = max(
                 duration, CONTACT_TIMES * static_plate(mass, velocity, k, stiffness).duration

@@ -30,7 +30,7 @@ from fecm.mechanics.mesh import Ints, MeshArrays, equation_numbers
 
 # Nodes that cards may generate or reset.
 GENERATED_PER_NODE = 10  # per node of the deck
-GENERATED = 10_000  # and besides
+GENERATED = 10_000  # in addition
 
 
 class _Budget:
@@ -166,7 +166,7 @@ def _existing(
 
 
 def _rows(first: int, last: int, increment: int) -> Indices:
-    """Return the rows of the nodes from one card up to, and without, the next."""
+    """Return the rows of the nodes from one card up to the next card, which is excluded."""
     step = abs(increment) if last >= first else -abs(increment)
     return np.arange(first - 1, last - 1, step)
 

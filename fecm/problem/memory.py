@@ -33,7 +33,7 @@ POINT = 250  # bytes per strain point of an element: Jacobians and strains
 STRETCHING = 400  # bytes per Gauss point of a nonlinear plate whose stretching is stored
 NUMBERS = 400  # bytes per point of an element that the kernels have no matrix for
 KEPT = 12  # bytes per entry of the element matrices that are kept
-INTEGRATED = 24  # and of one under integration, for each row of B and point
+INTEGRATED = 24  # bytes per entry under integration, for each row of B and each point
 ROWS = 8  # strains in B: six of the membrane and of bending, two of the transverse shear
 SHIFTED = 70  # bytes of EIGE's factors of a plate without coupling, over n^1.5
 GAGE = 10_000  # bytes per gage: its weights, as they are found and as the solver has them
@@ -61,7 +61,7 @@ def needed_bytes(
         total += _product(model, compiled=resolved(solver) == KERNELS, exact=exact)
     if (gages := checked.deck.last(Gages)) is not None:
         total += _gages(checked, len(gages.records))
-    # The check has ended, and returned what the buckling load took, when steps are taken.
+    # The check has freed the memory of the buckling load before steps are taken.
     together = checked.has_impact and resolved(solver) == KERNELS
     total += max(
         _fields(checked) if together else 0, _buckling(model) if model.is_compressed else 0
@@ -129,7 +129,7 @@ def _fields(checked: Problem) -> int:
     interval = TOGETHER.interval(n)
     if work.steps > interval:
         rows = min(rows, -(-stored * interval // work.steps))
-    # The vectors of the kernels have gone when strains are computed.
+    # The vectors of the kernels are freed before strains are computed.
     strains = len(STRAINS) * control.numel * len(checked.rules[2].xi) if work.contact_rows else 0
     return 8 * rows * (field + max(n, strains))
 
@@ -159,7 +159,7 @@ def _buckling(model: PlateModel) -> int:
 def _factors(model: PlateModel, words: set[str]) -> int:
     """Return the bytes of the factors of the stiffness.
 
-    They grow with n log n in a plane mesh ordered well, with n^1.5 if ordered by columns.
+    They grow with n log n for a well-ordered plane mesh, and with n^1.5 for nodes in columns.
     """
     n = model.neq
     total = FACTORS * n * math.log2(max(2, n)) if "TANG" in words else 0.0

@@ -68,7 +68,7 @@ def _ascii(body: bytes) -> Take:
     def take(kind: str, count: int) -> list[int]:
         taken_words = list(islice(words, count))
         if len(taken_words) < count:
-            raise ValueError(f"{count} numbers, of which {len(taken_words)} are there")
+            raise ValueError(f"{len(taken_words)} of {count} numbers are there")
         return [] if kind == "d" else [int(word) for word in taken_words]
 
     return take

@@ -74,7 +74,7 @@ class PlateSides(NamedTuple):
 def element_sides(mesh: MeshArrays) -> PlateSides:
     """Return the sides of the elements of a mesh."""
     corners, rows, held = [], [], []
-    # Node 0 stands for an absent one, which does not decide.
+    # Node 0 stands for an absent node, which is ignored.
     holds = np.concatenate([[True], mesh.codes[:, W] != 0])
     for block in element_blocks(mesh.elements, mesh.coordinates):
         count = block.shape.corners

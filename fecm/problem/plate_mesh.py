@@ -54,7 +54,7 @@ NASTRAN = (".bdf", ".fem", ".nas")
 BULK = re.compile(rb"^\s*BEGIN[ ,]+BULK", re.IGNORECASE | re.MULTILINE)
 # Elements of Abaqus that meshio knows by another name.
 ALIKE = {"S8": "S8R", "S6": "STRI65"}
-# Cards of Abaqus of which meshio reads one, or none.
+# Cards of Abaqus that may occur once, because meshio does not read further ones; and the remedy.
 ABAQUS_ONCE = {
     "Part": "write the part of the plate alone",
     "Instance": "write the part of the plate alone",
@@ -67,9 +67,9 @@ ABAQUS_GENERATE = re.compile(
     rb"^\*(?:n|el)set\b[^\n]*\bgenerate\b[^\n]*\n((?:[^*\n][^\n]*\n?)*)",
     re.IGNORECASE | re.MULTILINE,
 )
-SAME = 1e-9  # difference of equal coordinates, at most, over the size of the mesh
-NO_AREA = 1e-12  # area of a degenerate element, at most, over the square of the size
-NAMED = 8  # most elements named in a message
+SAME = 1e-9  # largest difference of equal coordinates, over the size of the mesh
+NO_AREA = 1e-12  # largest area of a degenerate element, over the square of the size
+NAMED = 8  # largest number of elements named in a message
 
 
 class MeshError(FecmError, ValueError):
@@ -157,7 +157,7 @@ class PlateMesh:
                 for on, code in zip(lines, bending, strict=True):
                     codes[on, 2:] = np.maximum(codes[on, 2:], code)
             elif bending.along_x != bending.along_y:
-                # Three nodes in a line, on a polygon for a curve, would hold its rotation too.
+                # Three nodes in a line, on the polygon of a curve, would hold the rotation too.
                 rows = np.setdiff1d(rows, self.middles)
             codes[rows, 2:] = np.maximum(codes[rows, 2:], everywhere_held)
             held = held_in_plane(support, in_plane)
@@ -556,7 +556,10 @@ def _sides(cells: Integers) -> tuple[Integers, Integers, Integers]:
 
 
 def _inside(sides: Integers, counts: Integers, group: Integers) -> Bools:
-    """Return which sides lie in a group of nodes; on the boundary only, if all its nodes do."""
+    """Return which sides lie in a group of nodes.
+
+    If all nodes of the group are on the boundary, only sides of the boundary count.
+    """
     edge = counts == 1
     within = np.asarray(np.isin(sides, group).all(axis=1))
     return within & edge if np.isin(group, sides[edge]).all() else within

@@ -47,9 +47,9 @@ class Threshold(NamedTuple):
 
     force: float
     rigidity: float  # effective rigidity D*, force*length
-    number: int  # delaminations of `force`
-    interfaces: int  # between plies of different angle: the largest possible number
-    band: tuple[float, float]  # forces for a delamination in each of them, and for a single one
+    number: int  # number of delaminations at `force`
+    interfaces: int  # interfaces between plies of different angle: the largest possible number
+    band: tuple[float, float]  # force for a delamination in each interface, and for a single one
 
 
 class ContactPatch(NamedTuple):
@@ -285,7 +285,7 @@ class Problem:
 
     @cached_property
     def patch_side(self) -> float:
-        """Longest side of the elements with the centre of the patch, length; 0 without a patch."""
+        """Longest side of the elements at the centre of the patch, length; 0 without a patch."""
         if self.patch is None:
             return 0.0
         place = np.array([[self.patch.x, self.patch.y]])
@@ -350,7 +350,7 @@ class Problem:
 
     @property
     def worst_at_rest(self) -> PlyExposure | None:
-        """Largest exposure before anything moves; None without strengths, or stresses at rest."""
+        """Largest exposure before anything moves; None without strengths or without stresses."""
         worst = self.worst_under()
         return None if worst is None else worst[0]
 

@@ -33,11 +33,11 @@ class RefineError(FecmError, ValueError):
 
 
 def refined_deck(deck: Deck, mesh: MeshArrays, marked: Bools | None = None) -> Deck:
-    """Bisect the elements of a deck with a mesh in both directions: all, or those marked, (numel,).
+    """Bisect all elements of a deck, or the marked elements, (numel,), in both directions.
 
-    Old nodes keep their numbers. A new node is restrained where all nodes of its side, or of its
-    element, are; nodal forces stay where they are. Raises RefineError if an element is not a
-    quadrilateral with four or nine nodes.
+    Old nodes keep their numbers. A new node is restrained if all nodes of its side, or of its
+    element, are restrained. Nodal forces stay on their nodes. Raises RefineError if an element is
+    not a quadrilateral with four or nine nodes.
     """
     nodes = _Nodes(mesh)
     elements: list[tuple[int, list[int]]] = []
@@ -87,7 +87,7 @@ class _Nodes:
         self.forces = list(mesh.forces)
 
     def number(self, row: int, nodes: Ints, place: tuple[float, ...], shares: Floats) -> int:
-        """Return the number of the node at a place of an old element; a new one where it is new."""
+        """Return the number of the node at a place of an old element; a new node gets a number."""
         old = np.flatnonzero(np.abs(shares - 1.0) < 1e-9)
         if len(old):
             return int(nodes[old[0]])

@@ -115,11 +115,11 @@ def measurement_of(
     """Read a measured force from a file, or from two arrays of time and force.
 
     A file has time and force, or time and transducer. `units` has the names of the deck's units,
-    which may be empty. A file that names its units is converted to them. `columns` has the names or
-    the numbers (from 1) of the columns of time and force. `stated` has the units of a measurement
-    that names none. Raises StudyError if the file is invalid, a unit is unknown, the times do not
-    increase, or times and forces are not finite numbers of equal count. Raises OSError if the file
-    can't be read.
+    which may be empty. A file that names its units is converted to the deck's units. `columns` has
+    the names or the numbers (from 1) of the columns of time and force. `stated` has the units of a
+    measurement that names none. Raises StudyError if the file is invalid, a unit is unknown, the
+    times do not increase, or times and forces are not finite numbers of equal count. Raises OSError
+    if the file can't be read.
     """
     for what, pair in (("columns", columns), ("units", stated)):
         if isinstance(pair, str) or len(pair) not in (0, 2) or not all(map(_is_text, pair)):

@@ -349,9 +349,10 @@ def diff(
 ) -> Difference:
     """Compare two results dataset by dataset.
 
-    Two numbers are equal if they differ by at most `rtol` times the dataset's scale plus `atol`;
-    without both, exactly, or those of tapes to their last digit.  The scale is the largest value of
-    the whole dataset.  Integers and texts must be equal, NaN equals NaN.
+    Two numbers are equal if they differ by at most `rtol` times the dataset's scale plus `atol`.
+    Without both tolerances they must be identical, on tapes up to one unit of the last digit.  The
+    scale is the largest value of the whole dataset.  Integers and texts must be equal, NaN equals
+    NaN.
 
     Parameters
     ----------
@@ -360,11 +361,11 @@ def diff(
     rtol, atol : float, optional
         Relative tolerance, and absolute tolerance in the dataset's unit.
     only, exclude : str or sequence of str
-        Names of datasets (``"tape9/force"``), groups (``"tape9"``) or patterns (``"*/force"``) that
-        alone are compared, or that are left out.
+        Datasets to compare instead of all, and datasets to leave out: names (``"tape9/force"``),
+        groups (``"tape9"``) or patterns (``"*/force"``).
     tol : mapping of str to float or sequence of float, optional
-        Tolerances of their own of such names, ``rtol`` or ``(rtol, atol)``; of several that match,
-        the last one holds.
+        Own tolerances by such names, ``rtol`` or ``(rtol, atol)``.  If several names match a
+        dataset, the last one holds.
 
     Returns
     -------
@@ -374,8 +375,8 @@ def diff(
     Raises
     ------
     IncomparableError
-        If one is not a result, or only one is that of a sweep, a name matches no dataset, nothing
-        is left to compare, or a tolerance is not a finite number from 0.
+        If an argument is not a result, the results are of different kinds, a name matches no
+        dataset, nothing is left to compare, or a tolerance is not a finite number from 0.
     ResultFileError
         If a file is not a result.
     OSError
@@ -456,11 +457,11 @@ def assert_same(
         What it is compared with, B in the message.
     rtol, atol : float, optional
         Tolerances of :func:`diff`; machines and versions of NumPy round differently.  None for both
-        requires equal numbers, or those of tapes to the last digit.
+        requires identical numbers, on tapes up to one unit of the last digit.
     only, exclude : str or sequence of str
-        Datasets that alone are compared, or that are left out; see :func:`diff`.
+        Datasets to compare instead of all, and datasets to leave out; see :func:`diff`.
     tol : mapping of str to float or sequence of float, optional
-        Tolerances of their own of some datasets; see :func:`diff`.
+        Own tolerances of some datasets; see :func:`diff`.
 
     Raises
     ------
@@ -539,7 +540,7 @@ def _chosen(
 ) -> set[str]:
     """Return the names that match patterns, or lie in groups that match.
 
-    Each pattern must match one, or a known name.
+    Each pattern must match one of the names, or a known name.
     """
     chosen: set[str] = set()
     for asked in patterns:

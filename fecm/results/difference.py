@@ -271,7 +271,7 @@ class Difference:
     rtol, atol : float
         General tolerances.
     tol : dict
-        Tolerances of datasets, groups or patterns of their own: ``(rtol,)`` or ``(rtol, atol)``.
+        Own tolerances of datasets, groups or patterns: ``(rtol,)`` or ``(rtol, atol)``.
     last_digit : bool
         Whether numbers of tapes are compared to their last digit instead.
     datasets : list of DatasetDifference

@@ -21,13 +21,13 @@ Texts = NDArray[np.str_]
 FALLEN = 0.9
 # A projectile leaves clearly if its velocity is above CLEAR of the largest velocity that the plate
 # had under the load.  In 300 random impacts, each cut at 40 times, no plate reached such a
-# projectile again; those that did were left at 0.04 to 0.24.
+# projectile again; projectiles that were reached again left at 0.04 to 0.24 of this velocity.
 CLEAR = 0.3
 # Factor on the largest compliance w^2/(2 E) seen in a run, as the static one may be larger.
 RESERVE = 1.5
-LEAST_WORK = 1.0e-3  # energy of the plate, of the initial energy, below which w^2/(2 E) is not used
-LATE = 0.8  # of the run; a largest value that comes later may still grow
-RINGING = 1.01  # a deflection that exceeds the largest so far by less is the same
+LEAST_WORK = 1.0e-3  # energy of the plate over the initial energy for which w^2/(2 E) is used
+LATE = 0.8  # share of the run; a largest value that comes later may still grow
+RINGING = 1.01  # least ratio of a new largest deflection to the largest so far
 
 
 class End(StrEnum):
@@ -150,7 +150,7 @@ def ends(last: LastContact, plate: Deflection, *, is_held: bool = True) -> Texts
 def time_to_decide(last: LastContact, plate: Deflection) -> Floats:
     """Return the time until the plate can't reach the projectile any more.
 
-    It is for cases that may touch again.
+    Only cases that may touch again need it.
     """
     return np.maximum(last.position + plate.reach, 0.0) / last.leaving
 

@@ -28,9 +28,9 @@ TIE = 1e-9  # relative difference of equal exposures; see fecm/mechanics/exposur
 FEWEST = 20  # evaluations of FAIL during contact below which maxima may be missed
 # Longest side of the elements on the circle around the load, over the radius R of the circle.
 COARSENESS = "coarseness"  # attribute of the group circle
-RESOLVED = 2.6  # up to which the errors of the largest exposures were measured to be within a band
-# Share by which largest exposures are below the finest mesh's at a coarseness, of four
-# plates on up to eight meshes; beyond the last it is not known.
+RESOLVED = 2.6  # coarseness up to which the measured errors of the largest exposures lie in a band
+# Share by which largest exposures are below the finest mesh's, by coarseness, measured on four
+# plates with up to eight meshes; beyond the last coarseness it is not known.
 COARSE = (RESOLVED, 3.8, 7.5, 15.0)
 TOO_LOW = {"plies": (0.015, 0.08, 0.25, 0.44), INTERLAMINAR: (0.12, 0.23, 0.37, 0.55)}
 TOO_HIGH = {"plies": 0.04, INTERLAMINAR: 0.12}
@@ -56,7 +56,7 @@ class LargestExposure(NamedTuple):
     at_rest: float | None = None  # largest exposure of the residual stresses alone
     # Factor on all other stresses at the place at which the exposure is 1.
     load_factor: float | None = None
-    # Names of the material of the ply, or of both plies; empty if all plies are of one.
+    # Names of the material of the ply, or of both plies; empty if the deck has one material.
     materials: tuple[str, ...] = ()
 
     @property
@@ -84,7 +84,7 @@ class FailureVerdict(StrEnum):
 
 
 def failure_verdict(largest: Sequence[LargestExposure]) -> FailureVerdict:
-    """Judge whether any of the largest exposures reaches 1 on every finer mesh, none, or some."""
+    """Judge whether any of the largest exposures reaches 1 on every, no, or some finer mesh."""
     if any(exposure.exposure >= 1.0 and not exposure.is_open for exposure in largest):
         return FailureVerdict.REACHED
     return (
@@ -309,7 +309,7 @@ class FirstFailure:
         Work of the contact force so far on plate and indentation: what the projectile has given up
         of its kinetic energy, force*length; NaN without impact.
     materials : tuple of str
-        Material of the ply, or of both plies of an interface; empty if all plies are of one.
+        Material of the ply, or of both plies of an interface; empty if the deck has one material.
     """
 
     criterion: str

@@ -44,7 +44,7 @@ GROUPS = {
     "energy": GroupInfo("energies at every step", "RODP"),
     "gages": GroupInfo("strain gages, read at every step", "RODP or EXCD"),
     "membrane": GroupInfo(
-        "stretching of a nonlinear plate, at the rows of tape8; without impact at those of tape3"
+        "stretching of a nonlinear plate, at the rows of tape8, or of tape3 without impact"
     ),
     "stresses": GroupInfo("strains and stress resultants, stored by STRE", "STRE"),
     "patch": GroupInfo("nodal weights of the contact force"),

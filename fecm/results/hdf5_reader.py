@@ -326,8 +326,8 @@ def first_misfit(
     return None
 
 
-# Attributes that are numbers, and lists of texts, by group.  A result without those of history and
-# energy only lacks its summary.
+# Attributes that are numbers, and lists of texts, by group.  A result without the
+# attributes of history and energy lacks only its summary.
 NUMBERS = {
     "energy": ("initial",),
     "history": ("permanent_indentation", "unsettled_steps", MOBILITY),

@@ -28,7 +28,7 @@ class Quantity(NamedTuple):
     dimension: str = ""  # physical dimension; may be empty
 
 
-# Those of every case.
+# Metrics of every case.
 SUMMARY = {
     "peak_force": Quantity("largest contact force", "force"),
     "time_of_peak": Quantity("time of the largest contact force", "time"),
@@ -51,7 +51,7 @@ SUMMARY = {
     ),
 }
 THRESHOLD_FORCE = "threshold_force"
-# Those of decks with a delamination threshold.
+# Metrics of decks with a delamination threshold.
 THRESHOLD = {
     THRESHOLD_FORCE: Quantity("delamination threshold", "force"),
     "threshold_margin": Quantity("1 less the largest contact force over the threshold"),
@@ -60,21 +60,21 @@ THRESHOLD = {
     ),
     "time_above": Quantity("time at or above the threshold", "time"),
 }
-# All of a run.
+# All metrics of a run.
 METRICS = {
     **SUMMARY,
     "max_deflection": Quantity("largest displacement of the plate under the load", "length"),
     **THRESHOLD,
 }
 INTEGERS = ("contacts", "peak_contact")
-# Those of a search for velocities.
+# Metrics of a search for velocities.
 FOUND = {
     "found_velocity": Quantity(
         "velocity at which the value searched for is reached", "length/time"
     ),
     "found_energy": Quantity("kinetic energy of the projectile at that velocity", "force*length"),
 }
-# Those of a sweep that are measured on request.
+# Metrics of a sweep that are measured on request.
 EXPOSURES = {
     f"exposure_{name}": Quantity(f"largest exposure {spelt(name)} outside the load")
     for name in ALL_CRITERIA
@@ -83,7 +83,7 @@ BAND = {
     "exposure_low": Quantity("lowest value of the largest exposure that finer meshes may give"),
     "exposure_high": Quantity("highest value of the largest exposure that finer meshes may give"),
 }
-# Of a search for an exposure, from that band.
+# Metrics of a search for an exposure, from that band.
 FOUND_BAND = {
     "found_energy_low": Quantity("lowest energy that finer meshes may find", "force*length"),
     "found_energy_high": Quantity("highest energy that finer meshes may find", "force*length"),
@@ -91,7 +91,7 @@ FOUND_BAND = {
 EVALUATIONS = {
     "fail_evaluations": Quantity("evaluations of FAIL during contact"),
 }
-# The place that is hit instead of the one given.
+# Place that is hit instead of the given place.
 HIT = {
     "hit_x": Quantity("x of the impact node or of the patch", "length"),
     "hit_y": Quantity("y of the impact node or of the patch", "length"),
@@ -100,7 +100,7 @@ RATIO = "deflection_ratio"
 RATIOS = {
     RATIO: Quantity("largest displacement of the plate under the load over its thickness"),
 }
-# All of a sweep; gages have one each, whose name begins with GAGE.
+# All metrics of a sweep.  Gages have one metric each; its name begins with GAGE.
 COLUMNS = {**METRICS, **FOUND, **FOUND_BAND, **EXPOSURES, **BAND, **EVALUATIONS, **HIT, **RATIOS}
 GAGE = "gage_"
 # Columns of texts: whether a case was run, and whether its result is valid.
@@ -166,8 +166,8 @@ def impact_metrics(
     :data:`SUMMARY`; with a delamination threshold (force, or (cases,)) also the names of
     :data:`THRESHOLD`. `plate` is the motion of the plate under the load, `mobility` (1/mass) the
     mobility of its rigid motion; see :class:`~fecm.results.validity.Judge`. Values that the end of
-    a case has not decided are NaN. If a case ends in contact, this is every value except the peaks,
-    and the peaks too unless the projectile leaves and they have passed.
+    a case has not decided are NaN. If a case ends in contact, only the peaks can be decided, and
+    only if they have passed and the projectile leaves.
     """
     limit = None if threshold is None else np.broadcast_to(threshold, force.shape[1])
     of_forces = _from_forces(force, times, limit)

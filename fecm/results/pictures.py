@@ -25,7 +25,7 @@ RunKind = Literal[
     "mesh",
     "animation",
 ]
-# Kinds of pictures of a sweep; those but map are of random sweeps.
+# Kinds of pictures of a sweep; all except map are for random sweeps.
 SweepKind = Literal["map", "exceedance", "sensitivity", "scatter"]
 
 

@@ -46,9 +46,9 @@ class PlyResults:
     z : ndarray (plies, 3)
         Lower, middle and upper z, from the struck face at -h/2, length.
     angles : ndarray (plies,)
-        Of the fibres, degrees.
+        Fibre angles, degrees.
     under_load : ndarray of bool (elements,)
-        Those so near to the load that plate theory fails.
+        Elements so near to the load that plate theory fails.
     sigma_1, sigma_2, tau_12 : ndarray (rows, elements, points, plies, 2)
         Stresses along and across the fibres, and in shear.
     eps_1, eps_2, gamma_12 : ndarray (rows, elements, points, plies, 2)

@@ -363,8 +363,8 @@ class Result(Stored, schema.ContactRows):
         Raises
         ------
         StudyError
-            If the file is invalid, a unit is unknown, the numbers are invalid, or no two of the
-            times are within those of the result.
+            If the file is invalid, a unit is unknown, the numbers are invalid, or fewer than two
+            times are within the times of the result.
 
         Examples
         --------

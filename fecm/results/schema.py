@@ -153,7 +153,7 @@ class MeshGroup(ResultGroup):
 
 
 class LaminateStiffness(ResultGroup):
-    """Stiffness of the laminate per area; of several, each has a group of its number in it."""
+    """Stiffness of the laminate per area. Several laminates have a group each, by number."""
 
     A: Annotated[Floats, "3 3", "extensional stiffness, order xx, yy, xy", "force/length"]
     B: Annotated[Floats, "3 3", "coupling stiffness, order xx, yy, xy", "force"]
@@ -222,7 +222,7 @@ class GageGroup(Rows):
 
 
 class MembraneRows(Rows):
-    """Stretching of a nonlinear plate, at the rows of tape8; without impact at those of tape3."""
+    """Stretching of a nonlinear plate, at the rows of tape8, or of tape3 without impact."""
 
     energy: Annotated[
         _Energy, "membrane energy, 1/2 n A^-1 n of n = A eps + B kappa", "force*length"
@@ -272,7 +272,7 @@ class Stresses(Rows):
 class PatchGroup(ResultGroup):
     """Nodal weights of the contact force."""
 
-    node: Annotated[Int32s, "patch_nodes", "node numbers from 1 that share the contact force"]
+    node: Annotated[Int32s, "patch_nodes", "numbers of the nodes that share the contact force"]
     weight: Annotated[Floats, "patch_nodes", "share of every node in the contact force"]
 
 
@@ -303,7 +303,7 @@ class PlyRows(Rows):
     cure_stress: Annotated[
         Floats,
         "layers faces components",
-        "residual stress of CURE in the axes of the ply, which the others do not contain",
+        "residual stress of CURE in the axes of the ply; the other stresses do not contain it",
         "force/length^2",
     ]
 
@@ -328,7 +328,7 @@ class CircleExposures(ResultGroup):
     ply: Annotated[Int32s, "", "its ply, from 1 at z = -h/2; of an interface the one above it"]
     x: Annotated[Floats, "", "x of its place", "length"]
     y: Annotated[Floats, "", "y of its place", "length"]
-    points: Annotated[Int32s, "", "number of points on the circle that have it"]
+    points: Annotated[Int32s, "", "number of points on the circle with this exposure"]
 
 
 class FailureGroup(ResultGroup):
@@ -447,7 +447,7 @@ def criterion_datasets(name: str) -> list[Dataset]:
     ]
 
 
-OF_QUANTITY = "of the quantity"  # dimension of a dataset whose name is that of a quantity
+OF_QUANTITY = "of the quantity"  # dimension of a dataset with the name of a quantity
 
 
 def _by_path(*datasets: Dataset) -> dict[str, Dataset]:
@@ -498,7 +498,7 @@ LOCATION_DATASETS = _by_path(
     Dataset("locate/place", ("ndm",), "place of the impact", "length"),
     Dataset("locate/covariance", (2, 2), "covariance of the place", "length^2"),
     Dataset("locate/candidates", ("candidates", "ndm"), "places that were tried first", "length"),
-    Dataset("locate/misfit", ("candidates",), "misfit there over that of the place found"),
+    Dataset("locate/misfit", ("candidates",), "misfit there over the misfit of the located place"),
     Dataset("locate/force/time", ("rows",), "time", "time"),
     Dataset("locate/force/value", ("rows",), "fitted contact force", "force"),
     Dataset("locate/force/sd", ("rows",), "its standard deviation", "force"),
@@ -608,8 +608,8 @@ SCALES = {
     "npt": ("point", "number of the point in its element"),
     "nps": ("stress_point", "number of the stress point in its element"),
     "ndf": ("unknown", "name of the unknown"),
-    "patch_nodes": ("patch_node", "position of the node among those of the patch, from 1"),
-    "members": ("member", "position of the element among those with ply stresses, from 1"),
+    "patch_nodes": ("patch_node", "position of the node among the nodes of the patch, from 1"),
+    "members": ("member", "position of the element among the elements with ply stresses, from 1"),
     "npp": ("ply_point", "number of the point in its element"),
     "layers": ("ply", "number of the ply, from z = -h/2"),
     "interfaces": ("interface", "number of the interface, from 1 between plies 1 and 2"),

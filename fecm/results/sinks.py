@@ -71,7 +71,7 @@ Sink: TypeAlias = "MemorySink | FileSink"
 class ReadOnce(Mapping[str, Array]):
     """Datasets of a sink by path, for the result of a run that is about to end.
 
-    Each dataset is read when it is needed first, and kept; rows of it are not.
+    Each dataset is read when it is first needed, and kept. Single rows are not kept.
     """
 
     def __init__(self, sink: Sink) -> None:

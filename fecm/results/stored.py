@@ -1,6 +1,6 @@
 """Stored data of a run: datasets by path, attributes of groups, and the deck.
 
-:class:`~fecm.results.result.Result` adds to it what can be computed from them.
+:class:`~fecm.results.result.Result` adds what can be computed from these data.
 """
 
 from __future__ import annotations

@@ -153,7 +153,7 @@ NEAR = 0.05  # distance of a row from the peak, over its time, that counts as th
 LISTED = 6  # most contacts and frequencies listed individually
 # Parts by the caller of the run: attribute, name, and the segment of the deck that they replace.
 OWN_PARTS = (("law", "contact law", "EXPE"), ("projectile", "projectile", "PROJ"))
-# Where a run has ended that has not decided its peak.
+# State at the end of a run that has not decided its peak.
 UNDECIDED = {
     End.RISING: "in contact",
     End.BETWEEN: "between two contacts",

@@ -122,11 +122,11 @@ def softness(ratio: float, in_plane: InPlane, *, preloaded: bool = False) -> str
 
 
 STRAIN = 0.01  # largest strain for which plies are taken as linear
-# Exposure, or force relative to the delamination threshold, above which a case is beyond it.  A
+# Exposure, or force over the delamination threshold, above which a case is beyond it.  A
 # search for the velocity that reaches 1 ends a hair above.
 CROSSED = 1.0001
-SLOPE = 0.25  # of a nonlinear plate, up to which its rotations are moderate
-INDENTATION = 0.25  # of the thickness, up to which the contact law of a half-space holds
+SLOPE = 0.25  # largest slope of a nonlinear plate for which its rotations are moderate
+INDENTATION = 0.25  # largest share of the thickness for which the law of a half-space holds
 
 # Validity of a case without a reason to doubt it, and of one that was not computed.
 VALID = "ok"
@@ -149,7 +149,7 @@ class Reason(StrEnum):
     OTHER = "other"  # in files of other versions
 
 
-# Reasons by the supports of the edges; unknown ones have the limit of held ones.
+# Reasons by the supports of the edges; unknown supports have the limit of held edges.
 BENT = {
     InPlane.HELD: Reason.BENT_HELD,
     InPlane.FREE: Reason.BENT_FREE,

@@ -222,7 +222,7 @@ class Checkpointer:
         }
         try:
             text = np.frombuffer(json.dumps(about).encode(), np.uint8)
-        except TypeError as error:  # of what a user's law remembers
+        except TypeError as error:  # in the memory of a user's law
             raise CheckpointError(
                 f"{self._checkpoint} can't be written ({error}): a contact law remembers numbers, "
                 "texts, None, arrays, or tuples of them"

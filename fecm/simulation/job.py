@@ -59,12 +59,12 @@ class Price(NamedTuple):
     steps : int
         Steps of the plate.
     output_bytes : int
-        Size of the results, about.
+        Approximate size of the results.
     memory_bytes : int
-        Memory at once, without the interpreter and its libraries; between 0.7 and 2 times what was
-        measured.
+        Memory at once, without the interpreter and its libraries; between 0.7 and 2 times the
+        measured memory.
     seconds : float
-        Time on this machine, about; NaN if it is not known.
+        Approximate time on this machine; NaN if it is not known.
     """
 
     steps: int
@@ -110,7 +110,7 @@ class Run:
     LawError, ProjectileError, CriterionError, ExtensionError
         If `law`, `projectile` or one of `criteria` can't be used.
     CheckpointError
-        If there is no checkpoint to resume from, or one that is in the way.
+        If there is no checkpoint to resume from, or if a checkpoint is in the way.
     OSError
         If a file can't be read or written, or exists and may not be replaced.
 
@@ -151,15 +151,15 @@ class Run:
     )
     solver: Solver = option(
         AUTO,
-        "Computation of K·u: by compiled kernels where there are any, else by NumPy; by one of "
-        "them; or by a sparse matrix.",
+        "Computation of K·u: kernels, numpy, or csr (a sparse matrix); auto takes the compiled "
+        "kernels if there are any, else numpy.",
         group="Computation",
         choices=SOLVERS,
     )
     threads: int = option(
         0,
-        "Threads that share the work of a step; 0 takes as many for a large mesh as other work "
-        "leaves processors free.  The result does not depend on it.",
+        "Threads that share the work of a step.  With 0 a large mesh takes a thread for each "
+        "free processor.  The result does not depend on it.",
         group="Computation",
         metavar="N",
     )
@@ -214,8 +214,8 @@ class Run:
     )
     resume: bool = option(
         False,
-        "Resume from the checkpoint of an interrupted run.  The result has the same bytes as that "
-        "of an uninterrupted run.",
+        "Resume from the checkpoint of an interrupted run.  The result has the same bytes as "
+        "without the interruption.",
         group="Interrupted runs",
     )
     checkpoint: float | None = option(
@@ -395,7 +395,7 @@ class ProblemRun:
     overwrite: bool = False
     resumes: bool = False  # from the checkpoint of an interrupted run
     interval: float | None = None  # seconds between two checkpoints
-    # Fingerprints of the problems of the deck that are finished; None of a deck with one problem.
+    # Fingerprints of the finished problems of the deck; None for a deck with one problem.
     finished: list[str] | None = None
     complete: bool = False  # in an interrupted run that is resumed
 

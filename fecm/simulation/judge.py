@@ -450,18 +450,18 @@ def _beyond(simulation: Simulation, result: Result) -> Iterator[Doubt]:
         reached = _reached(result, "slope", f"{slope.value:.3g}", slope)
         yield Doubt(
             Reason.STEEP,
-            f"{reached} {SLOPE} von Kármán strains, which are for moderate rotations, have an "
+            f"{reached} {SLOPE}, von Kármán strains, which are for moderate rotations, have an "
             f"error of about slope²/2 = {slope.value**2 / 2.0:.1%}",
         )
     if strain.value > STRAIN:
         reached = _reached(result, "strain", f"{strain.value:.2%}", strain)
-        yield Doubt(Reason.STRAINED, f"{reached} 1 % linear plies are doubtful")
+        yield Doubt(Reason.STRAINED, f"{reached} 1 %, linear plies are doubtful")
     if indentation.value > INDENTATION * limits.indented:
         size = _size(result, indentation.value, limits.indented)
         reached = _reached(result, "indentation", size, indentation)
-        of_face = ", h being the struck face's," if limits.struck else ""
+        of_face = ", where h is the struck face's thickness" if limits.struck else ""
         yield Doubt(
-            Reason.SOFT, f"{reached} h/4{of_face} the contact law of a half-space is doubtful"
+            Reason.SOFT, f"{reached} h/4{of_face}, the contact law of a half-space is doubtful"
         )
     broken = [
         spelt(exposure.criterion)
@@ -483,7 +483,7 @@ def _bent(simulation: Simulation, result: Result, peak: RunPeak) -> str:
     what = "deflection without the rigid-body motion" if is_free else "deflection"
     h = limits.thickness
     size = _size(result, peak.value, h)
-    note = f"{_reached(result, what, size, peak)} {limits.limit} h {TOO_SOFT}"
+    note = f"{_reached(result, what, size, peak)} {limits.limit} h, {TOO_SOFT}"
     if simulation.problem.has_impact:
         error, meaning = limits.softness(peak.value / h), unsafe(curved=limits.curved)
         note = f"{note}: {error}; {meaning}"

@@ -54,7 +54,7 @@ SCALARS = (
     "displacement",
     "on_tape9",
 )
-# Those that follow from the motion of the projectile.
+# Columns that follow from the motion of the projectile.
 PROJECTILE = ("velocity", "acceleration", "projectile_kinetic", "projectile_strain", "station")
 NAMES = (*SCALARS, *PROJECTILE)
 Columns = Mapping[str, Floats]  # of steps, by name
@@ -100,7 +100,7 @@ class StepRecorder:
         # The names, then the gages' strains, of the steps that are not stored yet.
         self._table = np.zeros((len(NAMES) + gages, BLOCK))
         self._count = 0  # of these steps
-        self._known = 0  # those with the projectile's columns
+        self._known = 0  # number of the steps with the projectile's columns
         self.initial = 0.0
         self._damped = Damped()
 

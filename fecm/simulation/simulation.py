@@ -46,8 +46,8 @@ class Simulation:
     printer: Printer = field(default_factory=Printer)  # writes the printed output
     # Called with the simulation every `interval` steps; may write a checkpoint or raise.
     observers: Sequence[Observer] = ()
-    on_macro: Observer = lambda simulation: None  # the same after every macro; must be fast
-    others: Sequence[Criteria] = ()  # that FAIL evaluates too; no checkpoint has them
+    on_macro: Observer = lambda simulation: None  # called after every macro; must be fast
+    others: Sequence[Criteria] = ()  # FAIL evaluates them too; checkpoints do not store them
 
     def __post_init__(self) -> None:
         problem, options = self.problem, self.options

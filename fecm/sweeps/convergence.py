@@ -22,8 +22,8 @@ from fecm.problem.problem import Problem
 from fecm.results.metrics import INTEGERS, VERDICTS
 from fecm.sweeps.outcome import Column
 
-ASSUMED_ORDER = 2.0  # of two factors, which observe none
-LOWEST_ORDER = 0.5  # that gives a limit
+ASSUMED_ORDER = 2.0  # for two factors, from which no order can be observed
+LOWEST_ORDER = 0.5  # least observed order that gives a limit
 # Order of the scheme in time and space, and in space for elements with nine nodes.
 SCHEME_ORDER = 2.0
 NINE_NODE_ORDER = 4.0
@@ -40,8 +40,8 @@ class Convergence:
     """Limit of a quantity for fine meshes and small time steps."""
 
     order: float  # observed order; NaN if it can't be computed
-    # Richardson extrapolation from the last values with the observed order, or with the highest of
-    # the scheme if that is lower; NaN if there is none.
+    # Richardson extrapolation from the last values with the observed order, or with the highest
+    # order of the scheme if that is lower; NaN without a limit.
     limit: float
     # The limit is expected within plus and minus this band of the finest value; NaN if there is no
     # limit, or the last values are equal.
@@ -66,8 +66,9 @@ def convergence(
     nodes : int
         Nodes of an element, which decide the order of the scheme.
     patch_ratio : float
-        Side of the elements at the patch over its radius, of the factor 1.  While the finest mesh
-        does not resolve the patch, the values approach those of another load: there is no limit.
+        Side of the elements at the patch over its radius, with the factor 1.  If the finest mesh
+        does not resolve the patch, the values approach the values of another load: there is no
+        limit.
     """
     if REFINE not in cases:
         return {}

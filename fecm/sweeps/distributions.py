@@ -19,7 +19,7 @@ from fecm.authoring.values import NAMES, ValueKind, check_free, kind_of
 LARGEST_SIGMA = 3.0  # of a lognormal law
 DOUBTFUL_SIGMA = 1.0  # from which a note asks whether it is meant
 DOUBTFUL_SHAPE = 200.0  # of a Weibull law, likewise
-LEAST_PART = 1e-6  # of a normal law, that is left of it between two ends
+LEAST_PART = 1e-6  # least probability of a normal law between the ends of a truncation
 LONGEST = 80  # characters of the text of an object
 
 

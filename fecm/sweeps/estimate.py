@@ -38,7 +38,7 @@ class ModelEstimate:
     Attributes
     ----------
     peak_force, duration : float
-        Of the contact; NaN where the run ends before they are known.
+        Peak and duration of the contact; NaN where the run ends before they are known.
     threshold : float
         Delamination threshold that the model reaches, force; NaN without DELA.
     velocity, energy : float
@@ -75,8 +75,8 @@ class Estimate:
         ``"infinite plate"``, ``"static plate"`` and ``"nonlinear static plate"``, as far as the
         plate has them, and the ``"run"``.
     remarks : dict of str to str
-        What models neglect, ``"damping"``, ``"preload"`` and ``"curvature"``, and how good or why
-        missing the static model of a nonlinear plate is, ``"stretching"``.
+        What models neglect (``"damping"``, ``"preload"``, ``"curvature"``), and how good the static
+        model of a nonlinear plate is, or why it is missing (``"stretching"``).
     notes : tuple of str
         Reasons to doubt the numbers.
     units : dict of str to str
@@ -146,10 +146,10 @@ class Estimate:
 def estimate(deck: str | Path | Deck) -> Estimate:
     """Estimate an impact by quick models, and compare them with its run.
 
-    The infinite plate is for small masses. The static plate is for large masses; decks with NONL
-    have it linear and nonlinear. With a DELA segment, velocity and energy are the values at which
-    the peak force reaches the delamination threshold. The models without a mesh neglect DAMP, and
-    the infinite plate neglects PREL. The notes of the result are :class:`FecmWarning`.
+    The infinite plate is for small masses, the static plate for large masses. With NONL the static
+    plate is computed linear and nonlinear. With a DELA segment, velocity and energy are the values
+    at which the peak force reaches the delamination threshold. The models without a mesh neglect
+    DAMP, and the infinite plate neglects PREL. The notes of the result are :class:`FecmWarning`.
 
     Parameters
     ----------
@@ -199,7 +199,7 @@ def estimate_problem(problem: Problem) -> Estimate:
         bent = [*_bent_statically(quick, problem.judge), *bent]
     if bent:
         bent = [
-            f"beyond {problem.judge.limit} h {TOO_SOFT}; {unsafe(curved=problem.judge.curved)}",
+            f"beyond {problem.judge.limit} h, {TOO_SOFT}; {unsafe(curved=problem.judge.curved)}",
             *bent,
         ]
     remarks: dict[str, str] = {}

@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from fecm.results.hdf5_writer import FileSink
 
 
-OWN = "own"  # in place of the name of a law: an object, which the file describes by a text
+OWN = "own"  # in place of the name of a law: the law is an object, described by a text
 
 
 def stored(random: RandomResult) -> Iterator[tuple[str, Column]]:

@@ -221,8 +221,8 @@ class Sweep:
     workers: int | None = option(
         1,
         "Worker processes on this machine.",
-        python="None: if the sweep takes more than some seconds, as many as other work leaves "
-        'processors free.  A script with several needs `if __name__ == "__main__"`.',
+        python="None: one for each free processor, if the sweep takes more than some seconds.  A "
+        'script with several workers needs `if __name__ == "__main__"`.',
         group="Computation",
         metavar="N",
     )

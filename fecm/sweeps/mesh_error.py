@@ -42,9 +42,9 @@ class MeshErrorEstimate:
     elements, refined_elements : int
         Sizes of both meshes.
     distance : float
-        Elements up to here from the load are bisected: a bending wave of the contact.
+        Distance from the load within which elements are bisected: a bending wave of the contact.
     undecided : bool
-        Whether a run ends before its peak: its largest force is then a lower bound of it.
+        Whether a run ends before its peak: its largest force is then a lower bound of the peak.
     exposures, refined_exposures : dict of str to float
         Largest exposure by criterion, 1 at failure; empty without FAIL.
     """

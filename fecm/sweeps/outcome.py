@@ -47,9 +47,9 @@ class Outcome:
     """Results of some cases."""
 
     numbers: list[int]  # of the cases, from 0
-    # (cases,) each, by name: those of :class:`About`, and results, of which those of
-    # :data:`~fecm.results.metrics.METRICS` are NaN if the case failed, or if its end has not
-    # decided them.
+    # (cases,) each, by name: the columns of :class:`About`, and results.  A result of
+    # :data:`~fecm.results.metrics.METRICS` is NaN if the case failed, or if its end has not
+    # decided the result.
     columns: dict[str, Column]
     force: Floats | None = None  # (cases, steps): contact force after every step
 

@@ -19,12 +19,10 @@ from fecm.sweeps.plan import WORTH_WORKERS, Plan, Task, shares_plate, tasks
 from fecm.sweeps.search import USUAL
 
 FILE = 35_000  # bytes of a file with few cases: groups, attributes, the deck
-FEW_CASES = 64  # that show what a case costs once its plate is stepped
-# Steps of a short run, which shows what a run costs before its steps; then runs of so many times
-# more steps follow, until one takes enough seconds longer.
-FEW = 10
-MORE = 8
-ENOUGH = 0.1
+FEW_CASES = 64  # cases that show what a case costs once its plate is stepped
+FEW = 10  # steps of a short run, which shows what a run costs before its steps
+MORE = 8  # factor on the steps of each further run
+ENOUGH = 0.1  # seconds that the last of these runs takes longer than the short run
 UNITS = ((3600.0, "h"), (60.0, "min"), (1.0, "s"))
 
 

@@ -28,7 +28,7 @@ from fecm.sweeps.distributions import (
 
 Correlation = tuple[tuple[float, ...], ...]  # (d, d): rows of the matrix
 Pair = tuple[str, str]
-ROUNDING = 1e-9  # of a matrix that is symmetric, or has a diagonal of 1
+ROUNDING = 1e-9  # rounding error of a symmetric matrix, and of a diagonal of 1
 
 
 def parse_correlation(text: str) -> tuple[Pair, float]:

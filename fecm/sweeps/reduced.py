@@ -184,12 +184,12 @@ class ReducedModel:
     modes : int
         Largest number of bending modes.
     columns : dict of ndarray (n,)
-        Of the cases that were also run in full: ``case``, their numbers; ``peak_force`` and
+        Columns of the cases that were also run in full: ``case``, their numbers; ``peak_force`` and
         ``deflection_ratio`` by the model; ``full_peak_force`` and ``full_deflection_ratio`` by the
         full runs.
     in_full : int
-        Number of cases that were run in full, as the model differs too much: those of the largest
-        energies.
+        Number of cases, with the largest energies, that were run in full because the model differs
+        too much.
     """
 
     modes: int

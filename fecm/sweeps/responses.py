@@ -98,7 +98,7 @@ class Convolution:
         self._block[:, :, row : row + remaining] += self._near[:, :, :remaining] * block
 
     def _add_block(self, start: int, kind: int, tiles: slice) -> None:
-        """Add the effect of a complete block, the last one, of forces on the later steps."""
+        """Add the effect of the last block of forces, which is complete, on the later steps."""
         if start % FAR:
             size, end = (NEAR, BLOCK) if start % BLOCK else (BLOCK, FAR)
             row, rows = start % FAR, end - start % end
@@ -211,7 +211,7 @@ class TipSteps:
         self._begin = self._steps[0].weights[0]
         self.gain: Floats = np.array([step.gain for step in self._steps])[hits.kind] / hits.scale
         # `end` adds r_1 = gain; the sum over earlier forces starts with r_2.  The force of a step
-        # is that at t + theta dt.
+        # is the force at t + theta dt.
         r = np.column_stack([tip_response(step, count + 1)[1:] for step in self._steps])
         before = np.vstack([np.zeros_like(r[:1]), r[:-1]])
         # Acceleration per contact force 1 to `count` steps earlier, (count, kinds).

@@ -234,7 +234,7 @@ class SweepResult(StoredSweep):
         Parameters
         ----------
         kind : {"map", "exceedance", "sensitivity", "scatter"}
-            Kind of picture; those but map are of random sweeps.
+            Kind of picture; all except map are for random sweeps.
         path : str or Path, optional
             File to write instead, as ``fecm plot`` does.  The suffix selects the format.
         quantity : str

@@ -22,7 +22,7 @@ Until = float | str | Mapping[str, float | str]  # what a search reaches; see :f
 RANGE = 100.0  # of velocities relative to the deck's
 FIRST_VELOCITIES = 25  # of the first round of a search
 VELOCITY_ERROR = 1e-6  # relative error of the velocity found
-ROUGH = 1e-4  # relative difference of the peak force from the value searched, beyond which it jumps
+ROUGH = 1e-4  # relative difference of the peak force from its level that counts as a jump
 LONGER = (1, 2, 4, 8)  # times the duration, until the peak at the velocity found is known
 BELOW = "the peak force is below"
 
@@ -86,8 +86,9 @@ def search(backend: Backend, impacts: Impacts, quantity: Sought, levels: Floats)
     """Find the impact velocities at which a quantity of each impact reaches its level, (rows,).
 
     A back end that computes many impacts together gets rounds of velocities from 1/100 to 100 times
-    those of the impacts; the lowest counts. Another back end gets one velocity after the other,
-    starting at the velocities of the impacts. Where the value is open, longer runs decide it.
+    the velocities of the impacts; the lowest velocity counts. Another back end gets one velocity
+    after the other, starting at the velocities of the impacts. If the value is open, longer runs
+    decide it.
     """
     if backend.computes_together:
         return _search_together(backend, impacts, levels)
@@ -244,10 +245,10 @@ def _search_in_turn(
 ) -> Outcome:
     """Find the velocity of one impact.
 
-    Raises CasesError with the reason if there is none.
+    Raises CasesError with the reason if there is no such velocity.
     """
     outcomes: dict[float, Outcome] = {}
-    factors = list(LONGER)  # those that are left
+    factors = list(LONGER)  # factors that are left
     largest = largest_exposure if quantity is Sought.EXPOSURE else peak_force
 
     def trial(velocity: float) -> Impacts:

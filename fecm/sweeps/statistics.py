@@ -31,11 +31,11 @@ class Statistics(NamedTuple):
     Attributes
     ----------
     draws : ndarray of int
-        Number of them.
+        Number of these draws.
     mean, standard_deviation : ndarray
-        Of the quantity.
+        Mean and standard deviation of the quantity.
     quantiles : ndarray (5,)
-        At the probabilities 1, 5, 50, 95 and 99 %.
+        Quantiles at the probabilities 1, 5, 50, 95 and 99 %.
     """
 
     draws: NDArray[np.int64]
@@ -197,7 +197,7 @@ class RandomResult:
     sensitivity : dict of Indices
         Sobol' indices ``first`` and ``total`` (d,) of every quantity, in the order of
         ``design.laws``, and their 95 % intervals ``first_interval`` and ``total_interval`` (d, 2).
-        Empty unless asked for; NaN of a quantity that is constant or lacks values.
+        Empty unless asked for; NaN for a quantity that is constant or lacks values.
     exceedance : Exceedance
         ``quantity``, ``limit``, ``probability``, its 95 % interval from ``lower`` to ``upper``,
         ``draws``, those that have a value, and ``open``, those that ended before they had one, for

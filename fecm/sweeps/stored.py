@@ -1,6 +1,6 @@
 """Stored data of a sweep: values and results of every case by name, and the deck.
 
-:class:`~fecm.sweeps.result.SweepResult` adds to it what can be computed from them.
+:class:`~fecm.sweeps.result.SweepResult` adds what can be computed from these data.
 """
 
 from __future__ import annotations

@@ -183,7 +183,7 @@ def remarks(result: StoredSweep) -> Iterator[str]:
             error = softness(largest, in_plane, preloaded=_has(result, Preload))
             size = f" (at w = {largest:.3g} h {error})"
         curved = _has(result, Curvature) or any(name in result for name in ("radius_x", "radius_y"))
-        yield f"beyond its range {TOO_SOFT}{size}; {unsafe(curved=curved)}"
+        yield f"beyond its range, {TOO_SOFT}{size}; {unsafe(curved=curved)}"
 
 
 def _decided_by_mesh(result: StoredSweep) -> int:

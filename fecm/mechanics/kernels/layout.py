@@ -88,7 +88,7 @@ def kernel_layout(families: list[ElementBlock]) -> Layout:
 def _find_strips(families: list[ElementBlock], axis: int) -> tuple[Indices, Indices]:
     """Return the strip of each element, and the place of the element in the strip.
 
-    A strip consists of elements of a family, each of which shares a side with the next.
+    A strip consists of elements of one family; each element shares a side with the next.
     """
     parts: list[Indices] = []
     for family, before in zip(families, _starts(families), strict=True):

@@ -55,7 +55,7 @@ def report_elements(deck: Deck, rows: NDArray[np.intp], what: str, hint: str = "
 Kinds = tuple[type[model.Segment], ...]
 ALWAYS: Kinds = (model.Coordinates, model.Elements, model.Material)
 IN_AN_IMPACT: Kinds = (model.Impact, model.Indentation)
-# Segments of which only the last is effective.
+# Segments that replace earlier ones of the same kind.
 SINGLE: Kinds = (
     *ALWAYS,
     *IN_AN_IMPACT,

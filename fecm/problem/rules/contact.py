@@ -20,9 +20,9 @@ GREATEST_POWER = 5.0
 # Slopes s_p of permanent indentations: measured ones are near 0.1.
 SMALLEST_SLOPE = 0.02
 USUAL_SLOPES = (0.03, 0.5)
-# Radii of a rigid sphere whose k the law has: in m where UNIT tells, otherwise over the thickness
-# and over the longer side of the plate.  The report's laws and isotropic plates give
-# radii from a third to 25 times that of the indenter.
+# Limits of the radius of the rigid sphere that has the law's k: in m if the deck has UNIT,
+# otherwise over the thickness and over the longer side of the plate.  The report's laws and
+# isotropic plates give radii from a third to 25 times the radius of the indenter.
 LEAST_RADIUS = 3e-5
 GREATEST_RADIUS = 5.0
 LEAST_OF_THICKNESS = 6e-3
@@ -120,7 +120,7 @@ def exchanged_constants(problem: Problem) -> Reports:
 def sphere_radius(deck: model.Deck) -> float:
     """Return the radius of a rigid sphere with the k of a deck, length.
 
-    Equation 3-2 with E2 for E_t.
+    The radius follows from equation 3-2 with E2 for E_t.
     """
     k, e2 = deck.require(model.Indentation).k, deck.require(model.Material).ply.e2
     with np.errstate(all="ignore"):
@@ -131,19 +131,19 @@ def sphere_radius(deck: model.Deck) -> float:
 def doubtful_coefficient(problem: Problem) -> Reports:
     """K belongs to a sphere of an impossible radius.
 
-    By equation 3-2 with E2 it is smaller than 0.03 mm or larger than 5 m (without UNIT: than 0.006
-    of the thickness, or 100 plates).
+    By equation 3-2 with E2 the radius is smaller than 0.03 mm or larger than 5 m (without UNIT:
+    smaller than 0.006 of the thickness, or larger than 100 plates).
 
     Remedy: k in force/length^1.5; `fecm indent estimate`.
     """
     deck, names = problem.deck, unit_names(problem.deck)
-    if not has_real_moduli(deck.require(model.Material).ply, names):  # W435 says so
+    if not has_real_moduli(deck.require(model.Material).ply, names):  # W435 reports it
         return
-    if deck.has(model.Materials):  # a face on a soft core gives way as no ply alone does
+    if deck.has(model.Materials):  # a face on a soft core is softer than its plies
         return
     law, radius = deck.require(model.Indentation), sphere_radius(deck)
     size, real = in_si(COEFFICIENT, names), REAL["contact coefficient"]
-    if size is not None and not real.least <= law.k * size <= real.greatest:  # the same
+    if size is not None and not real.least <= law.k * size <= real.greatest:  # W435 too
         return
     unit = in_si("length", names)
     if unit is not None:

@@ -219,7 +219,7 @@ def warped_plate(problem: Problem) -> Reports:
 
 @rule("W465", Subject.LAMINATE)
 def cure_without_stresses(problem: Problem) -> Reports:
-    """CURE is without PLYS and FAIL.
+    """CURE is given without PLYS and FAIL.
 
     Residual stresses change neither the motion nor the force.
 

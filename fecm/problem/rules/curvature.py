@@ -15,7 +15,7 @@ from fecm.problem.rules.nonlinear import ORDER, not_nine_nodes
 # Slope of the midplane at an edge: an arc has four times its rise over its side.
 SHALLOW = 0.5
 STEEP = 1.0
-THIN = 20.0  # radius over thickness, from which on the shell is thin
+THIN = 20.0  # least radius over thickness of a thin shell
 BALANCED = 1e-9  # force across the midplane by PREL, relative to its parts
 
 
@@ -112,9 +112,9 @@ def thick_panel(problem: Problem) -> Reports:
 
 @rule("W526", Subject.LAMINATE)
 def clamped_membrane(problem: Problem) -> Reports:
-    """CURV, and u or v is restrained at every node.
+    """The deck has CURV, and u or v is restrained at every node.
 
-    That clamps the membrane: the panel is much too stiff.
+    This clamps the membrane: the panel is much too stiff.
 
     Remedy: Restrain u and v only where a support holds them. `fecm new --radius-x` does so.
     """
@@ -123,8 +123,8 @@ def clamped_membrane(problem: Problem) -> Reports:
     if names:
         verb = "are" if len(names) > 1 else "is"
         message = (
-            f"CURV, and {' and '.join(names)} {verb} restrained at every node: that clamps the "
-            "membrane, and the panel is too stiff."
+            f"The deck has CURV, and {' and '.join(names)} {verb} restrained at every node: this "
+            "clamps the membrane, and the panel is too stiff."
         )
         boundary = problem.deck.last(model.Boundary)
         hint = "put 0 for u and v, the first two codes, where no support holds them"
@@ -133,9 +133,9 @@ def clamped_membrane(problem: Problem) -> Reports:
 
 @rule("E527", Subject.LAMINATE)
 def low_order(problem: Problem) -> Reports:
-    """CURV is with a bending order L1 below 3.
+    """CURV is used with a bending order L1 below 3.
 
-    The membrane is integrated with it: 2 leaves motions of u and v without energy.
+    The order L1 also integrates the membrane: 2 leaves motions of u and v without energy.
 
     Remedy: L1 = 3.
     """

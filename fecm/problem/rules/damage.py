@@ -54,7 +54,7 @@ USUAL_TOUGHNESS = 700.0
 # G_IIc/(E2 h) of plates from 0.5 to 20 mm.
 LOWEST_RELATIVE = 1e-7
 HIGHEST_RELATIVE = 5e-3
-ENOUGH_EVALUATIONS = 20  # of FAIL, that a largest exposure over time is not missed
+ENOUGH_EVALUATIONS = 20  # evaluations of FAIL that do not miss the largest exposure over time
 MOST_TWIST = 0.1  # largest |D16| and |D26|, over (D11 D22)^(1/2), without a warning of DELA
 
 
@@ -122,7 +122,7 @@ def coupled_threshold(problem: Problem) -> Reports:
 def twisted_threshold(problem: Problem) -> Reports:
     """Bending twists the plate.
 
-    D16 or D26 is more than a tenth of √(D11 D22). The threshold is that of an isotropic plate.
+    D16 or D26 is more than a tenth of √(D11 D22). The threshold is computed for an isotropic plate.
 
     Remedy: An estimate; a test of this layup is better.
     """
@@ -143,7 +143,8 @@ def twisted_threshold(problem: Problem) -> Reports:
 def strengths_in_another_unit(problem: Problem) -> Reports:
     """A strength does not suit the modulus in its direction.
 
-    It is below 5·10⁻⁵ or above 0.3 of it. The unit that it seems to be in is named.
+    It is below 5·10⁻⁵ or above 0.3 of the modulus. The finding names the unit that it seems to be
+    in.
 
     Remedy: Strengths in the moduli's unit.
     """
@@ -163,12 +164,12 @@ def _strengths(problem: Problem) -> list[tuple[model.Allowables, model.Ply]]:
 def _strengths_in_another_unit(
     card: model.Allowables, ply: model.Ply, names: dict[str, str]
 ) -> Reports:
-    if not has_real_moduli(ply, names):  # W435 says so
+    if not has_real_moduli(ply, names):  # W435 reports it
         return
     size = in_si(MODULUS, names)
     guessed = likely_unit(ply.e1, MODULUS, USUAL_MODULUS) if size is None else ""
     unit_of_stress = size or USED[MODULUS].get(guessed, 1.0)
-    wrong: dict[str, str] = {}  # what is said of a strength
+    wrong: dict[str, str] = {}  # fault of each strength
     likely = Counter[str]()
     for (name, modulus, usual), strength in zip(SHARES, card.row(), strict=False):
         value, stiffness = float(strength), float(getattr(ply, modulus.lower()))
@@ -196,8 +197,8 @@ def _strengths_in_another_unit(
 def strengths_in_another_order(problem: Problem) -> Reports:
     """YT or XC is above XT, YC above XC, or YC below YT in a ply with E1 > 2 E2.
 
-    The order that the values seem to be in is named. Plies of boron fibres, whose XC is above XT,
-    are known by E1 > 5 E2 and G12 < 0.35 E2.
+    The finding names the order that the values seem to be in. In plies of boron fibres XC may be
+    above XT; E1 > 5 E2 and G12 < 0.35 E2 tell these plies.
 
     Remedy: XT, XC, YT, YC, S12, S13, S23.
     """
@@ -239,7 +240,7 @@ def _faults(strengths: Sequence[float], ply: model.Ply) -> dict[str, str]:
 def weak_in_shear(problem: Problem) -> Reports:
     """A shear strength is below a quarter of YT in a ply with E1 > 2 E2.
 
-    The unit that the value seems to be in is named.
+    The finding names the unit that the value seems to be in.
 
     Remedy: S12, S13 and S23 in the unit of the other strengths.
     """
@@ -311,7 +312,7 @@ def too_many_delaminations(problem: Problem) -> Reports:
 
 @rule("W471", Subject.DAMAGE)
 def strengths_without_criteria(problem: Problem) -> Reports:
-    """ALLO is without FAIL.
+    """ALLO is given without FAIL.
 
     No exposure is computed.
 
@@ -334,7 +335,7 @@ def few_evaluations(problem: Problem) -> Reports:
     """
     cards = [macro for macro in flat(problem.program) if macro.word == "FAIL"]
     count = problem.work.passes["FAIL"]
-    if not cards or not problem.has_impact or count == 0:  # W510 says so
+    if not cards or not problem.has_impact or count == 0:  # W510 reports it
         return
     loops = [item for item in problem.program if isinstance(item, Loop)]
     stepping = [loop for loop in loops if "RODP" in {macro.word for macro in flat(loop.body)}]
@@ -372,10 +373,10 @@ def preload_beyond_strength(problem: Problem) -> Reports:
 
 @rule("W541", Subject.DAMAGE)
 def threshold_of_a_sandwich(problem: Problem) -> Reports:
-    """DELA is of no use: the plate is a sandwich.
+    """DELA has no effect: the plate is a sandwich.
 
     The threshold holds for a solid laminate. The faces of a sandwich delaminate, or leave the
-    core, at a small part of it. No threshold is computed.
+    core, at a small fraction of the threshold, which is not computed.
 
     Remedy: Remove DELA; FAIL has the exposures of faces and core.
     """
@@ -392,7 +393,8 @@ def threshold_of_a_sandwich(problem: Problem) -> Reports:
 def puck_of_a_fabric(problem: Problem) -> Reports:
     """FAIL leaves out Puck's criterion for the plies of a fabric.
 
-    The criterion is for unidirectional plies. E2 is near E1, and G12 far below.
+    The criterion holds for unidirectional plies. A ply is a fabric if E2 is near E1, and G12 far
+    below.
 
     Remedy: The other criteria are evaluated; none of them is made for fabrics either.
     """
@@ -439,7 +441,7 @@ def strengths_of_missing_material(deck: model.Deck) -> Reports:
 def layers_without_strengths(problem: Problem) -> Reports:
     """FAIL has no strengths of some layers.
 
-    Their exposures are not known (NaN), nor are those of the interfaces beside them.
+    The exposures of these layers and of the interfaces beside them are not known (NaN).
 
     Remedy: A pair of cards on ALLO for their material.
     """

@@ -17,7 +17,8 @@ from fecm.problem.problem import Problem
 THICKNESS_TOLERANCE = 1.0e-6  # difference of thicknesses that is rounding
 LARGEST_RATIO = 1e12  # of the transverse shear moduli of a ply
 THINNEST = 1.0e-4  # thickness over the longer side of the plate
-# Thickness over the distance between supports, above which plate theory is off, and fails.
+# Thickness over the distance between supports above which plate theory is inaccurate, and above
+# which it fails.
 THICK = 0.1
 THICKEST = 0.25
 # Difference from elasticity: docs/plies.md, from Pagano's exact solution.
@@ -354,7 +355,7 @@ def thick_plate(problem: Problem) -> Reports:
         card = problem.deck.last(model.Shear)
         has_equilibrium = card is not None and card.equilibrium
         subject = "the deck has SHEA EQUI, which" if has_equilibrium else "SHEA EQUI"
-        hint = f"{subject} brings the deflection of this example to 1 % at 0.1"
+        hint = f"{subject} reduces the error of this deflection to 1 % at 0.1"
         yield Report(f"the {what}: {ERRORS}", place, hint)
 
 

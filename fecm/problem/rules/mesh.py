@@ -26,7 +26,7 @@ SHOWN = 3  # hanging nodes that have a finding of their own
 declare(
     "E301",
     Subject.MESH,
-    "A node, or one that is generated, is outside 1 to NUMNP.",
+    "A node of a card, or a generated node, is outside 1 to NUMNP.",
     remedy="Correct node, increment or NUMNP.",
 )
 declare(

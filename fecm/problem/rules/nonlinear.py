@@ -16,13 +16,13 @@ from fecm.problem.parts import THETA_X, has_assumed_shear
 from fecm.problem.problem import Problem
 from fecm.problem.rules.cards import report_elements
 
-ORDER = 3  # bending order L1, by which the membrane is integrated too
+ORDER = 3  # bending order L1, which also integrates the membrane
 SAME_LINE = 1e-9  # difference of coordinates on one line, over the size of the mesh
 
 
 @rule("E490", Subject.LAMINATE)
 def held_plane(problem: Problem) -> Reports:
-    """NONL, and u and v are restrained at every node.
+    """The deck has NONL, and u and v are restrained at every node.
 
     The plate is too stiff: under 20 J on 4.4 mm in the fixture D7136 the force is 12 % too high.
 
@@ -37,7 +37,7 @@ def held_plane(problem: Problem) -> Reports:
     if inside:
         count = len(inside)
         cards = "this card of BOUN" if count == 1 else f"the {count} cards of BOUN like this one"
-    message = "NONL, and u and v are restrained at every node: the plate is too stiff."
+    message = "The deck has NONL, and u and v are restrained at every node: the plate is too stiff."
     hint = (
         f"put 0 for u and v, the first two codes, on {cards}, so that only supports hold them; "
         "fecm new --nonlinear --in-plane writes such supports"
@@ -47,7 +47,7 @@ def held_plane(problem: Problem) -> Reports:
 
 @rule("E491", Subject.LAMINATE)
 def without_assumed_shear(problem: Problem) -> Reports:
-    """NONL is without SHEA MITC.
+    """NONL is used without SHEA MITC.
 
     Full quadrature of the transverse shear locks before the plate stretches.
 
@@ -84,7 +84,7 @@ def not_nine_nodes(problem: Problem) -> Bools:
 
 @rule("E493", Subject.LAMINATE)
 def consistent_mass_of_nonlinear_plate(problem: Problem) -> Reports:
-    """NONL is with CMAS.
+    """NONL is used with CMAS.
 
     Nonlinear plates take the lumped mass.
 
@@ -97,9 +97,9 @@ def consistent_mass_of_nonlinear_plate(problem: Problem) -> Reports:
 
 @rule("E494", Subject.LAMINATE)
 def other_order(problem: Problem) -> Reports:
-    """NONL is with a bending order L1 other than 3.
+    """NONL is used with a bending order L1 other than 3.
 
-    The membrane is integrated with it: 2 leaves motions of u and v without energy.
+    The order L1 also integrates the membrane: 2 leaves motions of u and v without energy.
 
     Remedy: L1 = 3.
     """
@@ -111,7 +111,7 @@ def other_order(problem: Problem) -> Reports:
 
 @rule("W495", Subject.LAMINATE)
 def open_symmetry(problem: Problem) -> Reports:
-    """NONL or CURV, and a line of symmetry is free to move across itself.
+    """With NONL or CURV, a line of symmetry is free to move across itself.
 
     On a straight edge the slope across it is held, as by symmetry, but w and the in-plane
     displacement across it are free.

@@ -188,7 +188,8 @@ def blank_radius(problem: Problem) -> Reports:
 def patch_away_from_node(problem: Problem) -> Reports:
     """The patch is away from ROD's node.
 
-    It is further than its radius and the sides of the elements there. The force acts on the patch.
+    The distance is above its radius and the sides of the elements there. The force acts on the
+    patch.
 
     Remedy: x0 and y0 blank for the node of ROD.
     """

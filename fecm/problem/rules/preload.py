@@ -31,7 +31,7 @@ def no_preload(card: model.Preload) -> Reports:
 
 @rule("E483", Subject.LAMINATE)
 def preload_of_coupled_laminate(problem: Problem) -> Reports:
-    """PREL is with a laminate whose B is not zero.
+    """PREL is used with a laminate whose B is not zero.
 
     Such a laminate bends under a force in its plane.
 
@@ -66,7 +66,7 @@ def large_preload(problem: Problem) -> Reports:
 
 @rule("E499", Subject.LAMINATE)
 def preload_of_unlike_laminates(problem: Problem) -> Reports:
-    """PREL is with laminates of different stiffness.
+    """PREL is used with laminates of different stiffness.
 
     Their strains under the same force differ: the forces in such a plate are not uniform.
 
@@ -77,14 +77,14 @@ def preload_of_unlike_laminates(problem: Problem) -> Reports:
         return
     first, *other_stiffnesses = (problem.plate.laminates[n].A for n in problem.used_laminates)
     if any(np.abs(A - first).max() > ROUNDING * np.abs(first).max() for A in other_stiffnesses):
-        message = "The laminates differ in A: a force in the plane is not uniform, as PREL says."
+        message = "The laminates differ in A: a force in the plane is not uniform, but PREL is."
         hint = "preload it by a static solution before the impact, with NONL: FORC, TANG to CONV"
         yield Report(message, card.place(), hint)
 
 
 @rule("W557", Subject.LAMINATE)
 def preload_around_hole(problem: Problem) -> Reports:
-    """PREL is with a plate that has a hole.
+    """PREL is used with a plate that has a hole.
 
     PREL is uniform over the plate; around a hole the force in the plane is not.
 
@@ -94,7 +94,7 @@ def preload_around_hole(problem: Problem) -> Reports:
     if card is None or not any(card.forces) or not (count := holes(problem.mesh)) > 0:
         return
     has = "a hole" if count == 1 else f"{count} holes"
-    message = f"The plate has {has}: a force in the plane is not uniform, as PREL says."
+    message = f"The plate has {has}: a force in the plane is not uniform, but PREL is."
     hint = "preload it by a static solution before the impact, with NONL: FORC, TANG to CONV"
     yield Report(message, card.place(), hint)
 

@@ -239,7 +239,7 @@ def elements_without_assumed_shear(problem: Problem) -> Reports:
     for family in problem.families:
         wrong[family.rows] = not assumed_shear.uses_assumed_shear(family)
     what = "has no assumed shear strains (SHEA MITC)"
-    hint = "quadrilaterals with 4 or with 9 nodes have; without MITC any element will do"
+    hint = "quadrilaterals with 4 or 9 nodes have them; without MITC any element will do"
     yield from report_elements(problem.deck, np.flatnonzero(wrong), what, hint)
 
 

@@ -16,7 +16,8 @@ from fecm.mechanics.stiffness_product import SAFE
 from fecm.mechanics.strains import strain_of_deflection
 from fecm.problem.problem import Problem
 
-# Fraction of the critical time step below which a step's change, of its square, is rounded off.
+# Fraction of the critical time step below which rounding loses the change of a step.  The change is
+# proportional to the square of the step.
 LEAST_STEP = math.sqrt(sys.float_info.epsilon)
 WASTEFUL = 0.01  # time step over the stable one
 UNSTABLE = "E508"
@@ -155,7 +156,7 @@ WORST_RATE = 0.01  # relative error of the rate of damping
 def negative_damping(card: model.Damping) -> Reports:
     """The damping a of DAMP is negative.
 
-    Remedy: 0 is none.
+    Remedy: 0 means no damping.
     """
     if not card.coefficient >= 0.0:
         message = f"The damping a is {card.coefficient:g}; it must not be negative."
@@ -235,11 +236,11 @@ def overdamped(problem: Problem) -> Reports:
 
 
 def clamped_frequency(problem: Problem) -> float:
-    """Lowest natural frequency of a clamped rectangle of the plate's size, radians over time.
+    """Return the lowest natural frequency of a clamped plate of the same size, radians over time.
 
-    Rayleigh's quotient of products of the modes of clamped beams, whose integrals are 22.373^2
-    and 12.303^2; thin plate theory, without the coupling D16, D26.  With the preload, and with the
-    curvature, where u and v are held.
+    It is Rayleigh's quotient of products of the modes of clamped beams, whose integrals are
+    22.373^2 and 12.303^2, in thin plate theory without the coupling D16, D26.  The preload counts,
+    and so does the curvature, where u and v are held.
     """
     D = problem.laminate.D
     stretch = strain_of_deflection(problem.plate.curvature)

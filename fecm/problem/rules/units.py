@@ -74,9 +74,10 @@ OTHERS = {
 
 
 def likely_unit(value: float, dimension: str, usual: float) -> str:
-    """The unit of :data:`USED` in which a value comes nearest to the usual one.
+    """Return the unit of :data:`USED` in which a value comes nearest to the usual value.
 
-    `usual` is in m, N and s.  Empty if no unit brings the value within a factor of :data:`REACH`.
+    `usual` is in m, N and s.  The result is empty if no unit brings the value within a factor of
+    :data:`REACH`.
     """
     if not (0.0 < abs(value) < math.inf and 0.0 < usual < math.inf):
         return ""
@@ -109,7 +110,7 @@ def looks_like(value: float, dimension: str, usual: float, names: dict[str, str]
 
 
 def has_real_moduli(ply: Ply, names: dict[str, str]) -> bool:
-    """Whether E1 and E2 are in the range of real materials; True where the units are unknown."""
+    """Return whether E1 and E2 are in the range of real materials; True for unknown units."""
     factor = in_si(MODULUS, names)
     least, greatest = REAL["matrix modulus"].least, REAL["fibre modulus"].greatest
     return factor is None or all(least <= e * factor <= greatest for e in (ply.e1, ply.e2))
@@ -139,8 +140,8 @@ def unit_of_another_kind(card: model.Units) -> Reports:
 def unreal_values(problem: Problem) -> Reports:
     """A value is outside the range of real materials in the units of UNIT.
 
-    Modulus, density, thickness, velocity and k are judged. The unit that the value seems to be in
-    is named.
+    Modulus, density, thickness, velocity and k are judged. The finding names the unit that the
+    value seems to be in.
 
     Remedy: Correct the values or UNIT. Nothing is converted.
     """
@@ -164,7 +165,7 @@ def unreal_values(problem: Problem) -> Reports:
 
 
 def _judged(problem: Problem) -> list[tuple[str, Record, str, float]]:
-    """Kind in :data:`REAL`, card, name and value of the fields that are judged."""
+    """Return kind in :data:`REAL`, card, name and value of the fields that are judged."""
     deck = problem.deck
     ply = deck.require(model.Material).ply
     layers = [layer for laminate in deck.layers.values() for layer in laminate]

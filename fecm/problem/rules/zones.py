@@ -158,7 +158,7 @@ def coupled_inertia(problem: Problem) -> Reports:
 
 @rule("W466", Subject.POINTS)
 def soft_core(problem: Problem) -> Reports:
-    """A core is far softer in shear than the faces, and SHEA is without EQUI.
+    """A core is far softer in shear than the faces, and the deck has no SHEA EQUI.
 
     G13 of a ply is below 1/50 of the largest. The sum of the plies' shear stiffnesses is then
     several times too large.
