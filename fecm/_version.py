@@ -1,6 +1,7 @@
 """The version, in its own file so that reading it imports nothing else.
 
-The build writes it from the tag; a checkout that was never built has that of the last release.
+The build writes it from the tag. A checkout that was never built has the version of the last
+release.
 """
 
 from importlib import import_module

@@ -175,7 +175,7 @@ NO_RODP_HINT = "RODP takes an impact step; use it instead of EXCD"
 
 @rule("E519", Subject.PROGRAM)
 def plate_at_rest(problem: Problem) -> Reports:
-    """ROD, EXPE or PROJ are given without RODP, and nothing moves the plate.
+    """ROD, EXPE or PROJ lack RODP, and nothing moves the plate.
 
     Remedy: RODP instead of EXCD.
     """
@@ -188,7 +188,7 @@ def plate_at_rest(problem: Problem) -> Reports:
 
 @rule("W520", Subject.PROGRAM)
 def nothing_hits(problem: Problem) -> Reports:
-    """ROD, EXPE or PROJ are given without RODP, and EXCD moves the plate: nothing hits.
+    """ROD, EXPE or PROJ lack RODP, and EXCD moves the plate: nothing hits it.
 
     Statics and natural modes of a plate do not need its impact, and are not doubted.
 
