@@ -185,14 +185,14 @@ def identification_tables(fit: Identification) -> Iterator[Table]:
     values = tuple(_value_row(fit, name) for name in fit.values)
     yield Table(values, ("parameter", "value", "standard error", "start"), "Fitted values")
     if len(fit.values) > 1:
-        rows = tuple(
+        rows: list[Row] = [
             (name, *(ShownNumber(value, f"{value:.3f}") for value in row))
             for name, row in zip(fit.values, fit.correlation.tolist(), strict=True)
-        )
-        yield Table(rows, ("correlation", *fit.values), "Correlations")
+        ]
+        yield Table(tuple(rows), ("correlation", *fit.values), "Correlations")
     if fit.plate_errors:
-        rows = tuple(_plate_error_row(fit, name) for name in fit.values)
-        yield Table(rows, ("1 % more in the deck", *fit.plate_errors), PLATE_ERRORS)
+        rows = [_plate_error_row(fit, name) for name in fit.values]
+        yield Table(tuple(rows), ("1 % more in the deck", *fit.plate_errors), PLATE_ERRORS)
 
 
 def _quality(fit: Identification) -> Table:
