@@ -13,17 +13,17 @@ from fecm.results.schema import FILES, OF_QUANTITY, TEXTS, Dataset, Form, datase
 HEAD = """\
 # Datasets
 
-Look up the shape, the dimension and the meaning of every dataset here. `fecm info` lists the datasets
-of one file:
+Look up the shape, the dimension and the meaning of every dataset here. `fecm info` lists the
+datasets of one file:
 
 ```console
 $ fecm info RESULT.h5
 ```
 
-[Results](results.md) explains what the datasets mean together. Names in a shape are sizes: `rows` is
-the number of rows of the group, `numnp` and `numel` count nodes and elements, `npt` and `nps` points
-of an element, `ndf` degrees of freedom of a node. `NAME` stands for any name. Numbers without a
-dimension are pure.
+[Results](results.md) explains what the datasets mean together. Names in a shape are sizes: `rows`
+is the number of rows of the group, `numnp` and `numel` count nodes and elements, `npt` and `nps`
+points of an element, `ndf` degrees of freedom of a node. `NAME` stands for any name. Numbers
+without a dimension are pure.
 """
 TITLES = {Form.RUN: "Runs", Form.SWEEP: "Sweeps", Form.LOCATION: "Locations"}
 TABLE = ["| dataset | shape | dimension | what it is |", "|---|---|---|---|"]
