@@ -167,7 +167,7 @@ def test_a_peak_that_is_known_at_some_end_is_that_of_the_whole_run(mass: float) 
             0.5 * mass * 2330.0**2,
         )
         found = impact_metrics(
-            force, run.time[:steps], IndentationMetrics(none, none, none), hit, motion
+            force, run.time[:steps], IndentationMetrics(none, none, none, none), hit, motion
         )
         peak = found.columns["peak_force"][0]
         if not math.isnan(peak):

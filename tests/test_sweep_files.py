@@ -107,7 +107,7 @@ def test_a_sweep_is_the_same_as_itself_run_again(swept: Path, tmp_path: Path) ->
     assert again.read_bytes() == swept.read_bytes()
     done = call("diff", swept, again)
     assert done.exit_code == 0
-    assert done.stdout.endswith("same: 21 datasets within rtol 0, atol 0\n")
+    assert done.stdout.endswith("same: 22 datasets within rtol 0, atol 0\n")
 
 
 @pytest.mark.parametrize(

@@ -49,6 +49,10 @@ SUMMARY = {
         "of the plate, the indentation and the projectile",
         "force*length",
     ),
+    "contact_loop": Quantity(
+        "area of the loop of contact force and indentation: work that the indentation keeps",
+        "force*length",
+    ),
 }
 THRESHOLD_FORCE = "threshold_force"
 # Metrics of decks with a delamination threshold.
@@ -121,11 +125,12 @@ PART = 16  # cases whose forces stay in the cache
 
 
 class IndentationMetrics(NamedTuple):
-    """Largest, last and permanent indentation of cases (length)."""
+    """Largest, last and permanent indentation of cases (length), and work on it up to the end."""
 
     largest: Floats
     last: Floats
     permanent: Floats
+    work: Floats  # of the contact force, force*length
 
 
 class Projectiles(NamedTuple):
@@ -207,6 +212,7 @@ def impact_metrics(
         "impulse": where(finished, impulse),
         "rebound_velocity": where(finished, rebound),
         "energy_absorbed": where(finished, 0.5 * mass * (velocity**2 - rebound**2)),
+        "contact_loop": where(finished, indentation.work),
     }
     if limit is not None:
         columns[THRESHOLD_FORCE] = limit.copy()

@@ -49,6 +49,7 @@ def _summarised(stored: Stored) -> Metrics | None:
         largest=indentation.max(keepdims=True, initial=0.0),
         last=indentation[-1:],
         permanent=np.array([_number(history.get("permanent_indentation"))]),
+        work=stored["energy/contact_work"][-1:],
     )
     initial = _number(stored.attributes_of("energy").get("initial"))
     velocity = np.float64(_impact_velocity(stored))

@@ -413,6 +413,7 @@ def _impact(result: Stored) -> list[Row]:
         ]
         if not math.isnan(metrics_of(result)["rebound_velocity"]):
             lines.append(("rebound", _rebound(result)))
+            lines.append(("contact loop", _contact_loop(result)))
     return [*lines, ("energy balance", _energy_balance(result))]
 
 
@@ -492,6 +493,14 @@ def _rebound(result: Stored) -> str:
         f"{_quantity(result, metrics['energy_absorbed'], 'force*length')} "
         "absorbed (left in plate, indentation and projectile)"
     )
+
+
+def _contact_loop(result: Stored) -> str:
+    """Format the work that the indentation keeps, and its share of the impact energy."""
+    work = metrics_of(result)["contact_loop"]
+    initial = float(result.attributes_of("energy")["initial"])
+    share = f", {work / initial:.1%} of the impact energy" if initial else ""
+    return f"{_quantity(result, work, 'force*length')} kept by the indentation{share}"
 
 
 def _energy_balance(result: Stored) -> str:

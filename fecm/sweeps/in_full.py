@@ -259,7 +259,10 @@ def _outcome(
     about = result.attributes_of("history")
     permanent = np.array([about.get("permanent_indentation", 0.0)])
     indentation = IndentationMetrics(
-        np.maximum(depth.max(keepdims=True), 0.0), depth[-1:], permanent
+        largest=np.maximum(depth.max(keepdims=True), 0.0),
+        last=depth[-1:],
+        permanent=permanent,
+        work=result["energy/contact_work"][-1:],
     )
     strike = strike_of(checked.deck)
     metrics = impact_metrics(

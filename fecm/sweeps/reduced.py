@@ -113,7 +113,7 @@ class ReducedImpacts:
         last = law.of_law(state.contact).indentation
         return ComputedImpacts(
             force=force,
-            indentation=IndentationMetrics(deepest, last, permanent),
+            indentation=IndentationMetrics(deepest, last, permanent, state.contact_work),
             unconverged_steps=state.unconverged_steps,
             plate=record.deflection,
             error=balance_errors(force, Work(np.array(done), none), tips),

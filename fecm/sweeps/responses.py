@@ -321,7 +321,9 @@ def by_numpy(response: Floats, node_mass: float, tips: TipSteps) -> tuple[Comput
         if not (step + 1) % BLOCK or step + 1 == steps:
             done.append(state.contact_work + plate_work)
     permanent = law.permanent(state.memory, state.contact)
-    indentation = IndentationMetrics(deepest, state.contact.indentation, permanent)
+    indentation = IndentationMetrics(
+        deepest, state.contact.indentation, permanent, state.contact_work
+    )
     work = Work(np.array(done), node_mass * largest_ddw**2 / (8.0 * tips.dt**2))
     error = balance_errors(force, work, tips)
     return ComputedImpacts(
@@ -422,7 +424,10 @@ def _by_kernels(
     return ComputedImpacts(
         force=force.T,
         indentation=IndentationMetrics(
-            results[ResultRow.DEEPEST], results[ResultRow.INDENTATION], results[ResultRow.PERMANENT]
+            largest=results[ResultRow.DEEPEST],
+            last=results[ResultRow.INDENTATION],
+            permanent=results[ResultRow.PERMANENT],
+            work=results[ResultRow.CONTACT_WORK],
         ),
         unconverged_steps=results[ResultRow.UNCONVERGED].astype(np.int64),
         plate=Deflection(

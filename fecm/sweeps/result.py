@@ -42,6 +42,8 @@ if TYPE_CHECKING:
 
     from fecm.results.hdf5_reader import FileContents
 
+LATER = {"contact_loop"}  # results of every case that earlier files lack
+
 
 class SweepResult(StoredSweep):
     """Result of a sweep.
@@ -391,10 +393,11 @@ def sweep_of(contents: FileContents, *, history: bool = True) -> SweepResult:
     cases, summary = _group(contents, "cases/"), _group(contents, "summary/")
     required_names = ("dt", "steps", "unsettled_steps")
     steps = {n: contents[f"history/{n}"] for n in required_names if f"history/{n}" in contents}
-    required = (*SUMMARY, "status")
-    if not (summary.keys() >= {*required} and steps.keys() >= {"dt", "steps"}):
+    names = (*SUMMARY, "status")
+    required = {*names} - LATER
+    if not (summary.keys() >= required and steps.keys() >= {"dt", "steps"}):
         raise ResultFileError(f"{path}: the result of the sweep is incomplete")
-    summary = {name: summary[name] for name in required} | summary  # in their order
+    summary = {name: summary[name] for name in names if name in summary} | summary  # in order
     groups = ("history/", "cases/", "summary/")
     if first_misfit(contents, [dataset for dataset in contents if dataset.startswith(groups)]):
         message = f"{path}: the data of this sweep do not match in type or number of cases"

@@ -150,11 +150,12 @@ enum { GIVEN_K, GIVEN_Q, GIVEN_CRITICAL, GIVEN_SLOPE, GIVEN_VELOCITY, GIVEN_FACT
 
 /* Rows of `found`: largest, last and permanent indentation; largest and last displacement of the plate, and
  * its largest second difference; largest error of the energies, initial energy, and number of steps whose
- * contact iteration did not converge; largest change of the displacement in a step, work on the plate, and
- * largest compliance. */
+ * contact iteration did not converge; largest change of the displacement in a step, work on the plate,
+ * largest compliance, and work on the indentation. */
 enum {
     FOUND_DEEPEST, FOUND_INDENTATION, FOUND_PERMANENT, FOUND_HIGHEST, FOUND_W, FOUND_LARGEST_DDW, FOUND_LOST,
-    FOUND_INITIAL, FOUND_UNCONVERGED, FOUND_LARGEST_DW, FOUND_PLATE_WORK, FOUND_COMPLIANCE, FOUND
+    FOUND_INITIAL, FOUND_UNCONVERGED, FOUND_LARGEST_DW, FOUND_PLATE_WORK, FOUND_COMPLIANCE,
+    FOUND_CONTACT_WORK, FOUND
 };
 
 /* Strains of elements with the same nodes present.  `width` is `points` padded to a multiple of four.  `tying`

@@ -398,6 +398,7 @@ INLINE void NAME(store_found)(const Sweep *x, const Cases *c) {
             [FOUND_LARGEST_DW] = c->fastest[lane],
             [FOUND_PLATE_WORK] = c->plate_work[lane],
             [FOUND_COMPLIANCE] = c->compliance[lane],
+            [FOUND_CONTACT_WORK] = c->contact_work[lane],
         };
         for (int row = 0; row < FOUND; row++) x->found[row * x->stride + c->at[lane]] = found[row];
     }
