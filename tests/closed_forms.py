@@ -304,7 +304,7 @@ def hertz_impact(mass: float, velocity: float, k: float) -> tuple[float, ...]:
 
 
 def acr_impact(mass: float, velocity: float, k: float, alpha_cr: float) -> tuple[float, ...]:
-    """The same with the permanent indentation of equation 3-7, F (x/d)^2.5 in unloading.
+    """The same by equation 3-7, F (x/d)^2.5 in unloading; and the energy that is lost.
 
     The energy of the rebound is 2/7 F d, which takes d/v times the integral of
     dx/sqrt(1 - x^3.5) from 0 to 1.
@@ -312,7 +312,8 @@ def acr_impact(mass: float, velocity: float, k: float, alpha_cr: float) -> tuple
     deepest, force, whole, _ = hertz_impact(mass, velocity, k)
     d = alpha_cr**0.4 * deepest**0.6
     rebound = math.sqrt(4.0 / 7.0 * force * d / mass)
-    return deepest, force, whole / 2.0 + 2.0 / 7.0 * beta(2.0 / 7.0, 0.5) * d / rebound, rebound
+    duration = whole / 2.0 + 2.0 / 7.0 * beta(2.0 / 7.0, 0.5) * d / rebound
+    return deepest, force, duration, rebound, 0.5 * mass * (velocity**2 - rebound**2)
 
 
 def two_bodies(time: float) -> tuple[float, ...]:
@@ -436,6 +437,7 @@ EXPECTED: dict[str, Sequence[float | None]] = {
     "rod-pulse": (None, None, None, IMPULSE / (7.33e-4 * math.pi * 0.625**2 / 4.0), None),
     "rod-waves": (BAR_SPEED, 1000.0, math.pi * BAR_SPEED, math.pi * BAR_SPEED),
     "indentation": indentation(),
+    "permanent-indentation": (0.0, 0.094),
     "rigid-target": (
         *hertz_impact(2.0e-4, 100.0, 1.0e6), *acr_impact(2.0e-4, 100.0, 1.0e6, 1.2e-3)
     ),

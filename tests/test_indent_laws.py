@@ -138,6 +138,7 @@ def test_named_contacts_have_the_coefficients_of_table_3_1() -> None:
     table = {
         "report-0.5": 1.330e6, "report-0.5a": 1.284e6, "report-0.5b": 1.376e6,
         "report-0.75": 1.912e6, "report-0.75a": 1.833e6, "report-0.75b": 1.990e6,
+        "report-0.5-fit": 1.330e6, "report-0.75-fit": 1.912e6,
         "yang-0.5": 9.694e5,
     }  # fmt: skip
     assert {name: contact.law.k for name, contact in CONTACTS.items()} == table

@@ -352,7 +352,7 @@ def test_figures_of_series_and_of_waves_are_those_of_the_reference_files() -> No
     assert fronts[:5] == pytest.approx(given, rel=1e-13)
     columns = ("c_n_in/s", "ray_dir_deg")
     given = [of("waves_wavefront_rays.csv", "extension", c, normal_deg="45") for c in columns]
-    assert fronts[5:] == pytest.approx(given, rel=1e-10)
+    assert fronts[5:7] == pytest.approx(given, rel=1e-10)
     for quantity, ratio in (("ω, wavelength 10 h", "10"), ("ω, wavelength h", "1")):
         value = of(
             "waves_dispersion.csv",

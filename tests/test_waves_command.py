@@ -69,7 +69,9 @@ def test_speeds_of_the_reports_deck_are_the_reference_files() -> None:
 
 def test_fronts_of_the_reports_deck_are_the_reference_files() -> None:
     done = call("waves", "fronts", LONG, "--step", "45", "--time", "2e-6", "1e-5")
-    assert done.stdout.splitlines()[0] == "mode,normal_deg,time,x,y,ray_deg"
+    assert done.stdout.splitlines()[0] == (
+        "mode,normal_deg,time,x,y,ray_deg,length_per_radian,strength"
+    )
     found = {(r["mode"], float(r["normal_deg"]), float(r["time"])): r for r in rows(done)}
     assert len(found) == 5 * 9 * 2
     for row in table("waves_wavefront_rays.csv"):
@@ -116,7 +118,7 @@ def test_constants_of_a_ply_stand_for_a_named_one() -> None:
         ),
         (
             ("fronts", "--step", "90", "--time", "1e-5"),
-            "mode,normal_deg,time (s),x (in),y (in),ray_deg",
+            "mode,normal_deg,time (s),x (in),y (in),ray_deg,length_per_radian (in),strength",
         ),
     ],
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import click
 import numpy as np
 from click import option
 
+from fecm._typing import Floats
 from fecm.cli.common import RefusedError, echo, note
 from fecm.cli.laminate_options import LaminateOptions, as_options, laminate_options
 from fecm.cli.options import (
@@ -33,7 +35,7 @@ from fecm.deck import catalogue
 from fecm.deck.catalogue import CONTACTS
 from fecm.deck.model import Deck, Indentation
 from fecm.deck.reader import Reader, load_text
-from fecm.deck.units import KNOWN, convert, unit_names
+from fecm.deck.units import KNOWN, convert, unit_names, units_of
 from fecm.mechanics import contact_law
 from fecm.mechanics.contact_law import LinearPermanent, YangSunPermanent, hertz_coefficient
 from fecm.mechanics.half_space import effective_stiffness, indentation_modulus
@@ -45,6 +47,15 @@ from fecm.studies.indentation_test.study import fit_law
 from fecm.studies.indentation_test.turns import read_test
 
 PARAMETERS = ("acr", "columns", "units")  # of fits, which messages name
+# Largest indentation over the critical one, where --permanent ends by default: of 3-8, and of 3-7.
+REACH = (6.0, 2.0)
+Row = tuple[object, ...]  # of a table; the first value is the name of the law
+RATE = (
+    "The report loaded at about 10 lb/s. k hardly depended on the rate from 5 to 50 lb/s, and fell "
+    "below\n1 lb/s; the k of yang-0.5, read from a dial gage under held loads, is 27 % less than "
+    "the k of report-0.5.\nThe report uses q = 2.5 and 2.0; q = 2.2 and 1.8 (the laws -fit) fit "
+    "its unloading curves best."
+)
 
 
 @click.group("indent", cls=HelpGroup)
@@ -154,28 +165,62 @@ def _law(deck: Path) -> tuple[Deck, Indentation]:
 class CurveOptions:
     """Argument and options of ``fecm indent curve``."""
 
-    deck: Path
+    deck: Path | None
+    contacts: tuple[str, ...] | None
+    units: str | None
     path: tuple[float, ...] | None  # indentations at which it turns, or a range of them
     points: int
+    permanent: bool
     rigidity: bool
     q: float | None
     alpha_cr: float | None
     line: tuple[float, float] | None  # alpha_p and s_p
     targets: OutputPaths
 
+    def laws(self) -> tuple[dict[str, Indentation], dict[str, str]]:
+        """Return the named laws, or the law of the deck, and the names of their units."""
+        if (self.deck is None) == (self.contacts is None):
+            raise click.UsageError("give a DECK or --contact, not both")
+        if self.deck is not None:
+            if self.units is not None:
+                raise click.UsageError("--units are the units of --contact; a deck has its own")
+            problem, card = _law(self.deck)
+            return {"": card}, unit_names(problem)
+        system = self.units or catalogue.SYSTEM
+        names = self.contacts or ()
+        return {name: CONTACTS[name].converted(system) for name in names}, units_of(system)
+
+    def write(self, columns: dict[str, str], units: dict[str, str], rows: Iterable[Row]) -> None:
+        """Write the rows of a table; those of named laws begin with the name."""
+        named = {"contact": "", **columns} if self.contacts else columns
+        skipped = 0 if self.contacts else 1
+        self.targets.write(named, units, (row[skipped:] for row in rows))
+
 
 @indent_command.command(
     epilog=typical(
         "fecm indent curve impact-patch.inp --path 1.5e-3,0,2.5e-3,0 -o path.csv",
+        "fecm indent curve --contact report-0.5,report-0.75 --path 2e-3,0 --plot laws.png",
         "fecm indent curve impact-patch.inp --rigidity --q 2.5 --plot rigidity.png",
     )
 )
-@click.argument("deck", type=DECK_PATH)
+@click.argument("deck", type=DECK_PATH, required=False)
+@option(
+    "--contact",
+    "contacts",
+    type=list_of("NAME,...", OneOf(list(CONTACTS))),
+    help="Named laws (`fecm indent contacts`) instead of DECK's.",
+)
+@option(
+    "--units",
+    type=SYSTEM,
+    help=f"Units of --contact and of --path.  [default: {catalogue.SYSTEM}]",
+)
 @option(
     "--path",
     type=list_of("A,B,C,...", Finite()),
-    help="Indentations at which the path turns, from 0; with --rigidity the range FROM,TO of "
-    "alpha_m.",
+    help="Indentations at which the path turns, from 0; with --permanent and --rigidity the range "
+    "FROM,TO of alpha_m.",
 )
 @option(
     "--points",
@@ -185,107 +230,144 @@ class CurveOptions:
     help="Points between two turns.",
 )
 @option(
+    "--permanent",
+    is_flag=True,
+    help="Tabulate the permanent indentation alpha_0 over alpha_m instead, by equation 3-8, or by "
+    "3-7 of a law with ACR.",
+)
+@option(
     "--rigidity",
     is_flag=True,
     help="Tabulate the unloading rigidity s over alpha_m by equations 3-9 and 3-7 instead.",
 )
-@option("--q", type=POSITIVE, help="With --rigidity: power of 3-9.  [default: the deck's]")
+@option("--q", type=POSITIVE, help="With --rigidity: power of 3-9.  [default: the law's]")
 @option(
     "--alpha-cr",
     type=POSITIVE,
-    help="With --rigidity: alpha_cr of 3-7.  [default: the deck's, or the report's]",
+    help="With --rigidity: alpha_cr of 3-7.  [default: the law's, or the report's]",
 )
 @option(
     "--line",
     type=list_of("ALPHA_P,S_P", NOT_NEGATIVE, [2]),
-    help="With --rigidity: parameters of 3-8.  [default: the deck's, or the report's]",
+    help="With --rigidity: parameters of 3-8.  [default: the law's, or the report's]",
 )
 @outputs("deck")
 @collected(CurveOptions)
 def curve(options: CurveOptions) -> None:
-    """Write the force along an indentation path, by the law of DECK, as CSV.
+    """Write the force along an indentation path as CSV (figures 3.2 to 3.19).
 
-    The columns are indentation, force and the branch of the law; with --rigidity alpha_m, s_3_9 and
-    s_3_7.
+    The law is the law of DECK, or --contact names one or several.  The columns are indentation,
+    force and the branch of the law; with --permanent alpha_m and alpha_0; with --rigidity alpha_m,
+    s_3_9 and s_3_7.  The rows of named laws begin with the name.
     """
+    if options.permanent and options.rigidity:
+        raise click.UsageError("--permanent and --rigidity exclude each other")
     if options.rigidity:
         _rigidities(options)
         return
-    if not options.path:
-        raise click.UsageError("--path is missing: indentations separated by commas")
     if any(value is not None for value in (options.q, options.alpha_cr, options.line)):
         raise click.UsageError("--q, --alpha-cr and --line require --rigidity")
-    problem, card = _law(options.deck)
-    law = contact_law.HystereticLaw(build_constants(card))
-    try:
-        walk = list(contact_law.follow(law, options.path, options.points))
-    except OverflowError:
-        walk = []
-    if not walk or not all(math.isfinite(point.force) for point, _ in walk):
-        raise RefusedError("the forces along --path overflow")
-    columns = np.array([point for point, _ in walk]).T
-    units = unit_names(problem)
-    options.targets.draw("studies:path_picture", *columns, units)
+    if options.permanent:
+        _permanents(options)
+        return
+    if not options.path:
+        raise click.UsageError("--path is missing: indentations separated by commas")
+    cards, units = options.laws()
+    curves, rows = {}, []
     branches = ("loading", "unloading", "reloading")
-    rows = ((point.indentation, point.force, branches[branch]) for point, branch in walk)
-    dimensions = {"indentation": "length", "force": "force", "branch": ""}
-    options.targets.write(dimensions, units, rows)
+    for name, card in cards.items():
+        law = contact_law.HystereticLaw(build_constants(card))
+        try:
+            walk = list(contact_law.follow(law, options.path, options.points))
+        except OverflowError:
+            walk = []
+        if not walk or not all(math.isfinite(point.force) for point, _ in walk):
+            raise RefusedError("the forces along --path overflow")
+        curves[name] = np.array([point for point, _ in walk]).T
+        rows += [(name, *point, branches[branch]) for point, branch in walk]
+    options.targets.draw("studies:path_picture", curves, units)
+    options.write({"indentation": "length", "force": "force", "branch": ""}, units, rows)
+
+
+def _peaks(options: CurveOptions, name: str, default: float) -> Floats:
+    """Return the largest indentations of --path, by default from 0 to a value."""
+    path = options.path
+    if path and (len(path) != 2 or not 0.0 <= path[0] < path[1]):
+        raise click.BadParameter(f"with --{name} the range FROM,TO", param_hint="--path")
+    low, high = path or (0.0, default)
+    if not high > 0.0:
+        raise click.UsageError(f"the law has no permanent indentation; --{name} needs --path")
+    return np.linspace(low, high, options.points + 1)
+
+
+def _permanents(options: CurveOptions) -> None:
+    """Write largest and permanent indentations by 3-8, or 3-7 (figure 3.6)."""
+    cards, units = options.laws()
+    critical = max(REACH[bool(card.word)] * card.alpha_p for card in cards.values())
+    peaks = _peaks(options, "permanent", critical)
+    curves = {
+        name: np.array([peaks, build_constants(card).permanent(peaks)])
+        for name, card in cards.items()
+    }
+    options.targets.draw("studies:permanent_picture", curves, units)
+    rows = [(name, *point) for name, curve in curves.items() for point in curve.T.tolist()]
+    options.write({"alpha_m": "length", "alpha_0": "length"}, units, rows)
 
 
 def _rigidities(options: CurveOptions) -> None:
-    """Write largest indentations and rigidities by both equations."""
-    path, line, targets = options.path, options.line, options.targets
-    if path and (len(path) != 2 or not 0.0 <= path[0] < path[1]):
-        raise click.BadParameter("with --rigidity the range FROM,TO", param_hint="--path")
+    """Write largest indentations and rigidities by both equations (figure 3.19)."""
+    line, targets = options.line, options.targets
     if line is not None and line[1] >= 1.0:
         raise click.BadParameter("s_p must be below 1", param_hint="--line")
-    problem, card = _law(options.deck)
-    slope, critical = _permanent(problem, card, options)
+    cards, names = options.laws()
+    if len(cards) > 1:
+        raise click.UsageError("--rigidity takes one law")
+    ((name, card),) = cards.items()
+    slope, critical = _permanent(names, card, options)
     if slope.q != contact_law.ACR_POWER:
         units = f"s of 3-9 is force/length^{slope.q:g} here, s of 3-7 is force/length^2.5"
         if targets.picture:
             raise RefusedError(f"{units}: they can't share axes; --q 2.5 makes them comparable")
         note(f"{units}: --q 2.5 makes them comparable")
 
-    low, high = path or (0.0, 2.0 * max(critical.alpha_cr, slope.alpha_p))
-    peaks = np.linspace(low, high, options.points + 1)
+    peaks = _peaks(options, "rigidity", 2.0 * max(critical.alpha_cr, slope.alpha_p))
     peaks = peaks[peaks > 0.0]
     with np.errstate(all="ignore"):
         by = [np.asarray(relation.rigidity(peaks)) for relation in (slope, critical)]
     if not np.all(np.isfinite(by)):
         raise RefusedError("the rigidities along --path overflow")
     named = dict(zip(("equation 3-9", "equation 3-7"), by, strict=True))
-    names = unit_names(problem)
     targets.draw("studies:rigidity_picture", peaks, named, slope.q, names)
     dimensions = {
         "alpha_m": "length",
         "s_3_9": f"force/length^{slope.q:g}",
         "s_3_7": f"force/length^{contact_law.ACR_POWER:g}",
     }
-    targets.write(dimensions, names, np.column_stack([peaks, *by]).tolist())
+    rows = np.column_stack([peaks, *by]).tolist()
+    options.write(dimensions, names, ((name, *row) for row in rows))
 
 
 def _permanent(
-    problem: Deck, card: Indentation, options: CurveOptions
+    units: dict[str, str], card: Indentation, options: CurveOptions
 ) -> tuple[LinearPermanent, YangSunPermanent]:
-    """Return the permanent indentations of 3-8 and 3-7: of the options, the deck, or the report."""
+    """Return the permanent indentations of 3-8 and 3-7: of the options, the law, or the report."""
     constants = build_constants(card)
     line, alpha_cr = options.line, options.alpha_cr
     if line is None and isinstance(constants, LinearPermanent):
         line = float(constants.alpha_p), float(constants.s_p)
     elif line is None:
-        line = _report_length(problem, catalogue.ALPHA_P, "alpha_p", "--line"), catalogue.S_P
+        line = _report_length(units, catalogue.ALPHA_P, "alpha_p", "--line"), catalogue.S_P
     if alpha_cr is None and isinstance(constants, YangSunPermanent):
         alpha_cr = float(constants.alpha_cr)
     elif alpha_cr is None:
-        alpha_cr = _report_length(problem, catalogue.ALPHA_CR, "alpha_cr", "--alpha-cr")
+        alpha_cr = _report_length(units, catalogue.ALPHA_CR, "alpha_cr", "--alpha-cr")
     q = constants.q if options.q is None else options.q
     return LinearPermanent(card.k, *line, q), YangSunPermanent(card.k, alpha_cr)
 
 
-def _report_length(deck: Deck, value: float, name: str, flag: str) -> float:
-    """Convert a length of the report to the deck's unit, by default inches, and note it."""
-    unit = unit_names(deck).get("length", "in")
+def _report_length(units: dict[str, str], value: float, name: str, flag: str) -> float:
+    """Convert a length of the report to the unit of a law, by default inches, and note it."""
+    unit = units.get("length", "in")
     if unit not in KNOWN["length"]:
         message = f"the report's {name} is in inches and the deck's in {unit}: give {flag}"
         raise RefusedError(message)
@@ -461,3 +543,5 @@ def contacts_command(name: str | None, units: str, form: Format) -> None:
             click.echo(f"{contact.name} ({units})")
             click.echo(f"  k {law.k:g}, {critical} {law.alpha_p:g}{line}, q {law.q:g}")
             click.echo(f"  {contact.source}")
+    if name is None and form is Format.TEXT:
+        click.echo(f"\n{RATE}")

@@ -57,6 +57,7 @@ class PlotOptions:
     """Options of kinds of pictures, under the names of their functions."""
 
     at: tuple[tuple[float, float], ...]
+    projectile: bool
     gages: tuple[float, ...] | None
     face: str | None
     times: tuple[float, ...] | None
@@ -111,6 +112,7 @@ class PlotOptions:
     help="Point of strain (may be repeated), thickness or mesh.  [default of strain: the point "
     "with the largest bending strain outside the load; of thickness: where |sigma_1| is largest]",
 )
+@option("--projectile", is_flag=True, help="Draw the elements of the rod below the mesh.")
 @option(
     "--gage",
     "gages",

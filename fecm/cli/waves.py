@@ -22,6 +22,7 @@ from fecm.cli.options import (
     POSITIVE,
     Finite,
     HelpGroup,
+    OneOf,
     Parsed,
     collected,
     list_of,
@@ -30,6 +31,7 @@ from fecm.cli.options import (
 )
 from fecm.cli.outputs import OutputPaths, outputs
 from fecm.deck.units import VELOCITY
+from fecm.studies.waves import MODES
 from fecm.studies.waves.study import Waves, waves_of
 from fecm.studies.waves.study import waves as waves_in
 
@@ -189,14 +191,23 @@ def waves_command() -> None:
     show_default=True,
     help="N wavelengths at equal distances, in thicknesses.",
 )
+@option(
+    "--mode",
+    "modes",
+    type=list_of("NAME,...", OneOf(MODES)),
+    default=",".join(MODES),
+    show_default=True,
+    help="Modes to write and draw; flexural_1 is the lowest flexural wave.",
+)
 @_SHARED
 def dispersion_command(
     angles: tuple[float, ...],
     wavelengths: tuple[float, ...],
+    modes: tuple[str, ...],
     source: LaminateSource,
     targets: OutputPaths,
 ) -> None:
-    """Write phase velocity and frequency of all modes by wavelength (figures 2.4, 2.5)."""
+    """Write phase velocity and frequency of the modes by wavelength (figures 2.4, 2.5)."""
     _bound(5 * len(angles) * len(wavelengths))
     waves = source.waves()
     curves = [waves.dispersion(angle, wavelengths) for angle in angles]
@@ -211,8 +222,9 @@ def dispersion_command(
         for curve in curves
         for row, wavelength in enumerate(curve.wavelength.tolist())
         for place, mode in enumerate(curve.modes)
+        if mode in modes
     )
-    targets.draw("studies:dispersion_picture", waves.medium, curves)
+    targets.draw("studies:dispersion_picture", waves.medium, curves, modes)
     dimensions = {
         "angle_deg": "",
         "wavelength_over_h": "",
@@ -274,7 +286,10 @@ def fronts(
     source: LaminateSource,
     targets: OutputPaths,
 ) -> None:
-    """Write front positions and rays (figures 2.9 to 2.12); cusps go to standard error."""
+    """Write front positions, rays and strengths (figures 2.9 to 2.12).
+
+    The strength of a front is 1 at the first time.  Cusps go to standard error.
+    """
     _bound(5 * len(times) * 360.0 / step)
     waves = source.waves()
     start = waves.thickness if radius is None else radius
@@ -282,9 +297,19 @@ def fronts(
     if not math.isfinite(max(times) * float(surfaces.velocity.max()) + start):
         raise RefusedError("the positions of the fronts overflow at these times")
     positions = [surfaces.positions(time, start).tolist() for time in times]
+    lengths = [np.abs(surfaces.growth(time, start)).tolist() for time in times]
+    strengths = [surfaces.strength(times[0], time, start).tolist() for time in times]
     rays, normals = surfaces.ray_angle.tolist(), surfaces.normal.tolist()
     rows = (
-        (mode, normal, time, *positions[number][row][place], rays[row][place])
+        (
+            mode,
+            normal,
+            time,
+            *positions[number][row][place],
+            rays[row][place],
+            lengths[number][row][place],
+            strengths[number][row][place],
+        )
         for place, mode in enumerate(surfaces.modes)
         for row, normal in enumerate(normals)
         for number, time in enumerate(times)
@@ -308,6 +333,8 @@ def fronts(
         "x": "length",
         "y": "length",
         "ray_deg": "",
+        "length_per_radian": "length",
+        "strength": "",
     }
     targets.write(dimensions, waves.units, rows)
 

@@ -137,6 +137,7 @@ class PictureOptions(TypedDict, total=False):
 
     width: Width
     at: Sequence[tuple[float, float]]
+    projectile: bool
     times: Sequence[float]
     gages: Sequence[float]
     face: Face

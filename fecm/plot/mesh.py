@@ -1,4 +1,4 @@
-"""Picture of the mesh: elements, supports, impact point and patch (the report's figure 4.11 a)."""
+"""Picture of the mesh: elements, supports, impact point, patch; and of the rod (figure 4.11)."""
 
 from __future__ import annotations
 
@@ -12,9 +12,11 @@ from matplotlib.collections import LineCollection, PolyCollection
 
 from fecm._typing import Bools
 from fecm.deck.model import Impact
+from fecm.mechanics.projectile import Rod
 from fecm.plot import data, style
-from fecm.plot.kinds import Picture, Width
+from fecm.plot.kinds import Picture, PlotError, Width
 from fecm.plot.plate import aspect, draw_circle
+from fecm.problem.parts import build_projectile
 from fecm.results.result import Result
 from fecm.results.summary import radii_of
 
@@ -65,9 +67,13 @@ def mesh_picture(
     results: Mapping[str, Result],
     *,
     at: Sequence[tuple[float, float]] = (),
+    projectile: bool = False,
     width: Width = "column",
 ) -> Picture:
-    """Draw elements, supports, impact point, contact patch, and the points `at`."""
+    """Draw elements, supports, impact point, contact patch, and the points `at`.
+
+    With `projectile`, the elements of the rod are drawn below.
+    """
     ((name, result),) = results.items()
     coordinates, _ = data.require_datasets(result, name, "mesh/coordinates", "mesh/elements")
     cut = data.patches(result, 4, name)
@@ -75,7 +81,14 @@ def mesh_picture(
     low, high = cut.points.min(axis=0), cut.points.max(axis=0)
     height = aspect(cut.points)
     ratio = height + (0.55 - 0.5 * height) / style.WIDTHS[width]
-    figure, (axes,) = style.panels(width, ratio=ratio)
+    rod = _rod(result, name) if projectile else None
+    if rod is None:
+        figure, (axes,) = style.panels(width, ratio=ratio)
+    else:
+        slender = max(rod.diameters) / rod.length + 0.5 / style.WIDTHS[width]
+        heights, mean = [ratio, slender], 0.5 * (ratio + slender)
+        figure, (axes, below) = style.panels(width, 2, ratio=mean, height_ratios=heights)
+        _draw_rod(below, rod, place)
     _colour_laminates(axes, result, name, cut)
     sides = [cut.points[edge] for edge in cut.edges]
     axes.add_collection(LineCollection(sides, colors="0.4", linewidths=0.4))
@@ -94,6 +107,28 @@ def mesh_picture(
         axes.set_title(_curved(result, name, place), loc="left")
     style.lines_legend(figure, axes)
     return Picture(figure)
+
+
+def _rod(result: Result, name: str) -> Rod:
+    """Return the rod of a result; raise PlotError if its projectile is a rigid mass."""
+    projectile = build_projectile(data.result_deck(result, name))
+    if not isinstance(projectile, Rod):
+        raise PlotError(f"the projectile of {name} is a rigid mass, which has no elements to draw")
+    return projectile
+
+
+def _draw_rod(axes: Axes, rod: Rod, place: style.AxisScale) -> None:
+    """Draw the elements of a rod, whose impacted end is at 0."""
+    ends = rod.element_length * np.arange(rod.elements + 1.0)
+    boxes = [
+        [(first, -d / 2.0), (last, -d / 2.0), (last, d / 2.0), (first, d / 2.0)]
+        for first, last, d in zip(ends[:-1], ends[1:], rod.diameters, strict=True)
+    ]
+    axes.add_collection(PolyCollection(boxes, facecolors="none", edgecolors="0.4", linewidths=0.4))
+    reach = 0.5 * max(rod.diameters)
+    axes.set(xlim=(0.0, rod.length), ylim=(-reach, reach), aspect="equal")
+    place.name(axes.xaxis, "Distance from the impacted end")
+    place.name(axes.yaxis, "Radius")
 
 
 def _curved(result: Result, name: str, place: style.AxisScale) -> str:

@@ -104,12 +104,40 @@ def _permanent(axes: Axes, fit: ContactLawFit, length: style.AxisScale) -> None:
 
 
 @style.styled
-def path_picture(indentation: Floats, force: Floats, units: Mapping[str, str]) -> Picture:
-    """Draw the force along an indentation path."""
+def path_picture(curves: Mapping[str, Floats], units: Mapping[str, str]) -> Picture:
+    """Draw the forces along an indentation path by one or several laws (figures 3.2 to 3.18).
+
+    Each law has its indentations and forces, (2, n).
+    """
+    return _draw_laws(curves, units, ("Indentation", "length"), ("Force", "force"))
+
+
+@style.styled
+def permanent_picture(curves: Mapping[str, Floats], units: Mapping[str, str]) -> Picture:
+    """Draw permanent against largest indentations, (2, n), of some laws (figure 3.6)."""
+    labels = ("Largest indentation", "length"), ("Permanent indentation", "length")
+    return _draw_laws(curves, units, *labels)
+
+
+def _draw_laws(
+    curves: Mapping[str, Floats],
+    units: Mapping[str, str],
+    horizontal: tuple[str, str],
+    vertical: tuple[str, str],
+) -> Picture:
+    """Draw a line for each law; the axes have a label and a dimension each."""
+    limit_count(len(curves), "laws")
     figure, (axes,) = style.panels("column")
-    axes.plot(indentation, force, color=style.COLOURS[0])
-    style.scale_in(units, "length", indentation).name(axes.xaxis, "Indentation")
-    style.scale_in(units, "force", force).name(axes.yaxis, "Force")
+    for (name, curve), colour in zip(curves.items(), COLOURS, strict=False):
+        axes.plot(*curve, color=colour, label=name)
+    for axis, (label, dimension), row in (
+        (axes.xaxis, horizontal, 0),
+        (axes.yaxis, vertical, 1),
+    ):
+        values = [curve[row] for curve in curves.values()]
+        style.scale_in(units, dimension, *values).name(axis, label)
+    if any(curves):
+        style.lines_legend(figure, axes)
     return Picture(figure)
 
 
@@ -252,9 +280,15 @@ DASHES = (SOLID, DASHED, DOTTED, DASH_DOT, DASH_DOT_DOT)
 CUSP: Look = {"ls": "", "marker": "o", "ms": 3.0, "mfc": "white", "mec": "black", "mew": 0.6}
 
 
+# Modes whose phase velocity is bounded; the other two grow with the wavelength.
+BOUNDED = ("flexural_1", "extension", "in_plane_shear")
+
+
 @styled
-def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
-    """Draw phase velocities and frequencies of all modes against the wavelength.
+def dispersion_picture(
+    medium: Medium, curves: Sequence[Dispersion], modes: Sequence[str] = MODES
+) -> Picture:
+    """Draw phase velocities and frequencies of some modes against the wavelength.
 
     Velocities are divided by the transverse shear velocity, frequencies by the ratio of this
     velocity to the thickness, as in figures 2.4 and 2.5. The axes end just above the in-plane modes
@@ -267,18 +301,21 @@ def dispersion_picture(medium: Medium, curves: Sequence[Dispersion]) -> Picture:
     figure, axes = panels("full", 1, 2, ratio=0.66)
     for curve, colour, *both in zip(curves, COLOURS, velocities, frequencies, strict=False):
         for ax, values in zip(axes, both, strict=True):
-            for column, dashes in zip(values.T, DASHES, strict=True):
-                ax.plot(curve.wavelength, column, color=colour, ls=dashes)
+            for mode, column, dashes in zip(MODES, values.T, DASHES, strict=True):
+                if mode in modes:
+                    ax.plot(curve.wavelength, column, color=colour, ls=dashes)
     angles = [f"{curve.angle:g}°" for curve in curves]
     colours = [Line2D([], [], color=colour) for colour in COLOURS[: len(curves)]]
     figure.legend(colours, angles, loc="outside upper left", ncols=4)
-    modes = [Line2D([], [], color="0.3", ls=dashes) for dashes in DASHES]
-    words = [WORDS[mode] for mode in MODES]
-    figure.legend(modes, words, loc="outside upper right", ncols=5, handlelength=2.6)
+    looks = {mode: dashes for mode, dashes in zip(MODES, DASHES, strict=True) if mode in modes}
+    lines = [Line2D([], [], color="0.3", ls=dashes) for dashes in looks.values()]
+    words = [WORDS[mode] for mode in looks]
+    figure.legend(lines, words, loc="outside upper right", ncols=5, handlelength=2.6)
     longest = max(float(curve.wavelength[-1]) for curve in curves)
     for ax in axes:
         ax.set(xlim=(0.0, longest), xlabel="Wavelength $\\lambda/h$")
-    top = 1.15 * max(float(values[:, 3:].max()) for values in velocities)
+    bounded = [n for n, mode in enumerate(MODES) if mode in modes and mode in BOUNDED] or [3, 4]
+    top = 1.15 * max(float(values[:, bounded].max()) for values in velocities)
     axes[0].set(ylim=(0.0, top), ylabel="Phase velocity $c/c_s$")
     top = 2.6 * max(float(values[-1, 1:3].max()) for values in frequencies)
     axes[1].set(ylim=(0.0, top), ylabel="Frequency $\\omega h/c_s$")

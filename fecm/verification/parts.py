@@ -134,7 +134,10 @@ def _wave_fronts() -> Sequence[Value]:
     names = ("extension", "in_plane_shear", "bending", "twisting", "transverse_shear")
     places = [FRONTS.index(name) for name in names]
     first = places[0]
-    return [*fronts.velocity[0, places], fronts.velocity[1, first], fronts.ray_angle[1, first]]
+    round_fronts = WaveSurfaces(Medium(laminate(isotropic(1.0, 0.3, 1.0), [0.0], [0.1])))
+    strength = round_fronts.fronts([10.0]).strength(1.0, 4.0, 0.0)[0, first]
+    velocities = [*fronts.velocity[0, places], fronts.velocity[1, first]]
+    return [*velocities, fronts.ray_angle[1, first], strength]
 
 
 @case
@@ -206,3 +209,11 @@ def _indentation() -> Sequence[Value]:
         work,
         *(p.force for p in path(PEAK, (PEAK + ACR_REMAINS) / 2.0, ACR_REMAINS, law=acr)[1:]),
     ]
+
+
+@case
+def _permanent_indentation() -> Sequence[Value]:
+    law = LinearPermanent(k=1.330e6, alpha_p=ALPHA_P, s_p=S_P, q=2.5)
+    before = law.permanent(np.linspace(0.0, ALPHA_P, 7))
+    beyond = law.permanent(ALPHA_P * np.array([2.0, 3.0]))
+    return [float(before.max()), float(np.diff(beyond)[0]) / ALPHA_P]

@@ -56,7 +56,11 @@ BREAKS: Breaks = {
     ),
     "permanent indentation halved": (
         changed(LinearPermanent, "permanent", halved),
-        {"indentation": ("F halfway down", "F at α₀", "work")},
+        {"indentation": ("F halfway down", "F at α₀", "work"), "permanent-indentation": ("slope",)},
+    ),
+    "permanent indentation from the first touch on": (
+        instead(LinearPermanent, "permanent", lambda right, law, peak: law.s_p * peak),
+        {"permanent-indentation": ("largest value",), "indentation": ("F at α₀",)},
     ),
     "permanent indentation of ACR halved": (
         in_numpy(changed(YangSunPermanent, "permanent", halved)),

@@ -23,6 +23,9 @@ BREAKS: Breaks = {
     "normal velocity's slope forgotten in the ray": (
         instead(Fronts, "ray", ray_without_slope), {"wave-fronts": ("its ray",)},
     ),
+    "strength by the spreading of the rays, not by its root": (
+        changed(Fronts, "strength", lambda strength: strength**2), {"wave-fronts": ("strength",)},
+    ),
     "rotary inertia of one direction doubled": (
         changed(Medium, "inertia", entry(2, 2, 2.0)),
         {"wave-fronts": ("bending",), "dispersion": ("ω, wavelength", )},

@@ -99,6 +99,17 @@ class Fronts:
         """
         return radius + time * (self.velocity + self.curvature)
 
+    def strength(self, first: float, time: float, radius: float) -> Floats:
+        """Return the strength of the front over its strength at the time `first`, (n, 5).
+
+        Along a ray, the strength decays with the spreading of the rays (section 2.3.4): it is the
+        root of the ratio of the lengths per radian. It is NaN at a cusp, where this length is 0.
+        """
+        before, now = (np.abs(self.growth(t, radius)) for t in (first, time))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.sqrt(before / now)
+        return np.where(now > 0.0, ratio, np.nan)
+
 
 @dataclass(frozen=True)
 class Sheets(Fronts):
