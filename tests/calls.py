@@ -70,8 +70,8 @@ def diff(*arguments: object) -> Done:
     return call("diff", *arguments)
 
 
-def told(done: Done, name: str) -> str:
-    """The line about a dataset in what ``fecm diff`` says."""
+def line_about(done: Done, name: str) -> str:
+    """Return the line about a dataset in the output of ``fecm diff``."""
     return next(line for line in done.stdout.splitlines() if name in line.split())
 
 

@@ -15,7 +15,7 @@ import pytest
 
 import fecm
 from fecm import load
-from tests.calls import Done, assert_unusable, call, diff, told
+from tests.calls import Done, assert_unusable, call, diff, line_about
 from tests.decks import LONG, PROGRAM, ROOT, small
 
 Edit = Callable[[h5py.File], object]
@@ -77,11 +77,11 @@ def test_the_modes_differ_and_the_first_step_of_the_force_is_named(runs: Path) -
     assert done.exit_code == 1
     assert verdict(done) == "different"
     # Peaks of the original program: 6.190 lb and 6.642 lb, both in step 10.
-    assert "6.18964 against 6.64198 at step 10" in told(done, "history/force")
-    assert "first at step 1 " in told(done, "history/force")
-    assert "shape 2 against 10" in told(done, "tape9/force")
-    assert told(done, "mode:") == "listed     mode: `report` against `listing`"
-    assert told(done, "mesh/coordinates").startswith("same")
+    assert "6.18964 against 6.64198 at step 10" in line_about(done, "history/force")
+    assert "first at step 1 " in line_about(done, "history/force")
+    assert "shape 2 against 10" in line_about(done, "tape9/force")
+    assert line_about(done, "mode:") == "listed     mode: `report` against `listing`"
+    assert line_about(done, "mesh/coordinates").startswith("same")
 
 
 def test_a_zero_crossing_is_judged_by_the_size_of_the_whole_history(
@@ -95,7 +95,7 @@ def test_a_zero_crossing_is_judged_by_the_size_of_the_whole_history(
     assert diff(a, b, "--rtol", "1e-3", "--only", "history").exit_code == 0
     done = diff(a, b, "--rtol", "0.98e-3", "--only", "history")
     assert done.exit_code == 1
-    assert "first at step 1 " in told(done, "history/transducer")
+    assert "first at step 1 " in line_about(done, "history/transducer")
 
 
 def test_the_absolute_tolerance_is_in_the_datasets_own_unit(
@@ -115,7 +115,7 @@ def test_force_that_first_differs_at_step_3_is_said_to(
     def edit(file: h5py.File) -> None:
         file["history/force"][2:] = file["history/force"][2:] * 1.01
 
-    line = told(diff(a, changed(edit), "--only", "history/force"), "history/force")
+    line = line_about(diff(a, changed(edit), "--only", "history/force"), "history/force")
     assert "first at step 3 (time 1.5e-06)" in line
     assert "8 numbers differ" in line
 
@@ -186,7 +186,7 @@ def test_another_shape_or_type_is_a_difference_at_any_tolerance(
     done = diff(a, changed(edit), "--rtol", "10", "--atol", "1e9")
     assert done.exit_code == 1
     for name, (_, words) in changes.items():
-        assert words in told(done, name)
+        assert words in line_about(done, name)
     assert verdict(done) == "different"
     assert "5 of " in done.stdout.splitlines()[-1]
 
@@ -197,7 +197,7 @@ def test_node_numbers_and_steps_must_be_equal_at_any_tolerance(
     a, changed = pair
     done = diff(a, changed(put("mesh/elements", (2, 8), 1)), "--rtol", "10", "--atol", "1e9")
     assert done.exit_code == 1
-    assert "element 3, position 9" in told(done, "mesh/elements")
+    assert "element 3, position 9" in line_about(done, "mesh/elements")
 
 
 def test_a_dataset_that_one_file_alone_has_is_a_difference(
@@ -212,8 +212,8 @@ def test_a_dataset_that_one_file_alone_has_is_a_difference(
     b = changed(edit)
     done = diff(a, b)
     assert done.exit_code == 1
-    assert told(done, "tape8/kappa_x") == "only in A  tape8/kappa_x"
-    assert told(done, "extra/thing") == "only in B  extra/thing"
+    assert line_about(done, "tape8/kappa_x") == "only in A  tape8/kappa_x"
+    assert line_about(done, "extra/thing") == "only in B  extra/thing"
     assert diff(a, b, "--only", "history").exit_code == 0
     assert diff(a, b, "--brief").stdout.splitlines()[:-1] == ["extra/thing", "tape8/kappa_x"]
     said = strict(diff(a, b, "--format", "json"))
@@ -346,7 +346,7 @@ def test_the_documented_recipe_passes_rounding_and_fails_a_tenth_of_a_degree(
     assert call(*run, "--overwrite", cwd=tmp_path).exit_code == 0
     done = call(*compare, cwd=tmp_path)
     assert done.exit_code == 1
-    assert told(done, "history/force").startswith("different")
+    assert line_about(done, "history/force").startswith("different")
 
 
 def test_small_blocks_of_rows_find_the_same(
@@ -439,7 +439,7 @@ def test_resultants_of_the_midplane_are_judged_by_those_of_bending(tmp_path: Pat
             file[f"stresses/{name}"][0, 0, 0] = 1e-9 * scale
     assert diff(a, b, "--rtol", "1.01e-9", "--only", "stresses").exit_code == 0
     done = diff(a, b, "--rtol", "0.99e-9", "--only", "stresses")
-    assert all(told(done, f"stresses/{name}").startswith("different") for name in scales)
+    assert all(line_about(done, f"stresses/{name}").startswith("different") for name in scales)
 
 
 def test_coupling_that_is_a_rounding_is_judged_by_stretching_and_bending(
@@ -519,5 +519,5 @@ def test_the_coupling_of_a_numbered_laminate_is_judged_and_named_by_its_scale(
         scale = math.sqrt(math.prod(largest))
         file["laminate/2/B"][0, 0] += 1e-3 * scale
     done = diff(b, changed(several), "--only", "laminate")
-    assert f"of sqrt(max A * max D) {scale:.6g})" in told(done, "laminate/2/B")
+    assert f"of sqrt(max A * max D) {scale:.6g})" in line_about(done, "laminate/2/B")
     assert diff(b, changed(several), "--rtol", "1.1e-3", "--only", "laminate").exit_code == 0

@@ -13,7 +13,7 @@ import pytest
 
 from fecm import load
 from fecm.listing import fortran_number, read_tapes, write_tapes
-from tests.calls import assert_unusable, diff, told
+from tests.calls import assert_unusable, diff, line_about
 from tests.decks import DATA
 
 
@@ -71,13 +71,13 @@ def test_tapes_differ_where_a_number_is_two_units_of_its_last_digit_away(
         moved = least.replace(f".{digits:04d}", f".{near:04d}")
         (b / "tape9").write_text("\n".join(lines).replace(least, moved) + "\n")
         assert diff(a, b).exit_code == status
-    assert "1 number differs" in told(diff(a, b), "tape9/force")
+    assert "1 number differs" in line_about(diff(a, b), "tape9/force")
 
 
 def test_the_tapes_of_both_modes_differ_most_at_the_impact_node(tmp_path: Path) -> None:
     done = diff(originals("report", tmp_path / "a"), originals("listing", tmp_path / "b"))
     assert done.exit_code == 1
-    assert "at row 2, node 305" in told(done, "tape3/w")
+    assert "at row 2, node 305" in line_about(done, "tape3/w")
 
 
 @pytest.mark.parametrize("mode", ["report", "listing"])
@@ -107,7 +107,7 @@ def test_a_tape_that_is_missing_or_empty_is_a_difference(runs: Path, tmp_path: P
     for _ in range(2):
         done = diff(runs / "report.h5", folder, "--rtol", "1e-3")
         assert done.exit_code == 1
-        assert told(done, "tape9/force").startswith("only in A")
+        assert line_about(done, "tape9/force").startswith("only in A")
         (folder / "tape9").unlink(missing_ok=True)
     assert (
         diff(
@@ -123,7 +123,7 @@ def test_a_tape_short_of_a_whole_row_differs_in_shape(runs: Path, tmp_path: Path
     (folder / "tape3").write_text("".join(lines[:102]))
     done = diff(runs / "report.h5", folder, "--rtol", "1e-3")
     assert done.exit_code == 1
-    assert "shape 2x609 against 1x609" in told(done, "tape3/w")
+    assert "shape 2x609 against 1x609" in line_about(done, "tape3/w")
 
 
 @pytest.mark.parametrize("nodes", [3, 12, 25])
@@ -146,7 +146,7 @@ def test_lines_of_six_are_compared_by_lines_where_nothing_tells_the_nodes(tmp_pa
         (tmp_path / name).mkdir()
         (tmp_path / name / "tape3").write_text(text)
     done = diff(tmp_path / "a", tmp_path / "b")
-    assert "1 against 2 at line 4, column 1" in told(done, "tape3/w")
+    assert "1 against 2 at line 4, column 1" in line_about(done, "tape3/w")
 
 
 @pytest.mark.parametrize(

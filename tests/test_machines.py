@@ -169,26 +169,28 @@ def test_a_hint_that_is_a_question_has_no_full_stop_in_sarif(folder: Path) -> No
 
 
 def test_outputs_of_check_run_info_and_diff_are_as_their_schemas_say(folder: Path) -> None:
-    def said(*arguments: object, status: int = 0) -> str:
+    def output_of(*arguments: object, status: int = 0) -> str:
         done: Done = call(*arguments, "--format", "json")
         assert done.exit_code == status, done.stderr
         return done.stdout
 
     Path("plies.inp").write_text(small(PLY_PROGRAM, stop=False) + small("LMAS\nDT        .5E-6\n"))
-    validate("check", said("check", LONG, "wrong.inp", "sound.inp", "plies.inp", status=1))
-    validate("check", said("check", "doubtful.inp", "--mesh-error"))
-    runs = said("run", "plies.inp", "-o", "a.h5"), said("run", "sound.inp", "-o", "b.h5")
-    validate("run", *runs, said("run", "doubtful.inp", "-o", "c.h5", "--print", "c.txt"))
+    validate("check", output_of("check", LONG, "wrong.inp", "sound.inp", "plies.inp", status=1))
+    validate("check", output_of("check", "doubtful.inp", "--mesh-error"))
+    runs = output_of("run", "plies.inp", "-o", "a.h5"), output_of("run", "sound.inp", "-o", "b.h5")
+    validate("run", *runs, output_of("run", "doubtful.inp", "-o", "c.h5", "--print", "c.txt"))
     swept = call("sweep", "doubtful.inp", "--vary", "velocity=50,100", "-o", "s.h5")
     assert swept.exit_code in (0, 1), swept.stderr
     results = ("a.h5", "a-2.h5", "b.h5", "c.h5", "s.h5")
-    validate("info", *(said("info", result) for result in results))
+    validate("info", *(output_of("info", result) for result in results))
     shutil.copy("c.h5", "d.h5")
     Path("slow.inp").write_text(small().replace("115.0", "100.0"))
     assert call("run", "slow.inp", "-o", "e.h5").exit_code == 0
     own = ("--tol", "history=1e-6,1", "--exclude", "tape3")
-    validate("diff", said("diff", "c.h5", "d.h5"), said("diff", "c.h5", "e.h5", *own, status=1))
-    validate("diff", said("diff", "a.h5", "c.h5", status=1), said("diff", "s.h5", "s.h5"))
+    validate(
+        "diff", output_of("diff", "c.h5", "d.h5"), output_of("diff", "c.h5", "e.h5", *own, status=1)
+    )
+    validate("diff", output_of("diff", "a.h5", "c.h5", status=1), output_of("diff", "s.h5", "s.h5"))
 
 
 def test_the_schemas_are_those_of_the_types_of_the_outputs() -> None:

@@ -128,17 +128,17 @@ def test_the_expected_time_grows_with_the_work(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(price, "_costs", lambda *_: (1.0, 0.01))  # seconds of a run, of a step
     problem = problem_of(DECK)
 
-    def told(cases: list[dict[str, Any]], workers: int = 1, **more: Any) -> str:
+    def expected_time(cases: list[dict[str, Any]], workers: int = 1, **more: Any) -> str:
         return price.expected(problem, plan(problem, cases, **more), workers).split("about ")[-1]
 
-    assert told([{"k": 5e4}]) == "7 s"
-    assert told([{"k": 5e4 + n} for n in range(6)], 2) == "21 s by 2 workers"
-    assert told([{}], until=50.0) == "35 s"
-    assert told([{"duration": 2.4e-4}, {"duration": 4.8e-4}]) == "20 s"
-    assert told([{"k": 5e4 + n} for n in range(900)]) == "100 min"
-    assert told([{"dt": 4e-7}, {"dt": 2e-7}]) == "20 s"
+    assert expected_time([{"k": 5e4}]) == "7 s"
+    assert expected_time([{"k": 5e4 + n} for n in range(6)], 2) == "21 s by 2 workers"
+    assert expected_time([{}], until=50.0) == "35 s"
+    assert expected_time([{"duration": 2.4e-4}, {"duration": 4.8e-4}]) == "20 s"
+    assert expected_time([{"k": 5e4 + n} for n in range(900)]) == "100 min"
+    assert expected_time([{"dt": 4e-7}, {"dt": 2e-7}]) == "20 s"
     cases = [{"refine": 1, "elements": 4, "dt": 4e-7}, {"refine": 2, "elements": 16, "dt": 2e-7}]
-    assert told(cases) == "56 s"
+    assert expected_time(cases) == "56 s"
 
 
 def test_refined_and_random_cases_are_full_runs_too(runs: list[float]) -> None:

@@ -138,7 +138,7 @@ PLATE_VALUES: tuple[SweepValue[PlateSetter], ...] = (
     SweepValue("laminate_thickness", Changes.LAMINATE, "length", plates.set_thickness,
              meaning="thickness of the laminate; every ply is scaled"),
     SweepValue("ply_thickness", Changes.LAMINATE, "length", plates.set_ply_thickness,
-             meaning="thickness of every ply, which all have the same"),
+             meaning="thickness of every ply; all plies have the same"),
     SweepValue("thickness", Changes.LAMINATE, "length", plates.set_thickness,
              meaning="the same as `laminate_thickness`"),
     SweepValue("density", Changes.LAMINATE, _DENSITY, plates.ply_property("density"),
@@ -163,7 +163,8 @@ PLATE_VALUES: tuple[SweepValue[PlateSetter], ...] = (
     SweepValue("angle", Changes.LAMINATE, "", plates.add_angle,
              meaning="degrees added to the angle of every ply"),
     SweepValue("preload_x", Changes.LAMINATE, "force/length", plates.preload_force("n_x"),
-             meaning="membrane force N0x of `PREL`, tension positive; a deck without it gets it"),
+             meaning="membrane force N0x of `PREL`, tension positive; a deck without `PREL` gets "
+                     "one"),
     SweepValue("preload_y", Changes.LAMINATE, "force/length", plates.preload_force("n_y"),
              meaning="the same for N0y"),
     SweepValue("preload_xy", Changes.LAMINATE, "force/length", plates.preload_force("n_xy"),

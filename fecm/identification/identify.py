@@ -164,7 +164,7 @@ class IdentificationJob:
 
     @cached_property
     def price(self) -> Price:
-        """What the fit takes. The time is of the plate's response and of the usual trial forces."""
+        """What the fit takes. The time covers the plate's response and a usual number of forces."""
         begin = time.perf_counter()
         model = ForceModel(self.problem.deck, _shared_backend(self.problem.deck), None, self._law)
         model.histories([{}])

@@ -120,8 +120,8 @@ class LocationJob(LocationOptions):
     def price(self) -> Price:
         """What the location takes.
 
-        The time is estimated from some steps of the plate. It is the time of its runs; the least
-        squares take up to as long again.
+        The time is estimated from some steps of the plate and covers its runs. The least squares
+        may take as long again.
         """
         gages, mesh, times = len(self._table.gages), self.problem.mesh, self._times
         plate = moving_plate(self.problem.plate)

@@ -317,7 +317,10 @@ def _responses_in_region(
 
 
 def steps_between(problem: Problem, interval: float, critical: float) -> int:
-    """Return the number of steps between two samples: of the deck, or 0.9 of the critical."""
+    """Return the number of steps between two samples.
+
+    The step is the DT of the deck if it is stable, otherwise 0.9 of the critical time step.
+    """
     steps_of_deck = [macro.value for macro in flat(problem.program) if macro.word == "DT"]
     stable = [dt for dt in steps_of_deck if 0.0 < dt < critical]
     longest = stable[0] if stable else taken_time_step(critical)

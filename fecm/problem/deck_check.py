@@ -32,19 +32,19 @@ class DeckCheck:
     @property
     def errors(self) -> tuple[Finding, ...]:
         """Findings that make the deck unusable."""
-        return self._found(Severity.ERROR)
+        return self._of_severity(Severity.ERROR)
 
     @property
     def warnings(self) -> tuple[Finding, ...]:
         """Findings that are probably mistakes."""
-        return self._found(Severity.WARNING)
+        return self._of_severity(Severity.WARNING)
 
     @property
     def ok(self) -> bool:
         """Whether the deck has no errors."""
         return not self.errors
 
-    def _found(self, severity: Severity) -> tuple[Finding, ...]:
+    def _of_severity(self, severity: Severity) -> tuple[Finding, ...]:
         return tuple(finding for finding in self.findings if finding.severity is severity)
 
     def to_dicts(self) -> list[dict[str, object]]:

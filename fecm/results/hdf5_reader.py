@@ -204,10 +204,10 @@ def _open_file(file: AnyFile) -> tuple[Path, io.BytesIO]:
 def _check_links(path: Path, file: h5py.File) -> None:
     """Refuse all but hard links."""
 
-    def found(name: str | bytes, info: Any) -> tuple[str, int] | None:
+    def soft_or_external(name: str | bytes, info: Any) -> tuple[str, int] | None:
         return None if info.type == h5py.h5l.TYPE_HARD else (_text(name), info.type)
 
-    if link := file.id.links.visit(found, info=True):
+    if link := file.id.links.visit(soft_or_external, info=True):
         what = LINKS.get(link[1], "a link of unsupported kind")
         raise ResultFileError(f"{path}: {link[0]} is {what}; links are not followed")
 

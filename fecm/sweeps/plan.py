@@ -70,7 +70,7 @@ class Measure(StrEnum):
     FAILURE = "failure"
 
 
-MEASURES = tuple(one.value for one in Measure)
+MEASURES = tuple(measure.value for measure in Measure)
 
 
 @dataclass(frozen=True)
