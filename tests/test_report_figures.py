@@ -225,3 +225,13 @@ def test_the_contact_loop_is_open_while_the_contact_lasts() -> None:
     result = fecm.run_one(light_mass("1.E-7", 100))
     assert result.still_in_contact
     assert np.isnan(result.metrics["contact_loop"])
+
+
+def test_rounding_is_not_printed_as_the_loop_of_an_elastic_law() -> None:
+    inelastic = "  1912000. 0.0006564     0.094       2.0"
+    elastic = light_mass("1.E-7", 400).replace(
+        inelastic, "  1912000.        0.        0.       1.5"
+    )
+    result = fecm.run_one(elastic)
+    assert abs(result.metrics["contact_loop"]) < 1e-4 * 0.5 * 2e-6 * 115.0**2
+    assert "contact loop      0 kept by the indentation\n" in str(result)

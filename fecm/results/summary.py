@@ -498,9 +498,11 @@ def _rebound(result: Stored) -> str:
 def _contact_loop(result: Stored) -> str:
     """Format the work that the indentation keeps, and its share of the impact energy."""
     work = metrics_of(result)["contact_loop"]
+    if abs(work) <= np.abs(result["energy/balance_error"]).max():  # of an elastic law
+        return f"{_quantity(result, 0.0, 'force*length')} kept by the indentation"
     initial = float(result.attributes_of("energy")["initial"])
-    share = f", {work / initial:.1%} of the impact energy" if initial else ""
-    return f"{_quantity(result, work, 'force*length')} kept by the indentation{share}"
+    share = f"{work / initial:.1%} of the impact energy"
+    return f"{_quantity(result, work, 'force*length')} kept by the indentation, {share}"
 
 
 def _energy_balance(result: Stored) -> str:
