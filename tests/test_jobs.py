@@ -188,6 +188,7 @@ def test_a_fit_is_a_job_with_a_price_that_a_watch_may_stop() -> None:
     assert job.price.steps == fecm.Run(deck).price.steps
     assert job.price.seconds > 0.0
     assert job.price.memory_bytes > 0
+    assert str(job.price) in job._repr_html_()
     with pytest.raises(StoppedError, match=r"stopped after \d+ trial forces"):
         job.execute(StopAfter(8))
     watch = StopAfter()
@@ -207,6 +208,7 @@ def test_a_location_is_a_job_with_a_price_that_a_watch_may_stop() -> None:
     assert job.price.steps % strains.shape[1] == 0
     assert job.price.steps >= strains.size - strains.shape[1]
     assert job.price.seconds > 0.0
+    assert f"{len(strains.T)} gages" in job._repr_html_()
     with pytest.raises(StoppedError, match="no place is known yet"):
         job.execute(StopAfter(2))
     location = job.execute()

@@ -13,6 +13,7 @@ import numpy as np
 
 from fecm._errors import warn
 from fecm._options import documented, option
+from fecm._table import Table, html_table
 from fecm._typing import Floats
 from fecm._watch import SILENT, StoppedError, Watch
 from fecm.authoring.strike import strike_of
@@ -215,6 +216,14 @@ class IdentificationJob:
         return fit_deck(
             self.problem.deck, self.measurement, self._free, self._filter, self._law, count
         )
+
+    def __repr__(self) -> str:
+        return f"<fecm fit of {', '.join(self._free)} to {self.measurement.name}>"
+
+    def _repr_html_(self) -> str:
+        """Return a table of the title and the price, for notebooks."""
+        rows = (("title", self.problem.deck.title), ("price", str(self.price)))
+        return html_table(Table(rows, title=repr(self)[1:-1]))
 
 
 def identify(

@@ -11,6 +11,7 @@ import numpy as np
 
 from fecm._errors import FecmError, StudyError, warn
 from fecm._options import documented, with_parameters_of
+from fecm._table import Table, html_table
 from fecm._typing import Floats
 from fecm._watch import SILENT, StoppedError, Watch
 from fecm.deck.model import Gages, Nonlinear
@@ -182,6 +183,14 @@ class LocationJob(LocationOptions):
         cause = _find_cause(problem, table, self, searched) if is_doubtful(location) else None
         watch.advance(PARTS, PARTS)
         return judged(location, region, wide, cause)
+
+    def __repr__(self) -> str:
+        return f"<fecm location by {len(self._table.gages)} gages of {self._table.name}>"
+
+    def _repr_html_(self) -> str:
+        """Return a table of the title and the price, for notebooks."""
+        rows = (("title", self.problem.deck.title), ("price", str(self.price)))
+        return html_table(Table(rows, title=repr(self)[1:-1]))
 
 
 @with_parameters_of(LocationJob)

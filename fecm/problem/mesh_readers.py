@@ -7,6 +7,7 @@ Nastran: nodes and the elements CQUAD4, CQUADR, CTRIA3, CTRIAR, CQUAD8, CTRIA6. 
 converted from the systems of CP and GRDSET to the basic system. INCLUDE is followed. What a plate
 of fecm does not have, such as offsets, angles of elements and stiffeners, is refused. Bars without
 a property, as Gmsh writes lines, are groups of nodes named by the number of the property.
+This reader is our own: pyNastran 1.4 requires NumPy 1, and refuses these bars.
 """
 
 from __future__ import annotations
