@@ -5,6 +5,7 @@ from __future__ import annotations
 import gc
 import os
 import sys
+from collections import defaultdict
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -18,8 +19,23 @@ settings.register_profile("fecm", deadline=None)
 settings.load_profile("fecm")
 
 
+def beyond(cases: list[pytest.Item], count: int) -> list[pytest.Item]:
+    """All cases but so many, which lie at equal distances from the first to the last."""
+    step = (len(cases) - 1) / max(count - 1, 1)
+    kept = {int(n * step + 0.5) for n in range(count)}
+    return [case for n, case in enumerate(cases) if n not in kept]
+
+
+@pytest.hookimpl(tryfirst=True)  # before -m selects
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Skip what the system can't do."""
+    """Leave most cases of a family to the long run, and skip what the system can't do."""
+    families: dict[tuple[str, int], list[pytest.Item]] = defaultdict(list)
+    for item in items:
+        if (few := item.get_closest_marker("few")) and not item.get_closest_marker("long"):
+            families[item.nodeid.partition("[")[0], *few.args].append(item)
+    for (_, count), family in families.items():
+        for item in beyond(family, count):
+            item.add_marker(pytest.mark.long)
     posix = hasattr(os, "fork")
     can = {"posix": posix, "links": posix, "linux": posix and sys.platform == "linux"}
     for item in items:
