@@ -64,17 +64,13 @@ def shown(pairs: list[Seen]) -> set[Any]:
     return names.union(*(rows_of(case, quantities) for _, case, quantities in pairs))
 
 
-def of_the_default_run() -> list[Seen]:
-    """A case of every break and a break of every row, and none that shows nothing of its own."""
-    kept = SEEN
-    for pair in reversed(SEEN):
-        others = [other for other in kept if other is not pair]
-        if shown([pair]) <= shown(others):
-            kept = others
-    return kept
-
-
-DEFAULT = of_the_default_run()
+# Cases that take from a quarter of a second to two seconds.
+SLOW = (
+    "curved-impact", "curved-panel", "cylindrical-bending", "infinite-plate", "large-mass",
+    "location", "preload", "rigid-target", "small-mass", "stretching-disc", "stretching-impact",
+)  # fmt: skip
+# By default each break is seen by its first quick case; a break that slow ones alone see is long.
+DEFAULT = list({pair[0]: pair for pair in reversed(SEEN) if pair[1] not in SLOW}.values())
 
 
 @pytest.mark.parametrize(
@@ -104,4 +100,4 @@ def test_broken_physics_is_seen(
 
 
 def test_every_row_that_can_be_wrong_has_a_break_that_it_sees() -> None:
-    assert shown(DEFAULT) == {*BREAKS, *ROWS}
+    assert shown(SEEN) == {*BREAKS, *ROWS}
