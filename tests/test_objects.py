@@ -80,10 +80,10 @@ SIDES = (100.0, 80.0)
              fecm.Plate.rectangle(columns="3*20,2*10", rows="4*20"), PLIES, MASS, LAW,
              energy=0.1, duration=1e-5, patch=None, every=5)),
         (["--fixture", "D7136", "--mesh", "8x6", "--layup", "[45/0/-45/90]3s", "--ply-thickness",
-          ".184", "--material", "AS4/8552"],
+          ".184", "--material", "AS4/8552", "--energy", "1"],
          lambda: fecm.impact(
              fecm.Plate.on_fixture("D7136", (8, 6)),
-             fecm.Laminate("[45/0/-45/90]3s", "AS4/8552", 0.184))),
+             fecm.Laminate("[45/0/-45/90]3s", "AS4/8552", 0.184), energy=1.0)),
         ([*SIZE, *PLY, *SI, *LAW_OPTION, *MASS_OPTION, *GO, "--support", "clamped",
           "--in-plane", "normal", "--nonlinear", "--preload", "-20,0.01kN/mm,3"],
          lambda: fecm.impact(
@@ -114,6 +114,7 @@ def test_the_command_line_and_python_make_the_same_deck(options: list[str], made
 
 
 @pytest.mark.parametrize(("support", "limit"), [("clamped", 0.005), ("simple", 0.005)])
+@pytest.mark.few(1)  # of 2, 0.4 s each
 def test_a_gmsh_circle_has_the_centre_stiffness_of_the_closed_form(
     support: str, limit: float
 ) -> None:
@@ -384,6 +385,7 @@ def test_a_plate_whose_groups_hold_nothing_is_warned_of() -> None:
         deck_on(imported(CIRCLE))
 
 
+@pytest.mark.long
 def test_the_patch_of_an_imported_mesh_lies_at_the_impact_point() -> None:
     plate = imported(CIRCLE, {"rim": "clamped"})
     deck = deck_on(plate, at=(3.0, 4.0), patch="auto")
