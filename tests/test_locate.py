@@ -88,6 +88,7 @@ def curved(deck: fecm.Deck) -> fecm.Deck:
     [("[45/0/-45/90]s", flat), ("[0/90/45/45]", flat), ("[0/90/45/45]", curved)],
     ids=["flat", "coupled", "curved"],
 )
+@pytest.mark.few(1)  # of 3, 0.1 s each
 def test_the_run_of_a_gage_gives_the_strains_of_an_impulse(
     layup: str, shape: Callable[[fecm.Deck], fecm.Deck]
 ) -> None:
@@ -120,6 +121,7 @@ def test_the_place_and_the_force_of_a_run_are_found() -> None:
     assert found.accepted
 
 
+@pytest.mark.long
 def test_an_impact_on_a_curved_panel_is_found() -> None:
     deck = curved(panel("[0/90/45/45]"))
     run = fecm.run_one(deck)
@@ -128,6 +130,7 @@ def test_an_impact_on_a_curved_panel_is_found() -> None:
     assert found.peak_force == pytest.approx(float(run.force.max()), rel=0.05)
 
 
+@pytest.mark.long
 def test_an_impact_beside_the_edge_is_found() -> None:
     place = (60.0, 6.0)
     deck, strains, peak = struck(at=place)
@@ -314,6 +317,7 @@ def test_the_95_percent_ellipse_covers_the_place_in_95_of_100(
     assert (ratio < 1.3).all()
 
 
+@pytest.mark.long
 def test_the_ellipse_encloses_its_share_of_a_normal_distribution() -> None:
     found = noisy()
     edge = found.ellipse(0.5) - [found.x, found.y]
@@ -324,6 +328,7 @@ def test_the_ellipse_encloses_its_share_of_a_normal_distribution() -> None:
         found.ellipse(1.0)
 
 
+@pytest.mark.long
 def test_the_noise_is_that_of_the_residual_unless_it_is_given() -> None:
     strains, noise = scatter(struck_on_a_point()[1], NOISE, seed=1)
     found = located(strains)
@@ -353,6 +358,7 @@ def test_the_energy_bound_follows_from_impulse_and_mass() -> None:
     assert noisy().energy_bound is None
 
 
+@pytest.mark.long
 def test_a_force_that_has_not_ended_is_said_to_be_open() -> None:
     early = TIME < 1.2e-4
     deck, strains, _ = struck_on_a_point()
@@ -383,6 +389,7 @@ def test_hats_are_narrowed_where_the_strains_show_it_and_a_given_width_is_kept()
 # What may be fitted besides -----------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_record_that_begins_after_the_impact_is_located_with_a_shift() -> None:
     late = 10  # points
     deck, clean, _ = struck_on_a_point()
@@ -433,6 +440,7 @@ def test_fine_samples_give_the_place_of_coarse_ones() -> None:
     assert deviations(rough, STRUCK) < 4.0
 
 
+@pytest.mark.long
 def test_unequal_times_give_the_place_of_equal_ones() -> None:
     deck, run = struck_on_a_point()[0], run_of(radius=SMALL)
     time = np.sort(np.random.default_rng(4).uniform(2e-6, TIME[-1], 150))
@@ -441,6 +449,7 @@ def test_unequal_times_give_the_place_of_equal_ones() -> None:
     assert distance(found, STRUCK) < 0.1
 
 
+@pytest.mark.long
 def test_a_plate_without_patch_projectile_and_program_is_enough() -> None:
     deck = struck()[0]
     unused = (model.Impact, model.Indentation, model.Projectile, model.Patch)
@@ -453,6 +462,7 @@ def test_a_plate_without_patch_projectile_and_program_is_enough() -> None:
 # Doubts -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.long
 def test_a_wrong_plate_does_not_describe_the_strains() -> None:
     plate, clean, _ = struck_on_a_point()
     deck = plate.with_(e1=2.0 * 135000.0)
@@ -489,6 +499,7 @@ def wrong(strains: Floats, name: str) -> Floats:
         ("zero", "gage 3 less"),
     ],
 )
+@pytest.mark.few(2)  # of 10, 1 s each
 def test_a_mistake_of_the_measurement_is_named(name: str, words: str, given: bool) -> None:
     strains, noise = scatter(struck_on_a_point()[1], NOISE, seed=1)
     options: dict[str, object] = {"noise": noise} if given else {}
@@ -499,6 +510,7 @@ def test_a_mistake_of_the_measurement_is_named(name: str, words: str, given: boo
 
 
 @pytest.mark.parametrize("gage", [1, pytest.param(2, marks=pytest.mark.long)])
+@pytest.mark.long
 def test_a_gain_of_1_3_that_the_noise_nearly_hides_is_named_with_its_gage(gage: int) -> None:
     # A gain of one gage explains a part of what the gain of another one does.
     early = slice(0, 200)
@@ -525,6 +537,7 @@ def test_right_strains_have_no_likely_mistake_and_are_accepted() -> None:
     assert found.misfit < 1.0 + 3.0 / np.sqrt(2.0 * strains.size) + 0.05
 
 
+@pytest.mark.long
 def test_strains_of_a_late_trigger_are_named_as_late() -> None:
     late = 10  # points
     strains, _ = scatter(struck_on_a_point()[1], NOISE, seed=2)
@@ -536,6 +549,7 @@ def test_strains_of_a_late_trigger_are_named_as_late() -> None:
     assert "--shift" in cause
 
 
+@pytest.mark.long
 def test_a_misfit_that_noise_does_not_explain_is_said_and_widens_the_errors() -> None:
     # The noise is a quarter above what was said of it.
     strains, noise = scatter(struck_on_a_point()[1], NOISE, seed=1)
@@ -553,12 +567,14 @@ def test_a_misfit_that_noise_does_not_explain_is_said_and_widens_the_errors() ->
     assert not large.accepted
 
 
+@pytest.mark.long
 def test_strains_at_which_plies_fail_are_not_accepted() -> None:
     found = located(struck_on_a_point()[1] * (0.02 / np.abs(struck_on_a_point()[1]).max()))
     assert not found.accepted
     assert any("the largest strain is 2 %, at which plies fail" in note for note in found.notes)
 
 
+@pytest.mark.long
 def test_a_place_outside_the_region_is_doubted() -> None:
     found = located(struck_on_a_point()[1], region=(20.0, 30.0, 50.0, 60.0), grid=15.0)
     assert not found.accepted
@@ -596,6 +612,7 @@ def test_gages_on_an_axis_of_symmetry_are_refused_with_both_places() -> None:
         ("[0/90]2s", [(20.0, 41.0, 0.72, 0.0), (75.0, 40.0, 0.72, 0.0)]),
     ],
 )
+@pytest.mark.few(1)  # of 3, 1 s each
 def test_gages_that_tell_the_sides_apart_are_accepted(
     layup: str, places: list[tuple[float, float, float, float]]
 ) -> None:

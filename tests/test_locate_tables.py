@@ -84,12 +84,14 @@ def test_columns_of_a_file_are_matched_by_the_numbers_of_gages(
     assert np.array_equal(read.strains, strains()[:, order].T)
 
 
+@pytest.mark.long
 def test_the_order_of_columns_leaves_the_place_where_it_is(tmp_path: Path) -> None:
     read = located(written(tmp_path, "time (s),gage 3,gage 1,gage 2", strains()[:, [2, 0, 1]]))
     assert read.gages.tolist() == [3, 1, 2]
     assert (read.x, read.y) == pytest.approx((found().x, found().y), abs=1e-6)
 
 
+@pytest.mark.long
 def test_some_of_the_gages_are_enough() -> None:
     table = {"time": TIME, "gage 3": strains()[:, 2], "gage 1": strains()[:, 0]}
     read = located(table, basis=None)  # the widths are searched for, too
@@ -326,6 +328,7 @@ def test_the_command_prints_what_python_finds(folder: Path) -> None:
     assert fecm.load_location(folder / "located.h5").mass == 2e-6
 
 
+@pytest.mark.long
 def test_the_exit_status_is_1_if_the_place_is_in_doubt(folder: Path) -> None:
     done = call(
         "locate", "panel.inp", "strains.csv", "--region", "20,30,50,60", *WIDTHS, cwd=folder

@@ -138,6 +138,7 @@ def test_the_outline_has_the_sides_of_the_plate_and_none_inside() -> None:
     }
 
 
+@pytest.mark.long
 def test_of_many_gages_twelve_are_drawn_and_a_note_says_so() -> None:
     count = 14
     cards = "".join(f"{n}, {0.1 * n:.1f}, 0.5, .053, 0.\n" for n in range(1, count + 1))
@@ -163,6 +164,7 @@ def test_kinds_of_runs_and_of_locations_do_not_show_each_other() -> None:
         draw("location", {"it": run(small())})
 
 
+@pytest.mark.long
 def test_the_command_draws_the_file_as_the_method_draws_the_location(tmp_path: Path) -> None:
     found = located()
     found.save(tmp_path / "located.h5")
